@@ -119,9 +119,7 @@ def _to_dataset(recording: Recording) -> xr.Dataset:
     attributes = {name: getattr(recording, name) for name in _SCALARS}
     attributes["excitation"] = json.dumps(dict(recording.excitation))
     attributes["warnings"] = json.dumps(list(recording.warnings))
-    return xr.Dataset(
-        variables, coords={"time_s": ("time_s", recording.time_s, {"units": "s"})}, attrs=attributes
-    )
+    return xr.Dataset(variables, coords={"time_s": ("time_s", recording.time_s, {"units": "s"})}, attrs=attributes)
 
 
 def _from_dataset(name: str, dataset: xr.Dataset) -> Recording:

@@ -42,9 +42,7 @@ class ConduitPath:
         if (length <= 0).any():
             raise ValueError(f"every piece of a conduit has a positive length; got {length.min()} m")
         if (bend < 0).any():
-            raise ValueError(
-                f"bend angles are counted positive whichever way they turn; got {bend.min()} rad"
-            )
+            raise ValueError(f"bend angles are counted positive whichever way they turn; got {bend.min()} rad")
         object.__setattr__(self, "piece_length_m", length)
         object.__setattr__(self, "piece_bend_rad", bend)
 
