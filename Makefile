@@ -19,12 +19,17 @@ $(VENV)/.ready: requirements.lock pyproject.toml
 	@touch $@
 
 results: $(VENV)/.ready  ## regenerate every figure, table and the report from data/raw
-	$(BIN)/ccmodel run --cores $(CORES)
+	$(BIN)/snakemake --cores $(CORES)
+	@$(BIN)/ccmodel left-out results
+	@echo "The report is results/index.html"
 
 real: $(VENV)/.ready  ## run the pipeline on the public da Vinci recordings: make real DATA=path
 	@test -n "$(DATA)" || { echo "make real needs DATA=path of the mis-tool-characterization data" >&2; exit 2; }
+	@rm -rf results/real/raw  # made here; what an earlier DATA left must not stay among the batches
 	$(BIN)/ccmodel import-mis-tool "$(DATA)" --out results/real/raw
-	$(BIN)/ccmodel run --config config/real.yaml --cores $(CORES)
+	$(BIN)/snakemake --cores $(CORES) --configfile config/real.yaml
+	@$(BIN)/ccmodel left-out results/real
+	@echo "The report is results/real/index.html"
 
 data: $(VENV)/.ready  ## record data/raw again with the virtual rig
 	$(BIN)/virtualrig record config/virtual-rig.yaml --out data/raw

@@ -6,10 +6,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import netCDF4
+import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ccmodel.model.geometry import ConduitPath
+from ccmodel.geometry import ConduitPath
 
 # Channel names carry their unit; T1..T4 are the cable-end tensions of the paper (A: 1 drive, 2 load; B: 3, 4).
 ANGLES = ("theta_in_rad", "theta_out_rad")
@@ -17,6 +18,13 @@ TORQUES = ("tau_in_Nm", "tau_out_Nm")
 SUMS = ("F_drive_N", "F_load_N")
 TENSIONS = ("T1_N", "T2_N", "T3_N", "T4_N")
 CHANNELS = ANGLES + TORQUES + SUMS + TENSIONS
+
+# How figures and pages call each origin: nothing may leave a reader in doubt about where its numbers come from.
+ORIGIN = {
+    "rig": "recording (measured)",
+    "virtual-rig": "recording (virtual rig, simulated)",
+    "model": "model",
+}
 
 
 @dataclass(frozen=True)
@@ -76,8 +84,12 @@ class Recording:
     def __contains__(self, channel: str) -> bool:
         return channel in self.channels
 
-    def __getitem__(self, channel: str) -> NDArray:
-        return self.channels[channel]
+    def __getitem__(self, wanted: str | slice):
+        """A channel by its name, or some of the samples of all channels by a slice."""
+        if isinstance(wanted, str):
+            return self.channels[wanted]
+        channels = {name: values[wanted] for name, values in self.channels.items()}
+        return replace(self, time_s=self.time_s[wanted], channels=channels)
 
     def with_channels(self, channels: Mapping[str, NDArray], derived_from: Mapping[str, str], origin: str):
         """The same run with other channels: what a model says of it, or a part of what was measured."""
@@ -88,6 +100,11 @@ class Recording:
             origin=origin,
             accuracy=self.accuracy if origin == self.origin else {},
         )
+
+
+def stride(recording: Recording, step_s: float | None) -> int:
+    """Samples to step over for one every `step_s` seconds, as near as the recording's own step allows; 1 for None."""
+    return 1 if step_s is None else max(1, round(step_s / float(np.median(np.diff(recording.time_s)))))
 
 
 def write_recordings(path: Path, recordings: list[Recording], provenance: Mapping[str, str]) -> None:
@@ -110,7 +127,7 @@ _SCALARS = ("batch", "origin", "pretension_N", "rest_s", "settled_s")
 def _to_dataset(recording: Recording) -> xr.Dataset:
     variables = {}
     for name, values in recording.channels.items():
-        attributes = {"units": _unit(name), "derived_from": recording.derived_from.get(name, "")}
+        attributes = {"units": unit_of(name), "derived_from": recording.derived_from.get(name, "")}
         if name in recording.accuracy:
             attributes["accuracy"] = recording.accuracy[name]
         variables[name] = ("time_s", values, attributes)
@@ -139,5 +156,6 @@ def _from_dataset(name: str, dataset: xr.Dataset) -> Recording:
     )
 
 
-def _unit(channel: str) -> str:
+def unit_of(channel: str) -> str:
+    """The unit that a channel's name ends in, as it is printed."""
     return {"rad": "rad", "Nm": "N m", "N": "N"}[channel.rsplit("_", 1)[1]]

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ccmodel.model.geometry import ConduitPath
+from ccmodel.geometry import ConduitPath
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,81 @@
+"""The command line: the pipeline's functions from a shell."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from ccmodel.typed import InputError
+
+app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+_err = Console(stderr=True, soft_wrap=True, highlight=False)
+
+Folder = Annotated[Path, typer.Argument(exists=True, file_okay=False)]
+
+
+@app.command()
+def check(batch: Folder) -> None:
+    """Read a batch folder and say what is wrong with it; exits 1 where something cannot be used."""
+    from ccmodel.rig.ingest import ingest_batch
+
+    ingested = ingest_batch(batch)
+    for recording in ingested.recordings:
+        typer.echo(f"{recording.id}: {recording.time_s.size} samples, {', '.join(recording.channels)}")
+    for finding in ingested.findings:
+        _say(str(finding), finding.severity)
+    if any(f.severity == "refused" for f in ingested.findings):
+        raise typer.Exit(1)
+
+
+@app.command("import-mis-tool")
+def import_mis_tool(
+    source: Folder, out: Annotated[Path, typer.Option(help="Folder that gets a batch folder a tool and wrist angle.")]
+) -> None:
+    """Turn the public da Vinci instrument recordings below SOURCE into batches."""
+    from ccmodel.rig import mis_tool
+
+    imported = mis_tool.import_mis_tool(source, out)
+    for batch in imported.batches:
+        typer.echo(str(batch))
+    for finding in imported.findings:
+        _say(str(finding), finding.severity)
+
+
+@app.command("left-out")
+def left_out(results: Folder) -> None:
+    """Say what the last run left out and warned of; exits 1 where something was left out."""
+    from ccmodel.stages import left_out
+
+    lines, warnings = left_out(results)
+    for line in warnings:
+        _say(line, "warning")
+    for line in lines:
+        _say(line, "refused")
+    if lines:
+        raise typer.Exit(1)
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON schema of the configuration."""
+    from ccmodel.config import Config
+
+    typer.echo(json.dumps(Config.model_json_schema(), indent=1))
+
+
+def _say(line: str, severity: str) -> None:
+    style = {"warning": "yellow", "refused": "red"}[severity]
+    _err.print(f"[{style}]{'warning' if severity == 'warning' else 'left out'}[/]: ", end="")
+    _err.print(line, markup=False)
+
+
+def main() -> None:
+    """Entry point: what a user gave wrong is one line each and exit code 2, not a trace."""
+    try:
+        app()
+    except InputError as error:
+        _err.print(str(error), markup=False)
+        sys.exit(2)

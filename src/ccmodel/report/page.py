@@ -1,0 +1,93 @@
+"""The page of a run: figures, error tables, fits, and what was left out."""
+
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from jinja2 import Environment, StrictUndefined
+
+from ccmodel.config import Config, Study
+from ccmodel.recording import CHANNELS, ORIGIN
+
+SYMBOL = {
+    "theta_in_rad": "θ_in",
+    "theta_out_rad": "θ_out",
+    "tau_in_Nm": "τ_in",
+    "tau_out_Nm": "τ_out",
+    "F_drive_N": "F_drive",
+    "F_load_N": "F_load",
+    "T1_N": "T1",
+    "T2_N": "T2",
+    "T3_N": "T3",
+    "T4_N": "T4",
+}
+# Table I of the paper: its fitted model against its half-loop experiment.
+PAPER_TABLE_I = {"theta_out_rad": 3.7, "tau_in_Nm": 19.4, "tau_out_Nm": 3.7, "T1_N": 12.8, "T2_N": 4.1, "T3_N": 9.9,
+                 "T4_N": 5.5}  # fmt: skip
+
+
+def write_page(
+    file: Path, config: Config, studies: dict[str, Study], batches: Sequence[dict], errors: pd.DataFrame,
+    fits: Sequence[dict], left_out: Sequence[str], warnings: Sequence[str],
+) -> None:  # fmt: skip
+    """Write the page; figures are looked for in `figures/` beside it.
+
+    Parameters
+    ----------
+    file : Path
+    config : Config
+    studies : dict of str to Study
+        By figure name.
+    batches : sequence of dict
+        What ingest said of each batch.
+    errors : DataFrame
+        All errors, with the columns of `ccmodel.compare.errors.COLUMNS`.
+    fits : sequence of dict
+    left_out, warnings : sequence of str
+    """
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    template = environment.from_string(files("ccmodel.report").joinpath("page.html.j2").read_text())
+    channels = [c for c in CHANNELS if c in set(errors["channel"])]
+    file.write_text(
+        template.render(
+            origins=sorted({ORIGIN[o] for o in errors["origin"]}),
+            recordings=sum(len(b["recordings"]) for b in batches),
+            batches=batches,
+            studies={n: (s, config.parameters_of(s)) for n, s in studies.items()},
+            symbols=[SYMBOL[c] for c in channels],
+            summary=_summary(errors, channels),
+            paper=[PAPER_TABLE_I.get(c) for c in channels],
+            rows=_rows(errors),
+            fits=fits,
+            left_out=left_out,
+            warnings=warnings,
+        )
+    )
+
+
+def _summary(errors: pd.DataFrame, channels: list[str]) -> list[dict]:
+    """A row a batch and parameter set: the mean over its recordings of each channel's normalised error, %."""
+    if errors.empty:
+        return []
+    table = errors.pivot_table("nrmse_percent", ["batch", "parameters"], "channel", aggfunc="mean", observed=True)
+    counts = errors.groupby(["batch", "parameters"])["recording"].nunique()
+    return [
+        {
+            "batch": batch,
+            "parameters": parameters,
+            "count": int(counts[batch, parameters]),
+            "values": [_or_none(row.get(c, np.nan)) for c in channels],
+        }
+        for (batch, parameters), row in table.iterrows()
+    ]
+
+
+def _rows(errors: pd.DataFrame) -> list[dict]:
+    rows = errors.to_dict("records")
+    return [r | {"symbol": SYMBOL[r["channel"]], "nrmse_percent": _or_none(r["nrmse_percent"])} for r in rows]
+
+
+def _or_none(value: float) -> float | None:
+    return None if np.isnan(value) else float(value)

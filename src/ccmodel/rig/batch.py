@@ -1,0 +1,206 @@
+"""`batch.yaml`: what a batch of recordings is, format 1.
+
+The format stands in `docs/rig-log-format.md`. Beyond what it began with, it has grown by keys that are all optional,
+so that a batch written before them keeps its meaning:
+
+- `torque_sensor: {Nm_per_count, zero_counts}` on a side whose log carries `drive_torque_counts` or
+  `load_torque_counts`; where a log has such a column and a current, the sensor is used, for it measures what the
+  current only stands for.
+- `encoder_accuracy_rad` on a side whose encoder is not as good as `accuracy.encoder_rad` says.
+- `encoder_sign`, `torque_sign` (+1 or -1) on a side whose sensors count against the signs of the model.
+- `settled_s` on a recording that begins with a start-up transient.
+- `ranges` on the rig: what a sensor can read at most, by log column, for finding saturation.
+- `load_cell`, `torque_constant_Nm_per_A` and the accuracies of what a rig has not may be left out.
+- `note` on the batch or on a recording: free, read by people only.
+"""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from ccmodel.geometry import ConduitPath
+from ccmodel.typed import InputError, NotNegative, Positive, Problem, TypedModel, load_yaml_model
+
+REQUIRED_COLUMNS = ("time_s", "drive_encoder_counts")
+SENSOR_COLUMNS = (
+    "load_encoder_counts",
+    "drive_current_A",
+    "load_current_A",
+    "drive_torque_counts",
+    "load_torque_counts",
+    "drive_load_cell_V",
+    "load_load_cell_V",
+)
+COLUMNS = REQUIRED_COLUMNS + SENSOR_COLUMNS
+
+# Names become folders, files and groups of a netCDF file.
+Name = Annotated[str, Field(min_length=1)]
+Sign = Literal[1, -1]
+
+
+def _checked_name(name: str) -> str:
+    if not all(c.isalnum() or c in "-_.+=,@" for c in name) or not (name[0].isalnum() or name[0] == "_"):
+        raise ValueError("a name is letters, digits and -_.+=,@ only and begins with a letter or digit")
+    return name
+
+
+class LoadCell(TypedModel):
+    """A load cell between slide and conduit plate: force = (V - zero_V) / sensitivity_V_per_N, in N."""
+
+    sensitivity_V_per_N: Positive
+    zero_V: float
+
+
+class TorqueSensor(TypedModel):
+    """A torque sensor that is logged in counts: torque = (counts - zero_counts) * Nm_per_count, in N m."""
+
+    Nm_per_count: Positive
+    zero_counts: float = 0.0
+
+
+class Side(TypedModel):
+    """Pulley and sensors at one end."""
+
+    pulley_radius_m: Positive
+    encoder_counts_per_rev: Positive
+    encoder_sign: Sign = 1
+    encoder_accuracy_rad: Positive | None = None
+    torque_constant_Nm_per_A: Positive | None = None
+    torque_sensor: TorqueSensor | None = None
+    torque_sign: Sign = 1
+    load_cell: LoadCell | None = None
+
+
+class LoadSide(Side):
+    """The load end; without a spring the load is whatever was measured at the load pulley."""
+
+    spring_stiffness_Nm_per_rad: Positive | None = None
+
+
+class Cable(TypedModel):
+    """Estimates made beforehand; the stiffness is that of `length_m` of cable, so EA is their product."""
+
+    stiffness_N_per_m: Positive
+    length_m: Positive
+    friction_coefficient: NotNegative
+
+
+class Accuracy(TypedModel):
+    """What the sensors are good to, in SI units; left out for a sensor that the rig has not."""
+
+    encoder_rad: Positive
+    torque_Nm: Positive | None = None
+    load_cell_N: Positive | None = None
+
+
+class Rig(TypedModel):
+    """The rig: both ends, the cable, the sensors' accuracy and, by log column, their ranges."""
+
+    drive: Side
+    load: LoadSide
+    cable: Cable
+    accuracy: Accuracy
+    ranges: dict[Literal[SENSOR_COLUMNS], tuple[float, float]] = Field(default_factory=dict)
+
+    @field_validator("ranges")
+    @classmethod
+    def _ranges_rise(cls, ranges):
+        for column, (low, high) in ranges.items():
+            if low >= high:
+                raise ValueError(f"{column}: a range is [lowest, highest], found [{low}, {high}]")
+        return ranges
+
+    @model_validator(mode="after")
+    def _accuracy_of_every_sensor(self):
+        for side in (self.drive, self.load):
+            if (side.torque_constant_Nm_per_A or side.torque_sensor) and self.accuracy.torque_Nm is None:
+                raise ValueError("accuracy.torque_Nm is missing though the rig measures torque")
+            if side.load_cell and self.accuracy.load_cell_N is None:
+                raise ValueError("accuracy.load_cell_N is missing though the rig has load cells")
+        return self
+
+
+class Piece(TypedModel):
+    """A piece of the conduit's path of constant curvature."""
+
+    length_m: Positive
+    bend_rad: NotNegative
+
+
+class RecordingEntry(TypedModel):
+    """One recording: its log, and under what conditions it was made."""
+
+    id: Name
+    file: Name
+    pretension_N: Positive
+    conduit: Annotated[tuple[Piece, ...], Field(min_length=1)]
+    excitation: dict[str, Any] = Field(default_factory=dict)
+    settled_s: NotNegative = 0.0
+    note: Any = None
+
+    _safe_id = field_validator("id")(_checked_name)
+
+    @field_validator("file")
+    @classmethod
+    def _file_inside_the_batch(cls, file: str) -> str:
+        if Path(file).is_absolute() or ".." in Path(file).parts:
+            raise ValueError("a log lies inside its batch's folder: give its path from there")
+        return file
+
+    @property
+    def path(self) -> ConduitPath:
+        """The conduit's path."""
+        return ConduitPath([p.length_m for p in self.conduit], [p.bend_rad for p in self.conduit])
+
+
+class Batch(TypedModel):
+    """A whole `batch.yaml`."""
+
+    format: Literal[1]
+    batch: Name
+    origin: Literal["rig", "virtual-rig"]
+    note: Any = None
+    rig: Rig
+    recordings: Annotated[tuple[RecordingEntry, ...], Field(min_length=1)]
+
+    _safe_name = field_validator("batch")(_checked_name)
+
+    @field_validator("recordings")
+    @classmethod
+    def _each_once(cls, recordings):
+        for key in ("id", "file"):
+            values = [getattr(r, key) for r in recordings]
+            twice = sorted({v for v in values if values.count(v) > 1})
+            if twice:
+                raise ValueError(f"{key} '{twice[0]}' is given to {values.count(twice[0])} recordings")
+        return recordings
+
+
+def load_batch(folder: Path) -> Batch:
+    """Read the `batch.yaml` of a batch.
+
+    Parameters
+    ----------
+    folder : Path
+        The batch's folder, anywhere on disk.
+
+    Returns
+    -------
+    Batch
+        Its content.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or does not follow the format, or names another batch than its folder.
+    """
+    path = Path(folder) / "batch.yaml"
+    batch = load_yaml_model(path, Batch)
+    folder_name = Path(folder).resolve().name
+    if batch.batch != folder_name:
+        problem = Problem(
+            str(path), None, f"batch: must be the folder's name, '{folder_name}', found '{batch.batch}': rename either"
+        )
+        raise InputError(str(problem), [problem])
+    return batch

@@ -1,0 +1,108 @@
+"""Ingest: a batch's folder -> its recordings, and what was found wrong with it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ccmodel.recording import Recording
+from ccmodel.rig.batch import SENSOR_COLUMNS, Batch, RecordingEntry, load_batch
+from ccmodel.rig.calibration import calibrate
+from ccmodel.rig.checks import check_sensors
+from ccmodel.rig.findings import LIMITS, Finding, Limits
+from ccmodel.rig.logs import Log, read_log
+from ccmodel.typed import InputError
+
+
+@dataclass(frozen=True)
+class Ingested:
+    """A batch that was read.
+
+    Attributes
+    ----------
+    recordings : list of Recording
+        Those that can be used, in the batch's order.
+    findings : list of Finding
+        Everything found wrong, a line each; a recording that is refused has exactly one.
+    batch : Batch or None
+        What `batch.yaml` says: radii, spring, estimates of the cable. None if the batch is refused as a whole.
+    """
+
+    recordings: list[Recording]
+    findings: list[Finding]
+    batch: Batch | None = None
+
+
+def ingest_batch(folder: Path, limits: Limits = LIMITS) -> Ingested:
+    """Read a batch of rig logs.
+
+    Parameters
+    ----------
+    folder : Path
+        The batch's folder with its `batch.yaml` and logs, anywhere on disk; it is not changed.
+    limits : Limits
+        How much may be wrong with a log that is still used.
+
+    Returns
+    -------
+    Ingested
+        Recordings, findings and the batch's description. Bad data never raise: they are findings.
+    """
+    folder = Path(folder)
+    try:
+        batch = load_batch(folder)
+    except InputError as error:
+        name = folder.resolve().name
+        return Ingested([], [Finding(name, p.file, p.line, None, "refused", p.text) for p in error.problems])
+    logs = [read_log(folder / entry.file, batch.batch, limits) for entry in batch.recordings]
+    known_by_all = {c for log in logs for c in log.columns}
+    recordings, findings = [], []
+    for entry, log in zip(batch.recordings, logs, strict=True):
+        recording, found = _recording(folder, batch, entry, log, known_by_all, limits)
+        findings += found
+        if recording is not None:
+            recordings.append(recording)
+    return Ingested(recordings, findings, batch)
+
+
+def _recording(
+    folder: Path, batch: Batch, entry: RecordingEntry, log: Log, columns_of_batch: set[str], limits: Limits
+) -> tuple[Recording | None, list[Finding]]:
+    file = str(folder / entry.file)
+
+    def finding(row, column, severity, text):
+        return Finding(batch.batch, file, row, column, severity, text)
+
+    if log.table is None:
+        return None, log.findings
+    lost = [c for c in SENSOR_COLUMNS if c in columns_of_batch and c not in log.columns]
+    if lost:
+        text = f"column missing though other logs of the batch have it: {', '.join(lost)}"
+        return None, [finding(1, lost[0], "refused", text)]
+    table, found = check_sensors(log.table, batch.rig, batch.batch, file, limits)
+    if table is None:
+        return None, found
+    last = table["time_s"].iloc[-1]
+    if entry.settled_s >= last:
+        text = f"ends at {last:g} s, before settled_s {entry.settled_s:g} s of batch.yaml: nothing left to judge"
+        return None, [finding(None, None, "refused", text)]
+    calibrated = calibrate(table, batch.rig, limits)
+    found = log.findings + found
+    found += [
+        finding(None, column, "warning", f"not used: batch.yaml has no {key} to make sense of it")
+        for column, key in calibrated.missing.items()
+    ]
+    recording = Recording(
+        batch=batch.batch,
+        id=entry.id,
+        origin=batch.origin,
+        time_s=table["time_s"].to_numpy(),
+        channels=calibrated.channels,
+        derived_from=calibrated.derived_from,
+        pretension_N=entry.pretension_N,
+        path=entry.path,
+        accuracy=calibrated.accuracy,
+        excitation=entry.excitation,
+        rest_s=calibrated.rest_s,
+        settled_s=entry.settled_s,
+        warnings=tuple(str(f) for f in found),
+    )
+    return recording, found

@@ -1,0 +1,248 @@
+"""Typed YAML files: what every file of settings or of descriptions in this project shares.
+
+A model derives from `TypedModel`; `load_yaml_model` reads a file into it or raises `InputError`, whose text is made
+for the person who wrote the file: one line a problem, with the file, the line in it, the key, what was found and
+what to do.
+"""
+
+import difflib
+import json
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import UnionType
+from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+M = TypeVar("M", bound=BaseModel)
+
+
+class TypedModel(BaseModel):
+    """Base of every typed file: frozen, no key beyond those named, no silent conversions, no NaN or infinity."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing wrong with a file.
+
+    Attributes
+    ----------
+    file : str
+        The file.
+    line : int or None
+        Line in it, counted from 1; None where the file could not be read at all.
+    text : str
+        What is wrong, in one line.
+    """
+
+    file: str
+    line: int | None
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.file}: {self.text}" if self.line is None else f"{self.file}, line {self.line}: {self.text}"
+
+
+class InputError(Exception):
+    """Something a user gave cannot be used; the text says what, where and what to do.
+
+    Parameters
+    ----------
+    message : str
+        Text for a person, one line a problem.
+    problems : sequence of Problem
+        The same, taken apart, where a file was read.
+    """
+
+    def __init__(self, message: str, problems: Sequence[Problem] = ()):
+        super().__init__(message)
+        self.problems = tuple(problems)
+
+
+def load_yaml_model(path: Path, model: type[M]) -> M:
+    """Read a YAML file into a typed model.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    model : type
+        What it must hold.
+
+    Returns
+    -------
+    model
+        The file's content.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, no YAML, gives a key twice or does not fit the model: every problem in a line.
+    """
+    node, data = _read_yaml(Path(path))
+    try:
+        # JSON mode: lists may become tuples and text paths or choices, while numbers stay strict.
+        return model.model_validate_json(json.dumps(data, default=str))
+    except ValidationError as error:
+        problems = [Problem(str(path), _line_of(node, loc), text) for loc, text in _explain(error, model)]
+        raise _input_error(problems) from error
+
+
+def nearest(name: str, known: Iterable[str], cutoff: float = 0.75) -> str | None:
+    """Name among `known` that `name` is most likely a misspelling of; None if none is as like it as `cutoff`."""
+    by_lower = {k.lower(): k for k in known}
+    matches = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=cutoff)
+    return by_lower[matches[0]] if matches else None
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML as people write it: 5e4 is a number, and a key given twice is a mistake."""
+
+    def construct_mapping(self, node, deep=False):
+        seen = set()
+        for key, _ in node.value:
+            if key.value in seen and key.tag != "tag:yaml.org,2002:merge":
+                raise yaml.MarkedYAMLError(
+                    problem=f"key '{key.value}' is given twice: remove one", problem_mark=key.start_mark
+                )
+            seen.add(key.value)
+        return super().construct_mapping(node, deep)
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$"), list("-+.0123456789")
+)
+
+
+def _read_yaml(path: Path) -> tuple[yaml.Node, Any]:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise _input_error([Problem(str(path), None, "there is no such file")]) from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise _input_error([Problem(str(path), None, f"cannot be read as text ({error})")]) from error
+    try:
+        loader = _Loader(text)
+        node = loader.get_single_node()
+        data = loader.construct_document(node) if node is not None else None
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        what = error.problem or "it cannot be understood"
+        advice = "" if "given twice" in what else "not valid YAML: "
+        raise _input_error([Problem(str(path), mark.line + 1 if mark else None, advice + what)]) from error
+    except yaml.YAMLError as error:
+        raise _input_error([Problem(str(path), None, "not valid YAML: " + " ".join(str(error).split()))]) from error
+    if not isinstance(data, dict):
+        found = "nothing" if data is None else f"a {type(data).__name__}"
+        raise _input_error([Problem(str(path), None, f"must hold keys and values, found {found}")])
+    return node, data
+
+
+def _input_error(problems: list[Problem]) -> InputError:
+    return InputError("\n".join(map(str, problems)), problems)
+
+
+_EXPECTED = {
+    "float_type": "must be a number",
+    "int_type": "must be a whole number",
+    "string_type": "must be text (put it in quotes)",
+    "bool_type": "must be true or false",
+    "list_type": "must be a list",
+    "tuple_type": "must be a list",
+    "dict_type": "must hold keys and values",
+    "model_type": "must hold keys and values",
+    "finite_number": "must be finite",
+    "greater_than": "must be above {gt}",
+    "greater_than_equal": "must be at least {ge}",
+    "less_than": "must be below {lt}",
+    "less_than_equal": "must be at most {le}",
+    "literal_error": "must be {expected}",
+    "too_short": "needs at least {min_length} entries, has {actual_length}",
+    "too_long": "takes at most {max_length} entries, has {actual_length}",
+}
+
+
+def _explain(error: ValidationError, model: type[BaseModel]) -> list[tuple[tuple, str]]:
+    """Where and what, for every problem; a misspelt key is one problem, not also a missing key."""
+    explained, meant = [], set()
+    errors = error.errors(include_url=False)
+    for e in errors:
+        if _is_unknown_key(e):
+            *parent, key = (p for p in e["loc"] if p != "[key]")
+            known = _keys_at(model, parent)
+            guess = nearest(str(key), known)
+            meant.add((*parent, guess))
+            advice = f"did you mean '{guess}'?" if guess else f"known keys are {', '.join(known)}"
+            explained.append(((*parent, key), f"unknown key '{key}' {_inside(parent)}; {advice}"))
+    for e in errors:
+        if e["type"] == "missing" and e["loc"] not in meant:
+            explained.append((e["loc"], f"key '{e['loc'][-1]}' is missing {_inside(e['loc'][:-1])}"))
+        elif e["type"] != "missing" and not _is_unknown_key(e):
+            explained.append((e["loc"], _wrong_value(e)))
+    return explained
+
+
+def _is_unknown_key(e: dict) -> bool:
+    return e["type"] == "extra_forbidden" or e["loc"][-1:] == ("[key]",)
+
+
+def _wrong_value(e: dict) -> str:
+    context = e.get("ctx", {})
+    template = "{error}" if e["type"] == "value_error" else _EXPECTED.get(e["type"], e["msg"])
+    text = template.format(**context)
+    key = _dotted(e["loc"])
+    found = "" if isinstance(e["input"], dict | list) else f", found {e['input']!r}"
+    return f"{key}: {text}{found}" if key else f"{text}{found}"
+
+
+def _dotted(loc: Sequence) -> str:
+    """The place of a key as people write it: recordings[2].pretension_N."""
+    return "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in loc).lstrip(".")
+
+
+def _inside(loc: Sequence) -> str:
+    return f"in {_dotted(loc)}" if loc else "at the top level"
+
+
+def _keys_at(annotation: Any, loc: Sequence) -> list[str]:
+    """Keys that the model at `loc` knows, seen from a type: a model, a list or mapping of models, or a choice."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        if not loc:
+            return list(annotation.model_fields)
+        field = annotation.model_fields.get(str(loc[0]))
+        return _keys_at(field.annotation, loc[1:]) if field else []
+    origin, args = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        return _keys_at(args[0], loc)
+    if origin in (list, tuple) and loc:
+        return _keys_at(args[0], loc[1:])
+    if origin is dict:
+        return _keys_at(args[1], loc[1:]) if loc else list(get_args(args[0]))
+    if origin in (Union, UnionType):
+        # The place of a problem inside a choice may begin with the name of the member that was tried.
+        found = [_keys_at(a, rest) for a in args for rest in (loc, loc[1:])]
+        return next((keys for keys in found if keys), [])
+    return []
+
+
+def _line_of(node: yaml.Node, loc: Sequence) -> int:
+    """Line of the key at `loc`, or of the nearest thing around it that is there."""
+    line = node.start_mark.line + 1
+    for place in loc:
+        if isinstance(node, yaml.MappingNode):
+            pair = next(((k, v) for k, v in node.value if k.value == str(place)), None)
+        elif isinstance(node, yaml.SequenceNode) and isinstance(place, int):
+            pair = (node.value[place], node.value[place]) if place < len(node.value) else None
+        else:
+            pair = None
+        if pair is None:
+            break
+        line, node = pair[0].start_mark.line + 1, pair[1]
+    return line

@@ -1,0 +1,191 @@
+"""From a campaign's configuration to batches of raw logs on disk (format 1)."""
+
+import gzip
+import io
+import shutil
+import zlib
+from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import yaml
+from numpy.random import Generator, SeedSequence
+from numpy.typing import NDArray
+
+from virtualrig.config import BatchPlan, Campaign, RecordingPlan, Repeatability
+from virtualrig.dynamics import Preparation, Trajectory, simulate
+from virtualrig.grid import make_grid
+from virtualrig.sensors import DECIMALS, log
+
+ORIGIN = "virtual-rig"
+
+
+class BatchExistsError(FileExistsError):
+    """A batch would replace a folder that this package did not make."""
+
+
+def record_campaign(
+    campaign: Campaign,
+    out: Path,
+    batches: Iterable[str],
+    jobs: int,
+    on_recorded: Callable[[str], None],
+) -> None:
+    """Record the named batches into `out`, each replaced as a whole once all of its recordings are there.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        The rig and what is recorded on it.
+    out : Path
+        Folder that holds the batches' folders.
+    batches : iterable of str
+        Names of batches of the campaign.
+    jobs : int
+        Number of processes. What is recorded does not depend on it.
+    on_recorded : callable
+        Called with "batch/recording" as each is done.
+
+    Raises
+    ------
+    BatchExistsError
+        If a folder to be replaced does not hold a virtual rig's batch.
+    """
+    names = list(batches)
+    for name in names:
+        _check_replaceable(out / name)
+    out.mkdir(parents=True, exist_ok=True)
+    with (
+        TemporaryDirectory(dir=out, prefix=".recording-") as scratch,
+        # Spawned, because forking a process that already has threads (a progress display's) can hang.
+        ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool,
+    ):
+        for name in names:
+            (Path(scratch) / name).mkdir()
+            _write_description(campaign, name, Path(scratch) / name)
+        pending = {
+            pool.submit(_record_to, Path(scratch) / name / log_name(plan), campaign, name, plan): f"{name}/{plan.id}"
+            for name in names
+            for plan in campaign.batches[name].recordings
+        }
+        for done in as_completed(pending):
+            done.result()
+            on_recorded(pending[done])
+        for name in names:
+            shutil.rmtree(out / name, ignore_errors=True)
+            (Path(scratch) / name).rename(out / name)
+
+
+def record(campaign: Campaign, batch: str, plan: RecordingPlan) -> bytes:
+    """Make one recording: the bytes of its compressed log, the same on every call."""
+    draw = recording_generator(campaign.seed, batch, plan.id)
+    preparation = prepare(campaign, plan, draw)
+    trajectory = run(campaign, plan, preparation)
+    return compress(log(trajectory, campaign.sensors, campaign.rig.pulley_radius_m, draw))
+
+
+def recording_generator(seed: int, batch: str, recording: str) -> Generator:
+    """A recording's own random numbers: they depend on its name and the seed, not on what else is recorded."""
+    return np.random.default_rng(SeedSequence([seed, zlib.crc32(f"{batch}/{recording}".encode())]))
+
+
+def prepare(campaign: Campaign, plan: RecordingPlan, draw: Generator) -> Preparation:
+    """Draw how the cables were strung for one recording."""
+    spread: Repeatability = campaign.repeatability
+    low, high = spread.profile_share
+    return Preparation(
+        friction_coefficient=campaign.rig.cable.friction_coefficient * (1 + spread.friction * draw.standard_normal()),
+        pretension_N=plan.pretension_N * (1 + spread.pretension * draw.standard_normal()),
+        profile_share=(draw.uniform(low, high), draw.uniform(low, high)),
+    )
+
+
+def run(campaign: Campaign, plan: RecordingPlan, preparation: Preparation) -> Trajectory:
+    """Simulate one recording's motion."""
+    rate = campaign.sensors.sample_rate_Hz
+    time_s = np.arange(round(plan.excitation.duration_s * rate) + 1) / rate
+    numerics = campaign.numerics
+    grid = make_grid(plan.conduit, numerics.cell_length_m, numerics.cell_bend_rad)
+    return simulate(campaign.rig, grid, numerics, preparation, time_s, *plan.excitation.angle_and_rate(time_s))
+
+
+def compress(columns: dict[str, NDArray]) -> bytes:
+    """A log as gzipped CSV, without a file name or time stamp inside, so equal logs are equal files."""
+    text = io.StringIO()
+    formats = [f"%.{DECIMALS[name]}f" for name in columns]
+    np.savetxt(text, np.column_stack(list(columns.values())), formats, ",", header=",".join(columns), comments="")
+    return gzip.compress(text.getvalue().encode(), mtime=0)
+
+
+def describe(campaign: Campaign, name: str) -> dict:
+    """The batch.yaml of one batch: what the experimenter knows, beforehand estimates and not the cables' truth."""
+    batch: BatchPlan = campaign.batches[name]
+    rig, sensors = campaign.rig, campaign.sensors
+    side = {
+        "pulley_radius_m": rig.pulley_radius_m,
+        "encoder_counts_per_rev": sensors.encoder.counts_per_rev,
+        "torque_constant_Nm_per_A": sensors.torque.constant_Nm_per_A,
+        "load_cell": {
+            "sensitivity_V_per_N": sensors.load_cell.sensitivity_V_per_N,
+            "zero_V": sensors.load_cell.zero_V,
+        },
+    }
+    return {
+        "format": 1,
+        "batch": name,
+        "origin": ORIGIN,
+        "note": batch.note,
+        "rig": {
+            "drive": side,
+            "load": side | {"spring_stiffness_Nm_per_rad": rig.load.spring_stiffness_Nm_per_rad},
+            "cable": rig.estimates.model_dump(),
+            "accuracy": {
+                "encoder_rad": sensors.encoder.accuracy_rad,
+                "torque_Nm": sensors.torque.accuracy_Nm,
+                "load_cell_N": sensors.load_cell.accuracy_N,
+            },
+        },
+        "recordings": [
+            {
+                "id": plan.id,
+                "file": log_name(plan),
+                "pretension_N": plan.pretension_N,
+                "conduit": [piece.model_dump() for piece in plan.conduit],
+                "excitation": plan.excitation.asked,
+            }
+            for plan in batch.recordings
+        ],
+    }
+
+
+def log_name(plan: RecordingPlan) -> str:
+    """File name of a recording's log."""
+    return f"{plan.id}.csv.gz"
+
+
+def _record_to(path: Path, campaign: Campaign, batch: str, plan: RecordingPlan) -> None:
+    path.write_bytes(record(campaign, batch, plan))
+
+
+def _write_description(campaign: Campaign, name: str, folder: Path) -> None:
+    text = yaml.dump(describe(campaign, name), Dumper=_PlainDumper, sort_keys=False)
+    (folder / "batch.yaml").write_text(text, encoding="utf-8")
+
+
+class _PlainDumper(yaml.SafeDumper):
+    """YAML without anchors: what both sides share is written out for each."""
+
+    def ignore_aliases(self, data) -> bool:
+        return True
+
+
+def _check_replaceable(folder: Path) -> None:
+    if not folder.exists():
+        return
+    description = folder / "batch.yaml"
+    known = yaml.safe_load(description.read_text(encoding="utf-8")) if description.is_file() else None
+    if not isinstance(known, dict) or known.get("origin") != ORIGIN:
+        raise BatchExistsError(f"{folder} does not hold a batch of the virtual rig and is left alone; move it away")

@@ -1,0 +1,178 @@
+"""The whole pipeline on a tiny batch: what it makes, that it stops when nothing changed, what bad input does to it."""
+
+import gzip
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import yaml
+
+from builders import write_batch
+from ccmodel.recording import read_recordings
+
+ROOT = Path(__file__).parents[2]
+
+
+def snakemake(folder: Path, *options: str) -> subprocess.CompletedProcess:
+    command = [sys.executable, "-m", "snakemake", "--cores", "2", "--directory", str(folder), "--nolock"]
+    command += ["--snakefile", str(ROOT / "Snakefile"), "--configfile", str(folder / "config.yaml"), *options]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def ccmodel(*arguments: str) -> subprocess.CompletedProcess:
+    code = "from ccmodel.cli import main; main()"
+    return subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False)
+
+
+def write_config(folder: Path, **studies: dict) -> None:
+    config = {
+        "fits": {
+            "fitted": {
+                "batches": ["tiny"],
+                "free": {
+                    "stiffness_N_per_m": {"bounds": [1e3, 1e5]},
+                    "friction_coefficient": {"bounds": [0.01, 0.6]},
+                },
+                "channels": ["theta_out_rad", "tau_in_Nm"],
+            }
+        },
+        "studies": {
+            "pretension": {"batches": ["tiny"], "variable": "pretension", "title": "pretension"},
+            "one-run": {"batches": ["tiny"], "figure": "transmission"},
+            **studies,
+        },
+    }
+    (folder / "config.yaml").write_text(yaml.safe_dump(config))
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A finished run of a tiny batch."""
+    folder = tmp_path_factory.mktemp("run")
+    write_batch(folder / "data/raw/tiny")
+    write_config(folder)
+    run = snakemake(folder)
+    assert run.returncode == 0, run.stdout + run.stderr
+    return folder
+
+
+@pytest.fixture
+def copy(finished, tmp_path):
+    """The finished run, free to be changed."""
+    folder = tmp_path / "run"
+    shutil.copytree(finished, folder, copy_function=shutil.copy2)
+    return folder
+
+
+def read_gz(file: Path) -> str:
+    return gzip.decompress(file.read_bytes()).decode()
+
+
+def write_gz(file: Path, text: str) -> None:
+    file.write_bytes(gzip.compress(text.encode()))
+
+
+def test_it_makes_figures_tables_and_the_page(finished):
+    results = finished / "results"
+    for name in ("pretension", "one-run"):
+        assert (results / f"figures/{name}.png").stat().st_size > 10_000
+        assert "<svg" in (results / f"figures/{name}.svg").read_text()
+        assert f"figures/{name}.png" in (results / "index.html").read_text()
+    csv, parquet = pd.read_csv(results / "tables/errors.csv"), pd.read_parquet(results / "tables/errors.parquet")
+    assert csv["rmse"].to_numpy() == pytest.approx(parquet["rmse"].to_numpy(), rel=1e-4)
+    assert set(parquet["parameters"]) == {"estimated", "fitted"}
+    assert ccmodel("left-out", str(results)).returncode == 0
+
+
+def test_it_recovers_the_truth_that_the_logs_were_made_with(finished):
+    fit = json.loads((finished / "results/fits/fitted/shared.json").read_text())
+    assert fit["succeeded"]
+    assert fit["values"]["stiffness_N_per_m"] == pytest.approx(7750, rel=0.01)
+    assert fit["values"]["friction_coefficient"] == pytest.approx(0.156, rel=0.01)
+    errors = pd.read_parquet(finished / "results/tables/errors.parquet")
+    means = errors.groupby("parameters")["nrmse_percent"].mean()
+    assert means["fitted"] < 0.5 < means["estimated"]
+
+
+def test_simulated_data_are_never_called_measured(finished):
+    page = (finished / "results/index.html").read_text()
+    assert "virtual rig, simulated" in page
+    assert "measured" not in page
+    assert "experiment" not in page.replace("half-loop experiment", "")
+
+
+def test_recordings_carry_their_provenance(finished):
+    import netCDF4
+
+    with netCDF4.Dataset(finished / "results/recordings/tiny.nc") as root:
+        assert root.ccmodel_version
+        assert len(root.getncattr("sha256 batch.yaml")) == 64
+    recordings = read_recordings(finished / "results/recordings/tiny.nc")
+    assert [r.id for r in recordings] == ["t-7N", "t-3.5N"]
+    assert "tau_in_Nm" in recordings[0].derived_from["T1_N"]
+
+
+def test_a_second_run_does_nothing(copy):
+    before = (copy / "results/index.html").stat().st_mtime_ns
+    run = snakemake(copy)
+    assert "Nothing to be done" in run.stdout + run.stderr
+    assert (copy / "results/index.html").stat().st_mtime_ns == before
+
+
+def test_a_new_batch_appears_with_three_lines_of_config(copy):
+    write_batch(copy / "data/raw/added", pretensions=(5.0,))
+    write_config(copy, added={"batches": ["added"], "variable": "pretension"})
+    assert snakemake(copy).returncode == 0
+    assert (copy / "results/figures/added.png").exists()
+    assert "added" in set(pd.read_parquet(copy / "results/tables/errors.parquet")["batch"])
+
+
+def test_bad_input_is_a_line_each_and_nothing_else_is_lost(copy):
+    raw = copy / "data/raw"
+    for name in ("misspelt", "no-column", "empty", "cut"):
+        write_batch(raw / name)
+    batch = raw / "misspelt/batch.yaml"
+    batch.write_text(batch.read_text().replace("pretension_N", "pretensoin_N", 1))
+    log = raw / "no-column/t-7N.csv.gz"
+    rows = read_gz(log).splitlines()
+    write_gz(log, "\n".join(row.rsplit(",", 1)[0] for row in rows) + "\n")
+    write_gz(raw / "empty/t-7N.csv.gz", "")
+    log = raw / "cut/t-7N.csv.gz"
+    text = read_gz(log)
+    write_gz(log, text[: len(text) // 2])
+
+    run = snakemake(copy)
+    assert run.returncode == 0, run.stdout + run.stderr
+    said = ccmodel("left-out", str(copy / "results"))
+    assert said.returncode == 1
+    lines = [line for line in said.stderr.splitlines() if line.startswith("left out")]
+    assert len(lines) == 4, said.stderr
+    for place, what in (
+        ("misspelt/batch.yaml", "did you mean 'pretension_N'"),
+        ("no-column/t-7N.csv.gz", "load_load_cell_V"),
+        ("empty/t-7N.csv.gz", "empty"),
+        ("cut/t-7N.csv.gz", "cut"),
+    ):
+        (line,) = [line for line in lines if place in line]
+        assert what in line
+    errors = pd.read_parquet(copy / "results/tables/errors.parquet")
+    assert set(errors["batch"]) == {"tiny", "no-column", "empty", "cut"}
+    assert set(errors.loc[errors["batch"] == "cut", "recording"]) == {"t-3.5N"}
+
+
+def test_a_misspelt_key_of_the_configuration_is_one_line(copy):
+    config = copy / "config.yaml"
+    config.write_text(config.read_text().replace("variable:", "varable:", 1))
+    run = snakemake(copy)
+    assert run.returncode != 0
+    assert "did you mean 'variable'" in run.stderr
+    assert "Traceback" not in run.stderr
+
+
+def test_the_workflow_is_lint_clean(copy):
+    run = snakemake(copy, "--lint")
+    assert "Congratulations" in run.stdout + run.stderr, run.stdout + run.stderr

@@ -1,0 +1,181 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from ccmodel.rig.ingest import ingest_batch
+from ccmodel.rig.mis_tool import NM_PER_COUNT, import_mis_tool
+from ccmodel.typed import InputError
+
+REAL = Path(__file__).parents[3] / "shared/real/mis-tool-characterization/data"
+HEADER = "%Data taken by somebody\n%Freq_Hz=0.99\n%Back-end Time [ms], Back-end CUI Encoder [counts]\n"
+
+
+def trial(frequency=0.5, level=0.2, seed=0, seconds=8.0):
+    """Samples like the real ones: load angle and drive torque counted against the drive angle."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(round(1000 * seconds)) / 1000
+    phase = 2 * np.pi * frequency * time
+    drive, speed = 680 + 640 * np.sin(phase), np.cos(phase)
+    columns = [
+        time,
+        drive.round(),
+        (-1500 * np.tanh(5 * speed) + rng.normal(0, 4, time.size)).round(),
+        0.1 * speed,
+        (550 - 0.42 * drive).round(),
+        (-1000 * level + 150 * np.tanh(5 * speed) + rng.normal(0, 3, time.size)).round(),
+        np.full(time.size, level),
+        speed,
+        drive,
+        drive,
+    ]
+    return np.column_stack(columns)
+
+
+def text(samples, delimiter=",", header=HEADER):
+    return header + "\n".join(delimiter.join(f"{x:.3f}" for x in row) for row in samples) + "\n"
+
+
+def write(folder, name, content):
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / name).write_text(content)
+
+
+def test_a_nested_data_set(tmp_path):
+    source = tmp_path / "repository"
+    write(source, "README.txt", "The data set\nhas 10 columns.\n")
+    write(source / "data/Tool 9", "112.TXT", text(trial(0.5, 0.4)))
+    write(source / "data/Tool 9", "003.txt", text(trial(0.3, 0.8, 1), delimiter="\t", header=""))
+    write(source / "data/deep/Tool_8", "12.TXT", text(trial(0.2, 0.3, 2), delimiter="  ", header="some words\n\n"))
+    imported = import_mis_tool(source, tmp_path / "raw")
+    assert [b.name for b in imported.batches] == ["Tool-9", "Tool_8"]
+    (finding,) = imported.findings
+    assert "README.txt" in str(finding) and "no trial" in str(finding)
+    ingested = ingest_batch(imported.batches[0])
+    assert ingested.findings == []
+    assert ingested.batch.rig.drive.torque_sign == -1
+    assert ingested.batch.rig.load.encoder_sign == -1
+    assert ingested.batch.rig.load.torque_sign == 1
+    first, second = ingested.recordings
+    assert (first.id, second.id) == ("trial-003", "trial-112")
+    assert second.excitation == {"wave": "sine", "trial": "112", "frequency_Hz": 0.5, "load_level": 0.4, "stop": 1}
+    assert first.excitation["frequency_Hz"] == pytest.approx(0.3, abs=0.001)
+    assert second.settled_s == 4.0
+    assert second.origin == "rig"
+    assert set(second.channels) == {"theta_in_rad", "theta_out_rad", "tau_in_Nm", "tau_out_Nm"}
+    samples = trial(0.5, 0.4)
+    assert second["theta_in_rad"] == pytest.approx((samples[:, 1] - 680) * 2 * np.pi / 8192)
+    assert second["tau_in_Nm"] == pytest.approx(-samples[:, 2] * NM_PER_COUNT)
+    assert second.accuracy["theta_in_rad"] < second.accuracy["theta_out_rad"]
+    (deep,) = ingest_batch(imported.batches[1]).recordings
+    assert "stop" not in deep.excitation
+    described = yaml.safe_load((imported.batches[0] / "batch.yaml").read_text())
+    assert "%Freq_Hz=0.99" in described["recordings"][1]["note"]
+
+
+def test_a_single_folder_with_time_in_ms(tmp_path):
+    samples = trial()
+    samples[:, 0] *= 1000
+    write(tmp_path / "tool", "00.TXT", text(samples))
+    (batch,) = import_mis_tool(tmp_path / "tool", tmp_path / "raw").batches
+    (recording,) = ingest_batch(batch).recordings
+    assert recording.time_s[-1] == pytest.approx(7.999)
+
+
+def test_rows_that_are_no_samples(tmp_path):
+    lines = text(trial(), header="").splitlines()
+    lines[100] = lines[100].replace(",", ",oops", 1)
+    lines[200] = ",".join([*lines[200].split(",")[:3], "", *lines[200].split(",")[4:]])
+    lines[-1] = lines[-1][:20]
+    trailing = [line + ",," for line in lines[:-1]] + [lines[-1]]
+    for name, content in (("plain", lines), ("trailing", trailing)):
+        write(tmp_path / name, "00.TXT", "\n".join(content))
+        imported = import_mis_tool(tmp_path / name, tmp_path / "raw")
+        (finding,) = imported.findings
+        assert finding.text == "3 rows that are no samples dropped, the first is row 101"
+        (found,) = ingest_batch(imported.batches[0]).findings
+        assert (found.severity, found.column) == ("warning", "time_s")
+
+
+def test_a_cut_last_line(tmp_path):
+    write(tmp_path / "tool", "00.TXT", text(trial())[:-40])
+    (finding,) = import_mis_tool(tmp_path / "tool", tmp_path / "raw").findings
+    assert "the last line is cut" in finding.text
+
+
+def test_wild_trials_are_findings_and_the_good_one_comes_through(tmp_path):
+    reset = trial(seed=1)
+    reset[5000:, 1] -= 4096
+    stuck = trial(seed=2)
+    stuck[:, 1] = 12
+    back = trial(seed=3)
+    back[3000:, 0] -= 3
+    short = trial(seed=4)[:3000]
+    for name, samples in {"00": trial(), "01": reset, "02": stuck, "03": back, "04": short}.items():
+        write(tmp_path / "tool", f"{name}.TXT", text(samples))
+    (batch,) = import_mis_tool(tmp_path / "tool", tmp_path / "raw").batches
+    ingested = ingest_batch(batch)
+    assert [r.id for r in ingested.recordings] == ["trial-00"]
+    assert [(Path(f.file).name[6:8], f.severity) for f in ingested.findings] == [
+        ("01", "refused"),
+        ("02", "refused"),
+        ("03", "refused"),
+        ("04", "refused"),
+    ]
+
+
+def test_signs_in_doubt_are_told(tmp_path):
+    samples = trial()
+    samples[:, 5] = np.random.default_rng(0).normal(0, 10, len(samples)).round()
+    write(tmp_path / "tool", "00.TXT", text(samples))
+    (finding,) = import_mis_tool(tmp_path / "tool", tmp_path / "raw").findings
+    assert "sign of the load torque is in doubt" in finding.text
+
+
+def test_names_that_collide(tmp_path):
+    for folder in ("a/tool", "b/tool"):
+        for name in ("1 2.TXT", "1-2.TXT"):
+            write(tmp_path / "data" / folder, name, text(trial()))
+    imported = import_mis_tool(tmp_path / "data", tmp_path / "raw")
+    assert [b.name for b in imported.batches] == ["tool", "tool-2"]
+    assert [r.id for r in ingest_batch(imported.batches[1]).recordings] == ["trial-1-2", "trial-1-2-2"]
+
+
+def test_the_same_source_gives_the_same_files(tmp_path):
+    write(tmp_path / "tool", "00.TXT", text(trial()))
+    one, two = (import_mis_tool(tmp_path / "tool", tmp_path / name).batches[0] for name in ("x", "y"))
+    for file in one.iterdir():
+        assert file.read_bytes() == (two / file.name).read_bytes()
+
+
+def test_nothing_to_import(tmp_path):
+    with pytest.raises(InputError, match="no such folder"):
+        import_mis_tool(tmp_path / "nowhere", tmp_path / "raw")
+    with pytest.raises(InputError, match="no trial found in 0"):
+        import_mis_tool(tmp_path, tmp_path / "raw")
+
+
+@pytest.mark.parametrize(
+    ("folder", "name", "frequency", "level"),
+    [
+        ("Tool_4_Maryland_L_2", "21", 0.3, 0.2),
+        ("Tool_4_Maryland_L_Pitch_1", "113", 0.5, 0.8),
+        ("Tool_4_Maryland_L_Pitch_3", "002", 0.3, 0.6),
+    ],
+)
+def test_real_trials(tmp_path, folder, name, frequency, level):
+    file = REAL / folder / f"{name}.TXT"
+    if not file.is_file():
+        pytest.skip("the public mis-tool-characterization data are not at ../shared/real beside the repository")
+    write(tmp_path / folder, file.name, file.read_text())
+    imported = import_mis_tool(tmp_path / folder, tmp_path / "raw")
+    assert imported.findings == []
+    ingested = ingest_batch(imported.batches[0])
+    assert ingested.findings == []
+    rig = ingested.batch.rig
+    assert (rig.load.encoder_sign, rig.drive.torque_sign, rig.load.torque_sign) == (-1, -1, 1)
+    (recording,) = ingested.recordings
+    assert recording.excitation["frequency_Hz"] == pytest.approx(frequency, abs=0.002)
+    assert recording.excitation["load_level"] == level
+    assert np.corrcoef(recording["theta_in_rad"], recording["theta_out_rad"])[0, 1] > 0.9

@@ -1,0 +1,70 @@
+"""The typed configuration: what is refused, how, and that its schema file is up to date."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from ccmodel.config import Config, batches_in, expand_studies, load_config
+from ccmodel.typed import InputError
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def edited(tmp_path):
+    """The committed configuration with one piece of text replaced."""
+
+    def edit(old, new):
+        text = (ROOT / "config/config.yaml").read_text()
+        assert old in text
+        file = tmp_path / "config.yaml"
+        file.write_text(text.replace(old, new, 1))
+        return file
+
+    return edit
+
+
+@pytest.mark.parametrize("name", ["config.yaml", "real.yaml"])
+def test_committed_configurations_are_valid(name):
+    assert load_config(ROOT / "config" / name).studies
+
+
+def test_committed_schema_is_that_of_the_typed_config():
+    assert json.loads((ROOT / "config/schema.json").read_text()) == Config.model_json_schema()
+
+
+def test_an_unknown_key_is_refused_with_the_nearest_name(edited):
+    with pytest.raises(InputError, match="line 25.*unknown key 'varable' in studies.loops; did you mean 'variable'"):
+        load_config(edited("variable: bend", "varable: bend"))
+
+
+def test_an_unknown_parameter_cannot_be_free(edited):
+    with pytest.raises(InputError, match="stifness"):
+        load_config(edited("stiffness_N_per_m:", "stifness_N_per_m:"))
+
+
+def test_bounds_the_wrong_way_round_are_refused(edited):
+    with pytest.raises(InputError, match=r"friction_coefficient: bounds must be lowest then highest"):
+        load_config(edited("[0.01, 0.6]", "[0.6, 0.01]"))
+
+
+def test_a_study_with_unknown_parameters_is_refused(edited):
+    with pytest.raises(InputError, match="asks for parameters 'guessed'; there are estimated, fitted"):
+        load_config(edited("parameters: estimated", "parameters: guessed"))
+
+
+def test_a_study_of_a_batch_that_is_not_there_is_refused(edited):
+    config = load_config(edited("batches: [loops]", "batches: [lops]"))
+    with pytest.raises(InputError, match="studies.loops: there is no batch 'lops'"):
+        expand_studies(config, ["half-loop", "loops", "pretension", "radius"])
+
+
+def test_each_becomes_a_study_a_batch():
+    config = Config.model_validate({"studies": {"load": {"batches": "each"}}})
+    assert {n: s.batches for n, s in expand_studies(config, ["a", "b"]).items()} == {"load-a": ["a"], "load-b": ["b"]}
+
+
+def test_a_folder_without_batches_is_refused(tmp_path):
+    with pytest.raises(InputError, match="no batch here"):
+        batches_in(tmp_path)

@@ -1,0 +1,25 @@
+import pytest
+from virtual_runs import ROOT, plan_of, strung
+
+from virtualrig.campaign import run
+from virtualrig.config import Campaign, read_campaign
+
+
+@pytest.fixture(scope="session")
+def campaign() -> Campaign:
+    """The committed campaign."""
+    return read_campaign(ROOT / "config" / "virtual-rig.yaml")
+
+
+@pytest.fixture(scope="session")
+def trajectory(campaign):
+    """Call with (batch, recording) for the undrawn trajectory over two cycles; each is simulated once."""
+    made = {}
+
+    def simulated(batch, recording):
+        if (batch, recording) not in made:
+            plan = plan_of(campaign, batch, recording, rest_s=0.02, cycles=1.5)
+            made[batch, recording] = run(campaign, plan, strung(campaign, plan))
+        return made[batch, recording]
+
+    return simulated

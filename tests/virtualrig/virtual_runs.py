@@ -1,0 +1,40 @@
+"""What the tests of the virtual rig share: variants of the campaign, undrawn runs, what sensors would see."""
+
+from pathlib import Path
+
+import numpy as np
+
+from virtualrig.dynamics import Preparation, Trajectory
+
+ROOT = Path(__file__).parents[2]
+
+
+def changed(model, **updates):
+    """A copy of a nested config with dotted keys replaced, `__` standing for the dot."""
+    for path, value in updates.items():
+        head, _, rest = path.partition("__")
+        model = model.model_copy(update={head: changed(getattr(model, head), **{rest: value}) if rest else value})
+    return model
+
+
+def plan_of(campaign, batch, recording, **excitation):
+    """A recording's plan, with parts of its excitation replaced."""
+    (plan,) = [p for p in campaign.batches[batch].recordings if p.id == recording]
+    return changed(plan, **{f"excitation__{key}": value for key, value in excitation.items()})
+
+
+def strung(campaign, plan, profile_share=(0.2, 0.2)) -> Preparation:
+    """The preparation that was aimed at, with no draw."""
+    return Preparation(campaign.rig.cable.friction_coefficient, plan.pretension_N, profile_share)
+
+
+def channels(campaign, trajectory: Trajectory) -> dict[str, np.ndarray]:
+    """What the sensors see of a trajectory, before noise and quantization."""
+    radius, t = campaign.rig.pulley_radius_m, trajectory
+    return {
+        "theta_out": t.theta_out_rad,
+        "tau_in": radius * (t.T1_N - t.T3_N),
+        "tau_out": radius * (t.T2_N - t.T4_N),
+        "F_drive": t.T1_N + t.T3_N,
+        "F_load": t.T2_N + t.T4_N,
+    }

@@ -1,0 +1,54 @@
+# What the rules share: the typed configuration, the batches that are there, and which file belongs to what.
+import sys
+from pathlib import Path
+
+from snakemake.exceptions import WorkflowError
+
+from ccmodel.config import EACH, ESTIMATED, batches_in, expand_studies, load_config
+from ccmodel.provenance import source_digest
+from ccmodel.typed import InputError
+
+try:
+    # The run's one configfile, read by its typed reader, which refuses unknown keys.
+    CONFIG = load_config(Path(workflow.configfiles[-1]))
+    RAW = Path(CONFIG.raw)
+    RESULTS = CONFIG.results
+    BATCHES = batches_in(RAW)
+    STUDIES = expand_studies(CONFIG, BATCHES)
+except InputError as error:
+    print(error, file=sys.stderr)
+    sys.exit(2)
+
+
+wildcard_constraints:
+    batch="[^/]+",
+    parameters="[^/]+",
+    scope="[^/]+",
+    study="[^/]+",
+
+
+def recordings_of(batch):
+    return f"{RESULTS}/recordings/{batch}.nc"
+
+
+def simulated_of(parameters, batch):
+    return f"{RESULTS}/simulated/{parameters}/{batch}.nc"
+
+
+def fit_of(parameters, batch):
+    """The fit that a batch is simulated with: its own, or the one that all share."""
+    scope = batch if CONFIG.fits[parameters].batches == EACH else "shared"
+    return f"{RESULTS}/fits/{parameters}/{scope}.json"
+
+
+def fits():
+    return sorted({fit_of(name, batch) for name in CONFIG.fits for batch in BATCHES})
+
+
+def runs():
+    """Every (parameter set, recordings, simulated)."""
+    return [
+        (p, recordings_of(b), simulated_of(p, b))
+        for p in CONFIG.parameter_sets
+        for b in BATCHES
+    ]

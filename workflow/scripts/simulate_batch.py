@@ -1,0 +1,15 @@
+"""A batch's recordings and, if any, a fit -> what the model says of them (netCDF, SI units) and what failed (JSON)."""
+
+from pathlib import Path
+
+from ccmodel.jobs import logged
+from ccmodel.stages import simulate
+
+with logged(snakemake.log[0]):
+    simulate(
+        Path(snakemake.input.recordings),
+        Path(snakemake.input.fit) if snakemake.input.fit else None,
+        snakemake.params.sections,
+        Path(snakemake.output.simulated),
+        Path(snakemake.output.summary),
+    )

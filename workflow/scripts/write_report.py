@@ -1,0 +1,18 @@
+"""Error table, fits, what was found in the batches, figures -> the page (HTML) and what was left out (JSON)."""
+
+from pathlib import Path
+
+from ccmodel.config import Config, Study
+from ccmodel.jobs import logged
+from ccmodel.stages import report
+
+with logged(snakemake.log[0]):
+    report(
+        Config.model_validate_json(snakemake.params.config),
+        {name: Study.model_validate_json(study) for name, study in snakemake.params.studies.items()},
+        Path(snakemake.input.errors),
+        [Path(f) for f in snakemake.input.fits],
+        [Path(f) for f in snakemake.input.summaries],
+        [Path(f) for f in snakemake.input.simulations],
+        Path(snakemake.output.page),
+    )
