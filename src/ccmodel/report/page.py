@@ -23,7 +23,7 @@ SYMBOL = {
     "T3_N": "T3",
     "T4_N": "T4",
 }
-# Table I of the paper: its fitted model against its half-loop experiment.
+# Table I of the paper: its fitted model against its own half-loop recording.
 PAPER_TABLE_I = {"theta_out_rad": 3.7, "tau_in_Nm": 19.4, "tau_out_Nm": 3.7, "T1_N": 12.8, "T2_N": 4.1, "T3_N": 9.9,
                  "T4_N": 5.5}  # fmt: skip
 
@@ -52,6 +52,7 @@ def write_page(
     channels = [c for c in CHANNELS if c in set(errors["channel"])]
     file.write_text(
         template.render(
+            headline=_headline(errors),
             origins=sorted({ORIGIN[o] for o in errors["origin"]}),
             recordings=sum(len(b["recordings"]) for b in batches),
             batches=batches,
@@ -65,6 +66,19 @@ def write_page(
             warnings=warnings,
         )
     )
+
+
+def _headline(errors: pd.DataFrame) -> list[str]:
+    """A sentence a parameter set: how near the model is, and where it is furthest off."""
+    sentences = []
+    for parameters, table in errors.dropna(subset="nrmse_percent").groupby("parameters", sort=False):
+        means = table.groupby(["batch", "channel"])["nrmse_percent"].mean()
+        batch, channel = means.idxmax()
+        sentences.append(
+            f"With {parameters} parameters the model is off by {table['nrmse_percent'].median():.2g} % of peak to peak"
+            f" in the median channel, and furthest in {SYMBOL[channel]} of batch {batch}: {means.max():.2g} %."
+        )
+    return sentences
 
 
 def _summary(errors: pd.DataFrame, channels: list[str]) -> list[dict]:
