@@ -18,18 +18,20 @@ $(VENV)/.ready: requirements.lock pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $@
 
+# A run that fails still says what it left out, and one that left something out has failed.
+define run_pipeline
+	@$(BIN)/snakemake --cores $(CORES) --configfile $(1); status=$$?; \
+	$(BIN)/ccmodel left-out $(2) || status=1; \
+	echo "The report is $(2)/index.html"; exit $$status
+endef
+
 results: $(VENV)/.ready  ## regenerate every figure, table and the report from data/raw
-	$(BIN)/snakemake --cores $(CORES)
-	@$(BIN)/ccmodel left-out results
-	@echo "The report is results/index.html"
+	$(call run_pipeline,config/config.yaml,results)
 
 real: $(VENV)/.ready  ## run the pipeline on the public da Vinci recordings: make real DATA=path
 	@test -n "$(DATA)" || { echo "make real needs DATA=path of the mis-tool-characterization data" >&2; exit 2; }
-	@rm -rf results/real/raw  # made here; what an earlier DATA left must not stay among the batches
-	$(BIN)/ccmodel import-mis-tool "$(DATA)" --out results/real/raw
-	$(BIN)/snakemake --cores $(CORES) --configfile config/real.yaml
-	@$(BIN)/ccmodel left-out results/real
-	@echo "The report is results/real/index.html"
+	@$(BIN)/ccmodel import-mis-tool "$(DATA)" --out results/real/raw
+	$(call run_pipeline,config/real.yaml,results/real)
 
 data: $(VENV)/.ready  ## record data/raw again with the virtual rig
 	$(BIN)/virtualrig record config/virtual-rig.yaml --out data/raw

@@ -65,6 +65,15 @@ def test_each_becomes_a_study_a_batch():
     assert {n: s.batches for n, s in expand_studies(config, ["a", "b"]).items()} == {"load-a": ["a"], "load-b": ["b"]}
 
 
+def test_every_visible_folder_is_a_batch_or_named_as_none(tmp_path):
+    for name in ("b", "a", ".git", "my batch", "b{x}"):
+        (tmp_path / name).mkdir()
+    names, unusable = batches_in(tmp_path)
+    assert names == ["a", "b"]
+    assert len(unusable) == 2
+    assert "my batch: a batch's name is" in unusable[1]
+
+
 def test_a_folder_without_batches_is_refused(tmp_path):
     with pytest.raises(InputError, match="no batch here"):
         batches_in(tmp_path)

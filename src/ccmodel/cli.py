@@ -13,7 +13,7 @@ from ccmodel.typed import InputError
 app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 _err = Console(stderr=True, soft_wrap=True, highlight=False)
 
-Folder = Annotated[Path, typer.Argument(exists=True, file_okay=False)]
+Folder = Annotated[Path, typer.Argument()]
 
 
 @app.command()
@@ -47,14 +47,14 @@ def import_mis_tool(
 @app.command("left-out")
 def left_out(results: Folder) -> None:
     """Say what the last run left out and warned of; exits 1 where something was left out."""
-    from ccmodel.stages import left_out
+    from ccmodel.stages.report import left_out_of
 
-    lines, warnings = left_out(results)
-    for line in warnings:
+    said = left_out_of(results)
+    for line in said.warnings:
         _say(line, "warning")
-    for line in lines:
+    for line in said.left_out:
         _say(line, "refused")
-    if lines:
+    if said.left_out:
         raise typer.Exit(1)
 
 

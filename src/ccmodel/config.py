@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 from ccmodel.model.paper import SECTIONS
 from ccmodel.model.parameters import FREE
 from ccmodel.recording import CHANNELS
+from ccmodel.rig.batch import valid_name
 from ccmodel.typed import InputError, TypedModel, load_yaml_model
 
 # What a study can vary: how the legend names a recording is in ccmodel.compare.studies.
@@ -103,18 +104,20 @@ def load_config(path: Path) -> Config:
     return load_yaml_model(path, Config)
 
 
-def batches_in(raw: Path) -> list[str]:
-    """Names of the batch folders in `raw`, sorted.
+def batches_in(raw: Path) -> tuple[list[str], list[str]]:
+    """Names of the batch folders in `raw`, sorted; and a line on each folder that cannot be a batch by its name.
 
     Raises
     ------
     InputError
         If there is no such folder or no batch in it.
     """
-    names = sorted(p.parent.name for p in raw.glob("*/batch.yaml"))
-    if not names:
+    names = sorted(p.name for p in raw.glob("*") if p.is_dir() and not p.name.startswith("."))
+    usable = [name for name in names if valid_name(name)]
+    if not usable:
         raise InputError(f"{raw}: no batch here; a batch is a folder with a batch.yaml and its logs")
-    return names
+    advice = "a batch's name is letters, digits and -_.+=,@ only: rename the folder"
+    return usable, [f"{raw / name}: {advice}" for name in names if name not in usable]
 
 
 def expand_studies(config: Config, batches: list[str]) -> dict[str, Study]:
@@ -136,8 +139,8 @@ def expand_studies(config: Config, batches: list[str]) -> dict[str, Study]:
     for name, study in config.studies.items():
         if study.batches == EACH:
             for batch in batches:
-                title = f"{study.title}, {batch}" if study.title else batch
+                title = f"{study.title or name}, {batch}"
                 expanded[f"{name}-{batch}"] = study.model_copy(update={"batches": [batch], "title": title})
         else:
-            expanded[name] = study
+            expanded[name] = study.model_copy(update={"title": study.title or name})
     return expanded

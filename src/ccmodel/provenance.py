@@ -1,38 +1,69 @@
-"""Where a result came from: versions and digests that every file of results carries."""
+"""Where a result came from: versions and digests that files of results carry, and what a step's code consists of."""
 
+import ast
 import hashlib
+import os
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
 import ccmodel
 
-_PACKAGE = Path(ccmodel.__file__).parent
+_ROOT = Path(ccmodel.__file__).parents[1]
 
 
-def of_inputs(paths: Iterable[Path]) -> dict[str, str]:
-    """Version of the package and the digests of the files that a result was made from."""
-    inputs = {f"sha256 {Path(p).name}": hashlib.sha256(Path(p).read_bytes()).hexdigest() for p in paths}
+def files_in(folder: Path) -> list[Path]:
+    """The files of a batch's folder, at any depth; hidden ones (an editor's, a file browser's) are none of it."""
+    files = (f for f in Path(folder).rglob("*") if f.is_file())
+    return sorted(f for f in files if not any(part.startswith(".") for part in f.relative_to(folder).parts))
+
+
+def of_inputs(paths: Iterable[Path], folder: Path = Path()) -> dict[str, str]:
+    """Version of the package and the digests of the files that a result was made from, by path from `folder`."""
+    digests = {p: hashlib.sha256(p.read_bytes()).hexdigest() for p in map(Path, paths)}
+    inputs = {f"sha256 {os.path.relpath(p, folder)}": digest for p, digest in digests.items()}
     return {"ccmodel_version": ccmodel.__version__, **inputs}
 
 
 @cache
-def source_digest(*parts: str) -> str:
-    """Digest of parts of the package: a room ("rig") or a file ("recording.py").
+def source_digest(module: str) -> str:
+    """Digest of a module of the package with all of the package that it imports, and the templates beside those.
 
     Snakemake sees when a script changes, not when the package behind it does; with this among a rule's params, it
-    reruns what depends on an edited file.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such part.
+    reruns what depends on an edited file, and only that.
     """
     digest = hashlib.sha256()
-    for part in sorted(parts):
-        place = _PACKAGE / part
-        if not place.exists():
-            raise FileNotFoundError(f"the package has no part {part}")
-        for file in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
-            digest.update(str(file.relative_to(_PACKAGE)).encode() + b"\0" + file.read_bytes())
+    for file in sorted(sources_of(module)):
+        digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def sources_of(module: str) -> set[Path]:
+    """Files that `source_digest` takes in."""
+    files, waiting, seen = set(), [module], set()
+    while waiting:
+        name = waiting.pop()
+        if name in seen or (file := _file_of(name)) is None:
+            continue
+        seen.add(name)
+        files |= {file, *file.parent.glob("*.j2")}
+        waiting += [name.rpartition(".")[0], *_imports(file)]
+    return files
+
+
+def _file_of(name: str) -> Path | None:
+    """File of a module or package, found without importing it; None for a name inside a module."""
+    place = _ROOT.joinpath(*name.split("."))
+    candidates = (place.with_suffix(".py"), place / "__init__.py")
+    return next((file for file in candidates if name and file.exists()), None)
+
+
+def _imports(file: Path) -> list[str]:
+    """What a file imports of the package; with `from a import b`, both a and a.b, as b may be a module."""
+    names = []
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+    return [name for name in names if name.partition(".")[0] == ccmodel.__name__]

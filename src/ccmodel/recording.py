@@ -49,6 +49,8 @@ class Recording:
         The conduits' path.
     accuracy : mapping of str to float
         Accuracy stated for each measured channel, in the channel's unit; empty for a model.
+    encoder_step_rad : float or None
+        Angle of one count of the drive's encoder, rad; None where the drive angle was not counted.
     excitation : mapping
         A note of what was asked of the drive, not of what happened.
     rest_s : float
@@ -69,6 +71,7 @@ class Recording:
     pretension_N: float
     path: ConduitPath
     accuracy: Mapping[str, float] = field(default_factory=dict)
+    encoder_step_rad: float | None = None
     excitation: Mapping = field(default_factory=dict)
     rest_s: float = 0.0
     settled_s: float = 0.0
@@ -134,6 +137,8 @@ def _to_dataset(recording: Recording) -> xr.Dataset:
     variables["piece_length_m"] = ("piece", recording.path.piece_length_m, {"units": "m"})
     variables["piece_bend_rad"] = ("piece", recording.path.piece_bend_rad, {"units": "rad"})
     attributes = {name: getattr(recording, name) for name in _SCALARS}
+    if recording.encoder_step_rad is not None:
+        attributes["encoder_step_rad"] = recording.encoder_step_rad
     attributes["excitation"] = json.dumps(dict(recording.excitation))
     attributes["warnings"] = json.dumps(list(recording.warnings))
     return xr.Dataset(variables, coords={"time_s": ("time_s", recording.time_s, {"units": "s"})}, attrs=attributes)
@@ -150,6 +155,7 @@ def _from_dataset(name: str, dataset: xr.Dataset) -> Recording:
         derived_from={c: dataset[c].attrs["derived_from"] for c in channels},
         accuracy={c: float(dataset[c].attrs["accuracy"]) for c in channels if "accuracy" in dataset[c].attrs},
         path=ConduitPath(dataset["piece_length_m"].values, dataset["piece_bend_rad"].values),
+        encoder_step_rad=float(step) if (step := dataset.attrs.get("encoder_step_rad")) is not None else None,
         excitation=json.loads(dataset.attrs["excitation"]),
         warnings=tuple(json.loads(dataset.attrs["warnings"])),
         **scalars,

@@ -89,7 +89,7 @@ def load_yaml_model(path: Path, model: type[M]) -> M:
     node, data = _read_yaml(Path(path))
     try:
         # JSON mode: lists may become tuples and text paths or choices, while numbers stay strict.
-        return model.model_validate_json(json.dumps(data, default=str))
+        return model.model_validate_json(data)
     except ValidationError as error:
         problems = [Problem(str(path), _line_of(node, loc), text) for loc, text in _explain(error, model)]
         raise _input_error(problems) from error
@@ -103,17 +103,38 @@ def nearest(name: str, known: Iterable[str], cutoff: float = 0.75) -> str | None
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML as people write it: 5e4 is a number, and a key given twice is a mistake."""
+    """YAML as people write it: 5e4 is a number, a key is text as it stands, and one given twice is a mistake."""
 
     def construct_mapping(self, node, deep=False):
         seen = set()
-        for key, _ in node.value:
-            if key.value in seen and key.tag != "tag:yaml.org,2002:merge":
-                raise yaml.MarkedYAMLError(
-                    problem=f"key '{key.value}' is given twice: remove one", problem_mark=key.start_mark
+        for i, (key, value) in enumerate(node.value if isinstance(node, yaml.MappingNode) else []):
+            if not isinstance(key, yaml.ScalarNode):
+                raise _problem_at(
+                    key, "a key must be a word, found a list or a mapping (put text with brackets in quotes)"
                 )
+            if key.tag == "tag:yaml.org,2002:merge":
+                continue
+            if key.value in seen:
+                raise _problem_at(key, f"key {key.value!r} is given twice: remove one")
             seen.add(key.value)
+            # JSON knows no dates, numbers or nothing as keys.
+            node.value[i] = (yaml.ScalarNode("tag:yaml.org,2002:str", key.value, key.start_mark, key.end_mark), value)
         return super().construct_mapping(node, deep)
+
+    def construct_object(self, node, deep=False):
+        try:
+            return super().construct_object(node, deep)
+        except (ValueError, TypeError, LookupError, AttributeError, OverflowError) as error:
+            # What looks like a date or is tagged as a number and is none ends in whatever its constructor stumbles on.
+            if not isinstance(node, yaml.ScalarNode):
+                raise
+            raise _problem_at(
+                node, f"{node.value!r} cannot be read ({error}): if it is text, put it in quotes"
+            ) from error
+
+
+def _problem_at(node: yaml.Node, text: str) -> yaml.MarkedYAMLError:
+    return yaml.MarkedYAMLError(problem=text, problem_mark=node.start_mark)
 
 
 _Loader.add_implicit_resolver(
@@ -121,7 +142,8 @@ _Loader.add_implicit_resolver(
 )
 
 
-def _read_yaml(path: Path) -> tuple[yaml.Node, Any]:
+def _read_yaml(path: Path) -> tuple[yaml.Node, str]:
+    """The file's nodes, for finding lines, and its content as JSON."""
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
@@ -132,6 +154,7 @@ def _read_yaml(path: Path) -> tuple[yaml.Node, Any]:
         loader = _Loader(text)
         node = loader.get_single_node()
         data = loader.construct_document(node) if node is not None else None
+        as_json = json.dumps(data, default=str)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         what = error.problem or "it cannot be understood"
@@ -139,10 +162,15 @@ def _read_yaml(path: Path) -> tuple[yaml.Node, Any]:
         raise _input_error([Problem(str(path), mark.line + 1 if mark else None, advice + what)]) from error
     except yaml.YAMLError as error:
         raise _input_error([Problem(str(path), None, "not valid YAML: " + " ".join(str(error).split()))]) from error
+    except (TypeError, ValueError, RecursionError) as error:
+        # An alias that contains itself, brackets nested without end, an escape that is no character.
+        raise _input_error(
+            [Problem(str(path), None, f"holds what cannot be read as keys and values ({error})")]
+        ) from error
     if not isinstance(data, dict):
         found = "nothing" if data is None else f"a {type(data).__name__}"
         raise _input_error([Problem(str(path), None, f"must hold keys and values, found {found}")])
-    return node, data
+    return node, as_json
 
 
 def _input_error(problems: list[Problem]) -> InputError:
@@ -164,15 +192,16 @@ _EXPECTED = {
     "less_than": "must be below {lt}",
     "less_than_equal": "must be at most {le}",
     "literal_error": "must be {expected}",
+    "string_too_short": "needs at least {min_length} characters",
     "too_short": "needs at least {min_length} entries, has {actual_length}",
     "too_long": "takes at most {max_length} entries, has {actual_length}",
 }
 
 
 def _explain(error: ValidationError, model: type[BaseModel]) -> list[tuple[tuple, str]]:
-    """Where and what, for every problem; a misspelt key is one problem, not also a missing key."""
+    """Where and what, for every problem; a misspelt key is one problem, not also a missing key or a short list."""
     explained, meant = [], set()
-    errors = error.errors(include_url=False)
+    errors = [e for e in error.errors(include_url=False) if not _is_follow_on(e)]
     for e in errors:
         if _is_unknown_key(e):
             *parent, key = (p for p in e["loc"] if p != "[key]")
@@ -180,7 +209,7 @@ def _explain(error: ValidationError, model: type[BaseModel]) -> list[tuple[tuple
             guess = nearest(str(key), known)
             meant.add((*parent, guess))
             advice = f"did you mean '{guess}'?" if guess else f"known keys are {', '.join(known)}"
-            explained.append(((*parent, key), f"unknown key '{key}' {_inside(parent)}; {advice}"))
+            explained.append(((*parent, key), f"unknown key {key!r} {_inside(parent)}; {advice}"))
     for e in errors:
         if e["type"] == "missing" and e["loc"] not in meant:
             explained.append((e["loc"], f"key '{e['loc'][-1]}' is missing {_inside(e['loc'][:-1])}"))
@@ -189,14 +218,21 @@ def _explain(error: ValidationError, model: type[BaseModel]) -> list[tuple[tuple
     return explained
 
 
+def _is_follow_on(e: dict) -> bool:
+    """A list that is too short only because pydantic does not count the entries that have problems of their own."""
+    return e["type"] == "too_short" and len(e["input"]) >= e["ctx"]["min_length"]
+
+
 def _is_unknown_key(e: dict) -> bool:
     return e["type"] == "extra_forbidden" or e["loc"][-1:] == ("[key]",)
 
 
 def _wrong_value(e: dict) -> str:
     context = e.get("ctx", {})
-    template = "{error}" if e["type"] == "value_error" else _EXPECTED.get(e["type"], e["msg"])
-    text = template.format(**context)
+    if e["type"] == "value_error":
+        text = str(context["error"])
+    else:
+        text = _EXPECTED[e["type"]].format(**context) if e["type"] in _EXPECTED else e["msg"]
     key = _dotted(e["loc"])
     found = "" if isinstance(e["input"], dict | list) else f", found {e['input']!r}"
     return f"{key}: {text}{found}" if key else f"{text}{found}"

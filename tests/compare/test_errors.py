@@ -1,11 +1,13 @@
 """Error tables by hand, and the cycle they are taken over."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from builders import recording
 from ccmodel.compare.errors import COLUMNS, error_table, last_cycle
-from ccmodel.compare.studies import grouped, label_of
+from ccmodel.compare.studies import label_of, labelled, origins_of, value_of
 from ccmodel.model.run import PRESCRIBED
 
 
@@ -57,9 +59,21 @@ def test_without_a_cycle_all_that_is_judged_is_the_window():
 
 def test_repeats_of_a_condition_share_a_label_in_the_order_of_values():
     recordings = [recording(pretension_N=p, id=f"r{i}") for i, p in enumerate([7.0, 0.7, 7.0, 3.5])]
-    groups = grouped(recordings, "pretension")
-    assert list(groups) == ["0.7 N", "3.5 N", "7 N"]
-    assert [r.id for r in groups["7 N"]] == ["r0", "r2"]
+    labels = [(label, r.id) for label, r in labelled(recordings, "pretension")]
+    assert labels == [("0.7 N", "r1"), ("3.5 N", "r3"), ("7 N", "r0"), ("7 N", "r2")]
+
+
+def test_measured_and_simulated_recordings_in_one_study_are_told_apart():
+    simulated = recording()
+    measured = simulated.with_channels(simulated.channels, simulated.derived_from, "rig")
+    labels = [label for label, _ in labelled([simulated, measured], "pretension")]
+    assert labels == ["7 N, recording (virtual rig, simulated)", "7 N, recording (measured)"]
+    assert origins_of([simulated, measured]) == "recording (measured) and recording (virtual rig, simulated)"
+
+
+def test_a_note_of_the_excitation_that_is_no_number_is_not_stated():
+    noted = replace(recording(), excitation={"frequency_Hz": "about 1"})
+    assert np.isnan(value_of(noted, "frequency"))
 
 
 def test_labels_name_values_as_people_do():

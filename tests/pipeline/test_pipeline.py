@@ -101,8 +101,8 @@ def test_it_recovers_the_truth_that_the_logs_were_made_with(finished):
 def test_simulated_data_are_never_called_measured(finished):
     page = (finished / "results/index.html").read_text()
     assert "virtual rig, simulated" in page
-    assert "measured" not in page
-    assert "experiment" not in page.replace("half-loop experiment", "")
+    assert "measured" not in page.replace("the paper's rig (measured)", "")
+    assert "experiment" not in page
 
 
 def test_recordings_carry_their_provenance(finished):
@@ -126,7 +126,11 @@ def test_a_second_run_does_nothing(copy):
 def test_a_new_batch_appears_with_three_lines_of_config(copy):
     write_batch(copy / "data/raw/added", pretensions=(5.0,))
     write_config(copy, added={"batches": ["added"], "variable": "pretension"})
+    results = copy / "results"
+    old = ["simulated/fitted/tiny.nc", "fits/fitted/shared.json", "recordings/tiny.nc", "figures/pretension.png"]
+    before = [(results / f).stat().st_mtime_ns for f in old]
     assert snakemake(copy).returncode == 0
+    assert [(results / f).stat().st_mtime_ns for f in old] == before, "only what depends on the new batch is made"
     assert (copy / "results/figures/added.png").exists()
     assert "added" in set(pd.read_parquet(copy / "results/tables/errors.parquet")["batch"])
 
@@ -162,6 +166,31 @@ def test_bad_input_is_a_line_each_and_nothing_else_is_lost(copy):
     errors = pd.read_parquet(copy / "results/tables/errors.parquet")
     assert set(errors["batch"]) == {"tiny", "no-column", "empty", "cut"}
     assert set(errors.loc[errors["batch"] == "cut", "recording"]) == {"t-3.5N"}
+
+
+def test_a_refused_batch_takes_only_its_own_with_it(copy):
+    """The batch that everything was fitted on is refused: the recordings of the others are still drawn and scored."""
+    write_batch(copy / "data/raw/other", pretensions=(5.0,))
+    batch = copy / "data/raw/tiny/batch.yaml"
+    batch.write_text(batch.read_text().replace("format: 1", "fromat: 1"))
+    (copy / "data/raw/not a batch").mkdir()
+    (copy / "data/raw/empty").mkdir()
+    (copy / "data/raw/other/.ipynb_checkpoints").mkdir()
+    write_config(copy, added={"batches": ["other"], "variable": "pretension"})
+    run = snakemake(copy)
+    assert run.returncode == 0, run.stdout + run.stderr
+    lines = ccmodel("left-out", str(copy / "results")).stderr
+    for said in ("did you mean 'format'", "not a batch: a batch's name", "empty/batch.yaml", "fit fitted: no usable"):
+        assert said in lines
+    assert "not simulated" in (copy / "results/figures/added.svg").read_text()
+    assert set(pd.read_parquet(copy / "results/tables/errors.parquet")["batch"]) == {"other"}
+
+
+def test_left_out_of_a_run_that_did_not_end_says_so(tmp_path):
+    said = ccmodel("left-out", str(tmp_path))
+    assert said.returncode == 2
+    assert "no run came to its end" in said.stderr
+    assert "Traceback" not in said.stderr
 
 
 def test_a_misspelt_key_of_the_configuration_is_one_line(copy):

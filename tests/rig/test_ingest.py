@@ -3,8 +3,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_up_batch import COUNTS, table
 
 from ccmodel.recording import read_recordings, write_recordings
+from ccmodel.rig import ingest
+from ccmodel.rig.batch import valid_name
 from ccmodel.rig.ingest import ingest_batch
 
 CASES = Path(__file__).parents[3] / "shared/concealed/cases"
@@ -75,6 +78,7 @@ REFUSED = {
         "there twice",
     ),
     "text in a cell": (cell(17, 3, "over"), 17, "drive_current_A", "must be a number, found 'over'"),
+    "stray quotation mark": (cell(17, 3, '"1.0'), 17, "drive_current_A", "must be a number, found '\"1.0'"),
     "cells empty in bulk": (
         changed("drive_current_A", lambda t: t.drive_current_A.where((t.index < 50) | (t.index > 60))),
         52,
@@ -84,8 +88,10 @@ REFUSED = {
     "column empty": (changed("load_current_A", lambda t: np.nan), None, "load_current_A", "has no numbers"),
     "row too short": (line(20, lambda s: s.rsplit(",", 1)[0]), 20, None, "has 6 cells, the header has 7"),
     "row too long": (line(20, lambda s: s + ",1"), 20, None, "has 8 cells, the header has 7"),
-    "cut between cells": (write_bytes(lambda raw: raw[: raw.rindex(b",") - 3]), 401, None, "cut in the middle"),
-    "cut within a cell": (write_bytes(lambda raw: raw[: raw.rindex(b".") + 1]), 401, None, "cut in the middle"),
+    "cut between cells": (write_bytes(lambda raw: raw[: raw.rindex(b",") - 3]), 401, None, "the last line is cut"),
+    "cut within a cell": (write_bytes(lambda raw: raw[: raw.rindex(b".") + 1]), 401, None, "the last line is cut"),
+    "whole line without its end": (write_bytes(lambda raw: raw[:-1]), 401, None, "the last line is cut"),
+    "only commas left of a line": (write_bytes(lambda raw: raw + b",,"), 402, None, "the last line is cut"),
     "time back": (cell(30, 0, "0.05"), 30, "time_s", "time must increase, found 0.05 s after 0.112 s"),
     "gross gap": (frame(lambda t: t.drop(index=range(100, 150))), 102, "time_s", "a gap of 0.204 s"),
     "many gaps": (frame(lambda t: t.drop(index=range(150, 400, 2))), None, "time_s", "gaps"),
@@ -110,6 +116,13 @@ REFUSED = {
         "load_current_A",
         "missing though other logs of the batch have it",
     ),
+    "load encoder lost": (
+        frame(lambda t: t.drop(columns="load_encoder_counts")),
+        1,
+        "load_encoder_counts",
+        "missing though other logs of the batch have it",
+    ),
+    "path that is none": (lambda b: b.log().unlink() or b.log().mkdir(), None, None, "cannot be read"),
 }
 
 
@@ -141,7 +154,30 @@ WARNED = {
         "2 cells have no number",
     ),
     "sample twice": (frame(lambda t: t.loc[[*range(100), 99, *range(100, 400)]]), 102, None, "the same sample again"),
-    "no end": (write_bytes(lambda raw: raw[:-1] + b"0"), 401, None, "the last line has no end"),
+    "uneven": (
+        changed("time_s", lambda t: (t.time_s + np.random.default_rng(0).uniform(-0.0015, 0.0015, 400)).round(6)),
+        None,
+        "time_s",
+        "sampled unevenly",
+    ),
+    "one sample late": (
+        changed("time_s", lambda t: t.time_s + 0.003 * (t.index == 200)),
+        202,
+        "time_s",
+        "few or none are lost",
+    ),
+    "late and lost": (
+        frame(lambda t: t.assign(time_s=t.time_s + 0.003 * (t.index == 200)).drop(index=[300, 301])),
+        202,
+        "time_s",
+        "samples were dropped",
+    ),
+    "load cell frozen": (
+        changed("drive_load_cell_V", lambda t: t.drive_load_cell_V.where((t.index < 150) | (t.index >= 290), 0.95)),
+        152,
+        "drive_load_cell_V",
+        "stays at 0.95 up to row 291 while the drive moves: sensor frozen",
+    ),
     "extra column": (
         changed("motor_temperature_degC", lambda t: "warm"),
         1,
@@ -256,6 +292,8 @@ def edit(*keys, value=None, drop=False, new=None):
         (edit("batch", value="other"), "batch: must be the folder's name, 'bench', found 'other'"),
         (edit("origin", value="model"), "origin: must be 'rig' or 'virtual-rig', found 'model'"),
         (edit("recordings", 1, "id", value="one"), "recordings: id 'one' is given to 2 recordings"),
+        (edit("recordings", 1, "id", value=""), "recordings[1].id: a name is letters, digits"),
+        (edit("recordings", 1, "file", value=""), "recordings[1].file: must be the log's path"),
         (edit("recordings", 1, "id", value="a/b"), "recordings[1].id: a name is letters, digits"),
         (edit("recordings", 1, "file", value="../one.csv"), "recordings[1].file: a log lies inside"),
         (edit("recordings", 0, "conduit", value=[]), "recordings[0].conduit: needs at least 1 entries, has 0"),
@@ -274,6 +312,14 @@ def test_a_bad_description_refuses_the_batch_in_one_line(bench, change, text):
     assert text in finding.text
 
 
+def test_one_misspelt_key_of_the_only_recording_is_one_line(bench):
+    del bench.described["recordings"][1]
+    recording = bench.described["recordings"][0]
+    recording["pretensoin_N"] = recording.pop("pretension_N")
+    (finding,) = ingest_batch(bench.write().folder).findings
+    assert "did you mean 'pretension_N'?" in finding.text
+
+
 def test_no_description_at_all(tmp_path):
     (finding,) = ingest_batch(tmp_path).findings
     assert "there is no such file" in finding.text
@@ -286,12 +332,197 @@ def test_nothing_left_after_the_transient(bench):
     assert "before settled_s 4 s" in ingested.findings[0].text
 
 
+LACKING = ["load_current_A", "drive_load_cell_V", "load_encoder_counts"]
+
+
+def drop(bench, names, columns):
+    for name in names:
+        bench.tables[name] = bench.tables[name].drop(columns=columns)
+    return bench
+
+
+def without_sensors(bench):
+    for end, key in (("load", "torque_constant_Nm_per_A"), ("drive", "load_cell"), ("load", "encoder_counts_per_rev")):
+        del bench.described["rig"][end][key]
+    return bench
+
+
+def add_logs(bench, *names):
+    for seed, name in enumerate(names, start=3):
+        bench.tables[name] = table(seed=seed)
+        bench.described["recordings"].append({**bench.described["recordings"][0], "id": name, "file": f"{name}.csv"})
+    return bench
+
+
 def test_rig_without_a_sensor_lacks_its_channels_without_a_finding(bench):
-    for name, frame in bench.tables.items():
-        bench.tables[name] = frame.drop(columns=["load_current_A", "drive_load_cell_V"])
+    drop(without_sensors(bench), ["one", "two"], LACKING)
     ingested = ingest_batch(bench.write().folder)
     assert ingested.findings == []
-    assert set(ingested.recordings[0].channels) == {"theta_in_rad", "theta_out_rad", "tau_in_Nm", "F_load_N"}
+    assert set(ingested.recordings[0].channels) == {"theta_in_rad", "tau_in_Nm", "F_load_N"}
+
+
+def test_sensors_that_are_stated_and_in_no_log_are_told_once(bench):
+    ingested = ingest_batch(drop(bench, ["one", "two"], LACKING).write().folder)
+    assert [f.severity for f in ingested.findings] == ["warning"] * 3
+    assert {f.file for f in ingested.findings} == {str(bench.folder / "batch.yaml")}
+    assert {f.text for f in ingested.findings} == {
+        "states rig.drive.load_cell, but no log has drive_load_cell_V: F_drive_N, T1_N, T3_N are absent",
+        "states rig.load.encoder_counts_per_rev, but no log has load_encoder_counts: theta_out_rad is absent",
+        "states rig.load.torque_constant_Nm_per_A, but no log has load_current_A: tau_out_Nm, T2_N, T4_N are absent",
+    }
+    assert [set(r.channels) for r in ingested.recordings] == [{"theta_in_rad", "tau_in_Nm", "F_load_N"}] * 2
+
+
+def test_a_current_is_not_missed_where_there_is_a_torque_sensor(bench):
+    bench.described["rig"]["drive"]["torque_sensor"] = {"Nm_per_count": 4e-5}
+    for name, frame in bench.tables.items():
+        bench.tables[name] = frame.rename(columns={"drive_current_A": "drive_torque_counts"})
+    ingested = ingest_batch(bench.write().folder)
+    assert ingested.findings == []
+    assert "tau_in_Nm" in ingested.recordings[0]
+
+
+def test_most_logs_decide_what_a_rig_has(bench):
+    drop(add_logs(bench, "three"), ["one", "two"], ["load_current_A"])
+    ingested = ingest_batch(bench.write().folder)
+    (finding,) = ingested.findings
+    assert (finding.file, finding.severity) == (str(bench.log("three")), "warning")
+    assert "only 1 of 3 logs have this column" in finding.text
+    assert ["tau_out_Nm" in r for r in ingested.recordings] == [False, False, True]
+
+
+def test_a_refused_log_has_no_say_in_what_a_rig_has(bench):
+    drop(add_logs(bench, "three", "four"), ["one", "two"], ["load_current_A"])
+    bench.write()
+    for name in ("three", "four"):
+        bench.log(name).write_text(bench.log(name).read_text()[:-1])
+    ingested = ingest_batch(bench.folder)
+    assert [r.id for r in ingested.recordings] == ["one", "two"]
+    assert [(f.severity, f.file == str(bench.folder / "batch.yaml")) for f in ingested.findings] == [
+        ("warning", True),
+        ("refused", False),
+        ("refused", False),
+    ]
+
+
+def test_the_only_log_of_a_batch_is_not_believed_against_its_description(bench):
+    del bench.tables["two"], bench.described["recordings"][1]
+    ingested = ingest_batch(drop(bench, ["one"], LACKING).write().folder)
+    (finding,) = ingested.findings
+    assert ingested.recordings == []
+    assert (finding.severity, finding.row, finding.column) == ("refused", 1, "drive_load_cell_V")
+    assert "load_encoder_counts (stated by rig.load.encoder_counts_per_rev)" in finding.text
+    assert "restore the column or, if the rig has no such sensor, take its key out of batch.yaml" in finding.text
+    ingested = ingest_batch(without_sensors(bench).write().folder)
+    assert ingested.findings == []
+    assert set(ingested.recordings[0].channels) == {"theta_in_rad", "tau_in_Nm", "F_load_N"}
+
+
+def test_load_encoder_that_the_description_does_not_know(bench):
+    del bench.described["rig"]["load"]["encoder_counts_per_rev"]
+    ingested = ingest_batch(bench.write().folder)
+    assert {f.text for f in ingested.findings} == {
+        "not used: batch.yaml has no rig.load.encoder_counts_per_rev to make sense of it"
+    }
+    assert "theta_out_rad" not in ingested.recordings[0]
+
+
+def test_uneven_and_yet_lost_beyond_use(bench):
+    late = 0.003 * (np.arange(400) % 4 == 0)
+    changed("time_s", lambda t: t.time_s + late)(bench)
+    assert "few or none are lost" in ingest_batch(bench.folder).findings[0].text
+    frame(lambda t: t.drop(index=range(200, 240)))(bench)
+    (finding,) = ingest_batch(bench.folder).findings
+    assert (finding.severity, finding.row) == ("refused", 202)
+
+
+def test_cells_in_quotation_marks(bench):
+    plain = ingest_batch(bench.write().folder).recordings[0]
+    lines = bench.log().read_text().splitlines()
+    bench.log().write_text("".join('"' + line.replace(",", '","') + '"\n' for line in lines))
+    ingested = ingest_batch(bench.folder)
+    assert ingested.findings == []
+    assert ingested.recordings[0]["T1_N"] == pytest.approx(plain["T1_N"])
+
+
+def test_clock_coarser_than_half_a_step(bench):
+    time = table(seed=1).time_s
+    changed("time_s", lambda t: np.floor(time / 0.004 * 1.5) * 0.001)(bench)
+    assert ingest_batch(bench.folder).findings == []
+
+
+def test_step_of_the_drive_encoder_is_not_its_accuracy(bench):
+    bench.described["rig"]["drive"]["encoder_accuracy_rad"] = 0.001
+    (recording, _) = ingest_batch(bench.write().folder).recordings
+    assert recording.encoder_step_rad == pytest.approx(2 * np.pi / COUNTS)
+    assert recording.accuracy["theta_in_rad"] == 0.001
+
+
+def test_frozen_channel_is_told_and_kept_unless_the_drive_rests(bench):
+    changed("load_current_A", lambda t: t.load_current_A.where(t.index >= 350, t.load_current_A.abs().min()))(bench)
+    findings = ingest_batch(bench.folder).findings
+    assert [(f.column, f.row) for f in findings] == [("load_current_A", 2)]
+    long_rest = table(n=600, rest=1.2, seed=1)
+    long_rest.loc[20:220, "load_current_A"] = long_rest.load_current_A[20]
+    bench.tables["one"] = long_rest
+    assert ingest_batch(bench.write().folder).findings == []
+
+
+def test_load_encoder_that_stops_between_longer_holds(bench):
+    rest, stopped = table(n=2000, rest=4.2, seed=1), 40
+    rest.loc[(rest.index >= 1200) & (rest.index < 1600), "load_encoder_counts"] = stopped
+    bench.tables["one"] = rest
+    (finding,) = ingest_batch(bench.write().folder).findings
+    assert finding.column == "load_encoder_counts"
+
+
+def test_logs_in_a_folder_of_the_batch(bench):
+    bench.write()
+    (bench.folder / "logs").mkdir()
+    for entry in bench.described["recordings"]:
+        raw = bench.log(entry["id"]).read_bytes()
+        entry["file"] = f"logs/{entry['id']}.csv.gz"
+        (bench.folder / entry["file"]).write_bytes(gzip.compress(raw))
+    ingested = ingest_batch(bench.write().folder)
+    assert ingested.findings == []
+    assert [r.id for r in ingested.recordings] == ["one", "two"]
+
+
+@pytest.mark.parametrize("step", ["read_log", "check_sensors", "calibrate"])
+def test_what_nobody_foresaw_costs_one_recording_only(bench, monkeypatch, step):
+    real, calls = getattr(ingest, step), []
+
+    def first_fails(*args):
+        calls.append(args)
+        if len(calls) == 1:
+            raise ZeroDivisionError("odd\nlog")
+        return real(*args)
+
+    monkeypatch.setattr(ingest, step, first_fails)
+    ingested = ingest_batch(bench.write().folder)
+    assert [r.id for r in ingested.recordings] == ["two"]
+    (finding,) = ingested.findings
+    assert (finding.file, finding.severity) == (str(bench.log()), "refused")
+    assert "(ZeroDivisionError: odd log)" in finding.text
+
+
+def test_what_nobody_foresaw_in_a_description_is_a_finding(bench, monkeypatch):
+    def fails(folder):
+        raise KeyError("odd")
+
+    monkeypatch.setattr(ingest, "load_batch", fails)
+    (finding,) = ingest_batch(bench.write().folder).findings
+    assert finding.file == str(bench.folder / "batch.yaml")
+    assert "KeyError" in finding.text
+
+
+@pytest.mark.parametrize("name", ["my batch", "{batch}", ".hidden"])
+def test_folder_whose_name_no_batch_can_have(bench, name):
+    assert not valid_name(name)
+    folder = bench.write().folder.rename(bench.folder.parent / name)
+    (finding,) = ingest_batch(folder).findings
+    assert (finding.severity, finding.file) == ("refused", str(folder))
+    assert f"'{name}' cannot be a batch's name" in finding.text and "rename the folder" in finding.text
 
 
 def test_sensor_that_the_description_does_not_know(bench):

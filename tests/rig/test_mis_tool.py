@@ -1,3 +1,5 @@
+import json
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -50,8 +52,7 @@ def test_a_nested_data_set(tmp_path):
     write(source / "data/deep/Tool_8", "12.TXT", text(trial(0.2, 0.3, 2), delimiter="  ", header="some words\n\n"))
     imported = import_mis_tool(source, tmp_path / "raw")
     assert [b.name for b in imported.batches] == ["Tool-9", "Tool_8"]
-    (finding,) = imported.findings
-    assert "README.txt" in str(finding) and "no trial" in str(finding)
+    assert imported.findings == []
     ingested = ingest_batch(imported.batches[0])
     assert ingested.findings == []
     assert ingested.batch.rig.drive.torque_sign == -1
@@ -71,6 +72,7 @@ def test_a_nested_data_set(tmp_path):
     (deep,) = ingest_batch(imported.batches[1]).recordings
     assert "stop" not in deep.excitation
     described = yaml.safe_load((imported.batches[0] / "batch.yaml").read_text())
+    assert "Open Database License" in described["note"] and "10.1109/LRA.2018.2849862" in described["note"]
     assert "%Freq_Hz=0.99" in described["recordings"][1]["note"]
 
 
@@ -123,6 +125,51 @@ def test_wild_trials_are_findings_and_the_good_one_comes_through(tmp_path):
         ("03", "refused"),
         ("04", "refused"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        ("The data set\n- 10 columns,\n- 52 trials.\n\n1. Cite it.\n", False),
+        ("", True),
+        (HEADER, True),
+        (HEADER + "0.0,1,2,3,4,5,6\n", True),
+        ("0.0 1 2 3 4 5 6\n", True),
+        ("words\n" + "1,2,3\n" * 600, True),
+    ],
+    ids=["prose", "empty", "header only", "one row", "one row without header", "few columns"],
+)
+def test_files_that_are_no_trials(tmp_path, content, told):
+    write(tmp_path / "tool", "00.TXT", text(trial()))
+    write(tmp_path / "tool", "01.TXT", content)
+    imported = import_mis_tool(tmp_path / "tool", tmp_path / "raw")
+    assert [(Path(f.file).name, f.severity) for f in imported.findings] == ([("01.TXT", "refused")] if told else [])
+    assert json.loads((tmp_path / "raw/findings.json").read_text()) == [asdict(f) for f in imported.findings]
+
+
+def test_an_import_replaces_an_earlier_one_only_if_it_succeeds(tmp_path):
+    for folder in ("old", "new"):
+        write(tmp_path / folder / f"{folder}-tool", "00.TXT", text(trial()))
+    out = tmp_path / "made/raw"
+    import_mis_tool(tmp_path / "old", out)
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="no trial found"):
+        import_mis_tool(tmp_path / "empty", out)
+    assert sorted(p.name for p in out.iterdir()) == ["findings.json", "old-tool"]
+    (batch,) = import_mis_tool(tmp_path / "new", out).batches
+    assert batch == out / "new-tool"
+    assert sorted(p.name for p in out.iterdir()) == ["findings.json", "new-tool"]
+    assert [p.name for p in out.parent.iterdir()] == ["raw"]
+
+
+def test_an_import_replaces_nothing_else(tmp_path):
+    write(tmp_path / "tool", "00.TXT", text(trial()))
+    write(tmp_path / "raw/mine", "batch.yaml", "format: 1\n")
+    with pytest.raises(InputError, match="mine is from no import"):
+        import_mis_tool(tmp_path / "tool", tmp_path / "raw")
+    assert (tmp_path / "raw/mine/batch.yaml").is_file()
+    with pytest.raises(InputError, match="is no folder"):
+        import_mis_tool(tmp_path / "tool", tmp_path / "tool/00.TXT")
 
 
 def test_signs_in_doubt_are_told(tmp_path):

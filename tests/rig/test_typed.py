@@ -1,4 +1,4 @@
-from typing import Literal
+from typing import Annotated, Literal
 
 import pytest
 from pydantic import Field
@@ -17,6 +17,9 @@ class Outer(TypedModel):
     by_name: dict[str, Inner] = Field(default_factory=dict)
     choice: Inner | None = None
     friction: NotNegative = 0.1
+    short: Annotated[tuple[Inner, ...], Field(min_length=1)] | None = None
+    word: Annotated[str, Field(min_length=2)] = "word"
+    code: Annotated[str, Field(pattern="^[a-c]{1}$")] = "a"
     bounds: dict[Literal["low_N", "high_N"], float] = Field(default_factory=dict)
 
 
@@ -58,7 +61,26 @@ def test_numbers_as_people_write_them(tmp_path):
         ("name: a\n\tpieces: 3\n", 2, "not valid YAML"),
         ("", None, "must hold keys and values, found nothing"),
         ("- 1\n", None, "must hold keys and values, found a list"),
+        (GOOD + "note: 2026-02-30\n", 5, "'2026-02-30' cannot be read (day is out of range for month): if it is text"),
+        (GOOD + "friction: !!bool fast\n", 5, "'fast' cannot be read"),
+        (GOOD + "friction: !!timestamp fast\n", 5, "'fast' cannot be read"),
+        (GOOD + "? [1, 2]\n: x\n", 5, "a key must be a word, found a list or a mapping"),
+        ("name: a\npieces: {[a]: b}\n", 2, "a key must be a word"),
+        (GOOD + "choice: {{a: 1}: 2}\n", 5, "a key must be a word"),
+        (GOOD + "2026-01-01: 2\n", 5, "unknown key '2026-01-01' at the top level"),
+        (GOOD + "on: 2\n", 5, "unknown key 'on' at the top level"),
+        (GOOD + '"a\\nb": 2\n', 5, "unknown key 'a\\nb' at the top level"),
+        (GOOD + "choice: &x [*x]\n", None, "holds what cannot be read as keys and values"),
+        (GOOD + "choice: &x {a: *x}\n", None, "holds what cannot be read as keys and values"),
+        (GOOD + "choice: " + "[" * 5000 + "\n", None, "holds what cannot be read as keys and values"),
+        (GOOD + 'name2: "\\U00110000"\n', None, "holds what cannot be read as keys and values"),
+        (GOOD + 'name2: "\\ud800"\n', 1, "nvalid JSON"),
+        (GOOD + "short: []\n", 5, "short: needs at least 1 entries, has 0"),
+        (GOOD + "short:\n- {length_m: 1, sing: 1}\n", 6, "unknown key 'sing' in short[0]; did you mean 'sign'?"),
+        (GOOD + "word: ''\n", 5, "word: needs at least 2 characters, found ''"),
+        (GOOD + "code: z\n", 5, "code: String should match pattern '^[a-c]{1}$', found 'z'"),
     ],
+    ids=lambda value: repr(value)[:60],
 )
 def test_one_clear_line_a_problem(tmp_path, text, line, message):
     with pytest.raises(InputError) as raised:
@@ -86,3 +108,12 @@ def test_bytes_that_are_no_text(tmp_path):
     (tmp_path / "x.yaml").write_bytes(b"name: \xff\xfe")
     with pytest.raises(InputError, match="cannot be read as text"):
         load_yaml_model(tmp_path / "x.yaml", Outer)
+
+
+def test_keys_are_text_as_they_stand(tmp_path):
+    model = read(tmp_path, GOOD + "by_name:\n  2026-01-01: &a {length_m: 1}\n  yes: {<<: *a, sign: -1}\n  1: *a\n")
+    assert {name: (p.length_m, p.sign) for name, p in model.by_name.items()} == {
+        "2026-01-01": (1, 1),
+        "yes": (1, -1),
+        "1": (1, 1),
+    }

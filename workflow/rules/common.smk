@@ -5,7 +5,7 @@ from pathlib import Path
 from snakemake.exceptions import WorkflowError
 
 from ccmodel.config import EACH, ESTIMATED, batches_in, expand_studies, load_config
-from ccmodel.provenance import source_digest
+from ccmodel.provenance import files_in, source_digest
 from ccmodel.typed import InputError
 
 try:
@@ -13,7 +13,7 @@ try:
     CONFIG = load_config(Path(workflow.configfiles[-1]))
     RAW = Path(CONFIG.raw)
     RESULTS = CONFIG.results
-    BATCHES = batches_in(RAW)
+    BATCHES, UNUSABLE = batches_in(RAW)
     STUDIES = expand_studies(CONFIG, BATCHES)
 except InputError as error:
     print(error, file=sys.stderr)

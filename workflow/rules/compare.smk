@@ -13,7 +13,7 @@ rule tabulate_errors:
         "../envs/ccmodel.yaml"
     params:
         parameters=[parameters for parameters, _, _ in runs()],
-        sources=source_digest("compare", "recording.py"),
+        sources=source_digest("ccmodel.stages.tabulate"),
     message:
         "Comparing the model with all recordings"
     script:
@@ -45,7 +45,7 @@ rule draw_study:
         "../envs/ccmodel.yaml"
     params:
         study=lambda wildcards: STUDIES[wildcards.study].model_dump_json(),
-        sources=source_digest("report/figures.py", "compare"),
+        sources=source_digest("ccmodel.stages.draw"),
     message:
         "Drawing study {wildcards.study}"
     script:

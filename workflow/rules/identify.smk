@@ -17,8 +17,9 @@ rule fit:
     conda:
         "../envs/ccmodel.yaml"
     params:
-        config=CONFIG.model_dump_json(),
-        sources=source_digest("identify", "model", "rig/motion.py"),
+        problem=lambda wildcards: CONFIG.fits[wildcards.parameters].model_dump_json(),
+        sections=CONFIG.sections,
+        sources=source_digest("ccmodel.stages.fit"),
     message:
         "Fitting parameters '{wildcards.parameters}' ({wildcards.scope})"
     script:

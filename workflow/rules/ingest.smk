@@ -1,8 +1,6 @@
 rule ingest:
     input:
-        lambda wildcards: sorted(
-            str(f) for f in (RAW / wildcards.batch).iterdir() if f.is_file()
-        ),
+        lambda wildcards: [str(f) for f in files_in(RAW / wildcards.batch)],
     output:
         recordings=f"{RESULTS}/recordings/{{batch}}.nc",
         summary=f"{RESULTS}/recordings/{{batch}}.json",
@@ -14,7 +12,7 @@ rule ingest:
         "../envs/ccmodel.yaml"
     params:
         folder=lambda wildcards: str(RAW / wildcards.batch),
-        sources=source_digest("rig", "recording.py", "typed.py"),
+        sources=source_digest("ccmodel.stages.ingest"),
     message:
         "Reading batch {wildcards.batch}"
     script:

@@ -18,8 +18,9 @@ rule write_report:
         "../envs/ccmodel.yaml"
     params:
         config=CONFIG.model_dump_json(),
+        unusable=UNUSABLE,
         studies={name: study.model_dump_json() for name, study in STUDIES.items()},
-        sources=source_digest("report"),
+        sources=source_digest("ccmodel.stages.report"),
     message:
         "Writing the page"
     script:

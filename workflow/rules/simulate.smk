@@ -17,7 +17,7 @@ rule simulate:
         "../envs/ccmodel.yaml"
     params:
         sections=CONFIG.sections,
-        sources=source_digest("model", "rig/motion.py"),
+        sources=source_digest("ccmodel.stages.simulate"),
     message:
         "Running the model on batch {wildcards.batch} with parameters '{wildcards.parameters}'"
     script:

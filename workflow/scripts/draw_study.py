@@ -4,7 +4,7 @@ from pathlib import Path
 
 from ccmodel.config import Study
 from ccmodel.jobs import logged
-from ccmodel.stages import draw_study
+from ccmodel.stages.draw import draw_study
 
 with logged(snakemake.log[0]):
     draw_study(

@@ -2,14 +2,15 @@
 
 from pathlib import Path
 
-from ccmodel.config import Config
+from ccmodel.config import Fit
 from ccmodel.jobs import logged
-from ccmodel.stages import fit_parameters
+from ccmodel.stages.fit import fit_parameters
 
 with logged(snakemake.log[0]):
     fit_parameters(
         snakemake.wildcards.parameters,
-        Config.model_validate_json(snakemake.params.config),
+        Fit.model_validate_json(snakemake.params.problem),
+        snakemake.params.sections,
         [Path(f) for f in snakemake.input.recordings],
         Path(snakemake.output[0]),
     )

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ccmodel.jobs import logged
-from ccmodel.stages import ingest
+from ccmodel.stages.ingest import ingest
 
 with logged(snakemake.log[0]):
     ingest(Path(snakemake.params.folder), Path(snakemake.output.recordings), Path(snakemake.output.summary))

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ccmodel.jobs import logged
-from ccmodel.stages import simulate
+from ccmodel.stages.simulate import simulate
 
 with logged(snakemake.log[0]):
     simulate(

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ccmodel.jobs import logged
-from ccmodel.stages import tabulate_errors
+from ccmodel.stages.tabulate import tabulate_errors
 
 with logged(snakemake.log[0]):
     names, recordings, simulated = snakemake.params.parameters, snakemake.input.recordings, snakemake.input.simulated

@@ -4,15 +4,16 @@ from pathlib import Path
 
 from ccmodel.config import Config, Study
 from ccmodel.jobs import logged
-from ccmodel.stages import report
+from ccmodel.stages.report import write_report
 
 with logged(snakemake.log[0]):
-    report(
+    write_report(
         Config.model_validate_json(snakemake.params.config),
         {name: Study.model_validate_json(study) for name, study in snakemake.params.studies.items()},
         Path(snakemake.input.errors),
         [Path(f) for f in snakemake.input.fits],
         [Path(f) for f in snakemake.input.summaries],
         [Path(f) for f in snakemake.input.simulations],
+        list(snakemake.params.unusable),
         Path(snakemake.output.page),
     )

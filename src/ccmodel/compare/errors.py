@@ -56,15 +56,15 @@ def _upward_crossings(share: NDArray) -> list[int]:
     return crossings
 
 
-def error_table(pairs: Iterable[tuple[Recording, Recording]], parameters: str) -> pd.DataFrame:
+def error_table(pairs: Iterable[tuple[Recording, Recording | None]], parameters: str) -> pd.DataFrame:
     """Root mean square error of each channel over one cycle.
 
     The paper's Table I does not say what it divides by; here it is the recording's peak to peak over the cycle.
 
     Parameters
     ----------
-    pairs : iterable of (Recording, Recording)
-        Recordings, each with what the model says of it.
+    pairs : iterable of (Recording, Recording or None)
+        Recordings, each with what the model says of it, if it could be run.
     parameters : str
         Name of the parameter set that the model ran with.
 
@@ -76,6 +76,8 @@ def error_table(pairs: Iterable[tuple[Recording, Recording]], parameters: str) -
     """
     rows = []
     for recorded, simulated in pairs:
+        if simulated is None:
+            continue
         window = last_cycle(recorded)
         for channel in CHANNELS:
             if channel not in recorded or simulated.derived_from.get(channel) in (PRESCRIBED, None):

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ccmodel.recording import Recording
+from ccmodel.recording import ORIGIN, Recording
 
 
 def value_of(recording: Recording, variable: str) -> float | str:
@@ -20,10 +20,10 @@ def value_of(recording: Recording, variable: str) -> float | str:
     Returns
     -------
     float or str
-        NaN where the recording does not say.
+        NaN where the recording does not say; what was noted of the excitation is a note, and may not be a number.
     """
     if variable == "recording":
-        return recording.id
+        return f"{recording.batch}/{recording.id}"
     if variable == "bend":
         return recording.path.bend_rad
     if variable == "pretension":
@@ -32,7 +32,10 @@ def value_of(recording: Recording, variable: str) -> float | str:
         bent = recording.path.piece_bend_rad > 0
         return float((recording.path.piece_length_m[bent] / recording.path.piece_bend_rad[bent]).min(initial=np.inf))
     noted = {"frequency": "frequency_Hz", "load_level": "load_level"}[variable]
-    return float(recording.excitation.get(noted, np.nan))
+    try:
+        return float(recording.excitation[noted])
+    except (KeyError, TypeError, ValueError):
+        return np.nan
 
 
 def label_of(value: float | str, variable: str) -> str:
@@ -53,9 +56,22 @@ def label_of(value: float | str, variable: str) -> str:
     }[variable]
 
 
-def grouped(recordings: Iterable[Recording], variable: str) -> dict[str, list[Recording]]:
-    """Recordings by the label of a variable's value, in the order of the values; repeats come together."""
-    groups: dict[str, list[Recording]] = {}
-    for recording in sorted(recordings, key=lambda r: value_of(r, variable)):
-        groups.setdefault(label_of(value_of(recording, variable), variable), []).append(recording)
-    return groups
+def labelled(recordings: Iterable[Recording], variable: str) -> list[tuple[str, Recording]]:
+    """Recordings in the order of a variable's values, each with its label in the legend; repeats share one.
+
+    Where measured and simulated recordings come together, every label says which it is.
+    """
+    ordered = sorted(recordings, key=lambda r: _sort_key(value_of(r, variable)))
+    mixed = len({r.origin for r in ordered}) > 1
+    suffix = {r.origin: f", {ORIGIN[r.origin]}" if mixed else "" for r in ordered}
+    return [(label_of(value_of(r, variable), variable) + suffix[r.origin], r) for r in ordered]
+
+
+def origins_of(recordings: Iterable[Recording]) -> str:
+    """Where recordings come from, as figures and pages say it."""
+    return " and ".join(ORIGIN[origin] for origin in sorted({r.origin for r in recordings}))
+
+
+def _sort_key(value: float | str) -> tuple:
+    """Values in their order, those not stated last."""
+    return (value,) if isinstance(value, str) else (np.isnan(value), value)

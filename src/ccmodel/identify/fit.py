@@ -18,6 +18,15 @@ from ccmodel.recording import Recording
 DIFFERENCE_STEP = 1e-3
 # Far below what repeated recordings differ by (1 %).
 TOLERANCE = 1e-5
+# Why scipy's least_squares stops, by its status.
+STOPPED = {
+    -1: "the optimiser was given improper input",
+    0: "stopped at the largest number of evaluations without converging",
+    1: "converged: no direction leads downhill",
+    2: "converged: the error no longer falls",
+    3: "converged: the parameters no longer change",
+    4: "converged: neither the error falls nor the parameters change",
+}
 
 
 @dataclass(frozen=True)
@@ -75,6 +84,10 @@ def fit(recordings: Iterable[tuple[Recording, Parameters]], problem: Fit, sectio
     if not given:
         return FitResult(False, "no usable recording to fit", {}, [], None, 0, [])
     start = _start(problem, given[0][1])
+    unknown = [name for name, value in start.items() if value is None]
+    if unknown:
+        text = f"{unknown[0]} needs a start in the configuration: the batch file has no estimate of it"
+        return FitResult(False, text, {}, [], None, 0, names)
     low, high = (np.array([problem.free[n].bounds[i] for n in start]) for i in (0, 1))
     x0 = np.array(list(start.values()))
     if (outside := (x0 < low) | (x0 > high)).any():
@@ -107,7 +120,7 @@ def fit(recordings: Iterable[tuple[Recording, Parameters]], problem: Fit, sectio
     at_bound = [n for n, active in zip(start, found.active_mask, strict=True) if active]
     values = physical(found.x)
     mean_square = float(np.mean(found.fun**2))
-    return FitResult(bool(found.success), found.message, values, at_bound, mean_square, int(found.nfev), names)
+    return FitResult(bool(found.success), STOPPED[found.status], values, at_bound, mean_square, int(found.nfev), names)
 
 
 def _start(problem: Fit, estimates: Parameters) -> dict[str, float]:

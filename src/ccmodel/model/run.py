@@ -41,9 +41,9 @@ class ModelInput:
     @classmethod
     def of(cls, recording: Recording, step_s: float | None = None) -> "ModelInput":
         """Input from a recording; from a sample every `step_s` of it, once every sample has served its part."""
-        theta_in = drive_motion(
-            recording.time_s, recording["theta_in_rad"], recording.accuracy["theta_in_rad"], recording.rest_s
-        )
+        theta_in = recording["theta_in_rad"]
+        if recording.encoder_step_rad is not None:
+            theta_in = drive_motion(recording.time_s, theta_in, recording.encoder_step_rad, recording.rest_s)
         tau_out = _without_noise(recording["tau_out_Nm"], recording.time_s) if "tau_out_Nm" in recording else None
         every = stride(recording, step_s)
         return cls(recording[::every], theta_in[::every], None if tau_out is None else tau_out[::every])

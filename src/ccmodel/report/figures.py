@@ -1,7 +1,9 @@
 """The comparison figures: recordings beside what the model says of them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
+from itertools import cycle
+from pathlib import Path
 
 import matplotlib
 
@@ -13,11 +15,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ccmodel.compare.errors import last_cycle
-from ccmodel.compare.studies import grouped
+from ccmodel.compare.studies import labelled, origins_of
 from ccmodel.config import Study
+from ccmodel.model.run import PRESCRIBED
 from ccmodel.recording import ORIGIN, Recording
 
-Pair = tuple[Recording, Recording]  # a recording, and what the model says of it
+# A recording, and what the model says of it; None where the model could not be run.
+Pair = tuple[Recording, Recording | None]
 
 # Okabe and Ito's palette without its yellow, which is too faint on white: told apart with any kind of colour vision.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
@@ -61,11 +65,12 @@ def transmission_figure(pairs: Sequence[Pair], study: Study) -> Figure:
             ax.set_axis_off()
         for ax, letter, (x, y) in zip(axes.flat, "abcd", panels, strict=False):
             _loop(ax, recorded, x, y, color=COLOURS[4], linewidth=2.4, label=ORIGIN[recorded.origin])
-            _loop(ax, simulated, x, y, color="black", linewidth=1.0, label="model")
+            if simulated is not None:
+                _loop(ax, simulated, x, y, color="black", linewidth=1.0, label=_model_title([pairs[0]]))
             _name_axes(ax, x, y)
             ax.set_title(f"({letter})", loc="left")
-        _legend_below(figure, axes, columns=2)
-        figure.suptitle(f"{study.title}: {recorded.batch}/{recorded.id}, one cycle")
+        _legend_below(figure, axes)
+        figure.suptitle(f"{study.title}: {recorded.batch}/{recorded.id}")
     return figure
 
 
@@ -76,24 +81,26 @@ def loops_figure(pairs: Sequence[Pair], study: Study, x: str = "tau_in_Nm", y: s
     """
     if not pairs:
         return empty_figure(study)
-    simulated = _by_recording(pairs)
-    rows = grouped((r for r, _ in pairs), study.rows) if study.rows else {"": [r for r, _ in pairs]}
-    styles = _styles(pairs, study.variable)
+    rows = _by_label(pairs, study.rows) if study.rows else {"": pairs}
+    conditions = _by_label(pairs, study.variable)
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(
             len(rows), 2, figsize=(9, 0.8 + 3.4 * len(rows)), sharex=True, sharey=True, squeeze=False
         )
-        for (row_label, recordings), (left, right) in zip(rows.items(), axes, strict=True):
-            for label, group in grouped(recordings, study.variable).items():
-                for recorded in group:
-                    _loop(left, recorded, x, y, label=label, **styles[label])
-                    _loop(right, simulated[_key(recorded)], x, y, label=label, **styles[label])
-            left.set_title(_joined(row_label, ORIGIN[recordings[0].origin]), loc="left")
-            right.set_title(_joined(row_label, ORIGIN["model"]), loc="left")
+        for (row_label, row_pairs), (left, right) in zip(rows.items(), axes, strict=True):
+            in_row = {id(recorded) for recorded, _ in row_pairs}
+            for (label, group), style in zip(conditions.items(), _styles(), strict=False):
+                for recorded, simulated in (pair for pair in group if id(pair[0]) in in_row):
+                    _loop(left, recorded, x, y, label=label, **style)
+                    if simulated is not None:
+                        _loop(right, simulated, x, y, label=label, **style)
+            left.set_title(_joined(row_label, origins_of(r for r, _ in row_pairs)), loc="left")
+            right.set_title(_joined(row_label, _model_title(row_pairs)), loc="left")
             for ax in (left, right):
                 _name_axes(ax, x, y)
+                _say_if_empty(ax, x, y)
                 ax.label_outer()
-        _legend_below(figure, axes, columns=4)
+        _legend_below(figure, axes)
         figure.suptitle(study.title)
     return figure
 
@@ -103,24 +110,25 @@ def loops_apart_figure(pairs: Sequence[Pair], study: Study) -> Figure:
     if not pairs:
         return empty_figure(study)
     x, y = "tau_in_Nm", "tau_out_Nm"
-    simulated = _by_recording(pairs)
-    groups = grouped((r for r, _ in pairs), study.variable)
-    styles = _styles(pairs, study.variable)
-    rows = -(-(len(groups) + 1) // 2)
+    conditions = _by_label(pairs, study.variable)
+    rows = -(-(len(conditions) + 1) // 2)
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(rows, 2, figsize=(9, 0.8 + 3.2 * rows), sharex=True, sharey=True, squeeze=False)
-        for ax in axes.flat[len(groups) + 1 :]:
+        for ax in axes.flat[len(conditions) + 1 :]:
             ax.set_axis_off()
-        *apart, together = axes.flat[: len(groups) + 1]
-        for ax, (label, group) in zip(apart, groups.items(), strict=True):
-            for recorded in group:
-                _loop(ax, recorded, x, y, label=label, **styles[label])
-                _loop(together, simulated[_key(recorded)], x, y, label=label, **styles[label])
-            ax.set_title(f"{label}, {ORIGIN[group[0].origin]}", loc="left")
-        together.set_title("model, all of them", loc="left")
+        *apart, together = axes.flat[: len(conditions) + 1]
+        for ax, (label, group), style in zip(apart, conditions.items(), _styles(), strict=False):
+            for recorded, simulated in group:
+                _loop(ax, recorded, x, y, label=label, **style)
+                if simulated is not None:
+                    _loop(together, simulated, x, y, label=label, **style)
+            ax.set_title(f"{label}, {origins_of(r for r, _ in group)}", loc="left")
+        together.set_title(f"{_model_title(pairs)}, all of them", loc="left")
         for ax in (*apart, together):
             _name_axes(ax, x, y)
-        _legend_below(figure, axes, columns=4)
+            _say_if_empty(ax, x, y)
+            ax.tick_params(labelbottom=True)
+        _legend_below(figure, axes)
         figure.suptitle(study.title)
     return figure
 
@@ -134,6 +142,12 @@ def empty_figure(study: Study) -> Figure:
     return figure
 
 
+def save_figure(figure: Figure, file: Path) -> None:
+    """Write a figure as PNG or SVG; the same figure gives the same file, and text in an SVG stays text."""
+    with plt.rc_context({"svg.fonttype": "none", "svg.hashsalt": "ccmodel"}):
+        figure.savefig(file, dpi=150, metadata={"Date": None} if file.suffix == ".svg" else None)
+
+
 FIGURES = {
     "transmission": transmission_figure,
     "torque-loops": loops_figure,
@@ -142,21 +156,33 @@ FIGURES = {
 }
 
 
-def _key(recording: Recording) -> tuple[str, str]:
-    return recording.batch, recording.id
+def _by_label(pairs: Sequence[Pair], variable: str) -> dict[str, list[Pair]]:
+    """Pairs under the label of their recording's condition, in the order of the variable's values."""
+    pair_of = {id(recorded): (recorded, simulated) for recorded, simulated in pairs}
+    groups: dict[str, list[Pair]] = {}
+    for label, recorded in labelled((r for r, _ in pairs), variable):
+        groups.setdefault(label, []).append(pair_of[id(recorded)])
+    return groups
 
 
-def _by_recording(pairs: Sequence[Pair]) -> dict[tuple[str, str], Recording]:
-    return {_key(recorded): simulated for recorded, simulated in pairs}
+def _styles() -> Iterator[dict]:
+    """Colour and dash of one condition after the other: dashes change where the colours are used up."""
+    for linestyle in cycle(LINES):
+        for color in COLOURS:
+            yield {"color": color, "linestyle": linestyle}
 
 
-def _styles(pairs: Sequence[Pair], variable: str) -> dict[str, dict]:
-    """Colour and dash of each condition: dashes go on where the colours are used up."""
-    labels = grouped((r for r, _ in pairs), variable)
-    return {
-        label: {"color": COLOURS[i % len(COLOURS)], "linestyle": LINES[(i // len(COLOURS)) % len(LINES)]}
-        for i, label in enumerate(labels)
-    }
+def _model_title(pairs: Sequence[Pair]) -> str:
+    """What the model's panel is called; a load torque that it was given and not asked for is said."""
+    given = any(s is not None and s.derived_from["tau_out_Nm"] == PRESCRIBED for _, s in pairs)
+    return f"{ORIGIN['model']}, given the recorded load torque" if given else ORIGIN["model"]
+
+
+def _say_if_empty(ax: Axes, x: str, y: str) -> None:
+    """An empty panel says why it is empty."""
+    if not ax.lines:
+        text = f"not recorded, or not simulated:\n{AXIS[x][0]} over {AXIS[y][0]}"
+        ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes, wrap=True)
 
 
 def _loop(ax: Axes, recording: Recording, x: str, y: str, **style) -> None:
@@ -171,12 +197,13 @@ def _name_axes(ax: Axes, x: str, y: str) -> None:
     ax.set_ylabel(AXIS[y][0])
 
 
-def _legend_below(figure: Figure, axes: NDArray, columns: int) -> None:
+def _legend_below(figure: Figure, axes: NDArray) -> None:
     """One legend for all panels, each label once, outside them where it cannot cover the data."""
     handles = {}
     for ax in axes.flat:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
+    columns = max(1, min(4, 100 // (6 + max(map(len, handles), default=1))))
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns)
 
 

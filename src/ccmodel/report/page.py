@@ -59,7 +59,10 @@ def write_page(
             studies={n: (s, config.parameters_of(s)) for n, s in studies.items()},
             symbols=[SYMBOL[c] for c in channels],
             summary=_summary(errors, channels),
-            paper=[PAPER_TABLE_I.get(c) for c in channels],
+            # Table I is for rigs that show what the paper's did; an instrument without load cells is another thing.
+            paper=[PAPER_TABLE_I.get(c) for c in channels] if set(PAPER_TABLE_I) <= set(channels) else None,
+            simulated_only=set(errors["origin"]) == {"virtual-rig"},
+            notes={b["batch"]["batch"]: b["batch"]["note"] for b in batches if b["batch"] and b["batch"].get("note")},
             rows=_rows(errors),
             fits=fits,
             left_out=left_out,
@@ -86,11 +89,13 @@ def _summary(errors: pd.DataFrame, channels: list[str]) -> list[dict]:
     if errors.empty:
         return []
     table = errors.pivot_table("nrmse_percent", ["batch", "parameters"], "channel", aggfunc="mean", observed=True)
-    counts = errors.groupby(["batch", "parameters"])["recording"].nunique()
+    groups = errors.groupby(["batch", "parameters"])
+    counts, origins = groups["recording"].nunique(), groups["origin"].first()
     return [
         {
             "batch": batch,
             "parameters": parameters,
+            "origin": ORIGIN[origins[batch, parameters]],
             "count": int(counts[batch, parameters]),
             "values": [_or_none(row.get(c, np.nan)) for c in channels],
         }
@@ -100,7 +105,11 @@ def _summary(errors: pd.DataFrame, channels: list[str]) -> list[dict]:
 
 def _rows(errors: pd.DataFrame) -> list[dict]:
     rows = errors.to_dict("records")
-    return [r | {"symbol": SYMBOL[r["channel"]], "nrmse_percent": _or_none(r["nrmse_percent"])} for r in rows]
+    return [
+        r
+        | {"origin": ORIGIN[r["origin"]], "symbol": SYMBOL[r["channel"]], "nrmse_percent": _or_none(r["nrmse_percent"])}
+        for r in rows
+    ]
 
 
 def _or_none(value: float) -> float | None:

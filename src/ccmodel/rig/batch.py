@@ -10,7 +10,8 @@ so that a batch written before them keeps its meaning:
 - `encoder_sign`, `torque_sign` (+1 or -1) on a side whose sensors count against the signs of the model.
 - `settled_s` on a recording that begins with a start-up transient.
 - `ranges` on the rig: what a sensor can read at most, by log column, for finding saturation.
-- `load_cell`, `torque_constant_Nm_per_A` and the accuracies of what a rig has not may be left out.
+- `load_cell`, `torque_constant_Nm_per_A`, the load's `encoder_counts_per_rev` and the accuracies of what a rig has not
+  may be left out: what is stated is what the rig has.
 - `note` on the batch or on a recording: free, read by people only.
 """
 
@@ -34,14 +35,18 @@ SENSOR_COLUMNS = (
 )
 COLUMNS = REQUIRED_COLUMNS + SENSOR_COLUMNS
 
-# Names become folders, files and groups of a netCDF file.
-Name = Annotated[str, Field(min_length=1)]
 Sign = Literal[1, -1]
+NAMES = "a name is letters, digits and -_.+=,@ only and begins with a letter or digit"
+
+
+def valid_name(name: str) -> bool:
+    """Whether a batch or a recording may be called so: names become folders, files and groups of a netCDF file."""
+    return all(c.isalnum() or c in "-_.+=,@" for c in name) and (name[:1].isalnum() or name[:1] == "_")
 
 
 def _checked_name(name: str) -> str:
-    if not all(c.isalnum() or c in "-_.+=,@" for c in name) or not (name[0].isalnum() or name[0] == "_"):
-        raise ValueError("a name is letters, digits and -_.+=,@ only and begins with a letter or digit")
+    if not valid_name(name):
+        raise ValueError(NAMES)
     return name
 
 
@@ -73,8 +78,12 @@ class Side(TypedModel):
 
 
 class LoadSide(Side):
-    """The load end; without a spring the load is whatever was measured at the load pulley."""
+    """The load end; without a spring the load is whatever was measured at the load pulley.
 
+    The drive's encoder is the model's input, so every rig has it; the load's a rig may lack.
+    """
+
+    encoder_counts_per_rev: Positive | None = None
     spring_stiffness_Nm_per_rad: Positive | None = None
 
 
@@ -131,8 +140,8 @@ class Piece(TypedModel):
 class RecordingEntry(TypedModel):
     """One recording: its log, and under what conditions it was made."""
 
-    id: Name
-    file: Name
+    id: str
+    file: str
     pretension_N: Positive
     conduit: Annotated[tuple[Piece, ...], Field(min_length=1)]
     excitation: dict[str, Any] = Field(default_factory=dict)
@@ -144,6 +153,8 @@ class RecordingEntry(TypedModel):
     @field_validator("file")
     @classmethod
     def _file_inside_the_batch(cls, file: str) -> str:
+        if not file.strip():
+            raise ValueError("must be the log's path, from the batch's folder")
         if Path(file).is_absolute() or ".." in Path(file).parts:
             raise ValueError("a log lies inside its batch's folder: give its path from there")
         return file
@@ -158,7 +169,7 @@ class Batch(TypedModel):
     """A whole `batch.yaml`."""
 
     format: Literal[1]
-    batch: Name
+    batch: str
     origin: Literal["rig", "virtual-rig"]
     note: Any = None
     rig: Rig
@@ -193,14 +204,20 @@ def load_batch(folder: Path) -> Batch:
     Raises
     ------
     InputError
-        If the file is missing or does not follow the format, or names another batch than its folder.
+        If the folder's name is none a batch can have, the file is missing or does not follow the format, or it names
+        another batch than its folder.
     """
     path = Path(folder) / "batch.yaml"
-    batch = load_yaml_model(path, Batch)
     folder_name = Path(folder).resolve().name
+    if not valid_name(folder_name):
+        raise _batch_error(folder, f"{folder_name!r} cannot be a batch's name: {NAMES}; rename the folder")
+    batch = load_yaml_model(path, Batch)
     if batch.batch != folder_name:
-        problem = Problem(
-            str(path), None, f"batch: must be the folder's name, '{folder_name}', found '{batch.batch}': rename either"
-        )
-        raise InputError(str(problem), [problem])
+        text = f"batch: must be the folder's name, '{folder_name}', found '{batch.batch}': rename either"
+        raise _batch_error(path, text)
     return batch
+
+
+def _batch_error(place: Path, text: str) -> InputError:
+    problem = Problem(str(place), None, text)
+    return InputError(str(problem), [problem])

@@ -88,6 +88,9 @@ def _angle(result: Calibrated, table, end: str, side: Side, channel: str, restin
     column = f"{end}_encoder_counts"
     if column not in table:
         return
+    if side.encoder_counts_per_rev is None:
+        result.missing[column] = f"rig.{end}.encoder_counts_per_rev"
+        return
     counts = table[column].to_numpy()
     zero = counts[:resting].mean() if resting else counts[0]
     where = "the mean at rest" if resting else "the first sample"

@@ -9,7 +9,7 @@ import pandas as pd
 
 from ccmodel.rig.batch import Rig
 from ccmodel.rig.findings import LIMITS, Finding, Limits
-from ccmodel.rig.logs import longest_run
+from ccmodel.rig.logs import longest_run, runs
 
 DRIVE, LOAD = "drive_encoder_counts", "load_encoder_counts"
 
@@ -49,7 +49,8 @@ def check_sensors(
         elif column == LOAD:
             warnings += _load_stands(table, limits)
         else:
-            warnings += _saturated(table[column], rig.ranges.get(column), limits)
+            # A value that a sensor sticks to at the end of what it reads is clipping, not freezing.
+            warnings += _saturated(table[column], rig.ranges.get(column), limits) or _frozen(table, column, limits)
     return table.drop(columns=dead), [Finding(batch, file, row, col, "warning", text) for row, col, text in warnings]
 
 
@@ -77,7 +78,8 @@ def _dead(table: pd.DataFrame, column: str, rig: Rig, limits: Limits) -> tuple[i
     if column == LOAD:
         if np.ptp(values) <= limits.still_counts:
             return None, "stands still throughout while the drive moves: encoder stuck or load locked"
-        return _jump(table, column, rig.load.encoder_counts_per_rev, limits)
+        counts_per_rev = rig.load.encoder_counts_per_rev
+        return _jump(table, column, counts_per_rev, limits) if counts_per_rev else None
     if np.ptp(values) == 0:
         return None, f"is {values.iloc[0]:g} throughout: a sensor that is dead or was never connected"
     return None
@@ -96,13 +98,44 @@ def _jump(table: pd.DataFrame, column: str, counts_per_rev: float, limits: Limit
 
 def _load_stands(table: pd.DataFrame, limits: Limits) -> list[tuple]:
     """A load encoder that stops in mid-recording: a loose plug or real lost motion, so it is told and kept."""
-    start, length = longest_run(np.diff(table[LOAD].to_numpy(), prepend=np.nan) == 0)
-    drive = table[DRIVE]
-    if length == 0 or np.ptp(drive.iloc[start : start + length]) < limits.whole_travel_fraction * np.ptp(drive):
+    drive = table[DRIVE].to_numpy()
+    enough = limits.whole_travel_fraction * np.ptp(drive)
+    for part in _standstills(table, LOAD, limits):
+        if np.ptp(drive[part]) >= enough:
+            first, last = _first_and_last_row(table, part)
+            text = f"stands still up to row {last} while the drive runs through its whole range"
+            return [(first, LOAD, f"{text}: loose plug or lost motion")]
+    return []
+
+
+def _frozen(table: pd.DataFrame, column: str, limits: Limits) -> list[tuple]:
+    """A noisy sensor that keeps one value in mid-recording: a loose plug, or a converter that hung."""
+    still = _standstills(table, column, limits)
+    drive = table[DRIVE].to_numpy()
+    frozen = [part for part in still if np.ptp(drive[part]) > limits.still_counts]
+    repeats = np.diff(table[column].to_numpy(), prepend=np.nan) == 0
+    for part in still:
+        repeats[part] = False
+    if not frozen or repeats.mean() >= limits.frozen_noise_fraction:
         return []
-    last = int(table.index[start + length - 1])
-    text = f"stands still up to row {last} while the drive runs through its whole range: loose plug or lost motion"
-    return [(int(table.index[start]), LOAD, text)]
+    first, last = _first_and_last_row(table, frozen[0])
+    more = f" (and {len(frozen) - 1} more times)" if len(frozen) > 1 else ""
+    value = table[column].iloc[frozen[0].start]
+    return [(first, column, f"stays at {value:g} up to row {last} while the drive moves{more}: sensor frozen")]
+
+
+def _standstills(table: pd.DataFrame, column: str, limits: Limits) -> list[slice]:
+    """Parts of a log in which a column keeps one value for long."""
+    time = table["time_s"].to_numpy()
+    starts, lengths = runs(np.diff(table[column].to_numpy(), prepend=np.nan) == 0)
+    # A run of repeats begins behind the sample that they repeat.
+    first, last = starts - 1, starts + lengths - 1
+    long = (lengths > limits.frozen_samples) & (time[last] - time[first] > limits.frozen_s)
+    return [slice(start, stop + 1) for start, stop in zip(first[long], last[long], strict=True)]
+
+
+def _first_and_last_row(table: pd.DataFrame, part: slice) -> tuple[int, int]:
+    return int(table.index[part.start]), int(table.index[part.stop - 1])
 
 
 def _saturated(values: pd.Series, sensor_range: tuple[float, float] | None, limits: Limits) -> list[tuple]:

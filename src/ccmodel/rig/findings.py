@@ -49,6 +49,9 @@ class Limits:
         or many may hide a reversal.
     gap_steps : float
         A step of time this many times the usual one is a gap, not jitter.
+    uneven_fraction : float
+        If less than this share of the time in gaps is missing in the end, late samples were caught up with: the log is
+        sampled unevenly rather than lacking samples.
     gap_s, gap_fraction : float
         Longest single gap and largest share of the duration lost in gaps. Within a tenth of a second the drive, which
         moves at a few Hz at most, can be bridged; a longer gap may hide a reversal, and with it a branch of the loop.
@@ -67,6 +70,11 @@ class Limits:
         As many equal samples in a row at a noisy channel's extreme value are no coincidence: it is clipped.
     flat_noise_fraction : float
         A channel counts as noisy if less than this share of its samples repeat the one before.
+    frozen_s, frozen_samples : float, int
+        A noisy channel that stays the same for longer, and for more samples, while the drive moves, froze.
+    frozen_noise_fraction : float
+        A channel counts as noisy for that up to this share of repeats: a coarse converter repeats a value now and then
+        (a fifth of the time in the public recordings), yet not a score of times in a row.
     still_counts : int
         Counts that an encoder at rest may dither by.
     shortest_rest_s : float
@@ -77,6 +85,7 @@ class Limits:
     bad_cells_in_a_row: int = 3
     bad_cells_fraction: float = 0.01
     gap_steps: float = 1.5
+    uneven_fraction: float = 0.5
     gap_s: float = 0.1
     gap_fraction: float = 0.1
     fastest_rad_per_s: float = 30.0
@@ -86,6 +95,9 @@ class Limits:
     whole_travel_fraction: float = 0.95
     flat_samples: int = 5
     flat_noise_fraction: float = 0.1
+    frozen_s: float = 0.5
+    frozen_samples: int = 20
+    frozen_noise_fraction: float = 0.5
     still_counts: int = 1
     shortest_rest_s: float = 0.1
 

@@ -3,10 +3,13 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from ccmodel.recording import Recording
-from ccmodel.rig.batch import SENSOR_COLUMNS, Batch, RecordingEntry, load_batch
+from ccmodel.rig.batch import Batch, RecordingEntry, load_batch
 from ccmodel.rig.calibration import calibrate
 from ccmodel.rig.checks import check_sensors
+from ccmodel.rig.columns import check_columns
 from ccmodel.rig.findings import LIMITS, Finding, Limits
 from ccmodel.rig.logs import Log, read_log
 from ccmodel.typed import InputError
@@ -47,24 +50,48 @@ def ingest_batch(folder: Path, limits: Limits = LIMITS) -> Ingested:
         Recordings, findings and the batch's description. Bad data never raise: they are findings.
     """
     folder = Path(folder)
+    name = folder.resolve().name
     try:
         batch = load_batch(folder)
     except InputError as error:
-        name = folder.resolve().name
         return Ingested([], [Finding(name, p.file, p.line, None, "refused", p.text) for p in error.problems])
-    logs = [read_log(folder / entry.file, batch.batch, limits) for entry in batch.recordings]
-    known_by_all = {c for log in logs for c in log.columns}
-    recordings, findings = [], []
-    for entry, log in zip(batch.recordings, logs, strict=True):
-        recording, found = _recording(folder, batch, entry, log, known_by_all, limits)
+    except Exception as error:  # whatever is odd about one batch must not take the others with it
+        return Ingested([], [_unforeseen(name, folder / "batch.yaml", error)])
+    logs = [_read_log(folder / entry.file, batch.batch, limits) for entry in batch.recordings]
+    files = [str(folder / entry.file) for entry in batch.recordings]
+    findings, of_logs = check_columns(batch, str(folder / "batch.yaml"), files, logs)
+    recordings = []
+    for entry, log, of_columns in zip(batch.recordings, logs, of_logs, strict=True):
+        recording, found = _recording_or_finding(folder, batch, entry, log, of_columns, limits)
         findings += found
         if recording is not None:
             recordings.append(recording)
     return Ingested(recordings, findings, batch)
 
 
+def _unforeseen(batch: str, file: Path, error: Exception) -> Finding:
+    text = " ".join(f"cannot be read, for a reason that nobody thought of ({type(error).__name__}: {error})".split())
+    return Finding(batch, str(file), None, None, "refused", text)
+
+
+def _read_log(path: Path, batch: str, limits: Limits) -> Log:
+    try:
+        return read_log(path, batch, limits)
+    except Exception as error:  # whatever is odd about one log must not take the others with it
+        return Log((), None, [_unforeseen(batch, path, error)])
+
+
+def _recording_or_finding(
+    folder: Path, batch: Batch, entry: RecordingEntry, log: Log, of_columns: list[Finding], limits: Limits
+) -> tuple[Recording | None, list[Finding]]:
+    try:
+        return _recording(folder, batch, entry, log, of_columns, limits)
+    except Exception as error:  # as above
+        return None, [_unforeseen(batch.batch, folder / entry.file, error)]
+
+
 def _recording(
-    folder: Path, batch: Batch, entry: RecordingEntry, log: Log, columns_of_batch: set[str], limits: Limits
+    folder: Path, batch: Batch, entry: RecordingEntry, log: Log, of_columns: list[Finding], limits: Limits
 ) -> tuple[Recording | None, list[Finding]]:
     file = str(folder / entry.file)
 
@@ -73,10 +100,8 @@ def _recording(
 
     if log.table is None:
         return None, log.findings
-    lost = [c for c in SENSOR_COLUMNS if c in columns_of_batch and c not in log.columns]
-    if lost:
-        text = f"column missing though other logs of the batch have it: {', '.join(lost)}"
-        return None, [finding(1, lost[0], "refused", text)]
+    if any(f.severity == "refused" for f in of_columns):
+        return None, of_columns
     table, found = check_sensors(log.table, batch.rig, batch.batch, file, limits)
     if table is None:
         return None, found
@@ -85,7 +110,7 @@ def _recording(
         text = f"ends at {last:g} s, before settled_s {entry.settled_s:g} s of batch.yaml: nothing left to judge"
         return None, [finding(None, None, "refused", text)]
     calibrated = calibrate(table, batch.rig, limits)
-    found = log.findings + found
+    found = log.findings + of_columns + found
     found += [
         finding(None, column, "warning", f"not used: batch.yaml has no {key} to make sense of it")
         for column, key in calibrated.missing.items()
@@ -100,6 +125,7 @@ def _recording(
         pretension_N=entry.pretension_N,
         path=entry.path,
         accuracy=calibrated.accuracy,
+        encoder_step_rad=2 * np.pi / batch.rig.drive.encoder_counts_per_rev,
         excitation=entry.excitation,
         rest_s=calibrated.rest_s,
         settled_s=entry.settled_s,

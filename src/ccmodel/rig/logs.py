@@ -4,8 +4,10 @@ A log is refused as a whole when something in it shows that it is not what the r
 wrong with a file that ends in the middle of a line. What is known to be harmless is a warning.
 """
 
+import csv
 import gzip
 import io
+import re
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +18,8 @@ import pandas as pd
 from ccmodel.rig.batch import COLUMNS, REQUIRED_COLUMNS
 from ccmodel.rig.findings import LIMITS, Finding, Limits
 from ccmodel.typed import nearest
+
+QUOTED_CELL = re.compile(r'(?<![^,])"([^",]*)"(?![^,])')
 
 
 @dataclass(frozen=True)
@@ -64,11 +68,11 @@ def read_log(path: Path, batch: str, limits: Limits = LIMITS) -> Log:
     table = None
     findings = []
     try:
-        lines, ended = _lines(Path(path))
+        lines = _lines(Path(path))
         header = _header(lines)
         columns = tuple(c for c in header if c in COLUMNS)
         _check_header(header, warnings)
-        rows = _rows(lines, header, ended, warnings)
+        rows = _rows(lines, header)
         table = _numbers(rows, header)[list(columns)]
         table = _drop_repeated(_drop_bad(table, limits, warnings), warnings)
         if len(table) < limits.fewest_samples:
@@ -81,8 +85,8 @@ def read_log(path: Path, batch: str, limits: Limits = LIMITS) -> Log:
     return Log(columns, table, findings)
 
 
-def _lines(path: Path) -> tuple[list[str], bool]:
-    """Lines of the file, and whether the last of them is ended."""
+def _lines(path: Path) -> list[str]:
+    """Lines of the file, without the empty ones at its end."""
     try:
         raw = path.read_bytes()
     except FileNotFoundError:
@@ -98,14 +102,19 @@ def _lines(path: Path) -> tuple[list[str], bool]:
     except UnicodeDecodeError as error:
         row = raw[: error.start].count(b"\n") + 1
         raise _RefusedError(row, None, "is not text: the file is damaged, copy it again from the rig") from None
-    if not text.strip():
+    if not text.strip(", \t\r\n"):
         raise _RefusedError(None, None, "is empty: record it again or take it out of batch.yaml")
-    ended = text.endswith(("\n", "\r"))
     lines = text.splitlines()
+    if not text.rstrip(" \t").endswith(("\n", "\r")):
+        # Even where the last number is whole: nobody knows what the rig had still to write.
+        raise _RefusedError(
+            len(lines),
+            None,
+            "the last line is cut (it has no line end), nobody knows what else is lost: copy it again from the rig",
+        )
     while not lines[-1].strip(", \t"):
         lines.pop()
-        ended = True
-    return lines, ended
+    return lines
 
 
 def _unzip(raw: bytes) -> bytes:
@@ -140,37 +149,26 @@ def _check_header(header: list[str], warnings: list[tuple]) -> None:
     warnings += [(1, name or "(no name)", "unknown column, not used") for name in unknown]
 
 
-def _rows(lines: list[str], header: list[str], ended: bool, warnings: list[tuple]) -> list[str]:
+def _rows(lines: list[str], header: list[str]) -> list[str]:
     """Lines of the samples, every one with as many cells as the header."""
     rows = lines[1:]
     if not rows:
         raise _RefusedError(None, None, "has a header but no samples: record it again or take it out of batch.yaml")
     cells = np.array([row.count(",") for row in rows]) + 1
     wrong = np.flatnonzero(cells != len(header))
-    if not ended and (wrong.size == 0 or wrong[0] == len(rows) - 1):
-        if wrong.size or _decimals(rows[-1]) < min(map(_decimals, rows[:-1]), default=0):
-            raise _RefusedError(
-                len(lines),
-                None,
-                "the log is cut in the middle of this line, nobody knows what else is lost: copy it again from the rig",
-            )
-        warnings.append((len(lines), None, "the last line has no end, its last number may be cut: row dropped"))
-        return rows[:-1]
     if wrong.size:
         row = int(wrong[0])
         raise _RefusedError(row + 2, None, f"has {cells[row]} cells, the header has {len(header)}: the log is damaged")
     return rows
 
 
-def _decimals(row: str) -> int:
-    """Digits behind the point in the last cell of a row."""
-    return len(row.rsplit(",", 1)[-1].partition(".")[2].strip())
-
-
 def _numbers(rows: list[str], header: list[str]) -> pd.DataFrame:
     known = [name for name in header if name in COLUMNS]
+    # Cells were counted by commas, so a quotation mark may enclose one cell and nothing more.
+    rows = [QUOTED_CELL.sub(r"\1", row) if '"' in row else row for row in rows]
     table = pd.read_csv(
         io.StringIO("\n".join(rows)),
+        quoting=csv.QUOTE_NONE,
         header=None,
         names=range(len(header)),
         usecols=[header.index(name) for name in known],
@@ -225,28 +223,56 @@ def _check_time(time: pd.Series, limits: Limits, warnings: list[tuple]) -> None:
         at = int(np.flatnonzero(step <= 0)[0]) + 1
         now, before = time.iloc[at], time.iloc[at - 1]
         raise _RefusedError(int(time.index[at]), "time_s", f"time must increase, found {now:g} s after {before:g} s")
-    usual = np.median(step)
+    usual = _usual_step(time)
     # Where rows were dropped the step is longer for a reason that was told already.
-    expected = usual * np.diff(time.index)
-    gaps = step > limits.gap_steps * expected
+    rows = np.diff(time.index)
+    excess = step - usual * rows
+    slack = (limits.gap_steps - 1) * usual
+    gaps = excess > slack * rows
     if not gaps.any():
         return
-    lost = (step - expected)[gaps]
-    worst = np.flatnonzero(gaps)[np.argmax(lost)] + 1
-    first = np.flatnonzero(gaps)[0] + 1
-    what = f"{gaps.sum()} gaps, the longest" if gaps.sum() > 1 else "a gap"
-    text = f"{what} of {step[worst - 1]:.4g} s where a step is {usual:.4g} s"
-    if step[worst - 1] > limits.gap_s or lost.sum() > limits.gap_fraction * (time.iloc[-1] - time.iloc[0]):
-        text += f" ({lost.sum():.3g} s lost in all): too long to be bridged, record it again"
-        raise _RefusedError(int(time.index[worst]), "time_s", text)
-    warnings.append((int(time.index[first]), "time_s", f"{text}: samples were dropped"))
+    # A sample that only came late is followed by a step as much shorter; one that was lost never comes back.
+    caught_up = -excess[(excess < -slack) & (rows == 1)].sum()
+    lost = max(excess[gaps].sum() - caught_up, 0.0)
+    uneven = lost < limits.uneven_fraction * excess[gaps].sum()
+    worst = np.flatnonzero(gaps)[np.argmax(excess[gaps])]
+    text = _gap_text(gaps.sum(), step[worst], usual, uneven)
+    if step[worst] > limits.gap_s or lost > limits.gap_fraction * (time.iloc[-1] - time.iloc[0]):
+        text += f" ({lost:.3g} s lost in all): too long to be bridged, record it again"
+        raise _RefusedError(int(time.index[worst + 1]), "time_s", text)
+    first = int(time.index[np.flatnonzero(gaps)[0] + 1])
+    warnings.append(
+        (first, "time_s", f"{text}: {'they came late, few or none are lost' if uneven else 'samples were dropped'}")
+    )
+
+
+def _usual_step(time: pd.Series) -> float:
+    """The typical step over a few rows: one by one, a clock of whole ms may never step by the mean of 1 and 2 ms."""
+    over = 4
+    times, rows = time.to_numpy(), time.index.to_numpy()
+    return float(np.median((times[over:] - times[:-over]) / (rows[over:] - rows[:-over])))
+
+
+def _gap_text(count: int, longest: float, usual: float, uneven: bool) -> str:
+    if uneven:
+        return (
+            f"sampled unevenly: {count} steps are long, up to {longest:.4g} s, and others short where a step is"
+            f" {usual:.4g} s"
+        )
+    what = f"{count} gaps, the longest" if count > 1 else "a gap"
+    return f"{what} of {longest:.4g} s where a step is {usual:.4g} s"
+
+
+def runs(flags: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Starts and lengths of all runs of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
+    return edges[::2], edges[1::2] - edges[::2]
 
 
 def longest_run(flags: np.ndarray) -> tuple[int, int]:
     """Start and length of the longest run of true values; (0, 0) if there is none."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
-    if edges.size == 0:
+    starts, lengths = runs(flags)
+    if starts.size == 0:
         return 0, 0
-    starts, ends = edges[::2], edges[1::2]
-    longest = np.argmax(ends - starts)
-    return int(starts[longest]), int(ends[longest] - starts[longest])
+    longest = np.argmax(lengths)
+    return int(starts[longest]), int(lengths[longest])

@@ -10,8 +10,10 @@ are trusted, the header is carried along as a note. What the trials were made un
 possible, because file names are coded differently from folder to folder.
 """
 
+import json
 import re
-from dataclasses import dataclass
+import tempfile
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +60,13 @@ class Imported:
     findings: list[Finding]
 
 
+DOI = "10.1109/LRA.2018.2849862"
+SOURCE = (
+    "Measured on a da Vinci instrument; data set MRDLab/mis-tool-characterization. Cite: J. J. O'Neill, T. K. Stephens,"
+    ' T. M. Kowalewski, "Evaluation of Torque Measurement Surrogates as Applied to Grip Torque and Jaw Angle Estimation'
+    f' of Robotic Surgical Tools", IEEE RA-L 3(4), 3027-3034, 2018, doi {DOI}. Licence: Open Database License 1.0'
+    " (https://opendatacommons.org/licenses/odbl/1-0/), contents under the Database Contents License 1.0."
+)
 # The data set's own description.
 DRIVE_COUNTS_PER_REV = 8192
 LOAD_COUNTS_PER_REV = 4000
@@ -66,6 +75,8 @@ NM_PER_COUNT = 3.9811e-5
 SETTLED_S = 4.0
 # The torque sensors' noise is a few counts.
 TORQUE_NOISE_COUNTS = 4
+
+FINDINGS = "findings.json"
 
 # Columns of a trial, from the left; further ones (back-end command, motor encoder, target) are not used.
 TIME, DRIVE_ANGLE, DRIVE_TORQUE, LOAD_ANGLE, LOAD_TORQUE, LOAD_COMMAND = 0, 1, 2, 4, 5, 6
@@ -99,7 +110,8 @@ def import_mis_tool(source: Path, out: Path, nominal: Nominal | None = None) -> 
     source : Path
         The data set: its repository, its `data` folder or one folder of trials.
     out : Path
-        Where the batches' folders are made; logs of the same name in them are written anew.
+        Folder for the batches' folders and `findings.json`. One of an earlier import is replaced as a whole, and only
+        if this one succeeds.
     nominal : Nominal, optional
         What is stated for the values that are not published.
 
@@ -111,14 +123,42 @@ def import_mis_tool(source: Path, out: Path, nominal: Nominal | None = None) -> 
     Raises
     ------
     InputError
-        If `source` is no folder, or holds no trial at all.
+        If `source` is no folder or holds no trial at all, or `out` holds what no import has written.
     """
-    source, out = Path(source), Path(out)
+    source, out = Path(source), Path(out).resolve()
     if not source.is_dir():
         raise InputError(f"{source}: there is no such folder; give the mis-tool-characterization data set's folder")
+    _check_replaceable(out)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    # Beside `out`, for a folder can only be renamed on its own disk.
+    with tempfile.TemporaryDirectory(prefix=".import-", dir=out.parent) as work:
+        fresh = Path(work) / "fresh"
+        fresh.mkdir()
+        names, findings = _import_into(fresh, source, nominal or Nominal())
+        if out.exists():
+            out.rename(Path(work) / "earlier")
+        fresh.rename(out)
+    return Imported([out / name for name in names], findings)
+
+
+def _check_replaceable(out: Path) -> None:
+    """An import replaces what an earlier one wrote, and nothing else."""
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out}: is no folder; give a new or empty one")
+    for entry in sorted(out.iterdir()) if out.exists() else []:
+        description = entry / "batch.yaml"
+        imported = description.is_file() and DOI in description.read_text(encoding="utf-8", errors="replace")
+        if not imported and entry.name != FINDINGS:
+            raise InputError(
+                f"{out}: would be replaced, but {entry.name} is from no import; give a new or empty folder"
+            )
+
+
+def _import_into(out: Path, source: Path, nominal: Nominal) -> tuple[list[str], list[Finding]]:
+    """Write the batches and the findings; the batches' names and the findings."""
     files = sorted(f for f in source.rglob("*") if f.suffix.lower() == ".txt" and f.is_file())
     folders = sorted({f.parent for f in files})
-    batches, findings, taken = [], [], set()
+    names, findings, taken = [], [], set()
     for folder in folders:
         name = _unique(_safe(folder.resolve().name), taken)
         trials, found = _read_folder([f for f in files if f.parent == folder], name)
@@ -126,19 +166,23 @@ def import_mis_tool(source: Path, out: Path, nominal: Nominal | None = None) -> 
         if trials:
             signs, doubts = _signs(trials)
             findings += [Finding(name, str(folder), None, None, "warning", text) for text in doubts]
-            batches.append(_write_batch(out / name, trials, signs, nominal or Nominal()))
-    if not batches:
+            _write_batch(out / name, trials, signs, nominal)
+            names.append(name)
+    if not names:
         raise InputError(
             f"{source}: no trial found in {len(files)} .TXT files below it; a trial has {FEWEST_COLUMNS} columns of"
             f" numbers or more and at least {FEWEST_ROWS} rows"
         )
-    return Imported(batches, findings)
+    (out / FINDINGS).write_text(json.dumps([asdict(f) for f in findings], indent=1) + "\n", encoding="utf-8")
+    return names, findings
 
 
 def _read_folder(files: list[Path], batch: str) -> tuple[list[_Trial], list[Finding]]:
     trials, findings, taken = [], [], set()
     for file in files:
         header, samples, remarks = _read_trial(file)
+        if samples is None and not remarks:
+            continue
         if samples is None:
             findings.append(Finding(batch, str(file), None, None, "refused", remarks[-1]))
             continue
@@ -148,11 +192,16 @@ def _read_folder(files: list[Path], batch: str) -> tuple[list[_Trial], list[Find
 
 
 def _read_trial(file: Path) -> tuple[list[str], NDArray | None, list[str]]:
-    """Header lines, samples of shape (n, columns) with time in s, and remarks; no samples where it is no trial."""
+    """Header lines, samples of shape (n, columns) with time in s, and remarks.
+
+    There are no samples where it is no usable trial, and no remarks either where it never was one.
+    """
     lines = file.read_bytes().decode("utf-8", errors="replace").splitlines()
     header = [line.strip() for line in lines if _is_header(line)]
     rows = {row: line for row, line in enumerate(lines, start=1) if line.strip() and not _is_header(line)}
     if len(rows) < FEWEST_ROWS:
+        if _is_prose(lines):
+            return header, None, []
         return header, None, [f"no trial: {len(rows)} rows that begin with a number; not imported"]
     samples, bad, width = _table(list(rows.values()))
     if width < FEWEST_COLUMNS or len(samples) < FEWEST_ROWS:
@@ -166,6 +215,14 @@ def _read_trial(file: Path) -> tuple[list[str], NDArray | None, list[str]]:
     if np.median(np.diff(samples[:, TIME])) > 0.1:
         samples[:, TIME] /= 1000.0
     return header, samples, remarks
+
+
+def _is_prose(lines: list[str]) -> bool:
+    """A text for people, such as a README: words, neither a row of numbers nor the header of a trial."""
+    written = [line.strip() for line in lines if line.strip()]
+    cells = [re.split(r"[,;\s]+", line) for line in written]
+    rows_of_numbers = any(len(row) > 1 and _numbers(row) for row in cells)
+    return bool(written) and not rows_of_numbers and not any(line.startswith("%") for line in written)
 
 
 def _is_header(line: str) -> bool:
@@ -244,13 +301,12 @@ def _majority(what: str, strengths: list[float], doubts: list[str]) -> int:
     return sign
 
 
-def _write_batch(folder: Path, trials: list[_Trial], signs: dict, nominal: Nominal) -> Path:
-    folder.mkdir(parents=True, exist_ok=True)
+def _write_batch(folder: Path, trials: list[_Trial], signs: dict, nominal: Nominal) -> None:
+    folder.mkdir()
     for trial in trials:
         _write_log(folder / f"{trial.id}.csv.gz", trial.samples)
     text = yaml.safe_dump(_describe(folder.name, trials, signs, nominal), sort_keys=False, width=120)
     (folder / "batch.yaml").write_text(text, encoding="utf-8")
-    return folder
 
 
 def _write_log(path: Path, samples: NDArray) -> None:
@@ -284,8 +340,7 @@ def _describe(name: str, trials: list[_Trial], signs: dict, nominal: Nominal) ->
         "batch": name,
         "origin": "rig",
         "note": (
-            "da Vinci instrument, MRDLab/mis-tool-characterization (doi 10.1109/LRA.2018.2849862, ODbL 1.0)."
-            " Radii, length, bend, stiffness, friction and pretension are nominal, not published:"
+            f"{SOURCE} Radii, length, bend, stiffness, friction and pretension are nominal, not published:"
             " only k R^2, mu phi and T0 R are determined. Zeros of the torque sensors are not known."
         ),
         "rig": {

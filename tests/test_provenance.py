@@ -1,0 +1,34 @@
+"""What makes a step rerun: exactly the code that it uses."""
+
+from ccmodel.provenance import files_in, source_digest, sources_of
+
+
+def names(module):
+    return {file.name for file in sources_of(module)}
+
+
+def test_a_step_consists_of_what_it_imports():
+    simulate = names("ccmodel.stages.simulate")
+    assert {"simulate.py", "files.py", "paper.py", "geometry.py", "motion.py", "recording.py", "batch.py"} <= simulate
+    assert not {"figures.py", "errors.py", "mis_tool.py", "page.html.j2"} & simulate
+
+
+def test_templates_belong_to_the_step_that_fills_them():
+    assert "page.html.j2" in names("ccmodel.stages.report")
+
+
+def test_ingest_does_not_depend_on_the_model():
+    assert "paper.py" not in names("ccmodel.stages.ingest")
+
+
+def test_steps_differ_in_their_digests():
+    assert source_digest("ccmodel.stages.ingest") != source_digest("ccmodel.stages.simulate")
+
+
+def test_hidden_files_are_none_of_a_batch(tmp_path):
+    (tmp_path / ".ipynb_checkpoints").mkdir()
+    for name in (".DS_Store", ".ipynb_checkpoints/a.csv", "a.csv"):
+        (tmp_path / name).write_text("x")
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "logs/b.csv").write_text("x")
+    assert [f.name for f in files_in(tmp_path)] == ["a.csv", "b.csv"]
