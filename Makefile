@@ -18,11 +18,12 @@ $(VENV)/.ready: requirements.lock pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $@
 
-# A run that fails still says what it left out, and one that left something out has failed.
+# A run that left something out says what, and has failed.
 define run_pipeline
-	@$(BIN)/snakemake --cores $(CORES) --configfile $(1); status=$$?; \
-	$(BIN)/ccmodel left-out $(2) || status=1; \
-	echo "The report is $(2)/index.html"; exit $$status
+	@$(BIN)/snakemake --cores $(CORES) --configfile $(1) \
+	  || { echo "The run did not come to its end; the messages above say why" >&2; exit 1; }
+	@echo "The report is $(2)/index.html"
+	@$(BIN)/ccmodel left-out $(2)
 endef
 
 results: $(VENV)/.ready  ## regenerate every figure, table and the report from data/raw

@@ -18,11 +18,10 @@ def files_in(folder: Path) -> list[Path]:
     return sorted(f for f in files if not any(part.startswith(".") for part in f.relative_to(folder).parts))
 
 
-def of_inputs(paths: Iterable[Path], folder: Path = Path()) -> dict[str, str]:
+def of_inputs(paths: Iterable[Path], folder: Path = Path()) -> dict:
     """Version of the package and the digests of the files that a result was made from, by path from `folder`."""
-    digests = {p: hashlib.sha256(p.read_bytes()).hexdigest() for p in map(Path, paths)}
-    inputs = {f"sha256 {os.path.relpath(p, folder)}": digest for p, digest in digests.items()}
-    return {"ccmodel_version": ccmodel.__version__, **inputs}
+    digests = {os.path.relpath(p, folder): hashlib.sha256(Path(p).read_bytes()).hexdigest() for p in paths}
+    return {"ccmodel_version": ccmodel.__version__, "sha256": digests}
 
 
 @cache

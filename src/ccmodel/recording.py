@@ -110,10 +110,10 @@ def stride(recording: Recording, step_s: float | None) -> int:
     return 1 if step_s is None else max(1, round(step_s / float(np.median(np.diff(recording.time_s)))))
 
 
-def write_recordings(path: Path, recordings: list[Recording], provenance: Mapping[str, str]) -> None:
+def write_recordings(path: Path, recordings: list[Recording], provenance: Mapping) -> None:
     """Write recordings to one netCDF file, a group each, with `provenance` (versions, hashes) on the root."""
     with netCDF4.Dataset(path, "w") as root:
-        root.setncatts({"format": "ccmodel recordings 1", **provenance})
+        root.setncatts({"format": "ccmodel recordings 1", "provenance": json.dumps(provenance)})
     for recording in recordings:
         _to_dataset(recording).to_netcdf(path, mode="a", group=recording.id, engine="netcdf4")
 

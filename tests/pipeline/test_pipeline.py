@@ -109,11 +109,18 @@ def test_recordings_carry_their_provenance(finished):
     import netCDF4
 
     with netCDF4.Dataset(finished / "results/recordings/tiny.nc") as root:
-        assert root.ccmodel_version
-        assert len(root.getncattr("sha256 batch.yaml")) == 64
+        provenance = json.loads(root.provenance)
+    assert provenance["ccmodel_version"]
+    assert set(provenance["sha256"]) == {"batch.yaml", "t-7N.csv.gz", "t-3.5N.csv.gz"}
+    assert len(provenance["sha256"]["batch.yaml"]) == 64
     recordings = read_recordings(finished / "results/recordings/tiny.nc")
     assert [r.id for r in recordings] == ["t-7N", "t-3.5N"]
     assert "tau_in_Nm" in recordings[0].derived_from["T1_N"]
+
+
+def test_tables_carry_their_provenance(finished):
+    attrs = pd.read_parquet(finished / "results/tables/errors.parquet").attrs
+    assert "results/recordings/tiny.nc" in attrs["sha256"]
 
 
 def test_a_second_run_does_nothing(copy):
