@@ -40,28 +40,51 @@ SMALLEST_SUBSTEP = 1.0 / 4096
 
 IMPEDANCE, PRESCRIBED_ANGLE = 0, 1
 
-# Constants of a run. Arrays of a piece of cable have shape (2, n + 1), those of a node (2, n).
+# What a run and its steps know, in four arrays of rows: every array that goes from one compiled function to another
+# costs some time at every call.
+# piece, shape (rows, 2, n + 1): of the cable between nodes. N/m, m, -, -, then the state, then the step's results.
+STIFFNESS, LOST, RELAXING, SHARE, STRETCH, LOST_TENSION, ELASTIC, TENSION, TANGENT, PULL = range(10)
+# node, shape (rows, 2, n): constants (rad, N, N s/m), state, the step's equations and their elimination.
+(
+    HALF_BEND,
+    DRAG,
+    VISCOUS,
+    BRISTLE,
+    SPEED,
+    GRIP,
+    BRISTLE_NEXT,
+    NEAR,
+    FAR,
+    GIVES,
+    EXCESS,
+    ALPHA,
+    BETA,
+    ETA,
+) = range(14)
+# slide, shape (rows, 2, n + 2): drive end, nodes, load end, m. This step, Newton's step, and those before.
+NOW, STEP, SAVED, LAST, BEFORE = range(5)
+# mean, shape (rows, 2): mean tension of a cable that its conduit gives way to, N.
+MEAN, MEAN_NEXT, MEAN_STEP, MEAN_EXCESS, MEAN_SAVED, FIXED, BY_END, END_FIXED, END_BY_END = range(9)
+# load, shape (rows,): angle, last turn and step's length, speed, speed before, bristle of the bearing; the step's.
+ANGLE, TURN, DT, OMEGA, OMEGA_BEFORE, BEARING, OMEGA_NEXT, BEARING_NEXT, TORQUE = range(9)
+PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10, 14, 5, 9, 9
+
+# Numbers of a run.
 Physics = namedtuple(
     "Physics",
-    "stiffness lost has_settling relaxing has_relaxation tau share conduit_compliance half_bend drag viscous "
-    "bristle presliding exponent rise vs course radius eccentricity phase stiffness_load cubic half_gap damping "
-    "inertia load_friction kind general_friction",
+    "has_settling has_relaxation tau conduit_compliance bristle presliding exponent rise vs radius eccentricity phase "
+    "stiffness_load cubic half_gap damping inertia load_friction kind general_friction",
 )
-# What a run carries from step to step: stretch, bristles, lost tension, elastic tension, lagging speed, mean tension,
-# and of the load: angle, last turn, last step's length, speed, speed before, bristle of its bearing.
-State = namedtuple("State", "stretch xi lost_tension elastic speed mean load")
-# Room for a step.
-Work = namedtuple("Work", "d T K grip p q fd r alpha beta gamma eta xi elastic trial_load delta")
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}  # not nnan: a NaN must be seen
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def _tensions(ph, st, w, mean, weights):
-    """Tension of each piece and its tangent stiffness for the slides in `w.d`."""
-    n1 = ph.stiffness.shape[1]
+def _tensions(ph, piece, slide, mean, weights):
+    """Tension of each piece and its tangent stiffness for the slides of this step."""
+    n1 = piece.shape[2]
     for c in range(2):
-        T, K, k, d, e = w.T[c], w.K[c], ph.stiffness[c], w.d[c], st.stretch[c]
+        T, K, k, d, e = piece[TENSION, c], piece[TANGENT, c], piece[STIFFNESS, c], slide[NOW, c], piece[STRETCH, c]
         if not (ph.has_settling or ph.has_relaxation or ph.conduit_compliance > 0):
             for i in range(n1):
                 pull = k[i] * (e[i] + (d[i] - d[i + 1]))
@@ -69,17 +92,17 @@ def _tensions(ph, st, w, mean, weights):
                 T[i] = share * pull
                 K[i] = share * k[i]
             continue
-        gives = ph.conduit_compliance * (mean[c] - st.mean[c])
+        gives = ph.conduit_compliance * (mean[MEAN_NEXT, c] - mean[MEAN, c])
         for i in range(n1):
-            stretch = e[i] + (d[i] - d[i + 1]) - gives * ph.share[c, i]
+            stretch = e[i] + (d[i] - d[i + 1]) - gives * piece[SHARE, c, i]
             pull, tangent = k[i] * stretch, k[i]
-            if ph.lost[c, i] > 0.0 and stretch > 0.0:
-                pull, tangent = settling_tension(stretch, ph.lost[c, i], k[i])
+            if piece[LOST, c, i] > 0.0 and stretch > 0.0:
+                pull, tangent = settling_tension(stretch, piece[LOST, c, i], k[i])
                 tangent = max(tangent, SLACK_SHARE * k[i])
-            w.elastic[c, i] = pull
+            piece[PULL, c, i] = pull
             if ph.has_relaxation:
-                r = ph.relaxing[c, i]
-                q = weights[0] * st.lost_tension[c, i] + weights[1] * st.elastic[c, i] + weights[2] * max(pull, 0.0)
+                r = piece[RELAXING, c, i]
+                q = weights[0] * piece[LOST_TENSION, c, i] + weights[1] * piece[ELASTIC, c, i] + weights[2] * max(pull, 0.0)
                 tangent *= 1.0 - r * weights[2] if pull > 0.0 else 1.0
                 pull -= r * q
             share = 1.0 if pull > 0.0 else SLACK_SHARE
@@ -88,29 +111,29 @@ def _tensions(ph, st, w, mean, weights):
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def _nodes(ph, st, w, dt):
+def _nodes(ph, piece, node, slide, dt):
     """Balance of each node and its derivatives; the sum of squares of what is out of balance, N^2."""
-    n = ph.half_bend.shape[1]
+    n = node.shape[2]
     total = 0.0
     rate = 1.0 / dt if dt > 0.0 else 0.0
     for c in range(2):
-        T, K, d, grip, xi = w.T[c], w.K[c], w.d[c], w.grip[c], st.xi[c]
-        p, q, fd, r = w.p[c], w.q[c], w.fd[c], w.r[c]
+        T, K, d, grip, xi = piece[TENSION, c], piece[TANGENT, c], slide[NOW, c], node[GRIP, c], node[BRISTLE, c]
+        p, q, fd, r = node[NEAR, c], node[FAR, c], node[GIVES, c], node[EXCESS, c]
         if ph.presliding:
             for i in range(n):
                 x, slope = dahl(xi[i], d[i + 1], ph.bristle)
                 # Where nothing slides yet the slope is another to either side.
-                w.xi[c, i] = x
+                node[BRISTLE_NEXT, c, i] = x
                 fd[i] = slope if d[i + 1] != 0.0 else 1.0 / ph.bristle
         else:
             inverse = 1.0 / ph.bristle
             for i in range(n):
                 trial = xi[i] + d[i + 1] * inverse
-                w.xi[c, i] = min(max(trial, -1.0), 1.0)
+                node[BRISTLE_NEXT, c, i] = min(max(trial, -1.0), 1.0)
                 fd[i] = inverse if abs(trial) < 1.0 else 0.0
         if not ph.general_friction:
             for i in range(n):
-                x, g = w.xi[c, i], grip[i]
+                x, g = node[BRISTLE_NEXT, c, i], grip[i]
                 hold = g * (max(T[i], 0.0) + max(T[i + 1], 0.0))
                 p[i] = K[i] * (1.0 - x * g)
                 q[i] = K[i + 1] * (1.0 + x * g)
@@ -118,7 +141,7 @@ def _nodes(ph, st, w, dt):
                 r[i] = T[i] - T[i + 1] - x * hold
         else:
             for i in range(n):
-                x, g, slope = w.xi[c, i], grip[i], 0.0
+                x, g, slope = node[BRISTLE_NEXT, c, i], grip[i], 0.0
                 both = max(T[i], 0.0) + max(T[i + 1], 0.0)
                 if ph.exponent != 0.0:
                     factor, by_tension = power_of_tension(0.5 * both, ph.exponent)
@@ -126,10 +149,10 @@ def _nodes(ph, st, w, dt):
                     y = grip[i] * factor
                     g = np.tanh(y)
                     slope = 0.5 * both * (1.0 - g * g) * grip[i] * by_tension
-                hold = g * both + ph.drag[c, i]
+                hold = g * both + node[DRAG, c, i]
                 p[i] = K[i] * (1.0 - x * (g + slope))
                 q[i] = K[i + 1] * (1.0 + x * (g + slope))
-                drag = ph.viscous[c, i] * rate
+                drag = node[VISCOUS, c, i] * rate
                 fd[i] = fd[i] * hold + drag
                 r[i] = T[i] - T[i + 1] - x * hold - drag * d[i + 1]
         for i in range(n):
@@ -138,167 +161,174 @@ def _nodes(ph, st, w, dt):
 
 
 @njit(cache=True, error_model="numpy")
-def _load(ph, st, w, theta, torque, dt):
+def _load(ph, piece, load, theta, torque, dt):
     """Torque out of balance at the load pulley, its slope by the angle less what the cables add, and the radius."""
-    n = ph.half_bend.shape[1]
+    n = piece.shape[2] - 1
     _, round_, round_slope = winding(theta, ph.eccentricity, ph.phase)
     R = ph.radius * round_
-    turn = theta - st.load[0]
+    turn = theta - load[ANGLE]
     z, inside = dead_zone(theta, ph.half_gap)
     tau = torque + ph.stiffness_load * z + ph.cubic * z**3
     slope = (ph.stiffness_load + 3 * ph.cubic * z * z) * inside
     omega = 0.0
     if dt > 0.0:
-        ratio = dt / st.load[2] if st.load[2] > 0.0 else 1.0
+        ratio = dt / load[DT] if load[DT] > 0.0 else 1.0
         a1, a2 = (1 + 2 * ratio) / (1 + ratio), ratio * ratio / (1 + ratio)
-        omega = (a1 * turn - a2 * st.load[1]) / dt
-        alpha = (a1 * (omega - st.load[3]) - a2 * (st.load[3] - st.load[4])) / dt
+        omega = (a1 * turn - a2 * load[TURN]) / dt
+        alpha = (a1 * (omega - load[OMEGA]) - a2 * (load[OMEGA] - load[OMEGA_BEFORE])) / dt
         tau += ph.damping * omega + ph.inertia * alpha
         slope += (ph.damping + ph.inertia * a1 / dt) * a1 / dt
-    bearing = st.load[5]
+    bearing = load[BEARING]
     if ph.load_friction > 0.0:
-        bearing, by_turn = dahl(st.load[5], turn, PRESLIDING_RAD)
+        bearing, by_turn = dahl(load[BEARING], turn, PRESLIDING_RAD)
         slope += ph.load_friction * (by_turn if turn != 0.0 else 1.0 / PRESLIDING_RAD)
-    difference = max(w.T[0, n], 0.0) - max(w.T[1, n], 0.0)
-    w.trial_load[0], w.trial_load[1], w.trial_load[2] = omega, bearing, tau
+    difference = max(piece[TENSION, 0, n], 0.0) - max(piece[TENSION, 1, n], 0.0)
+    load[OMEGA_NEXT], load[BEARING_NEXT], load[TORQUE] = omega, bearing, tau
     return R * difference - tau - ph.load_friction * bearing, slope - ph.radius * round_slope * difference, R
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def _solve(ph, w, G, slope, R, free):
-    """Newton's step for the slides into `w.delta`, its drive ends zero; returns the load pulley's turn.
+def _solve(piece, node, slide, G, slope, R, free):
+    """Newton's step for the slides into `STEP`; returns the load pulley's turn.
 
     Elimination from the drive ends: delta_i = alpha_i + beta_i delta_{i+1}, with gamma = 1 - beta carried along by
     itself so that nothing is lost where pieces differ in stiffness by many orders.
     """
-    n = ph.half_bend.shape[1]
+    n = node.shape[2]
     alpha_A, alpha_B, gamma_A, gamma_B = 0.0, 0.0, 1.0, 1.0
     for i in range(n):
-        pA, pB = w.p[0, i], w.p[1, i]
-        fA, fB = pA * gamma_A + w.fd[0, i], pB * gamma_B + w.fd[1, i]
-        iA, iB = 1.0 / (fA + w.q[0, i]), 1.0 / (fB + w.q[1, i])
-        alpha_A, alpha_B = (w.r[0, i] + pA * alpha_A) * iA, (w.r[1, i] + pB * alpha_B) * iB
+        pA, pB = node[NEAR, 0, i], node[NEAR, 1, i]
+        fA, fB = pA * gamma_A + node[GIVES, 0, i], pB * gamma_B + node[GIVES, 1, i]
+        iA, iB = 1.0 / (fA + node[FAR, 0, i]), 1.0 / (fB + node[FAR, 1, i])
+        alpha_A, alpha_B = (node[EXCESS, 0, i] + pA * alpha_A) * iA, (node[EXCESS, 1, i] + pB * alpha_B) * iB
         gamma_A, gamma_B = fA * iA, fB * iB
-        w.alpha[0, i], w.alpha[1, i] = alpha_A, alpha_B
-        w.beta[0, i], w.beta[1, i] = w.q[0, i] * iA, w.q[1, i] * iB
-    KA, KB = w.K[0, n], w.K[1, n]
+        node[ALPHA, 0, i], node[ALPHA, 1, i] = alpha_A, alpha_B
+        node[BETA, 0, i], node[BETA, 1, i] = node[FAR, 0, i] * iA, node[FAR, 1, i] * iB
+    KA, KB = piece[TANGENT, 0, n], piece[TANGENT, 1, n]
     turn = 0.0
     if free:
         turn = (G + R * (KA * alpha_A - KB * alpha_B)) / (R * R * (KA * gamma_A + KB * gamma_B) + slope)
     dA, dB = R * turn, -R * turn
-    w.delta[0, n + 1], w.delta[1, n + 1] = dA, dB
+    slide[STEP, 0, n + 1], slide[STEP, 1, n + 1] = dA, dB
     for i in range(n - 1, -1, -1):
-        dA, dB = w.alpha[0, i] + w.beta[0, i] * dA, w.alpha[1, i] + w.beta[1, i] * dB
-        w.delta[0, i + 1], w.delta[1, i + 1] = dA, dB
+        dA, dB = node[ALPHA, 0, i] + node[BETA, 0, i] * dA, node[ALPHA, 1, i] + node[BETA, 1, i] * dB
+        slide[STEP, 0, i + 1], slide[STEP, 1, i + 1] = dA, dB
     return turn
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def _solve_with_conduits(ph, w, G, slope, R, free, out_of_mean, step_mean):
-    """The same with both conduits' mean tensions unknown; their steps go into `step_mean`.
+def _solve_with_conduits(ph, piece, node, slide, mean, G, slope, R, free):
+    """The same with both conduits' mean tensions unknown; their steps go into `MEAN_STEP`.
 
     Every slide is written as a part by itself, a part by the load end's slide and a part by the conduit's own mean
     tension; the conduit's equation then gives the mean by the load end's slide, and the load pulley's gives that.
     """
-    n = ph.half_bend.shape[1]
+    n = node.shape[2]
     C = ph.conduit_compliance
-    end_fixed, end_slide = np.zeros(2), np.zeros(2)
-    mean_fixed, mean_slide = np.zeros(2), np.zeros(2)
     for c in range(2):
         a, g, h = 0.0, 1.0, 0.0
         for i in range(n):
-            p, q = w.p[c, i], w.q[c, i]
-            f = p * g + w.fd[c, i]
+            p, q = node[NEAR, c, i], node[FAR, c, i]
+            f = p * g + node[GIVES, c, i]
             inverse = 1.0 / (f + q)
-            a = (w.r[c, i] + p * a) * inverse
-            h = (C * (q * ph.share[c, i + 1] - p * ph.share[c, i]) + p * h) * inverse
+            a = (node[EXCESS, c, i] + p * a) * inverse
+            h = (C * (q * piece[SHARE, c, i + 1] - p * piece[SHARE, c, i]) + p * h) * inverse
             g = f * inverse
-            w.alpha[c, i], w.beta[c, i], w.gamma[c, i], w.eta[c, i] = a, q * inverse, g, h
+            node[ALPHA, c, i], node[BETA, c, i], node[ETA, c, i] = a, q * inverse, h
         # From the load end back: sums of share * K * (stretch of the piece) for the three parts.
         A, B, H = 0.0, 1.0, 0.0
         sum_A, sum_B, sum_H, stiff = 0.0, 0.0, 0.0, 0.0
         for i in range(n, -1, -1):
             if i > 0:
-                A1 = w.alpha[c, i - 1] + w.beta[c, i - 1] * A
-                B1 = w.beta[c, i - 1] * B
-                H1 = w.eta[c, i - 1] + w.beta[c, i - 1] * H
+                A1 = node[ALPHA, c, i - 1] + node[BETA, c, i - 1] * A
+                B1 = node[BETA, c, i - 1] * B
+                H1 = node[ETA, c, i - 1] + node[BETA, c, i - 1] * H
             else:
                 A1, B1, H1 = 0.0, 0.0, 0.0
-            weight = ph.share[c, i] * w.K[c, i]
+            weight = piece[SHARE, c, i] * piece[TANGENT, c, i]
             sum_A += weight * (A1 - A)
             sum_B += weight * (B1 - B)
             sum_H += weight * (H1 - H)
-            stiff += weight * ph.share[c, i]
+            stiff += weight * piece[SHARE, c, i]
             A, B, H = A1, B1, H1
         scale = 1.0 / (1.0 + C * stiff - sum_H)
-        mean_fixed[c], mean_slide[c] = (out_of_mean[c] + sum_A) * scale, sum_B * scale
-        K = w.K[c, n]
-        own = h - C * ph.share[c, n]
-        end_fixed[c] = K * (a + own * mean_fixed[c])
-        end_slide[c] = K * (-g + own * mean_slide[c])
+        mean[FIXED, c], mean[BY_END, c] = (mean[MEAN_EXCESS, c] + sum_A) * scale, sum_B * scale
+        K = piece[TANGENT, c, n]
+        own = h - C * piece[SHARE, c, n]
+        mean[END_FIXED, c] = K * (a + own * mean[FIXED, c])
+        mean[END_BY_END, c] = K * (-g + own * mean[BY_END, c])
     turn = 0.0
     if free:
-        turn = (G + R * (end_fixed[0] - end_fixed[1])) / (slope - R * R * (end_slide[0] + end_slide[1]))
+        turn = (G + R * (mean[END_FIXED, 0] - mean[END_FIXED, 1])) / (slope - R * R * (mean[END_BY_END, 0] + mean[END_BY_END, 1]))
     for c in range(2):
-        slide = R * turn if c == 0 else -R * turn
-        step_mean[c] = mean_fixed[c] + mean_slide[c] * slide
-        w.delta[c, n + 1] = slide
+        d = R * turn if c == 0 else -R * turn
+        mean[MEAN_STEP, c] = mean[FIXED, c] + mean[BY_END, c] * d
+        slide[STEP, c, n + 1] = d
         for i in range(n - 1, -1, -1):
-            slide = w.alpha[c, i] + w.eta[c, i] * step_mean[c] + w.beta[c, i] * slide
-            w.delta[c, i + 1] = slide
+            d = node[ALPHA, c, i] + node[ETA, c, i] * mean[MEAN_STEP, c] + node[BETA, c, i] * d
+            slide[STEP, c, i + 1] = d
     return turn
 
 
 @njit(cache=True, error_model="numpy")
-def _move(ph, st, w, share):
+def _move(ph, node, slide, share):
     """Take the slides a share of Newton's step on, no node from sliding one way to sliding the other in one go.
 
     Between the two lies the narrow stretch in which the node sticks, and Newton's method would step over it for ever.
     """
-    n = ph.half_bend.shape[1]
+    n = node.shape[2]
     inverse = 1.0 / ph.bristle
     for c in range(2):
         for i in range(1, n + 1):
-            old = w.d[c, i]
-            new = old + share * w.delta[c, i]
+            old = slide[NOW, c, i]
+            new = old + share * slide[STEP, c, i]
             if ph.presliding:
                 if old * new < 0.0:
                     new = 0.0
             else:
-                xi = st.xi[c, i - 1]
+                xi = node[BRISTLE, c, i - 1]
                 before, after = xi + old * inverse, xi + new * inverse
                 if (before > 1.0 and after < -1.0) or (before < -1.0 and after > 1.0):
                     new = -xi * ph.bristle
-            w.d[c, i] = new
+            slide[NOW, c, i] = new
 
 
 @njit(cache=True, error_model="numpy")
-def _newton(ph, st, w, theta, torque, dt, saved, counts):
-    """Solve a step from the slides in `w.d` and the load angle `theta`; (whether it converged, load angle)."""
-    n = ph.half_bend.shape[1]
+def _mean_tension(piece, c):
+    total = 0.0
+    for i in range(piece.shape[2]):
+        total += piece[SHARE, c, i] * max(piece[TENSION, c, i], 0.0)
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def _newton(ph, piece, node, slide, mean, load, theta, torque, dt, counts):
+    """Solve a step from the slides in `NOW` and the load angle `theta`; (whether it converged, load angle)."""
+    n = node.shape[2]
     free = ph.kind == IMPEDANCE
     weights = lag_weights(dt / ph.tau) if ph.has_relaxation and dt > 0.0 else (1.0, 0.0, 0.0)
     soft = ph.conduit_compliance > 0.0
-    mean, step_mean, out_of_mean, old_mean = st.mean.copy(), np.zeros(2), np.zeros(2), np.zeros(2)
-    way_0 = winding(st.load[0], ph.eccentricity, ph.phase)[0]
+    for c in range(2):
+        mean[MEAN_NEXT, c], mean[MEAN_STEP, c] = mean[MEAN, c], 0.0
+    way_0 = winding(load[ANGLE], ph.eccentricity, ph.phase)[0]
     share, best = 1.0, np.inf
-    turn, old_theta = 0.0, theta
+    turn, saved_theta = 0.0, theta
     for iteration in range(NEWTON_LIMIT):
         way = ph.radius * (winding(theta, ph.eccentricity, ph.phase)[0] - way_0)
-        w.d[0, n + 1], w.d[1, n + 1] = way, -way
-        _tensions(ph, st, w, mean, weights)
-        error = _nodes(ph, st, w, dt)
-        G, slope, R = _load(ph, st, w, theta, torque, dt)
+        slide[NOW, 0, n + 1], slide[NOW, 1, n + 1] = way, -way
+        _tensions(ph, piece, slide, mean, weights)
+        error = _nodes(ph, piece, node, slide, dt)
+        G, slope, R = _load(ph, piece, load, theta, torque, dt)
         if free:
             error += (G / ph.radius) ** 2
         if soft:
             for c in range(2):
-                out_of_mean[c] = -mean[c]
-                for i in range(n + 1):
-                    out_of_mean[c] += ph.share[c, i] * max(w.T[c, i], 0.0)
-                error += out_of_mean[c] ** 2
+                mean[MEAN_EXCESS, c] = _mean_tension(piece, c) - mean[MEAN_NEXT, c]
+                error += mean[MEAN_EXCESS, c] ** 2
         counts[0] += 1
-        scale = max(max(w.T[0, 0], w.T[0, n]), max(w.T[1, 0], w.T[1, n]))
+        scale = max(
+            max(piece[TENSION, 0, 0], piece[TENSION, 0, n]), max(piece[TENSION, 1, 0], piece[TENSION, 1, n])
+        )
         limit = TOLERANCE * max(scale, 1e-2)
         if error <= limit * limit:
             return True, theta
@@ -307,83 +337,87 @@ def _newton(ph, st, w, theta, torque, dt, saved, counts):
         if iteration > 6 and error > best and share > 0.02:
             # Back towards where the step began; the limits on single nodes are undone with it.
             share *= 0.5
-            w.d[:] = saved
-            theta = old_theta
-            mean[:] = old_mean
+            slide[NOW] = slide[SAVED]
+            mean[MEAN_NEXT] = mean[MEAN_SAVED]
+            theta = saved_theta
         else:
+            if iteration > 5:
+                slide[SAVED] = slide[NOW]
+                mean[MEAN_SAVED] = mean[MEAN_NEXT]
+                saved_theta = theta
             best, share = error, 1.0
-            saved[:] = w.d
-            old_theta = theta
-            old_mean[:] = mean
             if soft:
-                turn = _solve_with_conduits(ph, w, G, slope, R, free, out_of_mean, step_mean)
+                turn = _solve_with_conduits(ph, piece, node, slide, mean, G, slope, R, free)
             else:
-                turn = _solve(ph, w, G, slope, R, free)
-        _move(ph, st, w, share)
+                turn = _solve(piece, node, slide, G, slope, R, free)
+        _move(ph, node, slide, share)
         theta += share * turn
-        for c in range(2):
-            mean[c] += share * step_mean[c]
+        if soft:
+            for c in range(2):
+                mean[MEAN_NEXT, c] += share * mean[MEAN_STEP, c]
     return False, theta
 
 
 @njit(cache=True, error_model="numpy")
-def _commit(ph, st, w, theta, dt):
+def _commit(ph, piece, node, slide, mean, load, theta, dt):
     """Take over a solved step."""
-    n = ph.half_bend.shape[1]
+    n = node.shape[2]
     weights = lag_weights(dt / ph.tau) if ph.has_relaxation and dt > 0.0 else (1.0, 0.0, 0.0)
+    soft = ph.conduit_compliance > 0.0
     for c in range(2):
-        mean = st.mean[c]
-        if ph.conduit_compliance > 0.0:
-            mean = 0.0
-            for i in range(n + 1):
-                mean += ph.share[c, i] * max(w.T[c, i], 0.0)
-        gives = ph.conduit_compliance * (mean - st.mean[c])
+        d = slide[NOW, c]
         for i in range(n + 1):
-            st.stretch[c, i] += w.d[c, i] - w.d[c, i + 1] - gives * ph.share[c, i]
-            if ph.has_relaxation:
-                elastic = max(w.elastic[c, i], 0.0)
-                st.lost_tension[c, i] = (
-                    weights[0] * st.lost_tension[c, i] + weights[1] * st.elastic[c, i] + weights[2] * elastic
-                )
-                st.elastic[c, i] = elastic
+            piece[STRETCH, c, i] += d[i] - d[i + 1]
+        if soft:
+            gives = ph.conduit_compliance * (mean[MEAN_NEXT, c] - mean[MEAN, c])
+            mean[MEAN, c] = mean[MEAN_NEXT, c]
+            for i in range(n + 1):
+                piece[STRETCH, c, i] -= gives * piece[SHARE, c, i]
+        if ph.has_relaxation:
+            for i in range(n + 1):
+                elastic = max(piece[PULL, c, i], 0.0)
+                lost = weights[0] * piece[LOST_TENSION, c, i] + weights[1] * piece[ELASTIC, c, i]
+                piece[LOST_TENSION, c, i] = lost + weights[2] * elastic
+                piece[ELASTIC, c, i] = elastic
         for i in range(n):
-            st.xi[c, i] = w.xi[c, i]
-        st.mean[c] = mean
+            node[BRISTLE, c, i] = node[BRISTLE_NEXT, c, i]
     if ph.rise > 0.0 and dt > 0.0:
         keep = np.exp(-dt / LAG_S)
         for c in range(2):
             for i in range(n):
-                st.speed[c, i] = keep * st.speed[c, i] + (1.0 - keep) * w.d[c, i + 1] / dt
+                node[SPEED, c, i] = keep * node[SPEED, c, i] + (1.0 - keep) * slide[NOW, c, i + 1] / dt
     if dt > 0.0:
-        st.load[1], st.load[2] = theta - st.load[0], dt
-        st.load[4], st.load[3] = st.load[3], w.trial_load[0]
-    st.load[0], st.load[5] = theta, w.trial_load[1]
+        load[TURN], load[DT] = theta - load[ANGLE], dt
+        load[OMEGA_BEFORE], load[OMEGA] = load[OMEGA], load[OMEGA_NEXT]
+    load[ANGLE], load[BEARING] = theta, load[BEARING_NEXT]
 
 
 @njit(cache=True, error_model="numpy")
-def _set_grip(ph, st, w, course):
+def _set_grip(ph, node, course):
     """Friction of each node per sum of its tensions; with a power of tension only its argument, mu phi / 2."""
-    n = ph.half_bend.shape[1]
     for c in range(2):
-        for i in range(n):
-            y = ph.half_bend[c, i] * course
+        for i in range(node.shape[2]):
+            y = node[HALF_BEND, c, i] * course
             if ph.rise > 0.0:
-                y *= breakaway(st.speed[c, i], ph.rise, ph.vs)
-            w.grip[c, i] = y if ph.exponent != 0.0 else np.tanh(y)
+                y *= breakaway(node[SPEED, c, i], ph.rise, ph.vs)
+            node[GRIP, c, i] = y if ph.exponent != 0.0 else np.tanh(y)
 
 
 @njit(cache=True, error_model="numpy")
-def march(ph, st, w, time_s, way_in, series, out, counts):
+def march(ph, piece, node, slide, mean, load, time_s, way_in, course, series, out, counts):
     """Step through the samples.
 
     Parameters
     ----------
-    ph, st, w : Physics, State, Work
-        `st` holds the state before the first sample; the first sample is solved at the drive's first position, which
-        brings a start that is out of balance into balance.
+    ph : Physics
+    piece, node, slide, mean, load : ndarray
+        Constants and the state before the first sample, in the rows named above. The first sample is solved at the
+        drive's first position, which brings a start that is out of balance into balance.
     time_s, way_in, series : ndarray, shape (m,)
         Times (s), way of the cables at the drive pulley (m), and what is prescribed at the load: a torque (N m) on
         top of the load's own, or the angle (rad).
+    course : ndarray, shape (m,) or (1,)
+        Factor of mu at each sample.
     out : ndarray, shape (7, m)
         Filled with T1, T2, T3, T4 (N), load angle (rad), the load's torque and the torque of its bearing (N m).
     counts : ndarray of int, shape (2,)
@@ -394,12 +428,10 @@ def march(ph, st, w, time_s, way_in, series, out, counts):
     int
         Samples that were solved.
     """
-    m, n = time_s.size, ph.half_bend.shape[1]
-    saved = np.zeros_like(w.d)
-    last, before = np.zeros_like(w.d), np.zeros_like(w.d)
+    m, n = time_s.size, node.shape[2]
     last_turn, before_turn, last_pull, before_pull, last_dt = 0.0, 0.0, 0.0, 0.0, 0.0
-    _set_grip(ph, st, w, ph.course[0])
-    fixed_grip = ph.rise == 0.0 and ph.course.size == 1
+    _set_grip(ph, node, course[0])
+    fixed_grip = ph.rise == 0.0 and course.size == 1
     prescribed = ph.kind == PRESCRIBED_ANGLE
     for j in range(m):
         pull = way_in[j] - way_in[j - 1] if j > 0 else 0.0
@@ -409,50 +441,51 @@ def march(ph, st, w, time_s, way_in, series, out, counts):
         while done < 1.0:
             part = min(part, 1.0 - done)
             if not fixed_grip:
-                _set_grip(ph, st, w, ph.course[min(j, ph.course.size - 1)])
+                _set_grip(ph, node, course[min(j, course.size - 1)])
             step_pull, step_dt = part * pull, part * dt
             # The start: what the last steps did, scaled to the drive's step while it goes the same way.
             expected = 2 * last_pull - before_pull
-            theta = st.load[0]
+            theta = load[ANGLE]
             if part == 1.0 and last_dt == dt and abs(expected - pull) <= 0.05 * abs(pull):
                 for c in range(2):
                     for i in range(n + 2):
-                        w.d[c, i] = 2 * last[c, i] - before[c, i]
+                        slide[NOW, c, i] = 2 * slide[LAST, c, i] - slide[BEFORE, c, i]
                 theta += 2 * last_turn - before_turn
             else:
                 ratio = step_pull / last_pull if last_pull * pull > 0.0 else 0.0
                 ratio = min(ratio, 4.0)
                 for c in range(2):
                     for i in range(n + 2):
-                        w.d[c, i] = ratio * last[c, i]
+                        slide[NOW, c, i] = ratio * slide[LAST, c, i]
                 theta += ratio * last_turn
-            w.d[0, 0], w.d[1, 0] = step_pull, -step_pull
+            slide[NOW, 0, 0], slide[NOW, 1, 0] = step_pull, -step_pull
             value = series[j] - (1.0 - done - part) * rise
             if prescribed:
                 theta = value
-            solved, theta = _newton(ph, st, w, theta, 0.0 if prescribed else value, step_dt, saved, counts)
+            torque = 0.0 if prescribed else value
+            solved, theta = _newton(ph, piece, node, slide, mean, load, theta, torque, step_dt, counts)
             if not solved:
                 part *= 0.5
                 last_pull = 0.0
                 if part < SMALLEST_SUBSTEP:
                     return j
                 continue
-            before[:] = last
-            last[:] = w.d
-            before_turn, last_turn = last_turn, theta - st.load[0]
+            slide[BEFORE] = slide[LAST]
+            slide[LAST] = slide[NOW]
+            before_turn, last_turn = last_turn, theta - load[ANGLE]
             before_pull, last_pull, last_dt = last_pull, step_pull, step_dt
-            _commit(ph, st, w, theta, step_dt)
+            _commit(ph, piece, node, slide, mean, load, theta, step_dt)
             counts[1] += 1
             done += part
             part *= 2.0
-        out[0, j], out[1, j] = max(w.T[0, 0], 0.0), max(w.T[0, n], 0.0)
-        out[2, j], out[3, j] = max(w.T[1, 0], 0.0), max(w.T[1, n], 0.0)
-        out[4, j] = st.load[0]
-        bearing = ph.load_friction * st.load[5]
+        out[0, j], out[1, j] = max(piece[TENSION, 0, 0], 0.0), max(piece[TENSION, 0, n], 0.0)
+        out[2, j], out[3, j] = max(piece[TENSION, 1, 0], 0.0), max(piece[TENSION, 1, n], 0.0)
+        out[4, j] = load[ANGLE]
+        bearing = ph.load_friction * load[BEARING]
         if prescribed:
-            R = ph.radius * winding(st.load[0], ph.eccentricity, ph.phase)[1]
+            R = ph.radius * winding(load[ANGLE], ph.eccentricity, ph.phase)[1]
             out[5, j] = R * (out[1, j] - out[3, j]) - bearing
         else:
-            out[5, j] = w.trial_load[2]
+            out[5, j] = load[TORQUE]
         out[6, j] = bearing
     return m

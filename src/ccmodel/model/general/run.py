@@ -8,19 +8,12 @@ from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
 from ccmodel.mechanisms.contract import Settings, Sensing, all_finite
+from ccmodel.mechanisms.load_dependent_friction import FLOOR_N, REFERENCE_N
 from ccmodel.mechanisms.pulley_eccentricity import winding
 from ccmodel.mechanisms.pulley_friction import bearing
 from ccmodel.mechanisms.strand_settling import stretch_at
+from ccmodel.model.general import march as rows
 from ccmodel.model.general.grid import Grid, make_grid
-from ccmodel.model.general.march import (
-    COULOMB_BRISTLE_M,
-    IMPEDANCE,
-    PRESCRIBED_ANGLE,
-    Physics,
-    State,
-    Work,
-    march,
-)
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, MechanicalLoad, SpringLoad, TorqueLoad
 from ccmodel.model.paper import ModelError
@@ -163,21 +156,20 @@ def simulate(
     _check(time_s, theta_in, series, elements)
 
     grid = make_grid(transmission.path, elements, settings.kinks)
-    physics = _physics(transmission, load, settings, grid, time_s)
-    state = _state(physics, transmission, settings, grid, initial, load, series)
-    shape, nodes = physics.stiffness.shape, physics.half_bend.shape
-    work = Work(
-        np.zeros((2, nodes[1] + 2)),
-        *(np.zeros(shape) for _ in range(2)),
-        *(np.zeros(nodes) for _ in range(10)),
-        np.zeros(shape),
-        np.zeros(3),
-        np.zeros((2, nodes[1] + 2)),
-    )
+    physics = _physics(transmission, load, settings)
+    piece, node = _constants(transmission, settings, grid)
+    course = np.ones(1) if settings.friction_course is None else settings.friction_course(time_s)
+    mean, state = np.zeros((rows.MEAN_ROWS, 2)), np.zeros(rows.LOAD_ROWS)
+    T = _initial_state(physics, piece, node, settings, initial.at(transmission.path, grid.boundary_m), course[0])
+    mean[rows.MEAN] = (piece[rows.SHARE] * T).sum(axis=1)
+    state[rows.ANGLE] = _load_angle(physics, T, load, series)
+    slide = np.zeros((rows.SLIDE_ROWS, 2, node.shape[2] + 2))
     R_i = transmission.drive_radius_m
     way, round_, _ = winding(theta_in, *settings.drive_eccentricity)
     out, counts = np.zeros((7, time_s.size)), np.zeros(2, dtype=np.int64)
-    solved = march(physics, state, work, time_s, R_i * way, series, out, counts)
+    solved = rows.march(
+        physics, piece, node, slide, mean, state, time_s, R_i * way, course, series, out, counts
+    )
 
     time_s, theta_in, out = time_s[:solved], theta_in[:solved], out[:, :solved]
     T1, T2, T3, T4, theta_out, tau_out, _ = out
@@ -245,96 +237,80 @@ def _check(time_s, theta_in, series, elements):
         raise ModelError(f"time_s must increase; it does not at sample {late[0] + 1}")
 
 
-def _physics(transmission: Transmission, load: Load, settings: Settings, grid: Grid, time_s: NDArray) -> Physics:
-    """Constants of the run. The ends' compliances are pieces of their own beyond a node without friction."""
+def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tuple[NDArray, NDArray]:
+    """Rows of pieces and nodes. The ends' compliances are pieces of their own beyond a node without friction."""
     ratio_K, ratio_mu = (np.array([[1.0], [r]]) for r in (settings.stiffness_ratio_B, settings.friction_ratio_B))
     EA = transmission.axial_rigidity_N * ratio_K
     segment, cell, length = grid.segment_m, grid.cell_m, transmission.path.length_m
-    stiffness = EA / segment
-    lost = np.outer([1.0, 1.0], segment) * settings.settling_N / EA
-    relaxing = np.full(stiffness.shape, settings.relaxing_share)
-    share = np.outer([1.0, 1.0], segment / length)
-    half_bend = transmission.friction_coefficient * ratio_mu * grid.cell_rad / 2
-    drag = np.outer([1.0, 1.0], settings.drag_N * cell / length)
-    viscous = np.outer([1.0, 1.0], settings.viscous * cell)
-    for compliance, at in ((settings.drive_end_compliance, 0), (settings.load_end_compliance, -1)):
-        if compliance > 0:
-            stiffness = _beyond(stiffness, at, 1 / compliance)
-            lost, relaxing, share = (_beyond(a, at, 0.0) for a in (lost, relaxing, share))
-            half_bend, drag, viscous = (_beyond(a, at, 0.0) for a in (half_bend, drag, viscous))
+    drive, extra = settings.drive_end_compliance, int(settings.drive_end_compliance > 0)
+    load = settings.load_end_compliance
+    cells = slice(extra, extra + cell.size)
+    segments = slice(extra, extra + segment.size)
+    nodes = cell.size + extra + int(load > 0)
+    piece, node = np.zeros((rows.PIECE_ROWS, 2, nodes + 1)), np.zeros((rows.NODE_ROWS, 2, nodes))
+    piece[rows.STIFFNESS][:, segments] = EA / segment
+    piece[rows.LOST][:, segments] = segment * settings.settling_N / EA
+    piece[rows.RELAXING][:, segments] = settings.relaxing_share
+    piece[rows.SHARE][:, segments] = segment / length
+    node[rows.HALF_BEND][:, cells] = transmission.friction_coefficient * ratio_mu * grid.cell_rad / 2
+    node[rows.DRAG][:, cells] = settings.drag_N * cell / length
+    node[rows.VISCOUS][:, cells] = settings.viscous * cell
+    if drive > 0:
+        piece[rows.STIFFNESS][:, 0] = 1 / drive
+    if load > 0:
+        piece[rows.STIFFNESS][:, -1] = 1 / load
+    return piece, node
+
+
+def _physics(transmission: Transmission, load: Load, settings: Settings) -> rows.Physics:
     is_mechanical = isinstance(load, MechanicalLoad)
     K_e = load.stiffness_Nm_per_rad if isinstance(load, SpringLoad | MechanicalLoad) else 0.0
-    course = np.ones(1) if settings.friction_course is None else settings.friction_course(time_s)
-    return Physics(
-        stiffness=stiffness,
-        lost=lost,
+    return rows.Physics(
         has_settling=settings.settling_N > 0,
-        relaxing=relaxing,
         has_relaxation=settings.relaxing_share != 0,
-        tau=settings.relaxing_time_s,
-        share=share,
-        conduit_compliance=settings.conduit_compliance,
-        half_bend=half_bend,
-        drag=drag,
-        viscous=viscous,
-        bristle=settings.bristle_m if settings.bristle_m > 0 else COULOMB_BRISTLE_M,
+        tau=float(settings.relaxing_time_s),
+        conduit_compliance=float(settings.conduit_compliance),
+        bristle=float(settings.bristle_m) if settings.bristle_m > 0 else rows.COULOMB_BRISTLE_M,
         presliding=settings.bristle_m > 0,
-        exponent=settings.tension_exponent,
-        rise=settings.stribeck_rise,
-        vs=settings.stribeck_speed,
-        course=course,
-        radius=transmission.load_radius_m,
-        eccentricity=settings.load_eccentricity[0],
-        phase=settings.load_eccentricity[1],
-        stiffness_load=K_e,
-        cubic=settings.cubic_stiffness + (load.cubic_Nm_per_rad3 if is_mechanical else 0.0),
-        half_gap=settings.half_gap,
-        damping=load.damping_Nms_per_rad if is_mechanical else 0.0,
-        inertia=settings.inertia + (load.inertia_kg_m2 if is_mechanical else 0.0),
-        load_friction=settings.load_friction_Nm,
-        kind=PRESCRIBED_ANGLE if isinstance(load, AngleLoad) else IMPEDANCE,
+        exponent=float(settings.tension_exponent),
+        rise=float(settings.stribeck_rise),
+        vs=float(settings.stribeck_speed),
+        radius=float(transmission.load_radius_m),
+        eccentricity=float(settings.load_eccentricity[0]),
+        phase=float(settings.load_eccentricity[1]),
+        stiffness_load=float(K_e),
+        cubic=float(settings.cubic_stiffness + (load.cubic_Nm_per_rad3 if is_mechanical else 0.0)),
+        half_gap=float(settings.half_gap),
+        damping=float(load.damping_Nms_per_rad if is_mechanical else 0.0),
+        inertia=float(settings.inertia + (load.inertia_kg_m2 if is_mechanical else 0.0)),
+        load_friction=float(settings.load_friction_Nm),
+        kind=rows.PRESCRIBED_ANGLE if isinstance(load, AngleLoad) else rows.IMPEDANCE,
         general_friction=bool(settings.tension_exponent != 0 or settings.drag_N != 0 or settings.viscous != 0),
     )
 
 
-def _beyond(a: NDArray, at: int, value: float) -> NDArray:
-    column = np.full((2, 1), value)
-    return np.concatenate([column, a] if at == 0 else [a, column], axis=1)
-
-
-def _state(physics, transmission, settings, grid, initial: InitialTension, load: Load, series: NDArray) -> State:
-    """State in which the cables hold the initial tension, with the bristles that this takes."""
-    T = np.stack(initial.at(transmission.path, grid.boundary_m))
+def _initial_state(physics, piece, node, settings, profiles, course) -> NDArray:
+    """State in which the cables hold the initial tension, with the bristles that this takes; that tension (N)."""
+    T = np.stack(profiles)
     if settings.drive_end_compliance > 0:
         T = np.concatenate([T[:, :1], T], axis=1)
     if settings.load_end_compliance > 0:
         T = np.concatenate([T, T[:, -1:]], axis=1)
-    stretch = T / physics.stiffness
-    settles = physics.lost > 0
-    if settles.any():
-        stretch[settles] = stretch_at(T[settles], physics.lost[settles], physics.stiffness[settles])
+    stretch = T / piece[rows.STIFFNESS]
+    settles = piece[rows.LOST] > 0
+    stretch[settles] = stretch_at(T[settles], piece[rows.LOST][settles], piece[rows.STIFFNESS][settles])
+    piece[rows.STRETCH], piece[rows.ELASTIC] = stretch, T
     both = T[:, :-1] + T[:, 1:]
-    factor = 1.0
+    factor = course * (1 + physics.rise)
     if physics.exponent != 0:
-        from ccmodel.mechanisms.load_dependent_friction import FLOOR_N, REFERENCE_N
-
-        factor = (np.maximum(both / 2, FLOOR_N) / REFERENCE_N) ** physics.exponent
-    hold = np.tanh(physics.half_bend * factor * physics.course[0] * (1 + physics.rise)) * both + physics.drag
+        factor = factor * (np.maximum(both / 2, FLOOR_N) / REFERENCE_N) ** physics.exponent
+    hold = np.tanh(node[rows.HALF_BEND] * factor) * both + node[rows.DRAG]
     xi = np.divide(T[:, :-1] - T[:, 1:], hold, out=np.zeros_like(both), where=hold > 0)
-    theta = _load_angle(physics, T, load, series)
-    zeros = np.zeros_like(T)
-    return State(
-        stretch=stretch,
-        xi=np.clip(xi, -1, 1),
-        lost_tension=zeros,
-        elastic=T.copy(),
-        speed=np.zeros_like(both),
-        mean=(physics.share * T).sum(axis=1),
-        load=np.array([theta, 0.0, 0.0, 0.0, 0.0, 0.0]),
-    )
+    node[rows.BRISTLE] = np.clip(xi, -1, 1)
+    return T
 
 
-def _load_angle(physics: Physics, T: NDArray, load: Load, series: NDArray) -> float:
+def _load_angle(physics: rows.Physics, T: NDArray, load: Load, series: NDArray) -> float:
     """Angle at which the load holds the initial tensions, rad; 0 for a load that knows no neutral position."""
     if isinstance(load, AngleLoad):
         return float(series[0])
