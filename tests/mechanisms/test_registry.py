@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from general_runs import OUTPUTS, rms, run, sine
 
 from ccmodel import mechanisms
 from ccmodel.model.general import Active
+from general_runs import OUTPUTS, rms, run, sine
 
 READ = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N")
 # Where the neutral value is a limit: how close to it the parameter is taken, and how close the numbers then are.

@@ -1,13 +1,15 @@
 """Each mechanism does to a run what is known of it."""
 
+import itertools
+
 import numpy as np
 import pytest
-from general_runs import HALF_LOOP, K_E, MU, T0, TENSIONS, L, R, last_cycle, loop_area, rms, run, sine
 
 from ccmodel.geometry import ConduitPath
 from ccmodel.mechanisms.pulley_friction import PRESLIDING_RAD
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, MechanicalLoad
+from general_runs import HALF_LOOP, K_E, MU, T0, TENSIONS, L, R, last_cycle, loop_area, rms, run, sine
 
 DRIVE_ONLY = (*TENSIONS, "theta_out_rad", "tau_out_Nm")
 
@@ -151,7 +153,9 @@ def test_strands_make_the_cable_soft_near_slack_only():
     assert stiffness[20.0] == pytest.approx(1.0, abs=1e-6)
 
 
-@pytest.mark.parametrize(("place", "name"), [("drive-end", "termination"), ("load-end", "termination"), ("conduit", "")])
+@pytest.mark.parametrize(
+    ("place", "name"), [("drive-end", "termination"), ("load-end", "termination"), ("conduit", "")]
+)
 def test_compliance_adds_to_the_cables_own(place, name):
     """Without friction all compliances are in series: 1 / K = 1 / K_cable + c."""
     c = 50e-6
@@ -275,7 +279,10 @@ def test_skewed_clocks_shift_one_side_against_the_other(base):
 
 
 def test_order_of_sensor_faults_is_the_order_given(base):
-    gain, offset = ("load-cell-scale", "drive-sensor", {"gain": 0.1}), ("load-cell-offset", "drive-sensor", {"offset": 1.0})
+    gain, offset = (
+        ("load-cell-scale", "drive-sensor", {"gain": 0.1}),
+        ("load-cell-offset", "drive-sensor", {"offset": 1.0}),
+    )
     a, b = run(sine(), [gain, offset]), run(sine(), [offset, gain])
     assert b.read["F_drive_N"] - a.read["F_drive_N"] == pytest.approx(0.1, abs=1e-9)
 
@@ -284,7 +291,7 @@ def test_return_point_memory_with_presliding():
     """A nested loop closes on itself, and the way on is as if it had not been."""
     mechanism = ("presliding", "conduit", {"z0": 20e-6})
     way = [0.0, 0.5, 0.3, 0.5, 0.6]
-    nested = np.concatenate([np.linspace(a, b, 100, endpoint=False) for a, b in zip(way[:-1], way[1:], strict=True)])
+    nested = np.concatenate([np.linspace(a, b, 100, endpoint=False) for a, b in itertools.pairwise(way)])
     r, direct = run(np.append(nested, 0.6), mechanism), run(np.linspace(0, 0.6, 400), mechanism)
     assert r.T1_N[-1] == pytest.approx(direct.T1_N[-1], rel=2e-3)
     assert rms(r.T1_N[[100]], r.T1_N[[300]]) < 5e-3 * T0

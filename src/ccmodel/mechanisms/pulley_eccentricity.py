@@ -20,6 +20,12 @@ def winding(theta, e, psi):
     return theta - e * np.cos(theta + psi), 1.0 + e * np.sin(theta + psi), e * np.cos(theta + psi)
 
 
+@njit(cache=True)
+def wound(theta, turn, e, psi):
+    """Way over R that a turn from theta makes (rad), without cancellation in a small turn."""
+    return turn + 2.0 * e * np.sin(theta + psi + 0.5 * turn) * np.sin(0.5 * turn)
+
+
 def _enters(settings, place, values):
     if side(place) == "drive":
         settings.drive_eccentricity = (values["e"], values["psi"])

@@ -23,7 +23,7 @@ from numba import njit
 from ccmodel.mechanisms.backlash import dead_zone
 from ccmodel.mechanisms.load_dependent_friction import power_of_tension
 from ccmodel.mechanisms.presliding import dahl
-from ccmodel.mechanisms.pulley_eccentricity import winding
+from ccmodel.mechanisms.pulley_eccentricity import winding, wound
 from ccmodel.mechanisms.pulley_friction import PRESLIDING_RAD
 from ccmodel.mechanisms.relaxation import lag_weights
 from ccmodel.mechanisms.strand_settling import settling_tension
@@ -31,11 +31,18 @@ from ccmodel.mechanisms.stribeck import LAG_S, breakaway
 
 # Coulomb friction has no bristle; this one is a millionth of the stretch of any cable worth pulling.
 COULOMB_BRISTLE_M = 1e-9
+# Where conduits give way to their cables' mean tension, every node of a cable turns around at once at each reversal.
+# Newton's method then needs to see further than a nanometre; this costs 0.03 % of tension.
+SOFT_CONDUIT_BRISTLE_M = 1e-7
 # A slack piece keeps this share of its stiffness, so that its nodes have a place; its tension counts as zero.
 SLACK_SHARE = 1e-9
 # Out of balance by no more than this share of the highest tension.
 TOLERANCE = 1e-9
-NEWTON_LIMIT = 40
+# A node that is about to turn around in one go is left at the edge of sticking, where its friction is what it was.
+EDGE = 1.0 - 1e-9
+NEWTON_LIMIT = 60
+PATIENCE = 12
+SMALLEST_SHARE = 1.0 / 128
 SMALLEST_SUBSTEP = 1.0 / 4096
 
 IMPEDANCE, PRESCRIBED_ANGLE = 0, 1
@@ -93,7 +100,7 @@ FAST = {"reassoc", "contract", "nsz", "arcp"}  # not nnan: a NaN must be seen
 
 @njit(cache=True, inline="always")
 def _tanh(y):
-    """tanh for the half of mu phi of a cell, y >= 0: to rounding below 0.05, to 1e-6 at 1, at a tenth of the cost."""
+    """Tanh for the half of mu phi of a cell, y >= 0: to rounding below 0.05, to 1e-6 at 1, at a tenth of the cost."""
     if y > 1.5:
         return np.tanh(y)
     y2 = y * y
@@ -123,7 +130,11 @@ def _tensions(ph, piece, slide, mean, weights):
             piece[PULL, c, i] = pull
             if ph.has_relaxation:
                 r = piece[RELAXING, c, i]
-                q = weights[0] * piece[LOST_TENSION, c, i] + weights[1] * piece[ELASTIC, c, i] + weights[2] * max(pull, 0.0)
+                q = (
+                    weights[0] * piece[LOST_TENSION, c, i]
+                    + weights[1] * piece[ELASTIC, c, i]
+                    + weights[2] * max(pull, 0.0)
+                )
                 tangent *= 1.0 - r * weights[2] if pull > 0.0 else 1.0
                 pull -= r * q
             share = 1.0 if pull > 0.0 else SLACK_SHARE
@@ -180,12 +191,12 @@ def _nodes(ph, piece, node, slide, dt):
 
 
 @njit(cache=True, error_model="numpy")
-def _load(ph, piece, load, theta, torque, dt):
+def _load(ph, piece, load, turn, torque, dt):
     """Torque out of balance at the load pulley, its slope by the angle less what the cables add, and the radius."""
     n = piece.shape[2] - 1
+    theta = load[ANGLE] + turn
     _, round_, round_slope = winding(theta, ph.eccentricity, ph.phase)
     R = ph.radius * round_
-    turn = theta - load[ANGLE]
     z, inside = dead_zone(theta, ph.half_gap)
     tau = torque + ph.stiffness_load * z + ph.cubic * z**3
     slope = (ph.stiffness_load + 3 * ph.cubic * z * z) * inside
@@ -278,7 +289,9 @@ def _solve_with_conduits(ph, piece, node, slide, mean, G, slope, R, free):
         mean[END_BY_END, c] = K * (-g + own * mean[BY_END, c])
     turn = 0.0
     if free:
-        turn = (G + R * (mean[END_FIXED, 0] - mean[END_FIXED, 1])) / (slope - R * R * (mean[END_BY_END, 0] + mean[END_BY_END, 1]))
+        turn = (G + R * (mean[END_FIXED, 0] - mean[END_FIXED, 1])) / (
+            slope - R * R * (mean[END_BY_END, 0] + mean[END_BY_END, 1])
+        )
     for c in range(2):
         d = R * turn if c == 0 else -R * turn
         mean[MEAN_STEP, c] = mean[FIXED, c] + mean[BY_END, c] * d
@@ -307,8 +320,10 @@ def _move(ph, node, slide, share):
             else:
                 xi = node[BRISTLE, c, i - 1]
                 before, after = xi + old * inverse, xi + new * inverse
-                if (before > 1.0 and after < -1.0) or (before < -1.0 and after > 1.0):
-                    new = -xi * ph.bristle
+                if before > 1.0 and after < -1.0:
+                    new = (EDGE - xi) * ph.bristle
+                elif before < -1.0 and after > 1.0:
+                    new = (-EDGE - xi) * ph.bristle
             slide[NOW, c, i] = new
 
 
@@ -321,21 +336,22 @@ def _mean_tension(piece, c):
 
 
 @njit(cache=True, error_model="numpy")
-def _newton(ph, piece, node, slide, mean, load, theta, torque, dt, counts):
-    """Solve a step from the slides in `NOW` and the load angle `theta`; (whether it converged, load angle)."""
+def _newton(ph, piece, node, slide, mean, load, turn, torque, dt, counts):
+    """Solve a step from the slides in `NOW` and a turn of the load; (whether it converged, the load's turn)."""
     n = node.shape[2]
     free = ph.kind == IMPEDANCE
     weights = lag_weights(dt / ph.tau) if ph.has_relaxation and dt > 0.0 else (1.0, 0.0, 0.0)
     soft = ph.conduit_compliance > 0.0
-    way_0 = winding(load[ANGLE], ph.eccentricity, ph.phase)[0]
+    # With conduits that give way all nodes turn around at once at a reversal, and full steps overshoot far.
+    patience = 2 if soft and not ph.presliding else PATIENCE
     share, best = 1.0, np.inf
-    turn, saved_theta = 0.0, theta
+    step_turn, saved_turn = 0.0, turn
     for iteration in range(NEWTON_LIMIT):
-        way = ph.radius * (winding(theta, ph.eccentricity, ph.phase)[0] - way_0)
+        way = ph.radius * wound(load[ANGLE], turn, ph.eccentricity, ph.phase)
         slide[NOW, 0, n + 1], slide[NOW, 1, n + 1] = way, -way
         _tensions(ph, piece, slide, mean, weights)
         error = _nodes(ph, piece, node, slide, dt)
-        G, slope, R = _load(ph, piece, load, theta, torque, dt)
+        G, slope, R = _load(ph, piece, load, turn, torque, dt)
         if free:
             error += (G / ph.radius) ** 2
         if soft:
@@ -343,40 +359,44 @@ def _newton(ph, piece, node, slide, mean, load, theta, torque, dt, counts):
                 mean[MEAN_EXCESS, c] = _mean_tension(piece, c) - mean[MEAN_NEXT, c]
                 error += mean[MEAN_EXCESS, c] ** 2
         counts[0] += 1
-        scale = max(
-            max(piece[TENSION, 0, 0], piece[TENSION, 0, n]), max(piece[TENSION, 1, 0], piece[TENSION, 1, n])
-        )
+        scale = max(max(piece[TENSION, 0, 0], piece[TENSION, 0, n]), max(piece[TENSION, 1, 0], piece[TENSION, 1, n]))
         limit = TOLERANCE * max(scale, 1e-2)
         if error <= limit * limit:
-            return True, theta
+            return True, turn
         if not np.isfinite(error):
-            return False, theta
-        if iteration > 6 and error > best and share > 0.02:
-            # Back towards where the step began; the limits on single nodes are undone with it.
+            return False, turn
+        if iteration == patience and error > best:
+            # Full steps lead nowhere: from the best point on, only steps that lessen the error count.
+            slide[NOW] = slide[SAVED]
+            mean[MEAN_NEXT] = mean[MEAN_SAVED]
+            turn, best = saved_turn, np.inf
+            continue
+        if iteration > patience and error > best and share > SMALLEST_SHARE:
             share *= 0.5
             slide[NOW] = slide[SAVED]
             mean[MEAN_NEXT] = mean[MEAN_SAVED]
-            theta = saved_theta
+            turn = saved_turn
         else:
-            if iteration > 5:
+            if error < best or iteration > patience:
+                best = error
                 slide[SAVED] = slide[NOW]
                 mean[MEAN_SAVED] = mean[MEAN_NEXT]
-                saved_theta = theta
-            best, share = error, 1.0
+                saved_turn = turn
+            share = 1.0
             if soft:
-                turn = _solve_with_conduits(ph, piece, node, slide, mean, G, slope, R, free)
+                step_turn = _solve_with_conduits(ph, piece, node, slide, mean, G, slope, R, free)
             else:
-                turn = _solve(piece, node, slide, G, slope, R, free)
+                step_turn = _solve(piece, node, slide, G, slope, R, free)
         _move(ph, node, slide, share)
-        theta += share * turn
+        turn += share * step_turn
         if soft:
             for c in range(2):
                 mean[MEAN_NEXT, c] += share * mean[MEAN_STEP, c]
-    return False, theta
+    return False, turn
 
 
 @njit(cache=True, error_model="numpy")
-def _commit(ph, piece, node, slide, mean, load, theta, dt):
+def _commit(ph, piece, node, slide, mean, load, turn, dt):
     """Take over a solved step."""
     n = node.shape[2]
     weights = lag_weights(dt / ph.tau) if ph.has_relaxation and dt > 0.0 else (1.0, 0.0, 0.0)
@@ -405,9 +425,10 @@ def _commit(ph, piece, node, slide, mean, load, theta, dt):
             for i in range(n):
                 node[SPEED, c, i] = keep * node[SPEED, c, i] + (1.0 - keep) * slide[NOW, c, i + 1] / dt
     if dt > 0.0:
-        load[TURN], load[DT] = theta - load[ANGLE], dt
+        load[TURN], load[DT] = turn, dt
         load[OMEGA_BEFORE], load[OMEGA] = load[OMEGA], load[OMEGA_NEXT]
-    load[ANGLE], load[BEARING] = theta, load[BEARING_NEXT]
+    load[ANGLE] += turn
+    load[BEARING] = load[BEARING_NEXT]
 
 
 @njit(cache=True, error_model="numpy")
@@ -463,13 +484,12 @@ def march(ph, piece, node, slide, mean, load, time_s, way_in, course, series, ou
             step_pull, step_dt = part * pull, part * dt
             # The start: what the last steps did, scaled to the drive's step while it goes the same way.
             expected = 2 * last_pull - before_pull
-            theta = load[ANGLE]
             if part == 1.0 and last_dt == dt and abs(expected - pull) <= 0.05 * abs(pull):
                 for c in range(2):
                     for i in range(n + 2):
                         slide[NOW, c, i] = 2 * slide[LAST, c, i] - slide[BEFORE, c, i]
                     mean[MEAN_NEXT, c] = mean[MEAN, c] + 2 * mean[MEAN_LAST, c] - mean[MEAN_BEFORE, c]
-                theta += 2 * last_turn - before_turn
+                turn = 2 * last_turn - before_turn
             else:
                 ratio = step_pull / last_pull if last_pull * pull > 0.0 else 0.0
                 ratio = min(ratio, 4.0)
@@ -477,13 +497,13 @@ def march(ph, piece, node, slide, mean, load, time_s, way_in, course, series, ou
                     for i in range(n + 2):
                         slide[NOW, c, i] = ratio * slide[LAST, c, i]
                     mean[MEAN_NEXT, c] = mean[MEAN, c] + ratio * mean[MEAN_LAST, c]
-                theta += ratio * last_turn
+                turn = ratio * last_turn
             slide[NOW, 0, 0], slide[NOW, 1, 0] = step_pull, -step_pull
             value = series[j] - (1.0 - done - part) * rise
             if prescribed:
-                theta = value
+                turn = value - load[ANGLE]
             torque = 0.0 if prescribed else value
-            solved, theta = _newton(ph, piece, node, slide, mean, load, theta, torque, step_dt, counts)
+            solved, turn = _newton(ph, piece, node, slide, mean, load, turn, torque, step_dt, counts)
             if not solved:
                 part *= 0.5
                 last_pull = 0.0
@@ -492,9 +512,9 @@ def march(ph, piece, node, slide, mean, load, time_s, way_in, course, series, ou
                 continue
             slide[BEFORE] = slide[LAST]
             slide[LAST] = slide[NOW]
-            before_turn, last_turn = last_turn, theta - load[ANGLE]
+            before_turn, last_turn = last_turn, turn
             before_pull, last_pull, last_dt = last_pull, step_pull, step_dt
-            _commit(ph, piece, node, slide, mean, load, theta, step_dt)
+            _commit(ph, piece, node, slide, mean, load, turn, step_dt)
             counts[1] += 1
             done += part
             part *= 2.0

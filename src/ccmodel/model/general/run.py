@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
-from ccmodel.mechanisms.contract import Settings, Sensing, all_finite
+from ccmodel.mechanisms.contract import Sensing, Settings, all_finite
 from ccmodel.mechanisms.load_dependent_friction import FLOOR_N, REFERENCE_N
 from ccmodel.mechanisms.pulley_eccentricity import winding
 from ccmodel.mechanisms.pulley_friction import bearing
@@ -151,7 +151,10 @@ def simulate(
     for a in active:
         mechanism = registry.get(a.name)
         if mechanism.enters is not None:
-            mechanism.enters(settings, a.place, a.values)
+            try:
+                mechanism.enters(settings, a.place, a.values)
+            except ValueError as e:
+                raise ModelError(str(e)) from None
     series = _series(load, theta_in)
     _check(time_s, theta_in, series, elements)
 
@@ -167,9 +170,7 @@ def simulate(
     R_i = transmission.drive_radius_m
     way, round_, _ = winding(theta_in, *settings.drive_eccentricity)
     out, counts = np.zeros((7, time_s.size)), np.zeros(2, dtype=np.int64)
-    solved = rows.march(
-        physics, piece, node, slide, mean, state, time_s, R_i * way, course, series, out, counts
-    )
+    solved = rows.march(physics, piece, node, slide, mean, state, time_s, R_i * way, course, series, out, counts)
 
     time_s, theta_in, out = time_s[:solved], theta_in[:solved], out[:, :solved]
     T1, T2, T3, T4, theta_out, tau_out, _ = out
@@ -209,6 +210,12 @@ def _active(mechanisms) -> list[Active]:
             )
         if not all_finite(a.values):
             raise ModelError(f"{a.name} has a parameter that is not finite: {dict(a.values)}")
+        for p in known.parameters:
+            if p.low > 0 and not p.signed and a.values[p.name] < 0:
+                raise ModelError(
+                    f"{a.name} has {p.name} = {a.values[p.name]:g} {p.unit}, which must not be negative; "
+                    f"plausible is {p.low:g} to {p.high:g}"
+                )
     return given
 
 
@@ -270,7 +277,7 @@ def _physics(transmission: Transmission, load: Load, settings: Settings) -> rows
         has_relaxation=settings.relaxing_share != 0,
         tau=float(settings.relaxing_time_s),
         conduit_compliance=float(settings.conduit_compliance),
-        bristle=float(settings.bristle_m) if settings.bristle_m > 0 else rows.COULOMB_BRISTLE_M,
+        bristle=float(settings.bristle_m) if settings.bristle_m > 0 else _coulomb_bristle(transmission, settings),
         presliding=settings.bristle_m > 0,
         exponent=float(settings.tension_exponent),
         rise=float(settings.stribeck_rise),
@@ -287,6 +294,11 @@ def _physics(transmission: Transmission, load: Load, settings: Settings) -> rows
         kind=rows.PRESCRIBED_ANGLE if isinstance(load, AngleLoad) else rows.IMPEDANCE,
         general_friction=bool(settings.tension_exponent != 0 or settings.drag_N != 0 or settings.viscous != 0),
     )
+
+
+def _coulomb_bristle(transmission: Transmission, settings: Settings) -> float:
+    over_cable = settings.conduit_compliance * transmission.axial_rigidity_N / transmission.path.length_m
+    return max(rows.COULOMB_BRISTLE_M, min(1.0, 10 * over_cable) * rows.SOFT_CONDUIT_BRISTLE_M)
 
 
 def _initial_state(physics, piece, node, settings, profiles, course) -> NDArray:
