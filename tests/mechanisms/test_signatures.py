@@ -27,23 +27,23 @@ def triangle(amplitude=0.6, cycles=2, samples=500):
 def test_presliding_rounds_reversals(base):
     """tau_in turns its corner within some bristle lengths of sliding, and full slip is left alone."""
     rounded = run(sine(), ("presliding", "conduit", {"z0": 100e-6}))
-    corner = slice(500 + 125, 500 + 140)
-    slope = [np.gradient(r.tau_in_Nm, r.read["theta_in_rad"])[corner] for r in (base, rounded)]
-    assert np.abs(slope[0][1:]).max() > 1.3 * np.abs(slope[1][1:]).max()
+    turned = slice(500 + 127, 500 + 140)
+    change = [np.diff(r.tau_in_Nm)[turned] / np.diff(sine())[turned] for r in (base, rounded)]
+    assert np.abs(change[0]).max() > 1.3 * np.abs(change[1]).max()
     assert np.log(rounded.T1_N[600] / rounded.T2_N[600]) == pytest.approx(MU * np.pi, rel=2e-2)
 
 
-def test_presliding_loses_energy_in_small_nested_reversals_and_a_termination_does_not():
-    theta = np.concatenate([np.linspace(0, 0.5, 200), 0.5 - 0.002 * (1 - np.cos(np.linspace(0, 8 * np.pi, 400)))])
-    area = {}
-    for name, place, values in (
-        ("presliding", "conduit", {"z0": 100e-6}),
-        ("termination-compliance", "drive-end", {"compliance": 40e-6}),
-    ):
-        r = run(theta, (name, place, values))
-        area[name] = abs(np.trapezoid(r.tau_in_Nm[-101:], theta[-101:]))
-    assert area["presliding"] > 0
-    assert area["presliding"] != pytest.approx(area["termination-compliance"], rel=0.2)
+def test_small_nested_reversals_creep_with_presliding_and_close_with_a_termination():
+    """Both soften a small reversal alike; only bristles let tension creep from one to the next."""
+    turns = np.linspace(0, 8 * np.pi, 401)
+    theta = np.concatenate([np.linspace(0, 0.5, 200), 0.5 - 0.002 * (1 - np.cos(turns))])
+    bristles = run(theta, ("presliding", "conduit", {"z0": 100e-6})).T1_N
+    end = run(theta, ("termination-compliance", "drive-end", {"compliance": 40e-6})).T1_N
+    swing = [np.ptp(T[500:]) for T in (run(theta).T1_N, bristles, end)]
+    assert swing[1] < 0.4 * swing[0]
+    assert swing[2] < 0.4 * swing[0]
+    assert bristles[200] - bristles[600] > swing[1]
+    assert end[600] == pytest.approx(end[200], abs=1e-6)
 
 
 def test_viscous_friction_widens_loops_with_speed_and_not_with_tension():
@@ -64,8 +64,6 @@ def test_stribeck_peaks_at_break_away_and_loses_less_at_speed():
     plain = loop_area(run(triangle()))
     assert slow > 1.1 * fast
     assert fast == pytest.approx(plain, rel=0.08)
-    ratio = np.log(last_cycle(run(triangle(), mechanism, period_s=20.0).T1_N) / 1.0)
-    assert np.isfinite(ratio).all()
 
 
 def test_stribeck_is_smooth_from_sample_to_sample():

@@ -7,7 +7,7 @@ as it keeps its direction.
 Signature: corners at every reversal, sharp in the paper's model, are rounded over some z0 of sliding.
 
 Mistaken for termination compliance, which also softens the start of a stroke. Nested reversals of small amplitude
-tell: bristles lose energy in the smallest of them, a termination does not.
+tell: with bristles the tension creeps from one of them to the next, with a termination the small loops close.
 """
 
 import numpy as np
