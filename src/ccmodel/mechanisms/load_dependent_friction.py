@@ -16,17 +16,16 @@ from numba import njit
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 REFERENCE_N = 5.0
-# Below this tension friction no longer matters, and the power law would grow without bound.
-FLOOR_N = 1e-2
+# The power law would grow without bound where a cable goes slack; it levels off around this tension.
+FLOOR_N = 0.1
 
 
 @njit(cache=True, inline="always")
 def power_of_tension(tension, n):
     """Factor of mu at a tension (N), and its derivative by the tension (1/N)."""
-    if tension <= FLOOR_N:
-        return np.exp(n * np.log(FLOOR_N / REFERENCE_N)), 0.0
-    factor = np.exp(n * np.log(tension / REFERENCE_N))
-    return factor, n * factor / tension
+    square = tension * tension + FLOOR_N * FLOOR_N
+    factor = np.exp(0.5 * n * np.log(square / (REFERENCE_N * REFERENCE_N)))
+    return factor, n * factor * tension / square
 
 
 def _enters(settings, place, values):

@@ -315,7 +315,7 @@ def _initial_state(physics, piece, node, settings, profiles, course) -> NDArray:
     both = T[:, :-1] + T[:, 1:]
     factor = course * (1 + physics.rise)
     if physics.exponent != 0:
-        factor = factor * (np.maximum(both / 2, FLOOR_N) / REFERENCE_N) ** physics.exponent
+        factor = factor * (np.hypot(both / 2, FLOOR_N) / REFERENCE_N) ** physics.exponent
     hold = np.tanh(node[rows.HALF_BEND] * factor) * both + node[rows.DRAG]
     xi = np.divide(T[:, :-1] - T[:, 1:], hold, out=np.zeros_like(both), where=hold > 0)
     node[rows.BRISTLE] = np.clip(xi, -1, 1)
