@@ -37,7 +37,7 @@ SOFT_CONDUIT_BRISTLE_M = 1e-7
 # A slack piece keeps this share of its stiffness, so that its nodes have a place; its tension counts as zero.
 SLACK_SHARE = 1e-9
 # Out of balance by no more than this share of the highest tension.
-TOLERANCE = 1e-9
+TOLERANCE = 1e-8
 LOOSE_TOLERANCE = 1e-5
 # A node that is about to turn around in one go is left at the edge of sticking, where its friction is what it was.
 EDGE = 1.0 - 1e-9
