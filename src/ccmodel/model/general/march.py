@@ -30,7 +30,7 @@ from ccmodel.mechanisms.strand_settling import settling_tension
 from ccmodel.mechanisms.stribeck import LAG_S, breakaway
 
 # Coulomb friction has no bristle; this one is a millionth of the stretch of any cable worth pulling.
-COULOMB_BRISTLE_M = 1e-9
+COULOMB_BRISTLE_M = 1e-10
 # Where conduits give way to their cables' mean tension, every node of a cable turns around at once at each reversal.
 # Newton's method then needs to see further than a nanometre; this costs 0.03 % of tension.
 SOFT_CONDUIT_BRISTLE_M = 1e-7
