@@ -29,11 +29,13 @@ from ccmodel.mechanisms.relaxation import lag_weights
 from ccmodel.mechanisms.strand_settling import settling_tension
 from ccmodel.mechanisms.stribeck import LAG_S, breakaway
 
-# Coulomb friction has no bristle; this one is a millionth of the stretch of any cable worth pulling.
+# Coulomb friction has no bristle; this one is a ten-millionth of the stretch of any cable worth pulling.
 COULOMB_BRISTLE_M = 1e-10
 # Where conduits give way to their cables' mean tension, every node of a cable turns around at once at each reversal.
-# Newton's method then needs to see further than a nanometre; this costs 0.03 % of tension.
+# Newton's method then needs to see further; this costs 0.03 % of tension.
 SOFT_CONDUIT_BRISTLE_M = 1e-7
+# A sample that has no solution otherwise is tried with bristles up to this length.
+LONGEST_BRISTLE_M = 1e-6
 # A slack piece keeps this share of its stiffness, so that its nodes have a place; its tension counts as zero.
 SLACK_SHARE = 1e-9
 # Out of balance by no more than this share of the highest tension.
@@ -144,7 +146,7 @@ def _tensions(ph, piece, slide, mean, weights):
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def _nodes(ph, piece, node, slide, dt):
+def _nodes(ph, piece, node, slide, dt, bristle):
     """Balance of each node and its derivatives; the sum of squares of what is out of balance, N^2."""
     n = node.shape[2]
     total = 0.0
@@ -154,12 +156,12 @@ def _nodes(ph, piece, node, slide, dt):
         p, q, fd, r = node[NEAR, c], node[FAR, c], node[GIVES, c], node[EXCESS, c]
         if ph.presliding:
             for i in range(n):
-                x, slope = dahl(xi[i], d[i + 1], ph.bristle)
+                x, slope = dahl(xi[i], d[i + 1], bristle)
                 # Where nothing slides yet the slope is another to either side.
                 node[BRISTLE_NEXT, c, i] = x
-                fd[i] = slope if d[i + 1] != 0.0 else 1.0 / ph.bristle
+                fd[i] = slope if d[i + 1] != 0.0 else 1.0 / bristle
         else:
-            inverse = 1.0 / ph.bristle
+            inverse = 1.0 / bristle
             for i in range(n):
                 trial = xi[i] + d[i + 1] * inverse
                 node[BRISTLE_NEXT, c, i] = min(max(trial, -1.0), 1.0)
@@ -304,13 +306,13 @@ def _solve_with_conduits(ph, piece, node, slide, mean, G, slope, R, free):
 
 
 @njit(cache=True, error_model="numpy")
-def _move(ph, node, slide, share):
+def _move(ph, node, slide, share, bristle):
     """Take the slides a share of Newton's step on, no node from sliding one way to sliding the other in one go.
 
     Between the two lies the narrow stretch in which the node sticks, and Newton's method would step over it for ever.
     """
     n = node.shape[2]
-    inverse = 1.0 / ph.bristle
+    inverse = 1.0 / bristle
     for c in range(2):
         for i in range(1, n + 1):
             old = slide[NOW, c, i]
@@ -322,9 +324,9 @@ def _move(ph, node, slide, share):
                 xi = node[BRISTLE, c, i - 1]
                 before, after = xi + old * inverse, xi + new * inverse
                 if before > 1.0 and after < -1.0:
-                    new = (EDGE - xi) * ph.bristle
+                    new = (EDGE - xi) * bristle
                 elif before < -1.0 and after > 1.0:
-                    new = (-EDGE - xi) * ph.bristle
+                    new = (-EDGE - xi) * bristle
             slide[NOW, c, i] = new
 
 
@@ -337,13 +339,13 @@ def _mean_tension(piece, c):
 
 
 @njit(cache=True, error_model="numpy")
-def _evaluate(ph, piece, node, slide, mean, load, turn, torque, dt, weights):
+def _evaluate(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, weights):
     """Everything that a step leaves out of balance: sum of squares (N^2), highest tension, and the load's terms."""
     n = node.shape[2]
     way = ph.radius * wound(load[ANGLE], turn, ph.eccentricity, ph.phase)
     slide[NOW, 0, n + 1], slide[NOW, 1, n + 1] = way, -way
     _tensions(ph, piece, slide, mean, weights)
-    error = _nodes(ph, piece, node, slide, dt)
+    error = _nodes(ph, piece, node, slide, dt, bristle)
     G, slope, R = _load(ph, piece, load, turn, torque, dt)
     if ph.kind == IMPEDANCE:
         error += (G / ph.radius) ** 2
@@ -356,7 +358,7 @@ def _evaluate(ph, piece, node, slide, mean, load, turn, torque, dt, weights):
 
 
 @njit(cache=True, error_model="numpy")
-def _newton(ph, piece, node, slide, mean, load, turn, torque, dt, counts):
+def _newton(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, counts):
     """Solve a step from the slides in `NOW` and a turn of the load; (whether it converged, the load's turn)."""
     free = ph.kind == IMPEDANCE
     weights = lag_weights(dt / ph.tau) if ph.has_relaxation and dt > 0.0 else (1.0, 0.0, 0.0)
@@ -366,7 +368,7 @@ def _newton(ph, piece, node, slide, mean, load, turn, torque, dt, counts):
     share, best = 1.0, np.inf
     step_turn, saved_turn = 0.0, turn
     for iteration in range(NEWTON_LIMIT):
-        error, limit, G, slope, R = _evaluate(ph, piece, node, slide, mean, load, turn, torque, dt, weights)
+        error, limit, G, slope, R = _evaluate(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, weights)
         counts[0] += 1
         if error <= (TOLERANCE * limit) ** 2:
             return True, turn
@@ -394,7 +396,7 @@ def _newton(ph, piece, node, slide, mean, load, turn, torque, dt, counts):
                 step_turn = _solve_with_conduits(ph, piece, node, slide, mean, G, slope, R, free)
             else:
                 step_turn = _solve(piece, node, slide, G, slope, R, free)
-        _move(ph, node, slide, share)
+        _move(ph, node, slide, share, bristle)
         turn += share * step_turn
         if soft:
             for c in range(2):
@@ -403,7 +405,7 @@ def _newton(ph, piece, node, slide, mean, load, turn, torque, dt, counts):
     slide[NOW] = slide[SAVED]
     mean[MEAN_NEXT] = mean[MEAN_SAVED]
     turn = saved_turn
-    error, limit, G, slope, R = _evaluate(ph, piece, node, slide, mean, load, turn, torque, dt, weights)
+    error, limit, G, slope, R = _evaluate(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, weights)
     return error <= (LOOSE_TOLERANCE * limit) ** 2, turn
 
 
@@ -488,7 +490,7 @@ def march(ph, piece, node, slide, mean, load, time_s, way_in, course, series, ou
         pull = way_in[j] - way_in[j - 1] if j > 0 else 0.0
         rise = series[j] - series[j - 1] if j > 0 else 0.0
         dt = time_s[j] - time_s[j - 1] if j > 0 else 0.0
-        done, part = 0.0, 1.0
+        done, part, bristle = 0.0, 1.0, ph.bristle
         while done < 1.0:
             part = min(part, 1.0 - done)
             if not fixed_grip:
@@ -515,12 +517,15 @@ def march(ph, piece, node, slide, mean, load, time_s, way_in, course, series, ou
             if prescribed:
                 turn = value - load[ANGLE]
             torque = 0.0 if prescribed else value
-            solved, turn = _newton(ph, piece, node, slide, mean, load, turn, torque, step_dt, counts)
+            solved, turn = _newton(ph, piece, node, slide, mean, load, turn, torque, step_dt, bristle, counts)
             if not solved:
                 part *= 0.5
                 last_pull = 0.0
                 if part < SMALLEST_SUBSTEP:
-                    return j
+                    if ph.presliding or bristle >= LONGEST_BRISTLE_M:
+                        return j
+                    bristle *= 10.0
+                    part = 1.0
                 continue
             slide[BEFORE] = slide[LAST]
             slide[LAST] = slide[NOW]
