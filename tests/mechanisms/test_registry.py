@@ -10,7 +10,7 @@ from general_runs import OUTPUTS, rms, run, sine
 READ = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N")
 # Where the neutral value is a limit: how close to it the parameter is taken, and how close the numbers then are.
 NEARLY_NEUTRAL = {
-    "presliding": ({"z0": 1e-9}, 1e-5),
+    "presliding": ({"z0": 1e-10}, 1e-5),
     "strand-settling": ({"T_scale": 1e-4}, 2e-4),
     "termination-compliance": ({"compliance": 1e-12}, 1e-6),
 }
