@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 from numpy.typing import NDArray
 
 
@@ -23,7 +24,49 @@ class SpringLoad:
 
 
 @dataclass(frozen=True)
+class MechanicalLoad:
+    """A spring that stiffens, with inertia and damping: tau_out = K_e theta + K_3 theta^3 + B omega + J alpha.
+
+    Attributes
+    ----------
+    stiffness_Nm_per_rad : float
+        K_e, >= 0; theta_out is counted from the neutral position (from the start if there is no spring at all).
+    cubic_Nm_per_rad3 : float
+        K_3; softening (negative) is allowed as long as the torque still rises with the angle.
+    damping_Nms_per_rad : float
+        B >= 0.
+    inertia_kg_m2 : float
+        J >= 0.
+    """
+
+    stiffness_Nm_per_rad: float = 0.0
+    cubic_Nm_per_rad3: float = 0.0
+    damping_Nms_per_rad: float = 0.0
+    inertia_kg_m2: float = 0.0
+
+    def __post_init__(self):
+        for name in ("stiffness_Nm_per_rad", "damping_Nms_per_rad", "inertia_kg_m2"):
+            if not getattr(self, name) >= 0:
+                raise ValueError(f"a load's {name} must not be negative; got {getattr(self, name)}")
+        if not np.isfinite(self.cubic_Nm_per_rad3):
+            raise ValueError(f"a load's cubic_Nm_per_rad3 must be finite; got {self.cubic_Nm_per_rad3}")
+
+
+@dataclass(frozen=True)
 class TorqueLoad:
     """A torque prescribed at every sample, such as the one measured at the load pulley, N m, shape (n,)."""
 
     torque_Nm: NDArray
+
+
+@dataclass(frozen=True)
+class AngleLoad:
+    """An angle known at every sample, as measured at the load pulley; linear in between.
+
+    Parameters
+    ----------
+    angle_rad : ndarray, shape (n,)
+        theta_out; constant for a load that is blocked.
+    """
+
+    angle_rad: NDArray

@@ -1,0 +1,29 @@
+"""Two cables that are not alike.
+
+Equation: cable B has mu times ``ratio`` and EA times ``K_ratio`` of cable A's.
+
+Signature: a residual that is odd in the direction of motion: cable A's stroke fits and B's does not.
+
+Mistaken for the gain of a load cell. Exchange the cables: the residual goes with them.
+"""
+
+from ccmodel.mechanisms.contract import Mechanism, Parameter
+
+
+def _enters(settings, place, values):
+    settings.friction_ratio_B = values["ratio"]
+    settings.stiffness_ratio_B = values["K_ratio"]
+
+
+MECHANISM = Mechanism(
+    name="cable-asymmetry",
+    places=("cable",),
+    parameters=(
+        Parameter("ratio", "1", 0.6, 1.4, 1.1, neutral=1.0),
+        Parameter("K_ratio", "1", 0.6, 1.4, 1.0, neutral=1.0),
+    ),
+    summary="friction or stiffness differs between the cables",
+    mistaken_for="load-cell-scale",
+    separated_by="exchange of the cables",
+    enters=_enters,
+)

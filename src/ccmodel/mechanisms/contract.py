@@ -1,0 +1,215 @@
+"""What a mechanism is: where it acts, the numbers it has, and how these enter the general solver.
+
+1. One file of this package holds one mechanism as ``MECHANISM`` (or a few close relatives as ``MECHANISMS``); the
+   package finds it by itself.
+2. Its docstring says the equation, what it looks like in a recording, what it is mistaken for and which experiment
+   tells the two apart.
+3. It enters through one of two doors. ``enters`` writes its values into `Settings` before a run. ``reads`` changes
+   what the sensors show after a run. Neither may touch what its values do not name.
+4. A mechanism that is not in a model leaves the numbers bit for bit as they are. One whose parameters are at their
+   neutral values gives the paper's model, or tends to it as a parameter with an open neutral value (a bristle
+   length of zero, a speed of zero) gets there.
+5. An equation that the march over the samples needs at every step stands in the mechanism's file as a compiled
+   function that the solver imports. (Numba keys its disc cache on the caller's file: after a change of such a
+   function, empty the caller's ``__pycache__``.)
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+PLACES = (
+    "drive-pulley",
+    "drive-end",
+    "cable",
+    "conduit",
+    "load-end",
+    "load-pulley",
+    "load",
+    "drive-sensor",
+    "load-sensor",
+)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a mechanism.
+
+    Attributes
+    ----------
+    name : str
+        As it stands in diagnoses and model files.
+    unit : str
+        SI; "1" for a pure number.
+    low, high : float
+        The range in which it is plausible.
+    start : float
+        Where a fit begins.
+    neutral : float
+        The value at which the mechanism is not there.
+    scale : {"log", "linear"}
+        How a fit should step over the range.
+    signed : bool
+        Whether the range holds for the size of the number and either sign is possible.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    start: float
+    neutral: float = 0.0
+    scale: str = "log"
+    signed: bool = False
+
+
+@dataclass
+class Settings:
+    """Everything that the general solver can be told beyond the paper's model; as made, it is the paper's model.
+
+    The fields are the solver's named places. Lengths in m, forces in N, angles in rad, times in s.
+
+    Attributes
+    ----------
+    kinks : list of (float, float)
+        Conduit: share of the length and extra bend (rad) of each kink.
+    bristle_m : float
+        Conduit: presliding length z0 of Dahl's bristle; 0 is Coulomb friction.
+    stribeck_rise, stribeck_speed : float
+        Conduit: share by which friction at rest exceeds that in fast sliding, and the speed (m/s) of its fall.
+    viscous : float
+        Conduit: drag per speed and length, N s/m per m.
+    tension_exponent : float
+        Conduit: n of mu (T / T_ref)^n.
+    drag_N : float
+        Conduit: friction of a whole cable that does not depend on tension.
+    friction_course : callable or None
+        Conduit: factor of mu at given times (s, shape (samples,)), same shape.
+    friction_ratio_B, stiffness_ratio_B : float
+        Cable: mu and EA of cable B over those of cable A.
+    relaxing_share, relaxing_time_s : float
+        Cable: standard linear solid.
+    settling_N : float
+        Cable: tension scale below which strands settle.
+    drive_end_compliance, load_end_compliance, conduit_compliance : float
+        Ends and conduit: m/N.
+    drive_friction_Nm, load_friction_Nm : float
+        Pulleys: friction torques.
+    drive_eccentricity, load_eccentricity : (float, float)
+        Pulleys: e and psi (rad) of R (1 + e sin(theta + psi)).
+    half_gap : float
+        Load pulley: half the dead zone between pulley and load, rad.
+    cubic_stiffness, inertia : float
+        Load: K_3 (N m/rad^3) and J (kg m^2), on top of what the load has by itself.
+    """
+
+    kinks: list[tuple[float, float]] = field(default_factory=list)
+    bristle_m: float = 0.0
+    stribeck_rise: float = 0.0
+    stribeck_speed: float = 1e-3
+    viscous: float = 0.0
+    tension_exponent: float = 0.0
+    drag_N: float = 0.0
+    friction_course: Callable[[NDArray], NDArray] | None = None
+    friction_ratio_B: float = 1.0
+    stiffness_ratio_B: float = 1.0
+    relaxing_share: float = 0.0
+    relaxing_time_s: float = 30.0
+    settling_N: float = 0.0
+    drive_end_compliance: float = 0.0
+    load_end_compliance: float = 0.0
+    conduit_compliance: float = 0.0
+    drive_friction_Nm: float = 0.0
+    load_friction_Nm: float = 0.0
+    drive_eccentricity: tuple[float, float] = (0.0, 0.0)
+    load_eccentricity: tuple[float, float] = (0.0, 0.0)
+    half_gap: float = 0.0
+    cubic_stiffness: float = 0.0
+    inertia: float = 0.0
+
+
+@dataclass(frozen=True)
+class Sensing:
+    """What the sensors are about to show, for a mechanism to change.
+
+    Attributes
+    ----------
+    time_s : ndarray, shape (n,)
+    channels : mapping of str to ndarray, each of shape (n,)
+        theta_in_rad, theta_out_rad, tau_in_Nm, tau_out_Nm, F_drive_N, F_load_N.
+    load_radius_m, drive_radius_m : float
+    """
+
+    time_s: NDArray
+    channels: Mapping[str, NDArray]
+    drive_radius_m: float
+    load_radius_m: float
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """An effect that the paper's model leaves out.
+
+    Attributes
+    ----------
+    name : str
+    places : tuple of str
+        Where it can act, of `PLACES`.
+    parameters : tuple of Parameter
+    enters : callable or None
+        ``enters(settings, place, values)`` writes into `Settings`.
+    reads : callable or None
+        ``reads(sensing, place, values)`` returns the channels that change.
+    summary : str
+        One line for tables and pages.
+    mistaken_for, separated_by : str
+        What looks like it, and the experiment that tells.
+    """
+
+    name: str
+    places: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
+    summary: str
+    mistaken_for: str
+    separated_by: str
+    enters: Callable[[Settings, str, Mapping[str, float]], None] | None = None
+    reads: Callable[[Sensing, str, Mapping[str, float]], dict[str, NDArray]] | None = None
+
+    def __post_init__(self):
+        unknown = set(self.places) - set(PLACES)
+        if unknown or not self.places:
+            raise ValueError(f"{self.name}: places are {', '.join(PLACES)}; got {', '.join(self.places) or 'none'}")
+        if (self.enters is None) == (self.reads is None):
+            raise ValueError(f"{self.name}: a mechanism either enters the solver or changes what sensors read")
+
+    @property
+    def neutral(self) -> dict[str, float]:
+        """Parameter values at which it is not there."""
+        return {p.name: p.neutral for p in self.parameters}
+
+    @property
+    def start(self) -> dict[str, float]:
+        """Parameter values from which a fit begins."""
+        return {p.name: p.start for p in self.parameters}
+
+
+def side(place: str) -> str:
+    """'drive' or 'load', the end of the transmission that a place belongs to."""
+    return place.split("-")[0]
+
+
+def sensor_torque(place: str) -> str:
+    """Name of the torque channel on the side of a sensor place."""
+    return {"drive": "tau_in_Nm", "load": "tau_out_Nm"}[side(place)]
+
+
+def sensor_sum(place: str) -> str:
+    """Name of the load cell's channel on the side of a sensor place."""
+    return {"drive": "F_drive_N", "load": "F_load_N"}[side(place)]
+
+
+def all_finite(values: Mapping[str, float]) -> bool:
+    """Whether every value is a finite number."""
+    return bool(np.isfinite(list(values.values())).all())

@@ -1,0 +1,46 @@
+"""Friction in a pulley's bearing.
+
+Equation: a torque tau_b sgn(omega) against the pulley's motion, built up over a small presliding angle with Dahl's
+law, as in `ccmodel.mechanisms.presliding`.
+
+Signature: at the drive tau_in is off by a square wave in step with the speed, and all else is right. At the load
+(T2 - T4) R shows a step at each reversal that the torque of the load itself does not show.
+
+Mistaken for a torque sensor's gain and for constant drag. The load tells: a gain's error grows with the torque, a
+bearing's has the sign of the speed and one size.
+"""
+
+import numpy as np
+from numba import njit
+
+from ccmodel.mechanisms.contract import Mechanism, Parameter, side
+from ccmodel.mechanisms.presliding import dahl
+
+PRESLIDING_RAD = 2e-3
+
+
+@njit(cache=True)
+def bearing(theta):
+    """Friction over friction torque (-1 to 1) along a course of angles (rad, shape (n,)) that starts unloaded."""
+    share = np.zeros_like(theta)
+    for j in range(1, theta.size):
+        share[j] = dahl(share[j - 1], theta[j] - theta[j - 1], PRESLIDING_RAD)[0]
+    return share
+
+
+def _enters(settings, place, values):
+    if side(place) == "drive":
+        settings.drive_friction_Nm = values["friction_torque"]
+    else:
+        settings.load_friction_Nm = values["friction_torque"]
+
+
+MECHANISM = Mechanism(
+    name="pulley-friction",
+    places=("drive-pulley", "load-pulley"),
+    parameters=(Parameter("friction_torque", "N m", 0.5e-3, 50e-3, 5e-3),),
+    summary="a friction torque in a pulley's bearing",
+    mistaken_for="torque-scale, constant-drag",
+    separated_by="parity of the error against speed and load",
+    enters=_enters,
+)

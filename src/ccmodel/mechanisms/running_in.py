@@ -1,0 +1,33 @@
+"""Running-in: friction that changes as cable and liner wear into each other or warm up.
+
+Equation: mu (1 + change (1 - exp(-t / tau))), t from the start of the recording.
+
+Signature: loops drift through a recording while the sensors' zeros stay.
+
+Mistaken for relaxation. A hold tells, since relaxation goes on at rest, and so does a return to the first condition.
+"""
+
+import numpy as np
+
+from ccmodel.mechanisms.contract import Mechanism, Parameter
+
+
+def _enters(settings, place, values):
+    def course(time_s):
+        return 1 + values["change"] * -np.expm1(-(time_s - time_s[0]) / values["tau"])
+
+    settings.friction_course = course
+
+
+MECHANISM = Mechanism(
+    name="running-in",
+    places=("conduit",),
+    parameters=(
+        Parameter("change", "1", 0.05, 0.3, 0.1, signed=True),
+        Parameter("tau", "s", 2.0, 100.0, 10.0, neutral=10.0),
+    ),
+    summary="friction coefficient changes through a recording",
+    mistaken_for="relaxation",
+    separated_by="holds, and a return to the start condition",
+    enters=_enters,
+)

@@ -1,0 +1,26 @@
+"""Viscous friction: a film of lubricant that is sheared.
+
+Equation: a drag c v per length of conduit on top of Coulomb friction, whatever the tension.
+
+Signature: loops widen with speed and not with tension; at low speed nothing is left of it.
+
+Mistaken for Stribeck friction (whose loops narrow with speed) and for a clock that is late. Three speeds tell.
+"""
+
+from ccmodel.mechanisms.contract import Mechanism, Parameter
+
+
+def _enters(settings, place, values):
+    settings.viscous = values["c"]
+
+
+# A film that takes 1 to 40 % of Coulomb friction: 0.05 to 2 N over a metre of conduit at some 3 mm/s.
+MECHANISM = Mechanism(
+    name="viscous-friction",
+    places=("conduit",),
+    parameters=(Parameter("c", "N s/m^2", 5.0, 1000.0, 50.0),),
+    summary="drag in proportion to sliding speed",
+    mistaken_for="stribeck, time-skew",
+    separated_by="three speeds",
+    enters=_enters,
+)

@@ -1,0 +1,85 @@
+"""Cells along the conduit: a friction node in the middle of each, a piece of cable from node to node."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ccmodel.geometry import ConduitPath
+
+# How much of the cells the bend attracts; the rest is spread by length, for what acts per length.
+BEND_WEIGHT = 0.8
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Cells along one conduit, drive end first.
+
+    Attributes
+    ----------
+    boundary_m, boundary_rad : ndarray, shape (n + 1,)
+        Arc length and bend angle at the cells' boundaries; a kink is a cell without length.
+    """
+
+    boundary_m: NDArray
+    boundary_rad: NDArray
+
+    @property
+    def cell_m(self) -> NDArray:
+        """Length of each cell, m, shape (n,)."""
+        return np.diff(self.boundary_m)
+
+    @property
+    def cell_rad(self) -> NDArray:
+        """Bend of each cell, rad, shape (n,)."""
+        return np.diff(self.boundary_rad)
+
+    @property
+    def segment_m(self) -> NDArray:
+        """Length of cable from node to node, the two end pieces included, m, shape (n + 1,)."""
+        half = np.concatenate([[0.0], self.cell_m, [0.0]]) / 2
+        return half[:-1] + half[1:]
+
+
+def make_grid(path: ConduitPath, elements: int, kinks: Sequence[tuple[float, float]] = ()) -> Grid:
+    """About `elements` cells, finer towards both ends, none across a corner of the path or a kink.
+
+    A front that runs in from an end by X needs a pull of the order X^2, so the tension at that end rises as a square
+    root. Straight lines between the nodes' values of it are off by (cell)^2 / X: cells that grow as the square root
+    of the distance from the end keep that error even, and of second order at the end as well.
+
+    Parameters
+    ----------
+    path : ConduitPath
+    elements : int
+        Cells wanted; a path of many pieces gets at least one a piece.
+    kinks : sequence of (float, float)
+        Share of the length, in (0, 1), and extra bend (rad) of each.
+    """
+    length, bend = path.length_m, path.bend_rad
+    kinks = sorted((share * length, extra) for share, extra in kinks)
+    corners = np.concatenate([[0.0], np.cumsum(path.piece_length_m)])
+    corners[-1] = length
+    corners = np.union1d(corners, [x for x, _ in kinks])
+    weight = BEND_WEIGHT if bend > 0 else 0.0
+
+    def coordinate(x):
+        curved = path.bend_at(x) / bend if bend > 0 else 0.0
+        return weight * curved + (1 - weight) * x / length
+
+    graded = (1 - np.cos(np.pi * np.arange(elements + 1) / elements)) / 2
+    x = np.interp(graded[1:-1], coordinate(corners), corners)
+    # A boundary that all but meets a corner would make a cell of no use.
+    keep = np.ones(x.size, dtype=bool)
+    own = np.gradient(np.concatenate([[0.0], x, [length]]))[1:-1] if x.size else x
+    for corner in corners[1:-1]:
+        keep &= np.abs(x - corner) > 0.4 * own
+    x = np.union1d(x[keep], corners)
+    phi = path.bend_at(x)
+    for place, extra in kinks:
+        i = int(np.searchsorted(x, place))
+        x = np.insert(x, i + 1, x[i])
+        phi = np.insert(phi, i + 1, phi[i])
+        phi[i + 1 :] += extra
+    return Grid(x, phi)

@@ -1,0 +1,548 @@
+"""The compiled march over the samples: both cables and the load pulley as one chain, implicit in every step.
+
+Each cable is a row of nodes with friction between pieces of cable that carry no compression; row 0 is cable A, row 1
+cable B. Displacements count towards the drive end. The unknowns of a step are the slides d of all nodes and the load
+pulley's turn, and what they must solve is
+
+    T_i - T_{i+1} = xi_i(d_i) tanh(mu phi_i / 2) (T_i + T_{i+1}) + (drag),      i = node, T_i on its drive side
+
+and the balance of torques at the load pulley. With this form of friction a node that slides has the capstan's ratio
+T_i / T_{i+1} = exp(mu phi_i) without any error of the grid. xi is the node's bristle, -1 to 1: Dahl's law where there
+is presliding, else a bristle of `COULOMB_BRISTLE_M` that yields at once, which makes the step's equations piecewise
+linear and Newton's method exact as soon as it knows who slides.
+
+Newton's matrix is tridiagonal from the drive end of A over the load pulley to the drive end of B, so it is eliminated
+from both drive ends at once. A conduit that gives way to its cable's mean tension adds one unknown a cable.
+"""
+
+from collections import namedtuple
+
+import numpy as np
+from numba import njit
+
+from ccmodel.mechanisms.backlash import dead_zone
+from ccmodel.mechanisms.load_dependent_friction import power_of_tension
+from ccmodel.mechanisms.presliding import dahl
+from ccmodel.mechanisms.pulley_eccentricity import winding, wound
+from ccmodel.mechanisms.pulley_friction import PRESLIDING_RAD
+from ccmodel.mechanisms.relaxation import lag_weights
+from ccmodel.mechanisms.strand_settling import settling_tension
+from ccmodel.mechanisms.stribeck import LAG_S, breakaway
+
+# Coulomb friction has no bristle; this one is a ten-millionth of the stretch of any cable worth pulling.
+COULOMB_BRISTLE_M = 1e-10
+# Where conduits give way to their cables' mean tension, every node of a cable turns around at once at each reversal.
+# Newton's method then needs to see further; this costs 0.03 % of tension.
+SOFT_CONDUIT_BRISTLE_M = 1e-7
+# A sample that has no solution otherwise is tried with bristles up to this length.
+LONGEST_BRISTLE_M = 1e-6
+# A slack piece keeps this share of its stiffness, so that its nodes have a place; its tension counts as zero.
+SLACK_SHARE = 1e-9
+# Out of balance by no more than this share of the highest tension.
+TOLERANCE = 1e-8
+LOOSE_TOLERANCE = 1e-5
+# A node that is about to turn around in one go is left at the edge of sticking, where its friction is what it was.
+EDGE = 1.0 - 1e-9
+NEWTON_LIMIT = 60
+PATIENCE = 12
+SMALLEST_SHARE = 1.0 / 128
+SMALLEST_SUBSTEP = 1.0 / 4096
+
+IMPEDANCE, PRESCRIBED_ANGLE = 0, 1
+
+# What a run and its steps know, in four arrays of rows: every array that goes from one compiled function to another
+# costs some time at every call.
+# piece, shape (rows, 2, n + 1): of the cable between nodes. N/m, m, -, -, then the state, then the step's results.
+STIFFNESS, LOST, RELAXING, SHARE, STRETCH, LOST_TENSION, ELASTIC, TENSION, TANGENT, PULL = range(10)
+# node, shape (rows, 2, n): constants (rad, N, N s/m), state, the step's equations and their elimination.
+(
+    HALF_BEND,
+    DRAG,
+    VISCOUS,
+    BRISTLE,
+    SPEED,
+    GRIP,
+    BRISTLE_NEXT,
+    NEAR,
+    FAR,
+    GIVES,
+    EXCESS,
+    ALPHA,
+    BETA,
+    ETA,
+) = range(14)
+# slide, shape (rows, 2, n + 2): drive end, nodes, load end, m. This step, Newton's step, and those before.
+NOW, STEP, SAVED, LAST, BEFORE = range(5)
+# mean, shape (rows, 2): mean tension of a cable that its conduit gives way to, N.
+(
+    MEAN,
+    MEAN_NEXT,
+    MEAN_LAST,
+    MEAN_BEFORE,
+    MEAN_STEP,
+    MEAN_EXCESS,
+    MEAN_SAVED,
+    FIXED,
+    BY_END,
+    END_FIXED,
+    END_BY_END,
+) = range(11)
+# load, shape (rows,): angle, last turn and step's length, speed, speed before, bristle of the bearing; the step's.
+ANGLE, TURN, DT, OMEGA, OMEGA_BEFORE, BEARING, OMEGA_NEXT, BEARING_NEXT, TORQUE = range(9)
+PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10, 14, 5, 11, 9
+
+# Numbers of a run.
+Physics = namedtuple(
+    "Physics",
+    "has_settling has_relaxation tau conduit_compliance bristle presliding exponent rise vs radius eccentricity phase "
+    "stiffness_load cubic half_gap damping inertia load_friction kind general_friction",
+)
+
+FAST = {"reassoc", "contract", "nsz", "arcp"}  # not nnan: a NaN must be seen
+
+
+@njit(cache=True, inline="always")
+def _tanh(y):
+    """Tanh for the half of mu phi of a cell, y >= 0: to rounding below 0.05, to 1e-6 at 1, at a tenth of the cost."""
+    if y > 1.5:
+        return np.tanh(y)
+    y2 = y * y
+    return y * (945.0 + y2 * (105.0 + y2)) / (945.0 + y2 * (420.0 + 15.0 * y2))
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _tensions(ph, piece, slide, mean, weights):
+    """Tension of each piece and its tangent stiffness for the slides of this step."""
+    n1 = piece.shape[2]
+    for c in range(2):
+        T, K, k, d, e = piece[TENSION, c], piece[TANGENT, c], piece[STIFFNESS, c], slide[NOW, c], piece[STRETCH, c]
+        if not (ph.has_settling or ph.has_relaxation or ph.conduit_compliance > 0):
+            for i in range(n1):
+                pull = k[i] * (e[i] + (d[i] - d[i + 1]))
+                share = 1.0 if pull > 0.0 else SLACK_SHARE
+                T[i] = share * pull
+                K[i] = share * k[i]
+            continue
+        gives = ph.conduit_compliance * (mean[MEAN_NEXT, c] - mean[MEAN, c])
+        for i in range(n1):
+            stretch = e[i] + (d[i] - d[i + 1]) - gives * piece[SHARE, c, i]
+            pull, tangent = k[i] * stretch, k[i]
+            if piece[LOST, c, i] > 0.0 and stretch > 0.0:
+                pull, tangent = settling_tension(stretch, piece[LOST, c, i], k[i])
+                tangent = max(tangent, SLACK_SHARE * k[i])
+            piece[PULL, c, i] = pull
+            if ph.has_relaxation:
+                r = piece[RELAXING, c, i]
+                q = (
+                    weights[0] * piece[LOST_TENSION, c, i]
+                    + weights[1] * piece[ELASTIC, c, i]
+                    + weights[2] * max(pull, 0.0)
+                )
+                tangent *= 1.0 - r * weights[2] if pull > 0.0 else 1.0
+                pull -= r * q
+            share = 1.0 if pull > 0.0 else SLACK_SHARE
+            T[i] = share * pull
+            K[i] = share * tangent
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _nodes(ph, piece, node, slide, dt, bristle):
+    """Balance of each node and its derivatives; the sum of squares of what is out of balance, N^2."""
+    n = node.shape[2]
+    total = 0.0
+    rate = 1.0 / dt if dt > 0.0 else 0.0
+    for c in range(2):
+        T, K, d, grip, xi = piece[TENSION, c], piece[TANGENT, c], slide[NOW, c], node[GRIP, c], node[BRISTLE, c]
+        p, q, fd, r = node[NEAR, c], node[FAR, c], node[GIVES, c], node[EXCESS, c]
+        if ph.presliding:
+            for i in range(n):
+                x, slope = dahl(xi[i], d[i + 1], bristle)
+                # Where nothing slides yet the slope is another to either side.
+                node[BRISTLE_NEXT, c, i] = x
+                fd[i] = slope if d[i + 1] != 0.0 else 1.0 / bristle
+        else:
+            inverse = 1.0 / bristle
+            for i in range(n):
+                trial = xi[i] + d[i + 1] * inverse
+                node[BRISTLE_NEXT, c, i] = min(max(trial, -1.0), 1.0)
+                fd[i] = inverse if abs(trial) < 1.0 else 0.0
+        if not ph.general_friction:
+            for i in range(n):
+                x, g = node[BRISTLE_NEXT, c, i], grip[i]
+                hold = g * (max(T[i], 0.0) + max(T[i + 1], 0.0))
+                p[i] = K[i] * (1.0 - x * g)
+                q[i] = K[i + 1] * (1.0 + x * g)
+                fd[i] *= hold
+                r[i] = T[i] - T[i + 1] - x * hold
+        else:
+            for i in range(n):
+                x, g, slope = node[BRISTLE_NEXT, c, i], grip[i], 0.0
+                both = max(T[i], 0.0) + max(T[i + 1], 0.0)
+                if ph.exponent != 0.0:
+                    factor, by_tension = power_of_tension(0.5 * both, ph.exponent)
+                    g = _tanh(grip[i] * factor)
+                    slope = 0.5 * both * (1.0 - g * g) * grip[i] * by_tension
+                hold = g * both + node[DRAG, c, i]
+                p[i] = K[i] * (1.0 - x * (g + slope))
+                q[i] = K[i + 1] * (1.0 + x * (g + slope))
+                drag = node[VISCOUS, c, i] * rate
+                fd[i] = fd[i] * hold + drag
+                r[i] = T[i] - T[i + 1] - x * hold - drag * d[i + 1]
+        for i in range(n):
+            total += r[i] * r[i]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def _load(ph, piece, load, turn, torque, dt):
+    """Torque out of balance at the load pulley, its slope by the angle less what the cables add, and the radius."""
+    n = piece.shape[2] - 1
+    theta = load[ANGLE] + turn
+    _, round_, round_slope = winding(theta, ph.eccentricity, ph.phase)
+    R = ph.radius * round_
+    z, inside = dead_zone(theta, ph.half_gap)
+    tau = torque + ph.stiffness_load * z + ph.cubic * z**3
+    slope = (ph.stiffness_load + 3 * ph.cubic * z * z) * inside
+    omega = 0.0
+    if dt > 0.0:
+        ratio = dt / load[DT] if load[DT] > 0.0 else 1.0
+        a1, a2 = (1 + 2 * ratio) / (1 + ratio), ratio * ratio / (1 + ratio)
+        omega = (a1 * turn - a2 * load[TURN]) / dt
+        alpha = (a1 * (omega - load[OMEGA]) - a2 * (load[OMEGA] - load[OMEGA_BEFORE])) / dt
+        tau += ph.damping * omega + ph.inertia * alpha
+        slope += (ph.damping + ph.inertia * a1 / dt) * a1 / dt
+    bearing = load[BEARING]
+    if ph.load_friction > 0.0:
+        bearing, by_turn = dahl(load[BEARING], turn, PRESLIDING_RAD)
+        slope += ph.load_friction * (by_turn if turn != 0.0 else 1.0 / PRESLIDING_RAD)
+    difference = max(piece[TENSION, 0, n], 0.0) - max(piece[TENSION, 1, n], 0.0)
+    load[OMEGA_NEXT], load[BEARING_NEXT], load[TORQUE] = omega, bearing, tau
+    return R * difference - tau - ph.load_friction * bearing, slope - ph.radius * round_slope * difference, R
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _solve(piece, node, slide, G, slope, R, free):
+    """Newton's step for the slides into `STEP`; returns the load pulley's turn.
+
+    Elimination from the drive ends: delta_i = alpha_i + beta_i delta_{i+1}, with gamma = 1 - beta carried along by
+    itself so that nothing is lost where pieces differ in stiffness by many orders.
+    """
+    n = node.shape[2]
+    alpha_A, alpha_B, gamma_A, gamma_B = 0.0, 0.0, 1.0, 1.0
+    for i in range(n):
+        pA, pB = node[NEAR, 0, i], node[NEAR, 1, i]
+        fA, fB = pA * gamma_A + node[GIVES, 0, i], pB * gamma_B + node[GIVES, 1, i]
+        iA, iB = 1.0 / (fA + node[FAR, 0, i]), 1.0 / (fB + node[FAR, 1, i])
+        alpha_A, alpha_B = (node[EXCESS, 0, i] + pA * alpha_A) * iA, (node[EXCESS, 1, i] + pB * alpha_B) * iB
+        gamma_A, gamma_B = fA * iA, fB * iB
+        node[ALPHA, 0, i], node[ALPHA, 1, i] = alpha_A, alpha_B
+        node[BETA, 0, i], node[BETA, 1, i] = node[FAR, 0, i] * iA, node[FAR, 1, i] * iB
+    KA, KB = piece[TANGENT, 0, n], piece[TANGENT, 1, n]
+    turn = 0.0
+    if free:
+        turn = (G + R * (KA * alpha_A - KB * alpha_B)) / (R * R * (KA * gamma_A + KB * gamma_B) + slope)
+    dA, dB = R * turn, -R * turn
+    slide[STEP, 0, n + 1], slide[STEP, 1, n + 1] = dA, dB
+    for i in range(n - 1, -1, -1):
+        dA, dB = node[ALPHA, 0, i] + node[BETA, 0, i] * dA, node[ALPHA, 1, i] + node[BETA, 1, i] * dB
+        slide[STEP, 0, i + 1], slide[STEP, 1, i + 1] = dA, dB
+    return turn
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _solve_with_conduits(ph, piece, node, slide, mean, G, slope, R, free):
+    """The same with both conduits' mean tensions unknown; their steps go into `MEAN_STEP`.
+
+    Every slide is written as a part by itself, a part by the load end's slide and a part by the conduit's own mean
+    tension; the conduit's equation then gives the mean by the load end's slide, and the load pulley's gives that.
+    """
+    n = node.shape[2]
+    C = ph.conduit_compliance
+    for c in range(2):
+        a, g, h = 0.0, 1.0, 0.0
+        for i in range(n):
+            p, q = node[NEAR, c, i], node[FAR, c, i]
+            f = p * g + node[GIVES, c, i]
+            inverse = 1.0 / (f + q)
+            a = (node[EXCESS, c, i] + p * a) * inverse
+            h = (C * (q * piece[SHARE, c, i + 1] - p * piece[SHARE, c, i]) + p * h) * inverse
+            g = f * inverse
+            node[ALPHA, c, i], node[BETA, c, i], node[ETA, c, i] = a, q * inverse, h
+        # From the load end back: sums of share * K * (stretch of the piece) for the three parts.
+        A, B, H = 0.0, 1.0, 0.0
+        sum_A, sum_B, sum_H, stiff = 0.0, 0.0, 0.0, 0.0
+        for i in range(n, -1, -1):
+            if i > 0:
+                A1 = node[ALPHA, c, i - 1] + node[BETA, c, i - 1] * A
+                B1 = node[BETA, c, i - 1] * B
+                H1 = node[ETA, c, i - 1] + node[BETA, c, i - 1] * H
+            else:
+                A1, B1, H1 = 0.0, 0.0, 0.0
+            weight = piece[SHARE, c, i] * piece[TANGENT, c, i]
+            sum_A += weight * (A1 - A)
+            sum_B += weight * (B1 - B)
+            sum_H += weight * (H1 - H)
+            stiff += weight * piece[SHARE, c, i]
+            A, B, H = A1, B1, H1
+        scale = 1.0 / (1.0 + C * stiff - sum_H)
+        mean[FIXED, c], mean[BY_END, c] = (mean[MEAN_EXCESS, c] + sum_A) * scale, sum_B * scale
+        K = piece[TANGENT, c, n]
+        own = h - C * piece[SHARE, c, n]
+        mean[END_FIXED, c] = K * (a + own * mean[FIXED, c])
+        mean[END_BY_END, c] = K * (-g + own * mean[BY_END, c])
+    turn = 0.0
+    if free:
+        turn = (G + R * (mean[END_FIXED, 0] - mean[END_FIXED, 1])) / (
+            slope - R * R * (mean[END_BY_END, 0] + mean[END_BY_END, 1])
+        )
+    for c in range(2):
+        d = R * turn if c == 0 else -R * turn
+        mean[MEAN_STEP, c] = mean[FIXED, c] + mean[BY_END, c] * d
+        slide[STEP, c, n + 1] = d
+        for i in range(n - 1, -1, -1):
+            d = node[ALPHA, c, i] + node[ETA, c, i] * mean[MEAN_STEP, c] + node[BETA, c, i] * d
+            slide[STEP, c, i + 1] = d
+    return turn
+
+
+@njit(cache=True, error_model="numpy")
+def _move(ph, node, slide, share, bristle):
+    """Take the slides a share of Newton's step on, no node from sliding one way to sliding the other in one go.
+
+    Between the two lies the narrow stretch in which the node sticks, and Newton's method would step over it for ever.
+    """
+    n = node.shape[2]
+    inverse = 1.0 / bristle
+    for c in range(2):
+        for i in range(1, n + 1):
+            old = slide[NOW, c, i]
+            new = old + share * slide[STEP, c, i]
+            if ph.presliding:
+                if old * new < 0.0:
+                    new = 0.0
+            else:
+                xi = node[BRISTLE, c, i - 1]
+                before, after = xi + old * inverse, xi + new * inverse
+                if before > 1.0 and after < -1.0:
+                    new = (EDGE - xi) * bristle
+                elif before < -1.0 and after > 1.0:
+                    new = (-EDGE - xi) * bristle
+            slide[NOW, c, i] = new
+
+
+@njit(cache=True, error_model="numpy")
+def _mean_tension(piece, c):
+    total = 0.0
+    for i in range(piece.shape[2]):
+        total += piece[SHARE, c, i] * max(piece[TENSION, c, i], 0.0)
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def _evaluate(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, weights):
+    """Everything that a step leaves out of balance: sum of squares (N^2), highest tension, and the load's terms."""
+    n = node.shape[2]
+    way = ph.radius * wound(load[ANGLE], turn, ph.eccentricity, ph.phase)
+    slide[NOW, 0, n + 1], slide[NOW, 1, n + 1] = way, -way
+    _tensions(ph, piece, slide, mean, weights)
+    error = _nodes(ph, piece, node, slide, dt, bristle)
+    G, slope, R = _load(ph, piece, load, turn, torque, dt)
+    if ph.kind == IMPEDANCE:
+        error += (G / ph.radius) ** 2
+    if ph.conduit_compliance > 0.0:
+        for c in range(2):
+            mean[MEAN_EXCESS, c] = _mean_tension(piece, c) - mean[MEAN_NEXT, c]
+            error += mean[MEAN_EXCESS, c] ** 2
+    highest = max(max(piece[TENSION, 0, 0], piece[TENSION, 0, n]), max(piece[TENSION, 1, 0], piece[TENSION, 1, n]))
+    return error, max(highest, 1e-2), G, slope, R
+
+
+@njit(cache=True, error_model="numpy")
+def _newton(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, counts):
+    """Solve a step from the slides in `NOW` and a turn of the load; (whether it converged, the load's turn)."""
+    free = ph.kind == IMPEDANCE
+    weights = lag_weights(dt / ph.tau) if ph.has_relaxation and dt > 0.0 else (1.0, 0.0, 0.0)
+    soft = ph.conduit_compliance > 0.0
+    # With conduits that give way all nodes turn around at once at a reversal, and full steps overshoot far.
+    patience = 2 if soft and not ph.presliding else PATIENCE
+    share, best = 1.0, np.inf
+    step_turn, saved_turn = 0.0, turn
+    for iteration in range(NEWTON_LIMIT):
+        error, limit, G, slope, R = _evaluate(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, weights)
+        counts[0] += 1
+        if error <= (TOLERANCE * limit) ** 2:
+            return True, turn
+        if not np.isfinite(error):
+            return False, turn
+        if iteration == patience and error > best:
+            # Full steps lead nowhere: from the best point on, only steps that lessen the error count.
+            slide[NOW] = slide[SAVED]
+            mean[MEAN_NEXT] = mean[MEAN_SAVED]
+            turn, best = saved_turn, np.inf
+            continue
+        if iteration > patience and error > best and share > SMALLEST_SHARE:
+            share *= 0.5
+            slide[NOW] = slide[SAVED]
+            mean[MEAN_NEXT] = mean[MEAN_SAVED]
+            turn = saved_turn
+        else:
+            if error < best or iteration > patience:
+                best = error
+                slide[SAVED] = slide[NOW]
+                mean[MEAN_SAVED] = mean[MEAN_NEXT]
+                saved_turn = turn
+            share = 1.0
+            if soft:
+                step_turn = _solve_with_conduits(ph, piece, node, slide, mean, G, slope, R, free)
+            else:
+                step_turn = _solve(piece, node, slide, G, slope, R, free)
+        _move(ph, node, slide, share, bristle)
+        turn += share * step_turn
+        if soft:
+            for c in range(2):
+                mean[MEAN_NEXT, c] += share * mean[MEAN_STEP, c]
+    # Sliding and sticking may take turns at a node or two for ever; what they disagree about is then next to nothing.
+    slide[NOW] = slide[SAVED]
+    mean[MEAN_NEXT] = mean[MEAN_SAVED]
+    turn = saved_turn
+    error, limit, G, slope, R = _evaluate(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, weights)
+    return error <= (LOOSE_TOLERANCE * limit) ** 2, turn
+
+
+@njit(cache=True, error_model="numpy")
+def _commit(ph, piece, node, slide, mean, load, turn, dt):
+    """Take over a solved step."""
+    n = node.shape[2]
+    weights = lag_weights(dt / ph.tau) if ph.has_relaxation and dt > 0.0 else (1.0, 0.0, 0.0)
+    soft = ph.conduit_compliance > 0.0
+    for c in range(2):
+        d = slide[NOW, c]
+        for i in range(n + 1):
+            piece[STRETCH, c, i] += d[i] - d[i + 1]
+        if soft:
+            mean[MEAN_BEFORE, c], mean[MEAN_LAST, c] = mean[MEAN_LAST, c], mean[MEAN_NEXT, c] - mean[MEAN, c]
+            gives = ph.conduit_compliance * mean[MEAN_LAST, c]
+            mean[MEAN, c] = mean[MEAN_NEXT, c]
+            for i in range(n + 1):
+                piece[STRETCH, c, i] -= gives * piece[SHARE, c, i]
+        if ph.has_relaxation:
+            for i in range(n + 1):
+                elastic = max(piece[PULL, c, i], 0.0)
+                lost = weights[0] * piece[LOST_TENSION, c, i] + weights[1] * piece[ELASTIC, c, i]
+                piece[LOST_TENSION, c, i] = lost + weights[2] * elastic
+                piece[ELASTIC, c, i] = elastic
+        for i in range(n):
+            node[BRISTLE, c, i] = node[BRISTLE_NEXT, c, i]
+    if ph.rise > 0.0 and dt > 0.0:
+        keep = np.exp(-dt / LAG_S)
+        for c in range(2):
+            for i in range(n):
+                node[SPEED, c, i] = keep * node[SPEED, c, i] + (1.0 - keep) * slide[NOW, c, i + 1] / dt
+    if dt > 0.0:
+        load[TURN], load[DT] = turn, dt
+        load[OMEGA_BEFORE], load[OMEGA] = load[OMEGA], load[OMEGA_NEXT]
+    load[ANGLE] += turn
+    load[BEARING] = load[BEARING_NEXT]
+
+
+@njit(cache=True, error_model="numpy")
+def _set_grip(ph, node, course):
+    """Friction of each node per sum of its tensions; with a power of tension only its argument, mu phi / 2."""
+    for c in range(2):
+        for i in range(node.shape[2]):
+            y = node[HALF_BEND, c, i] * course
+            if ph.rise > 0.0:
+                y *= breakaway(node[SPEED, c, i], ph.rise, ph.vs)
+            node[GRIP, c, i] = y if ph.exponent != 0.0 else _tanh(y)
+
+
+@njit(cache=True, error_model="numpy")
+def march(ph, piece, node, slide, mean, load, time_s, way_in, course, series, out, counts):
+    """Step through the samples.
+
+    Parameters
+    ----------
+    ph : Physics
+    piece, node, slide, mean, load : ndarray
+        Constants and the state before the first sample, in the rows named above. The first sample is solved at the
+        drive's first position, which brings a start that is out of balance into balance.
+    time_s, way_in, series : ndarray, shape (m,)
+        Times (s), way of the cables at the drive pulley (m), and what is prescribed at the load: a torque (N m) on
+        top of the load's own, or the angle (rad).
+    course : ndarray, shape (m,) or (1,)
+        Factor of mu at each sample.
+    out : ndarray, shape (7, m)
+        Filled with T1, T2, T3, T4 (N), load angle (rad), the load's torque and the torque of its bearing (N m).
+    counts : ndarray of int, shape (2,)
+        Adds up Newton iterations and substeps.
+
+    Returns
+    -------
+    int
+        Samples that were solved.
+    """
+    m, n = time_s.size, node.shape[2]
+    last_turn, before_turn, last_pull, before_pull, last_dt = 0.0, 0.0, 0.0, 0.0, 0.0
+    _set_grip(ph, node, course[0])
+    fixed_grip = ph.rise == 0.0 and course.size == 1
+    prescribed = ph.kind == PRESCRIBED_ANGLE
+    for j in range(m):
+        pull = way_in[j] - way_in[j - 1] if j > 0 else 0.0
+        rise = series[j] - series[j - 1] if j > 0 else 0.0
+        dt = time_s[j] - time_s[j - 1] if j > 0 else 0.0
+        done, part, bristle = 0.0, 1.0, ph.bristle
+        while done < 1.0:
+            part = min(part, 1.0 - done)
+            if not fixed_grip:
+                _set_grip(ph, node, course[min(j, course.size - 1)])
+            step_pull, step_dt = part * pull, part * dt
+            # The start: what the last steps did, scaled to the drive's step while it goes the same way.
+            expected = 2 * last_pull - before_pull
+            if part == 1.0 and last_dt == dt and abs(expected - pull) <= 0.05 * abs(pull):
+                for c in range(2):
+                    for i in range(n + 2):
+                        slide[NOW, c, i] = 2 * slide[LAST, c, i] - slide[BEFORE, c, i]
+                    mean[MEAN_NEXT, c] = mean[MEAN, c] + 2 * mean[MEAN_LAST, c] - mean[MEAN_BEFORE, c]
+                turn = 2 * last_turn - before_turn
+            else:
+                ratio = step_pull / last_pull if last_pull * pull > 0.0 else 0.0
+                ratio = min(ratio, 4.0)
+                for c in range(2):
+                    for i in range(n + 2):
+                        slide[NOW, c, i] = ratio * slide[LAST, c, i]
+                    mean[MEAN_NEXT, c] = mean[MEAN, c] + ratio * mean[MEAN_LAST, c]
+                turn = ratio * last_turn
+            slide[NOW, 0, 0], slide[NOW, 1, 0] = step_pull, -step_pull
+            value = series[j] - (1.0 - done - part) * rise
+            if prescribed:
+                turn = value - load[ANGLE]
+            torque = 0.0 if prescribed else value
+            solved, turn = _newton(ph, piece, node, slide, mean, load, turn, torque, step_dt, bristle, counts)
+            if not solved:
+                part *= 0.5
+                last_pull = 0.0
+                if part < SMALLEST_SUBSTEP:
+                    if ph.presliding or bristle >= LONGEST_BRISTLE_M:
+                        return j
+                    bristle *= 10.0
+                    part = 1.0
+                continue
+            slide[BEFORE] = slide[LAST]
+            slide[LAST] = slide[NOW]
+            before_turn, last_turn = last_turn, turn
+            before_pull, last_pull, last_dt = last_pull, step_pull, step_dt
+            _commit(ph, piece, node, slide, mean, load, turn, step_dt)
+            counts[1] += 1
+            done += part
+            part *= 2.0
+        out[0, j], out[1, j] = max(piece[TENSION, 0, 0], 0.0), max(piece[TENSION, 0, n], 0.0)
+        out[2, j], out[3, j] = max(piece[TENSION, 1, 0], 0.0), max(piece[TENSION, 1, n], 0.0)
+        out[4, j] = load[ANGLE]
+        bearing = ph.load_friction * load[BEARING]
+        if prescribed:
+            R = ph.radius * winding(load[ANGLE], ph.eccentricity, ph.phase)[1]
+            out[5, j] = R * (out[1, j] - out[3, j]) - bearing
+        else:
+            out[5, j] = load[TORQUE]
+        out[6, j] = bearing
+    return m

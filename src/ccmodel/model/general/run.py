@@ -1,0 +1,366 @@
+"""Set up the march, run it, and say what the sensors would read."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ccmodel import mechanisms as registry
+from ccmodel.mechanisms.contract import Sensing, Settings, all_finite
+from ccmodel.mechanisms.load_dependent_friction import FLOOR_N, REFERENCE_N
+from ccmodel.mechanisms.pulley_eccentricity import winding
+from ccmodel.mechanisms.pulley_friction import bearing
+from ccmodel.mechanisms.strand_settling import stretch_at
+from ccmodel.model.general import march as rows
+from ccmodel.model.general.grid import Grid, make_grid
+from ccmodel.model.initial import InitialTension
+from ccmodel.model.load import AngleLoad, MechanicalLoad, SpringLoad, TorqueLoad
+from ccmodel.model.paper import ModelError
+from ccmodel.model.transmission import Transmission
+
+ELEMENTS = 32
+
+Load = SpringLoad | MechanicalLoad | TorqueLoad | AngleLoad
+
+
+@dataclass(frozen=True)
+class Active:
+    """A mechanism that is in a model.
+
+    Attributes
+    ----------
+    name : str
+        One of `ccmodel.mechanisms.names()`.
+    place : str
+        One of the mechanism's places.
+    values : mapping of str to float
+        A value for each of its parameters.
+    """
+
+    name: str
+    place: str
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Status:
+    """How a run ended.
+
+    Attributes
+    ----------
+    name : {"solved", "no-convergence"}
+    solved : int
+        Samples that were solved, from the first on.
+    advice : str
+        What to try next; empty for "solved".
+    """
+
+    name: str
+    solved: int
+    advice: str = ""
+
+
+@dataclass(frozen=True)
+class Response:
+    """What the model says of a run; arrays of shape (n,), or shorter where `status` says that the run broke off.
+
+    Attributes
+    ----------
+    status : Status
+    time_s : ndarray
+    T1_N, T2_N, T3_N, T4_N : ndarray
+        Tensions of cable A at the drive and the load end, and of cable B, as they are.
+    theta_out_rad : ndarray
+        Angle of the load pulley: from the neutral position of a spring load, else from the start.
+    tau_in_Nm, tau_out_Nm : ndarray
+        Torque of the drive on its pulley, and torque on the load (beyond its pulley's bearing).
+    read : mapping of str to ndarray
+        What the sensors would read: theta_in_rad, theta_out_rad, tau_in_Nm, tau_out_Nm, F_drive_N, F_load_N.
+    newton_iterations, substeps : int
+        Work done.
+    """
+
+    status: Status
+    time_s: NDArray
+    T1_N: NDArray
+    T2_N: NDArray
+    T3_N: NDArray
+    T4_N: NDArray
+    theta_out_rad: NDArray
+    tau_in_Nm: NDArray
+    tau_out_Nm: NDArray
+    read: Mapping[str, NDArray]
+    newton_iterations: int
+    substeps: int
+
+    def complete(self) -> "Response":
+        """Itself if every sample was solved.
+
+        Raises
+        ------
+        ModelError
+            With the status's advice, if not.
+        """
+        if self.status.name != "solved":
+            raise ModelError(f"{self.status.name} at sample {self.status.solved}: {self.status.advice}")
+        return self
+
+
+def simulate(
+    transmission: Transmission,
+    load: Load,
+    time_s: NDArray,
+    theta_in: NDArray,
+    initial: InitialTension,
+    mechanisms: Mapping[str, Mapping] | Sequence[Active] = (),
+    elements: int = ELEMENTS,
+) -> Response:
+    """Run the pair through a motion of the drive pulley.
+
+    Parameters
+    ----------
+    transmission : Transmission
+    load : SpringLoad, MechanicalLoad, TorqueLoad or AngleLoad
+    time_s : ndarray, shape (n,)
+        Sample times, s, increasing.
+    theta_in : ndarray, shape (n,)
+        Drive angle at each sample, rad; the first is the angle at which `initial` holds. Linear in between.
+    initial : InitialTension
+    mechanisms : sequence of Active, or mapping of name to {"place": ..., "values": {...}}
+        What acts besides the paper's physics. A mapping may leave out the place of a mechanism that has only one,
+        and values, which then are the mechanism's starting values.
+    elements : int
+        Cells of each cable.
+
+    Returns
+    -------
+    Response
+        With a status: a step without a solution breaks the run off, and what was solved until then is returned.
+
+    Raises
+    ------
+    ModelError
+        If an input is not finite or of the wrong shape.
+    ccmodel.mechanisms.UnknownMechanismError
+        If a mechanism's name is not known.
+    """
+    time_s, theta_in = (np.ascontiguousarray(a, dtype=float) for a in (time_s, theta_in))
+    active = _active(mechanisms)
+    settings = Settings()
+    for a in active:
+        mechanism = registry.get(a.name)
+        if mechanism.enters is not None:
+            try:
+                mechanism.enters(settings, a.place, a.values)
+            except ValueError as e:
+                raise ModelError(str(e)) from None
+    series = _series(load, theta_in)
+    _check(time_s, theta_in, series, elements)
+
+    grid = make_grid(transmission.path, elements, settings.kinks)
+    physics = _physics(transmission, load, settings)
+    piece, node = _constants(transmission, settings, grid)
+    course = np.ones(1) if settings.friction_course is None else settings.friction_course(time_s)
+    mean, state = np.zeros((rows.MEAN_ROWS, 2)), np.zeros(rows.LOAD_ROWS)
+    T = _initial_state(physics, piece, node, settings, initial.at(transmission.path, grid.boundary_m), course[0])
+    mean[rows.MEAN] = (piece[rows.SHARE] * T).sum(axis=1)
+    state[rows.ANGLE] = _load_angle(physics, T, load, series)
+    slide = np.zeros((rows.SLIDE_ROWS, 2, node.shape[2] + 2))
+    R_i = transmission.drive_radius_m
+    way, round_, _ = winding(theta_in, *settings.drive_eccentricity)
+    out, counts = np.zeros((7, time_s.size)), np.zeros(2, dtype=np.int64)
+    solved = rows.march(physics, piece, node, slide, mean, state, time_s, R_i * way, course, series, out, counts)
+
+    time_s, theta_in, out = time_s[:solved], theta_in[:solved], out[:, :solved]
+    T1, T2, T3, T4, theta_out, tau_out, _ = out
+    tau_in = (T1 - T3) * R_i * (round_ if np.ndim(round_) == 0 else round_[:solved])
+    if settings.drive_friction_Nm != 0.0:
+        tau_in = tau_in + settings.drive_friction_Nm * bearing(theta_in)
+    channels = {
+        "theta_in_rad": theta_in,
+        "theta_out_rad": theta_out,
+        "tau_in_Nm": tau_in,
+        "tau_out_Nm": tau_out,
+        "F_drive_N": T1 + T3,
+        "F_load_N": T2 + T4,
+    }
+    read = _read(active, time_s, channels, transmission)
+    status = _status(solved, series.size, theta_in)
+    return Response(status, time_s, T1, T2, T3, T4, theta_out, tau_in, tau_out, read, int(counts[0]), int(counts[1]))
+
+
+def _active(mechanisms) -> list[Active]:
+    given = []
+    if isinstance(mechanisms, Mapping):
+        for name, entry in mechanisms.items():
+            known = registry.get(name)
+            place = entry.get("place", known.places[0] if len(known.places) == 1 else None)
+            given.append(Active(name, place, entry.get("values", known.start)))
+    else:
+        given = list(mechanisms)
+    for a in given:
+        known = registry.get(a.name)
+        if a.place not in known.places:
+            raise ModelError(f"{a.name} acts at {' or '.join(known.places)}; got {a.place!r}")
+        wanted = {p.name for p in known.parameters}
+        if set(a.values) != wanted:
+            raise ModelError(
+                f"{a.name} has the parameters {', '.join(sorted(wanted))}; got {', '.join(sorted(a.values)) or 'none'}"
+            )
+        if not all_finite(a.values):
+            raise ModelError(f"{a.name} has a parameter that is not finite: {dict(a.values)}")
+        for p in known.parameters:
+            if p.low > 0 and not p.signed and a.values[p.name] < 0:
+                raise ModelError(
+                    f"{a.name} has {p.name} = {a.values[p.name]:g} {p.unit}, which must not be negative; "
+                    f"plausible is {p.low:g} to {p.high:g}"
+                )
+    return given
+
+
+def _series(load: Load, theta_in: NDArray) -> NDArray:
+    if isinstance(load, TorqueLoad):
+        return np.ascontiguousarray(load.torque_Nm, dtype=float)
+    if isinstance(load, AngleLoad):
+        return np.ascontiguousarray(load.angle_rad, dtype=float)
+    return np.zeros_like(theta_in)
+
+
+def _check(time_s, theta_in, series, elements):
+    if elements < 1:
+        raise ModelError(f"each cable needs at least one element; got {elements}")
+    if theta_in.ndim != 1 or theta_in.size == 0:
+        raise ModelError(f"theta_in must be one row of samples; got shape {theta_in.shape}")
+    for name, values in (("time_s", time_s), ("the load's series", series)):
+        if values.shape != theta_in.shape:
+            raise ModelError(f"{name} has {values.size} samples, the drive angle {theta_in.size}")
+    for name, values in (("time_s", time_s), ("theta_in", theta_in), ("the load's series", series)):
+        bad = np.flatnonzero(~np.isfinite(values))
+        if bad.size:
+            raise ModelError(f"{name} is not finite at sample {bad[0]}")
+    late = np.flatnonzero(np.diff(time_s) <= 0)
+    if late.size:
+        raise ModelError(f"time_s must increase; it does not at sample {late[0] + 1}")
+
+
+def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tuple[NDArray, NDArray]:
+    """Rows of pieces and nodes. The ends' compliances are pieces of their own beyond a node without friction."""
+    ratio_K, ratio_mu = (np.array([[1.0], [r]]) for r in (settings.stiffness_ratio_B, settings.friction_ratio_B))
+    EA = transmission.axial_rigidity_N * ratio_K
+    segment, cell, length = grid.segment_m, grid.cell_m, transmission.path.length_m
+    drive, extra = settings.drive_end_compliance, int(settings.drive_end_compliance > 0)
+    load = settings.load_end_compliance
+    cells = slice(extra, extra + cell.size)
+    segments = slice(extra, extra + segment.size)
+    nodes = cell.size + extra + int(load > 0)
+    piece, node = np.zeros((rows.PIECE_ROWS, 2, nodes + 1)), np.zeros((rows.NODE_ROWS, 2, nodes))
+    piece[rows.STIFFNESS][:, segments] = EA / segment
+    piece[rows.LOST][:, segments] = segment * settings.settling_N / EA
+    piece[rows.RELAXING][:, segments] = settings.relaxing_share
+    piece[rows.SHARE][:, segments] = segment / length
+    node[rows.HALF_BEND][:, cells] = transmission.friction_coefficient * ratio_mu * grid.cell_rad / 2
+    node[rows.DRAG][:, cells] = settings.drag_N * cell / length
+    node[rows.VISCOUS][:, cells] = settings.viscous * cell
+    if drive > 0:
+        piece[rows.STIFFNESS][:, 0] = 1 / drive
+    if load > 0:
+        piece[rows.STIFFNESS][:, -1] = 1 / load
+    return piece, node
+
+
+def _physics(transmission: Transmission, load: Load, settings: Settings) -> rows.Physics:
+    is_mechanical = isinstance(load, MechanicalLoad)
+    K_e = load.stiffness_Nm_per_rad if isinstance(load, SpringLoad | MechanicalLoad) else 0.0
+    return rows.Physics(
+        has_settling=settings.settling_N > 0,
+        has_relaxation=settings.relaxing_share != 0,
+        tau=float(settings.relaxing_time_s),
+        conduit_compliance=float(settings.conduit_compliance),
+        bristle=float(settings.bristle_m) if settings.bristle_m > 0 else _coulomb_bristle(transmission, settings),
+        presliding=settings.bristle_m > 0,
+        exponent=float(settings.tension_exponent),
+        rise=float(settings.stribeck_rise),
+        vs=float(settings.stribeck_speed),
+        radius=float(transmission.load_radius_m),
+        eccentricity=float(settings.load_eccentricity[0]),
+        phase=float(settings.load_eccentricity[1]),
+        stiffness_load=float(K_e),
+        cubic=float(settings.cubic_stiffness + (load.cubic_Nm_per_rad3 if is_mechanical else 0.0)),
+        half_gap=float(settings.half_gap),
+        damping=float(load.damping_Nms_per_rad if is_mechanical else 0.0),
+        inertia=float(settings.inertia + (load.inertia_kg_m2 if is_mechanical else 0.0)),
+        load_friction=float(settings.load_friction_Nm),
+        kind=rows.PRESCRIBED_ANGLE if isinstance(load, AngleLoad) else rows.IMPEDANCE,
+        general_friction=bool(settings.tension_exponent != 0 or settings.drag_N != 0 or settings.viscous != 0),
+    )
+
+
+def _coulomb_bristle(transmission: Transmission, settings: Settings) -> float:
+    over_cable = settings.conduit_compliance * transmission.axial_rigidity_N / transmission.path.length_m
+    return max(rows.COULOMB_BRISTLE_M, min(1.0, 10 * over_cable) * rows.SOFT_CONDUIT_BRISTLE_M)
+
+
+def _initial_state(physics, piece, node, settings, profiles, course) -> NDArray:
+    """State in which the cables hold the initial tension, with the bristles that this takes; that tension (N)."""
+    T = np.stack(profiles)
+    if settings.drive_end_compliance > 0:
+        T = np.concatenate([T[:, :1], T], axis=1)
+    if settings.load_end_compliance > 0:
+        T = np.concatenate([T, T[:, -1:]], axis=1)
+    stretch = T / piece[rows.STIFFNESS]
+    settles = piece[rows.LOST] > 0
+    stretch[settles] = stretch_at(T[settles], piece[rows.LOST][settles], piece[rows.STIFFNESS][settles])
+    piece[rows.STRETCH], piece[rows.ELASTIC] = stretch, T
+    both = T[:, :-1] + T[:, 1:]
+    factor = course * (1 + physics.rise)
+    if physics.exponent != 0:
+        factor = factor * (np.hypot(both / 2, FLOOR_N) / REFERENCE_N) ** physics.exponent
+    hold = np.tanh(node[rows.HALF_BEND] * factor) * both + node[rows.DRAG]
+    xi = np.divide(T[:, :-1] - T[:, 1:], hold, out=np.zeros_like(both), where=hold > 0)
+    node[rows.BRISTLE] = np.clip(xi, -1, 1)
+    return T
+
+
+def _load_angle(physics: rows.Physics, T: NDArray, load: Load, series: NDArray) -> float:
+    """Angle at which the load holds the initial tensions, rad; 0 for a load that knows no neutral position."""
+    if isinstance(load, AngleLoad):
+        return float(series[0])
+    K, K3 = physics.stiffness_load, physics.cubic
+    if isinstance(load, TorqueLoad) or (K == 0 and K3 == 0):
+        return 0.0
+    theta = 0.0
+    for _ in range(50):
+        R = physics.radius * winding(theta, physics.eccentricity, physics.phase)[1]
+        torque = R * (T[0, -1] - T[1, -1])
+        if K == 0:
+            z = np.cbrt(torque / K3)
+        else:
+            z = torque / K
+            for _ in range(50 if K3 else 0):
+                z -= (K * z + K3 * z**3 - torque) / (K + 3 * K3 * z * z)
+        theta = z + np.sign(z) * physics.half_gap
+        if physics.eccentricity == 0:
+            break
+    return float(theta)
+
+
+def _read(active: list[Active], time_s: NDArray, channels: dict[str, NDArray], transmission: Transmission):
+    for a in active:
+        mechanism = registry.get(a.name)
+        if mechanism.reads is not None:
+            sensing = Sensing(time_s, channels, transmission.drive_radius_m, transmission.load_radius_m)
+            channels = channels | mechanism.reads(sensing, a.place, a.values)
+    return channels
+
+
+def _status(solved: int, samples: int, theta_in: NDArray) -> Status:
+    if solved == samples:
+        return Status("solved", solved)
+    return Status(
+        "no-convergence",
+        solved,
+        "the cables and the load find no balance there, not in the smallest substep either: look at the load "
+        "torque and at the drive's step before this sample, keep parameters within their ranges, or give friction "
+        "a presliding length",
+    )

@@ -1,0 +1,315 @@
+"""Each mechanism does to a run what is known of it."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from ccmodel.geometry import ConduitPath
+from ccmodel.mechanisms.pulley_friction import PRESLIDING_RAD
+from ccmodel.model.initial import InitialTension
+from ccmodel.model.load import AngleLoad, MechanicalLoad
+from general_runs import HALF_LOOP, K_E, MU, T0, TENSIONS, L, R, last_cycle, loop_area, rms, run, sine
+
+DRIVE_ONLY = (*TENSIONS, "theta_out_rad", "tau_out_Nm")
+
+
+@pytest.fixture(scope="module")
+def base():
+    return run(sine())
+
+
+def triangle(amplitude=0.6, cycles=2, samples=500):
+    phase = np.arange(cycles * samples + 1) / samples
+    return amplitude * (2 / np.pi) * np.arcsin(np.sin(2 * np.pi * phase))
+
+
+def test_presliding_rounds_reversals(base):
+    """tau_in turns its corner within some bristle lengths of sliding, and full slip is left alone."""
+    rounded = run(sine(), ("presliding", "conduit", {"z0": 100e-6}))
+    turned = slice(500 + 127, 500 + 140)
+    change = [np.diff(r.tau_in_Nm)[turned] / np.diff(sine())[turned] for r in (base, rounded)]
+    assert np.abs(change[0]).max() > 1.3 * np.abs(change[1]).max()
+    assert np.log(rounded.T1_N[600] / rounded.T2_N[600]) == pytest.approx(MU * np.pi, rel=2e-2)
+
+
+def test_small_nested_reversals_creep_with_presliding_and_close_with_a_termination():
+    """Both soften a small reversal alike; only bristles let tension creep from one to the next."""
+    turns = np.linspace(0, 8 * np.pi, 401)
+    theta = np.concatenate([np.linspace(0, 0.5, 200), 0.5 - 0.002 * (1 - np.cos(turns))])
+    bristles = run(theta, ("presliding", "conduit", {"z0": 100e-6})).T1_N
+    end = run(theta, ("termination-compliance", "drive-end", {"compliance": 40e-6})).T1_N
+    swing = [np.ptp(T[500:]) for T in (run(theta).T1_N, bristles, end)]
+    assert swing[1] < 0.4 * swing[0]
+    assert swing[2] < 0.4 * swing[0]
+    assert bristles[200] - bristles[600] > swing[1]
+    assert end[600] == pytest.approx(end[200], abs=1e-6)
+
+
+def test_viscous_friction_widens_loops_with_speed_and_not_with_tension():
+    mechanism = ("viscous-friction", "conduit", {"c": 100.0})
+    plain = {T: loop_area(run(triangle(), T=T)) for T in (5.0, 10.0)}
+    extra = {
+        (T, period): loop_area(run(triangle(), mechanism, T=T, period_s=period)) - plain[T]
+        for T in (5.0, 10.0)
+        for period in (1.0, 4.0)
+    }
+    assert extra[5.0, 1.0] > 3.5 * extra[5.0, 4.0] > 0
+    assert extra[5.0, 1.0] == pytest.approx(extra[10.0, 1.0], rel=0.15)
+
+
+def test_stribeck_peaks_at_break_away_and_loses_less_at_speed():
+    mechanism = ("stribeck", "conduit", {"a": 0.4, "vs": 2e-3})
+    slow, fast = (loop_area(run(triangle(), mechanism, period_s=p)) for p in (20.0, 0.5))
+    plain = loop_area(run(triangle()))
+    assert slow > 1.1 * fast
+    assert fast == pytest.approx(plain, rel=0.08)
+
+
+def test_stribeck_is_smooth_from_sample_to_sample():
+    r = run(sine(), ("stribeck", "conduit", {"a": 0.3, "vs": 3e-3}))
+    slip = slice(560, 610)
+    assert np.abs(np.diff(r.T1_N[slip], 2)).max() < 0.02 * T0
+
+
+def test_full_slip_ratio_falls_with_tension_by_a_power():
+    n = -0.2
+    ratio = []
+    for T in (4.0, 8.0):
+        r = run(np.linspace(0, 0.9, 200), ("load-dependent-friction", "conduit", {"n": n}), T=T, mu=0.05)
+        ratio.append((np.log(r.T1_N[-1] / r.T2_N[-1]), np.sqrt(r.T1_N[-1] * r.T2_N[-1])))
+    measured = np.log(ratio[1][0] / ratio[0][0]) / np.log(ratio[1][1] / ratio[0][1])
+    assert measured == pytest.approx(n, rel=0.02)
+
+
+def test_constant_drag_is_left_when_tension_goes():
+    f0 = 0.8
+    theta = np.linspace(0, 0.6, 200)
+    r = run(theta, ("constant-drag", "conduit", {"f0": f0}), T=0.02, mu=1e-6)
+    assert r.T1_N[-1] - r.T2_N[-1] == pytest.approx(f0, rel=1e-3)
+
+
+def test_kink_adds_its_bend_to_the_loss_and_stalls_the_front():
+    mechanism = ("kink", "conduit", {"beta": 1.0, "s": 0.5})
+    theta = np.linspace(0, 0.6, 600)
+    kinked, plain = run(theta, mechanism), run(theta)
+    assert np.log(kinked.T1_N[-1] / kinked.T2_N[-1]) == pytest.approx(MU * (np.pi + 1.0), rel=1e-7)
+    arrival = [np.argmax(r.theta_out_rad > 1e-5) for r in (plain, kinked)]
+    assert arrival[1] > arrival[0] + 5
+    # Until the front reaches the kink nothing differs.
+    early = theta < 0.2 * theta[arrival[0]]
+    assert kinked.T1_N[early] == pytest.approx(plain.T1_N[early], rel=2e-3)
+
+
+def test_running_in_makes_loops_drift():
+    r = run(sine(cycles=6), ("running-in", "conduit", {"change": 0.3, "tau": 3.0}))
+    ratio = np.log(r.T1_N / r.T2_N)
+    for cycle in (1, 5):
+        at = cycle * 500 + 110
+        expected = MU * np.pi * (1 + 0.3 * -np.expm1(-(at / 500) / 3.0))
+        assert ratio[at] == pytest.approx(expected, rel=1e-6)
+
+
+def test_asymmetry_is_odd_in_direction():
+    r = run(sine(), ("cable-asymmetry", "cable", {"ratio": 1.3, "K_ratio": 1.0}))
+    pull, back = 500 + 110, 500 + 360
+    assert np.log(r.T1_N[pull] / r.T2_N[pull]) == pytest.approx(MU * np.pi, rel=1e-6)
+    assert np.log(r.T3_N[back] / r.T4_N[back]) == pytest.approx(1.3 * MU * np.pi, rel=1e-6)
+
+
+def test_stiffness_asymmetry_leaves_friction_alone():
+    r = run(sine(), ("cable-asymmetry", "cable", {"ratio": 1.0, "K_ratio": 0.7}))
+    assert np.log(r.T3_N[860] / r.T4_N[860]) == pytest.approx(MU * np.pi, rel=1e-6)
+
+
+def test_relaxation_decays_at_rest_as_the_standard_linear_solid():
+    r, tau = 0.1, 30.0
+    run_ = run(np.zeros(501), ("relaxation", "cable", {"r": r, "tau": tau}), period_s=60.0)
+    expected = T0 * (1 - r * -np.expm1(-run_.time_s / tau))
+    for name in TENSIONS:
+        assert getattr(run_, name) == pytest.approx(expected, rel=1e-6)
+    assert np.abs(run_.theta_out_rad).max() < 1e-9
+
+
+def test_relaxation_does_not_depend_on_the_step():
+    theta = np.interp(np.arange(501) / 500, [0, 0.2, 1], [0, 0.4, 0.4])
+    fine = run(theta, ("relaxation", "cable", {"r": 0.1, "tau": 10.0}), period_s=20.0)
+    coarse = run(theta[::10], ("relaxation", "cable", {"r": 0.1, "tau": 10.0}), period_s=20.0, samples=50)
+    assert coarse.T1_N[-1] == pytest.approx(fine.T1_N[-1], rel=2e-4)
+
+
+def test_strands_make_the_cable_soft_near_slack_only():
+    """Stiffness of the pair against a small turn, load blocked and without friction."""
+    theta = np.linspace(0, 1e-3, 3)
+    blocked = AngleLoad(np.zeros(3))
+    stiffness = {}
+    for T in (0.3, 20.0):
+        r = run(theta, ("strand-settling", "cable", {"T_scale": 1.0}), T=T, mu=0.0, load=blocked)
+        plain = run(theta, T=T, mu=0.0, load=blocked)
+        stiffness[T] = (r.tau_in_Nm[-1] - r.tau_in_Nm[0]) / (plain.tau_in_Nm[-1] - plain.tau_in_Nm[0])
+    assert stiffness[0.3] < 0.6
+    assert stiffness[20.0] == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("place", "name"), [("drive-end", "termination"), ("load-end", "termination"), ("conduit", "")]
+)
+def test_compliance_adds_to_the_cables_own(place, name):
+    """Without friction all compliances are in series: 1 / K = 1 / K_cable + c."""
+    c = 50e-6
+    mechanism = ("termination-compliance" if name else "conduit-compliance", place, {"compliance": c})
+    theta = np.linspace(0, 0.01, 3)
+    r = run(theta, mechanism, mu=0.0, load=AngleLoad(np.zeros(3)))
+    per_turn = (r.T1_N[-1] - T0) / (R * theta[-1])
+    assert per_turn == pytest.approx(1 / (1 / 7750 + c), rel=1e-7)
+
+
+def test_a_termination_gives_before_the_front_has_come_far_and_a_conduit_hardly():
+    """Start of a pull: the cable gives over the front's length only, a termination at once, a conduit by its mean."""
+    theta = np.linspace(0, 2e-3, 20)
+    plain = run(theta)
+    end = run(theta, ("termination-compliance", "drive-end", {"compliance": 40e-6}))
+    conduit = run(theta, ("conduit-compliance", "conduit", {"compliance": 40e-6}))
+    rise = [r.T1_N[-1] - T0 for r in (plain, end, conduit)]
+    assert rise[1] < 0.9 * rise[0]
+    assert abs(rise[2] - rise[0]) < 0.25 * abs(rise[1] - rise[0])
+
+
+def test_drive_pulley_friction_is_a_square_wave_in_tau_in_alone(base):
+    torque = 4e-3
+    r = run(sine(), ("pulley-friction", "drive-pulley", {"friction_torque": torque}))
+    for name in DRIVE_ONLY:
+        assert (getattr(r, name) == getattr(base, name)).all()
+    extra = r.tau_in_Nm - base.tau_in_Nm
+    omega = np.gradient(sine())
+    moving = np.abs(omega) > 1.0 * PRESLIDING_RAD
+    steady = moving & (np.abs(np.arange(1001) % 500 - 250) < 100)
+    assert extra[steady] == pytest.approx(torque * np.sign(omega[steady]), abs=0.05 * torque)
+
+
+def test_load_pulley_friction_is_a_step_that_the_load_does_not_show():
+    torque = 4e-3
+    r = run(sine(), ("pulley-friction", "load-pulley", {"friction_torque": torque}))
+    assert r.tau_out_Nm == pytest.approx(K_E * r.theta_out_rad, abs=1e-9)
+    extra = (r.T2_N - r.T4_N) * R - r.tau_out_Nm
+    omega = np.gradient(r.theta_out_rad)
+    moving = np.abs(omega) > 1.5e-3
+    assert np.abs(extra).max() <= torque * (1 + 1e-6)
+    assert np.median(extra[moving] * np.sign(omega[moving])) == pytest.approx(torque, rel=0.05)
+
+
+@pytest.mark.parametrize("place", ["drive-pulley", "load-pulley"])
+def test_eccentricity_repeats_with_the_angle(place):
+    """Without friction and with a stiff pair, the ways of the cables at the two pulleys are the same."""
+    e, psi = 0.05, 0.7
+    theta = np.linspace(0, 4 * np.pi, 400)
+    r = run(theta, ("pulley-eccentricity", place, {"e": e, "psi": psi}), mu=0.0, k=1e9, T=50.0)
+    round_, eccentric = (r.theta_out_rad, theta) if place == "drive-pulley" else (theta, r.theta_out_rad)
+    way = eccentric - e * (np.cos(eccentric + psi) - np.cos(psi))
+    assert round_ == pytest.approx(way, abs=1e-4)
+    # Ideal pulleys lose no power.
+    power_in = np.trapezoid(r.tau_in_Nm, theta)
+    assert power_in == pytest.approx(0.5 * K_E * r.theta_out_rad[-1] ** 2, rel=1e-3)
+
+
+def test_backlash_flattens_the_loads_torque_around_zero():
+    b = 0.05
+    r = run(sine(), ("backlash", "load-pulley", {"half_gap": b}))
+    inside = np.abs(r.theta_out_rad) < b
+    assert inside.sum() > 20
+    assert r.tau_out_Nm[inside] == pytest.approx(0.0, abs=1e-8)
+    beyond = r.theta_out_rad > b
+    assert r.tau_out_Nm[beyond] == pytest.approx(K_E * (r.theta_out_rad[beyond] - b), abs=1e-9)
+
+
+def test_stiffening_curves_torque_against_angle():
+    r = run(sine(), ("load-stiffening", "load", {"K3": 0.05}))
+    assert r.tau_out_Nm == pytest.approx(K_E * r.theta_out_rad + 0.05 * r.theta_out_rad**3, abs=1e-9)
+    same = run(sine(), load=MechanicalLoad(K_E, 0.05))
+    assert (r.T1_N == same.T1_N).all()
+
+
+def test_inertia_grows_with_the_square_of_the_frequency():
+    extra = []
+    for period in (2.0, 1.0):
+        r = run(sine(cycles=3), ("load-inertia", "load", {"J": 1e-4}), period_s=period, mu=0.02)
+        torque = r.tau_out_Nm - K_E * r.theta_out_rad
+        extra.append(np.abs(np.fft.rfft(last_cycle(torque))[1]))
+    assert extra[1] / extra[0] == pytest.approx(4.0, rel=0.02)
+
+
+# Sensors: nothing but the channel that the name says
+
+
+def changed(base, r):
+    return {name for name in base.read if not np.array_equal(r.read[name], base.read[name])}
+
+
+@pytest.mark.parametrize("side", ["drive", "load"])
+@pytest.mark.parametrize(
+    ("name", "values", "channel", "expected"),
+    [
+        ("torque-scale", {"gain": 0.05}, "tau", lambda F, tau, t: 1.05 * tau),
+        ("load-cell-scale", {"gain": -0.05}, "F", lambda F, tau, t: 0.95 * F),
+        ("load-cell-offset", {"offset": 0.7}, "F", lambda F, tau, t: F + 0.7),
+        ("load-cell-drift", {"rate": 0.1}, "F", lambda F, tau, t: F + 0.1 * t),
+        ("load-cell-crosstalk", {"crosstalk": 0.08}, "F", lambda F, tau, t: F + 0.08 * tau / R),
+    ],
+)
+def test_a_sensor_fault_shows_in_one_channel(base, side, name, values, channel, expected):
+    r = run(sine(), (name, f"{side}-sensor", values))
+    torque = {"drive": "tau_in_Nm", "load": "tau_out_Nm"}[side]
+    wanted = torque if channel == "tau" else f"F_{side}_N"
+    assert changed(base, r) == {wanted}
+    reading = expected(base.read[f"F_{side}_N"], base.read[torque], base.time_s)
+    assert r.read[wanted] == pytest.approx(reading, rel=1e-12)
+    assert (base.T1_N == r.T1_N).all()
+
+
+def test_skewed_clocks_shift_one_side_against_the_other(base):
+    steps = 6
+    delay = steps / 500
+    load = run(sine(), ("time-skew", "load-sensor", {"delay": delay}))
+    drive = run(sine(), ("time-skew", "drive-sensor", {"delay": delay}))
+    assert changed(base, load) == changed(base, drive) == {"theta_out_rad", "tau_out_Nm", "F_load_N"}
+    assert load.read["F_load_N"][steps:] == pytest.approx(base.read["F_load_N"][:-steps], abs=1e-9)
+    assert drive.read["F_load_N"][:-steps] == pytest.approx(base.read["F_load_N"][steps:], abs=1e-9)
+
+
+def test_order_of_sensor_faults_is_the_order_given(base):
+    gain, offset = (
+        ("load-cell-scale", "drive-sensor", {"gain": 0.1}),
+        ("load-cell-offset", "drive-sensor", {"offset": 1.0}),
+    )
+    a, b = run(sine(), [gain, offset]), run(sine(), [offset, gain])
+    assert b.read["F_drive_N"] - a.read["F_drive_N"] == pytest.approx(0.1, abs=1e-9)
+
+
+def test_return_point_memory_with_presliding():
+    """A nested loop closes on itself, and the way on is as if it had not been."""
+    mechanism = ("presliding", "conduit", {"z0": 20e-6})
+    way = [0.0, 0.5, 0.3, 0.5, 0.6]
+    nested = np.concatenate([np.linspace(a, b, 100, endpoint=False) for a, b in itertools.pairwise(way)])
+    r, direct = run(np.append(nested, 0.6), mechanism), run(np.linspace(0, 0.6, 400), mechanism)
+    assert r.T1_N[-1] == pytest.approx(direct.T1_N[-1], rel=2e-3)
+    assert rms(r.T1_N[[100]], r.T1_N[[300]]) < 5e-3 * T0
+
+
+def test_uneven_initial_tension_under_every_friction_law_stays_at_rest():
+    initial = InitialTension.between_ends(HALF_LOOP, 0.6 * MU, (8.0, 6.0), (6.5, 7.0))
+    for mechanism in (
+        ("presliding", "conduit", {"z0": 50e-6}),
+        ("load-dependent-friction", "conduit", {"n": -0.1}),
+        ("stribeck", "conduit", {"a": 0.3, "vs": 1e-3}),
+        ("constant-drag", "conduit", {"f0": 0.3}),
+    ):
+        r = run(np.zeros(5), mechanism, T=initial)
+        profile = [initial.tension_A_N[0], initial.tension_A_N[-1], initial.tension_B_N[0], initial.tension_B_N[-1]]
+        assert [getattr(r, name)[-1] for name in TENSIONS] == pytest.approx(profile, rel=1e-6), mechanism
+
+
+def test_path_of_many_pieces_takes_every_conduit_effect():
+    path = ConduitPath(np.full(6, L / 6), [0, 1, 0.2, 0, 1.5, 0])
+    for mechanism in (("kink", "conduit", {"beta": 0.5, "s": 0.3}), ("constant-drag", "conduit", {"f0": 1.0})):
+        coarse, fine = run(sine(), mechanism, path=path), run(sine(), mechanism, path=path, elements=128)
+        assert rms(coarse.T1_N, fine.T1_N) < 2e-3 * np.ptp(fine.T1_N)

@@ -1,0 +1,245 @@
+"""The general solver without effects: against the paper's discretisation refined, closed forms, and any load."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ccmodel.geometry import ConduitPath
+from ccmodel.model.general import simulate
+from ccmodel.model.general.grid import make_grid
+from ccmodel.model.initial import InitialTension
+from ccmodel.model.load import AngleLoad, MechanicalLoad, SpringLoad, TorqueLoad
+from ccmodel.model.paper import ModelError, simulate_pair
+from general_runs import HALF_LOOP, K_E, MU, OUTPUTS, T0, TENSIONS, K, L, R, rms, run, sine, transmission
+
+LOOPS = ConduitPath([0.3, 0.5, 0.4], [0.0, 4.0, 1.0])
+
+
+def paper(theta_in, path=HALF_LOOP, T=T0, load=None, sections=512):
+    initial = InitialTension.uniform(path, T) if np.isscalar(T) else T
+    return simulate_pair(transmission(path), load or SpringLoad(K_E), theta_in, initial, sections)
+
+
+@pytest.mark.parametrize("path", [HALF_LOOP, LOOPS], ids=["half-loop", "pieces"])
+@pytest.mark.parametrize("T", [7.3, 3.5, 0.7], ids=lambda T: f"{T}N")
+def test_without_effects_it_is_the_papers_model(path, T):
+    """Slack at the lower pretensions included; near tensions to 0.06 %, far tensions and the angle to 0.02 %."""
+    theta = sine(0.7)
+    r, ref = run(theta, path=path, T=T), paper(theta, path=path, T=T)
+    for name, limit in zip(OUTPUTS, (6e-4, 2e-4, 6e-4, 2e-4, 2e-4, 4e-4, 2e-4), strict=True):
+        assert rms(getattr(r, name), getattr(ref, name)) < limit * np.ptp(getattr(ref, name)), name
+
+
+def test_order_of_convergence_is_two_at_both_ends():
+    theta = sine()
+    fine = run(theta, elements=512)
+    elements = np.array([8, 16, 32, 64])
+    for name in OUTPUTS:
+        error = [rms(getattr(run(theta, elements=n), name), getattr(fine, name)) for n in elements]
+        order = -np.polyfit(np.log(elements), np.log(error), 1)[0]
+        assert order > 1.85, (name, order)
+
+
+def test_it_converges_to_the_same_as_the_paper():
+    """Errors against the reference fall until they reach the reference's own."""
+    theta = sine()
+    ref = paper(theta)
+    error = [rms(run(theta, elements=n).T1_N, ref.T1_N) for n in (16, 32, 64, 128)]
+    assert error[0] > 3 * error[1] > 9 * error[2]
+    assert error[3] < 2e-5 * np.ptp(ref.T1_N)
+
+
+def test_full_slip_has_the_capstan_ratio_on_any_grid():
+    for elements in (1, 3, 32):
+        r = run(np.linspace(0, 0.6, 50), elements=elements)
+        assert np.log(r.T1_N[-1] / r.T2_N[-1]) == pytest.approx(MU * np.pi, rel=1e-9)
+        assert np.log(r.T4_N[-1] / r.T3_N[-1]) == pytest.approx(MU * np.pi, rel=1e-9)
+
+
+def test_steps_may_be_large():
+    """Between reversals the path does not matter: one step a stroke ends where five hundred do."""
+    ends = np.array([0, 0.6, -0.6, 0.3, -0.1, 0.5])
+    fine = np.concatenate([np.linspace(a, b, 100, endpoint=False) for a, b in itertools.pairwise(ends)])
+    coarse, fine = run(ends), run(np.append(fine, ends[-1]))
+    for name in OUTPUTS:
+        assert getattr(coarse, name) == pytest.approx(getattr(fine, name)[::100], abs=2e-6), name
+
+
+def test_nothing_moves_at_rest():
+    r = run(np.zeros(20))
+    for name in TENSIONS:
+        assert getattr(r, name) == pytest.approx(T0, rel=1e-9)
+    assert np.abs(r.theta_out_rad).max() < 1e-12
+
+
+def test_mirrored_motion_swaps_the_cables():
+    theta = sine()
+    r, m = run(theta), run(-theta)
+    assert pytest.approx(m.T3_N, abs=1e-6) == r.T1_N
+    assert r.theta_out_rad == pytest.approx(-m.theta_out_rad, abs=1e-9)
+
+
+def test_initial_profiles_within_friction_hold():
+    profile = InitialTension.between_ends(HALF_LOOP, MU, (8.0, 6.0), (7.0, 7.5))
+    r = run(np.zeros(5), T=profile)
+    assert [getattr(r, name)[-1] for name in TENSIONS] == pytest.approx([8.0, 6.0, 7.0, 7.5], rel=1e-6)
+    assert r.theta_out_rad[-1] == pytest.approx((6.0 - 7.5) * R / K_E, rel=1e-6)
+
+
+def test_a_straight_path_is_two_springs():
+    theta = sine(0.3)
+    r = run(theta, path=ConduitPath([L], [0.0]))
+    expected = 2 * K * R**2 * theta / (2 * K * R**2 + K_E)
+    assert r.theta_out_rad == pytest.approx(expected, abs=1e-9)
+
+
+# Loads
+
+
+def test_prescribed_torque_of_the_spring_gives_the_spring_back():
+    theta = sine()
+    spring = run(theta)
+    torque = run(theta, load=TorqueLoad(spring.tau_out_Nm))
+    assert torque.theta_out_rad == pytest.approx(spring.theta_out_rad, abs=1e-5)
+    assert rms(torque.T1_N, spring.T1_N) < 1e-3
+
+
+def test_prescribed_angle_of_the_spring_gives_the_spring_back():
+    theta = sine()
+    spring = run(theta)
+    angle = run(theta, load=AngleLoad(spring.theta_out_rad))
+    for name in OUTPUTS:
+        assert rms(getattr(angle, name), getattr(spring, name)) < 1e-4 * np.ptp(getattr(spring, name)), name
+
+
+def test_blocked_load_shows_the_capstan_and_no_motion():
+    theta = np.linspace(0, 0.4, 60)
+    r = run(theta, load=AngleLoad(np.zeros(60)))
+    assert (r.theta_out_rad == 0).all()
+    # A cable that slides as a whole between fixed ends: the closed form of the stretch, (12).
+    stretch = T0 / K + R * theta[-1]
+    T1 = stretch * K * MU * np.pi / -np.expm1(-MU * np.pi)
+    assert r.T1_N[-1] == pytest.approx(T1, rel=1e-3)
+
+
+def test_cubic_spring_holds_its_law():
+    r = run(sine(), load=MechanicalLoad(K_E, 0.04))
+    assert r.tau_out_Nm == pytest.approx(K_E * r.theta_out_rad + 0.04 * r.theta_out_rad**3, abs=1e-9)
+    assert pytest.approx(r.tau_out_Nm, abs=1e-7) == (r.T2_N - r.T4_N) * R
+
+
+def test_damping_and_inertia_take_their_torques():
+    theta, dt = sine(cycles=3), 1 / 500
+    r = run(theta, load=MechanicalLoad(K_E, damping_Nms_per_rad=2e-3, inertia_kg_m2=2e-4))
+    omega = np.gradient(r.theta_out_rad, dt)
+    alpha = np.gradient(omega, dt)
+    expected = K_E * r.theta_out_rad + 2e-3 * omega + 2e-4 * alpha
+    assert rms(r.tau_out_Nm[500:], expected[500:]) < 5e-3 * np.ptp(expected[500:])
+
+
+def test_inertia_oscillates_at_its_own_frequency():
+    """Cables without friction and a load with mass, let go: the frequency is that of the two cables' stiffness."""
+    J = 1e-3
+    frequency = np.sqrt((2 * K * R**2) / J) / (2 * np.pi)
+    samples = 400
+    theta = np.where(np.arange(3 * samples) > 0, 0.05, 0.0)
+    load = MechanicalLoad(0.0, inertia_kg_m2=J)
+    r = run(theta, mu=0.0, load=load, period_s=1 / frequency, samples=samples)
+    crossings = np.flatnonzero(np.diff(np.sign(r.theta_out_rad - 0.05)))
+    assert 2 * np.diff(crossings).mean() == pytest.approx(samples, rel=5e-3)
+
+
+def test_a_load_that_turns_against_the_drive_keeps_its_torque():
+    theta = sine(0.3, cycles=1)
+    torque = 0.02 * np.sin(2 * np.pi * np.arange(theta.size) / 170)
+    r = run(theta, load=TorqueLoad(torque))
+    assert pytest.approx(torque, abs=1e-7) == (r.T2_N - r.T4_N) * R
+    for near, far in ((r.T1_N, r.T2_N), (r.T3_N, r.T4_N)):
+        assert np.abs(np.log(near / far)).max() <= MU * np.pi + 1e-7
+
+
+# Robustness and what is refused
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    mu=st.floats(0.0, 0.4),
+    T=st.floats(0.2, 20),
+    bends=st.lists(st.floats(0, 3), min_size=1, max_size=4),
+    turns=st.lists(st.floats(-0.8, 0.8), min_size=2, max_size=8),
+    noise=st.floats(0, 0.01),
+)
+def test_friction_and_balance_hold_for_any_path_and_motion(mu, T, bends, turns, noise):
+    path = ConduitPath(np.full(len(bends), L / len(bends)), bends)
+    theta = np.concatenate([np.linspace(a, b, 40) for a, b in zip([0.0, *turns[:-1]], turns, strict=True)])
+    theta += noise * np.random.default_rng(0).normal(size=theta.size)
+    r = run(theta, path=path, T=T, mu=mu)
+    assert np.abs((r.T2_N - r.T4_N) * R - K_E * r.theta_out_rad).max() < 1e-6
+    for near, far in ((r.T1_N, r.T2_N), (r.T3_N, r.T4_N)):
+        assert near.min() >= 0
+        assert far.min() >= 0
+        taut = (near > 1e-3) & (far > 1e-3)
+        assert np.abs(np.log(near[taut] / far[taut])).max(initial=0) <= mu * path.bend_rad + 1e-5
+
+
+def test_a_run_that_cannot_go_on_says_so():
+    """A spring that pushes on harder than the cables hold: what was solved until then is returned, and why no more."""
+    load = MechanicalLoad(1e-4, cubic_Nm_per_rad3=-10.0)
+    theta = np.linspace(0, 5, 100)
+    r = simulate(transmission(), load, np.arange(100) * 0.01, theta, InitialTension.uniform(HALF_LOOP, T0))
+    assert r.status.name == "no-convergence"
+    assert 0 < r.status.solved < 100
+    assert "load" in r.status.advice
+    for name in OUTPUTS:
+        assert getattr(r, name).size == r.status.solved
+        assert np.isfinite(getattr(r, name)).all()
+    with pytest.raises(ModelError, match="no-convergence at sample"):
+        r.complete()
+
+
+def test_bad_input_is_refused_by_name():
+    theta = np.zeros(4)
+    initial = InitialTension.uniform(HALF_LOOP, T0)
+
+    def attempt(time_s=np.arange(4.0), theta=theta, load=SpringLoad(K_E), mechanisms=(), elements=32):  # noqa: B008
+        return simulate(transmission(), load, time_s, theta, initial, mechanisms, elements)
+
+    with pytest.raises(ModelError, match="theta_in is not finite at sample 2"):
+        attempt(theta=np.array([0, 0, np.nan, 0]))
+    with pytest.raises(ModelError, match="time_s must increase; it does not at sample 3"):
+        attempt(time_s=np.array([0.0, 1, 2, 2]))
+    with pytest.raises(ModelError, match="load's series has 2 samples"):
+        attempt(load=TorqueLoad(np.zeros(2)))
+    with pytest.raises(ModelError, match="at least one element"):
+        attempt(elements=0)
+    with pytest.raises(ModelError, match="presliding acts at conduit"):
+        attempt(mechanisms={"presliding": {"place": "load"}})
+    with pytest.raises(ModelError, match="z0 = -0.01 m, which must not be negative"):
+        attempt(mechanisms={"presliding": {"values": {"z0": -0.01}}})
+    with pytest.raises(ModelError, match="share of the length"):
+        attempt(mechanisms={"kink": {"values": {"beta": 0.5, "s": 1.5}}})
+    with pytest.raises(ModelError, match="relaxation has the parameters r, tau; got r"):
+        attempt(mechanisms={"relaxation": {"values": {"r": 0.1}}})
+
+
+# Grid
+
+
+def test_grid_respects_corners_and_kinks():
+    grid = make_grid(LOOPS, 32, kinks=[(0.5, 0.7)])
+    for corner in (0.3, 0.8, 0.6):
+        assert np.abs(grid.boundary_m - corner).min() < 1e-12
+    assert grid.boundary_rad[-1] == pytest.approx(LOOPS.bend_rad + 0.7)
+    assert (grid.segment_m > 0).all()
+    assert grid.segment_m.sum() == pytest.approx(L)
+    kink = np.flatnonzero(grid.cell_m == 0)
+    assert grid.cell_rad[kink] == pytest.approx([0.7])
+
+
+def test_grid_has_about_the_cells_asked_for():
+    for path in (HALF_LOOP, LOOPS, ConduitPath([L], [0.0])):
+        for elements in (8, 32, 128):
+            assert abs(make_grid(path, elements).cell_m.size - elements) <= 3
