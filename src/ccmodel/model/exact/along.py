@@ -1,0 +1,179 @@
+"""A step in which the load follows the drive: every point slides one way, and nothing depends on the path in between.
+
+The pulled cable (at the drive) is let in at the load, the released one is pulled there. The load's displacement Q =
+R_o theta_out solves T2 - T4 = given + stiffness Q, whose left side falls with Q: linear where a cable slides as a whole,
+a quadratic a segment where it does not.
+"""
+
+from numba import njit
+
+from ccmodel.model.exact.cable import (
+    DRIVE,
+    E0,
+    FRONTS,
+    GIVEN,
+    LINE,
+    LOAD,
+    MODE,
+    SIGMA,
+    P,
+    T_DRIVE,
+    T_LOAD,
+    D,
+    end_compliance,
+    has_met,
+    keep,
+    pull_line,
+    slide_whole,
+    turn,
+    walk,
+)
+
+
+@njit(cache=True)
+def step_along(path, state, kept, way, drive, given, stiffness):
+    """Move the drive to `drive` (m) and the load law's constant part to `given` (N), the load following the drive.
+
+    `way` is +1 where cable A is the one pulled, -1 where it is B. A load that would have to turn back stays.
+    """
+    state.pair[DRIVE] = drive
+    fronts_left = 0
+    still_fronts = -1
+    for c in range(2):
+        sign = 1 - 2 * c
+        turn(path, state, c, sign * way, -sign * way)
+        if state.cable_kind[c, MODE] == FRONTS:
+            walk(path, state, c, 0, 0.0, 1.0, sign * drive)
+            state.cable[c, T_DRIVE] = state.front[c, 0, P]
+            if has_met(path, state, c):
+                slide_whole(state, path, c, -sign * way)
+            else:
+                fronts_left += 1
+                still_fronts = c
+        else:
+            pull_line(state, path, c)
+    changed = given != state.pair[GIVEN]
+    state.pair[GIVEN] = given
+    if fronts_left == 2 and not changed:
+        return
+    if way * excess(state, given, stiffness) <= 0.0:
+        return
+    if fronts_left == 2:
+        both_fronts(path, state, kept, way, given, stiffness)
+        if not (has_met(path, state, 0) or has_met(path, state, 1)):
+            return
+        keep(kept, state)
+        still_fronts = _first_whole(path, state, kept, way)
+    if fronts_left > 0 and one_front(path, state, kept, still_fronts, given, stiffness):
+        return
+    balance_lines(state, path, given, stiffness)
+
+
+@njit(cache=True)
+def excess(state, given, stiffness):
+    """T2 - T4 less what the load takes, N."""
+    return state.cable[0, T_LOAD] - state.cable[1, T_LOAD] - given - stiffness * state.pair[LOAD]
+
+
+@njit(cache=True)
+def balance_lines(state, path, given, stiffness):
+    """Balance the load where both cables slide as a whole, taut or slack."""
+    index = ((state.cable_kind[0, LINE] + 1) // 2, (state.cable_kind[1, LINE] + 1) // 2)
+    k_A = state.stiffness[0, index[0]] * path.ratio[index[0]]
+    k_B = state.stiffness[1, index[1]] * path.ratio[index[1]]
+    e_A = state.cable[0, E0] + state.pair[DRIVE]
+    e_B = state.cable[1, E0] - state.pair[DRIVE]
+    state.pair[LOAD] = balanced(k_A, e_A, k_B, e_B, given, stiffness, state.pair[LOAD])
+    pull_line(state, path, 0)
+    pull_line(state, path, 1)
+
+
+@njit(cache=True)
+def balanced(k_A, e_A, k_B, e_B, given, stiffness, load):
+    """Q with k_A max(0, e_A - Q) - k_B max(0, e_B + Q) = given + stiffness Q; `load` where nothing holds the load."""
+    total = k_A + k_B + stiffness
+    if total == 0.0:
+        return load
+    q = (k_A * e_A - k_B * e_B - given) / total
+    if e_A - q < 0.0 and k_A > 0.0 and k_B + stiffness > 0.0:
+        return (-k_B * e_B - given) / (k_B + stiffness)
+    if e_B + q < 0.0 and k_B > 0.0 and k_A + stiffness > 0.0:
+        return (k_A * e_A - given) / (k_A + stiffness)
+    return q
+
+
+@njit(cache=True)
+def one_front(path, state, kept, c, given, stiffness):
+    """Balance the load where cable `c` has fronts and the other slides as a whole; False if `c` then does so too."""
+    other = 1 - c
+    sign = 1 - 2 * c
+    index = (state.cable_kind[other, LINE] + 1) // 2
+    k = state.stiffness[other, index] * path.ratio[index]
+    stretch = state.cable[other, E0] - sign * state.pair[DRIVE]
+    keep(state, kept)
+    walk(path, state, c, 1, 1.0, k + stiffness, k * stretch + sign * given)
+    if k > 0.0 and stretch - state.front[c, 1, D] < 0.0:
+        # The other one is slack: the load and this cable balance alone.
+        keep(kept, state)
+        walk(path, state, c, 1, 1.0, stiffness, sign * given)
+    state.pair[LOAD] = -sign * state.front[c, 1, D]
+    state.cable[c, T_LOAD] = state.front[c, 1, P]
+    pull_line(state, path, other)
+    if not has_met(path, state, c):
+        return True
+    slide_whole(state, path, c, state.front_kind[c, 1, SIGMA])
+    return False
+
+
+@njit(cache=True)
+def both_fronts(path, state, kept, way, given, stiffness):
+    """Balance the load between two fronts, as if they could not meet others, the load moving in direction `way`.
+
+    The unknown is the tension at the load of the cable that is pulled there: displacements are smooth in it, while it
+    starts as a square root of them. What was before stays in `kept`.
+    """
+    pulled = (1 + way) // 2
+    let_in = 1 - pulled
+    keep(state, kept)
+    start = state.cable[let_in, T_LOAD]
+    low = state.cable[pulled, T_LOAD]
+    high = start - way * (given + stiffness * state.pair[LOAD])
+    tension = 0.5 * (low + high)
+    for _ in range(100):
+        keep(kept, state)
+        walk(path, state, pulled, 1, 1.0, 0.0, tension)
+        load = (2 * pulled - 1) * state.front[pulled, 1, D]
+        wanted = tension + way * (given + stiffness * load)
+        walk(path, state, let_in, 1, 1.0, 0.0, min(start, wanted))
+        gap = way * (load - (2 * let_in - 1) * state.front[let_in, 1, D])
+        if gap > 0.0:
+            high = tension
+        else:
+            low = tension
+        gives = end_compliance(state, pulled, 1)
+        slope = gives + (1.0 + stiffness * gives) * end_compliance(state, let_in, 1)
+        following = tension - gap / slope if slope > 0.0 else low
+        if not (low < following < high):
+            following = 0.5 * (low + high)
+        if abs(following - tension) <= 2e-16 * abs(tension):
+            break
+        tension = following
+    state.pair[LOAD] = load
+    state.cable[0, T_LOAD] = state.front[0, 1, P]
+    state.cable[1, T_LOAD] = state.front[1, 1, P]
+
+
+@njit(cache=True)
+def _first_whole(path, state, kept, way):
+    """Let the cable whose fronts meet after the lesser displacement of the load slide whole; returns the other."""
+    keep(state, kept)
+    travel = [0.0, 0.0]
+    for c in range(2):
+        sigma = state.front_kind[c, 0, SIGMA]
+        before = state.front[c, 1, D]
+        walk(path, state, c, 1, 1.0, 0.0, state.front[c, 0, P] * path.ratio[(1 - sigma) // 2])
+        travel[c] = abs(state.front[c, 1, D] - before)
+    keep(kept, state)
+    first = 0 if travel[0] <= travel[1] else 1
+    slide_whole(state, path, first, (2 * first - 1) * way)
+    return 1 - first

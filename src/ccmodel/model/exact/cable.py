@@ -1,0 +1,440 @@
+"""One cable in its conduit: the old profile as a list of corners, and the fronts that sweep it from either end.
+
+All kernels work on a `State`, in which cable A is row 0 and cable B row 1; end 0 is the drive end, 1 the load end.
+
+A sliding line drawn in from an end changes ln T by -sigma per unit of m = mu phi going inward, sigma = +1 for a pull
+and -1 for a release. Inside one segment of the old profile (one slope, one bend) the front stands where
+r = expm1(sigma dm), dm counted from where it entered the segment. Against a line of the opposite slope
+    displacement - displacement at entry = T_e r (E (2 + r) + sigma c r)
+    end tension / end tension at entry   = (1 + r)**2
+with T_e the tension at the point of entry, E the compliance of what already moves per unit of the front's tension, and
+c = dx / (EA dm) of the bend: a quadratic in r whose coefficients keep their sign, so that nothing cancels. An increment
+is always counted from where the segment was entered, not from the last sample: small steps and large ones agree.
+"""
+
+from math import exp, expm1, log1p, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+FRONTS, WHOLE, STILL_POINT = 0, 1, 2
+
+# Front, floats: where the segment was entered (position, front's and end's tension, compliance, displacement), where it
+# stops, its slope relative to the line, its bend's compliance, r at its stop and now, end tension and displacement now,
+# displacement at which the front set out.
+ME, TE, PE, EE, DE, STOP, SLOPE, BEND, R_STOP, R, P, D, D_START = range(13)
+# Front, integers: sigma (0: none), bend it is in, whether a segment lies ahead.
+SIGMA, PIECE, OPEN = range(3)
+# Cable, floats: elongation at the zero of all angles, position of a still point, tensions at both ends.
+E0, M_STILL, T_DRIVE, T_LOAD = range(4)
+# Cable, integers: first and last corner, what it does (mode), slope of a whole slide or sigma of a still point, the
+# piece a still point is in, whether it stands in a straight stretch (at that piece's first node).
+LO, HI, MODE, LINE, STILL_PIECE, PINNED = range(6)
+# Pair, floats: displacement of the drive and of the load pulley's rim, load law's constant part.
+DRIVE, LOAD, GIVEN = range(3)
+
+
+class State(NamedTuple):
+    """Everything that the past leaves behind; arrays are written in place.
+
+    Attributes
+    ----------
+    m, T, slope : ndarray, shape (2, capacity)
+        Corners of the old profile by position (from the drive end) and tension, and d ln T / dm from each to the next.
+    front : ndarray, shape (2, 2, 13)
+    front_kind : ndarray, shape (2, 2, 3)
+    cable : ndarray, shape (2, 4)
+    cable_kind : ndarray, shape (2, 6)
+    pair : ndarray, shape (3,)
+    stiffness : ndarray, shape (2, 2)
+        Drive-end tension per elongation of a cable that slides as a whole on a line of slope -1, +1, N/m; zero for a
+        cable that is not there.
+    """
+
+    m: NDArray
+    T: NDArray
+    slope: NDArray
+    front: NDArray
+    front_kind: NDArray
+    cable: NDArray
+    cable_kind: NDArray
+    pair: NDArray
+    stiffness: NDArray
+
+
+def blank_state(capacity: int) -> State:
+    """A state with room for `capacity` corners a cable, all zero."""
+    return State(
+        np.zeros((2, capacity)),
+        np.zeros((2, capacity)),
+        np.zeros((2, capacity)),
+        np.zeros((2, 2, 13)),
+        np.zeros((2, 2, 3), dtype=np.int64),
+        np.zeros((2, 4)),
+        np.zeros((2, 6), dtype=np.int64),
+        np.zeros(3),
+        np.zeros((2, 2)),
+    )
+
+
+@njit(cache=True)
+def keep(state, kept):
+    """Copy what a step may change (all but the corners, which a step only drops) from `state` to `kept`."""
+    kept.front[:] = state.front
+    kept.front_kind[:] = state.front_kind
+    kept.cable[:] = state.cable
+    kept.cable_kind[:] = state.cable_kind
+    kept.pair[:] = state.pair
+
+
+@njit(cache=True)
+def elongation(state, c):
+    """End-to-end elongation of cable `c` beyond its natural length, m."""
+    sign = 1.0 - 2.0 * c
+    return state.cable[c, E0] + sign * (state.pair[DRIVE] - state.pair[LOAD])
+
+
+# ---------------------------------------------------------------------------------------------- one segment of a sweep
+
+
+@njit(cache=True)
+def _curl(s, y):
+    """exp((s + 1) y) - exp(s y) - (exp(s y) - 1) / s: what a line of slope s adds over y, in tension times c."""
+    if abs(y) < 0.3:
+        # (1 + s) sum over n >= 2 of ((1 + s)^(n-1) - s^(n-1)) y^n / n!, for the difference cancels at small y
+        total, power, high, low = 0.0, y, 1.0, 1.0
+        for n in range(2, 20):
+            power *= y / n
+            high *= 1.0 + s
+            low *= s
+            total += (high - low) * power
+        return (1.0 + s) * total
+    if abs(s) < 1e-9:
+        return expm1(y) - y
+    return exp(s * y) * expm1(y) - expm1(s * y) / s
+
+
+@njit(cache=True)
+def _tension_gain(slope, r):
+    """End tension over end tension at entry, less one."""
+    if slope == 1.0:
+        return r * (2.0 + r)
+    return expm1((1.0 + slope) * log1p(r))
+
+
+@njit(cache=True)
+def _displacement_gain(front, c, end, sigma, r):
+    """End displacement since the segment was entered, m."""
+    T_e, E, bend, slope = front[c, end, TE], front[c, end, EE], front[c, end, BEND], front[c, end, SLOPE]
+    if slope == 1.0:
+        return T_e * r * (E * (2.0 + r) + sigma * bend * r)
+    y = log1p(r)
+    return T_e * (E * expm1((1.0 + slope) * y) + sigma * bend * _curl(slope, y))
+
+
+@njit(cache=True)
+def _solve_segment(front, c, end, sigma, weight_P, weight_d, residual):
+    """r at which weight_P (P - P_e) + weight_d (d - d_e) = residual, within the segment."""
+    T_e, P_e, E, bend = front[c, end, TE], front[c, end, PE], front[c, end, EE], front[c, end, BEND]
+    slope = front[c, end, SLOPE]
+    b = weight_P * P_e + weight_d * T_e * E
+    if slope == 1.0:
+        a = b + weight_d * T_e * sigma * bend
+        return residual / (b + sqrt(max(0.0, b * b + a * residual)))
+    return _solve_sloping(slope, b, weight_d * T_e * sigma * bend, residual, log1p(front[c, end, R_STOP]))
+
+
+@njit(cache=True)
+def _solve_sloping(slope, b, k, residual, y_stop):
+    """r = expm1(y) with b expm1((1 + slope) y) + k curl(y) = residual, y between 0 and y_stop, by safeguarded Newton."""
+    near, far = 0.0, y_stop
+    gain = 1.0 + slope
+    linear = b * gain
+    square = 0.5 * gain * (b * gain + k)
+    y = 2.0 * residual / (linear + sqrt(max(0.0, linear * linear + 4.0 * square * residual)))
+    for _ in range(60):
+        if not (min(near, far) < y < max(near, far)):
+            y = 0.5 * (near + far)
+        miss = b * expm1(gain * y) + k * _curl(slope, y) - residual
+        if (miss > 0.0) == (y_stop > 0.0):
+            far = y
+        else:
+            near = y
+        step = miss / (b * gain * exp(gain * y) + k * gain * exp(slope * y) * expm1(y))
+        y -= step
+        if abs(step) <= 2e-16 * abs(y):
+            break
+    return expm1(y)
+
+
+# ------------------------------------------------------------------------------------------------------------- a front
+
+
+@njit(cache=True)
+def start_front(path, state, c, end, sigma):
+    """Let a new front set out from an end, from the tension and displacement that stand there now."""
+    sign = 1.0 - 2.0 * c
+    front = state.front
+    tension = state.cable[c, T_DRIVE + end]
+    front[c, end, ME] = 0.0
+    front[c, end, TE] = tension
+    front[c, end, PE] = tension
+    front[c, end, P] = tension
+    front[c, end, EE] = path.lump[end, 0]
+    displacement = sign * state.pair[DRIVE] if end == 0 else -sign * state.pair[LOAD]
+    front[c, end, DE] = displacement
+    front[c, end, D] = displacement
+    front[c, end, D_START] = displacement
+    state.front_kind[c, end, SIGMA] = sigma
+    state.front_kind[c, end, PIECE] = 0
+    aim(path, state, c, end)
+
+
+@njit(cache=True)
+def aim(path, state, c, end):
+    """Look at what lies ahead of a front's point of entry; what already has the line's slope is taken at once."""
+    front, kind = state.front, state.front_kind
+    sigma = kind[c, end, SIGMA]
+    front[c, end, R] = 0.0
+    while True:
+        lo, hi, piece = state.cable_kind[c, LO], state.cable_kind[c, HI], kind[c, end, PIECE]
+        if lo >= hi or piece >= path.bend.shape[1]:
+            kind[c, end, OPEN] = 0
+            front[c, end, R_STOP] = 0.0
+            return
+        if end == 0:
+            slope, corner = state.slope[c, lo], state.m[c, lo + 1]
+        else:
+            slope, corner = -state.slope[c, hi - 1], path.total - state.m[c, hi - 1]
+        node = path.node[end, piece + 1]
+        stop = min(corner, node)
+        dm = stop - front[c, end, ME]
+        if dm > 0.0:
+            r = expm1(sigma * dm)
+            if slope != -sigma:
+                front[c, end, STOP] = stop
+                front[c, end, SLOPE] = sigma * slope
+                front[c, end, BEND] = path.bend[end, piece]
+                front[c, end, R_STOP] = r
+                kind[c, end, OPEN] = 1
+                return
+            front[c, end, TE] /= 1.0 + r
+            front[c, end, EE] = front[c, end, EE] * (1.0 + r) + abs(r) * path.bend[end, piece]
+            front[c, end, ME] = stop
+        _cross(path, state, c, end, corner <= stop, node <= stop)
+
+
+@njit(cache=True)
+def _cross(path, state, c, end, corner, node):
+    """Leave a corner of the old profile and a node of the path behind."""
+    if corner:
+        if end == 0:
+            state.cable_kind[c, LO] += 1
+            state.front[c, end, TE] = state.T[c, state.cable_kind[c, LO]]
+        else:
+            state.cable_kind[c, HI] -= 1
+            state.front[c, end, TE] = state.T[c, state.cable_kind[c, HI]]
+    if node:
+        state.front_kind[c, end, PIECE] += 1
+        state.front[c, end, EE] += path.lump[end, state.front_kind[c, end, PIECE]]
+
+
+@njit(cache=True)
+def walk(path, state, c, end, weight_P, weight_d, target):
+    """Draw a front inward until weight_P P + weight_d d = target, P the end's tension and d its displacement.
+
+    Stops where the old profile ends, with nothing ahead (OPEN = 0).
+    """
+    front, kind = state.front, state.front_kind
+    sigma = kind[c, end, SIGMA]
+    while kind[c, end, OPEN] == 1:
+        residual = target - weight_P * front[c, end, PE] - weight_d * front[c, end, DE]
+        if sigma * residual <= 0.0:
+            r = 0.0
+        else:
+            r = front[c, end, R_STOP]
+            whole = weight_P * front[c, end, PE] * _tension_gain(front[c, end, SLOPE], r)
+            whole += weight_d * _displacement_gain(front, c, end, sigma, r)
+            if sigma * residual < sigma * whole:
+                r = _solve_segment(front, c, end, sigma, weight_P, weight_d, residual)
+            else:
+                _pass_segment(path, state, c, end, sigma, r)
+                continue
+        front[c, end, R] = r
+        front[c, end, P] = front[c, end, PE] * (1.0 + _tension_gain(front[c, end, SLOPE], r))
+        front[c, end, D] = front[c, end, DE] + _displacement_gain(front, c, end, sigma, r)
+        return
+    front[c, end, P] = front[c, end, PE]
+    front[c, end, D] = front[c, end, DE]
+
+
+@njit(cache=True)
+def _pass_segment(path, state, c, end, sigma, r):
+    front = state.front
+    slope = front[c, end, SLOPE]
+    front[c, end, DE] += _displacement_gain(front, c, end, sigma, r)
+    front[c, end, PE] *= 1.0 + _tension_gain(slope, r)
+    front[c, end, TE] *= 1.0 + r if slope == 1.0 else exp(slope * log1p(r))
+    front[c, end, EE] = front[c, end, EE] * (1.0 + r) + abs(r) * front[c, end, BEND]
+    stop = front[c, end, STOP]
+    front[c, end, ME] = stop
+    if end == 0:
+        corner = state.m[c, state.cable_kind[c, LO] + 1]
+    else:
+        corner = path.total - state.m[c, state.cable_kind[c, HI] - 1]
+    node = path.node[end, state.front_kind[c, end, PIECE] + 1]
+    _cross(path, state, c, end, corner <= stop, node <= stop)
+    aim(path, state, c, end)
+
+
+@njit(cache=True)
+def position(state, c, end):
+    """How far a front has come, in m counted from its end."""
+    return state.front[c, end, ME] + state.front_kind[c, end, SIGMA] * log1p(state.front[c, end, R])
+
+
+@njit(cache=True)
+def end_compliance(state, c, end):
+    """Displacement of an end per unit of its own tension while its front goes on, m/N."""
+    front = state.front
+    sigma = state.front_kind[c, end, SIGMA]
+    r = front[c, end, R]
+    per_front_tension = front[c, end, EE] * (1.0 + r) + abs(r) * front[c, end, BEND]
+    return per_front_tension * exp(-sigma * position(state, c, end))
+
+
+@njit(cache=True)
+def has_met(path, state, c):
+    """Whether fronts that slide the same way have met: then their lines are one line."""
+    if state.front_kind[c, 0, OPEN] == 0 or state.front_kind[c, 1, OPEN] == 0:
+        return True
+    sigma = state.front_kind[c, 0, SIGMA]
+    ratio = path.ratio[(1 - sigma) // 2]
+    return sigma * (state.front[c, 0, P] * ratio - state.front[c, 1, P]) >= 0.0
+
+
+# --------------------------------------------------------------------------------------------------- keeping a profile
+
+
+@njit(cache=True)
+def _commit_front(path, state, c, end):
+    """Write the line drawn in from an end into the list of corners."""
+    sigma = state.front_kind[c, end, SIGMA]
+    state.front_kind[c, end, SIGMA] = 0
+    front = state.front
+    inward, r = position(state, c, end), front[c, end, R]
+    if sigma == 0 or inward <= 0.0:
+        return
+    slope = front[c, end, SLOPE]
+    tension = front[c, end, TE] * (1.0 + r if slope == 1.0 else exp(slope * log1p(r)))
+    if end == 0:
+        lo = state.cable_kind[c, LO]
+        state.m[c, lo] = min(inward, path.total)
+        state.T[c, lo] = tension
+        state.m[c, lo - 1] = 0.0
+        state.T[c, lo - 1] = front[c, end, P]
+        state.slope[c, lo - 1] = -sigma
+        state.cable_kind[c, LO] = lo - 1
+    else:
+        hi = state.cable_kind[c, HI]
+        state.m[c, hi] = max(0.0, path.total - inward)
+        state.T[c, hi] = tension
+        state.slope[c, hi] = sigma
+        state.m[c, hi + 1] = path.total
+        state.T[c, hi + 1] = front[c, end, P]
+        state.cable_kind[c, HI] = hi + 1
+
+
+@njit(cache=True)
+def _commit_line(path, state, c):
+    """Make a whole slide's line, or the two about a still point, the old profile."""
+    kind = state.cable_kind
+    line = kind[c, LINE]
+    lo = state.m.shape[1] // 2 - 1
+    kind[c, LO], kind[c, HI] = lo, lo + 1
+    state.m[c, lo], state.T[c, lo] = 0.0, state.cable[c, T_DRIVE]
+    if kind[c, MODE] == WHOLE:
+        state.slope[c, lo] = line
+    else:
+        still = state.cable[c, M_STILL]
+        state.slope[c, lo] = -line
+        state.m[c, lo + 1] = still
+        state.T[c, lo + 1] = state.cable[c, T_DRIVE] * exp(-line * still)
+        state.slope[c, lo + 1] = line
+        kind[c, HI] = lo + 2
+    hi = kind[c, HI]
+    state.m[c, hi], state.T[c, hi] = path.total, state.cable[c, T_LOAD]
+    kind[c, MODE] = FRONTS
+    state.front_kind[c, 0, SIGMA] = 0
+    state.front_kind[c, 1, SIGMA] = 0
+
+
+@njit(cache=True)
+def slide_whole(state, path, c, line):
+    """Cable `c` slides along its whole length on a line of slope `line`."""
+    state.cable_kind[c, MODE] = WHOLE
+    state.cable_kind[c, LINE] = line
+    pull_line(state, path, c)
+
+
+@njit(cache=True)
+def pull_line(state, path, c):
+    """End tensions of a cable that slides as a whole, from its elongation; none where it is slack."""
+    index = (state.cable_kind[c, LINE] + 1) // 2
+    tension = state.stiffness[c, index] * max(0.0, elongation(state, c))
+    state.cable[c, T_DRIVE] = tension
+    state.cable[c, T_LOAD] = tension * path.ratio[index]
+
+
+@njit(cache=True)
+def is_slack(state, c):
+    """Whether a cable hangs without tension: it then has no memory."""
+    return state.cable_kind[c, MODE] == WHOLE and elongation(state, c) <= 0.0
+
+
+@njit(cache=True)
+def turn(path, state, c, sigma_drive, sigma_load):
+    """Make cable `c` ready for its ends to move as pulls (+1) or releases (-1): what turns round leaves a corner."""
+    kind = state.cable_kind
+    if kind[c, MODE] == WHOLE:
+        if sigma_load != sigma_drive:
+            if kind[c, LINE] == -sigma_drive:
+                return
+            if path.total == 0.0 or is_slack(state, c):
+                kind[c, LINE] = -sigma_drive
+                return
+        elif path.total == 0.0 or is_slack(state, c):
+            return
+        _commit_line(path, state, c)
+    elif kind[c, MODE] == STILL_POINT:
+        if sigma_load == sigma_drive == kind[c, LINE]:
+            return
+        _commit_line(path, state, c)
+    sigmas = (sigma_drive, sigma_load)
+    turned_drive = state.front_kind[c, 0, SIGMA] != sigma_drive
+    turned_load = state.front_kind[c, 1, SIGMA] != sigma_load
+    if turned_drive:
+        _commit_front(path, state, c, 0)
+    if turned_load:
+        _commit_front(path, state, c, 1)
+    for end in range(2):
+        if (turned_drive, turned_load)[end]:
+            start_front(path, state, c, end, sigmas[end])
+        elif turned_drive or turned_load:
+            _shorten(path, state, c, end)
+
+
+@njit(cache=True)
+def _shorten(path, state, c, end):
+    """Stop a front short where the other end has just left a corner in the segment it is in."""
+    if state.front_kind[c, end, OPEN] == 0:
+        return
+    if end == 0:
+        corner = state.m[c, state.cable_kind[c, LO] + 1]
+    else:
+        corner = path.total - state.m[c, state.cable_kind[c, HI] - 1]
+    if corner < state.front[c, end, STOP]:
+        state.front[c, end, STOP] = corner
+        state.front[c, end, R_STOP] = expm1(state.front_kind[c, end, SIGMA] * (corner - state.front[c, end, ME]))
