@@ -36,12 +36,13 @@ def step_along(path, state, kept, way, drive, given, stiffness):
 
     `way` is +1 where cable A is the one pulled, -1 where it is B. A load that would have to turn back stays.
     """
+    turn(path, state, 0, way, -way)
+    turn(path, state, 1, -way, way)
     state.pair[DRIVE] = drive
     fronts_left = 0
     still_fronts = -1
     for c in range(2):
         sign = 1 - 2 * c
-        turn(path, state, c, sign * way, -sign * way)
         if state.cable_kind[c, MODE] == FRONTS:
             walk(path, state, c, 0, 0.0, 1.0, sign * drive)
             state.cable[c, T_DRIVE] = state.front[c, 0, P]

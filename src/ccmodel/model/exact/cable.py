@@ -322,9 +322,9 @@ def has_met(path, state, c):
 def _commit_front(path, state, c, end):
     """Write the line drawn in from an end into the list of corners."""
     sigma = state.front_kind[c, end, SIGMA]
-    state.front_kind[c, end, SIGMA] = 0
     front = state.front
     inward, r = position(state, c, end), front[c, end, R]
+    state.front_kind[c, end, SIGMA] = 0
     if sigma == 0 or inward <= 0.0:
         return
     slope = front[c, end, SLOPE]
