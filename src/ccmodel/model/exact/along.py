@@ -12,7 +12,6 @@ from ccmodel.model.exact.cable import (
     E0,
     FRONTS,
     GIVEN,
-    LINE,
     LOAD,
     MODE,
     SIGMA,
@@ -23,6 +22,7 @@ from ccmodel.model.exact.cable import (
     end_compliance,
     has_met,
     keep,
+    line_stiffness,
     pull_line,
     slide_whole,
     turn,
@@ -47,12 +47,12 @@ def step_along(path, state, kept, way, drive, given, stiffness):
             walk(path, state, c, 0, 0.0, 1.0, sign * drive)
             state.cable[c, T_DRIVE] = state.front[c, 0, P]
             if has_met(path, state, c):
-                slide_whole(state, path, c, -sign * way)
+                slide_whole(path, state, c, -sign * way)
             else:
                 fronts_left += 1
                 still_fronts = c
         else:
-            pull_line(state, path, c)
+            pull_line(path, state, c)
     changed = given != state.pair[GIVEN]
     state.pair[GIVEN] = given
     if fronts_left == 2 and not changed:
@@ -65,9 +65,12 @@ def step_along(path, state, kept, way, drive, given, stiffness):
             return
         keep(kept, state)
         still_fronts = _first_whole(path, state, kept, way)
-    if fronts_left > 0 and one_front(path, state, kept, still_fronts, given, stiffness):
-        return
-    balance_lines(state, path, given, stiffness)
+    if fronts_left > 0:
+        one_front(path, state, kept, still_fronts, given, stiffness)
+        if not has_met(path, state, still_fronts):
+            return
+        slide_whole(path, state, still_fronts, state.front_kind[still_fronts, 1, SIGMA])
+    balance_lines(path, state, given, stiffness)
 
 
 @njit(cache=True)
@@ -77,16 +80,15 @@ def excess(state, given, stiffness):
 
 
 @njit(cache=True)
-def balance_lines(state, path, given, stiffness):
-    """Balance the load where both cables slide as a whole, taut or slack."""
-    index = ((state.cable_kind[0, LINE] + 1) // 2, (state.cable_kind[1, LINE] + 1) // 2)
-    k_A = state.stiffness[0, index[0]] * path.ratio[index[0]]
-    k_B = state.stiffness[1, index[1]] * path.ratio[index[1]]
+def balance_lines(path, state, given, stiffness):
+    """Balance the load where both cables move as a whole, taut or slack."""
+    k_A = line_stiffness(path, state, 0)[1]
+    k_B = line_stiffness(path, state, 1)[1]
     e_A = state.cable[0, E0] + state.pair[DRIVE]
     e_B = state.cable[1, E0] - state.pair[DRIVE]
     state.pair[LOAD] = balanced(k_A, e_A, k_B, e_B, given, stiffness, state.pair[LOAD])
-    pull_line(state, path, 0)
-    pull_line(state, path, 1)
+    pull_line(path, state, 0)
+    pull_line(path, state, 1)
 
 
 @njit(cache=True)
@@ -105,25 +107,22 @@ def balanced(k_A, e_A, k_B, e_B, given, stiffness, load):
 
 @njit(cache=True)
 def one_front(path, state, kept, c, given, stiffness):
-    """Balance the load where cable `c` has fronts and the other slides as a whole; False if `c` then does so too."""
+    """Balance the load where cable `c` has fronts and the other moves as a whole, taut or slack."""
     other = 1 - c
     sign = 1 - 2 * c
-    index = (state.cable_kind[other, LINE] + 1) // 2
-    k = state.stiffness[other, index] * path.ratio[index]
+    k = line_stiffness(path, state, other)[1]
     stretch = state.cable[other, E0] - sign * state.pair[DRIVE]
-    keep(state, kept)
-    walk(path, state, c, 1, 1.0, k + stiffness, k * stretch + sign * given)
-    if k > 0.0 and stretch - state.front[c, 1, D] < 0.0:
-        # The other one is slack: the load and this cable balance alone.
-        keep(kept, state)
+    if k > 0.0:
+        keep(state, kept)
+        walk(path, state, c, 1, 1.0, k + stiffness, k * stretch + sign * given)
+        if stretch - state.front[c, 1, D] < 0.0:
+            keep(kept, state)
+            k = 0.0
+    if k == 0.0:
         walk(path, state, c, 1, 1.0, stiffness, sign * given)
     state.pair[LOAD] = -sign * state.front[c, 1, D]
     state.cable[c, T_LOAD] = state.front[c, 1, P]
-    pull_line(state, path, other)
-    if not has_met(path, state, c):
-        return True
-    slide_whole(state, path, c, state.front_kind[c, 1, SIGMA])
-    return False
+    pull_line(path, state, other)
 
 
 @njit(cache=True)
@@ -176,5 +175,25 @@ def _first_whole(path, state, kept, way):
         travel[c] = abs(state.front[c, 1, D] - before)
     keep(kept, state)
     first = 0 if travel[0] <= travel[1] else 1
-    slide_whole(state, path, first, (2 * first - 1) * way)
+    slide_whole(path, state, first, (2 * first - 1) * way)
     return 1 - first
+
+
+@njit(cache=True)
+def move_along(path, state, way, drive, load):
+    """Move both ends to given displacements, the load end following the drive end or at rest."""
+    turn(path, state, 0, way, -way)
+    turn(path, state, 1, -way, way)
+    state.pair[DRIVE] = drive
+    state.pair[LOAD] = load
+    for c in range(2):
+        sign = 1 - 2 * c
+        if state.cable_kind[c, MODE] == FRONTS:
+            walk(path, state, c, 0, 0.0, 1.0, sign * drive)
+            walk(path, state, c, 1, 0.0, 1.0, -sign * load)
+            state.cable[c, T_DRIVE] = state.front[c, 0, P]
+            state.cable[c, T_LOAD] = state.front[c, 1, P]
+            if has_met(path, state, c):
+                slide_whole(path, state, c, -sign * way)
+        else:
+            pull_line(path, state, c)

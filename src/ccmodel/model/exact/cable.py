@@ -372,20 +372,54 @@ def _commit_line(path, state, c):
 
 
 @njit(cache=True)
-def slide_whole(state, path, c, line):
+def slide_whole(path, state, c, line):
     """Cable `c` slides along its whole length on a line of slope `line`."""
     state.cable_kind[c, MODE] = WHOLE
     state.cable_kind[c, LINE] = line
-    pull_line(state, path, c)
+    pull_line(path, state, c)
 
 
 @njit(cache=True)
-def pull_line(state, path, c):
-    """End tensions of a cable that slides as a whole, from its elongation; none where it is slack."""
-    index = (state.cable_kind[c, LINE] + 1) // 2
-    tension = state.stiffness[c, index] * max(0.0, elongation(state, c))
-    state.cable[c, T_DRIVE] = tension
-    state.cable[c, T_LOAD] = tension * path.ratio[index]
+def passed(path, end, sigma, piece, m):
+    """Integral of exp(-sigma m) dx / EA from an end to `m` (counted from it) in bend `piece` (likewise), m/N."""
+    node = path.node[end, piece]
+    bend = path.bend[end, piece] * exp(-sigma * node) * sigma * -expm1(-sigma * (m - node))
+    return path.passed[end, (sigma + 1) // 2, piece] + bend
+
+
+@njit(cache=True)
+def about_still_point(path, state, c):
+    """Compliance on the drive's and the load's side of a still point, per unit of that end's tension, m/N."""
+    sigma, piece, m = state.cable_kind[c, LINE], state.cable_kind[c, STILL_PIECE], state.cable[c, M_STILL]
+    last = path.bend.shape[1]
+    if state.cable_kind[c, PINNED]:
+        # The straight stretch counts to the drive's side: tension is the same all along it.
+        lump = path.lump[0, piece] * exp(-sigma * (path.total - m))
+        index = (sigma + 1) // 2
+        return path.passed[0, index, piece], path.passed[1, index, last - piece] - lump
+    return passed(path, 0, sigma, piece, m), passed(path, 1, sigma, last - 1 - piece, path.total - m)
+
+
+@njit(cache=True)
+def line_stiffness(path, state, c):
+    """Tension per elongation, N/m, at the drive and at the load end of a cable that moves as a whole."""
+    if state.cable_kind[c, MODE] == WHOLE:
+        index = (state.cable_kind[c, LINE] + 1) // 2
+        return state.stiffness[c, index], state.stiffness[c, index] * path.ratio[index]
+    sigma, m = state.cable_kind[c, LINE], state.cable[c, M_STILL]
+    drive_side, load_side = about_still_point(path, state, c)
+    rise_drive, rise_load = exp(sigma * m), exp(sigma * (path.total - m))
+    per_lowest = drive_side * rise_drive + load_side * rise_load
+    return rise_drive / per_lowest, rise_load / per_lowest
+
+
+@njit(cache=True)
+def pull_line(path, state, c):
+    """End tensions of a cable that moves as a whole, from its elongation; none where it is slack."""
+    stretch = max(0.0, elongation(state, c))
+    drive, load = line_stiffness(path, state, c)
+    state.cable[c, T_DRIVE] = drive * stretch
+    state.cable[c, T_LOAD] = load * stretch
 
 
 @njit(cache=True)

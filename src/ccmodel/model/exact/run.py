@@ -1,11 +1,8 @@
 """The loop over samples: what kind of step each is, and what is written down of it."""
 
-from math import log1p
-
-import numpy as np
 from numba import njit
 
-from ccmodel.model.exact.along import balance_lines, step_along
+from ccmodel.model.exact.along import move_along, step_along
 from ccmodel.model.exact.cable import (
     DRIVE,
     FRONTS,
@@ -18,6 +15,8 @@ from ccmodel.model.exact.cable import (
     MODE,
     OPEN,
     PIECE,
+    PINNED,
+    STILL_PIECE,
     STILL_POINT,
     T_DRIVE,
     T_LOAD,
@@ -27,14 +26,15 @@ from ccmodel.model.exact.cable import (
     is_slack,
     position,
 )
+from ccmodel.model.exact.still_point import step_apart, step_given
 
-DONE, CORNERS_FULL = 0, 100
+DONE, STUCK, CORNERS_FULL = 0, 1, 100
 # Room that one sample may need at either end of a list of corners.
 MARGIN = 64
 
 
 @njit(cache=True)
-def run(path, state, kept, progress, drive, law, angle_given, given, stiffness, present, out, phase):
+def run(path, state, trials, progress, drive, angle_given, given, stiffness, present, out, phase):
     """Simulate from sample progress[0] on; stops early where the list of corners wants more room.
 
     Parameters
@@ -60,8 +60,17 @@ def run(path, state, kept, progress, drive, law, angle_given, given, stiffness, 
             if way == -progress[1]:
                 progress[2] = _any_slack(state, present)
             progress[1] = way
-        if move != 0.0 or given[i] != state.pair[GIVEN]:
-            status = step_along(path, state, kept, way, drive[i], given[i], stiffness)
+        if move != 0.0 or given[i] != state.pair[LOAD if angle_given else GIVEN]:
+            if angle_given:
+                status = _step_angle(path, state, trials, way, drive[i], given[i], stiffness)
+            elif given[i] != state.pair[GIVEN]:
+                status = step_given(path, state, trials, drive[i], given[i], stiffness)
+            else:
+                step_along(path, state, trials[0], way, drive[i], given[i], stiffness)
+                status = DONE
+            if status != DONE:
+                progress[0] = i
+                return status
         out[0, i] = state.cable[0, T_DRIVE]
         out[1, i] = state.cable[0, T_LOAD]
         out[2, i] = state.cable[1, T_DRIVE]
@@ -72,6 +81,18 @@ def run(path, state, kept, progress, drive, law, angle_given, given, stiffness, 
         phase[i] = _phase(state, present, progress)
     progress[0] = drive.size
     return DONE
+
+
+@njit(cache=True)
+def _step_angle(path, state, trials, way, drive, load, stiffness):
+    """Move both pulleys to given angles, linearly and together."""
+    load_rate = load - state.pair[LOAD]
+    if drive == state.pair[DRIVE]:
+        way = 1 if load_rate > 0.0 else -1
+    if way * load_rate >= 0.0 or path.total == 0.0:
+        move_along(path, state, way, drive, load)
+        return DONE
+    return step_apart(path, state, trials, (drive, load), stiffness, True)
 
 
 @njit(cache=True)
@@ -101,9 +122,20 @@ def moving(path, state, c):
     if state.cable_kind[c, MODE] == WHOLE:
         return path.length, 0.0
     if state.cable_kind[c, MODE] == STILL_POINT:
-        x = 0.0
+        x = _still_x(path, state, c)
         return x, x
     return _reach(path, state, c, 0), path.length - _reach(path, state, c, 1)
+
+
+@njit(cache=True)
+def _still_x(path, state, c):
+    """Arc length of a still point; of one in a straight stretch, where that stretch begins, m."""
+    piece = state.cable_kind[c, STILL_PIECE]
+    if state.cable_kind[c, PINNED]:
+        if piece == 0:
+            return 0.0
+        return path.x_start[0, piece - 1] + path.x_per_m[0, piece - 1] * (path.node[0, piece] - path.node[0, piece - 1])
+    return path.x_start[0, piece] + path.x_per_m[0, piece] * (state.cable[c, M_STILL] - path.node[0, piece])
 
 
 @njit(cache=True)
