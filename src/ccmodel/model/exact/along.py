@@ -1,8 +1,8 @@
 """A step in which the load follows the drive: every point slides one way, and nothing depends on the path in between.
 
 The pulled cable (at the drive) is let in at the load, the released one is pulled there. The load's displacement Q =
-R_o theta_out solves T2 - T4 = given + stiffness Q, whose left side falls with Q: linear where a cable slides as a whole,
-a quadratic a segment where it does not.
+R_o theta_out solves T2 - T4 = given + stiffness Q, whose left side falls with Q: linear where a cable slides as a
+whole, a quadratic a segment where it does not.
 """
 
 from numba import njit
@@ -14,11 +14,12 @@ from ccmodel.model.exact.cable import (
     GIVEN,
     LOAD,
     MODE,
+    PAIR,
     SIGMA,
-    P,
     T_DRIVE,
     T_LOAD,
     D,
+    P,
     end_compliance,
     has_met,
     keep,
@@ -38,14 +39,14 @@ def step_along(path, state, kept, way, drive, given, stiffness):
     """
     turn(path, state, 0, way, -way)
     turn(path, state, 1, -way, way)
-    state.pair[DRIVE] = drive
+    state.value[PAIR, DRIVE] = drive
     fronts_left = 0
     still_fronts = -1
     for c in range(2):
         sign = 1 - 2 * c
-        if state.cable_kind[c, MODE] == FRONTS:
+        if state.kind[c, MODE] == FRONTS:
             walk(path, state, c, 0, 0.0, 1.0, sign * drive)
-            state.cable[c, T_DRIVE] = state.front[c, 0, P]
+            state.value[c, T_DRIVE] = state.front[2 * c, P]
             if has_met(path, state, c):
                 slide_whole(path, state, c, -sign * way)
             else:
@@ -53,8 +54,8 @@ def step_along(path, state, kept, way, drive, given, stiffness):
                 still_fronts = c
         else:
             pull_line(path, state, c)
-    changed = given != state.pair[GIVEN]
-    state.pair[GIVEN] = given
+    changed = given != state.value[PAIR, GIVEN]
+    state.value[PAIR, GIVEN] = given
     if fronts_left == 2 and not changed:
         return
     if way * excess(state, given, stiffness) <= 0.0:
@@ -69,14 +70,14 @@ def step_along(path, state, kept, way, drive, given, stiffness):
         one_front(path, state, kept, still_fronts, given, stiffness)
         if not has_met(path, state, still_fronts):
             return
-        slide_whole(path, state, still_fronts, state.front_kind[still_fronts, 1, SIGMA])
+        slide_whole(path, state, still_fronts, state.kind[still_fronts, SIGMA + 3])
     balance_lines(path, state, given, stiffness)
 
 
 @njit(cache=True)
 def excess(state, given, stiffness):
     """T2 - T4 less what the load takes, N."""
-    return state.cable[0, T_LOAD] - state.cable[1, T_LOAD] - given - stiffness * state.pair[LOAD]
+    return state.value[0, T_LOAD] - state.value[1, T_LOAD] - given - stiffness * state.value[PAIR, LOAD]
 
 
 @njit(cache=True)
@@ -84,9 +85,9 @@ def balance_lines(path, state, given, stiffness):
     """Balance the load where both cables move as a whole, taut or slack."""
     k_A = line_stiffness(path, state, 0)[1]
     k_B = line_stiffness(path, state, 1)[1]
-    e_A = state.cable[0, E0] + state.pair[DRIVE]
-    e_B = state.cable[1, E0] - state.pair[DRIVE]
-    state.pair[LOAD] = balanced(k_A, e_A, k_B, e_B, given, stiffness, state.pair[LOAD])
+    e_A = state.value[0, E0] + state.value[PAIR, DRIVE]
+    e_B = state.value[1, E0] - state.value[PAIR, DRIVE]
+    state.value[PAIR, LOAD] = balanced(k_A, e_A, k_B, e_B, given, stiffness, state.value[PAIR, LOAD])
     pull_line(path, state, 0)
     pull_line(path, state, 1)
 
@@ -111,17 +112,17 @@ def one_front(path, state, kept, c, given, stiffness):
     other = 1 - c
     sign = 1 - 2 * c
     k = line_stiffness(path, state, other)[1]
-    stretch = state.cable[other, E0] - sign * state.pair[DRIVE]
+    stretch = state.value[other, E0] - sign * state.value[PAIR, DRIVE]
     if k > 0.0:
         keep(state, kept)
         walk(path, state, c, 1, 1.0, k + stiffness, k * stretch + sign * given)
-        if stretch - state.front[c, 1, D] < 0.0:
+        if stretch - state.front[2 * c + 1, D] < 0.0:
             keep(kept, state)
             k = 0.0
     if k == 0.0:
         walk(path, state, c, 1, 1.0, stiffness, sign * given)
-    state.pair[LOAD] = -sign * state.front[c, 1, D]
-    state.cable[c, T_LOAD] = state.front[c, 1, P]
+    state.value[PAIR, LOAD] = -sign * state.front[2 * c + 1, D]
+    state.value[c, T_LOAD] = state.front[2 * c + 1, P]
     pull_line(path, state, other)
 
 
@@ -135,17 +136,17 @@ def both_fronts(path, state, kept, way, given, stiffness):
     pulled = (1 + way) // 2
     let_in = 1 - pulled
     keep(state, kept)
-    start = state.cable[let_in, T_LOAD]
-    low = state.cable[pulled, T_LOAD]
-    high = start - way * (given + stiffness * state.pair[LOAD])
+    start = state.value[let_in, T_LOAD]
+    low = state.value[pulled, T_LOAD]
+    high = start - way * (given + stiffness * state.value[PAIR, LOAD])
     tension = 0.5 * (low + high)
     for _ in range(100):
         keep(kept, state)
         walk(path, state, pulled, 1, 1.0, 0.0, tension)
-        load = (2 * pulled - 1) * state.front[pulled, 1, D]
+        load = (2 * pulled - 1) * state.front[2 * pulled + 1, D]
         wanted = tension + way * (given + stiffness * load)
         walk(path, state, let_in, 1, 1.0, 0.0, min(start, wanted))
-        gap = way * (load - (2 * let_in - 1) * state.front[let_in, 1, D])
+        gap = way * (load - (2 * let_in - 1) * state.front[2 * let_in + 1, D])
         if gap > 0.0:
             high = tension
         else:
@@ -158,9 +159,9 @@ def both_fronts(path, state, kept, way, given, stiffness):
         if abs(following - tension) <= 2e-16 * abs(tension):
             break
         tension = following
-    state.pair[LOAD] = load
-    state.cable[0, T_LOAD] = state.front[0, 1, P]
-    state.cable[1, T_LOAD] = state.front[1, 1, P]
+    state.value[PAIR, LOAD] = load
+    state.value[0, T_LOAD] = state.front[0 + 1, P]
+    state.value[1, T_LOAD] = state.front[2 + 1, P]
 
 
 @njit(cache=True)
@@ -169,10 +170,10 @@ def _first_whole(path, state, kept, way):
     keep(state, kept)
     travel = [0.0, 0.0]
     for c in range(2):
-        sigma = state.front_kind[c, 0, SIGMA]
-        before = state.front[c, 1, D]
-        walk(path, state, c, 1, 1.0, 0.0, state.front[c, 0, P] * path.ratio[(1 - sigma) // 2])
-        travel[c] = abs(state.front[c, 1, D] - before)
+        sigma = state.kind[c, SIGMA]
+        before = state.front[2 * c + 1, D]
+        walk(path, state, c, 1, 1.0, 0.0, state.front[2 * c, P] * path.ratio[(1 - sigma) // 2])
+        travel[c] = abs(state.front[2 * c + 1, D] - before)
     keep(kept, state)
     first = 0 if travel[0] <= travel[1] else 1
     slide_whole(path, state, first, (2 * first - 1) * way)
@@ -184,15 +185,15 @@ def move_along(path, state, way, drive, load):
     """Move both ends to given displacements, the load end following the drive end or at rest."""
     turn(path, state, 0, way, -way)
     turn(path, state, 1, -way, way)
-    state.pair[DRIVE] = drive
-    state.pair[LOAD] = load
+    state.value[PAIR, DRIVE] = drive
+    state.value[PAIR, LOAD] = load
     for c in range(2):
         sign = 1 - 2 * c
-        if state.cable_kind[c, MODE] == FRONTS:
+        if state.kind[c, MODE] == FRONTS:
             walk(path, state, c, 0, 0.0, 1.0, sign * drive)
             walk(path, state, c, 1, 0.0, 1.0, -sign * load)
-            state.cable[c, T_DRIVE] = state.front[c, 0, P]
-            state.cable[c, T_LOAD] = state.front[c, 1, P]
+            state.value[c, T_DRIVE] = state.front[2 * c, P]
+            state.value[c, T_LOAD] = state.front[2 * c + 1, P]
             if has_met(path, state, c):
                 slide_whole(path, state, c, -sign * way)
         else:

@@ -19,81 +19,72 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from ccmodel.model.exact.path import LUMP, NODE, PASSED, PER_M
+
 FRONTS, WHOLE, STILL_POINT = 0, 1, 2
 
-# Front, floats: where the segment was entered (position, front's and end's tension, compliance, displacement), where it
-# stops, its slope relative to the line, its bend's compliance, r at its stop and now, end tension and displacement now,
-# displacement at which the front set out.
+# Rows of `State.corner`: position, tension, d ln T / dm from a corner to the next.
+C_M, C_T, C_SLOPE = range(3)
+# Fields of `State.front`: where the segment was entered (position, front's and end's tension, compliance,
+# displacement), where it stops, its slope relative to the line, its bend's compliance, r at its stop and now, end tension and
+# displacement now, displacement at which the front set out.
 ME, TE, PE, EE, DE, STOP, SLOPE, BEND, R_STOP, R, P, D, D_START = range(13)
-# Front, integers: sigma (0: none), bend it is in, whether a segment lies ahead.
-SIGMA, PIECE, OPEN = range(3)
-# Cable, floats: elongation at the zero of all angles, position of a still point, tensions at both ends.
-E0, M_STILL, T_DRIVE, T_LOAD = range(4)
-# Cable, integers: first and last corner, what it does (mode), slope of a whole slide or sigma of a still point, the
-# piece a still point is in, whether it stands in a straight stretch (at that piece's first node).
-LO, HI, MODE, LINE, STILL_PIECE, PINNED = range(6)
-# Pair, floats: displacement of the drive and of the load pulley's rim, load law's constant part.
+# Fields of `State.value`, rows 0 and 1: elongation at the zero of all angles, position of a still point, tensions at
+# both ends, drive-end tension per elongation on a line of slope -1, +1 (zero for a cable that is not there).
+E0, M_STILL, T_DRIVE, T_LOAD, STIFFNESS = range(5)
+# Row 2: displacement of the drive and of the load pulley's rim, the load law's constant part.
+PAIR = 2
 DRIVE, LOAD, GIVEN = range(3)
+# Fields of `State.kind`: first and last corner, what a cable does (mode), slope of a whole slide or sigma of a still
+# point, the piece a still point is in, whether it stands in a straight stretch (at that piece's first node); then of
+# the front at the drive end (at the load end 3 further on) sigma (0: none), the bend it is in, whether anything is
+# ahead.
+LO, HI, MODE, LINE, STILL_PIECE, PINNED, SIGMA, PIECE, OPEN = range(9)
 
 
 class State(NamedTuple):
-    """Everything that the past leaves behind; arrays are written in place.
+    """Everything that the past leaves behind; arrays are written in place. The fields are named above.
 
     Attributes
     ----------
-    m, T, slope : ndarray, shape (2, capacity)
-        Corners of the old profile by position (from the drive end) and tension, and d ln T / dm from each to the next.
-    front : ndarray, shape (2, 2, 13)
-    front_kind : ndarray, shape (2, 2, 3)
-    cable : ndarray, shape (2, 4)
-    cable_kind : ndarray, shape (2, 6)
-    pair : ndarray, shape (3,)
-    stiffness : ndarray, shape (2, 2)
-        Drive-end tension per elongation of a cable that slides as a whole on a line of slope -1, +1, N/m; zero for a
-        cable that is not there.
+    corner : ndarray, shape (3, 2, capacity)
+        Corners of the old profile of either cable, m counted from the drive end.
+    front : ndarray, shape (4, 13)
+        Fronts: A at drive and load, B at drive and load.
+    value : ndarray, shape (3, 6)
+    kind : ndarray of int64, shape (2, 12)
     """
 
-    m: NDArray
-    T: NDArray
-    slope: NDArray
+    corner: NDArray
     front: NDArray
-    front_kind: NDArray
-    cable: NDArray
-    cable_kind: NDArray
-    pair: NDArray
-    stiffness: NDArray
+    value: NDArray
+    kind: NDArray
 
 
 def blank_state(capacity: int) -> State:
     """A state with room for `capacity` corners a cable, all zero."""
-    return State(
-        np.zeros((2, capacity)),
-        np.zeros((2, capacity)),
-        np.zeros((2, capacity)),
-        np.zeros((2, 2, 13)),
-        np.zeros((2, 2, 3), dtype=np.int64),
-        np.zeros((2, 4)),
-        np.zeros((2, 6), dtype=np.int64),
-        np.zeros(3),
-        np.zeros((2, 2)),
-    )
+    return State(np.zeros((3, 2, capacity)), np.zeros((4, 13)), np.zeros((3, 6)), np.zeros((2, 12), dtype=np.int64))
 
 
 @njit(cache=True)
 def keep(state, kept):
     """Copy what a step may change (all but the corners, which a step only drops) from `state` to `kept`."""
-    kept.front[:] = state.front
-    kept.front_kind[:] = state.front_kind
-    kept.cable[:] = state.cable
-    kept.cable_kind[:] = state.cable_kind
-    kept.pair[:] = state.pair
+    for i in range(4):
+        for j in range(13):
+            kept.front[i, j] = state.front[i, j]
+    for i in range(3):
+        for j in range(6):
+            kept.value[i, j] = state.value[i, j]
+    for i in range(2):
+        for j in range(12):
+            kept.kind[i, j] = state.kind[i, j]
 
 
 @njit(cache=True)
 def elongation(state, c):
     """End-to-end elongation of cable `c` beyond its natural length, m."""
     sign = 1.0 - 2.0 * c
-    return state.cable[c, E0] + sign * (state.pair[DRIVE] - state.pair[LOAD])
+    return state.value[c, E0] + sign * (state.value[PAIR, DRIVE] - state.value[PAIR, LOAD])
 
 
 # ---------------------------------------------------------------------------------------------- one segment of a sweep
@@ -127,7 +118,12 @@ def _tension_gain(slope, r):
 @njit(cache=True)
 def _displacement_gain(front, c, end, sigma, r):
     """End displacement since the segment was entered, m."""
-    T_e, E, bend, slope = front[c, end, TE], front[c, end, EE], front[c, end, BEND], front[c, end, SLOPE]
+    T_e, E, bend, slope = (
+        front[2 * c + end, TE],
+        front[2 * c + end, EE],
+        front[2 * c + end, BEND],
+        front[2 * c + end, SLOPE],
+    )
     if slope == 1.0:
         return T_e * r * (E * (2.0 + r) + sigma * bend * r)
     y = log1p(r)
@@ -136,19 +132,19 @@ def _displacement_gain(front, c, end, sigma, r):
 
 @njit(cache=True)
 def _solve_segment(front, c, end, sigma, weight_P, weight_d, residual):
-    """r at which weight_P (P - P_e) + weight_d (d - d_e) = residual, within the segment."""
-    T_e, P_e, E, bend = front[c, end, TE], front[c, end, PE], front[c, end, EE], front[c, end, BEND]
-    slope = front[c, end, SLOPE]
+    """R at which weight_P (P - P_e) + weight_d (d - d_e) = residual, within the segment."""
+    T_e, P_e, E, bend = front[2 * c + end, TE], front[2 * c + end, PE], front[2 * c + end, EE], front[2 * c + end, BEND]
+    slope = front[2 * c + end, SLOPE]
     b = weight_P * P_e + weight_d * T_e * E
     if slope == 1.0:
         a = b + weight_d * T_e * sigma * bend
         return residual / (b + sqrt(max(0.0, b * b + a * residual)))
-    return _solve_sloping(slope, b, weight_d * T_e * sigma * bend, residual, log1p(front[c, end, R_STOP]))
+    return _solve_sloping(slope, b, weight_d * T_e * sigma * bend, residual, log1p(front[2 * c + end, R_STOP]))
 
 
 @njit(cache=True)
 def _solve_sloping(slope, b, k, residual, y_stop):
-    """r = expm1(y) with b expm1((1 + slope) y) + k curl(y) = residual, y between 0 and y_stop, by safeguarded Newton."""
+    """R = expm1(y) with b expm1((1 + slope) y) + k curl(y) = residual, y 0 <= y / y_stop <= 1, by guarded Newton."""
     near, far = 0.0, y_stop
     gain = 1.0 + slope
     linear = b * gain
@@ -177,52 +173,52 @@ def start_front(path, state, c, end, sigma):
     """Let a new front set out from an end, from the tension and displacement that stand there now."""
     sign = 1.0 - 2.0 * c
     front = state.front
-    tension = state.cable[c, T_DRIVE + end]
-    front[c, end, ME] = 0.0
-    front[c, end, TE] = tension
-    front[c, end, PE] = tension
-    front[c, end, P] = tension
-    front[c, end, EE] = path.lump[end, 0]
-    displacement = sign * state.pair[DRIVE] if end == 0 else -sign * state.pair[LOAD]
-    front[c, end, DE] = displacement
-    front[c, end, D] = displacement
-    front[c, end, D_START] = displacement
-    state.front_kind[c, end, SIGMA] = sigma
-    state.front_kind[c, end, PIECE] = 0
+    tension = state.value[c, T_DRIVE + end]
+    front[2 * c + end, ME] = 0.0
+    front[2 * c + end, TE] = tension
+    front[2 * c + end, PE] = tension
+    front[2 * c + end, P] = tension
+    front[2 * c + end, EE] = path.table[end, LUMP, 0]
+    displacement = sign * state.value[PAIR, DRIVE] if end == 0 else -sign * state.value[PAIR, LOAD]
+    front[2 * c + end, DE] = displacement
+    front[2 * c + end, D] = displacement
+    front[2 * c + end, D_START] = displacement
+    state.kind[c, SIGMA + 3 * end] = sigma
+    state.kind[c, PIECE + 3 * end] = 0
     aim(path, state, c, end)
 
 
 @njit(cache=True)
 def aim(path, state, c, end):
     """Look at what lies ahead of a front's point of entry; what already has the line's slope is taken at once."""
-    front, kind = state.front, state.front_kind
-    sigma = kind[c, end, SIGMA]
-    front[c, end, R] = 0.0
+    front, kind = state.front, state.kind
+    sigma = kind[c, SIGMA + 3 * end]
+    front[2 * c + end, R] = 0.0
     while True:
-        lo, hi, piece = state.cable_kind[c, LO], state.cable_kind[c, HI], kind[c, end, PIECE]
-        if lo >= hi or piece >= path.bend.shape[1]:
-            kind[c, end, OPEN] = 0
-            front[c, end, R_STOP] = 0.0
+        lo, hi, piece = state.kind[c, LO], state.kind[c, HI], kind[c, PIECE + 3 * end]
+        if lo >= hi or piece >= (path.table.shape[2] - 1):
+            kind[c, OPEN + 3 * end] = 0
+            front[2 * c + end, R_STOP] = 0.0
             return
         if end == 0:
-            slope, corner = state.slope[c, lo], state.m[c, lo + 1]
+            slope, corner = state.corner[C_SLOPE, c, lo], state.corner[C_M, c, lo + 1]
         else:
-            slope, corner = -state.slope[c, hi - 1], path.total - state.m[c, hi - 1]
-        node = path.node[end, piece + 1]
+            slope, corner = -state.corner[C_SLOPE, c, hi - 1], path.total - state.corner[C_M, c, hi - 1]
+        node = path.table[end, NODE, piece + 1]
         stop = min(corner, node)
-        dm = stop - front[c, end, ME]
+        dm = stop - front[2 * c + end, ME]
         if dm > 0.0:
             r = expm1(sigma * dm)
             if slope != -sigma:
-                front[c, end, STOP] = stop
-                front[c, end, SLOPE] = sigma * slope
-                front[c, end, BEND] = path.bend[end, piece]
-                front[c, end, R_STOP] = r
-                kind[c, end, OPEN] = 1
+                front[2 * c + end, STOP] = stop
+                front[2 * c + end, SLOPE] = sigma * slope
+                front[2 * c + end, BEND] = path.table[end, PER_M, piece]
+                front[2 * c + end, R_STOP] = r
+                kind[c, OPEN + 3 * end] = 1
                 return
-            front[c, end, TE] /= 1.0 + r
-            front[c, end, EE] = front[c, end, EE] * (1.0 + r) + abs(r) * path.bend[end, piece]
-            front[c, end, ME] = stop
+            front[2 * c + end, TE] /= 1.0 + r
+            front[2 * c + end, EE] = front[2 * c + end, EE] * (1.0 + r) + abs(r) * path.table[end, PER_M, piece]
+            front[2 * c + end, ME] = stop
         _cross(path, state, c, end, corner <= stop, node <= stop)
 
 
@@ -231,14 +227,14 @@ def _cross(path, state, c, end, corner, node):
     """Leave a corner of the old profile and a node of the path behind."""
     if corner:
         if end == 0:
-            state.cable_kind[c, LO] += 1
-            state.front[c, end, TE] = state.T[c, state.cable_kind[c, LO]]
+            state.kind[c, LO] += 1
+            state.front[2 * c + end, TE] = state.corner[C_T, c, state.kind[c, LO]]
         else:
-            state.cable_kind[c, HI] -= 1
-            state.front[c, end, TE] = state.T[c, state.cable_kind[c, HI]]
+            state.kind[c, HI] -= 1
+            state.front[2 * c + end, TE] = state.corner[C_T, c, state.kind[c, HI]]
     if node:
-        state.front_kind[c, end, PIECE] += 1
-        state.front[c, end, EE] += path.lump[end, state.front_kind[c, end, PIECE]]
+        state.kind[c, PIECE + 3 * end] += 1
+        state.front[2 * c + end, EE] += path.table[end, LUMP, state.kind[c, PIECE + 3 * end]]
 
 
 @njit(cache=True)
@@ -247,44 +243,44 @@ def walk(path, state, c, end, weight_P, weight_d, target):
 
     Stops where the old profile ends, with nothing ahead (OPEN = 0).
     """
-    front, kind = state.front, state.front_kind
-    sigma = kind[c, end, SIGMA]
-    while kind[c, end, OPEN] == 1:
-        residual = target - weight_P * front[c, end, PE] - weight_d * front[c, end, DE]
+    front, kind = state.front, state.kind
+    sigma = kind[c, SIGMA + 3 * end]
+    while kind[c, OPEN + 3 * end] == 1:
+        residual = target - weight_P * front[2 * c + end, PE] - weight_d * front[2 * c + end, DE]
         if sigma * residual <= 0.0:
             r = 0.0
         else:
-            r = front[c, end, R_STOP]
-            whole = weight_P * front[c, end, PE] * _tension_gain(front[c, end, SLOPE], r)
+            r = front[2 * c + end, R_STOP]
+            whole = weight_P * front[2 * c + end, PE] * _tension_gain(front[2 * c + end, SLOPE], r)
             whole += weight_d * _displacement_gain(front, c, end, sigma, r)
             if sigma * residual < sigma * whole:
                 r = _solve_segment(front, c, end, sigma, weight_P, weight_d, residual)
             else:
                 _pass_segment(path, state, c, end, sigma, r)
                 continue
-        front[c, end, R] = r
-        front[c, end, P] = front[c, end, PE] * (1.0 + _tension_gain(front[c, end, SLOPE], r))
-        front[c, end, D] = front[c, end, DE] + _displacement_gain(front, c, end, sigma, r)
+        front[2 * c + end, R] = r
+        front[2 * c + end, P] = front[2 * c + end, PE] * (1.0 + _tension_gain(front[2 * c + end, SLOPE], r))
+        front[2 * c + end, D] = front[2 * c + end, DE] + _displacement_gain(front, c, end, sigma, r)
         return
-    front[c, end, P] = front[c, end, PE]
-    front[c, end, D] = front[c, end, DE]
+    front[2 * c + end, P] = front[2 * c + end, PE]
+    front[2 * c + end, D] = front[2 * c + end, DE]
 
 
 @njit(cache=True)
 def _pass_segment(path, state, c, end, sigma, r):
     front = state.front
-    slope = front[c, end, SLOPE]
-    front[c, end, DE] += _displacement_gain(front, c, end, sigma, r)
-    front[c, end, PE] *= 1.0 + _tension_gain(slope, r)
-    front[c, end, TE] *= 1.0 + r if slope == 1.0 else exp(slope * log1p(r))
-    front[c, end, EE] = front[c, end, EE] * (1.0 + r) + abs(r) * front[c, end, BEND]
-    stop = front[c, end, STOP]
-    front[c, end, ME] = stop
+    slope = front[2 * c + end, SLOPE]
+    front[2 * c + end, DE] += _displacement_gain(front, c, end, sigma, r)
+    front[2 * c + end, PE] *= 1.0 + _tension_gain(slope, r)
+    front[2 * c + end, TE] *= 1.0 + r if slope == 1.0 else exp(slope * log1p(r))
+    front[2 * c + end, EE] = front[2 * c + end, EE] * (1.0 + r) + abs(r) * front[2 * c + end, BEND]
+    stop = front[2 * c + end, STOP]
+    front[2 * c + end, ME] = stop
     if end == 0:
-        corner = state.m[c, state.cable_kind[c, LO] + 1]
+        corner = state.corner[C_M, c, state.kind[c, LO] + 1]
     else:
-        corner = path.total - state.m[c, state.cable_kind[c, HI] - 1]
-    node = path.node[end, state.front_kind[c, end, PIECE] + 1]
+        corner = path.total - state.corner[C_M, c, state.kind[c, HI] - 1]
+    node = path.table[end, NODE, state.kind[c, PIECE + 3 * end] + 1]
     _cross(path, state, c, end, corner <= stop, node <= stop)
     aim(path, state, c, end)
 
@@ -292,27 +288,27 @@ def _pass_segment(path, state, c, end, sigma, r):
 @njit(cache=True)
 def position(state, c, end):
     """How far a front has come, in m counted from its end."""
-    return state.front[c, end, ME] + state.front_kind[c, end, SIGMA] * log1p(state.front[c, end, R])
+    return state.front[2 * c + end, ME] + state.kind[c, SIGMA + 3 * end] * log1p(state.front[2 * c + end, R])
 
 
 @njit(cache=True)
 def end_compliance(state, c, end):
     """Displacement of an end per unit of its own tension while its front goes on, m/N."""
     front = state.front
-    sigma = state.front_kind[c, end, SIGMA]
-    r = front[c, end, R]
-    per_front_tension = front[c, end, EE] * (1.0 + r) + abs(r) * front[c, end, BEND]
+    sigma = state.kind[c, SIGMA + 3 * end]
+    r = front[2 * c + end, R]
+    per_front_tension = front[2 * c + end, EE] * (1.0 + r) + abs(r) * front[2 * c + end, BEND]
     return per_front_tension * exp(-sigma * position(state, c, end))
 
 
 @njit(cache=True)
 def has_met(path, state, c):
     """Whether fronts that slide the same way have met: then their lines are one line."""
-    if state.front_kind[c, 0, OPEN] == 0 or state.front_kind[c, 1, OPEN] == 0:
+    if state.kind[c, OPEN] == 0 or state.kind[c, OPEN + 3] == 0:
         return True
-    sigma = state.front_kind[c, 0, SIGMA]
+    sigma = state.kind[c, SIGMA]
     ratio = path.ratio[(1 - sigma) // 2]
-    return sigma * (state.front[c, 0, P] * ratio - state.front[c, 1, P]) >= 0.0
+    return sigma * (state.front[2 * c, P] * ratio - state.front[2 * c + 1, P]) >= 0.0
 
 
 # --------------------------------------------------------------------------------------------------- keeping a profile
@@ -321,92 +317,92 @@ def has_met(path, state, c):
 @njit(cache=True)
 def _commit_front(path, state, c, end):
     """Write the line drawn in from an end into the list of corners."""
-    sigma = state.front_kind[c, end, SIGMA]
+    sigma = state.kind[c, SIGMA + 3 * end]
     front = state.front
-    inward, r = position(state, c, end), front[c, end, R]
-    state.front_kind[c, end, SIGMA] = 0
+    inward, r = position(state, c, end), front[2 * c + end, R]
+    state.kind[c, SIGMA + 3 * end] = 0
     if sigma == 0 or inward <= 0.0:
         return
-    slope = front[c, end, SLOPE]
-    tension = front[c, end, TE] * (1.0 + r if slope == 1.0 else exp(slope * log1p(r)))
+    slope = front[2 * c + end, SLOPE]
+    tension = front[2 * c + end, TE] * (1.0 + r if slope == 1.0 else exp(slope * log1p(r)))
     if end == 0:
-        lo = state.cable_kind[c, LO]
-        state.m[c, lo] = min(inward, path.total)
-        state.T[c, lo] = tension
-        state.m[c, lo - 1] = 0.0
-        state.T[c, lo - 1] = front[c, end, P]
-        state.slope[c, lo - 1] = -sigma
-        state.cable_kind[c, LO] = lo - 1
+        lo = state.kind[c, LO]
+        state.corner[C_M, c, lo] = min(inward, path.total)
+        state.corner[C_T, c, lo] = tension
+        state.corner[C_M, c, lo - 1] = 0.0
+        state.corner[C_T, c, lo - 1] = front[2 * c + end, P]
+        state.corner[C_SLOPE, c, lo - 1] = -sigma
+        state.kind[c, LO] = lo - 1
     else:
-        hi = state.cable_kind[c, HI]
-        state.m[c, hi] = max(0.0, path.total - inward)
-        state.T[c, hi] = tension
-        state.slope[c, hi] = sigma
-        state.m[c, hi + 1] = path.total
-        state.T[c, hi + 1] = front[c, end, P]
-        state.cable_kind[c, HI] = hi + 1
+        hi = state.kind[c, HI]
+        state.corner[C_M, c, hi] = max(0.0, path.total - inward)
+        state.corner[C_T, c, hi] = tension
+        state.corner[C_SLOPE, c, hi] = sigma
+        state.corner[C_M, c, hi + 1] = path.total
+        state.corner[C_T, c, hi + 1] = front[2 * c + end, P]
+        state.kind[c, HI] = hi + 1
 
 
 @njit(cache=True)
 def _commit_line(path, state, c):
     """Make a whole slide's line, or the two about a still point, the old profile."""
-    kind = state.cable_kind
+    kind = state.kind
     line = kind[c, LINE]
-    lo = state.m.shape[1] // 2 - 1
+    lo = state.corner.shape[2] // 2 - 1
     kind[c, LO], kind[c, HI] = lo, lo + 1
-    state.m[c, lo], state.T[c, lo] = 0.0, state.cable[c, T_DRIVE]
+    state.corner[C_M, c, lo], state.corner[C_T, c, lo] = 0.0, state.value[c, T_DRIVE]
     if kind[c, MODE] == WHOLE:
-        state.slope[c, lo] = line
+        state.corner[C_SLOPE, c, lo] = line
     else:
-        still = state.cable[c, M_STILL]
-        state.slope[c, lo] = -line
-        state.m[c, lo + 1] = still
-        state.T[c, lo + 1] = state.cable[c, T_DRIVE] * exp(-line * still)
-        state.slope[c, lo + 1] = line
+        still = state.value[c, M_STILL]
+        state.corner[C_SLOPE, c, lo] = -line
+        state.corner[C_M, c, lo + 1] = still
+        state.corner[C_T, c, lo + 1] = state.value[c, T_DRIVE] * exp(-line * still)
+        state.corner[C_SLOPE, c, lo + 1] = line
         kind[c, HI] = lo + 2
     hi = kind[c, HI]
-    state.m[c, hi], state.T[c, hi] = path.total, state.cable[c, T_LOAD]
+    state.corner[C_M, c, hi], state.corner[C_T, c, hi] = path.total, state.value[c, T_LOAD]
     kind[c, MODE] = FRONTS
-    state.front_kind[c, 0, SIGMA] = 0
-    state.front_kind[c, 1, SIGMA] = 0
+    state.kind[c, SIGMA] = 0
+    state.kind[c, SIGMA + 3] = 0
 
 
 @njit(cache=True)
 def slide_whole(path, state, c, line):
     """Cable `c` slides along its whole length on a line of slope `line`."""
-    state.cable_kind[c, MODE] = WHOLE
-    state.cable_kind[c, LINE] = line
+    state.kind[c, MODE] = WHOLE
+    state.kind[c, LINE] = line
     pull_line(path, state, c)
 
 
 @njit(cache=True)
 def passed(path, end, sigma, piece, m):
     """Integral of exp(-sigma m) dx / EA from an end to `m` (counted from it) in bend `piece` (likewise), m/N."""
-    node = path.node[end, piece]
-    bend = path.bend[end, piece] * exp(-sigma * node) * sigma * -expm1(-sigma * (m - node))
-    return path.passed[end, (sigma + 1) // 2, piece] + bend
+    node = path.table[end, NODE, piece]
+    bend = path.table[end, PER_M, piece] * exp(-sigma * node) * sigma * -expm1(-sigma * (m - node))
+    return path.table[end, PASSED + (sigma + 1) // 2, piece] + bend
 
 
 @njit(cache=True)
 def about_still_point(path, state, c):
     """Compliance on the drive's and the load's side of a still point, per unit of that end's tension, m/N."""
-    sigma, piece, m = state.cable_kind[c, LINE], state.cable_kind[c, STILL_PIECE], state.cable[c, M_STILL]
-    last = path.bend.shape[1]
-    if state.cable_kind[c, PINNED]:
+    sigma, piece, m = state.kind[c, LINE], state.kind[c, STILL_PIECE], state.value[c, M_STILL]
+    last = path.table.shape[2] - 1
+    if state.kind[c, PINNED]:
         # The straight stretch counts to the drive's side: tension is the same all along it.
-        lump = path.lump[0, piece] * exp(-sigma * (path.total - m))
+        lump = path.table[0, LUMP, piece] * exp(-sigma * (path.total - m))
         index = (sigma + 1) // 2
-        return path.passed[0, index, piece], path.passed[1, index, last - piece] - lump
+        return path.table[0, PASSED + index, piece], path.table[1, PASSED + index, last - piece] - lump
     return passed(path, 0, sigma, piece, m), passed(path, 1, sigma, last - 1 - piece, path.total - m)
 
 
 @njit(cache=True)
 def line_stiffness(path, state, c):
     """Tension per elongation, N/m, at the drive and at the load end of a cable that moves as a whole."""
-    if state.cable_kind[c, MODE] == WHOLE:
-        index = (state.cable_kind[c, LINE] + 1) // 2
-        return state.stiffness[c, index], state.stiffness[c, index] * path.ratio[index]
-    sigma, m = state.cable_kind[c, LINE], state.cable[c, M_STILL]
+    if state.kind[c, MODE] == WHOLE:
+        index = (state.kind[c, LINE] + 1) // 2
+        return state.value[c, STIFFNESS + index], state.value[c, STIFFNESS + index] * path.ratio[index]
+    sigma, m = state.kind[c, LINE], state.value[c, M_STILL]
     drive_side, load_side = about_still_point(path, state, c)
     rise_drive, rise_load = exp(sigma * m), exp(sigma * (path.total - m))
     per_lowest = drive_side * rise_drive + load_side * rise_load
@@ -418,20 +414,20 @@ def pull_line(path, state, c):
     """End tensions of a cable that moves as a whole, from its elongation; none where it is slack."""
     stretch = max(0.0, elongation(state, c))
     drive, load = line_stiffness(path, state, c)
-    state.cable[c, T_DRIVE] = drive * stretch
-    state.cable[c, T_LOAD] = load * stretch
+    state.value[c, T_DRIVE] = drive * stretch
+    state.value[c, T_LOAD] = load * stretch
 
 
 @njit(cache=True)
 def is_slack(state, c):
     """Whether a cable hangs without tension: it then has no memory."""
-    return state.cable_kind[c, MODE] == WHOLE and elongation(state, c) <= 0.0
+    return state.kind[c, MODE] == WHOLE and elongation(state, c) <= 0.0
 
 
 @njit(cache=True)
 def turn(path, state, c, sigma_drive, sigma_load):
     """Make cable `c` ready for its ends to move as pulls (+1) or releases (-1): what turns round leaves a corner."""
-    kind = state.cable_kind
+    kind = state.kind
     if kind[c, MODE] == WHOLE:
         if sigma_load != sigma_drive:
             if kind[c, LINE] == -sigma_drive:
@@ -447,8 +443,8 @@ def turn(path, state, c, sigma_drive, sigma_load):
             return
         _commit_line(path, state, c)
     sigmas = (sigma_drive, sigma_load)
-    turned_drive = state.front_kind[c, 0, SIGMA] != sigma_drive
-    turned_load = state.front_kind[c, 1, SIGMA] != sigma_load
+    turned_drive = state.kind[c, SIGMA] != sigma_drive
+    turned_load = state.kind[c, SIGMA + 3] != sigma_load
     if turned_drive:
         _commit_front(path, state, c, 0)
     if turned_load:
@@ -463,12 +459,14 @@ def turn(path, state, c, sigma_drive, sigma_load):
 @njit(cache=True)
 def _shorten(path, state, c, end):
     """Stop a front short where the other end has just left a corner in the segment it is in."""
-    if state.front_kind[c, end, OPEN] == 0:
+    if state.kind[c, OPEN + 3 * end] == 0:
         return
     if end == 0:
-        corner = state.m[c, state.cable_kind[c, LO] + 1]
+        corner = state.corner[C_M, c, state.kind[c, LO] + 1]
     else:
-        corner = path.total - state.m[c, state.cable_kind[c, HI] - 1]
-    if corner < state.front[c, end, STOP]:
-        state.front[c, end, STOP] = corner
-        state.front[c, end, R_STOP] = expm1(state.front_kind[c, end, SIGMA] * (corner - state.front[c, end, ME]))
+        corner = path.total - state.corner[C_M, c, state.kind[c, HI] - 1]
+    if corner < state.front[2 * c + end, STOP]:
+        state.front[2 * c + end, STOP] = corner
+        state.front[2 * c + end, R_STOP] = expm1(
+            state.kind[c, SIGMA + 3 * end] * (corner - state.front[2 * c + end, ME])
+        )

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from ccmodel.model.exact import run as kernels
 from ccmodel.model.exact.cable import (
+    C_M,
+    C_SLOPE,
+    C_T,
     E0,
     FRONTS,
     GIVEN,
@@ -17,8 +20,10 @@ from ccmodel.model.exact.cable import (
     LO,
     M_STILL,
     MODE,
+    PAIR,
     SIGMA,
     SLOPE,
+    STIFFNESS,
     T_DRIVE,
     T_LOAD,
     TE,
@@ -28,7 +33,8 @@ from ccmodel.model.exact.cable import (
     blank_state,
     position,
 )
-from ccmodel.model.exact.path import PathTables, tabulate
+from ccmodel.model.exact.path import LUMP, NODE, PASSED, PER_M, X_PER_M, X_START, PathTables, tabulate
+from ccmodel.model.exact.still_point import REACHED, step_apart
 from ccmodel.model.geometry import ConduitPath
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
@@ -317,10 +323,10 @@ class _Run:
                 _set_initial(self.state, self.tables, c, m, tension, slope)
             else:
                 # A cable that is not there is one without stiffness that hangs slack for ever.
-                self.state.cable[c, E0] = -1e30
-                self.state.cable_kind[c, MODE] = WHOLE
-                self.state.cable_kind[c, LINE] = -1
-        self.state.pair[GIVEN] = self.state.cable[0, T_LOAD] - self.state.cable[1, T_LOAD]
+                self.state.value[c, E0] = -1e30
+                self.state.kind[c, MODE] = WHOLE
+                self.state.kind[c, LINE] = -1
+        self.state.value[PAIR, GIVEN] = self.state.value[0, T_LOAD] - self.state.value[1, T_LOAD]
 
     def simulate(self, drive, given, stiffness, angle_given, record_at):
         n = drive.size
@@ -351,11 +357,27 @@ class _Run:
         while True:
             trials = (_trial(self.state), _trial(self.state))
             code = kernels.run(
-                self.tables, self.state, trials, progress, drive, angle_given, given, stiffness, self.present, out, phase
+                self.tables,
+                self.state,
+                trials,
+                progress,
+                drive,
+                angle_given,
+                given,
+                stiffness,
+                self.present,
+                out,
+                phase,
             )
-            if code != kernels.CORNERS_FULL:
+            if code == kernels.APART:
+                i = progress[0]
+                code = step_apart(self.tables, self.state, trials, (drive[i], given[i]), stiffness, angle_given)
+                if code != REACHED:
+                    return kernels.STUCK
+            elif code == kernels.CORNERS_FULL:
+                self.state = _with_room(self.state)
+            else:
                 return code
-            self.state = _with_room(self.state)
 
     def status(self, balance, angle_given):
         """Whether every sample was reached, and the load balanced at each."""
@@ -370,11 +392,11 @@ class _Run:
         m, tension = _corners(self.state, self.tables, c)
         x_piece = np.concatenate([[0.0], np.cumsum(self.path.piece_length_m)])
         m_piece = self.friction * np.concatenate([[0.0], np.cumsum(self.path.piece_bend_rad)])
-        inside = (m[1:-1] > 0) & (m[1:-1] < m_piece[-1])
-        bent = np.diff(m_piece, prepend=-1.0) > 0
-        x_corner = np.interp(m[1:-1][inside], m_piece[bent], x_piece[bent])
-        x = np.concatenate([x_piece, x_corner])
-        m_all = np.concatenate([m_piece, m[1:-1][inside]])
+        table = self.tables.table[0]
+        within = m[(m > 0) & (m < self.tables.total)]
+        piece = np.clip(np.searchsorted(table[NODE], within, side="right") - 1, 0, None)
+        x = np.concatenate([x_piece, table[X_START, piece] + table[X_PER_M, piece] * (within - table[NODE, piece])])
+        m_all = np.concatenate([m_piece, within])
         order = np.lexsort((m_all, x))
         log_tension = np.log(tension) if tension.min() > 0 else np.full(tension.size, -np.inf)
         values = np.exp(np.interp(m_all[order], m, log_tension)) if tension.min() > 0 else np.zeros(x.size)
@@ -383,24 +405,24 @@ class _Run:
 
 def _set_initial(state: State, tables: PathTables, c: int, m, tension, slope):
     """Write an initial profile into the list of corners."""
-    low = (state.m.shape[1] - m.size) // 2
+    low = (state.corner.shape[2] - m.size) // 2
     place = slice(low, low + m.size)
-    state.m[c, place], state.T[c, place] = m, tension
-    state.m[c, low + m.size - 1] = tables.total
-    state.slope[c, low : low + m.size - 1] = slope
-    state.cable_kind[c, LO], state.cable_kind[c, HI] = low, low + m.size - 1
-    state.cable[c, T_DRIVE], state.cable[c, T_LOAD] = tension[0], tension[-1]
-    state.cable[c, E0] = _elongation(tables, m, tension, slope)
+    state.corner[C_M, c, place], state.corner[C_T, c, place] = m, tension
+    state.corner[C_M, c, low + m.size - 1] = tables.total
+    state.corner[C_SLOPE, c, low : low + m.size - 1] = slope
+    state.kind[c, LO], state.kind[c, HI] = low, low + m.size - 1
+    state.value[c, T_DRIVE], state.value[c, T_LOAD] = tension[0], tension[-1]
+    state.value[c, E0] = _elongation(tables, m, tension, slope)
     # On a line of slope +1 compliance per drive-end tension is that of sigma = -1.
-    state.stiffness[c] = 1.0 / tables.passed[0, ::-1, -1]
+    state.value[c, STIFFNESS : STIFFNESS + 2] = 1.0 / tables.table[0, [PASSED + 1, PASSED], -1]
     if tables.total == 0.0 or tension[0] == 0.0:
-        state.cable_kind[c, MODE] = WHOLE
-        state.cable_kind[c, LINE] = -1
+        state.kind[c, MODE] = WHOLE
+        state.kind[c, LINE] = -1
 
 
 def _elongation(tables: PathTables, m, tension, slope) -> float:
     """Stretch of a profile: the integral of T dx / EA, m."""
-    at = np.union1d(m, tables.node[0])
+    at = np.union1d(m, tables.table[0, NODE])
     segment = np.clip(np.searchsorted(m, at[:-1], side="right") - 1, 0, max(m.size - 2, 0))
     start = tension[segment] * np.exp(slope[segment] * (at[:-1] - m[segment]))
     run = np.diff(at)
@@ -408,58 +430,51 @@ def _elongation(tables: PathTables, m, tension, slope) -> float:
     mean = np.divide(np.expm1(rise), rise, out=np.ones_like(rise), where=rise != 0)
     total = 0.0
     if run.size:
-        piece = np.clip(np.searchsorted(tables.node[0], at[:-1], side="right") - 1, 0, tables.bend.shape[1] - 1)
-        total = float((tables.bend[0][piece] * start * mean * run).sum())
-    at_node = np.clip(np.searchsorted(m, tables.node[0], side="right") - 1, 0, m.size - 2)
-    values = tension[at_node] * np.exp(slope[at_node] * (tables.node[0] - m[at_node]))
-    return total + float((tables.lump[0] * values).sum())
+        piece = np.clip(np.searchsorted(tables.table[0, NODE], at[:-1], side="right") - 1, 0, tables.table.shape[2] - 2)
+        total = float((tables.table[0, PER_M][piece] * start * mean * run).sum())
+    at_node = np.clip(np.searchsorted(m, tables.table[0, NODE], side="right") - 1, 0, m.size - 2)
+    values = tension[at_node] * np.exp(slope[at_node] * (tables.table[0, NODE] - m[at_node]))
+    return total + float((tables.table[0, LUMP] * values).sum())
 
 
 def _trial(state: State) -> State:
     """Room to keep a state in; what a trial never changes is shared."""
-    return state._replace(
-        front=state.front.copy(),
-        front_kind=state.front_kind.copy(),
-        cable=state.cable.copy(),
-        cable_kind=state.cable_kind.copy(),
-        pair=state.pair.copy(),
-    )
+    return state._replace(front=state.front.copy(), value=state.value.copy(), kind=state.kind.copy())
 
 
 def _with_room(state: State) -> State:
     """The same state with its corners in the middle of arrays at least twice as long as what they hold."""
-    used = int((state.cable_kind[:, HI] - state.cable_kind[:, LO]).max()) + 1
+    used = int((state.kind[:, HI] - state.kind[:, LO]).max()) + 1
     larger = blank_state(2 * used + 8 * kernels.MARGIN)
     for c in range(2):
-        lo, hi = state.cable_kind[c, LO], state.cable_kind[c, HI]
-        low = (larger.m.shape[1] - (hi - lo + 1)) // 2
-        for old, new in ((state.m, larger.m), (state.T, larger.T), (state.slope, larger.slope)):
-            new[c, low : low + hi - lo + 1] = old[c, lo : hi + 1]
-        state.cable_kind[c, LO], state.cable_kind[c, HI] = low, low + hi - lo
-    return state._replace(m=larger.m, T=larger.T, slope=larger.slope)
+        lo, hi = state.kind[c, LO], state.kind[c, HI]
+        low = (larger.corner.shape[2] - (hi - lo + 1)) // 2
+        larger.corner[:, c, low : low + hi - lo + 1] = state.corner[:, c, lo : hi + 1]
+        state.kind[c, LO], state.kind[c, HI] = low, low + hi - lo
+    return state._replace(corner=larger.corner)
 
 
 def _corners(state: State, tables: PathTables, c: int):
     """The whole profile of cable `c` as corners, m from the drive end and T, fronts' lines included."""
-    ends = state.cable[c, T_DRIVE], state.cable[c, T_LOAD]
-    kind = state.cable_kind[c]
+    ends = state.value[c, T_DRIVE], state.value[c, T_LOAD]
+    kind = state.kind[c]
     if kind[MODE] == WHOLE:
         return np.array([0.0, max(tables.total, 0.0)]), np.array(ends)
     if kind[MODE] != FRONTS:
-        still = state.cable[c, M_STILL]
+        still = state.value[c, M_STILL]
         return np.array([0.0, still, tables.total]), np.array([ends[0], ends[0] * np.exp(-kind[LINE] * still), ends[1]])
     points = []
     for end in range(2):
-        if state.front_kind[c, end, SIGMA]:
-            front = state.front[c, end]
+        if state.kind[c, SIGMA + 3 * end]:
+            front = state.front[2 * c + end]
             tension = front[TE] * np.exp(front[SLOPE] * np.log1p(front[R]))
             points.append((abs(end * tables.total - position(state, c, end)), tension))
     limits = [p[0] for p in points]
-    low = limits[0] if state.front_kind[c, 0, SIGMA] else 0.0
-    high = limits[-1] if state.front_kind[c, 1, SIGMA] else tables.total
+    low = limits[0] if state.kind[c, SIGMA] else 0.0
+    high = limits[-1] if state.kind[c, SIGMA + 3] else tables.total
     for i in range(kind[LO], kind[HI] + 1):
-        if low < state.m[c, i] < high:
-            points.append((state.m[c, i], state.T[c, i]))
+        if low < state.corner[C_M, c, i] < high:
+            points.append((state.corner[C_M, c, i], state.corner[C_T, c, i]))
     points = [(0.0, ends[0]), *sorted(points), (tables.total, ends[1])]
     return np.array([p[0] for p in points]), np.array([p[1] for p in points])
 

@@ -1,5 +1,6 @@
 """The conduit as the kernels see it: nodes in m = mu phi, with compliance between them and at them."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -11,40 +12,34 @@ from ccmodel.model.geometry import ConduitPath
 STRAIGHT = 1e-15
 
 
+# Rows of `PathTables.table`, each seen from one end: m at the nodes; of the bend after a node dx / (EA dm), the arc
+# length at which it begins and dx/dm; the straight stretch's length / EA at a node; and the integral of
+# exp(-sigma m) dx / EA up to and with the node's straight stretch, for sigma = -1 and +1.
+NODE, PER_M, X_START, X_PER_M, LUMP, PASSED = range(6)
+
+
 class PathTables(NamedTuple):
-    """Tables of a path, seen from both ends (first axis: 0 from the drive end inward, 1 from the load end inward).
+    """Tables of a path, seen from both ends.
 
     Bends lie between nodes; straight stretches are lumps of compliance at a node, since tension depends on m alone.
 
     Attributes
     ----------
-    node : ndarray, shape (2, n + 1)
-        m = mu phi at the nodes, counted from that end.
-    bend : ndarray, shape (2, n)
-        Compliance of a bend per unit of m, dx / (EA dm), 1/N m.
-    lump : ndarray, shape (2, n + 1)
-        Compliance of the straight stretch at a node, length / EA.
-    x_start, x_per_m : ndarray, shape (2, n)
-        Arc length at which a bend begins, and dx/dm along it, counted from that end, m.
-    passed : ndarray, shape (2, 2, n + 1)
-        Integral of exp(-sigma m) dx / EA up to and with the node's lump; second axis: sigma = -1, +1.
+    table : ndarray, shape (2, 7, n + 1)
+        First axis: from the drive end inward, from the load end inward; second axis as named above. A bend's values
+        stand at the node before it.
+    ratio : tuple of two floats
+        exp(-total), exp(+total): T_load / T_drive of a line of slope -1, +1.
     total : float
         m of the whole path.
     length : float
         Arc length of the whole path, m.
-    ratio : ndarray, shape (2,)
-        exp(-total), exp(+total): T_load / T_drive of a line of slope -1, +1.
     """
 
-    node: NDArray
-    bend: NDArray
-    lump: NDArray
-    x_start: NDArray
-    x_per_m: NDArray
-    passed: NDArray
+    table: NDArray
+    ratio: tuple[float, float]
     total: float
     length: float
-    ratio: NDArray
 
 
 def tabulate(path: ConduitPath, friction_coefficient: float, axial_rigidity_N: float) -> PathTables:
@@ -66,15 +61,18 @@ def tabulate(path: ConduitPath, friction_coefficient: float, axial_rigidity_N: f
     lump = np.array(straight) / axial_rigidity_N
     total = float(node[-1])
     x_end = x_start + x_per_m * np.diff(node)
-    both = (
-        np.stack([node, total - node[::-1]]),
-        np.stack([bend, bend[::-1]]),
-        np.stack([lump, lump[::-1]]),
-        np.stack([x_start, x - x_end[::-1]]),
-        np.stack([x_per_m, x_per_m[::-1]]),
-    )
-    passed = np.stack([[_passed(both[0][end], both[1][end], both[2][end], sigma) for sigma in (-1, 1)] for end in (0, 1)])
-    return PathTables(*both, passed, total, x, np.exp(np.array([-total, total])))
+    table = np.zeros((2, PASSED + 2, node.size))
+    _fill(table[0], node, bend, x_start, x_per_m, lump)
+    _fill(table[1], total - node[::-1], bend[::-1], x - x_end[::-1], x_per_m[::-1], lump[::-1])
+    return PathTables(table, (math.exp(-total), math.exp(total)), total, float(x))
+
+
+def _fill(table, node, bend, x_start, x_per_m, lump):
+    table[NODE], table[LUMP] = node, lump
+    for row, values in ((PER_M, bend), (X_START, x_start), (X_PER_M, x_per_m)):
+        table[row, :-1] = values
+    for row, sigma in ((PASSED, -1), (PASSED + 1, 1)):
+        table[row] = _passed(node, bend, lump, sigma)
 
 
 def _passed(node, bend, lump, sigma):

@@ -4,8 +4,8 @@ from numba import njit
 
 from ccmodel.model.exact.along import move_along, step_along
 from ccmodel.model.exact.cable import (
+    D_START,
     DRIVE,
-    FRONTS,
     GIVEN,
     HI,
     LINE,
@@ -14,6 +14,7 @@ from ccmodel.model.exact.cable import (
     M_STILL,
     MODE,
     OPEN,
+    PAIR,
     PIECE,
     PINNED,
     STILL_PIECE,
@@ -22,15 +23,20 @@ from ccmodel.model.exact.cable import (
     T_LOAD,
     WHOLE,
     D,
-    D_START,
     is_slack,
+    keep,
+    line_stiffness,
     position,
+    turn,
 )
-from ccmodel.model.exact.still_point import step_apart, step_given
+from ccmodel.model.exact.path import NODE, X_PER_M, X_START
 
-DONE, STUCK, CORNERS_FULL = 0, 1, 100
+# How `run` came to its end; APART: the next sample wants `still_point.step_apart` first.
+DONE, STUCK, CORNERS_FULL, APART = range(4)
 # Room that one sample may need at either end of a list of corners.
 MARGIN = 64
+# Changes of regime within one sample before it is given up.
+MAX_EVENTS = 1000
 
 
 @njit(cache=True)
@@ -51,31 +57,31 @@ def run(path, state, trials, progress, drive, angle_given, given, stiffness, pre
     """
     for i in range(progress[0], drive.size):
         for c in range(2):
-            if state.cable_kind[c, LO] < MARGIN or state.cable_kind[c, HI] > state.m.shape[1] - MARGIN:
+            if state.kind[c, LO] < MARGIN or state.kind[c, HI] > state.corner.shape[2] - MARGIN:
                 progress[0] = i
                 return CORNERS_FULL
-        move = drive[i] - state.pair[DRIVE]
+        move = drive[i] - state.value[PAIR, DRIVE]
         way = 1 if move > 0.0 else -1
         if move != 0.0:
             if way == -progress[1]:
                 progress[2] = _any_slack(state, present)
             progress[1] = way
-        if move != 0.0 or given[i] != state.pair[LOAD if angle_given else GIVEN]:
+        if move != 0.0 or given[i] != state.value[PAIR, LOAD if angle_given else GIVEN]:
             if angle_given:
-                status = _step_angle(path, state, trials, way, drive[i], given[i], stiffness)
-            elif given[i] != state.pair[GIVEN]:
-                status = step_given(path, state, trials, drive[i], given[i], stiffness)
+                status = _step_angle(path, state, way, drive[i], given[i])
+            elif given[i] != state.value[PAIR, GIVEN]:
+                status = _step_given(path, state, trials, drive[i], given[i], stiffness)
             else:
                 step_along(path, state, trials[0], way, drive[i], given[i], stiffness)
                 status = DONE
             if status != DONE:
                 progress[0] = i
                 return status
-        out[0, i] = state.cable[0, T_DRIVE]
-        out[1, i] = state.cable[0, T_LOAD]
-        out[2, i] = state.cable[1, T_DRIVE]
-        out[3, i] = state.cable[1, T_LOAD]
-        out[4, i] = state.pair[LOAD]
+        out[0, i] = state.value[0, T_DRIVE]
+        out[1, i] = state.value[0, T_LOAD]
+        out[2, i] = state.value[1, T_DRIVE]
+        out[3, i] = state.value[1, T_LOAD]
+        out[4, i] = state.value[PAIR, LOAD]
         for c in range(2):
             out[5 + 2 * c, i], out[6 + 2 * c, i] = moving(path, state, c)
         phase[i] = _phase(state, present, progress)
@@ -84,15 +90,72 @@ def run(path, state, trials, progress, drive, angle_given, given, stiffness, pre
 
 
 @njit(cache=True)
-def _step_angle(path, state, trials, way, drive, load, stiffness):
+def _step_angle(path, state, way, drive, load):
     """Move both pulleys to given angles, linearly and together."""
-    load_rate = load - state.pair[LOAD]
-    if drive == state.pair[DRIVE]:
+    load_rate = load - state.value[PAIR, LOAD]
+    if drive == state.value[PAIR, DRIVE]:
         way = 1 if load_rate > 0.0 else -1
-    if way * load_rate >= 0.0 or path.total == 0.0:
-        move_along(path, state, way, drive, load)
-        return DONE
-    return step_apart(path, state, trials, (drive, load), stiffness, True)
+    if way * load_rate < 0.0 and path.total > 0.0:
+        return APART
+    move_along(path, state, way, drive, load)
+    return DONE
+
+
+@njit(cache=True)
+def _step_given(path, state, trials, drive, given, stiffness):
+    """Move drive and given torque together, linearly; the load goes with the drive or against it, as balance wants."""
+    for _ in range(MAX_EVENTS):
+        drive_rate, given_rate = drive - state.value[PAIR, DRIVE], given - state.value[PAIR, GIVEN]
+        if drive_rate == 0.0 and given_rate == 0.0:
+            return DONE
+        way = 1 if drive_rate > 0.0 or (drive_rate == 0.0 and given_rate < 0.0) else -1
+        if path.total > 0.0 and _push(path, state, way, abs(drive_rate), given_rate) < 0.0:
+            return APART
+        _step_along_to_slack(path, state, trials, way, drive, given, stiffness)
+    return STUCK
+
+
+@njit(cache=True)
+def _push(path, state, way, drive_rate, given_rate):
+    """Rate of T2 - T4 - given in the drive's direction were the load at rest."""
+    push = -way * given_rate
+    for c in range(2):
+        kind = state.kind
+        if kind[c, MODE] == WHOLE and kind[c, LINE] == (2 * c - 1) * way and not is_slack(state, c):
+            push += line_stiffness(path, state, c)[1] * drive_rate
+    return push
+
+
+@njit(cache=True)
+def _step_along_to_slack(path, state, trials, way, drive, given, stiffness):
+    """Go along with the drive to the end, or to where the released cable hangs slack and the load would turn back."""
+    turn(path, state, 0, way, -way)
+    turn(path, state, 1, -way, way)
+    before = trials[1]
+    keep(state, before)
+    start_drive, start_given = state.value[PAIR, DRIVE], state.value[PAIR, GIVEN]
+    released = (1 + way) // 2
+    was_slack = is_slack(state, released)
+    step_along(path, state, trials[0], way, drive, given, stiffness)
+    if was_slack or not is_slack(state, released) or way * (given - start_given) <= 0.0 or path.total == 0.0:
+        return
+    if _push(path, state, way, abs(drive - start_drive), given - start_given) >= 0.0:
+        return
+    near, far = 0.0, 1.0
+    while True:
+        s = 0.5 * (near + far)
+        if not near < s < far:
+            break
+        keep(before, state)
+        at = (start_drive + s * (drive - start_drive), start_given + s * (given - start_given))
+        step_along(path, state, trials[0], way, at[0], at[1], stiffness)
+        if is_slack(state, released):
+            far = s
+        else:
+            near = s
+    keep(before, state)
+    at = (start_drive + far * (drive - start_drive), start_given + far * (given - start_given))
+    step_along(path, state, trials[0], way, at[0], at[1], stiffness)
 
 
 @njit(cache=True)
@@ -111,7 +174,7 @@ def _phase(state, present, progress):
     progress[2] = 0
     reached = 0
     for c in range(2):
-        if present[c] and state.cable_kind[c, MODE] == WHOLE and state.cable_kind[c, LINE] == (2 * c - 1) * progress[1]:
+        if present[c] and state.kind[c, MODE] == WHOLE and state.kind[c, LINE] == (2 * c - 1) * progress[1]:
             reached += 1
     return 1 + reached
 
@@ -119,9 +182,9 @@ def _phase(state, present, progress):
 @njit(cache=True)
 def moving(path, state, c):
     """Arc length from the drive end up to which, and from which on, a cable has moved since its ends last turned, m."""
-    if state.cable_kind[c, MODE] == WHOLE:
+    if state.kind[c, MODE] == WHOLE:
         return path.length, 0.0
-    if state.cable_kind[c, MODE] == STILL_POINT:
+    if state.kind[c, MODE] == STILL_POINT:
         x = _still_x(path, state, c)
         return x, x
     return _reach(path, state, c, 0), path.length - _reach(path, state, c, 1)
@@ -130,20 +193,20 @@ def moving(path, state, c):
 @njit(cache=True)
 def _still_x(path, state, c):
     """Arc length of a still point; of one in a straight stretch, where that stretch begins, m."""
-    piece = state.cable_kind[c, STILL_PIECE]
-    if state.cable_kind[c, PINNED]:
-        if piece == 0:
+    piece, m = state.kind[c, STILL_PIECE], state.value[c, M_STILL]
+    if state.kind[c, PINNED]:
+        piece -= 1
+        if piece < 0:
             return 0.0
-        return path.x_start[0, piece - 1] + path.x_per_m[0, piece - 1] * (path.node[0, piece] - path.node[0, piece - 1])
-    return path.x_start[0, piece] + path.x_per_m[0, piece] * (state.cable[c, M_STILL] - path.node[0, piece])
+    return path.table[0, X_START, piece] + path.table[0, X_PER_M, piece] * (m - path.table[0, NODE, piece])
 
 
 @njit(cache=True)
 def _reach(path, state, c, end):
-    if state.front[c, end, D] == state.front[c, end, D_START]:
+    if state.front[2 * c + end, D] == state.front[2 * c + end, D_START]:
         return 0.0
-    if state.front_kind[c, end, OPEN] == 0:
+    if state.kind[c, OPEN + 3 * end] == 0:
         return path.length
-    piece = state.front_kind[c, end, PIECE]
-    inward = position(state, c, end) - path.node[end, piece]
-    return path.x_start[end, piece] + inward * path.x_per_m[end, piece]
+    piece = state.kind[c, PIECE + 3 * end]
+    inward = position(state, c, end) - path.table[end, NODE, piece]
+    return path.table[end, X_START, piece] + inward * path.table[end, X_PER_M, piece]

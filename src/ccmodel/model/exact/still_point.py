@@ -14,10 +14,9 @@ from math import exp, inf
 import numpy as np
 from numba import njit
 
-from ccmodel.model.exact.along import balanced, both_fronts, one_front, step_along
+from ccmodel.model.exact.along import balance_lines, both_fronts, one_front
 from ccmodel.model.exact.cable import (
     DRIVE,
-    E0,
     FRONTS,
     GIVEN,
     LINE,
@@ -25,8 +24,9 @@ from ccmodel.model.exact.cable import (
     M_STILL,
     MODE,
     OPEN,
+    PAIR,
     PINNED,
-    SIGMA,
+    STIFFNESS,
     STILL_PIECE,
     STILL_POINT,
     T_DRIVE,
@@ -45,6 +45,7 @@ from ccmodel.model.exact.cable import (
     turn,
     walk,
 )
+from ccmodel.model.exact.path import LUMP, NODE, PASSED
 
 REACHED, STUCK = 0, 1
 # What stands for 1 / 0: a side without compliance.
@@ -52,7 +53,7 @@ RIGID = 1e200
 TOLERANCE = 1e-13
 MAX_EVENTS = 1000
 # What an integration step was ended by.
-NOTHING, NODE, MEETING, UNPINNED, SLACK, TAUT = range(6)
+NOTHING, BEND_LEFT, MEETING, UNPINNED, SLACK, TAUT = range(6)
 
 
 # ------------------------------------------------------------------------------------------- before fronts have met
@@ -74,10 +75,10 @@ def step_apart(path, state, trials, ends, stiffness, angle_given):
     -------
     status : int
     """
-    way = _way(state, ends, angle_given)
+    start = (state.value[PAIR, DRIVE], state.value[PAIR, LOAD] if angle_given else state.value[PAIR, GIVEN])
+    way = _way(start, ends)
     turn(path, state, 0, way, way)
     turn(path, state, 1, -way, -way)
-    start = (state.pair[DRIVE], state.pair[LOAD] if angle_given else state.pair[GIVEN])
     s = 0.0
     for _ in range(MAX_EVENTS):
         if _settle_meetings(path, state, start, ends, stiffness, angle_given):
@@ -94,26 +95,22 @@ def step_apart(path, state, trials, ends, stiffness, angle_given):
 
 
 @njit(cache=True)
-def _way(state, ends, angle_given):
-    """Direction of the drive, or where it rests the one that makes the load its opposite."""
-    if ends[0] != state.pair[DRIVE]:
-        return 1 if ends[0] > state.pair[DRIVE] else -1
-    if angle_given:
-        return -1 if ends[1] > state.pair[LOAD] else 1
-    return 1 if ends[1] > state.pair[GIVEN] else -1
+def _way(start, ends):
+    """Direction of the drive; the load moves against it."""
+    return 1 if ends[0] > start[0] else -1
 
 
 @njit(cache=True)
 def _is_still(state, c):
-    return state.cable_kind[c, MODE] == STILL_POINT
+    return state.kind[c, MODE] == STILL_POINT
 
 
 @njit(cache=True)
 def _crossed(path, state, c):
     """Whether fronts that slide against each other have met."""
-    if state.cable_kind[c, MODE] != FRONTS:
+    if state.kind[c, MODE] != FRONTS:
         return False
-    if state.front_kind[c, 0, OPEN] == 0 or state.front_kind[c, 1, OPEN] == 0:
+    if state.kind[c, OPEN] == 0 or state.kind[c, OPEN + 3] == 0:
         return True
     return position(state, c, 0) + position(state, c, 1) >= path.total
 
@@ -148,7 +145,7 @@ def _changed_kind(path, state, before):
     for c in range(2):
         if _crossed(path, state, c):
             return True
-        if state.cable_kind[c, MODE] == WHOLE and is_slack(before, c) and elongation(state, c) > 0.0:
+        if state.kind[c, MODE] == WHOLE and is_slack(before, c) and elongation(state, c) > 0.0:
             return True
     return False
 
@@ -156,49 +153,38 @@ def _changed_kind(path, state, before):
 @njit(cache=True)
 def _place(path, state, trial, s, start, ends, stiffness, angle_given):
     """Put the ends where they are at `s`, each front for itself."""
-    way = _way_between(start, ends)
-    state.pair[DRIVE] = start[0] + s * (ends[0] - start[0])
+    way = _way(start, ends)
+    state.value[PAIR, DRIVE] = start[0] + s * (ends[0] - start[0])
     given = start[1] + s * (ends[1] - start[1])
-    fronts = 0
+    if s >= 1.0:
+        state.value[PAIR, DRIVE], given = ends
     for c in range(2):
-        if state.cable_kind[c, MODE] == FRONTS:
-            fronts += 1
-            walk(path, state, c, 0, 0.0, 1.0, (1 - 2 * c) * state.pair[DRIVE])
-            state.cable[c, T_DRIVE] = state.front[c, 0, P]
+        if state.kind[c, MODE] == FRONTS:
+            walk(path, state, c, 0, 0.0, 1.0, (1 - 2 * c) * state.value[PAIR, DRIVE])
+            state.value[c, T_DRIVE] = state.front[2 * c, P]
     if angle_given:
-        state.pair[LOAD] = given
+        state.value[PAIR, LOAD] = given
         for c in range(2):
-            if state.cable_kind[c, MODE] == FRONTS:
+            if state.kind[c, MODE] == FRONTS:
                 walk(path, state, c, 1, 0.0, 1.0, -(1 - 2 * c) * given)
-                state.cable[c, T_LOAD] = state.front[c, 1, P]
+                state.value[c, T_LOAD] = state.front[2 * c + 1, P]
             else:
                 pull_line(path, state, c)
         return
-    state.pair[GIVEN] = given
+    state.value[PAIR, GIVEN] = given
     _balance(path, state, trial, given, stiffness, way)
-
-
-@njit(cache=True)
-def _way_between(start, ends):
-    if ends[0] != start[0]:
-        return 1 if ends[0] > start[0] else -1
-    return 1 if ends[1] > start[1] else -1
 
 
 @njit(cache=True)
 def _balance(path, state, trial, given, stiffness, way):
     """Balance the load, which moves against `way`, whatever the two cables do."""
-    fronts_A, fronts_B = state.cable_kind[0, MODE] == FRONTS, state.cable_kind[1, MODE] == FRONTS
+    fronts_A, fronts_B = state.kind[0, MODE] == FRONTS, state.kind[1, MODE] == FRONTS
     if fronts_A and fronts_B:
         both_fronts(path, state, trial, -way, given, stiffness)
     elif fronts_A or fronts_B:
         one_front(path, state, trial, 0 if fronts_A else 1, given, stiffness)
     else:
-        k_A, k_B = line_stiffness(path, state, 0)[1], line_stiffness(path, state, 1)[1]
-        e_A, e_B = state.cable[0, E0] + state.pair[DRIVE], state.cable[1, E0] - state.pair[DRIVE]
-        state.pair[LOAD] = balanced(k_A, e_A, k_B, e_B, given, stiffness, state.pair[LOAD])
-        pull_line(path, state, 0)
-        pull_line(path, state, 1)
+        balance_lines(path, state, given, stiffness)
 
 
 # -------------------------------------------------------------------------------------------------- the still point
@@ -207,18 +193,18 @@ def _balance(path, state, trial, given, stiffness, way):
 @njit(cache=True)
 def _settle_meetings(path, state, start, ends, stiffness, angle_given):
     """Give cables whose fronts have met, or that have become taut, a still point; True if the load was reached."""
-    way = _way_between(start, ends)
+    way = _way(start, ends)
     for c in range(2):
         sigma = (1 - 2 * c) * way
         if _crossed(path, state, c):
-            if state.front_kind[c, 0, OPEN] == 0:
+            if state.kind[c, OPEN] == 0:
                 m = position(state, c, 0)
-            elif state.front_kind[c, 1, OPEN] == 0:
+            elif state.kind[c, OPEN + 3] == 0:
                 m = path.total - position(state, c, 1)
             else:
                 m = position(state, c, 0)
             _set_still(state, c, sigma, min(max(m, 0.0), path.total))
-        elif state.cable_kind[c, MODE] == WHOLE and elongation(state, c) > 0.0 and state.stiffness[c, 0] > 0.0:
+        elif state.kind[c, MODE] == WHOLE and elongation(state, c) > 0.0 and state.value[c, STIFFNESS + 0] > 0.0:
             if path.total == 0.0:
                 continue
             _set_still(state, c, sigma, 0.0)
@@ -233,18 +219,18 @@ def _settle_meetings(path, state, start, ends, stiffness, angle_given):
 
 @njit(cache=True)
 def _set_still(state, c, sigma, m):
-    state.cable_kind[c, MODE] = STILL_POINT
-    state.cable_kind[c, LINE] = sigma
-    state.cable[c, M_STILL] = m
-    state.cable_kind[c, PINNED] = 0
-    state.cable_kind[c, STILL_PIECE] = 0
+    state.kind[c, MODE] = STILL_POINT
+    state.kind[c, LINE] = sigma
+    state.value[c, M_STILL] = m
+    state.kind[c, PINNED] = 0
+    state.kind[c, STILL_PIECE] = 0
 
 
 @njit(cache=True)
 def _piece_at(path, m):
     """The bend that `m` lies in, the one before it at a node."""
     piece = 0
-    while piece < path.bend.shape[1] - 1 and m > path.node[0, piece + 1]:
+    while piece < (path.table.shape[2] - 1) - 1 and m > path.table[0, NODE, piece + 1]:
         piece += 1
     return piece
 
@@ -262,15 +248,14 @@ def _rates(path, state, start, ends, stiffness, angle_given):
     drive_rate, given_rate = ends[0] - start[0], ends[1] - start[1]
     alpha_A, beta_A, drive_A, T2_A = _response(path, state, 0, drive_rate)
     alpha_B, beta_B, drive_B, T2_B = _response(path, state, 1, -drive_rate)
-    if angle_given:
-        load_rate = given_rate
-    else:
+    load_rate = given_rate
+    if not angle_given:
         load_rate = (alpha_A - alpha_B - given_rate) / (beta_A + beta_B + stiffness)
     load_A = (alpha_A - beta_A * load_rate) / T2_A if _is_still(state, 0) else 0.0
     load_B = (alpha_B + beta_B * load_rate) / T2_B if _is_still(state, 1) else 0.0
-    if _is_still(state, 0) and state.cable_kind[0, PINNED]:
+    if _is_still(state, 0) and state.kind[0, PINNED]:
         drive_A = load_A
-    if _is_still(state, 1) and state.cable_kind[1, PINNED]:
+    if _is_still(state, 1) and state.kind[1, PINNED]:
         drive_B = load_B
     return load_rate, (drive_A, drive_B), (load_A, load_B)
 
@@ -278,7 +263,7 @@ def _rates(path, state, start, ends, stiffness, angle_given):
 @njit(cache=True)
 def _response(path, state, c, drive_rate):
     """How tension at the load answers: dT2 = alpha ds + beta (load end's way out); also dT1 / (T1 ds), and T2."""
-    mode = state.cable_kind[c, MODE]
+    mode = state.kind[c, MODE]
     if mode == FRONTS:
         gives = end_compliance(state, c, 1)
         return 0.0, 1.0 / gives if gives > 1.0 / RIGID else RIGID, 0.0, 1.0
@@ -286,7 +271,7 @@ def _response(path, state, c, drive_rate):
         return 0.0, 0.0, 0.0, 1.0
     k_drive, k_load = line_stiffness(path, state, c)
     e = elongation(state, c)
-    if state.cable_kind[c, PINNED]:
+    if state.kind[c, PINNED]:
         return k_load * drive_rate, k_load, 0.0, k_load * e
     drive_side, load_side = about_still_point(path, state, c)
     beta = 1.0 / load_side if load_side > 1.0 / RIGID else RIGID
@@ -298,7 +283,7 @@ def _response(path, state, c, drive_rate):
 @njit(cache=True)
 def _needed(path, state, c, start, ends, stiffness, angle_given):
     """Compliance on the drive's side that would keep m_still where it is, were all beyond it straight."""
-    state.cable_kind[c, PINNED] = 1
+    state.kind[c, PINNED] = 1
     drive_rate = (1 - 2 * c) * (ends[0] - start[0])
     _, drive, _ = _rates(path, state, start, ends, stiffness, angle_given)
     tension_rate = drive[c] * line_stiffness(path, state, c)[0] * elongation(state, c)
@@ -310,51 +295,51 @@ def _needed(path, state, c, start, ends, stiffness, angle_given):
 @njit(cache=True)
 def _seat(path, state, c, start, ends, stiffness, angle_given):
     """Decide which way a still point leaves where it is; True if it leaves at the load end."""
-    m = state.cable[c, M_STILL]
-    last = path.bend.shape[1]
+    m = state.value[c, M_STILL]
+    last = path.table.shape[2] - 1
     for node in range(last + 1):
-        if abs(m - path.node[0, node]) <= 4e-16 * path.total:
-            state.cable[c, M_STILL] = path.node[0, node]
-            state.cable_kind[c, STILL_PIECE] = node
-            sigma = state.cable_kind[c, LINE]
+        if abs(m - path.table[0, NODE, node]) <= 4e-16 * path.total:
+            state.value[c, M_STILL] = path.table[0, NODE, node]
+            state.kind[c, STILL_PIECE] = node
+            sigma = state.kind[c, LINE]
             needed = _needed(path, state, c, start, ends, stiffness, angle_given)
-            with_lump = path.passed[0, (sigma + 1) // 2, node]
-            without = with_lump - path.lump[0, node] * exp(-sigma * path.node[0, node])
-            if without <= needed <= with_lump and path.lump[0, node] > 0.0:
+            with_lump = path.table[0, PASSED + (sigma + 1) // 2, node]
+            without = with_lump - path.table[0, LUMP, node] * exp(-sigma * path.table[0, NODE, node])
+            if without <= needed <= with_lump and path.table[0, LUMP, node] > 0.0:
                 return False
-            state.cable_kind[c, PINNED] = 0
+            state.kind[c, PINNED] = 0
             if needed > with_lump:
-                state.cable_kind[c, STILL_PIECE] = min(node, last - 1)
+                state.kind[c, STILL_PIECE] = min(node, last - 1)
                 return node == last
-            state.cable_kind[c, STILL_PIECE] = max(node - 1, 0)
+            state.kind[c, STILL_PIECE] = max(node - 1, 0)
             return False
-    state.cable_kind[c, PINNED] = 0
-    state.cable_kind[c, STILL_PIECE] = _piece_at(path, m)
+    state.kind[c, PINNED] = 0
+    state.kind[c, STILL_PIECE] = _piece_at(path, m)
     return False
 
 
 @njit(cache=True)
 def _find_balance_point(path, state, c, start, ends, stiffness, angle_given):
     """Still point of a cable that becomes taut, from no tension: where both ends' shares of its stretch agree."""
-    sigma = state.cable_kind[c, LINE]
+    sigma = state.kind[c, LINE]
     near, far = 0.0, path.total
     while True:
         m = 0.5 * (near + far)
         if not near < m < far:
             break
-        state.cable[c, M_STILL] = m
-        state.cable_kind[c, PINNED] = 0
-        state.cable_kind[c, STILL_PIECE] = _piece_at(path, m)
+        state.value[c, M_STILL] = m
+        state.kind[c, PINNED] = 0
+        state.kind[c, STILL_PIECE] = _piece_at(path, m)
         _, drive, load = _rates(path, state, start, ends, stiffness, angle_given)
         if sigma * (drive[c] - load[c]) > 0.0:
             near = m
         else:
             far = m
     # At a straight stretch the search closes in on its node.
-    for node in range(path.bend.shape[1] + 1):
-        if abs(m - path.node[0, node]) <= 1e-14 * path.total:
-            m = path.node[0, node]
-    state.cable[c, M_STILL] = m
+    for node in range((path.table.shape[2] - 1) + 1):
+        if abs(m - path.table[0, NODE, node]) <= 1e-14 * path.total:
+            m = path.table[0, NODE, node]
+    state.value[c, M_STILL] = m
 
 
 @njit(cache=True)
@@ -370,8 +355,8 @@ def _derivative(path, state, trial, y, start, ends, stiffness, angle_given, out)
     for c in range(2):
         pace += abs(drive[c]) + abs(load[c])
     for c in range(2):
-        moves = _is_still(state, c) and state.cable_kind[c, PINNED] == 0
-        out[c] = 0.5 * state.cable_kind[c, LINE] * (drive[c] - load[c]) / pace if moves else 0.0
+        moves = _is_still(state, c) and state.kind[c, PINNED] == 0
+        out[c] = 0.5 * state.kind[c, LINE] * (drive[c] - load[c]) / pace if moves else 0.0
     out[2] = load_rate / pace
     out[3] = 1.0 / pace
 
@@ -379,18 +364,20 @@ def _derivative(path, state, trial, y, start, ends, stiffness, angle_given, out)
 @njit(cache=True)
 def _set(path, state, trial, y, start, ends):
     """Put the state where y says; cables with fronts are drawn along from where `trial` has them."""
-    state.pair[DRIVE] = start[0] + y[3] * (ends[0] - start[0])
-    state.pair[LOAD] = y[2]
+    state.value[PAIR, DRIVE] = start[0] + y[3] * (ends[0] - start[0])
+    state.value[PAIR, LOAD] = y[2]
     for c in range(2):
-        mode = state.cable_kind[c, MODE]
+        mode = state.kind[c, MODE]
         if mode == STILL_POINT:
-            state.cable[c, M_STILL] = y[c]
+            state.value[c, M_STILL] = y[c]
         elif mode == FRONTS:
             sign = 1 - 2 * c
-            state.front[c] = trial.front[c]
-            state.front_kind[c] = trial.front_kind[c]
-            state.cable_kind[c] = trial.cable_kind[c]
-            walk(path, state, c, 0, 0.0, 1.0, sign * state.pair[DRIVE])
+            for i in range(13):
+                state.front[2 * c, i] = trial.front[2 * c, i]
+                state.front[2 * c + 1, i] = trial.front[2 * c + 1, i]
+            for i in range(12):
+                state.kind[c, i] = trial.kind[c, i]
+            walk(path, state, c, 0, 0.0, 1.0, sign * state.value[PAIR, DRIVE])
             walk(path, state, c, 1, 0.0, 1.0, -sign * y[2])
 
 
@@ -433,24 +420,24 @@ def _try_step(path, state, trial, y, h, start, ends, stiffness, angle_given, slo
 def _event(path, state, before, start, ends, stiffness, angle_given):
     """What has happened to a cable in the step that `state` is the end of, and to which cable."""
     for c in range(2):
-        mode = state.cable_kind[c, MODE]
+        mode = state.kind[c, MODE]
         if mode == STILL_POINT:
             if elongation(state, c) <= 0.0:
                 return SLACK, c
-            piece, m = state.cable_kind[c, STILL_PIECE], state.cable[c, M_STILL]
-            if state.cable_kind[c, PINNED]:
-                sigma = state.cable_kind[c, LINE]
+            piece, m = state.kind[c, STILL_PIECE], state.value[c, M_STILL]
+            if state.kind[c, PINNED]:
+                sigma = state.kind[c, LINE]
                 needed = _needed(path, state, c, start, ends, stiffness, angle_given)
-                with_lump = path.passed[0, (sigma + 1) // 2, piece]
-                without = with_lump - path.lump[0, piece] * exp(-sigma * m)
+                with_lump = path.table[0, PASSED + (sigma + 1) // 2, piece]
+                without = with_lump - path.table[0, LUMP, piece] * exp(-sigma * m)
                 if not without <= needed <= with_lump:
                     return UNPINNED, c
-            elif m < path.node[0, piece] or m > path.node[0, piece + 1]:
-                return NODE, c
+            elif m < path.table[0, NODE, piece] or m > path.table[0, NODE, piece + 1]:
+                return BEND_LEFT, c
         elif mode == FRONTS:
             if _crossed(path, state, c):
                 return MEETING, c
-        elif elongation(state, c) > 0.0 and state.stiffness[c, 0] > 0.0:
+        elif elongation(state, c) > 0.0 and state.value[c, STIFFNESS + 0] > 0.0:
             return TAUT, c
     return NOTHING, 0
 
@@ -460,7 +447,7 @@ def _wander(path, state, trials, s, start, ends, stiffness, angle_given):
     """Integrate until s = 1 or something happens to a cable; returns s and whether a drive front reached the load."""
     before = trials[1]
     keep(state, before)
-    y = np.array([state.cable[0, M_STILL], state.cable[1, M_STILL], state.pair[LOAD], s])
+    y = np.array([state.value[0, M_STILL], state.value[1, M_STILL], state.value[PAIR, LOAD], s])
     following, slopes = np.empty(4), np.empty((7, 4))
     h = 1e-3
     end = 1.0
@@ -499,7 +486,7 @@ def _wander(path, state, trials, s, start, ends, stiffness, angle_given):
             return _arrive(path, state, trials[0], start, ends, stiffness, angle_given)
         _set(path, state, before, following, start, ends)
         if not angle_given:
-            state.pair[GIVEN] = start[1] + following[3] * (ends[1] - start[1])
+            state.value[PAIR, GIVEN] = start[1] + following[3] * (ends[1] - start[1])
         reached = _handle(path, state, event, c, start, ends, stiffness, angle_given)
         _refresh(path, state)
         return following[3], reached
@@ -534,14 +521,14 @@ def _hit_end(path, state, before, y, h, start, ends, stiffness, angle_given, slo
 @njit(cache=True)
 def _arrive(path, state, trial, start, ends, stiffness, angle_given):
     """Close a step at s = 1: the displacements as given, the load balanced anew where its torque is given."""
-    state.pair[DRIVE] = ends[0]
+    state.value[PAIR, DRIVE] = ends[0]
     if angle_given:
-        state.pair[LOAD] = ends[1]
+        state.value[PAIR, LOAD] = ends[1]
         _refresh(path, state)
     else:
         _refresh(path, state)
-        state.pair[GIVEN] = ends[1]
-        _balance(path, state, trial, ends[1], stiffness, _way_between(start, ends))
+        state.value[PAIR, GIVEN] = ends[1]
+        _balance(path, state, trial, ends[1], stiffness, _way(start, ends))
     return 1.0, False
 
 
@@ -549,9 +536,9 @@ def _arrive(path, state, trial, start, ends, stiffness, angle_given):
 def _refresh(path, state):
     """Write down end tensions after an integration."""
     for c in range(2):
-        if state.cable_kind[c, MODE] == FRONTS:
-            state.cable[c, T_DRIVE] = state.front[c, 0, P]
-            state.cable[c, T_LOAD] = state.front[c, 1, P]
+        if state.kind[c, MODE] == FRONTS:
+            state.value[c, T_DRIVE] = state.front[2 * c, P]
+            state.value[c, T_LOAD] = state.front[2 * c + 1, P]
         else:
             pull_line(path, state, c)
 
@@ -560,18 +547,18 @@ def _refresh(path, state):
 def _handle(path, state, event, c, start, ends, stiffness, angle_given):
     """Change what cable `c` does after an event; True if its drive front has reached the load."""
     if event == SLACK:
-        state.cable_kind[c, MODE] = WHOLE
-        state.cable_kind[c, LINE] = -1
+        state.kind[c, MODE] = WHOLE
+        state.kind[c, LINE] = -1
         # Slack begins where elongation ends, whatever rounding has left of it.
-        state.cable[c, T_DRIVE] = 0.0
-        state.cable[c, T_LOAD] = 0.0
+        state.value[c, T_DRIVE] = 0.0
+        state.value[c, T_LOAD] = 0.0
         return False
     if event == UNPINNED:
         return _leave(path, state, c, start, ends, stiffness, angle_given)
-    if event == NODE:
-        piece = state.cable_kind[c, STILL_PIECE]
-        beyond = state.cable[c, M_STILL] > path.node[0, piece + 1]
-        state.cable[c, M_STILL] = path.node[0, piece + 1 if beyond else piece]
+    if event == BEND_LEFT:
+        piece = state.kind[c, STILL_PIECE]
+        beyond = state.value[c, M_STILL] > path.table[0, NODE, piece + 1]
+        state.value[c, M_STILL] = path.table[0, NODE, piece + 1 if beyond else piece]
         return _leave(path, state, c, start, ends, stiffness, angle_given)
     return False
 
@@ -579,68 +566,6 @@ def _handle(path, state, event, c, start, ends, stiffness, angle_given):
 @njit(cache=True)
 def _leave(path, state, c, start, ends, stiffness, angle_given):
     if _seat(path, state, c, start, ends, stiffness, angle_given):
-        slide_whole(path, state, c, -state.cable_kind[c, LINE])
+        slide_whole(path, state, c, -state.kind[c, LINE])
         return True
     return False
-
-
-# ------------------------------------------------------------------------------------- a load law that moves by itself
-
-
-@njit(cache=True)
-def step_given(path, state, trials, drive, given, stiffness):
-    """Move drive and given torque together, linearly; the load goes with the drive or against it, as balance wants."""
-    for _ in range(MAX_EVENTS):
-        drive_rate, given_rate = drive - state.pair[DRIVE], given - state.pair[GIVEN]
-        if drive_rate == 0.0 and given_rate == 0.0:
-            return REACHED
-        way = 1 if drive_rate > 0.0 or (drive_rate == 0.0 and given_rate < 0.0) else -1
-        push = _push(path, state, way, abs(drive_rate), given_rate, 2)
-        if push >= 0.0 or path.total == 0.0:
-            _step_along_to_slack(path, state, trials, way, drive, given, stiffness)
-        elif step_apart(path, state, trials, (drive, given), stiffness, False) != REACHED:
-            return STUCK
-    return STUCK
-
-
-@njit(cache=True)
-def _push(path, state, way, drive_rate, given_rate, without):
-    """Rate of T2 - T4 - given in the drive's direction were the load at rest; `without` names a cable not counted."""
-    push = -way * given_rate
-    for c in range(2):
-        kind = state.cable_kind
-        if c != without and kind[c, MODE] == WHOLE and kind[c, LINE] == (2 * c - 1) * way and not is_slack(state, c):
-            push += line_stiffness(path, state, c)[1] * drive_rate
-    return push
-
-
-@njit(cache=True)
-def _step_along_to_slack(path, state, trials, way, drive, given, stiffness):
-    """Go along with the drive to the end, or to where the released cable hangs slack and the load would turn back."""
-    turn(path, state, 0, way, -way)
-    turn(path, state, 1, -way, way)
-    before = trials[1]
-    keep(state, before)
-    start_drive, start_given = state.pair[DRIVE], state.pair[GIVEN]
-    released = (1 + way) // 2
-    was_slack = is_slack(state, released)
-    step_along(path, state, trials[0], way, drive, given, stiffness)
-    if was_slack or not is_slack(state, released) or way * (given - start_given) <= 0.0 or path.total == 0.0:
-        return
-    if _push(path, state, way, abs(drive - start_drive), given - start_given, 2) >= 0.0:
-        return
-    near, far = 0.0, 1.0
-    while True:
-        s = 0.5 * (near + far)
-        if not near < s < far:
-            break
-        keep(before, state)
-        at = (start_drive + s * (drive - start_drive), start_given + s * (given - start_given))
-        step_along(path, state, trials[0], way, at[0], at[1], stiffness)
-        if is_slack(state, released):
-            far = s
-        else:
-            near = s
-    keep(before, state)
-    at = (start_drive + far * (drive - start_drive), start_given + far * (given - start_given))
-    step_along(path, state, trials[0], way, at[0], at[1], stiffness)
