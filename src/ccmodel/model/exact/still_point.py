@@ -22,6 +22,7 @@ from ccmodel.model.exact.cable import (
     LINE,
     LOAD,
     M_STILL,
+    ME,
     MODE,
     OPEN,
     PAIR,
@@ -197,12 +198,7 @@ def _settle_meetings(path, state, start, ends, stiffness, angle_given):
     for c in range(2):
         sigma = (1 - 2 * c) * way
         if _crossed(path, state, c):
-            if state.kind[c, OPEN] == 0:
-                m = position(state, c, 0)
-            elif state.kind[c, OPEN + 3] == 0:
-                m = path.total - position(state, c, 1)
-            else:
-                m = position(state, c, 0)
+            m = _meeting(path, state, c)
             _set_still(state, c, sigma, min(max(m, 0.0), path.total))
         elif state.kind[c, MODE] == WHOLE and elongation(state, c) > 0.0 and state.value[c, STIFFNESS + 0] > 0.0:
             if path.total == 0.0:
@@ -215,6 +211,16 @@ def _settle_meetings(path, state, start, ends, stiffness, angle_given):
             slide_whole(path, state, c, -sigma)
             return True
     return False
+
+
+@njit(cache=True)
+def _meeting(path, state, c):
+    """Where fronts that slide against each other have met, m from the drive end."""
+    drive, load = position(state, c, 0), position(state, c, 1)
+    # What already has a line's slope is taken by its front at once, even beyond the other front: that one's counts.
+    drive_leapt = state.front[2 * c, ME] + load > path.total
+    load_leapt = state.front[2 * c + 1, ME] + drive > path.total
+    return path.total - load if drive_leapt and not load_leapt else drive
 
 
 @njit(cache=True)
