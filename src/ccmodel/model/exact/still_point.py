@@ -17,6 +17,7 @@ from numba import njit
 from ccmodel.model.exact.along import balance_lines, both_fronts, one_front
 from ccmodel.model.exact.cable import (
     DRIVE,
+    E0,
     FRONTS,
     GIVEN,
     LINE,
@@ -50,7 +51,9 @@ from ccmodel.model.exact.path import LUMP, NODE, PASSED
 
 REACHED, STUCK = 0, 1
 # What stands for 1 / 0: a side without compliance.
-RIGID = 1e200
+RIGID = 1e100
+# Elongation that is rounding of the displacements it is the difference of, relative to them.
+FAINT = 1e-12
 TOLERANCE = 1e-13
 MAX_EVENTS = 1000
 # What an integration step was ended by.
@@ -90,6 +93,8 @@ def step_apart(path, state, trials, ends, stiffness, angle_given):
             s, reached_load = _wander(path, state, trials, s, start, ends, stiffness, angle_given)
             if reached_load:
                 return REACHED
+            if s < 0.0:
+                return STUCK
         else:
             s = _move_fronts(path, state, trials, s, start, ends, stiffness, angle_given)
     return STUCK
@@ -276,7 +281,8 @@ def _response(path, state, c, drive_rate):
     if mode == WHOLE:
         return 0.0, 0.0, 0.0, 1.0
     k_drive, k_load = line_stiffness(path, state, c)
-    e = elongation(state, c)
+    # A trial may go past where the cable becomes slack.
+    e = max(elongation(state, c), 1.0 / RIGID)
     if state.kind[c, PINNED]:
         return k_load * drive_rate, k_load, 0.0, k_load * e
     drive_side, load_side = about_still_point(path, state, c)
@@ -292,7 +298,7 @@ def _needed(path, state, c, start, ends, stiffness, angle_given):
     state.kind[c, PINNED] = 1
     drive_rate = (1 - 2 * c) * (ends[0] - start[0])
     _, drive, _ = _rates(path, state, start, ends, stiffness, angle_given)
-    tension_rate = drive[c] * line_stiffness(path, state, c)[0] * elongation(state, c)
+    tension_rate = drive[c] * line_stiffness(path, state, c)[0] * max(elongation(state, c), 1.0 / RIGID)
     if tension_rate * drive_rate <= 0.0:
         return inf if drive_rate != 0.0 else 0.0
     return drive_rate / tension_rate
@@ -359,12 +365,20 @@ def _derivative(path, state, trial, y, start, ends, stiffness, angle_given, out)
     load_rate, drive, load = _rates(path, state, start, ends, stiffness, angle_given)
     pace = 1.0
     for c in range(2):
-        pace += abs(drive[c]) + abs(load[c])
+        if not _is_faint(state, c):
+            pace += abs(drive[c]) + abs(load[c])
     for c in range(2):
-        moves = _is_still(state, c) and state.kind[c, PINNED] == 0
+        moves = _is_still(state, c) and state.kind[c, PINNED] == 0 and not _is_faint(state, c)
         out[c] = 0.5 * state.kind[c, LINE] * (drive[c] - load[c]) / pace if moves else 0.0
     out[2] = load_rate / pace
     out[3] = 1.0 / pace
+
+
+@njit(cache=True)
+def _is_faint(state, c):
+    """Whether a cable is as good as slack: its still point then cannot be followed, nor does it matter."""
+    drive, load = state.value[PAIR, DRIVE], state.value[PAIR, LOAD]
+    return elongation(state, c) <= FAINT * (abs(state.value[c, E0]) + abs(drive) + abs(load))
 
 
 @njit(cache=True)
@@ -450,7 +464,10 @@ def _event(path, state, before, start, ends, stiffness, angle_given):
 
 @njit(cache=True)
 def _wander(path, state, trials, s, start, ends, stiffness, angle_given):
-    """Integrate until s = 1 or something happens to a cable; returns s and whether a drive front reached the load."""
+    """Integrate until s = 1 or something happens to a cable; returns s and whether a drive front reached the load.
+
+    s is negative where the steps it took to get there would be too many.
+    """
     before = trials[1]
     keep(state, before)
     y = np.array([state.value[0, M_STILL], state.value[1, M_STILL], state.value[PAIR, LOAD], s])
@@ -496,7 +513,7 @@ def _wander(path, state, trials, s, start, ends, stiffness, angle_given):
         reached = _handle(path, state, event, c, start, ends, stiffness, angle_given)
         _refresh(path, state)
         return following[3], reached
-    return 1.0, False
+    return -1.0, False
 
 
 @njit(cache=True)
