@@ -35,11 +35,15 @@ E0, M_STILL, T_DRIVE, T_LOAD, STIFFNESS = range(5)
 # Row 2: displacement of the drive and of the load pulley's rim, the load law's constant part.
 PAIR = 2
 DRIVE, LOAD, GIVEN = range(3)
-# Fields of `State.kind`: first and last corner, what a cable does (mode), slope of a whole slide or sigma of a still
+# Fields of `State.kind`: the corners last passed by the front at the drive and at the load, first and last corner of the
+# list (a front does not see what the other one has passed), what a cable does (mode), slope of a whole slide or sigma of a still
 # point, the piece a still point is in, whether it stands in a straight stretch (at that piece's first node); then of
 # the front at the drive end (at the load end 3 further on) sigma (0: none), the bend it is in, whether anything is
 # ahead.
-LO, HI, MODE, LINE, STILL_PIECE, PINNED, SIGMA, PIECE, OPEN = range(9)
+LO, HI, FIRST, LAST, MODE, LINE, STILL_PIECE, PINNED, SIGMA, PIECE, OPEN = range(11)
+
+# Two lines that differ by less, relative to their tension, are one.
+ROUNDING = 1e-15
 
 
 class State(NamedTuple):
@@ -52,7 +56,7 @@ class State(NamedTuple):
     front : ndarray, shape (4, 13)
         Fronts: A at drive and load, B at drive and load.
     value : ndarray, shape (3, 6)
-    kind : ndarray of int64, shape (2, 12)
+    kind : ndarray of int64, shape (2, 14)
     """
 
     corner: NDArray
@@ -63,7 +67,7 @@ class State(NamedTuple):
 
 def blank_state(capacity: int) -> State:
     """A state with room for `capacity` corners a cable, all zero."""
-    return State(np.zeros((3, 2, capacity)), np.zeros((4, 13)), np.zeros((3, 6)), np.zeros((2, 12), dtype=np.int64))
+    return State(np.zeros((3, 2, capacity)), np.zeros((4, 13)), np.zeros((3, 6)), np.zeros((2, 14), dtype=np.int64))
 
 
 @njit(cache=True)
@@ -76,7 +80,7 @@ def keep(state, kept):
         for j in range(6):
             kept.value[i, j] = state.value[i, j]
     for i in range(2):
-        for j in range(12):
+        for j in range(14):
             kept.kind[i, j] = state.kind[i, j]
 
 
@@ -196,7 +200,8 @@ def aim(path, state, c, end):
     front[2 * c + end, R] = 0.0
     while True:
         lo, hi, piece = state.kind[c, LO], state.kind[c, HI], kind[c, PIECE + 3 * end]
-        if lo >= hi or piece >= (path.table.shape[2] - 1):
+        at_end = lo >= state.kind[c, LAST] if end == 0 else hi <= state.kind[c, FIRST]
+        if at_end or piece >= (path.table.shape[2] - 1):
             kind[c, OPEN + 3 * end] = 0
             front[2 * c + end, R_STOP] = 0.0
             return
@@ -308,7 +313,8 @@ def has_met(path, state, c):
         return True
     sigma = state.kind[c, SIGMA]
     ratio = path.ratio[(1 - sigma) // 2]
-    return sigma * (state.front[2 * c, P] * ratio - state.front[2 * c + 1, P]) >= 0.0
+    load = state.front[2 * c + 1, P]
+    return sigma * (state.front[2 * c, P] * ratio - load) >= -ROUNDING * load
 
 
 # --------------------------------------------------------------------------------------------------- keeping a profile
@@ -333,6 +339,7 @@ def _commit_front(path, state, c, end):
         state.corner[C_T, c, lo - 1] = front[2 * c + end, P]
         state.corner[C_SLOPE, c, lo - 1] = -sigma
         state.kind[c, LO] = lo - 1
+        state.kind[c, FIRST] = lo - 1
     else:
         hi = state.kind[c, HI]
         state.corner[C_M, c, hi] = max(0.0, path.total - inward)
@@ -341,6 +348,7 @@ def _commit_front(path, state, c, end):
         state.corner[C_M, c, hi + 1] = path.total
         state.corner[C_T, c, hi + 1] = front[2 * c + end, P]
         state.kind[c, HI] = hi + 1
+        state.kind[c, LAST] = hi + 1
 
 
 @njit(cache=True)
@@ -362,6 +370,7 @@ def _commit_line(path, state, c):
         kind[c, HI] = lo + 2
     hi = kind[c, HI]
     state.corner[C_M, c, hi], state.corner[C_T, c, hi] = path.total, state.value[c, T_LOAD]
+    kind[c, FIRST], kind[c, LAST] = lo, hi
     kind[c, MODE] = FRONTS
     state.kind[c, SIGMA] = 0
     state.kind[c, SIGMA + 3] = 0

@@ -13,9 +13,11 @@ from ccmodel.model.exact.cable import (
     C_SLOPE,
     C_T,
     E0,
+    FIRST,
     FRONTS,
     GIVEN,
     HI,
+    LAST,
     LINE,
     LO,
     M_STILL,
@@ -354,8 +356,9 @@ class _Run:
         self._advance(np.array([0, 0, 0]), np.zeros(1), np.array([given]), stiffness, False, out, phase)
 
     def _advance(self, progress, drive, given, stiffness, angle_given, out, phase):
+        trials = (_trial(self.state), _trial(self.state))
+        apart_at, times = -1, 0
         while True:
-            trials = (_trial(self.state), _trial(self.state))
             code = kernels.run(
                 self.tables,
                 self.state,
@@ -371,11 +374,15 @@ class _Run:
             )
             if code == kernels.APART:
                 i = progress[0]
+                apart_at, times = i, times + 1 if i == apart_at else 1
+                if times > kernels.MAX_EVENTS:
+                    return kernels.STUCK
                 code = step_apart(self.tables, self.state, trials, (drive[i], given[i]), stiffness, angle_given)
                 if code != REACHED:
                     return kernels.STUCK
             elif code == kernels.CORNERS_FULL:
                 self.state = _with_room(self.state)
+                trials = (_trial(self.state), _trial(self.state))
             else:
                 return code
 
@@ -410,7 +417,7 @@ def _set_initial(state: State, tables: PathTables, c: int, m, tension, slope):
     state.corner[C_M, c, place], state.corner[C_T, c, place] = m, tension
     state.corner[C_M, c, low + m.size - 1] = tables.total
     state.corner[C_SLOPE, c, low : low + m.size - 1] = slope
-    state.kind[c, LO], state.kind[c, HI] = low, low + m.size - 1
+    state.kind[c, [LO, FIRST]], state.kind[c, [HI, LAST]] = low, low + m.size - 1
     state.value[c, T_DRIVE], state.value[c, T_LOAD] = tension[0], tension[-1]
     state.value[c, E0] = _elongation(tables, m, tension, slope)
     # On a line of slope +1 compliance per drive-end tension is that of sigma = -1.
@@ -444,13 +451,13 @@ def _trial(state: State) -> State:
 
 def _with_room(state: State) -> State:
     """The same state with its corners in the middle of arrays at least twice as long as what they hold."""
-    used = int((state.kind[:, HI] - state.kind[:, LO]).max()) + 1
+    used = int((state.kind[:, LAST] - state.kind[:, FIRST]).max()) + 1
     larger = blank_state(2 * used + 8 * kernels.MARGIN)
     for c in range(2):
-        lo, hi = state.kind[c, LO], state.kind[c, HI]
-        low = (larger.corner.shape[2] - (hi - lo + 1)) // 2
-        larger.corner[:, c, low : low + hi - lo + 1] = state.corner[:, c, lo : hi + 1]
-        state.kind[c, LO], state.kind[c, HI] = low, low + hi - lo
+        first, last = state.kind[c, FIRST], state.kind[c, LAST]
+        low = (larger.corner.shape[2] - (last - first + 1)) // 2
+        larger.corner[:, c, low : low + last - first + 1] = state.corner[:, c, first : last + 1]
+        state.kind[c, [LO, HI, FIRST, LAST]] += low - first
     return state._replace(corner=larger.corner)
 
 

@@ -6,10 +6,10 @@ from ccmodel.model.exact.along import move_along, step_along
 from ccmodel.model.exact.cable import (
     D_START,
     DRIVE,
+    FIRST,
     GIVEN,
-    HI,
+    LAST,
     LINE,
-    LO,
     LOAD,
     M_STILL,
     MODE,
@@ -57,7 +57,7 @@ def run(path, state, trials, progress, drive, angle_given, given, stiffness, pre
     """
     for i in range(progress[0], drive.size):
         for c in range(2):
-            if state.kind[c, LO] < MARGIN or state.kind[c, HI] > state.corner.shape[2] - MARGIN:
+            if state.kind[c, FIRST] < MARGIN or state.kind[c, LAST] > state.corner.shape[2] - MARGIN:
                 progress[0] = i
                 return CORNERS_FULL
         move = drive[i] - state.value[PAIR, DRIVE]
@@ -120,10 +120,18 @@ def _push(path, state, way, drive_rate, given_rate):
     """Rate of T2 - T4 - given in the drive's direction were the load at rest."""
     push = -way * given_rate
     for c in range(2):
-        kind = state.kind
-        if kind[c, MODE] == WHOLE and kind[c, LINE] == (2 * c - 1) * way and not is_slack(state, c):
+        if _at_load(path, state, c, way) and not is_slack(state, c):
             push += line_stiffness(path, state, c)[1] * drive_rate
     return push
+
+
+@njit(cache=True)
+def _at_load(path, state, c, way):
+    """Whether the front from the drive, moving in direction `way`, stands at the load."""
+    sigma = (1 - 2 * c) * way
+    if state.kind[c, MODE] == WHOLE:
+        return state.kind[c, LINE] == -sigma
+    return state.kind[c, MODE] == STILL_POINT and state.kind[c, LINE] == sigma and state.value[c, M_STILL] == path.total
 
 
 @njit(cache=True)

@@ -286,10 +286,12 @@ def _response(path, state, c, drive_rate):
     if state.kind[c, PINNED]:
         return k_load * drive_rate, k_load, 0.0, k_load * e
     drive_side, load_side = about_still_point(path, state, c)
-    beta = 1.0 / load_side if load_side > 1.0 / RIGID else RIGID
+    # At the load itself still: it takes what its line takes, and more at once.
+    at_load = load_side <= 1.0 / RIGID
+    alpha, beta = (k_load * drive_rate, RIGID) if at_load else (0.0, 1.0 / load_side)
     stretch = drive_side * k_drive * e
     drive = drive_rate / stretch if stretch > 1.0 / RIGID else RIGID * drive_rate
-    return 0.0, beta, drive, k_load * e
+    return alpha, beta, drive, k_load * e
 
 
 @njit(cache=True)
@@ -314,6 +316,11 @@ def _seat(path, state, c, start, ends, stiffness, angle_given):
             state.value[c, M_STILL] = path.table[0, NODE, node]
             state.kind[c, STILL_PIECE] = node
             sigma = state.kind[c, LINE]
+            if node == last and path.table[0, LUMP, last] == 0.0:
+                state.kind[c, PINNED] = 0
+                state.kind[c, STILL_PIECE] = last - 1
+                _, drive, load = _rates(path, state, start, ends, stiffness, angle_given)
+                return sigma * (drive[c] - load[c]) >= 0.0
             needed = _needed(path, state, c, start, ends, stiffness, angle_given)
             with_lump = path.table[0, PASSED + (sigma + 1) // 2, node]
             without = with_lump - path.table[0, LUMP, node] * exp(-sigma * path.table[0, NODE, node])
@@ -395,7 +402,7 @@ def _set(path, state, trial, y, start, ends):
             for i in range(13):
                 state.front[2 * c, i] = trial.front[2 * c, i]
                 state.front[2 * c + 1, i] = trial.front[2 * c + 1, i]
-            for i in range(12):
+            for i in range(14):
                 state.kind[c, i] = trial.kind[c, i]
             walk(path, state, c, 0, 0.0, 1.0, sign * state.value[PAIR, DRIVE])
             walk(path, state, c, 1, 0.0, 1.0, -sign * y[2])
