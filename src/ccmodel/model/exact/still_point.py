@@ -362,14 +362,14 @@ def _find_balance_point(path, state, c, start, ends, stiffness, angle_given):
 
 
 @njit(cache=True)
-def _derivative(path, state, trial, y, start, ends, stiffness, angle_given, out):
-    """Derivatives of (m_still of A, of B, Q, s) by a parameter that has no singular point; 'state' is left at y.
+def _derivative(path, state, trials, y, start, ends, stiffness, angle_given, out):
+    """Derivatives of (m_still of A, of B, s) by a parameter that has no singular point; `state` is left at y.
 
     The parameter counts both sides' relative changes of tension: where a side has no compliance yet, s stands still
     and m_still moves on.
     """
-    _set(path, state, trial, y, start, ends)
-    load_rate, drive, load = _rates(path, state, start, ends, stiffness, angle_given)
+    _set(path, state, trials, y, start, ends, stiffness, angle_given)
+    _, drive, load = _rates(path, state, start, ends, stiffness, angle_given)
     pace = 1.0
     for c in range(2):
         if not _is_faint(state, c):
@@ -377,8 +377,7 @@ def _derivative(path, state, trial, y, start, ends, stiffness, angle_given, out)
     for c in range(2):
         moves = _is_still(state, c) and state.kind[c, PINNED] == 0 and not _is_faint(state, c)
         out[c] = 0.5 * state.kind[c, LINE] * (drive[c] - load[c]) / pace if moves else 0.0
-    out[2] = load_rate / pace
-    out[3] = 1.0 / pace
+    out[2] = 1.0 / pace
 
 
 @njit(cache=True)
@@ -389,23 +388,19 @@ def _is_faint(state, c):
 
 
 @njit(cache=True)
-def _set(path, state, trial, y, start, ends):
-    """Put the state where y says; cables with fronts are drawn along from where `trial` has them."""
-    state.value[PAIR, DRIVE] = start[0] + y[3] * (ends[0] - start[0])
-    state.value[PAIR, LOAD] = y[2]
+def _set(path, state, trials, y, start, ends, stiffness, angle_given):
+    """Put the state where y says, the load balanced; cables with fronts are drawn along from where they were."""
+    before = trials[1]
     for c in range(2):
-        mode = state.kind[c, MODE]
-        if mode == STILL_POINT:
+        if state.kind[c, MODE] == STILL_POINT:
             state.value[c, M_STILL] = y[c]
-        elif mode == FRONTS:
-            sign = 1 - 2 * c
+        elif state.kind[c, MODE] == FRONTS:
             for i in range(13):
-                state.front[2 * c, i] = trial.front[2 * c, i]
-                state.front[2 * c + 1, i] = trial.front[2 * c + 1, i]
+                state.front[2 * c, i] = before.front[2 * c, i]
+                state.front[2 * c + 1, i] = before.front[2 * c + 1, i]
             for i in range(14):
-                state.kind[c, i] = trial.kind[c, i]
-            walk(path, state, c, 0, 0.0, 1.0, sign * state.value[PAIR, DRIVE])
-            walk(path, state, c, 1, 0.0, 1.0, -sign * y[2])
+                state.kind[c, i] = before.kind[c, i]
+    _place(path, state, trials[0], y[2], start, ends, stiffness, angle_given)
 
 
 # Dormand and Prince's pair of orders 5 and 4.
@@ -424,18 +419,18 @@ ERROR = np.array([71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 5
 
 
 @njit(cache=True)
-def _try_step(path, state, trial, y, h, start, ends, stiffness, angle_given, slopes, following):
+def _try_step(path, state, trials, y, h, start, ends, stiffness, angle_given, slopes, following):
     """One step of length h from y into `following`; returns the error by the tolerance."""
     for stage in range(7):
-        for i in range(4):
+        for i in range(3):
             total = 0.0
             for j in range(stage):
                 total += STAGES[stage, j] * slopes[j, i]
             following[i] = y[i] + h * total
-        _derivative(path, state, trial, following, start, ends, stiffness, angle_given, slopes[stage])
+        _derivative(path, state, trials, following, start, ends, stiffness, angle_given, slopes[stage])
     worst = 0.0
-    scale = (path.total, path.total, abs(y[2]) + abs(following[2] - y[2]) + 1e-6 * path.length, 1.0)
-    for i in range(4):
+    scale = (path.total, path.total, 1.0)
+    for i in range(3):
         error = 0.0
         for j in range(7):
             error += ERROR[j] * slopes[j, i]
@@ -444,7 +439,7 @@ def _try_step(path, state, trial, y, h, start, ends, stiffness, angle_given, slo
 
 
 @njit(cache=True)
-def _event(path, state, before, start, ends, stiffness, angle_given):
+def _event(path, state, start, ends, stiffness, angle_given):
     """What has happened to a cable in the step that `state` is the end of, and to which cable."""
     for c in range(2):
         mode = state.kind[c, MODE]
@@ -477,100 +472,71 @@ def _wander(path, state, trials, s, start, ends, stiffness, angle_given):
     """
     before = trials[1]
     keep(state, before)
-    y = np.array([state.value[0, M_STILL], state.value[1, M_STILL], state.value[PAIR, LOAD], s])
-    following, slopes = np.empty(4), np.empty((7, 4))
+    y = np.array([state.value[0, M_STILL], state.value[1, M_STILL], s])
+    following, slopes = np.empty(3), np.empty((7, 3))
     h = 1e-3
-    end = 1.0
     for _ in range(100_000):
-        error = _try_step(path, state, before, y, h, start, ends, stiffness, angle_given, slopes, following)
+        error = _try_step(path, state, trials, y, h, start, ends, stiffness, angle_given, slopes, following)
         if not error <= 1.0:
             h *= max(0.1, 0.9 * error**-0.2) if error > 0.0 else 0.1
             continue
-        _set(path, state, before, following, start, ends)
-        event, c = _event(path, state, before, start, ends, stiffness, angle_given)
-        if event == NOTHING and following[3] < end:
+        _set(path, state, trials, following, start, ends, stiffness, angle_given)
+        event, c = _event(path, state, start, ends, stiffness, angle_given)
+        if event == NOTHING and following[2] < 1.0:
             y[:] = following
             h *= min(5.0, 0.9 * max(error, 1e-10) ** -0.2)
             continue
         if event == NOTHING:
-            _hit_end(path, state, before, y, h, start, ends, stiffness, angle_given, slopes, following)
-            _set(path, state, before, following, start, ends)
-            return _arrive(path, state, trials[0], start, ends, stiffness, angle_given)
+            _hit_end(path, state, trials, y, h, start, ends, stiffness, angle_given, slopes, following)
+            _set(path, state, trials, following, start, ends, stiffness, angle_given)
+            return 1.0, False
         near, far = 0.0, h
         while True:
             middle = 0.5 * (near + far)
             if not near < middle < far or far - near < 1e-17:
                 break
-            _try_step(path, state, before, y, middle, start, ends, stiffness, angle_given, slopes, following)
-            _set(path, state, before, following, start, ends)
-            tried, tried_c = _event(path, state, before, start, ends, stiffness, angle_given)
+            _try_step(path, state, trials, y, middle, start, ends, stiffness, angle_given, slopes, following)
+            _set(path, state, trials, following, start, ends, stiffness, angle_given)
+            tried, tried_c = _event(path, state, start, ends, stiffness, angle_given)
             if tried == NOTHING:
                 near = middle
             else:
                 far, event, c = middle, tried, tried_c
-        _try_step(path, state, before, y, far, start, ends, stiffness, angle_given, slopes, following)
-        if following[3] >= end:
-            _try_step(path, state, before, y, near, start, ends, stiffness, angle_given, slopes, following)
-            _hit_end(path, state, before, y, far, start, ends, stiffness, angle_given, slopes, following)
-            _set(path, state, before, following, start, ends)
-            return _arrive(path, state, trials[0], start, ends, stiffness, angle_given)
-        _set(path, state, before, following, start, ends)
-        if not angle_given:
-            state.value[PAIR, GIVEN] = start[1] + following[3] * (ends[1] - start[1])
+        _try_step(path, state, trials, y, far, start, ends, stiffness, angle_given, slopes, following)
+        if following[2] >= 1.0:
+            _try_step(path, state, trials, y, near, start, ends, stiffness, angle_given, slopes, following)
+            _hit_end(path, state, trials, y, far, start, ends, stiffness, angle_given, slopes, following)
+            _set(path, state, trials, following, start, ends, stiffness, angle_given)
+            return 1.0, False
+        _set(path, state, trials, following, start, ends, stiffness, angle_given)
         reached = _handle(path, state, event, c, start, ends, stiffness, angle_given)
-        _refresh(path, state)
-        return following[3], reached
+        return following[2], reached
     return -1.0, False
 
 
 @njit(cache=True)
-def _hit_end(path, state, before, y, h, start, ends, stiffness, angle_given, slopes, following):
+def _hit_end(path, state, trials, y, h, start, ends, stiffness, angle_given, slopes, following):
     """Shorten a step of length h so that it ends where s = 1 (regula falsi, Illinois)."""
     near, far = 0.0, h
-    miss_near, miss_far = y[3] - 1.0, following[3] - 1.0
+    miss_near, miss_far = y[2] - 1.0, following[2] - 1.0
     if miss_far < 0.0:
-        _try_step(path, state, before, y, h, start, ends, stiffness, angle_given, slopes, following)
-        miss_far = following[3] - 1.0
+        _try_step(path, state, trials, y, h, start, ends, stiffness, angle_given, slopes, following)
+        miss_far = following[2] - 1.0
     for _ in range(60):
-        if abs(following[3] - 1.0) <= 2e-16:
+        if abs(following[2] - 1.0) <= 2e-16:
             break
         middle = far - miss_far * (far - near) / (miss_far - miss_near)
         if not near < middle < far:
             break
-        _try_step(path, state, before, y, middle, start, ends, stiffness, angle_given, slopes, following)
-        miss = following[3] - 1.0
+        _try_step(path, state, trials, y, middle, start, ends, stiffness, angle_given, slopes, following)
+        miss = following[2] - 1.0
         if miss > 0.0:
             far, miss_far = middle, miss
             miss_near *= 0.5
         else:
             near, miss_near = middle, miss
             miss_far *= 0.5
-    following[3] = 1.0
-
-
-@njit(cache=True)
-def _arrive(path, state, trial, start, ends, stiffness, angle_given):
-    """Close a step at s = 1: the displacements as given, the load balanced anew where its torque is given."""
-    state.value[PAIR, DRIVE] = ends[0]
-    if angle_given:
-        state.value[PAIR, LOAD] = ends[1]
-        _refresh(path, state)
-    else:
-        _refresh(path, state)
-        state.value[PAIR, GIVEN] = ends[1]
-        _balance(path, state, trial, ends[1], stiffness, _way(start, ends))
-    return 1.0, False
-
-
-@njit(cache=True)
-def _refresh(path, state):
-    """Write down end tensions after an integration."""
-    for c in range(2):
-        if state.kind[c, MODE] == FRONTS:
-            state.value[c, T_DRIVE] = state.front[2 * c, P]
-            state.value[c, T_LOAD] = state.front[2 * c + 1, P]
-        else:
-            pull_line(path, state, c)
+    following[2] = 1.0
 
 
 @njit(cache=True)
