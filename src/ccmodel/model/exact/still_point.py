@@ -38,7 +38,6 @@ from ccmodel.model.exact.cable import (
     about_still_point,
     elongation,
     end_compliance,
-    is_slack,
     keep,
     line_stiffness,
     position,
@@ -52,7 +51,8 @@ from ccmodel.model.exact.path import LUMP, NODE, PASSED
 REACHED, STUCK = 0, 1
 # What stands for 1 / 0: a side without compliance.
 RIGID = 1e100
-# Elongation that is rounding of the displacements it is the difference of, relative to them.
+# A still point is followed down to this elongation, relative to the displacements that it is the difference of: below,
+# the cable is as good as slack. It counts as taut again from twice that.
 FAINT = 1e-12
 TOLERANCE = 1e-13
 MAX_EVENTS = 1000
@@ -112,6 +112,14 @@ def _is_still(state, c):
 
 
 @njit(cache=True)
+def _is_above(state, c, factor):
+    """Whether a cable that is there is stretched by more than `factor` times what its displacements' rounding leaves."""
+    drive, load = state.value[PAIR, DRIVE], state.value[PAIR, LOAD]
+    rounding = FAINT * (abs(state.value[c, E0]) + abs(drive) + abs(load))
+    return state.value[c, STIFFNESS] > 0.0 and elongation(state, c) > factor * rounding
+
+
+@njit(cache=True)
 def _crossed(path, state, c):
     """Whether fronts that slide against each other have met."""
     if state.kind[c, MODE] != FRONTS:
@@ -151,7 +159,7 @@ def _changed_kind(path, state, before):
     for c in range(2):
         if _crossed(path, state, c):
             return True
-        if state.kind[c, MODE] == WHOLE and is_slack(before, c) and elongation(state, c) > 0.0:
+        if state.kind[c, MODE] == WHOLE and _is_above(state, c, 2.0):
             return True
     return False
 
@@ -205,7 +213,7 @@ def _settle_meetings(path, state, start, ends, stiffness, angle_given):
         if _crossed(path, state, c):
             m = _meeting(path, state, c)
             _set_still(state, c, sigma, min(max(m, 0.0), path.total))
-        elif state.kind[c, MODE] == WHOLE and elongation(state, c) > 0.0 and state.value[c, STIFFNESS + 0] > 0.0:
+        elif state.kind[c, MODE] == WHOLE and _is_above(state, c, 2.0):
             if path.total == 0.0:
                 continue
             _set_still(state, c, sigma, 0.0)
@@ -372,19 +380,11 @@ def _derivative(path, state, trials, y, start, ends, stiffness, angle_given, out
     _, drive, load = _rates(path, state, start, ends, stiffness, angle_given)
     pace = 1.0
     for c in range(2):
-        if not _is_faint(state, c):
-            pace += abs(drive[c]) + abs(load[c])
+        pace += abs(drive[c]) + abs(load[c])
     for c in range(2):
-        moves = _is_still(state, c) and state.kind[c, PINNED] == 0 and not _is_faint(state, c)
+        moves = _is_still(state, c) and state.kind[c, PINNED] == 0
         out[c] = 0.5 * state.kind[c, LINE] * (drive[c] - load[c]) / pace if moves else 0.0
     out[2] = 1.0 / pace
-
-
-@njit(cache=True)
-def _is_faint(state, c):
-    """Whether a cable is as good as slack: its still point then cannot be followed, nor does it matter."""
-    drive, load = state.value[PAIR, DRIVE], state.value[PAIR, LOAD]
-    return elongation(state, c) <= FAINT * (abs(state.value[c, E0]) + abs(drive) + abs(load))
 
 
 @njit(cache=True)
@@ -444,7 +444,7 @@ def _event(path, state, start, ends, stiffness, angle_given):
     for c in range(2):
         mode = state.kind[c, MODE]
         if mode == STILL_POINT:
-            if elongation(state, c) <= 0.0:
+            if not _is_above(state, c, 1.0):
                 return SLACK, c
             piece, m = state.kind[c, STILL_PIECE], state.value[c, M_STILL]
             if state.kind[c, PINNED]:
@@ -459,7 +459,7 @@ def _event(path, state, start, ends, stiffness, angle_given):
         elif mode == FRONTS:
             if _crossed(path, state, c):
                 return MEETING, c
-        elif elongation(state, c) > 0.0 and state.value[c, STIFFNESS + 0] > 0.0:
+        elif _is_above(state, c, 2.0):
             return TAUT, c
     return NOTHING, 0
 
@@ -545,9 +545,7 @@ def _handle(path, state, event, c, start, ends, stiffness, angle_given):
     if event == SLACK:
         state.kind[c, MODE] = WHOLE
         state.kind[c, LINE] = -1
-        # Slack begins where elongation ends, whatever rounding has left of it.
-        state.value[c, T_DRIVE] = 0.0
-        state.value[c, T_LOAD] = 0.0
+        pull_line(path, state, c)
         return False
     if event == UNPINNED:
         return _leave(path, state, c, start, ends, stiffness, angle_given)
