@@ -2,7 +2,7 @@
 
 from numba import njit
 
-from ccmodel.model.exact.along import move_along, step_along
+from ccmodel.model.exact.along import balance_lines, move_along, step_along
 from ccmodel.model.exact.cable import (
     D_START,
     DRIVE,
@@ -109,7 +109,11 @@ def _step_given(path, state, trials, drive, given, stiffness):
         if drive_rate == 0.0 and given_rate == 0.0:
             return DONE
         way = 1 if drive_rate > 0.0 or (drive_rate == 0.0 and given_rate < 0.0) else -1
-        if path.total > 0.0 and _push(path, state, way, abs(drive_rate), given_rate) < 0.0:
+        if path.total == 0.0:
+            state.value[PAIR, DRIVE], state.value[PAIR, GIVEN] = drive, given
+            balance_lines(path, state, given, stiffness)
+            return DONE
+        if _push(path, state, way, abs(drive_rate), given_rate) < 0.0:
             return APART
         _step_along_to_slack(path, state, trials, way, drive, given, stiffness)
     return STUCK
@@ -145,7 +149,7 @@ def _step_along_to_slack(path, state, trials, way, drive, given, stiffness):
     released = (1 + way) // 2
     was_slack = is_slack(state, released)
     step_along(path, state, trials[0], way, drive, given, stiffness)
-    if was_slack or not is_slack(state, released) or way * (given - start_given) <= 0.0 or path.total == 0.0:
+    if was_slack or not is_slack(state, released) or way * (given - start_given) <= 0.0:
         return
     if _push(path, state, way, abs(drive - start_drive), given - start_given) >= 0.0:
         return

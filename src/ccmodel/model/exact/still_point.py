@@ -52,8 +52,8 @@ REACHED, STUCK = 0, 1
 # What stands for 1 / 0: a side without compliance.
 RIGID = 1e100
 # A still point is followed down to this elongation, relative to the displacements that it is the difference of: below,
-# the cable is as good as slack. It counts as taut again from twice that.
-FAINT = 1e-12
+# the cable is as good as slack. It counts as taut again from some hundred times that.
+FAINT, TAUT_AGAIN = 1e-12, 100.0
 TOLERANCE = 1e-13
 MAX_EVENTS = 1000
 # What an integration step was ended by.
@@ -159,7 +159,7 @@ def _changed_kind(path, state, before):
     for c in range(2):
         if _crossed(path, state, c):
             return True
-        if state.kind[c, MODE] == WHOLE and _is_above(state, c, 2.0):
+        if state.kind[c, MODE] == WHOLE and _is_above(state, c, TAUT_AGAIN):
             return True
     return False
 
@@ -213,7 +213,7 @@ def _settle_meetings(path, state, start, ends, stiffness, angle_given):
         if _crossed(path, state, c):
             m = _meeting(path, state, c)
             _set_still(state, c, sigma, min(max(m, 0.0), path.total))
-        elif state.kind[c, MODE] == WHOLE and _is_above(state, c, 2.0):
+        elif state.kind[c, MODE] == WHOLE and _is_above(state, c, TAUT_AGAIN):
             if path.total == 0.0:
                 continue
             _set_still(state, c, sigma, 0.0)
@@ -429,13 +429,21 @@ def _try_step(path, state, trials, y, h, start, ends, stiffness, angle_given, sl
             following[i] = y[i] + h * total
         _derivative(path, state, trials, following, start, ends, stiffness, angle_given, slopes[stage])
     worst = 0.0
-    scale = (path.total, path.total, 1.0)
+    # What counts is tension: in a cable that is all but slack the still point need not be known so well.
+    e_A, e_B = elongation(state, 0), elongation(state, 1)
+    most = max(e_A, e_B)
+    scale = (path.total * _looser(most, e_A), path.total * _looser(most, e_B), 1.0)
     for i in range(3):
         error = 0.0
         for j in range(7):
             error += ERROR[j] * slopes[j, i]
         worst = max(worst, abs(h * error) / scale[i])
     return worst / TOLERANCE
+
+
+@njit(cache=True)
+def _looser(most, e):
+    return min(max(1.0, most / e), 1e7) if e > 0.0 else 1.0
 
 
 @njit(cache=True)
@@ -459,7 +467,7 @@ def _event(path, state, start, ends, stiffness, angle_given):
         elif mode == FRONTS:
             if _crossed(path, state, c):
                 return MEETING, c
-        elif _is_above(state, c, 2.0):
+        elif _is_above(state, c, TAUT_AGAIN):
             return TAUT, c
     return NOTHING, 0
 
