@@ -61,7 +61,9 @@ def test_lost_motion_before_the_far_end_feels_a_reversal():
     assert response.T_near_N[1] == pytest.approx(Tm * np.exp(-2 * M), rel=1e-8)
 
 
-@pytest.mark.parametrize(("way", "stiffness"), [(1, 1 / (-np.expm1(-M) * COMPLIANCE)), (-1, 1 / (np.expm1(M) * COMPLIANCE))])
+@pytest.mark.parametrize(
+    ("way", "stiffness"), [(1, 1 / (-np.expm1(-M) * COMPLIANCE)), (-1, 1 / (np.expm1(M) * COMPLIANCE))]
+)
 def test_apparent_stiffness_in_full_slip_differs_by_direction(way, stiffness):
     response = run(np.array([0.0, 1.0, 2.0]) * way * 1e-4, line(40.0, -way))
     assert np.diff(response.T_near_N) == pytest.approx(way * 1e-4 * stiffness, rel=1e-12)

@@ -22,12 +22,16 @@ def still_point_by_scipy(path, initial_m, elongation, a, b, sigma):
 
     def compliance(low, high, value):
         points = [m for m in node_m if low < m < high]
+
         def integrand(m):
             x_per_m = np.interp(m, node_m, np.arange(node_m.size))
             i = min(int(x_per_m), node_m.size - 2)
             return value(m) * (node_x[i + 1] - node_x[i]) / (node_m[i + 1] - node_m[i]) / EA
+
         edges = [low, *points, high]
-        return sum(quad(integrand, p, q, epsabs=1e-16, epsrel=1e-13)[0] for p, q in zip(edges[:-1], edges[1:], strict=True))
+        return sum(
+            quad(integrand, p, q, epsabs=1e-16, epsrel=1e-13)[0] for p, q in zip(edges[:-1], edges[1:], strict=True)
+        )
 
     def rate(s, y):
         m = y[0]
@@ -139,4 +143,6 @@ def test_a_far_force_a_cable_cannot_push_is_said():
     assert response.status is Status.UNBALANCED
     assert "only pull" in response.status.value
     assert np.isfinite(response.T_near_N).all()
-    assert simulate_cable(PATH, EA, MU, SpringEnd(0.0), np.zeros(3), InitialTension.uniform(1.0, PATH)).status is Status.OK
+    assert (
+        simulate_cable(PATH, EA, MU, SpringEnd(0.0), np.zeros(3), InitialTension.uniform(1.0, PATH)).status is Status.OK
+    )
