@@ -74,13 +74,13 @@ def step_along(path, state, kept, way, drive, given, stiffness):
     balance_lines(path, state, given, stiffness)
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def excess(state, given, stiffness):
     """T2 - T4 less what the load takes, N."""
     return state.value[0, T_LOAD] - state.value[1, T_LOAD] - given - stiffness * state.value[PAIR, LOAD]
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def balance_lines(path, state, given, stiffness):
     """Balance the load where both cables move as a whole, taut or slack."""
     k_A = line_stiffness(path, state, 0)[1]
@@ -92,7 +92,7 @@ def balance_lines(path, state, given, stiffness):
     pull_line(path, state, 1)
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def balanced(k_A, e_A, k_B, e_B, given, stiffness, load):
     """Q with k_A max(0, e_A - Q) - k_B max(0, e_B + Q) = given + stiffness Q; `load` where nothing holds the load."""
     total = k_A + k_B + stiffness

@@ -84,7 +84,7 @@ def keep(state, kept):
             kept.kind[i, j] = state.kind[i, j]
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def elongation(state, c):
     """End-to-end elongation of cable `c` beyond its natural length, m."""
     sign = 1.0 - 2.0 * c
@@ -111,7 +111,7 @@ def _curl(s, y):
     return exp(s * y) * expm1(y) - expm1(s * y) / s
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _tension_gain(slope, r):
     """End tension over end tension at entry, less one."""
     if slope == 1.0:
@@ -119,7 +119,7 @@ def _tension_gain(slope, r):
     return expm1((1.0 + slope) * log1p(r))
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _displacement_gain(front, c, end, sigma, r):
     """End displacement since the segment was entered, m."""
     T_e, E, bend, slope = (
@@ -134,7 +134,7 @@ def _displacement_gain(front, c, end, sigma, r):
     return T_e * (E * expm1((1.0 + slope) * y) + sigma * bend * _curl(slope, y))
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _solve_segment(front, c, end, sigma, weight_P, weight_d, residual):
     """R at which weight_P (P - P_e) + weight_d (d - d_e) = residual, within the segment."""
     T_e, P_e, E, bend = front[2 * c + end, TE], front[2 * c + end, PE], front[2 * c + end, EE], front[2 * c + end, BEND]
@@ -242,7 +242,7 @@ def _cross(path, state, c, end, corner, node):
         state.front[2 * c + end, EE] += path.table[end, LUMP, state.kind[c, PIECE + 3 * end]]
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def walk(path, state, c, end, weight_P, weight_d, target):
     """Draw a front inward until weight_P P + weight_d d = target, P the end's tension and d its displacement.
 
@@ -290,7 +290,7 @@ def _pass_segment(path, state, c, end, sigma, r):
     aim(path, state, c, end)
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def position(state, c, end):
     """How far a front has come, in m counted from its end."""
     return state.front[2 * c + end, ME] + state.kind[c, SIGMA + 3 * end] * log1p(state.front[2 * c + end, R])
@@ -306,7 +306,7 @@ def end_compliance(state, c, end):
     return per_front_tension * exp(-sigma * position(state, c, end))
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def has_met(path, state, c):
     """Whether fronts that slide the same way have met: then their lines are one line."""
     if state.kind[c, OPEN] == 0 or state.kind[c, OPEN + 3] == 0:
@@ -405,7 +405,7 @@ def about_still_point(path, state, c):
     return passed(path, 0, sigma, piece, m), passed(path, 1, sigma, last - 1 - piece, path.total - m)
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def line_stiffness(path, state, c):
     """Tension per elongation, N/m, at the drive and at the load end of a cable that moves as a whole."""
     if state.kind[c, MODE] == WHOLE:
@@ -418,7 +418,7 @@ def line_stiffness(path, state, c):
     return rise_drive / per_lowest, rise_load / per_lowest
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def pull_line(path, state, c):
     """End tensions of a cable that moves as a whole, from its elongation; none where it is slack."""
     stretch = max(0.0, elongation(state, c))
@@ -427,7 +427,7 @@ def pull_line(path, state, c):
     state.value[c, T_LOAD] = load * stretch
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def is_slack(state, c):
     """Whether a cable hangs without tension: it then has no memory."""
     return state.kind[c, MODE] == WHOLE and elongation(state, c) <= 0.0

@@ -170,7 +170,7 @@ def _step_along_to_slack(path, state, trials, way, drive, given, stiffness):
     step_along(path, state, trials[0], way, at[0], at[1], stiffness)
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _any_slack(state, present):
     for c in range(2):
         if present[c] and is_slack(state, c):
@@ -178,7 +178,7 @@ def _any_slack(state, present):
     return 0
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _phase(state, present, progress):
     """1 to 3 for phases I to III, 4 for IVa, 5 for IVb."""
     if _any_slack(state, present):
@@ -191,7 +191,7 @@ def _phase(state, present, progress):
     return 1 + reached
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def moving(path, state, c):
     """Arc length from the drive end up to which, and from which on, a cable has moved since its ends last turned, m."""
     if state.kind[c, MODE] == WHOLE:
@@ -213,7 +213,7 @@ def _still_x(path, state, c):
     return path.table[0, X_START, piece] + path.table[0, X_PER_M, piece] * (m - path.table[0, NODE, piece])
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _reach(path, state, c, end):
     if state.front[2 * c + end, D] == state.front[2 * c + end, D_START]:
         return 0.0
