@@ -1,5 +1,7 @@
 """Both ends drawn apart or let in at once: the point that stays still, against an independent integration."""
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
@@ -29,9 +31,7 @@ def still_point_by_scipy(path, initial_m, elongation, a, b, sigma):
             return value(m) * (node_x[i + 1] - node_x[i]) / (node_m[i + 1] - node_m[i]) / EA
 
         edges = [low, *points, high]
-        return sum(
-            quad(integrand, p, q, epsabs=1e-16, epsrel=1e-13)[0] for p, q in zip(edges[:-1], edges[1:], strict=True)
-        )
+        return sum(quad(integrand, p, q, epsabs=1e-16, epsrel=1e-13)[0] for p, q in itertools.pairwise(edges))
 
     def rate(s, y):
         m = y[0]

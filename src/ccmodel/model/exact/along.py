@@ -5,8 +5,6 @@ R_o theta_out solves T2 - T4 = given + stiffness Q, whose left side falls with Q
 whole, a quadratic a segment where it does not.
 """
 
-from numba import njit
-
 from ccmodel.model.exact.cable import (
     DRIVE,
     E0,
@@ -29,9 +27,10 @@ from ccmodel.model.exact.cable import (
     turn,
     walk,
 )
+from ccmodel.model.exact.kernel import kernel, small_kernel
 
 
-@njit(cache=True)
+@kernel
 def step_along(path, state, kept, way, drive, given, stiffness):
     """Move the drive to `drive` (m) and the load law's constant part to `given` (N), the load following the drive.
 
@@ -74,13 +73,13 @@ def step_along(path, state, kept, way, drive, given, stiffness):
     balance_lines(path, state, given, stiffness)
 
 
-@njit(cache=True, forceinline=True)
+@small_kernel
 def excess(state, given, stiffness):
     """T2 - T4 less what the load takes, N."""
     return state.value[0, T_LOAD] - state.value[1, T_LOAD] - given - stiffness * state.value[PAIR, LOAD]
 
 
-@njit(cache=True, forceinline=True)
+@small_kernel
 def balance_lines(path, state, given, stiffness):
     """Balance the load where both cables move as a whole, taut or slack."""
     k_A = line_stiffness(path, state, 0)[1]
@@ -92,7 +91,7 @@ def balance_lines(path, state, given, stiffness):
     pull_line(path, state, 1)
 
 
-@njit(cache=True, forceinline=True)
+@small_kernel
 def balanced(k_A, e_A, k_B, e_B, given, stiffness, load):
     """Q with k_A max(0, e_A - Q) - k_B max(0, e_B + Q) = given + stiffness Q; `load` where nothing holds the load."""
     total = k_A + k_B + stiffness
@@ -106,7 +105,7 @@ def balanced(k_A, e_A, k_B, e_B, given, stiffness, load):
     return q
 
 
-@njit(cache=True)
+@kernel
 def one_front(path, state, kept, c, given, stiffness):
     """Balance the load where cable `c` has fronts and the other moves as a whole, taut or slack."""
     other = 1 - c
@@ -126,7 +125,7 @@ def one_front(path, state, kept, c, given, stiffness):
     pull_line(path, state, other)
 
 
-@njit(cache=True)
+@kernel
 def both_fronts(path, state, kept, way, given, stiffness):
     """Balance the load between two fronts, as if they could not meet others, the load moving in direction `way`.
 
@@ -164,7 +163,7 @@ def both_fronts(path, state, kept, way, given, stiffness):
     state.value[1, T_LOAD] = state.front[2 + 1, P]
 
 
-@njit(cache=True)
+@kernel
 def _first_whole(path, state, kept, way):
     """Let the cable whose fronts meet after the lesser displacement of the load slide whole; returns the other."""
     keep(state, kept)
@@ -180,7 +179,7 @@ def _first_whole(path, state, kept, way):
     return 1 - first
 
 
-@njit(cache=True)
+@kernel
 def move_along(path, state, way, drive, load):
     """Move both ends to given displacements, the load end following the drive end or at rest."""
     turn(path, state, 0, way, -way)

@@ -16,9 +16,9 @@ from math import exp, expm1, log1p, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ccmodel.model.exact.kernel import kernel, small_kernel
 from ccmodel.model.exact.path import LUMP, NODE, PASSED, PER_M
 
 FRONTS, WHOLE, STILL_POINT = 0, 1, 2
@@ -26,8 +26,8 @@ FRONTS, WHOLE, STILL_POINT = 0, 1, 2
 # Rows of `State.corner`: position, tension, d ln T / dm from a corner to the next.
 C_M, C_T, C_SLOPE = range(3)
 # Fields of `State.front`: where the segment was entered (position, front's and end's tension, compliance,
-# displacement), where it stops, its slope relative to the line, its bend's compliance, r at its stop and now, end tension and
-# displacement now, displacement at which the front set out.
+# displacement), where it stops, its slope relative to the line, its bend's compliance, r at its stop and now, end
+# tension and displacement now, displacement at which the front set out.
 ME, TE, PE, EE, DE, STOP, SLOPE, BEND, R_STOP, R, P, D, D_START = range(13)
 # Fields of `State.value`, rows 0 and 1: elongation at the zero of all angles, position of a still point, tensions at
 # both ends, drive-end tension per elongation on a line of slope -1, +1 (zero for a cable that is not there).
@@ -35,11 +35,11 @@ E0, M_STILL, T_DRIVE, T_LOAD, STIFFNESS = range(5)
 # Row 2: displacement of the drive and of the load pulley's rim, the load law's constant part.
 PAIR = 2
 DRIVE, LOAD, GIVEN = range(3)
-# Fields of `State.kind`: the corners last passed by the front at the drive and at the load, first and last corner of the
-# list (a front does not see what the other one has passed), what a cable does (mode), slope of a whole slide or sigma of a still
-# point, the piece a still point is in, whether it stands in a straight stretch (at that piece's first node); then of
-# the front at the drive end (at the load end 3 further on) sigma (0: none), the bend it is in, whether anything is
-# ahead.
+# Fields of `State.kind`: the corners last passed by the front at the drive and at the load; first and last corner of
+# the list (a front does not see what the other one has passed); what a cable does (mode); slope of a whole slide or
+# sigma of a still point; the piece a still point is in, whether it stands in a straight stretch (at that piece's first
+# node); then of the front at the drive end (at the load end 3 further on) sigma (0: none), the bend it is in, whether
+# anything lies ahead.
 LO, HI, FIRST, LAST, MODE, LINE, STILL_PIECE, PINNED, SIGMA, PIECE, OPEN = range(11)
 
 # Two lines that differ by less, relative to their tension, are one.
@@ -70,7 +70,7 @@ def blank_state(capacity: int) -> State:
     return State(np.zeros((3, 2, capacity)), np.zeros((4, 13)), np.zeros((3, 6)), np.zeros((2, 14), dtype=np.int64))
 
 
-@njit(cache=True)
+@kernel
 def keep(state, kept):
     """Copy what a step may change (all but the corners, which a step only drops) from `state` to `kept`."""
     for i in range(4):
@@ -84,7 +84,7 @@ def keep(state, kept):
             kept.kind[i, j] = state.kind[i, j]
 
 
-@njit(cache=True, forceinline=True)
+@small_kernel
 def elongation(state, c):
     """End-to-end elongation of cable `c` beyond its natural length, m."""
     sign = 1.0 - 2.0 * c
@@ -94,7 +94,7 @@ def elongation(state, c):
 # ---------------------------------------------------------------------------------------------- one segment of a sweep
 
 
-@njit(cache=True)
+@kernel
 def _curl(s, y):
     """exp((s + 1) y) - exp(s y) - (exp(s y) - 1) / s: what a line of slope s adds over y, in tension times c."""
     if abs(y) < 0.3:
@@ -111,7 +111,7 @@ def _curl(s, y):
     return exp(s * y) * expm1(y) - expm1(s * y) / s
 
 
-@njit(cache=True, forceinline=True)
+@small_kernel
 def _tension_gain(slope, r):
     """End tension over end tension at entry, less one."""
     if slope == 1.0:
@@ -119,7 +119,7 @@ def _tension_gain(slope, r):
     return expm1((1.0 + slope) * log1p(r))
 
 
-@njit(cache=True, forceinline=True)
+@small_kernel
 def _displacement_gain(front, c, end, sigma, r):
     """End displacement since the segment was entered, m."""
     T_e, E, bend, slope = (
@@ -134,7 +134,7 @@ def _displacement_gain(front, c, end, sigma, r):
     return T_e * (E * expm1((1.0 + slope) * y) + sigma * bend * _curl(slope, y))
 
 
-@njit(cache=True, forceinline=True)
+@small_kernel
 def _solve_segment(front, c, end, sigma, weight_P, weight_d, residual):
     """R at which weight_P (P - P_e) + weight_d (d - d_e) = residual, within the segment."""
     T_e, P_e, E, bend = front[2 * c + end, TE], front[2 * c + end, PE], front[2 * c + end, EE], front[2 * c + end, BEND]
@@ -146,7 +146,7 @@ def _solve_segment(front, c, end, sigma, weight_P, weight_d, residual):
     return _solve_sloping(slope, b, weight_d * T_e * sigma * bend, residual, log1p(front[2 * c + end, R_STOP]))
 
 
-@njit(cache=True)
+@kernel
 def _solve_sloping(slope, b, k, residual, y_stop):
     """R = expm1(y) with b expm1((1 + slope) y) + k curl(y) = residual, y 0 <= y / y_stop <= 1, by guarded Newton."""
     near, far = 0.0, y_stop
@@ -172,7 +172,7 @@ def _solve_sloping(slope, b, k, residual, y_stop):
 # ------------------------------------------------------------------------------------------------------------- a front
 
 
-@njit(cache=True)
+@kernel
 def start_front(path, state, c, end, sigma):
     """Let a new front set out from an end, from the tension and displacement that stand there now."""
     sign = 1.0 - 2.0 * c
@@ -192,7 +192,7 @@ def start_front(path, state, c, end, sigma):
     aim(path, state, c, end)
 
 
-@njit(cache=True)
+@kernel
 def aim(path, state, c, end):
     """Look at what lies ahead of a front's point of entry; what already has the line's slope is taken at once."""
     front, kind = state.front, state.kind
@@ -227,7 +227,7 @@ def aim(path, state, c, end):
         _cross(path, state, c, end, corner <= stop, node <= stop)
 
 
-@njit(cache=True)
+@kernel
 def _cross(path, state, c, end, corner, node):
     """Leave a corner of the old profile and a node of the path behind."""
     if corner:
@@ -242,7 +242,7 @@ def _cross(path, state, c, end, corner, node):
         state.front[2 * c + end, EE] += path.table[end, LUMP, state.kind[c, PIECE + 3 * end]]
 
 
-@njit(cache=True, forceinline=True)
+@small_kernel
 def walk(path, state, c, end, weight_P, weight_d, target):
     """Draw a front inward until weight_P P + weight_d d = target, P the end's tension and d its displacement.
 
@@ -271,7 +271,7 @@ def walk(path, state, c, end, weight_P, weight_d, target):
     front[2 * c + end, D] = front[2 * c + end, DE]
 
 
-@njit(cache=True)
+@kernel
 def _pass_segment(path, state, c, end, sigma, r):
     front = state.front
     slope = front[2 * c + end, SLOPE]
@@ -290,13 +290,13 @@ def _pass_segment(path, state, c, end, sigma, r):
     aim(path, state, c, end)
 
 
-@njit(cache=True, forceinline=True)
+@small_kernel
 def position(state, c, end):
     """How far a front has come, in m counted from its end."""
     return state.front[2 * c + end, ME] + state.kind[c, SIGMA + 3 * end] * log1p(state.front[2 * c + end, R])
 
 
-@njit(cache=True)
+@kernel
 def end_compliance(state, c, end):
     """Displacement of an end per unit of its own tension while its front goes on, m/N."""
     front = state.front
@@ -306,7 +306,7 @@ def end_compliance(state, c, end):
     return per_front_tension * exp(-sigma * position(state, c, end))
 
 
-@njit(cache=True, forceinline=True)
+@small_kernel
 def has_met(path, state, c):
     """Whether fronts that slide the same way have met: then their lines are one line."""
     if state.kind[c, OPEN] == 0 or state.kind[c, OPEN + 3] == 0:
@@ -320,7 +320,7 @@ def has_met(path, state, c):
 # --------------------------------------------------------------------------------------------------- keeping a profile
 
 
-@njit(cache=True)
+@kernel
 def _commit_front(path, state, c, end):
     """Write the line drawn in from an end into the list of corners."""
     sigma = state.kind[c, SIGMA + 3 * end]
@@ -351,7 +351,7 @@ def _commit_front(path, state, c, end):
         state.kind[c, LAST] = hi + 1
 
 
-@njit(cache=True)
+@kernel
 def _commit_line(path, state, c):
     """Make a whole slide's line, or the two about a still point, the old profile."""
     kind = state.kind
@@ -376,7 +376,7 @@ def _commit_line(path, state, c):
     state.kind[c, SIGMA + 3] = 0
 
 
-@njit(cache=True)
+@kernel
 def slide_whole(path, state, c, line):
     """Cable `c` slides along its whole length on a line of slope `line`."""
     state.kind[c, MODE] = WHOLE
@@ -384,7 +384,7 @@ def slide_whole(path, state, c, line):
     pull_line(path, state, c)
 
 
-@njit(cache=True)
+@kernel
 def passed(path, end, sigma, piece, m):
     """Integral of exp(-sigma m) dx / EA from an end to `m` (counted from it) in bend `piece` (likewise), m/N."""
     node = path.table[end, NODE, piece]
@@ -392,7 +392,7 @@ def passed(path, end, sigma, piece, m):
     return path.table[end, PASSED + (sigma + 1) // 2, piece] + bend
 
 
-@njit(cache=True)
+@kernel
 def about_still_point(path, state, c):
     """Compliance on the drive's and the load's side of a still point, per unit of that end's tension, m/N."""
     sigma, piece, m = state.kind[c, LINE], state.kind[c, STILL_PIECE], state.value[c, M_STILL]
@@ -405,7 +405,7 @@ def about_still_point(path, state, c):
     return passed(path, 0, sigma, piece, m), passed(path, 1, sigma, last - 1 - piece, path.total - m)
 
 
-@njit(cache=True, forceinline=True)
+@small_kernel
 def line_stiffness(path, state, c):
     """Tension per elongation, N/m, at the drive and at the load end of a cable that moves as a whole."""
     if state.kind[c, MODE] == WHOLE:
@@ -418,7 +418,7 @@ def line_stiffness(path, state, c):
     return rise_drive / per_lowest, rise_load / per_lowest
 
 
-@njit(cache=True, forceinline=True)
+@small_kernel
 def pull_line(path, state, c):
     """End tensions of a cable that moves as a whole, from its elongation; none where it is slack."""
     stretch = max(0.0, elongation(state, c))
@@ -427,13 +427,13 @@ def pull_line(path, state, c):
     state.value[c, T_LOAD] = load * stretch
 
 
-@njit(cache=True, forceinline=True)
+@small_kernel
 def is_slack(state, c):
     """Whether a cable hangs without tension: it then has no memory."""
     return state.kind[c, MODE] == WHOLE and elongation(state, c) <= 0.0
 
 
-@njit(cache=True)
+@kernel
 def turn(path, state, c, sigma_drive, sigma_load):
     """Make cable `c` ready for its ends to move as pulls (+1) or releases (-1): what turns round leaves a corner."""
     kind = state.kind
@@ -465,7 +465,7 @@ def turn(path, state, c, sigma_drive, sigma_load):
             _shorten(path, state, c, end)
 
 
-@njit(cache=True)
+@kernel
 def _shorten(path, state, c, end):
     """Stop a front short where the other end has just left a corner in the segment it is in."""
     if state.kind[c, OPEN + 3 * end] == 0:

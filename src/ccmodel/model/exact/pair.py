@@ -199,7 +199,9 @@ def simulate_pair(
     Parameters
     ----------
     transmission : Transmission
+        Path, cables and pulleys.
     load : SpringLoad, TorqueLoad or AngleLoad
+        What the load pulley drives; series have one value a sample of the drive.
     theta_in_rad : ndarray, shape (n,)
         Angle of the drive pulley, zero where the initial tension stands; the first sample may be elsewhere.
     initial : InitialTension
@@ -263,15 +265,19 @@ def simulate_cable(
     Parameters
     ----------
     path : ConduitPath
+        From the near, driven end to the far end.
     axial_rigidity_N : float
         EA, N.
     friction_coefficient : float
+        mu between cable and conduit.
     far_end : FixedEnd, SpringEnd, ForceEnd or MotionEnd
+        What holds the far end.
     displacement_m : ndarray, shape (n,)
         Displacement of the near end, positive out of the conduit (a pull), zero where the initial tension stands.
     initial : InitialTension
         Its cable B plays no part.
     record_profiles_at : sequence of int
+        Samples at which the tension along the cable is kept.
 
     Returns
     -------

@@ -1,7 +1,5 @@
 """The loop over samples: what kind of step each is, and what is written down of it."""
 
-from numba import njit
-
 from ccmodel.model.exact.along import balance_lines, move_along, step_along
 from ccmodel.model.exact.cable import (
     D_START,
@@ -29,6 +27,7 @@ from ccmodel.model.exact.cable import (
     position,
     turn,
 )
+from ccmodel.model.exact.kernel import kernel, small_kernel
 from ccmodel.model.exact.path import NODE, X_PER_M, X_START
 
 # How `run` came to its end; APART: the next sample wants `still_point.step_apart` first.
@@ -39,21 +38,34 @@ MARGIN = 64
 MAX_EVENTS = 1000
 
 
-@njit(cache=True)
+@kernel
 def run(path, state, trials, progress, drive, angle_given, given, stiffness, present, out, phase):
     """Simulate from sample progress[0] on; stops early where the list of corners wants more room.
 
     Parameters
     ----------
+    path : PathTables
+        The conduit.
+    state : State
+        What the past has left behind; carried on.
+    trials : tuple of two State
+        Room for what was before a trial.
+    progress : ndarray of int, shape (3,)
+        Next sample, direction of the last stroke, whether slack has lasted through a reversal; carried on.
     drive : ndarray, shape (n,)
         Displacement of the drive pulley's rim, m.
+    angle_given : bool
+        Whether the load's displacement is given, not its law.
     given : ndarray, shape (n,)
         The load law's constant part (N), or the load's displacement (m) where `angle_given`.
-    progress : ndarray, shape (3,)
-        Next sample, direction of the last stroke, whether slack has lasted through a reversal.
+    stiffness : float
+        The load law's stiffness, N/m.
+    present : ndarray of bool, shape (2,)
+        Whether cables A and B are there.
     out : ndarray, shape (9, n)
         T1, T2, T3, T4, Q, and arc length of the moving stretches' limits: A at drive and load, B likewise.
-    phase : ndarray, shape (n,)
+    phase : ndarray of int, shape (n,)
+        1 to 3 for phases I to III, 4 for IVa, 5 for IVb.
     """
     for i in range(progress[0], drive.size):
         for c in range(2):
@@ -89,7 +101,7 @@ def run(path, state, trials, progress, drive, angle_given, given, stiffness, pre
     return DONE
 
 
-@njit(cache=True)
+@kernel
 def _step_angle(path, state, way, drive, load):
     """Move both pulleys to given angles, linearly and together."""
     load_rate = load - state.value[PAIR, LOAD]
@@ -101,7 +113,7 @@ def _step_angle(path, state, way, drive, load):
     return DONE
 
 
-@njit(cache=True)
+@kernel
 def _step_given(path, state, trials, drive, given, stiffness):
     """Move drive and given torque together, linearly; the load goes with the drive or against it, as balance wants."""
     for _ in range(MAX_EVENTS):
@@ -119,7 +131,7 @@ def _step_given(path, state, trials, drive, given, stiffness):
     return STUCK
 
 
-@njit(cache=True)
+@kernel
 def _push(path, state, way, drive_rate, given_rate):
     """Rate of T2 - T4 - given in the drive's direction were the load at rest."""
     push = -way * given_rate
@@ -129,7 +141,7 @@ def _push(path, state, way, drive_rate, given_rate):
     return push
 
 
-@njit(cache=True)
+@kernel
 def _at_load(path, state, c, way):
     """Whether the front from the drive, moving in direction `way`, stands at the load."""
     sigma = (1 - 2 * c) * way
@@ -138,7 +150,7 @@ def _at_load(path, state, c, way):
     return state.kind[c, MODE] == STILL_POINT and state.kind[c, LINE] == sigma and state.value[c, M_STILL] == path.total
 
 
-@njit(cache=True)
+@kernel
 def _step_along_to_slack(path, state, trials, way, drive, given, stiffness):
     """Go along with the drive to the end, or to where the released cable hangs slack and the load would turn back."""
     turn(path, state, 0, way, -way)
@@ -170,7 +182,7 @@ def _step_along_to_slack(path, state, trials, way, drive, given, stiffness):
     step_along(path, state, trials[0], way, at[0], at[1], stiffness)
 
 
-@njit(cache=True, forceinline=True)
+@small_kernel
 def _any_slack(state, present):
     for c in range(2):
         if present[c] and is_slack(state, c):
@@ -178,7 +190,7 @@ def _any_slack(state, present):
     return 0
 
 
-@njit(cache=True, forceinline=True)
+@small_kernel
 def _phase(state, present, progress):
     """1 to 3 for phases I to III, 4 for IVa, 5 for IVb."""
     if _any_slack(state, present):
@@ -191,7 +203,7 @@ def _phase(state, present, progress):
     return 1 + reached
 
 
-@njit(cache=True, forceinline=True)
+@small_kernel
 def moving(path, state, c):
     """Arc length from the drive end up to which, and from which on, a cable has moved since its ends last turned, m."""
     if state.kind[c, MODE] == WHOLE:
@@ -202,7 +214,7 @@ def moving(path, state, c):
     return _reach(path, state, c, 0), path.length - _reach(path, state, c, 1)
 
 
-@njit(cache=True)
+@kernel
 def _still_x(path, state, c):
     """Arc length of a still point; of one in a straight stretch, where that stretch begins, m."""
     piece, m = state.kind[c, STILL_PIECE], state.value[c, M_STILL]
@@ -213,7 +225,7 @@ def _still_x(path, state, c):
     return path.table[0, X_START, piece] + path.table[0, X_PER_M, piece] * (m - path.table[0, NODE, piece])
 
 
-@njit(cache=True, forceinline=True)
+@small_kernel
 def _reach(path, state, c, end):
     if state.front[2 * c + end, D] == state.front[2 * c + end, D_START]:
         return 0.0

@@ -12,7 +12,6 @@ move. In a straight stretch tension is the same all along, and m_still rests whi
 from math import exp, inf
 
 import numpy as np
-from numba import njit
 
 from ccmodel.model.exact.along import balance_lines, both_fronts, one_front
 from ccmodel.model.exact.cable import (
@@ -46,6 +45,7 @@ from ccmodel.model.exact.cable import (
     turn,
     walk,
 )
+from ccmodel.model.exact.kernel import kernel
 from ccmodel.model.exact.path import LUMP, NODE, PASSED
 
 REACHED, STUCK = 0, 1
@@ -63,21 +63,30 @@ NOTHING, BEND_LEFT, MEETING, UNPINNED, SLACK, TAUT = range(6)
 # ------------------------------------------------------------------------------------------- before fronts have met
 
 
-@njit(cache=True)
+@kernel
 def step_apart(path, state, trials, ends, stiffness, angle_given):
     """Move the load against the drive until `ends` is reached, or until a cable's drive front reaches the load.
 
     Parameters
     ----------
+    path : PathTables
+        The conduit.
+    state : State
+        What the past has left behind; carried on.
     trials : tuple of two State
         Room for what was before a trial.
     ends : tuple of float
         Drive displacement (m) and given (N; or the load's displacement in m where `angle_given`) to go to, linearly
         and together.
+    stiffness : float
+        The load law's stiffness, N/m.
+    angle_given : bool
+        Whether the load's displacement is given, not its law.
 
     Returns
     -------
     status : int
+        REACHED (either of the two) or STUCK.
     """
     start = (state.value[PAIR, DRIVE], state.value[PAIR, LOAD] if angle_given else state.value[PAIR, GIVEN])
     way = _way(start, ends)
@@ -100,26 +109,26 @@ def step_apart(path, state, trials, ends, stiffness, angle_given):
     return STUCK
 
 
-@njit(cache=True)
+@kernel
 def _way(start, ends):
     """Direction of the drive; the load moves against it."""
     return 1 if ends[0] > start[0] else -1
 
 
-@njit(cache=True)
+@kernel
 def _is_still(state, c):
     return state.kind[c, MODE] == STILL_POINT
 
 
-@njit(cache=True)
+@kernel
 def _is_above(state, c, factor):
-    """Whether a cable that is there is stretched by more than `factor` times what its displacements' rounding leaves."""
+    """Whether a cable that is there is stretched by more than `factor` times what rounding leaves."""
     drive, load = state.value[PAIR, DRIVE], state.value[PAIR, LOAD]
     rounding = FAINT * (abs(state.value[c, E0]) + abs(drive) + abs(load))
     return state.value[c, STIFFNESS] > 0.0 and elongation(state, c) > factor * rounding
 
 
-@njit(cache=True)
+@kernel
 def _crossed(path, state, c):
     """Whether fronts that slide against each other have met."""
     if state.kind[c, MODE] != FRONTS:
@@ -129,7 +138,7 @@ def _crossed(path, state, c):
     return position(state, c, 0) + position(state, c, 1) >= path.total
 
 
-@njit(cache=True)
+@kernel
 def _move_fronts(path, state, trials, s, start, ends, stiffness, angle_given):
     """Move on while no cable has a still point; returns how far, the first meeting at the latest."""
     before = trials[1]
@@ -153,7 +162,7 @@ def _move_fronts(path, state, trials, s, start, ends, stiffness, angle_given):
     return far
 
 
-@njit(cache=True)
+@kernel
 def _changed_kind(path, state, before):
     """Whether a cable's fronts have met, or a slack cable has become taut."""
     for c in range(2):
@@ -164,7 +173,7 @@ def _changed_kind(path, state, before):
     return False
 
 
-@njit(cache=True)
+@kernel
 def _place(path, state, trial, s, start, ends, stiffness, angle_given):
     """Put the ends where they are at `s`, each front for itself."""
     way = _way(start, ends)
@@ -189,7 +198,7 @@ def _place(path, state, trial, s, start, ends, stiffness, angle_given):
     _balance(path, state, trial, given, stiffness, way)
 
 
-@njit(cache=True)
+@kernel
 def _balance(path, state, trial, given, stiffness, way):
     """Balance the load, which moves against `way`, whatever the two cables do."""
     fronts_A, fronts_B = state.kind[0, MODE] == FRONTS, state.kind[1, MODE] == FRONTS
@@ -204,7 +213,7 @@ def _balance(path, state, trial, given, stiffness, way):
 # -------------------------------------------------------------------------------------------------- the still point
 
 
-@njit(cache=True)
+@kernel
 def _settle_meetings(path, state, start, ends, stiffness, angle_given):
     """Give cables whose fronts have met, or that have become taut, a still point; True if the load was reached."""
     way = _way(start, ends)
@@ -226,7 +235,7 @@ def _settle_meetings(path, state, start, ends, stiffness, angle_given):
     return False
 
 
-@njit(cache=True)
+@kernel
 def _meeting(path, state, c):
     """Where fronts that slide against each other have met, m from the drive end."""
     drive, load = position(state, c, 0), position(state, c, 1)
@@ -236,7 +245,7 @@ def _meeting(path, state, c):
     return path.total - load if drive_leapt and not load_leapt else drive
 
 
-@njit(cache=True)
+@kernel
 def _set_still(state, c, sigma, m):
     state.kind[c, MODE] = STILL_POINT
     state.kind[c, LINE] = sigma
@@ -245,7 +254,7 @@ def _set_still(state, c, sigma, m):
     state.kind[c, STILL_PIECE] = 0
 
 
-@njit(cache=True)
+@kernel
 def _piece_at(path, m):
     """The bend that `m` lies in, the one before it at a node."""
     piece = 0
@@ -254,7 +263,7 @@ def _piece_at(path, m):
     return piece
 
 
-@njit(cache=True)
+@kernel
 def _rates(path, state, start, ends, stiffness, angle_given):
     """dQ/ds, and of each cable C_drive T1 / a's inverse and T2'/T2: what moves m_still, to and fro.
 
@@ -279,7 +288,7 @@ def _rates(path, state, start, ends, stiffness, angle_given):
     return load_rate, (drive_A, drive_B), (load_A, load_B)
 
 
-@njit(cache=True)
+@kernel
 def _response(path, state, c, drive_rate):
     """How tension at the load answers: dT2 = alpha ds + beta (load end's way out); also dT1 / (T1 ds), and T2."""
     mode = state.kind[c, MODE]
@@ -302,7 +311,7 @@ def _response(path, state, c, drive_rate):
     return alpha, beta, drive, k_load * e
 
 
-@njit(cache=True)
+@kernel
 def _needed(path, state, c, start, ends, stiffness, angle_given):
     """Compliance on the drive's side that would keep m_still where it is, were all beyond it straight."""
     state.kind[c, PINNED] = 1
@@ -314,7 +323,7 @@ def _needed(path, state, c, start, ends, stiffness, angle_given):
     return drive_rate / tension_rate
 
 
-@njit(cache=True)
+@kernel
 def _seat(path, state, c, start, ends, stiffness, angle_given):
     """Decide which way a still point leaves where it is; True if it leaves at the load end."""
     m = state.value[c, M_STILL]
@@ -345,7 +354,7 @@ def _seat(path, state, c, start, ends, stiffness, angle_given):
     return False
 
 
-@njit(cache=True)
+@kernel
 def _find_balance_point(path, state, c, start, ends, stiffness, angle_given):
     """Still point of a cable that becomes taut, from no tension: where both ends' shares of its stretch agree."""
     sigma = state.kind[c, LINE]
@@ -369,7 +378,7 @@ def _find_balance_point(path, state, c, start, ends, stiffness, angle_given):
     state.value[c, M_STILL] = m
 
 
-@njit(cache=True)
+@kernel
 def _derivative(path, state, trials, y, start, ends, stiffness, angle_given, out):
     """Derivatives of (m_still of A, of B, s) by a parameter that has no singular point; `state` is left at y.
 
@@ -387,7 +396,7 @@ def _derivative(path, state, trials, y, start, ends, stiffness, angle_given, out
     out[2] = 1.0 / pace
 
 
-@njit(cache=True)
+@kernel
 def _set(path, state, trials, y, start, ends, stiffness, angle_given):
     """Put the state where y says, the load balanced; cables with fronts are drawn along from where they were."""
     before = trials[1]
@@ -418,7 +427,7 @@ STAGES = np.array(
 ERROR = np.array([71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
 
 
-@njit(cache=True)
+@kernel
 def _try_step(path, state, trials, y, h, start, ends, stiffness, angle_given, slopes, following):
     """One step of length h from y into `following`; returns the error by the tolerance."""
     for stage in range(7):
@@ -441,12 +450,12 @@ def _try_step(path, state, trials, y, h, start, ends, stiffness, angle_given, sl
     return worst / TOLERANCE
 
 
-@njit(cache=True)
+@kernel
 def _looser(most, e):
     return min(max(1.0, most / e), 1e7) if e > 0.0 else 1.0
 
 
-@njit(cache=True)
+@kernel
 def _event(path, state, start, ends, stiffness, angle_given):
     """What has happened to a cable in the step that `state` is the end of, and to which cable."""
     for c in range(2):
@@ -472,7 +481,7 @@ def _event(path, state, start, ends, stiffness, angle_given):
     return NOTHING, 0
 
 
-@njit(cache=True)
+@kernel
 def _wander(path, state, trials, s, start, ends, stiffness, angle_given):
     """Integrate until s = 1 or something happens to a cable; returns s and whether a drive front reached the load.
 
@@ -522,7 +531,7 @@ def _wander(path, state, trials, s, start, ends, stiffness, angle_given):
     return -1.0, False
 
 
-@njit(cache=True)
+@kernel
 def _hit_end(path, state, trials, y, h, start, ends, stiffness, angle_given, slopes, following):
     """Shorten a step of length h so that it ends where s = 1 (regula falsi, Illinois)."""
     near, far = 0.0, h
@@ -547,7 +556,7 @@ def _hit_end(path, state, trials, y, h, start, ends, stiffness, angle_given, slo
     following[2] = 1.0
 
 
-@njit(cache=True)
+@kernel
 def _handle(path, state, event, c, start, ends, stiffness, angle_given):
     """Change what cable `c` does after an event; True if its drive front has reached the load."""
     if event == SLACK:
@@ -565,7 +574,7 @@ def _handle(path, state, event, c, start, ends, stiffness, angle_given):
     return False
 
 
-@njit(cache=True)
+@kernel
 def _leave(path, state, c, start, ends, stiffness, angle_given):
     if _seat(path, state, c, start, ends, stiffness, angle_given):
         slide_whole(path, state, c, -state.kind[c, LINE])
