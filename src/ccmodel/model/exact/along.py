@@ -151,7 +151,9 @@ def both_fronts(path, state, kept, way, given, stiffness):
         else:
             low = tension
         gives = end_compliance(state, pulled, 1)
-        slope = gives + (1.0 + stiffness * gives) * end_compliance(state, let_in, 1)
+        slope = gives
+        if wanted < start:
+            slope += (1.0 + stiffness * gives) * end_compliance(state, let_in, 1)
         following = tension - gap / slope if slope > 0.0 else low
         if not (low < following < high):
             following = 0.5 * (low + high)
