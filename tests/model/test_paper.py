@@ -181,8 +181,8 @@ def test_bad_input_is_refused_by_name():
         run(np.array([0, 0.1, 0.2, np.nan]))
     with pytest.raises(ModelError, match="load torque has 2 samples"):
         run(np.zeros(3), load=TorqueLoad(np.zeros(2)))
-    with pytest.raises(ValueError, match="positive stiffness"):
-        SpringLoad(0.0)
+    with pytest.raises(ValueError, match="not negative"):
+        SpringLoad(-1.0)
     with pytest.raises(ValueError, match="positive length"):
         ConduitPath([0.0], [1.0])
 

@@ -1,4 +1,4 @@
-"""The tension that the cables hold before the drive moves."""
+"""Tension along both cables before anything moves."""
 
 from dataclasses import dataclass
 
@@ -7,25 +7,45 @@ from numpy.typing import NDArray
 
 from ccmodel.geometry import ConduitPath
 
+# A profile may exceed the friction bound by what printing and reading numbers back costs, no more.
+BOUND_TOLERANCE = 1e-9
+
 
 @dataclass(frozen=True)
 class InitialTension:
-    """Initial tension profiles T(x, 0) of cables A and B (the paper's (7), Remark 1: any profile goes in).
+    """Tension profiles of cables A and B as corners; between corners ln T is linear in the bend angle phi.
 
-    Between the given places ln T is linear in the bend angle, the form that friction gives to a profile; where the
-    path is straight, tension is the same.
-
-    Attributes
+    Parameters
     ----------
-    x_m : ndarray, shape (m,)
-        Arc lengths from the drive end, m, increasing, first 0, last the path's length.
-    tension_A_N, tension_B_N : ndarray, shape (m,)
-        Tensions there, N, >= 0; zero everywhere for a slack cable.
+    x_m : ndarray, shape (k,)
+        Arc length of the corners from the drive end, m, strictly increasing, from 0 to the conduit's length.
+    tension_A_N, tension_B_N : ndarray, shape (k,)
+        Tension at the corners, N: positive throughout, or zero throughout for a cable that hangs just slack.
+
+    Raises
+    ------
+    ValueError
+        If shapes differ, a value is not finite, positions do not increase or tensions are not positive.
     """
 
     x_m: NDArray
     tension_A_N: NDArray
     tension_B_N: NDArray
+
+    def __post_init__(self):
+        for name in ("x_m", "tension_A_N", "tension_B_N"):
+            values = np.atleast_1d(np.asarray(getattr(self, name), dtype=float))
+            if values.ndim != 1 or not np.isfinite(values).all():
+                raise ValueError(f"{name} must be a finite, one-dimensional array")
+            object.__setattr__(self, name, values)
+        if not self.x_m.shape == self.tension_A_N.shape == self.tension_B_N.shape or self.x_m.size < 2:
+            raise ValueError("an initial profile has at least two corners and a tension of A and of B at each")
+        if (np.diff(self.x_m) <= 0).any():
+            raise ValueError("the corners of an initial profile go from the drive end to the load end")
+        for name in ("tension_A_N", "tension_B_N"):
+            tension = getattr(self, name)
+            if not ((tension > 0).all() or (tension == 0).all()):
+                raise ValueError(f"{name} must be positive along the whole cable, or zero along the whole cable")
 
     @classmethod
     def uniform(cls, path: ConduitPath, tension_N: float) -> "InitialTension":
@@ -64,6 +84,40 @@ class InitialTension:
         """Tensions of A and B at arc lengths `x` (m), N; two arrays of the shape of `x`."""
         phi, corner_phi = path.bend_at(x), path.bend_at(self.x_m)
         return tuple(_interpolate(phi, corner_phi, T) for T in (self.tension_A_N, self.tension_B_N))
+
+    def log_slopes(self, path: ConduitPath, friction_coefficient: float) -> tuple[NDArray, NDArray, NDArray]:
+        """Corners in the plane of mu phi and ln T, checked against friction's bound |d ln T / d phi| <= mu.
+
+        Returns
+        -------
+        m : ndarray, shape (k,)
+            mu phi at the corners.
+        slope_A, slope_B : ndarray, shape (k - 1,)
+            d ln T / d(mu phi) between corners, within [-1, 1]; zero where the path does not bend.
+        """
+        length = path.length_m
+        if abs(self.x_m[0]) > 1e-9 * length or abs(self.x_m[-1] - length) > 1e-9 * length:
+            raise ValueError(f"the initial profile must cover the conduit, 0 to {length} m; got {self.x_m[[0, -1]]}")
+        m = friction_coefficient * path.bend_at(self.x_m)
+        m[-1] = friction_coefficient * path.bend_rad
+        return m, _slopes(m, self.tension_A_N, "A"), _slopes(m, self.tension_B_N, "B")
+
+
+def _slopes(m: NDArray, tension: NDArray, cable: str) -> NDArray:
+    if tension[0] == 0:
+        return np.zeros(m.size - 1)
+    run, rise = np.diff(m), np.diff(np.log(tension))
+    excess = np.abs(rise) - run
+    worst = int(excess.argmax())
+    if excess[worst] > BOUND_TOLERANCE:
+        raise ValueError(
+            f"cable {cable}: friction cannot hold the initial tension between corners {worst} and {worst + 1},"
+            f" |d ln T| = {abs(rise[worst]):.6g} where mu d phi = {run[worst]:.6g}"
+        )
+    # A profile on the bound is a sliding line up to rounding of the logarithm.
+    on_bound = excess > -4e-15
+    slope = np.divide(rise, run, out=np.zeros_like(run), where=run > 0)
+    return np.where(on_bound & (run > 0), np.sign(rise), np.clip(slope, -1, 1))
 
 
 def _interpolate(phi: NDArray, corner_phi: NDArray, tension: NDArray) -> NDArray:

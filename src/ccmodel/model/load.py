@@ -10,16 +10,17 @@ from numpy.typing import NDArray
 class SpringLoad:
     """A torsional spring: tau_out = K_e theta_out, theta_out counted from the spring's neutral position.
 
-    The paper's (21) counts the load's torque on the pulley, hence its opposite sign.
+    A stiffness of zero is a load that turns freely. The paper's (21) counts the load's torque on the pulley, hence its
+    opposite sign.
     """
 
     stiffness_Nm_per_rad: float
 
     def __post_init__(self):
-        if not self.stiffness_Nm_per_rad > 0:
+        if not (np.isfinite(self.stiffness_Nm_per_rad) and self.stiffness_Nm_per_rad >= 0):
             raise ValueError(
-                f"a spring load needs a positive stiffness; got {self.stiffness_Nm_per_rad} N m/rad. "
-                "A free load is TorqueLoad with zero torque"
+                f"a load spring's stiffness is finite and not negative; got {self.stiffness_Nm_per_rad}"
+                " (for a blocked load use AngleLoad with a constant angle)"
             )
 
 
@@ -54,9 +55,18 @@ class MechanicalLoad:
 
 @dataclass(frozen=True)
 class TorqueLoad:
-    """A torque prescribed at every sample, such as the one measured at the load pulley, N m, shape (n,)."""
+    """A torque known at every sample, as measured at the load pulley; linear in between.
+
+    Parameters
+    ----------
+    torque_Nm : ndarray, shape (n,)
+        tau_out, the torque of the cables on the load.
+    """
 
     torque_Nm: NDArray
+
+    def __post_init__(self):
+        object.__setattr__(self, "torque_Nm", _series(self.torque_Nm, "torque_Nm"))
 
 
 @dataclass(frozen=True)
@@ -70,3 +80,13 @@ class AngleLoad:
     """
 
     angle_rad: NDArray
+
+    def __post_init__(self):
+        object.__setattr__(self, "angle_rad", _series(self.angle_rad, "angle_rad"))
+
+
+def _series(values, name: str) -> NDArray:
+    values = np.ascontiguousarray(values, dtype=float)
+    if values.ndim != 1 or values.size == 0 or not np.isfinite(values).all():
+        raise ValueError(f"{name} is one finite value a sample; got an array of shape {values.shape}")
+    return values

@@ -1,0 +1,81 @@
+"""The conduit as the kernels see it: nodes in m = mu phi, with compliance between them and at them."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ccmodel.geometry import ConduitPath
+
+# Below this mu phi a piece's capstan loss is less than rounding: it is straight.
+STRAIGHT = 1e-15
+
+
+# Rows of `PathTables.table`, each seen from one end: m at the nodes; of the bend after a node dx / (EA dm), the arc
+# length at which it begins and dx/dm; the straight stretch's length / EA at a node; and the integral of
+# exp(-sigma m) dx / EA up to and with the node's straight stretch, for sigma = -1 and +1.
+NODE, PER_M, X_START, X_PER_M, LUMP, PASSED = range(6)
+
+
+class PathTables(NamedTuple):
+    """Tables of a path, seen from both ends.
+
+    Bends lie between nodes; straight stretches are lumps of compliance at a node, since tension depends on m alone.
+
+    Attributes
+    ----------
+    table : ndarray, shape (2, 7, n + 1)
+        First axis: from the drive end inward, from the load end inward; second axis as named above. A bend's values
+        stand at the node before it.
+    ratio : tuple of two floats
+        exp(-total), exp(+total): T_load / T_drive of a line of slope -1, +1.
+    total : float
+        m of the whole path.
+    length : float
+        Arc length of the whole path, m.
+    """
+
+    table: NDArray
+    ratio: tuple[float, float]
+    total: float
+    length: float
+
+
+def tabulate(path: ConduitPath, friction_coefficient: float, axial_rigidity_N: float) -> PathTables:
+    """Tables of `path` for a cable of rigidity EA (N) under friction mu."""
+    node, bend, x_start, x_per_m, straight = [0.0], [], [], [], [0.0]
+    x = 0.0
+    for length, angle in zip(path.piece_length_m, path.piece_bend_rad, strict=True):
+        m = friction_coefficient * angle
+        if m < STRAIGHT:
+            straight[-1] += length
+        else:
+            node.append(node[-1] + m)
+            bend.append(length / (m * axial_rigidity_N))
+            x_start.append(x)
+            x_per_m.append(length / m)
+            straight.append(0.0)
+        x += length
+    node, bend, x_start, x_per_m = (np.array(a, dtype=float) for a in (node, bend, x_start, x_per_m))
+    lump = np.array(straight) / axial_rigidity_N
+    total = float(node[-1])
+    x_end = x_start + x_per_m * np.diff(node)
+    table = np.zeros((2, PASSED + 2, node.size))
+    _fill(table[0], node, bend, x_start, x_per_m, lump)
+    _fill(table[1], total - node[::-1], bend[::-1], x - x_end[::-1], x_per_m[::-1], lump[::-1])
+    return PathTables(table, (math.exp(-total), math.exp(total)), total, float(x))
+
+
+def _fill(table, node, bend, x_start, x_per_m, lump):
+    table[NODE], table[LUMP] = node, lump
+    for row, values in ((PER_M, bend), (X_START, x_start), (X_PER_M, x_per_m)):
+        table[row, :-1] = values
+    for row, sigma in ((PASSED, -1), (PASSED + 1, 1)):
+        table[row] = _passed(node, bend, lump, sigma)
+
+
+def _passed(node, bend, lump, sigma):
+    """Integral of exp(-sigma m) dx / EA from the end to each node, its lump included."""
+    step = bend * np.exp(-sigma * node[:-1]) * sigma * -np.expm1(-sigma * np.diff(node))
+    return np.concatenate([[0.0], np.cumsum(step)]) + np.cumsum(lump * np.exp(-sigma * node))

@@ -1,0 +1,170 @@
+"""The exact solver against what the capstan equation gives in closed form: one bend of radius R = L / phi."""
+
+import numpy as np
+import pytest
+
+from ccmodel.geometry import ConduitPath
+from ccmodel.model.exact import FixedEnd, ForceEnd, MotionEnd, SpringEnd, Status, simulate_cable
+from ccmodel.model.initial import InitialTension
+
+LENGTH, BEND, MU, EA = 2.0, 3 * np.pi, 0.15, 2000.0
+PATH = ConduitPath([LENGTH], [BEND])
+M = MU * BEND
+COMPLIANCE = LENGTH / (M * EA)  # dx / (EA d(mu phi))
+
+
+def line(T1, slope):
+    """A sliding line as an initial profile, from the drive end's tension."""
+    ends = T1 * np.exp([0.0, slope * M])
+    return InitialTension([0.0, LENGTH], ends, ends)
+
+
+def run(displacement, initial, far_end=None):
+    response = simulate_cable(PATH, EA, MU, far_end or FixedEnd(), np.asarray(displacement), initial)
+    assert response.status is Status.OK
+    return response
+
+
+@pytest.mark.parametrize("y", [1e-8, 1e-4, 0.03, 0.5, 0.99 * M])
+def test_first_loading_from_uniform_pretension(y):
+    # T1 = T0 exp(y) once the front has run through y = mu phi; stretch is the integral of T1 exp(-mu phi) - T0
+    T0 = 10.0
+    series = sum(y**n / np.prod(np.arange(1.0, n + 1)) for n in range(2, 30))
+    response = run([0.0, COMPLIANCE * T0 * series], InitialTension.uniform(PATH, T0))
+    assert response.T_near_N[-1] / T0 - 1 == pytest.approx(np.expm1(y), rel=1e-12 if y > 1e-3 else 1e-6)
+    assert response.T_far_N[-1] == T0
+    assert response.moving_m[-1] == pytest.approx([LENGTH * y / M, LENGTH], rel=1e-7)
+
+
+@pytest.mark.parametrize("y", [1e-6, 1e-3, 0.03, 0.5, 0.99 * M])
+def test_unloading_a_pulled_cable(y):
+    # the release's line exp(+mu phi) meets the pull's exp(-mu phi) at y: T1 = Tm exp(-2 y)
+    Tm = 25.0
+    response = run([0.0, -COMPLIANCE * Tm * np.expm1(-y) ** 2], line(Tm, -1))
+    assert response.T_near_N[-1] == pytest.approx(Tm * np.exp(-2 * y), rel=1e-12)
+    assert response.T_far_N[-1] == pytest.approx(Tm * np.exp(-M), rel=1e-15)
+
+
+@pytest.mark.parametrize("y", [1e-6, 1e-3, 0.03, 0.5, 0.99 * M])
+def test_loading_again_after_a_release(y):
+    Tm = 3.0
+    response = run([0.0, COMPLIANCE * Tm * np.expm1(y) ** 2], line(Tm, +1))
+    assert response.T_near_N[-1] == pytest.approx(Tm * np.exp(2 * y), rel=1e-12)
+
+
+def test_lost_motion_before_the_far_end_feels_a_reversal():
+    Tm = 25.0
+    lost = COMPLIANCE * Tm * np.expm1(-M) ** 2
+    response = run([0.0, -lost * (1 - 1e-9), -lost * (1 + 1e-9)], line(Tm, -1))
+    assert response.T_far_N[1] == Tm * np.exp(-M)
+    assert response.T_far_N[2] < Tm * np.exp(-M)
+    assert response.T_near_N[1] == pytest.approx(Tm * np.exp(-2 * M), rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("way", "stiffness"), [(1, 1 / (-np.expm1(-M) * COMPLIANCE)), (-1, 1 / (np.expm1(M) * COMPLIANCE))]
+)
+def test_apparent_stiffness_in_full_slip_differs_by_direction(way, stiffness):
+    response = run(np.array([0.0, 1.0, 2.0]) * way * 1e-4, line(40.0, -way))
+    assert np.diff(response.T_near_N) == pytest.approx(way * 1e-4 * stiffness, rel=1e-12)
+    assert response.T_far_N / response.T_near_N == pytest.approx(np.exp(-way * M), rel=1e-14)
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_full_slip_against_a_spring(way):
+    k, T1 = 700.0, 20.0
+    step = way * 3e-3
+    response = run([0.0, step], line(T1, -way), SpringEnd(k))
+    along = -way * np.expm1(-way * M) * COMPLIANCE  # stretch per near tension
+    ratio = np.exp(-way * M)
+    rise = step / (along + ratio / k)
+    assert response.T_near_N[-1] - T1 == pytest.approx(rise, rel=1e-12)
+    assert response.T_far_N[-1] == pytest.approx((T1 + rise) * ratio, rel=1e-12)
+    assert response.far_displacement_m[-1] == pytest.approx(rise * ratio / k, rel=1e-12)
+
+
+@pytest.mark.parametrize("y", [0.01, 0.4, 0.9 * M])
+def test_unloading_and_loading_against_a_spring_before_it_is_felt(y):
+    Tm = 25.0
+    response = run([0.0, -COMPLIANCE * Tm * np.expm1(-y) ** 2], line(Tm, -1), SpringEnd(300.0))
+    assert response.T_near_N[-1] == pytest.approx(Tm * np.exp(-2 * y), rel=1e-12)
+    assert response.far_displacement_m[-1] == 0.0
+
+
+def test_spring_follows_through_unloading_and_loading():
+    # pulled through, released through, pulled through: each time from one line to the other and then on it
+    k, T1 = 300.0, 20.0
+    e0 = -np.expm1(-M) * COMPLIANCE * T1
+    for target in (-0.12, -0.25):
+        response = run([0.0, target, 0.1], line(T1, -1), SpringEnd(k))
+        far0 = T1 * np.exp(-M)
+        # released: T2 = T1 exp(M); e = e0 + d - q; T2 = far0 + k q
+        e_per_T2 = np.expm1(M) * COMPLIANCE * np.exp(-M)
+        T2 = (far0 + k * (e0 + target)) / (1 + k * e_per_T2)
+        if T2 > 0:
+            assert response.T_far_N[1] == pytest.approx(T2, rel=1e-12)
+        else:
+            assert response.T_far_N[1] == 0.0
+            assert response.far_displacement_m[1] == pytest.approx(-far0 / k, rel=1e-12)
+        e_per_T2 = -np.expm1(-M) * COMPLIANCE * np.exp(M)
+        T2 = (far0 + k * (e0 + 0.1)) / (1 + k * e_per_T2)
+        assert response.T_far_N[2] == pytest.approx(T2, rel=1e-12)
+
+
+def test_far_force_alone_pulls_the_cable_from_its_far_end():
+    y, T0 = 0.3, 10.0
+    force = T0 * np.exp([0.0, y, y])
+    response = run([0.0, 0.0, 0.0], InitialTension.uniform(PATH, T0), ForceEnd(force))
+    assert response.T_far_N == pytest.approx(force, rel=1e-15)
+    assert response.far_displacement_m[-1] == pytest.approx(-COMPLIANCE * T0 * (np.expm1(y) - y), rel=1e-12)
+    assert (response.T_near_N == T0).all()
+
+
+def test_near_and_far_end_are_alike():
+    rng = np.random.default_rng(3)
+    path = ConduitPath([0.3, 0.5, 0.2, 0.4], [1.0, 0.0, 2.0, 0.7])
+    turned = ConduitPath(path.piece_length_m[::-1], path.piece_bend_rad[::-1])
+    near, far = 0.003 * rng.normal(size=(2, 30)).cumsum(axis=1)
+    uniform = InitialTension.uniform(path, 20.0)
+    one = simulate_cable(path, EA, MU, MotionEnd(-far), near, uniform)
+    other = simulate_cable(turned, EA, MU, MotionEnd(-near), far, uniform)
+    assert one.T_near_N == pytest.approx(other.T_far_N, abs=1e-9)
+    assert one.T_far_N == pytest.approx(other.T_near_N, abs=1e-9)
+
+
+@pytest.mark.parametrize("far_end", [FixedEnd(), SpringEnd(500.0)])
+def test_without_friction_tension_is_uniform(far_end):
+    k = getattr(far_end, "stiffness_N_per_m", np.inf)
+    displacement = 0.01 * np.sin(np.linspace(0, 20, 101))
+    response = simulate_cable(PATH, EA, 0.0, far_end, displacement, InitialTension.uniform(PATH, 10.0))
+    expected = np.maximum(10.0 + displacement / (LENGTH / EA + 1 / k), 0.0)
+    assert response.T_near_N == pytest.approx(expected, rel=1e-12, abs=1e-12)
+    assert (response.T_near_N == response.T_far_N).all()
+
+
+def test_a_straight_path_is_a_path_without_friction():
+    straight = ConduitPath([1.0, 1.0], [0.0, 0.0])
+    displacement = 0.01 * np.sin(np.linspace(0, 20, 101))
+    initial = InitialTension.uniform(straight, 10.0)
+    one = simulate_cable(straight, EA, 0.3, FixedEnd(), displacement, initial)
+    other = simulate_cable(PATH, EA, 0.0, FixedEnd(), displacement, initial)
+    assert one.T_near_N == pytest.approx(other.T_near_N, rel=1e-14)
+
+
+@pytest.mark.parametrize("mu", [1e-12, 1e-9, 1e-6])
+def test_little_friction_tends_to_none(mu):
+    displacement = 0.01 * np.sin(np.linspace(0, 20, 101))
+    initial = InitialTension.uniform(PATH, 10.0)
+    one = simulate_cable(PATH, EA, mu, SpringEnd(300.0), displacement, initial)
+    other = simulate_cable(PATH, EA, 0.0, SpringEnd(300.0), displacement, initial)
+    assert one.T_near_N == pytest.approx(other.T_near_N, abs=300 * mu + 1e-11)
+
+
+def test_slack_holds_no_memory_and_ends_where_it_began():
+    T1 = 20.0
+    e0 = -np.expm1(-M) * COMPLIANCE * T1
+    displacement = np.array([0.0, -0.9 * e0, -e0, -1.7 * e0, -1.2 * e0, -1.5 * e0, -0.9 * e0])
+    response = run(displacement, line(T1, -1))
+    assert (response.T_near_N[2:6] == 0).all()
+    assert response.T_near_N[1] == pytest.approx(0.1 * e0 / (np.expm1(M) * COMPLIANCE), rel=1e-11)
+    assert response.T_near_N[6] == pytest.approx(0.1 * e0 / (-np.expm1(-M) * COMPLIANCE), rel=1e-11)
