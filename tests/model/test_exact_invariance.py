@@ -235,3 +235,11 @@ def test_inputs_that_cannot_be_are_refused():
         simulate_pair(transmission(), SpringLoad(0.1), np.zeros(2), steep)
     with pytest.raises(ValueError, match="positive along the whole"):
         InitialTension([0, 1.0], [0.0, 1.0], [1.0, 1.0])
+
+
+def test_a_start_far_out_of_balance_against_a_stiff_spring():
+    initial = InitialTension([0.0, 5.0], [3.0, 3.0], 10.0 * np.exp([0.0, -0.03]))
+    whole = ConduitPath(np.ones(5), [0.0, 0.0, 0.0, 1.0, 1.0])
+    split = ConduitPath(np.full(10, 0.5), np.repeat([0.0, 0.0, 0.0, 0.5, 0.5], 2))
+    a, b = (simulate_pair(transmission(p, 0.03), SpringLoad(10.0), np.zeros(1), initial) for p in (whole, split))
+    assert tensions(a) == pytest.approx(tensions(b), rel=1e-13)
