@@ -5,7 +5,6 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from ccmodel.model.paper import SECTIONS
 from ccmodel.model.parameters import FREE
 from ccmodel.recording import CHANNELS
 from ccmodel.rig.batch import valid_name
@@ -67,7 +66,6 @@ class Config(TypedModel):
 
     raw: str = Field("data/raw", description="folder with a folder a batch")
     results: str = Field("results", description="folder for all that the run makes")
-    sections: int = Field(SECTIONS, ge=1, description="segments a cable in the paper's discretisation")
     fits: dict[str, Fit] = Field(default_factory=dict, description="parameter sets fitted to recordings")
     studies: dict[str, Study] = Field(default_factory=dict, description="figures")
 

@@ -1,6 +1,9 @@
 """The numbers that a run of the model needs besides the recording it is compared with."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+
+from ccmodel.model.general.run import Active
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,8 @@ class Parameters:
         Initial tension, the same all along both cables; None takes from each recording what its rest shows.
     tau_in_zero_Nm, tau_out_zero_Nm : float
         What the torque sensors read without a torque.
+    mechanisms : tuple of Active
+        What acts besides the paper's physics.
     """
 
     stiffness_N_per_m: float
@@ -34,6 +39,7 @@ class Parameters:
     pretension_N: float | None = None
     tau_in_zero_Nm: float = 0.0
     tau_out_zero_Nm: float = 0.0
+    mechanisms: tuple[Active, ...] = ()
 
     @classmethod
     def estimated(cls, rig) -> "Parameters":
@@ -47,10 +53,47 @@ class Parameters:
             load_stiffness_Nm_per_rad=rig.load.spring_stiffness_Nm_per_rad,
         )
 
-    def with_values(self, values: dict[str, float]) -> "Parameters":
-        """The same with some of them replaced."""
-        return replace(self, **values)
+    def with_values(self, values: Mapping[str, float]) -> "Parameters":
+        """The same with some of them replaced.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            By the names of the attributes, and for a number of a mechanism by `mechanism_key`.
+
+        Raises
+        ------
+        ValueError
+            If no active mechanism has such a number.
+        """
+        own = {name: value for name, value in values.items() if mechanism_parameter(name) is None}
+        acting = {(m.name, m.place): dict(m.values) for m in self.mechanisms}
+        for key in values.keys() - own.keys():
+            name, place, parameter = mechanism_parameter(key)
+            if parameter not in acting.get((name, place), {}):
+                raise ValueError(f"{key}: the model has no {parameter} of {name} at {place}")
+            acting[name, place][parameter] = values[key]
+        mechanisms = tuple(Active(name, place, numbers) for (name, place), numbers in acting.items())
+        return replace(self, **own, mechanisms=mechanisms)
+
+    def value_of(self, name: str) -> float:
+        """One of them, by the names that `with_values` takes."""
+        if (parts := mechanism_parameter(name)) is None:
+            return getattr(self, name)
+        mechanism, place, parameter = parts
+        return next(m.values[parameter] for m in self.mechanisms if (m.name, m.place) == (mechanism, place))
+
+
+def mechanism_key(mechanism: str, place: str, parameter: str) -> str:
+    """The name under which a mechanism's number stands among the parameters."""
+    return f"{mechanism}/{place}/{parameter}"
+
+
+def mechanism_parameter(key: str) -> tuple[str, str, str] | None:
+    """Mechanism, place and parameter of a name that `mechanism_key` made; None for any other."""
+    parts = key.split("/")
+    return tuple(parts) if len(parts) == 3 else None
 
 
 # What a fit may leave free; lengths and the drive radius only scale what is among these.
-FREE = tuple(f.name for f in fields(Parameters) if f.name not in ("reference_length_m", "drive_radius_m"))
+FREE = tuple(f.name for f in fields(Parameters) if f.name not in ("reference_length_m", "drive_radius_m", "mechanisms"))

@@ -10,7 +10,7 @@ from ccmodel.recording import read_recordings
 from ccmodel.stages.files import estimates_of, write_json
 
 
-def fit_parameters(name: str, problem: Fit, sections: int, recordings_files: Sequence[Path], result_file: Path) -> None:
+def fit_parameters(name: str, problem: Fit, recordings_files: Sequence[Path], result_file: Path) -> None:
     """Fit a parameter set; a fit that fails is a result that says so."""
     pairs = [
         (recording, estimates)
@@ -18,5 +18,5 @@ def fit_parameters(name: str, problem: Fit, sections: int, recordings_files: Seq
         if (estimates := estimates_of(file)) is not None
         for recording in read_recordings(file)
     ]
-    result = fit(pairs, problem, sections)
+    result = fit(pairs, problem)
     write_json(result_file, {"fit": name, **result.as_dict(), "provenance": provenance.of_inputs(recordings_files)})
