@@ -7,8 +7,8 @@ import pytest
 
 from builders import recording
 from ccmodel.model import parts
+from ccmodel.model.failure import ModelError
 from ccmodel.model.general.run import Active
-from ccmodel.model.paper import ModelError
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 

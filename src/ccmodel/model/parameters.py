@@ -1,7 +1,7 @@
 """The numbers that a run of the model needs besides the recording it is compared with."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 from ccmodel.model.general.run import Active
 
@@ -26,6 +26,13 @@ class Parameters:
         Initial tension, the same all along both cables; None takes from each recording what its rest shows.
     tau_in_zero_Nm, tau_out_zero_Nm : float
         What the torque sensors read without a torque.
+    F_drive_zero_N, F_load_zero_N : float
+        What the load cells read without a tension.
+    extra_bend_rad : float
+        Bend beyond what the path states, spread evenly along it: slings, fittings, a conduit that is not laid straight.
+    friction_scale, pretension_scale : float
+        Friction and initial tension of one recording over what they are in the population, and over what its rest
+        shows.
     mechanisms : tuple of Active
         What acts besides the paper's physics.
     """
@@ -39,7 +46,17 @@ class Parameters:
     pretension_N: float | None = None
     tau_in_zero_Nm: float = 0.0
     tau_out_zero_Nm: float = 0.0
+    F_drive_zero_N: float = 0.0
+    F_load_zero_N: float = 0.0
+    extra_bend_rad: float = 0.0
+    friction_scale: float = 1.0
+    pretension_scale: float = 1.0
     mechanisms: tuple[Active, ...] = ()
+
+    @property
+    def friction(self) -> float:
+        """Mu in this recording."""
+        return self.friction_coefficient * self.friction_scale
 
     @classmethod
     def estimated(cls, rig) -> "Parameters":
@@ -95,5 +112,24 @@ def mechanism_parameter(key: str) -> tuple[str, str, str] | None:
     return tuple(parts) if len(parts) == 3 else None
 
 
-# What a fit may leave free; lengths and the drive radius only scale what is among these.
-FREE = tuple(f.name for f in fields(Parameters) if f.name not in ("reference_length_m", "drive_radius_m", "mechanisms"))
+# What each recording has of its own, and what all share; lengths and the drive radius only scale what is among these.
+OWN = (
+    "friction_scale",
+    "pretension_scale",
+    "tau_in_zero_Nm",
+    "tau_out_zero_Nm",
+    "F_drive_zero_N",
+    "F_load_zero_N",
+)
+FREE = (
+    "stiffness_N_per_m",
+    "friction_coefficient",
+    "extra_bend_rad",
+    "load_radius_m",
+    "load_stiffness_Nm_per_rad",
+    "pretension_N",
+    "tau_in_zero_Nm",
+    "tau_out_zero_Nm",
+    "F_drive_zero_N",
+    "F_load_zero_N",
+)

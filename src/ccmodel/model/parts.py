@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from ccmodel.mechanisms.pulley_eccentricity import winding
 from ccmodel.mechanisms.pulley_friction import bearing
 from ccmodel.model.exact.pair import CableResponse, ForceEnd, MotionEnd, simulate_cable
+from ccmodel.model.failure import ModelError
 from ccmodel.model.general.run import load_law, settings_of
-from ccmodel.model.paper import ModelError
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, initial_tension
 
@@ -79,7 +79,8 @@ def cable(
     near = side * parameters.drive_radius_m * given.theta_in
     rigidity = parameters.stiffness_N_per_m * parameters.reference_length_m
     initial = initial_tension(recording, parameters).of_cable(name)
-    return simulate_cable(recording.path, rigidity, parameters.friction_coefficient, end, near, initial)
+    path = recording.path.with_extra_bend(parameters.extra_bend_rad)
+    return simulate_cable(path, rigidity, parameters.friction, end, near, initial)
 
 
 def load(given: ModelInput, parameters: Parameters) -> NDArray:

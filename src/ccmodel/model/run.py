@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from ccmodel.model.exact import pair as exact
+from ccmodel.model.failure import ModelError
 from ccmodel.model.general import run as general
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
-from ccmodel.model.paper import ModelError
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.transmission import Transmission
 from ccmodel.recording import Recording, stride
@@ -34,6 +34,8 @@ class ModelInput:
     recording : Recording
     theta_in : ndarray, shape (n,)
         The drive's motion behind its encoder's counts, rad.
+    drive_deviations : ndarray, shape (draws, n)
+        Likely deviations of that motion from the true one, rad.
     theta_out : ndarray, shape (n,), or None
         The load's motion behind its encoder's counts, rad; None where it was not recorded.
     tau_out : ndarray, shape (n,), or None
@@ -42,6 +44,7 @@ class ModelInput:
 
     recording: Recording
     theta_in: NDArray
+    drive_deviations: NDArray
     theta_out: NDArray | None
     tau_out: NDArray | None
 
@@ -51,8 +54,9 @@ class ModelInput:
         theta_out = _motion(recording, "theta_out_rad") if "theta_out_rad" in recording else None
         tau_out = _without_noise(recording["tau_out_Nm"], recording.time_s) if "tau_out_Nm" in recording else None
         every = stride(recording, step_s)
-        series = (_motion(recording, "theta_in_rad"), theta_out, tau_out)
-        return cls(recording[::every], *(None if values is None else values[::every] for values in series))
+        theta_in, deviations = _motion(recording, "theta_in_rad"), np.zeros((0, recording.time_s.size))
+        series = (theta_in, deviations, theta_out, tau_out)
+        return cls(recording[::every], *(None if values is None else values[..., ::every] for values in series))
 
 
 def simulate_recording(recording: Recording, parameters: Parameters) -> Recording:
@@ -88,9 +92,9 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
     """
     recording = given.recording
     transmission = Transmission(
-        path=recording.path,
+        path=recording.path.with_extra_bend(parameters.extra_bend_rad),
         axial_rigidity_N=parameters.stiffness_N_per_m * parameters.reference_length_m,
-        friction_coefficient=parameters.friction_coefficient,
+        friction_coefficient=parameters.friction,
         drive_radius_m=parameters.drive_radius_m,
         load_radius_m=parameters.load_radius_m,
     )
@@ -98,18 +102,19 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
     initial = initial_tension(recording, parameters)
     read = _run(transmission, load, given, initial, parameters)
     tau_in, tau_out = (read[f"tau_{end}_Nm"] + getattr(parameters, f"tau_{end}_zero_Nm") for end in ("in", "out"))
+    F_drive, F_load = (read[f"F_{end}_N"] + getattr(parameters, f"F_{end}_zero_N") for end in ("drive", "load"))
     drive, load_side = tau_in / parameters.drive_radius_m, tau_out / parameters.load_radius_m
     channels = {
         "theta_in_rad": read["theta_in_rad"],
         "theta_out_rad": _zeroed(read["theta_out_rad"], recording),
         "tau_in_Nm": tau_in,
         "tau_out_Nm": tau_out,
-        "F_drive_N": read["F_drive_N"],
-        "F_load_N": read["F_load_N"],
-        "T1_N": (read["F_drive_N"] + drive) / 2,
-        "T2_N": (read["F_load_N"] + load_side) / 2,
-        "T3_N": (read["F_drive_N"] - drive) / 2,
-        "T4_N": (read["F_load_N"] - load_side) / 2,
+        "F_drive_N": F_drive,
+        "F_load_N": F_load,
+        "T1_N": (F_drive + drive) / 2,
+        "T2_N": (F_load + load_side) / 2,
+        "T3_N": (F_drive - drive) / 2,
+        "T4_N": (F_load - load_side) / 2,
     }
     sources = dict.fromkeys(channels, "model") | {"theta_in_rad": PRESCRIBED}
     if isinstance(load, TorqueLoad):
@@ -144,14 +149,23 @@ def _run(transmission, load, given: ModelInput, initial: InitialTension, paramet
 
 def initial_tension(recording: Recording, parameters: Parameters) -> InitialTension:
     """Tension before the drive moves: fitted, or what the rest shows at the four cable ends, or what was aimed at."""
-    path = recording.path
+    path = recording.path.with_extra_bend(parameters.extra_bend_rad)
+    scale = parameters.pretension_scale
     if parameters.pretension_N is not None:
-        return InitialTension.uniform(path, parameters.pretension_N)
+        return InitialTension.uniform(path, scale * parameters.pretension_N)
     at_rest = recording.time_s < recording.rest_s
     if not at_rest.any() or not all(f"T{i}_N" in recording for i in (1, 2, 3, 4)):
-        return InitialTension.uniform(path, recording.pretension_N)
-    T1, T2, T3, T4 = (recording[f"T{i}_N"][at_rest].mean() for i in (1, 2, 3, 4))
-    return InitialTension.between_ends(path, parameters.friction_coefficient, (T1, T2), (T3, T4))
+        return InitialTension.uniform(path, scale * recording.pretension_N)
+    ends = {}
+    for end, names, radius in (
+        ("drive", ("T1", "T3"), parameters.drive_radius_m),
+        ("load", ("T2", "T4"), parameters.load_radius_m),
+    ):
+        torque = f"tau_{'in' if end == 'drive' else 'out'}"
+        total = recording[f"F_{end}_N"][at_rest].mean() - getattr(parameters, f"F_{end}_zero_N")
+        difference = (recording[f"{torque}_Nm"][at_rest].mean() - getattr(parameters, f"{torque}_zero_Nm")) / radius
+        ends[names[0]], ends[names[1]] = scale * (total + difference) / 2, scale * (total - difference) / 2
+    return InitialTension.between_ends(path, parameters.friction, (ends["T1"], ends["T2"]), (ends["T3"], ends["T4"]))
 
 
 def _load(given: ModelInput, parameters: Parameters, load_from: LoadFrom) -> SpringLoad | TorqueLoad | AngleLoad:

@@ -12,11 +12,11 @@ from ccmodel.mechanisms.load_dependent_friction import FLOOR_N, REFERENCE_N
 from ccmodel.mechanisms.pulley_eccentricity import winding
 from ccmodel.mechanisms.pulley_friction import bearing
 from ccmodel.mechanisms.strand_settling import stretch_at
+from ccmodel.model.failure import ModelError
 from ccmodel.model.general import march as rows
 from ccmodel.model.general.grid import Grid, make_grid
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, MechanicalLoad, SpringLoad, TorqueLoad
-from ccmodel.model.paper import ModelError
 from ccmodel.model.transmission import Transmission
 
 ELEMENTS = 32
