@@ -59,6 +59,22 @@ def left_out(results: Folder) -> None:
 
 
 @app.command()
+def predict(
+    batch: Folder,
+    model: Annotated[Path, typer.Option(help="A model file, as a diagnosis or a fit writes it.")],
+    out: Annotated[Path, typer.Option(help="Folder that gets a CSV a recording.")],
+) -> None:
+    """Say what the sensors of a batch's recordings would read, by a fitted model; exits 1 where it cannot be said."""
+    from ccmodel.stages.predict import predict as run
+
+    said = run(batch, model, out)
+    for line in said:
+        _say(line, "refused")
+    if said:
+        raise typer.Exit(1)
+
+
+@app.command()
 def schema() -> None:
     """Print the JSON schema of the configuration."""
     from ccmodel.config import Config

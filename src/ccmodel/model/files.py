@@ -1,0 +1,59 @@
+"""A model as a file: parameters and what acts besides the paper's physics, as JSON."""
+
+from dataclasses import asdict
+from pathlib import Path
+
+from pydantic import Field, ValidationError
+
+from ccmodel import mechanisms as registry
+from ccmodel.model.general.run import Active
+from ccmodel.model.parameters import Parameters
+from ccmodel.typed import InputError, TypedModel
+
+FORMAT = 1
+
+
+class _Acting(TypedModel):
+    name: str
+    place: str
+    values: dict[str, float]
+
+
+class _ModelFile(TypedModel):
+    format: int = Field(ge=FORMAT, le=FORMAT)
+    parameters: dict[str, float | None]
+    mechanisms: list[_Acting] = Field(default_factory=list)
+    provenance: dict = Field(default_factory=dict)
+
+
+def model_as_dict(parameters: Parameters, provenance: dict) -> dict:
+    """Plain data for a model file; what belongs to single recordings is not in it."""
+    numbers = asdict(parameters)
+    acting = numbers.pop("mechanisms")
+    return {"format": FORMAT, "parameters": numbers, "mechanisms": acting, "provenance": provenance}
+
+
+def read_model(path: Path) -> Parameters:
+    """Parameters from a model file.
+
+    Raises
+    ------
+    InputError
+        With one line on what is wrong with the file.
+    """
+    try:
+        stated = _ModelFile.model_validate_json(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"])) or "the file"
+        raise InputError(f"{path}: {where}: {first['msg']}; a model file is what a diagnosis or a fit wrote") from None
+    for acting in stated.mechanisms:
+        if acting.name not in registry.names():
+            raise InputError(f"{path}: no mechanism is called {acting.name!r}; there are {', '.join(registry.names())}")
+    mechanisms = tuple(Active(m.name, m.place, m.values) for m in stated.mechanisms)
+    try:
+        return Parameters(**stated.parameters, mechanisms=mechanisms)
+    except TypeError as error:
+        raise InputError(f"{path}: {error}") from None

@@ -1,0 +1,32 @@
+"""A model and a batch -> what the sensors would read of every recording."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from ccmodel.model.failure import ModelError
+from ccmodel.model.files import read_model
+from ccmodel.model.run import simulate_recording
+from ccmodel.recording import CHANNELS
+from ccmodel.rig.ingest import ingest_batch
+
+
+def predict(batch: Path, model_file: Path, out: Path) -> list[str]:
+    """Write a CSV a recording, at the recording's own times; a line on each for which there is none.
+
+    From a recording come the drive angle, what its rest shows and, where the model has no load law, the load: nothing
+    else.
+    """
+    parameters = read_model(model_file)
+    ingested = ingest_batch(batch)
+    said = [str(f) for f in ingested.findings if f.severity == "refused"]
+    out.mkdir(parents=True, exist_ok=True)
+    for recording in ingested.recordings:
+        try:
+            modelled = simulate_recording(recording, parameters)
+        except (ModelError, ValueError) as error:
+            said.append(f"{recording.batch}/{recording.id}: {error}")
+            continue
+        table = pd.DataFrame({"time_s": modelled.time_s} | {c: modelled[c] for c in CHANNELS})
+        table.to_csv(out / f"{recording.id}.csv", index=False, float_format="%.9g")
+    return said
