@@ -12,7 +12,7 @@ from ccmodel.model.paper import SECTIONS, ModelError, simulate_pair
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.transmission import Transmission
 from ccmodel.recording import Recording, stride
-from ccmodel.rig.motion import drive_motion
+from ccmodel.rig.motion import DriveMotion, drive_motion
 
 # A load torque that was measured is the load's course and the sensor's noise. The noise would rock the load end; a
 # hand, a spring or a brake does nothing above this frequency at the rates that rigs run at (0.1 to 1 Hz).
@@ -29,7 +29,9 @@ class ModelInput:
     ----------
     recording : Recording
     theta_in : ndarray, shape (n,)
-        The drive's motion behind its encoder's counts, rad.
+        The drive's motion behind its encoder's counts, rad; 0 at the rest at the start where there is one.
+    drive : DriveMotion or None
+        The same motion with what is left of its uncertainty; None where the drive's angle was not counted.
     tau_out : ndarray, shape (n,), or None
         Torque measured at the load pulley without the sensor's noise, N m; None where it was not recorded.
     """
@@ -37,16 +39,23 @@ class ModelInput:
     recording: Recording
     theta_in: NDArray
     tau_out: NDArray | None
+    drive: DriveMotion | None = None
 
     @classmethod
     def of(cls, recording: Recording, step_s: float | None = None) -> "ModelInput":
         """Input from a recording; from a sample every `step_s` of it, once every sample has served its part."""
-        theta_in = recording["theta_in_rad"]
+        drive, theta_in = None, recording["theta_in_rad"]
         if recording.encoder_step_rad is not None:
-            theta_in = drive_motion(recording.time_s, theta_in, recording.encoder_step_rad, recording.rest_s)
+            drive = drive_motion(recording.time_s, theta_in, recording.encoder_step_rad, recording.rest_s)
+            theta_in = drive.theta_rad
         tau_out = _without_noise(recording["tau_out_Nm"], recording.time_s) if "tau_out_Nm" in recording else None
-        every = stride(recording, step_s)
-        return cls(recording[::every], theta_in[::every], None if tau_out is None else tau_out[::every])
+        every = slice(None, None, stride(recording, step_s))
+        return cls(
+            recording[every],
+            theta_in[every],
+            None if tau_out is None else tau_out[every],
+            None if drive is None else drive[every],
+        )
 
 
 def simulate_recording(recording: Recording, parameters: Parameters, sections: int = SECTIONS) -> Recording:
