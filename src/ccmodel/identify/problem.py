@@ -91,7 +91,7 @@ class Evidence:
             raise ModelError(f"{recording.batch}/{recording.id}: none of {', '.join(channels)} was recorded")
         time_s = given.recording.time_s
         judged = time_s >= max(recording.rest_s, recording.settled_s)
-        sensors, drive = sensor_noise(recording), drive_noise(given, parameters)
+        sensors, drive = sensor_noise(given), drive_noise(given, parameters)
         measured = np.stack([given.recording[c][judged] for c in used])
         sigma = np.stack([np.hypot(sensors[c], drive[c][judged]) for c in used])
         sigma = np.hypot(sigma, allowance * np.ptp(measured, axis=1, keepdims=True))

@@ -26,6 +26,8 @@ class Parameters:
         Initial tension, the same all along both cables; None takes from each recording what its rest shows.
     tau_in_zero_Nm, tau_out_zero_Nm : float
         What the torque sensors read without a torque.
+    theta_out_zero_rad : float
+        Angle of the load that its encoder shows as none: where in its count it rests.
     F_drive_zero_N, F_load_zero_N : float
         What the load cells read without a tension.
     extra_bend_rad : float
@@ -46,6 +48,7 @@ class Parameters:
     pretension_N: float | None = None
     tau_in_zero_Nm: float = 0.0
     tau_out_zero_Nm: float = 0.0
+    theta_out_zero_rad: float = 0.0
     F_drive_zero_N: float = 0.0
     F_load_zero_N: float = 0.0
     extra_bend_rad: float = 0.0
@@ -116,6 +119,7 @@ def mechanism_parameter(key: str) -> tuple[str, str, str] | None:
 OWN = (
     "friction_scale",
     "pretension_scale",
+    "theta_out_zero_rad",
     "tau_in_zero_Nm",
     "tau_out_zero_Nm",
     "F_drive_zero_N",

@@ -78,7 +78,7 @@ def cable(
         end = MotionEnd(side * parameters.load_radius_m * given.theta_out)
     near = side * parameters.drive_radius_m * given.theta_in
     rigidity = parameters.stiffness_N_per_m * parameters.reference_length_m
-    initial = initial_tension(recording, parameters).of_cable(name)
+    initial = initial_tension(given, parameters).of_cable(name)
     path = recording.path.with_extra_bend(parameters.extra_bend_rad)
     return simulate_cable(path, rigidity, parameters.friction, end, near, initial)
 
@@ -94,7 +94,7 @@ def load(given: ModelInput, parameters: Parameters) -> NDArray:
     recording = given.recording
     if given.theta_out is None or parameters.load_stiffness_Nm_per_rad is None:
         raise ModelError(f"{recording.batch}/{recording.id}: no angle or no law of the load to work it from")
-    start = initial_tension(recording, parameters)
+    start = initial_tension(given, parameters)
     torque = (start.tension_A_N[-1] - start.tension_B_N[-1]) * parameters.load_radius_m
     settings = settings_of(parameters.mechanisms)
     return load_law(settings, parameters.load_stiffness_Nm_per_rad, recording.time_s, given.theta_out, torque)

@@ -1,5 +1,6 @@
 """Run the model beside a recording: the same drive motion, load and initial state; what would the sensors read?"""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -21,6 +22,9 @@ from ccmodel.rig.motion import drive_motion
 # hand, a spring or a brake does nothing above this frequency at the rates that rigs run at (0.1 to 1 Hz).
 LOAD_TORQUE_CUTOFF_HZ = 10.0
 
+# Before the first count comes, a drive has moved by up to a count, and the torque with it.
+STILL_RAD = 1e-5
+
 LoadFrom = Literal["law", "torque", "angle"]
 PRESCRIBED = "prescribed"  # `derived_from` of a channel that the model was given, not asked
 
@@ -33,13 +37,15 @@ class ModelInput:
     ----------
     recording : Recording
     theta_in : ndarray, shape (n,)
-        The drive's motion behind its encoder's counts, rad.
+        The drive's motion behind its encoder's counts, rad; 0 at the rest at the start where there is one.
     drive_deviations : ndarray, shape (draws, n)
-        Likely deviations of that motion from the true one, rad.
+        Likely deviations of that motion from the true one, rad; no draws where the drive's angle was not counted.
     theta_out : ndarray, shape (n,), or None
         The load's motion behind its encoder's counts, rad; None where it was not recorded.
     tau_out : ndarray, shape (n,), or None
         Torque measured at the load pulley without the sensor's noise, N m; None where it was not recorded.
+    resting : mapping of str to ndarray
+        What each channel read while the drive did not move, each of shape (resting samples,); empty without a rest.
     """
 
     recording: Recording
@@ -47,16 +53,19 @@ class ModelInput:
     drive_deviations: NDArray
     theta_out: NDArray | None
     tau_out: NDArray | None
+    resting: Mapping[str, NDArray]
 
     @classmethod
     def of(cls, recording: Recording, step_s: float | None = None) -> "ModelInput":
         """Input from a recording; from a sample every `step_s` of it, once every sample has served its part."""
-        theta_out = _motion(recording, "theta_out_rad") if "theta_out_rad" in recording else None
+        theta_in, deviations = _motion(recording, "theta_in_rad")
+        theta_out = _motion(recording, "theta_out_rad")[0] if "theta_out_rad" in recording else None
         tau_out = _without_noise(recording["tau_out_Nm"], recording.time_s) if "tau_out_Nm" in recording else None
+        rest = _rest(recording, theta_in)
         every = stride(recording, step_s)
-        theta_in, deviations = _motion(recording, "theta_in_rad"), np.zeros((0, recording.time_s.size))
         series = (theta_in, deviations, theta_out, tau_out)
-        return cls(recording[::every], *(None if values is None else values[..., ::every] for values in series))
+        thinned = (None if values is None else values[..., ::every] for values in series)
+        return cls(recording[::every], *thinned, {c: values[rest] for c, values in recording.channels.items()})
 
 
 def simulate_recording(recording: Recording, parameters: Parameters) -> Recording:
@@ -99,14 +108,14 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
         load_radius_m=parameters.load_radius_m,
     )
     load = _load(given, parameters, load_from)
-    initial = initial_tension(recording, parameters)
+    initial = initial_tension(given, parameters)
     read = _run(transmission, load, given, initial, parameters)
     tau_in, tau_out = (read[f"tau_{end}_Nm"] + getattr(parameters, f"tau_{end}_zero_Nm") for end in ("in", "out"))
     F_drive, F_load = (read[f"F_{end}_N"] + getattr(parameters, f"F_{end}_zero_N") for end in ("drive", "load"))
     drive, load_side = tau_in / parameters.drive_radius_m, tau_out / parameters.load_radius_m
     channels = {
         "theta_in_rad": read["theta_in_rad"],
-        "theta_out_rad": _zeroed(read["theta_out_rad"], recording),
+        "theta_out_rad": _zeroed(read["theta_out_rad"], recording) + parameters.theta_out_zero_rad,
         "tau_in_Nm": tau_in,
         "tau_out_Nm": tau_out,
         "F_drive_N": F_drive,
@@ -147,25 +156,21 @@ def _run(transmission, load, given: ModelInput, initial: InitialTension, paramet
     }
 
 
-def initial_tension(recording: Recording, parameters: Parameters) -> InitialTension:
+def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension:
     """Tension before the drive moves: fitted, or what the rest shows at the four cable ends, or what was aimed at."""
-    path = recording.path.with_extra_bend(parameters.extra_bend_rad)
+    path = given.recording.path.with_extra_bend(parameters.extra_bend_rad)
     scale = parameters.pretension_scale
     if parameters.pretension_N is not None:
         return InitialTension.uniform(path, scale * parameters.pretension_N)
-    at_rest = recording.time_s < recording.rest_s
-    if not at_rest.any() or not all(f"T{i}_N" in recording for i in (1, 2, 3, 4)):
-        return InitialTension.uniform(path, scale * recording.pretension_N)
-    ends = {}
-    for end, names, radius in (
-        ("drive", ("T1", "T3"), parameters.drive_radius_m),
-        ("load", ("T2", "T4"), parameters.load_radius_m),
-    ):
-        torque = f"tau_{'in' if end == 'drive' else 'out'}"
-        total = recording[f"F_{end}_N"][at_rest].mean() - getattr(parameters, f"F_{end}_zero_N")
-        difference = (recording[f"{torque}_Nm"][at_rest].mean() - getattr(parameters, f"{torque}_zero_Nm")) / radius
-        ends[names[0]], ends[names[1]] = scale * (total + difference) / 2, scale * (total - difference) / 2
-    return InitialTension.between_ends(path, parameters.friction, (ends["T1"], ends["T2"]), (ends["T3"], ends["T4"]))
+    read = {c: values.mean() for c, values in given.resting.items() if values.size}
+    if not all(f"T{i}_N" in read for i in (1, 2, 3, 4)):
+        return InitialTension.uniform(path, scale * given.recording.pretension_N)
+    tau_in, tau_out = (read[f"tau_{end}_Nm"] - getattr(parameters, f"tau_{end}_zero_Nm") for end in ("in", "out"))
+    F_drive, F_load = (read[f"F_{end}_N"] - getattr(parameters, f"F_{end}_zero_N") for end in ("drive", "load"))
+    drive, load = tau_in / parameters.drive_radius_m, tau_out / parameters.load_radius_m
+    T1, T3 = scale * (F_drive + drive) / 2, scale * (F_drive - drive) / 2
+    T2, T4 = scale * (F_load + load) / 2, scale * (F_load - load) / 2
+    return InitialTension.between_ends(path, parameters.friction, (T1, T2), (T3, T4))
 
 
 def _load(given: ModelInput, parameters: Parameters, load_from: LoadFrom) -> SpringLoad | TorqueLoad | AngleLoad:
@@ -184,10 +189,19 @@ def _load(given: ModelInput, parameters: Parameters, load_from: LoadFrom) -> Spr
     return TorqueLoad(given.tau_out - parameters.tau_out_zero_Nm)
 
 
-def _motion(recording: Recording, channel: str) -> NDArray:
+def _motion(recording: Recording, channel: str) -> tuple[NDArray, NDArray]:
+    """The motion behind an encoder's counts, and likely deviations from it."""
     if channel not in recording.encoder_step_rad:
-        return recording[channel]
-    return drive_motion(recording.time_s, recording[channel], recording.encoder_step_rad[channel], recording.rest_s)
+        return recording[channel], np.zeros((0, recording.time_s.size))
+    step_rad = recording.encoder_step_rad[channel]
+    found = drive_motion(recording.time_s, recording[channel], step_rad, recording.rest_s)
+    return found.theta_rad, found.deviations_rad
+
+
+def _rest(recording: Recording, theta_in: NDArray) -> slice:
+    """The samples at the start at which the drive does not move: fewer than those at which its count does not."""
+    moved = (recording.time_s >= recording.rest_s) | (np.abs(theta_in - theta_in[0]) > STILL_RAD)
+    return slice(0, int(np.argmax(moved)) if moved.any() else recording.time_s.size)
 
 
 def _without_noise(torque: NDArray, time_s: NDArray) -> NDArray:

@@ -14,7 +14,7 @@ from ccmodel.model.run import LoadFrom, ModelInput, simulate
 # no source is worth more than 1e-4 of a sensitivity's root mean square over a run.
 STEP = 1e-5
 # What stands for the size of a parameter that is zero, by the end of its name.
-SIZE_AT_ZERO = {"_Nm": 1e-3, "_N": 1.0}
+SIZE_AT_ZERO = {"_Nm": 1e-3, "_N": 1.0, "_rad": 1e-2}
 
 
 def sensitivities(

@@ -1,30 +1,92 @@
 """The drive's true motion behind the staircase of its encoder, for use as the model's input."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.ndimage import uniform_filter1d
 
-# Motions much slower than this are followed, wiggles much faster are taken for the staircase's. Longer makes sines
-# better still and rounds off the corners of triangles; 7 ms was the best compromise of 5, 7 and 10.
-SMOOTHING_S = 0.007
-# Between 5 and 100 the error changes by a fiftieth of a count at most on sines and slow motions.
-ROUNDS = 20
-# Difference of third order: what is penalised is jerk, so that a constant acceleration is left as it is.
-JERK = np.array([-1.0, 3.0, -3.0, 1.0])
+from ccmodel.rig import bounded
+from ccmodel.rig.rests import Rest, find_rests
 
 
-def drive_motion(time_s: NDArray, theta_counts_rad: NDArray, step_rad: float, rest_s: float) -> NDArray:
+@dataclass(frozen=True)
+class Prior:
+    """What kind of motion is expected: a difference that is small, normally distributed or with heavy tails.
+
+    Attributes
+    ----------
+    difference : tuple of float
+        Third or fourth difference: jerk or its rate.
+    start : float
+        Variance of it to begin with, in counts.
+    least : float
+        Variance below which the estimate would be lost in rounding.
+    tails : float
+        Degrees of freedom of Student's t; infinite for a normal distribution.
+    """
+
+    difference: tuple[float, ...]
+    start: float
+    least: float
+    tails: float
+
+
+SMOOTH = Prior((1.0, -4.0, 6.0, -4.0, 1.0), 1e-6, 1e-13, np.inf)
+CORNERED = Prior((-1.0, 3.0, -3.0, 1.0), 1e-4, 1e-10, 1.0)
+PRIORS = (SMOOTH, CORNERED)
+# Time over which the variance of the difference is taken to be the same.
+ALIKE_S = 0.08
+FIRST_ROUNDS, MORE_ROUNDS, LAST_ROUNDS = 10, 10, 5
+NODE_S = 0.004  # Motions are much slower than this.
+DRAWS = 8
+PIN = 1e6  # Precision with which a rest is held where it was found to be; its variance is added afterwards.
+NODES = 5  # What a rest is reduced to: more than any difference spans.
+
+
+@dataclass(frozen=True)
+class DriveMotion:
+    """The drive's motion and what is left of its uncertainty.
+
+    Attributes
+    ----------
+    theta_rad : ndarray, shape (n,)
+        Drive angle, rad; 0 at the rest at the start where there is one.
+    sigma_rad : ndarray, shape (n,)
+        Standard deviation of what is left, rad.
+    deviations_rad : ndarray, shape (draws, n)
+        Equally likely deviations from `theta_rad`, rad: run through a model, they show what is left does to it.
+    offset_rad : float
+        `theta_rad + offset_rad` lies within half a count of the angle as counted: where in its count the drive rests.
+    """
+
+    theta_rad: NDArray
+    sigma_rad: NDArray
+    deviations_rad: NDArray
+    offset_rad: float
+
+    def __getitem__(self, wanted: slice) -> "DriveMotion":
+        """Some of the samples."""
+        return DriveMotion(
+            self.theta_rad[wanted], self.sigma_rad[wanted], self.deviations_rad[:, wanted], self.offset_rad
+        )
+
+
+def drive_motion(time_s: NDArray, theta_counts_rad: NDArray, step_rad: float, rest_s: float) -> DriveMotion:
     """Estimate the drive angle that an encoder's counts only bound.
 
-    The smoothest curve (least jerk) that stays within half a count of the counts, softly: penalised least squares
-    towards the nearest angle that the counts allow, a few rounds of it. At rest the angle rests.
+    A Gaussian process, of which every count says that the angle lies within one count's width: its fourth difference is
+    small (motions without corners) or its third has heavy tails (triangles, jumps of acceleration), whichever predicts
+    each count better from all the others. How small follows the recording, a tenth of a second at a time. Where the
+    drive rests the angle is constant; where in its count it rests is told by the first counts on either side
+    (`ccmodel.rig.rests`), no better than that.
 
     Parameters
     ----------
     time_s : ndarray, shape (n,)
-        Sample times, s, increasing; small gaps are bridged.
+        Sample times, s, increasing, evenly spaced but for gaps.
     theta_counts_rad : ndarray, shape (n,)
-        Drive angle as counted, rad, zero at rest.
+        Drive angle as counted, rad, from any zero.
     step_rad : float
         Angle of one count, rad.
     rest_s : float
@@ -32,68 +94,167 @@ def drive_motion(time_s: NDArray, theta_counts_rad: NDArray, step_rad: float, re
 
     Returns
     -------
-    ndarray, shape (n,)
-        Drive angle, rad.
+    DriveMotion
 
     Raises
     ------
     ValueError
-        If the arrays differ in shape, have fewer than 4 samples or the step is not positive.
+        If the arrays differ in shape, are too short or the step is not positive.
 
     Notes
     -----
-    Rms error in counts, over the whole motion / near reversals, on motions that start from rest: a sine (0.6 rad,
-    0.5 Hz), a triangle (0.45 rad, 0.4 Hz, corners rounded over 80 ms), steps with holds, a slow sine (0.5 rad, 0.1 Hz).
-    First counts of 0.18 deg at 250 Hz, then 8192 counts a revolution at 1 kHz:
-
-    ====================================  ===========  ===========  ===========  ===========
-    0.18 deg, 250 Hz                      sine         triangle     steps        slow
-    ====================================  ===========  ===========  ===========  ===========
-    the counts as they stand              0.29 / 0.29  0.29 / 0.28  0.29 / 0.29  0.29 / 0.29
-    pchip through the changes of count    0.21 / 0.33  0.26 / 0.49  0.29 / 0.30  0.15 / 0.23
-    Savitzky-Golay, cubic, 60 ms          0.14 / 0.13  0.14 / 0.10  0.27 / 0.29  0.16 / 0.26
-    smoothing spline, lambda 1e-6         0.13 / 0.12  0.13 / 0.12  0.27 / 0.29  0.15 / 0.25
-    this                                  0.12 / 0.09  0.09 / 0.18  0.27 / 0.29  0.14 / 0.24
-    ====================================  ===========  ===========  ===========  ===========
-
-    ====================================  ===========  ===========  ===========  ===========
-    8192 counts/rev, 1 kHz                sine         triangle     steps        slow
-    ====================================  ===========  ===========  ===========  ===========
-    the counts as they stand              0.29 / 0.29  0.29 / 0.29  0.30 / 0.30  0.29 / 0.29
-    pchip through the changes of count    0.20 / 0.25  0.26 / 0.45  0.30 / 0.31  0.14 / 0.19
-    Savitzky-Golay, cubic, 60 ms          0.10 / 0.06  0.09 / 0.32  0.29 / 0.30  0.12 / 0.17
-    smoothing spline, lambda 1e-6         0.10 / 0.07  0.08 / 0.14  0.27 / 0.29  0.12 / 0.18
-    this                                  0.09 / 0.04  0.10 / 0.40  0.31 / 0.34  0.11 / 0.14
-    ====================================  ===========  ===========  ===========  ===========
-
-    The spline's lambda fits one sampling rate, and it takes six times as long. Where the drive holds, nothing tells
-    where within a count it stands: what is left of the steps' error is that.
+    Measured errors follow.
     """
     time = np.asarray(time_s, dtype=float)
     counted = np.asarray(theta_counts_rad, dtype=float)
-    if time.shape != counted.shape or time.ndim != 1 or time.size < JERK.size:
-        raise ValueError(f"time and angle must be alike and have {JERK.size} samples or more; got {counted.shape}")
+    if time.shape != counted.shape or time.ndim != 1 or time.size < NODES:
+        raise ValueError(f"time and angle must be alike and have {NODES} samples or more; got {counted.shape}")
     if not step_rad > 0:
         raise ValueError(f"the angle of one count must be positive; got {step_rad}")
-    # Differences are those of even steps.
+    thinned = slice(None, None, _samples_a_node(time, counted / step_rad))
+    step_s = float(np.median(np.diff(time[thinned])))
+    # Differences are those of even steps; what falls into a gap is bounded by nothing.
+    place = np.round((time[thinned] - time[0]) / step_s).astype(int)
+    seen = np.zeros(place[-1] + 1, bool)
+    seen[place] = True
+    zero = counted[0]
+    latest = np.searchsorted(place, np.arange(seen.size), "right") - 1
+    counts = np.round((counted[thinned][latest] - zero) / step_rad)
+    rests = find_rests(counts, int(np.searchsorted(time[thinned], rest_s, "right")) if rest_s > 0 else 0)
+    curves = _curves(_Data.of(counts, seen, rests), ALIKE_S / step_s, from_rest=rest_s > 0)
+    grid = time[0] + step_s * np.arange(seen.size)
+    angle, sigma, *draws = (np.interp(time, grid, curve) * step_rad for curve in curves)
+    if rest_s > 0:
+        return DriveMotion(angle - angle[0], sigma, np.array(draws), angle[0] + zero)
+    return DriveMotion(angle + zero, sigma, np.array(draws), 0.0)
+
+
+def _samples_a_node(time: NDArray, counts: NDArray) -> int:
+    """Samples to step over for one that tells something: more of them would only make rounding errors grow."""
     step_s = np.median(np.diff(time))
-    grid = np.linspace(time[0], time[-1], max(JERK.size, round((time[-1] - time[0]) / step_s) + 1))
-    centre = np.interp(grid, time, counted)
-    room = np.where((grid <= rest_s) & (rest_s > 0), 0.0, step_rad / 2)
-    factor = cholesky_banded(_normal_matrix(grid.size, (SMOOTHING_S / step_s) ** 6))
-    angle = centre
-    for _ in range(ROUNDS):
-        angle = cho_solve_banded((factor, False), np.clip(angle, centre - room, centre + room))
-    return np.interp(time, grid, angle)
+    fastest = uniform_filter1d(abs(np.diff(counts)), max(1, round(ALIKE_S / step_s)), mode="nearest").max()
+    most = min(int(NODE_S / step_s * 1.01), time.size // NODES)
+    return max(1, most if fastest * most < 1 else int(1 / fastest))
 
 
-def _normal_matrix(n: int, weight: float) -> NDArray:
-    """Identity + weight * D^T D, D the third difference of n samples, in the upper banded form of scipy."""
-    order = JERK.size - 1
-    banded = np.zeros((order + 1, n))
-    for above in range(order + 1):
-        for i in range(order + 1 - above):
-            first = i + above
-            banded[order - above, first : first + n - order] += weight * JERK[i] * JERK[first]
-    banded[order] += 1.0
-    return banded
+def _curves(data: "_Data", alike: float, from_rest: bool) -> NDArray:
+    """Angle, its standard deviation and likely deviations, in counts, shape (2 + DRAWS, samples)."""
+    tries = [_Estimate(data, prior, alike) for prior in PRIORS]
+    for each in tries:
+        each.rounds(FIRST_ROUNDS)
+    best = max(tries, key=lambda each: each.likelihood)
+    best.rounds(MORE_ROUNDS)
+    best.rounds(LAST_ROUNDS, adapt=False)
+    follow = np.zeros((data.rest.size, best.mean.size))
+    follow[np.arange(data.rest.size), data.rest] = PIN
+    noise = np.random.default_rng(0)
+    draws = noise.standard_normal((DRAWS, best.mean.size))
+    for curve in follow:
+        bounded.solved(best.L, curve)
+    for curve in draws:
+        bounded.solved_upper(best.L, curve)
+    if from_rest and data.rest.size:
+        follow -= follow[:, :1]
+    follow *= np.sqrt(data.variance)[:, None]
+    draws += noise.standard_normal((DRAWS, data.rest.size)) @ follow
+    sigma = np.sqrt(best.spread + (follow**2).sum(axis=0))
+    return np.vstack([best.mean, sigma, draws])[:, data.node]
+
+
+@dataclass(frozen=True)
+class _Data:
+    """Samples of a motion, each rest reduced to a few that are tied together.
+
+    Attributes
+    ----------
+    node : ndarray of int, shape (n,)
+        Which of them stands for each of the recording's samples.
+    low, high : ndarray, shape (nodes,)
+        Bounds, in counts.
+    bounded : ndarray of bool, shape (nodes,)
+        Where these count: not in gaps, and not in a rest, of whose place more is known.
+    tie : ndarray, shape (nodes,)
+        Weight that holds a node and the next together.
+    rest, level, variance : ndarray, shape (rests,)
+        First node of each rest, where it stands and the variance of that.
+    """
+
+    node: NDArray
+    low: NDArray
+    high: NDArray
+    bounded: NDArray
+    tie: NDArray
+    rest: NDArray
+    level: NDArray
+    variance: NDArray
+
+    @classmethod
+    def of(cls, counts: NDArray, seen: NDArray, rests: list[Rest]) -> "_Data":
+        rests = [rest for rest in rests if rest.last - rest.first > NODES]
+        keep, tied, bounded_at = np.ones(counts.size, bool), np.zeros(counts.size, bool), seen.copy()
+        for rest in rests:
+            keep[rest.first + NODES : rest.last + 1] = False
+            tied[rest.first : rest.first + NODES - 1] = True
+            bounded_at[rest.first : rest.first + NODES] = False
+        node = np.cumsum(keep) - 1
+        for rest in rests:
+            node[rest.first : rest.last + 1] = node[rest.first]
+        return cls(
+            node,
+            counts[keep] - 0.5,
+            counts[keep] + 0.5,
+            bounded_at[keep],
+            bounded.TIE * tied[keep],
+            node[np.array([rest.first for rest in rests], int)],
+            np.array([rest.level for rest in rests]),
+            np.array([rest.variance for rest in rests]),
+        )
+
+
+class _Estimate:
+    """A motion under one prior, made better round by round."""
+
+    def __init__(self, data: _Data, prior: Prior, alike: float):
+        self.data, self.prior, self.alike = data, prior, alike
+        self.precision, self.pull = bounded.start(data.low, data.high, data.bounded)
+        self.precision[data.rest], self.pull[data.rest] = PIN, PIN * data.level
+        order = len(prior.difference) - 1
+        tied = np.convolve(data.tie > 0, np.ones(order), "valid")[: data.low.size - order]
+        self.free = tied < order
+        self.variance = np.full(data.low.size - order, prior.start)
+        self.calm = np.ones(self.variance.size)
+
+    def rounds(self, n: int, adapt: bool = True) -> None:
+        data, prior = self.data, self.prior
+        for _ in range(n):
+            self.mean, self.spread, self.L, kick, blur, self.likelihood = bounded.one_round(
+                prior.difference,
+                1 / self.variance,
+                data.tie,
+                data.low,
+                data.high,
+                data.bounded,
+                self.precision,
+                self.pull,
+            )
+            if adapt:
+                self._adapt(kick, blur)
+
+    def _adapt(self, kick: NDArray, blur: NDArray) -> None:
+        """Variance of the difference that makes its estimates likeliest, alike over a while (MacKay's update)."""
+        tails = self.prior.tails
+        known = np.where(self.free, np.clip(1 - blur / self.variance, 1e-9, 1), 0.0)
+        power = np.where(self.free, kick**2 * self.calm, 0.0)
+        common = power.sum() / max(known.sum(), 1e-9)
+        local = (common + _around(power, self.alike)) / (1 + _around(known, self.alike))
+        local = np.maximum(local, self.prior.least)
+        if np.isfinite(tails):
+            self.calm = (tails + 1) / (tails + (kick**2 + blur) / local)
+        self.variance = np.maximum(local / self.calm, self.prior.least)
+
+
+def _around(values: NDArray, width: float) -> NDArray:
+    """Sum over what lies within about `width` samples, weighed by a bell curve."""
+    box = max(3, round(2 * width) | 1)
+    twice = uniform_filter1d(uniform_filter1d(values, box, mode="constant"), box, mode="constant")
+    return np.maximum(twice, 0.0) * width * np.sqrt(2 * np.pi)
