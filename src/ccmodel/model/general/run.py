@@ -211,7 +211,7 @@ def load_law(settings: Settings, stiffness: float, time_s: NDArray, theta: NDArr
     """
     K3 = settings.cubic_stiffness
     z = _deflection(stiffness, K3, start_Nm)
-    angle = theta - theta[0] + z + np.sign(z) * settings.half_gap
+    angle = theta - theta[0] + _with_gap(z, settings.half_gap)
     beyond = np.sign(angle) * np.maximum(np.abs(angle) - settings.half_gap, 0.0)
     acceleration = np.gradient(np.gradient(theta, time_s), time_s)
     return stiffness * beyond + K3 * beyond**3 + settings.inertia * acceleration
@@ -360,7 +360,7 @@ def _load_angle(physics: rows.Physics, T: NDArray, load: Load, series: NDArray) 
     for _ in range(50):
         R = physics.radius * winding(theta, physics.eccentricity, physics.phase)[1]
         z = _deflection(K, K3, R * (T[0, -1] - T[1, -1]))
-        theta = z + np.sign(z) * physics.half_gap
+        theta = _with_gap(z, physics.half_gap)
         if physics.eccentricity == 0:
             break
     return float(theta)
@@ -374,6 +374,15 @@ def _deflection(K: float, K3: float, torque: float) -> float:
     for _ in range(50 if K3 else 0):
         z -= (K * z + K3 * z**3 - torque) / (K + 3 * K3 * z * z)
     return float(z)
+
+
+def _with_gap(deflection: float, half_gap: float) -> float:
+    """Angle of a load at rest whose spring is deflected, rad.
+
+    What a gap hides cannot be seen from the torque: a load that is all but free may stand anywhere in it. It is taken
+    to stand in the middle, and the further off, the more it is loaded, up to a deflection as large as the gap.
+    """
+    return deflection + float(np.clip(deflection, -half_gap, half_gap))
 
 
 def _read(active: list[Active], time_s: NDArray, channels: dict[str, NDArray], transmission: Transmission):

@@ -1,0 +1,91 @@
+"""The recordings of a batch made ready for a diagnosis: what differs from run to run is part of their noise.
+
+Friction that is a per cent higher, a sensor's zero, where in its count an encoder rests, what is not known of the
+drive's motion: each is a direction in which a recording may lie off what the right model says. Together with the
+sensors' noise they make the covariance of a recording's errors. Errors that were whitened by it are what hypotheses
+are judged by, and no fit needs unknowns for what differs from run to run.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ccmodel.identify.problem import Evidence
+from ccmodel.model.parameters import Parameters
+from ccmodel.model.run import simulate
+from ccmodel.model.sensitivity import STEP, size_of
+
+FRICTION_SPREAD = 0.01  # of itself, from run to run (docs/rig-log-format.md)
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """A recording with the covariance of its errors.
+
+    Attributes
+    ----------
+    evidence : Evidence
+    directions : ndarray, shape (rows, k)
+        Orthonormal directions of what differs from run to run, among the errors over the sensors' noise.
+    shrink : ndarray, shape (k,)
+        By how much whitening shrinks the errors along each.
+    floor : dict of str to float
+        Root mean square of what a right model leaves, by channel, in its unit.
+    """
+
+    evidence: Evidence
+    directions: NDArray
+    shrink: NDArray
+    floor: Mapping[str, float]
+
+    def whitened(self, errors: NDArray) -> NDArray:
+        """Errors over the sensors' noise, whitened; shape (rows,) or (rows, columns) as given."""
+        along = self.directions.T @ errors
+        return errors - self.directions @ (self.shrink[:, None] * along if along.ndim == 2 else self.shrink * along)
+
+    def acting(self, parameters: Parameters) -> "Weighed":
+        """The same recording beside another model."""
+        return replace(self, evidence=replace(self.evidence, parameters=parameters))
+
+
+def weigh(evidence: Evidence, parameters: Parameters) -> Weighed:
+    """Work out what may differ from run to run, about a model that is fitted already."""
+    e = replace(evidence, parameters=parameters)
+    said = _stack(e, parameters)
+    columns = [
+        spread * (_stack(e, parameters.with_values({name: value + step})) - said) / step
+        for name, value, spread, step in _nuisances(e, parameters)
+    ]
+    given, judged = e.given, e.judged
+    drawn = [
+        _stack(replace(e, given=replace(given, theta_in=given.theta_in + deviation)), parameters) - said
+        for deviation in given.drive_deviations
+    ]
+    columns += [d / np.sqrt(len(drawn)) for d in drawn]
+    floor = np.sqrt((e.sigma**2).mean(axis=1) + sum((c**2).mean(axis=1) for c in columns[:1]))
+    N = np.stack([(c / e.sigma).ravel() for c in columns], axis=1)
+    U, s, _ = np.linalg.svd(N, full_matrices=False)
+    assert judged.shape == given.theta_in.shape
+    return Weighed(e, U, 1 - 1 / np.hypot(1, s), dict(zip(e.channels, floor.tolist(), strict=True)))
+
+
+def _stack(e: Evidence, parameters: Parameters) -> NDArray:
+    said = simulate(e.given, parameters)
+    return np.stack([said[c][e.judged] for c in e.channels])
+
+
+def _nuisances(e: Evidence, parameters: Parameters) -> Sequence[tuple[str, float, float, float]]:
+    """Name, value, spread from run to run and step of each number that differs; friction first."""
+    recording = e.given.recording
+    mu = parameters.friction_coefficient
+    found = [("friction_coefficient", mu, FRICTION_SPREAD * mu)]
+    zeros = {"tau_in_zero_Nm": "tau_in_Nm", "tau_out_zero_Nm": "tau_out_Nm"}
+    zeros |= {"F_drive_zero_N": "F_drive_N", "F_load_zero_N": "F_load_N"}
+    for name, channel in zeros.items():
+        if channel in e.channels and channel in recording.accuracy:
+            found.append((name, getattr(parameters, name), recording.accuracy[channel]))
+    if "theta_out_rad" in e.channels and (step := recording.encoder_step_rad.get("theta_out_rad")):
+        found.append(("theta_out_zero_rad", parameters.theta_out_zero_rad, step / np.sqrt(12)))
+    return [(name, value, spread, STEP * size_of(name, value) * 10) for name, value, spread in found]

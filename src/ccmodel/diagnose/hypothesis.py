@@ -1,0 +1,110 @@
+"""What could be missing: nothing, one mechanism at one of its places, or two of them."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from ccmodel import mechanisms as registry
+from ccmodel.identify.problem import Free
+from ccmodel.mechanisms import Parameter
+from ccmodel.model.general.run import Active
+from ccmodel.model.parameters import Parameters, mechanism_key
+
+# How far beyond its plausible range a fit may take a number: far enough to see that it wants to leave it.
+BEYOND = 3.0
+# Where in its range, on a logarithmic scale, the strength of a mechanism is tried out.
+STRENGTHS = (0.25, 0.6)
+SHAPES = (0.2, 0.5, 0.8)
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """Mechanisms that act besides the paper's physics.
+
+    Attributes
+    ----------
+    acting : tuple of (str, str)
+        Mechanism and place of each; empty for the paper's model.
+    """
+
+    acting: tuple[tuple[str, str], ...] = ()
+
+    def __str__(self) -> str:
+        return " + ".join(f"{name} at {place}" for name, place in self.acting) or "the paper's model"
+
+    def of(self, parameters: Parameters) -> Parameters:
+        """Parameters with the mechanisms in them, at their starting values."""
+        acting = tuple(Active(name, place, registry.get(name).start) for name, place in self.acting)
+        return replace(parameters, mechanisms=acting)
+
+    def free(self, start: Mapping[str, float]) -> dict[str, Free]:
+        """The mechanisms' numbers as unknowns, from `start`."""
+        found = {}
+        for name, place in self.acting:
+            for k, parameter in enumerate(registry.get(name).parameters):
+                key = mechanism_key(name, place, parameter.name)
+                low, high = _reach(parameter, strength=k == 0)
+                found[key] = Free(float(np.clip(start[key], low, high)), low, high)
+        return found
+
+    def probes(self) -> Iterator[dict[str, float]]:
+        """Values at which a single mechanism is tried out, all over its plausible range."""
+        ((name, place),) = self.acting
+        strength, *shapes = registry.get(name).parameters
+        grids = [[_within(strength, share) for share in STRENGTHS]]
+        if name == "cable-asymmetry":
+            yield from _asymmetries(name, place)
+            return
+        grids += [[_within(p, share) for share in SHAPES] for p in shapes]
+        for values in product(*grids):
+            keys = (mechanism_key(name, place, p.name) for p in (strength, *shapes))
+            yield dict(zip(keys, values, strict=True))
+
+
+def singles() -> list[Hypothesis]:
+    """Every mechanism at each of its places."""
+    return [Hypothesis(((name, place),)) for name in registry.names() for place in registry.get(name).places]
+
+
+def plausible(hypothesis: Hypothesis, values: Mapping[str, float], slack: float = 1.5) -> bool:
+    """Whether every number lies in its mechanism's range, or not further than a factor from it."""
+    return all(
+        _is_plausible(parameter, values[mechanism_key(name, place, parameter.name)], slack)
+        for name, place in hypothesis.acting
+        for parameter in registry.get(name).parameters
+    )
+
+
+def _is_plausible(parameter: Parameter, value: float, slack: float) -> bool:
+    if parameter.scale == "linear" or parameter.low < 0 or parameter.neutral != 0:
+        return True
+    size = abs(value) if parameter.signed else value
+    return parameter.low / slack <= size <= parameter.high * slack
+
+
+def _asymmetries(name: str, place: str) -> Iterator[dict[str, float]]:
+    for ratio, K_ratio in ((1.15, 1.0), (1.0, 1.15)):
+        yield {mechanism_key(name, place, "ratio"): ratio, mechanism_key(name, place, "K_ratio"): K_ratio}
+
+
+def _within(parameter: Parameter, share: float) -> float:
+    low, high = parameter.low, parameter.high
+    if parameter.scale == "log" and low > 0:
+        return float(low * (high / low) ** share)
+    return float(low + share * (high - low))
+
+
+def _reach(parameter: Parameter, strength: bool) -> tuple[float, float]:
+    low, high = parameter.low, parameter.high
+    if parameter.scale == "linear" and not strength:
+        # An angle may go round; a place may not leave the conduit.
+        return (2 * low, 2 * high) if parameter.unit == "rad" else (low, high)
+    if low < 0:
+        return BEYOND * low, 0.5 * abs(low)
+    if parameter.neutral == 1.0:
+        return low / BEYOND, high * BEYOND
+    if parameter.signed:
+        return -BEYOND * high, BEYOND * high
+    return (0.0 if strength else low / BEYOND), BEYOND * high

@@ -1,0 +1,216 @@
+"""Trying a hypothesis: a quick score against the calibrated model, a full refit, and recordings held out in turn."""
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from ccmodel.diagnose.evidence import Weighed
+from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.identify.problem import CORES, Free
+from ccmodel.model.failure import ModelError
+from ccmodel.model.parameters import Parameters
+from ccmodel.model.sensitivity import STEP, size_of
+
+TOLERANCE = 1e-4
+MOST_EVALUATIONS = 25
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A hypothesis fitted to all recordings.
+
+    Attributes
+    ----------
+    hypothesis : Hypothesis
+    values : dict of str to float
+    whitened : list of ndarray, each of shape (rows,)
+        By recording, what the fit leaves.
+    jacobian : list of ndarray, each of shape (rows, unknowns)
+    covariance : ndarray, shape (unknowns, unknowns)
+        By how much the recordings disagree about the values.
+    held_out : list of dict
+        By recording, the values that the other recordings ask for.
+    left : ndarray, shape (recordings,)
+        Mean square of what these leave of the recording.
+    """
+
+    hypothesis: Hypothesis
+    values: dict[str, float]
+    whitened: list[NDArray]
+    jacobian: list[NDArray]
+    covariance: NDArray
+    held_out: list[dict[str, float]]
+    left: NDArray
+
+    @property
+    def mean_square(self) -> float:
+        """Mean square of what the fit leaves, recordings alike."""
+        return float(np.mean([(w**2).mean() for w in self.whitened]))
+
+
+def each(weighed: Sequence[Weighed], work: Callable) -> list:
+    """Some work on every recording with its number."""
+    with ThreadPoolExecutor(CORES) as pool:
+        return list(pool.map(work, range(len(weighed)), weighed))
+
+
+def errors(one: Weighed, values: Mapping[str, float]) -> NDArray:
+    """Whitened errors of a recording, shape (rows,)."""
+    return one.whitened(one.evidence.errors(values).ravel())
+
+
+def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str, Free], start: dict) -> Trial:
+    """Fit a hypothesis from given values and hold every recording out in turn.
+
+    Parameters
+    ----------
+    weighed : sequence of Weighed
+    hypothesis : Hypothesis
+    calibrated : dict of str to Free
+        What a calibration of the paper's model leaves free.
+    start : dict of str to float
+        Values of these and of the mechanisms' numbers to start from.
+
+    Returns
+    -------
+    Trial
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be run on the way.
+    """
+    free = {n: Free(start[n], f.low, f.high) for n, f in calibrated.items()} | hypothesis.free(start)
+    names = list(free)
+    acting = [w.acting(hypothesis.of(w.evidence.parameters)) for w in weighed]
+    low, high = (np.array([getattr(f, end) for f in free.values()]) for end in ("low", "high"))
+    x0 = np.clip([f.start for f in free.values()], low + 1e-9 * (high - low), high - 1e-9 * (high - low))
+    sizes = np.array([size_of(n, f.start) for n, f in free.items()])
+    counts = [w.evidence.measured.size for w in acting]
+
+    def named(x):
+        return dict(zip(names, x.tolist(), strict=True))
+
+    def residuals(x):
+        return np.concatenate(each(acting, lambda i, w: errors(w, named(x)) / np.sqrt(counts[i])))
+
+    def jacobian(x):
+        return np.concatenate([J / np.sqrt(n) for J, n in zip(_jacobians(acting, x, names, sizes, high), counts)])
+
+    found = least_squares(
+        residuals, x0, jac=jacobian, bounds=(low, high), x_scale=sizes, ftol=TOLERANCE, xtol=TOLERANCE, gtol=TOLERANCE,
+        max_nfev=MOST_EVALUATIONS,
+    )  # fmt: skip
+    J = _jacobians(acting, found.x, names, sizes, high)
+    r = each(acting, lambda i, w: errors(w, named(found.x)))
+    information = [j.T @ j / n for j, n in zip(J, counts, strict=True)]
+    score = [j.T @ e / n for j, e, n in zip(J, r, counts, strict=True)]
+    total = sum(information)
+    count = len(acting)
+    inverse = _inverse(total, sizes)
+    scatter = inverse @ sum(np.outer(g, g) for g in score) @ inverse * count / max(count - 1, 1)
+    aside = [np.clip(found.x + _inverse(total - H, sizes) @ g, low, high) for H, g in zip(information, score)]
+    held_out = [named(x) for x in aside]
+    left = each(acting, lambda i, w: float((errors(w, held_out[i]) ** 2).mean()))
+    return Trial(hypothesis, named(found.x), r, J, scatter, held_out, np.array(left))
+
+
+def _inverse(information: NDArray, sizes: NDArray) -> NDArray:
+    scaled = information * np.outer(sizes, sizes)
+    return np.linalg.pinv(scaled, rcond=1e-10, hermitian=True) * np.outer(sizes, sizes)
+
+
+def _jacobians(acting, x, names, sizes, high) -> list[NDArray]:
+    def one(i: int, w: Weighed) -> NDArray:
+        base = errors(w, dict(zip(names, x.tolist(), strict=True)))
+        columns = []
+        for k in range(x.size):
+            step = 10 * STEP * sizes[k] * (-1 if x[k] + 10 * STEP * sizes[k] > high[k] else 1)
+            aside = x.copy()
+            aside[k] += step
+            columns.append((errors(w, dict(zip(names, aside.tolist(), strict=True))) - base) / step)
+        return np.stack(columns, axis=1)
+
+    return each(acting, one)
+
+
+@dataclass(frozen=True)
+class Score:
+    """What a hypothesis would take off the calibrated model's errors, from one run at each of its probes.
+
+    Attributes
+    ----------
+    hypothesis : Hypothesis
+    gain : float
+        Share of the mean square that goes, after everything that recalibration absorbs.
+    values : dict of str to float
+        The probe that does best, its strength as the recordings ask for.
+    """
+
+    hypothesis: Hypothesis
+    gain: float
+    values: dict[str, float]
+
+
+def score(weighed: Sequence[Weighed], base: Trial, hypotheses: Sequence[Hypothesis]) -> list[Score]:
+    """Score hypotheses against a fitted one that they extend, the best first."""
+    counts = [w.evidence.measured.size for w in weighed]
+    A = np.concatenate([J / np.sqrt(n) for J, n in zip(base.jacobian, counts, strict=True)])
+    r = np.concatenate([e / np.sqrt(n) for e, n in zip(base.whitened, counts, strict=True)])
+    Q, _ = np.linalg.qr(A)
+    left = r - Q @ (Q.T @ r)
+    scored = [_score(weighed, base, h, counts, Q, left) for h in hypotheses]
+    return sorted(scored, key=lambda s: -s.gain)
+
+
+def _score(weighed, base: Trial, hypothesis: Hypothesis, counts, Q, left) -> Score:
+    best = Score(hypothesis, 0.0, {})
+    added = Hypothesis(base.hypothesis.acting + hypothesis.acting)
+    acting = [w.acting(added.of(w.evidence.parameters)) for w in weighed]
+    for probe in hypothesis.probes():
+        try:
+            said = each(acting, lambda i, w, p=probe: errors(w, base.values | p) - base.whitened[i])
+        except ModelError:
+            continue
+        d = np.concatenate([e / np.sqrt(n) for e, n in zip(said, counts, strict=True)])
+        d = d - Q @ (Q.T @ d)
+        size = float(d @ d)
+        # A mechanism that recalibration absorbs wholly says nothing.
+        if size < 1e-12:
+            continue
+        strength = -float(d @ left) / size
+        gain = strength * abs(strength) * size / float(left @ left)
+        values = scaled(hypothesis, probe, strength)
+        if values is not None and abs(gain) > best.gain:
+            best = Score(hypothesis, abs(gain), values)
+    return best
+
+
+def scaled(hypothesis: Hypothesis, probe: Mapping[str, float], strength: float) -> dict[str, float] | None:
+    """A probe at another strength; None where its mechanism cannot have it."""
+    from ccmodel import mechanisms as registry
+    from ccmodel.model.parameters import mechanism_key
+
+    ((name, place),) = hypothesis.acting
+    parameters = registry.get(name).parameters
+    first = parameters[0]
+    signed = first.signed or first.neutral == 1.0
+    if strength <= 0 and not signed:
+        return None
+    strength = float(np.clip(strength, -4.0, 4.0))
+    strength = np.copysign(max(abs(strength), 0.1), strength)
+    values = dict(probe)
+    scaled_ones = parameters if name == "cable-asymmetry" else parameters[:1]
+    for p in scaled_ones:
+        key = mechanism_key(name, place, p.name)
+        values[key] = p.neutral + strength * (probe[key] - p.neutral)
+    return values
+
+
+def parameters_of(trial: Trial, estimates: Parameters) -> Parameters:
+    """The fitted model, for any recording."""
+    return trial.hypothesis.of(estimates).with_values(trial.values)
