@@ -59,6 +59,16 @@ def left_out(results: Folder) -> None:
 
 
 @app.command()
+def diagnose(
+    batch: Folder, out: Annotated[Path, typer.Option(help="Folder that gets diagnosis.json, the page and two models.")]
+) -> None:
+    """Say whether the calibrated model explains a batch, and if not: where it fails and what was left out."""
+    from ccmodel.stages.diagnose import diagnose as run
+
+    typer.echo(run(batch, out, tell=lambda text: _err.print(text, style="dim", markup=False)))
+
+
+@app.command()
 def predict(
     batch: Folder,
     model: Annotated[Path, typer.Option(help="A model file, as a diagnosis or a fit writes it.")],

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from ccmodel import mechanisms as registry
 from ccmodel.diagnose.evidence import Weighed
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.identify.problem import CORES, Free
 from ccmodel.model.failure import ModelError
-from ccmodel.model.parameters import Parameters
+from ccmodel.model.parameters import mechanism_key
 from ccmodel.model.sensitivity import STEP, size_of
 
 TOLERANCE = 1e-4
@@ -99,7 +100,8 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
         return np.concatenate(each(acting, lambda i, w: errors(w, named(x)) / np.sqrt(counts[i])))
 
     def jacobian(x):
-        return np.concatenate([J / np.sqrt(n) for J, n in zip(_jacobians(acting, x, names, sizes, high), counts)])
+        parts = _jacobians(acting, x, names, sizes, high)
+        return np.concatenate([J / np.sqrt(n) for J, n in zip(parts, counts, strict=True)])
 
     found = least_squares(
         residuals, x0, jac=jacobian, bounds=(low, high), x_scale=sizes, ftol=TOLERANCE, xtol=TOLERANCE, gtol=TOLERANCE,
@@ -113,7 +115,9 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
     count = len(acting)
     inverse = _inverse(total, sizes)
     scatter = inverse @ sum(np.outer(g, g) for g in score) @ inverse * count / max(count - 1, 1)
-    aside = [np.clip(found.x + _inverse(total - H, sizes) @ g, low, high) for H, g in zip(information, score)]
+    aside = [
+        np.clip(found.x + _inverse(total - H, sizes) @ g, low, high) for H, g in zip(information, score, strict=True)
+    ]
     held_out = [named(x) for x in aside]
     left = each(acting, lambda i, w: float((errors(w, held_out[i]) ** 2).mean()))
     return Trial(hypothesis, named(found.x), r, J, scatter, held_out, np.array(left))
@@ -192,9 +196,6 @@ def _score(weighed, base: Trial, hypothesis: Hypothesis, counts, Q, left) -> Sco
 
 def scaled(hypothesis: Hypothesis, probe: Mapping[str, float], strength: float) -> dict[str, float] | None:
     """A probe at another strength; None where its mechanism cannot have it."""
-    from ccmodel import mechanisms as registry
-    from ccmodel.model.parameters import mechanism_key
-
     ((name, place),) = hypothesis.acting
     parameters = registry.get(name).parameters
     first = parameters[0]
@@ -209,8 +210,3 @@ def scaled(hypothesis: Hypothesis, probe: Mapping[str, float], strength: float) 
         key = mechanism_key(name, place, p.name)
         values[key] = p.neutral + strength * (probe[key] - p.neutral)
     return values
-
-
-def parameters_of(trial: Trial, estimates: Parameters) -> Parameters:
-    """The fitted model, for any recording."""
-    return trial.hypothesis.of(estimates).with_values(trial.values)

@@ -139,7 +139,9 @@ def fit(problem: Problem, starts: int = 1) -> FitResult:
     return _result(problem, best, _warnings(problem, best, solutions, failures))
 
 
-def solve(problem: Problem, start: NDArray, most_evaluations: int = MOST_EVALUATIONS) -> Solution:
+def solve(
+    problem: Problem, start: NDArray, most_evaluations: int = MOST_EVALUATIONS, tolerance: float = TOLERANCE
+) -> Solution:
     """The nearest least cost, by scipy's trust region within bounds.
 
     Raises
@@ -153,9 +155,9 @@ def solve(problem: Problem, start: NDArray, most_evaluations: int = MOST_EVALUAT
         jac=problem.jacobian,
         bounds=problem.bounds,
         x_scale=problem.sizes,
-        ftol=TOLERANCE,
-        xtol=TOLERANCE,
-        gtol=TOLERANCE,
+        ftol=tolerance,
+        xtol=tolerance,
+        gtol=tolerance,
         max_nfev=most_evaluations,
     )
     message = STOPPED[found.status]

@@ -1,0 +1,210 @@
+"""A batch's recordings -> a diagnosis, as plain data."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from ccmodel import mechanisms as registry
+from ccmodel.diagnose import experiment, locate
+from ccmodel.diagnose.evidence import Weighed, weigh
+from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.diagnose.judge import MOST_ALTERNATIVES, RIVAL, Judgement, judge, nested_errors
+from ccmodel.diagnose.trial import Trial, each
+from ccmodel.identify.fit import solve
+from ccmodel.identify.intervals import COVERAGE
+from ccmodel.identify.problem import MEASURED, Evidence, Free, Problem
+from ccmodel.model.failure import ModelError
+from ccmodel.model.parameters import Parameters, mechanism_key
+from ccmodel.recording import Recording, unit_of
+
+FORMAT = 1
+# Enough for rates that such rigs run at; a third of the work.
+STEP_S = 0.008
+STIFFNESS_N_PER_M, FRICTION, LOAD = (1e2, 1e7), (0.005, 1.5), (1e-4, 10.0)
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What a diagnosis found, and what it was found from.
+
+    Attributes
+    ----------
+    said : dict
+        The content of diagnosis.json.
+    judgement : Judgement
+    weighed : sequence of Weighed
+    estimates : Parameters
+        The batch's own, beforehand.
+    """
+
+    said: dict
+    judgement: Judgement
+    weighed: Sequence[Weighed]
+    estimates: Parameters
+
+    def model(self, trial: Trial) -> Parameters:
+        """A trial's model, for any recording."""
+        return trial.hypothesis.of(self.estimates).with_values(trial.values)
+
+
+def diagnose(
+    recordings: Sequence[Recording],
+    estimates: Parameters,
+    not_judged: Sequence[Mapping[str, str]] = (),
+    tell: Callable[[str], None] = lambda text: None,
+) -> Diagnosis:
+    """Say whether the calibrated model explains recordings, and if not, where and why.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Of one batch.
+    estimates : Parameters
+        The batch's own.
+    not_judged : sequence of {"what", "why"}
+        What could not be judged, as far as is known already.
+    tell : callable
+        Is told how the work goes on.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be run on any of the recordings.
+    """
+    not_judged = [dict(n) for n in not_judged]
+    evidence = []
+    for recording in recordings:
+        try:
+            evidence.append(Evidence.of(recording, estimates, step_s=STEP_S))
+        except (ModelError, ValueError) as error:
+            not_judged.append({"what": recording.id, "why": str(error)})
+    if not evidence:
+        raise ModelError("none of the recordings can be compared with the model: " + not_judged[0]["why"])
+    not_judged += _what_is_missing(evidence)
+    calibrated = _calibrated(estimates)
+    tell(f"calibrating the paper's model on {len(evidence)} recordings")
+    start = _first_fit(evidence, calibrated)
+    fitted = estimates.with_values(start)
+    weighed = each(evidence, lambda i, e: weigh(e, fitted))
+    judgement = judge(weighed, calibrated, start, tell)
+    said = _said(recordings[0].batch, judgement, weighed, estimates, not_judged)
+    return Diagnosis(said, judgement, weighed, estimates)
+
+
+def _calibrated(estimates: Parameters) -> dict[str, Free]:
+    free = {
+        "stiffness_N_per_m": Free(estimates.stiffness_N_per_m, *STIFFNESS_N_PER_M),
+        "friction_coefficient": Free(estimates.friction_coefficient, *FRICTION),
+    }
+    if estimates.load_stiffness_Nm_per_rad is not None:
+        free["load_stiffness_Nm_per_rad"] = Free(estimates.load_stiffness_Nm_per_rad, *LOAD)
+    return free
+
+
+def _first_fit(evidence: Sequence[Evidence], calibrated: Mapping[str, Free]) -> dict[str, float]:
+    problem = Problem(evidence, calibrated, {"friction_scale": Free(1.0, 0.2, 5.0, 0.01)})
+    found = solve(problem, problem.start, most_evaluations=20, tolerance=1e-4)
+    return dict(zip(calibrated, found.x.tolist(), strict=False))
+
+
+def _what_is_missing(evidence: Sequence[Evidence]) -> list[dict[str, str]]:
+    found = []
+    recorded = {c for e in evidence for c in e.channels}
+    for channel in MEASURED:
+        if channel not in recorded:
+            found.append({"what": channel, "why": "not recorded, or the load's course had to be taken from it"})
+    if len(evidence) == 1:
+        found.append({"what": "held-out error", "why": "a single recording: nothing can be held out"})
+    if len({round(e.given.recording.path.bend_rad, 3) for e in evidence}) == 1:
+        found.append({"what": "friction apart from bend", "why": "one bend angle: only the product of the two shows"})
+    return found
+
+
+def _said(batch, judgement: Judgement, weighed, estimates: Parameters, not_judged) -> dict:
+    best, base = judgement.best, judgement.calibrated
+    named = best.hypothesis.acting if judgement.verdict == "explained" else ()
+    confidence = dict(zip([t.hypothesis for t in judgement.trials], judgement.probability, strict=True))
+    alternatives = _alternatives(judgement, named, confidence)
+    next_experiment = None
+    if judgement.verdict in ("undecided", "unexplained"):
+        next_experiment = experiment.proposed(judgement, weighed, estimates)
+    return {
+        "format": FORMAT,
+        "batch": batch,
+        "verdict": judgement.verdict,
+        "location": locate.location(judgement, weighed),
+        "mechanisms": [_mechanism(best, k, confidence[best.hypothesis]) for k in range(len(named))],
+        "alternatives": alternatives,
+        "fit": {
+            "held_out": [w.evidence.given.recording.id for w in weighed] if len(weighed) > 1 else [],
+            "calibrated": base.values,
+            "mean_square": {"calibrated": float(base.left.mean()), "extended": float(best.left.mean())},
+            "error": held_out_errors(judgement, weighed),
+        },
+        "next_experiment": next_experiment,
+        "not_judged": list(not_judged),
+    }
+
+
+def _alternatives(judgement: Judgement, named, confidence) -> list[dict]:
+    if judgement.verdict in ("agrees", "unexplained"):
+        return []
+    best: dict[tuple[str, str], float] = {}
+    for hypothesis, p in confidence.items():
+        for name, place in hypothesis.acting:
+            if (name, place) not in named:
+                best[name, place] = best.get((name, place), 0.0) + p
+    ranked = sorted(best.items(), key=lambda item: -item[1])[:MOST_ALTERNATIVES]
+    return [{"name": n, "place": p, "confidence": round(c, 4)} for (n, p), c in ranked if c > RIVAL]
+
+
+def _mechanism(trial: Trial, k: int, confidence: float) -> dict:
+    name, place = trial.hypothesis.acting[k]
+    names = list(trial.values)
+    reach = norm.ppf(0.5 + COVERAGE / 2)
+    parameters = []
+    for p in registry.get(name).parameters:
+        key = mechanism_key(name, place, p.name)
+        value, i = trial.values[key], names.index(key)
+        sd = float(np.sqrt(max(trial.covariance[i, i], 0.0)))
+        parameters.append(
+            {
+                "name": p.name,
+                "value": value,
+                "low": value - reach * sd,
+                "high": value + reach * sd,
+                "unit": p.unit.replace(" ", "*"),
+            }
+        )
+    return {"name": name, "place": place, "confidence": round(confidence, 4), "parameters": parameters}
+
+
+def held_out_errors(judgement: Judgement, weighed: Sequence[Weighed]) -> dict[str, dict]:
+    """Root mean square on held-out recordings by channel, before and after, and what a right model leaves."""
+    chosen = nested_errors(judgement)
+    square: dict[str, list[tuple[float, float, float]]] = {}
+    for i, w in enumerate(weighed):
+        before = _raw(w, judgement.calibrated, i)
+        after = before if chosen[i] is judgement.calibrated else _raw(w, chosen[i], i)
+        for c, channel in enumerate(w.evidence.channels):
+            row = (np.mean(before[c] ** 2), np.mean(after[c] ** 2), w.floor[channel] ** 2)
+            square.setdefault(channel, []).append(row)
+    found = {}
+    for channel, rows in square.items():
+        before, after, noise = np.sqrt(np.mean(rows, axis=0)).tolist()
+        name = channel.rsplit("_", 1)[0]
+        found[name] = {"before": before, "after": after, "noise": noise, "unit": unit_of(channel).replace(" ", "*")}
+    return found
+
+
+def _raw(w: Weighed, trial: Trial, i: int) -> NDArray:
+    e = replace(w.evidence, parameters=trial.hypothesis.of(w.evidence.parameters))
+    return e.errors(trial.held_out[i]) * e.sigma
+
+
+def said_of(hypothesis: Hypothesis) -> str:
+    """What a hypothesis means, in words."""
+    return " and ".join(registry.get(name).summary for name, _ in hypothesis.acting)

@@ -1,0 +1,183 @@
+"""From trials to a verdict.
+
+Hypotheses are compared by what they leave of recordings that they were not fitted to: the mean square of whitened
+errors, which is one where nothing is missing. Samples are far too many to count each as evidence (what a model leaves
+beyond noise is alike from sample to sample), so each channel of a recording counts as a number of looks.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ccmodel.diagnose.evidence import Weighed
+from ccmodel.diagnose.hypothesis import Hypothesis, plausible, singles
+from ccmodel.diagnose.trial import Score, Trial, fit, score
+from ccmodel.identify.problem import Free
+from ccmodel.model.failure import ModelError
+
+# Independent looks that a channel of a recording gives at a hypothesis.
+LOOKS = 20
+# A mechanism is worth a trial if it takes this share off the calibrated model's mean square, and a naming if it takes
+# more than this off what is left of held-out recordings.
+WORTH_A_TRIAL = 0.01
+WORTH_A_NAME = 0.05
+# Trials after the screening, and partners tried with each of the best two for a pair.
+TRIALS = 6
+PARTNERS = 3
+# What a right model leaves: the mean square of held-out recordings, and on top the share of the calibrated model's
+# excess that a mechanism's simple form may miss.
+RIGHT = 1.5
+FORM_SHARE = 0.04
+# A second mechanism must halve what the first one leaves beyond noise.
+PAIR_SHARE = 0.5
+# Odds against naming something before anything is seen, and probability from which a name is given alone.
+PRIOR_AGREES = 0.5
+SURE = 0.8
+RIVAL = 0.02
+MOST_ALTERNATIVES = 4
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What the comparison of all hypotheses came to.
+
+    Attributes
+    ----------
+    verdict : {"agrees", "explained", "undecided", "unexplained"}
+    calibrated : Trial
+        The paper's model.
+    best : Trial
+        The hypothesis with the least left; the calibrated model where nothing is missing.
+    trials : list of Trial
+        All that were fitted in full, the best first.
+    probability : list of float
+        Of each of these.
+    scores : list of Score
+        The screening.
+    """
+
+    verdict: str
+    calibrated: Trial
+    best: Trial
+    trials: list[Trial]
+    probability: list[float]
+    scores: list[Score]
+
+
+def judge(
+    weighed: Sequence[Weighed],
+    calibrated: Mapping[str, Free],
+    start: Mapping[str, float],
+    tell: Callable[[str], None] = lambda text: None,
+) -> Judgement:
+    """Try all hypotheses and come to a verdict.
+
+    Parameters
+    ----------
+    weighed : sequence of Weighed
+    calibrated : mapping of str to Free
+        What a calibration of the paper's model leaves free.
+    start : mapping of str to float
+        Values of these from a first fit.
+    tell : callable
+        Is told how the work goes on, a line at a time.
+    """
+    base = fit(weighed, Hypothesis(), calibrated, start)
+    tell(f"the calibrated model leaves {_left(base):.2f} of the noise's mean square; asking every mechanism")
+    scores = score(weighed, base, singles())
+    trials = _fit_all(weighed, calibrated, base, [s for s in scores if s.gain > WORTH_A_TRIAL][:TRIALS], tell)
+    trials = sorted(trials, key=_left)
+    if trials and _left(trials[0]) > enough(base) and len(weighed) > 1:
+        trials = sorted([*trials, *_pairs(weighed, calibrated, trials[:2], tell)], key=_left)
+    trials = [t for t in trials if _names_more(t, trials)]
+    probability = _probabilities(weighed, base, trials)
+    return _verdict(base, trials, probability, scores)
+
+
+def enough(base: Trial) -> float:
+    """Mean square that a hypothesis may leave and still be the explanation."""
+    return RIGHT + FORM_SHARE * max(_left(base) - 1.0, 0.0)
+
+
+def _left(trial: Trial) -> float:
+    return float(trial.left.mean())
+
+
+def _fit_all(weighed, calibrated, base: Trial, chosen: Sequence[Score], tell) -> list[Trial]:
+    trials = []
+    for s in chosen:
+        hypothesis = Hypothesis(base.hypothesis.acting + s.hypothesis.acting)
+        try:
+            trial = fit(weighed, hypothesis, calibrated, base.values | s.values)
+        except (ModelError, ValueError) as error:
+            tell(f"{hypothesis}: cannot be run ({error})")
+            continue
+        tell(f"{hypothesis}: leaves {_left(trial):.2f}")
+        trials.append(trial)
+    return trials
+
+
+def _pairs(weighed, calibrated, firsts: Sequence[Trial], tell) -> list[Trial]:
+    tell("one mechanism is not enough; trying pairs")
+    found, seen = [], set()
+    for first in firsts:
+        partners = [h for h in singles() if h.acting[0] not in first.hypothesis.acting]
+        chosen = []
+        for s in score(weighed, first, partners):
+            pair = frozenset(first.hypothesis.acting + s.hypothesis.acting)
+            if s.gain > WORTH_A_TRIAL and pair not in seen and len(chosen) < PARTNERS:
+                seen.add(pair)
+                chosen.append(s)
+        found += _fit_all(weighed, calibrated, first, chosen, tell)
+    return found
+
+
+def _names_more(trial: Trial, trials: Sequence[Trial]) -> bool:
+    """Whether a pair is worth more than each of its members alone; a single always is."""
+    if len(trial.hypothesis.acting) < 2:
+        return True
+    members = set(trial.hypothesis.acting)
+    alone = [t for t in trials if set(t.hypothesis.acting) < members]
+    return all(_left(trial) - 1 < PAIR_SHARE * (_left(t) - 1) for t in alone)
+
+
+def _probabilities(weighed, base: Trial, trials: Sequence[Trial]) -> list[float]:
+    """Probability of each trial; what is missing from one is the calibrated model's."""
+    if not trials:
+        return []
+    looks = sum(LOOKS * len(w.evidence.channels) for w in weighed)
+    left = np.array([_left(base), *map(_left, trials)])
+    unknowns = np.array([0, *(len(t.values) - len(base.values) for t in trials)])
+    scale = max(1.0, left.min())
+    log = -0.5 * looks * left / scale - 0.5 * unknowns * np.log(looks)
+    log += np.log([PRIOR_AGREES, *[(1 - PRIOR_AGREES) / len(trials)] * len(trials)])
+    weight = np.exp(log - log.max())
+    return (weight / weight.sum())[1:].tolist()
+
+
+def _verdict(base: Trial, trials: list[Trial], probability: list[float], scores) -> Judgement:
+    agrees = 1.0 - sum(probability)
+    best = trials[0] if trials else base
+    matters = trials and _left(base) - _left(best) > WORTH_A_NAME * max(1.0, _left(base))
+    if not matters or agrees > 0.5:
+        verdict = "agrees" if _left(base) <= RIGHT else "unexplained"
+        return Judgement(verdict, base, base, trials, probability, scores)
+    order = np.argsort(probability)[::-1]
+    trials, probability = [trials[k] for k in order], [probability[k] for k in order]
+    if _left(trials[0]) > enough(base) or not plausible(trials[0].hypothesis, trials[0].values):
+        return Judgement("unexplained", base, base, trials, probability, scores)
+    verdict = "explained" if probability[0] >= SURE else "undecided"
+    return Judgement(verdict, base, trials[0], trials, probability, scores)
+
+
+def nested_errors(judgement: Judgement) -> list[Trial]:
+    """By recording, the trial that would have been chosen had the recording not been there."""
+    rivals = [judgement.calibrated, *judgement.trials]
+    if judgement.best is judgement.calibrated:
+        return [judgement.calibrated] * judgement.calibrated.left.size
+    left = np.stack([t.left for t in rivals])
+    others = left.sum(axis=1, keepdims=True) - left
+    pick: NDArray = np.argmin(others, axis=0)
+    return [rivals[k] for k in pick]

@@ -1,0 +1,142 @@
+"""The page of a diagnosis: one sentence, the rig with the guilty place lit, and what it rests on."""
+
+import base64
+import io
+from dataclasses import replace
+from pathlib import Path
+
+import jinja2
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+
+from ccmodel import mechanisms as registry
+from ccmodel.diagnose.diagnosis import Diagnosis
+from ccmodel.diagnose.judge import nested_errors
+from ccmodel.diagnose.locate import PARTS, mismatch
+from ccmodel.recording import ORIGIN
+from ccmodel.report.figures import AXIS, COLOURS, STYLE
+
+LOOPS = 3
+RIVALS = 8
+FAINT = "#9a9a9a"
+SYMBOL = {"theta_out": "θ_out", "tau_in": "τ_in", "tau_out": "τ_out", "F_drive": "F_drive", "F_load": "F_load"}
+
+
+def headline(said: dict) -> str:
+    """The one sentence of a diagnosis."""
+    batch, error = said["batch"], said["fit"]["error"]
+    worst = max(error, key=lambda c: error[c]["before"] / error[c]["noise"])
+    e = error[worst]
+    fall = f"{e['before'] / e['noise']:.1f} to {e['after'] / e['noise']:.1f} times the noise in {SYMBOL[worst]}"
+    if said["verdict"] == "agrees":
+        return f"{batch}: the calibrated model agrees with the recordings; nothing is missing that they could show."
+    if said["verdict"] == "explained":
+        what = " and ".join(
+            f"{registry.get(m['name']).summary} ({m['name']}, {m['place']})" for m in said["mechanisms"]
+        )
+        return f"{batch}: what was left out is {what}; with it the held-out error falls from {fall}."
+    if said["verdict"] == "undecided":
+        names = " or ".join(f"{a['name']} at {a['place']}" for a in said["alternatives"])
+        return f"{batch}: something is missing, and these recordings cannot tell {names} apart."
+    place = said["location"]["place"]
+    return f"{batch}: something is missing at the {place}, and no mechanism known here accounts for it."
+
+
+def write_diagnosis(file: Path, found: Diagnosis) -> None:
+    """Write the page, its figures inside it."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("ccmodel.report", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
+    )
+    origin = found.weighed[0].evidence.given.recording.origin
+    with plt.rc_context(STYLE):
+        text = environment.get_template("diagnosis.html.j2").render(
+            said=found.said,
+            headline=headline(found.said),
+            origin=ORIGIN[origin],
+            symbol=SYMBOL,
+            rivals=_rivals(found),
+            summaries={name: registry.get(name) for name in registry.names()},
+            map=_encoded(_map(found)),
+            loops=_encoded(_loops(found)),
+            recordings=[w.evidence.given.recording.id for w in found.weighed],
+        )
+    file.write_text(text, encoding="utf-8")
+
+
+def _rivals(found: Diagnosis) -> list[dict]:
+    j = found.judgement
+    rows = [{"what": "the calibrated model", "left": float(j.calibrated.left.mean()), "p": None, "why": ""}]
+    for trial, p in list(zip(j.trials, j.probability, strict=True))[:RIVALS]:
+        left = float(trial.left.mean())
+        why = "named" if trial is j.best else f"leaves {left / max(float(j.best.left.mean()), 1e-9):.3g} times as much"
+        rows.append({"what": str(trial.hypothesis), "left": left, "p": p, "why": why})
+    return rows
+
+
+def _map(found: Diagnosis) -> Figure:
+    """Errors over the noise, channel by part of the motion, before and after."""
+    j = found.judgement
+    before, after = mismatch(found.weighed, j.calibrated), mismatch(found.weighed, j.best)
+    figure, axes = plt.subplots(1, 2, figsize=(8, 2.9), sharey=True)
+    highest = max(np.nanmax([list(v.values()) for v in before.values()]), 3.0)
+    for ax, table, title in zip(axes, (before, after), ("calibrated model", "with what was found"), strict=True):
+        values = np.array([[table[c][p] for p in PARTS] for c in table])
+        ax.imshow(values, cmap="cividis", norm=matplotlib.colors.LogNorm(0.7, highest), aspect="auto")
+        ax.set_xticks(range(len(PARTS)), PARTS)
+        ax.set_yticks(range(len(table)), [SYMBOL[c] for c in table])
+        ax.set_title(title, fontsize=9)
+        ax.grid(False)
+        for (row, column), value in np.ndenumerate(values):
+            dark = value < np.sqrt(0.7 * highest)
+            ax.text(column, row, f"{value:.1f}", ha="center", va="center", color="white" if dark else "black")
+    figure.suptitle("rms error on held-out recordings, in units of the noise", fontsize=9)
+    return figure
+
+
+def _loops(found: Diagnosis) -> Figure:
+    """Torque loops of the recordings that were off most, before and after, held out."""
+    j = found.judgement
+    chosen = nested_errors(j)
+    order = np.argsort(j.calibrated.left)[::-1][:LOOPS]
+    channel = _worst_channel(found)
+    label, scale = AXIS.get(channel, (f"{channel.rsplit('_', 1)[0]} (N)", 1))
+    figure, axes = plt.subplots(1, len(order), figsize=(3.1 * len(order), 3.1), squeeze=False)
+    for ax, i in zip(axes[0], order, strict=True):
+        w = found.weighed[i]
+        e = w.evidence
+        c = e.channels.index(channel)
+        theta = e.given.theta_in[e.judged]
+        ax.plot(theta, scale * e.measured[c], color=FAINT, lw=2.2, label="recording")
+        for trial, colour, line, name in (
+            (j.calibrated, COLOURS[0], "--", "calibrated"),
+            (chosen[i], COLOURS[1], "-", "with what was found"),
+        ):
+            if name != "calibrated" and trial is j.calibrated:
+                continue
+            said = replace(e, parameters=trial.hypothesis.of(e.parameters)).modelled(trial.held_out[i])[c]
+            ax.plot(theta, scale * said, color=colour, lw=1.0, ls=line, label=name)
+        ax.set_title(e.given.recording.id, fontsize=9)
+        ax.set_xlabel(AXIS["theta_in_rad"][0])
+    axes[0][0].set_ylabel(label)
+    handles, labels = axes[0][0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    return figure
+
+
+def _worst_channel(found: Diagnosis) -> str:
+    error = found.said["fit"]["error"]
+    worst = max(error, key=lambda c: error[c]["before"] / error[c]["noise"])
+    channels = found.weighed[int(np.argmax(found.judgement.calibrated.left))].evidence.channels
+    return next((c for c in channels if c.rsplit("_", 1)[0] == worst), channels[0])
+
+
+def _encoded(figure: Figure) -> str:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, dpi=130, format="png")
+    plt.close(figure)
+    return base64.b64encode(buffer.getvalue()).decode()
