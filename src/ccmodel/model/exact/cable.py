@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.model.exact.kernel import kernel, small_kernel
+from ccmodel.kernel import kernel, small_kernel
 from ccmodel.model.exact.path import LUMP, NODE, PASSED, PER_M
 
 FRONTS, WHOLE, STILL_POINT = 0, 1, 2

@@ -1,5 +1,6 @@
 """The loop over samples: what kind of step each is, and what is written down of it."""
 
+from ccmodel.kernel import kernel, small_kernel
 from ccmodel.model.exact.along import balance_lines, move_along, step_along
 from ccmodel.model.exact.cable import (
     D_START,
@@ -27,7 +28,6 @@ from ccmodel.model.exact.cable import (
     position,
     turn,
 )
-from ccmodel.model.exact.kernel import kernel, small_kernel
 from ccmodel.model.exact.path import NODE, X_PER_M, X_START
 
 # How `run` came to its end; APART: the next sample wants `still_point.step_apart` first.
