@@ -1,7 +1,8 @@
 """All figures of speed and accuracy from one run: ``make bench``, or ``python benchmarks/bench.py [--cold]``.
 
-Times are of one core, the least of some repeats, microseconds a sample unless a figure's name says otherwise. Prints
-them and writes results/bench.json; the chart of error against time goes to docs/figures/work-precision.png.
+Times are processor time on one core, the least of some repeats, in microseconds a sample unless a figure's name says
+otherwise; those of whole processes (..._s) are by the clock. Prints all and writes results/bench.json; the chart of
+error against time goes to docs/figures/work-precision.png.
 ``--cold`` also compiles everything anew in an empty cache, which takes minutes.
 
 exact_vs_paper_numpy_a_sample

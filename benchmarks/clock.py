@@ -1,4 +1,4 @@
-"""How long something takes: the least of some repeats, since all that others do on a machine only adds to it."""
+"""How long something takes: processor time, the least of some repeats, since all that others do only adds to it."""
 
 import time
 from collections.abc import Callable
@@ -7,13 +7,13 @@ REPEATS = 5
 
 
 def seconds(function: Callable[[], object], repeats: int = REPEATS) -> float:
-    """Least time of `function` over `repeats` calls, after one that does not count, s."""
+    """Least processor time of `function` over `repeats` calls, after one that does not count, s."""
     function()
     best = float("inf")
     for _ in range(repeats):
-        start = time.perf_counter()
+        start = time.process_time()
         function()
-        best = min(best, time.perf_counter() - start)
+        best = min(best, time.process_time() - start)
     return best
 
 

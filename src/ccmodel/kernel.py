@@ -2,7 +2,8 @@
 
 from functools import partial
 
-from numba import njit
+from numba import njit, types
+from numba.extending import intrinsic
 
 from ccmodel.provenance import source_digest
 
@@ -28,3 +29,29 @@ def kernel(function=None, **options):
 
 # Made part of whatever calls it: for what every sample goes through.
 small_kernel = kernel(forceinline=True)
+
+
+@intrinsic
+def borrowed(typing_context, value):
+    """`value`, an array or a tuple with arrays in it, without a share in its memory; for use inside kernels.
+
+    Else every kernel that is handed an array counts itself in and out, with locked instructions that take longer than
+    its arithmetic. Whoever calls the outermost kernel keeps the arrays alive.
+    """
+
+    def generate(context, builder, signature, arguments):
+        return _disowned(context, builder, value, arguments[0])
+
+    return value(value), generate
+
+
+def _disowned(context, builder, kind, value):
+    """LLVM value of the numba type `kind` with no owner named in any of its arrays."""
+    if isinstance(kind, types.Array):
+        array = context.make_array(kind)(context, builder, value)
+        array.meminfo = array.meminfo.type(None)
+        return array._getvalue()
+    if isinstance(kind, types.BaseTuple):
+        parts = [_disowned(context, builder, part, builder.extract_value(value, i)) for i, part in enumerate(kind)]
+        return context.make_tuple(builder, kind, parts)
+    return value
