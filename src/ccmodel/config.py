@@ -5,9 +5,8 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from ccmodel.model.paper import SECTIONS
-from ccmodel.model.parameters import FREE
-from ccmodel.recording import CHANNELS
+from ccmodel.identify.problem import MEASURED
+from ccmodel.model.parameters import FREE, OWN
 from ccmodel.rig.batch import valid_name
 from ccmodel.typed import InputError, TypedModel, load_yaml_model
 
@@ -34,6 +33,12 @@ class FreeParameter(TypedModel):
         return self
 
 
+class OwnParameter(TypedModel):
+    """A parameter of each recording by itself."""
+
+    spread: float = Field(gt=0, description="standard deviation from recording to recording, SI units")
+
+
 class Fit(TypedModel):
     """A set of parameters fitted to recordings; its name is the name of the set."""
 
@@ -41,7 +46,16 @@ class Fit(TypedModel):
         description="batches fitted together and then carried over to all others; or 'each': every batch by itself"
     )
     free: dict[Literal[FREE], FreeParameter] = Field(min_length=1, description="what is fitted")
-    channels: list[Literal[CHANNELS]] = Field(min_length=1, description="what is compared; those recorded are used")
+    per_recording: dict[Literal[OWN], OwnParameter] = Field(
+        default_factory=dict, description="what each recording has a value of its own of"
+    )
+    channels: list[Literal[MEASURED]] = Field(
+        list(MEASURED), min_length=1, description="what is compared; those recorded are used"
+    )
+    allowance: float = Field(
+        0.0, ge=0, description="share of a channel's peak to peak that the model may leave, besides the noise"
+    )
+    starts: int = Field(1, ge=1, description="starts of the search, the configured one and others about it")
     step_s: float | None = Field(None, gt=0, description="take a sample every so often, s; absent: every sample")
 
 
@@ -67,7 +81,6 @@ class Config(TypedModel):
 
     raw: str = Field("data/raw", description="folder with a folder a batch")
     results: str = Field("results", description="folder for all that the run makes")
-    sections: int = Field(SECTIONS, ge=1, description="segments a cable in the paper's discretisation")
     fits: dict[str, Fit] = Field(default_factory=dict, description="parameter sets fitted to recordings")
     studies: dict[str, Study] = Field(default_factory=dict, description="figures")
 

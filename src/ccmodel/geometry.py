@@ -56,6 +56,12 @@ class ConduitPath:
         """Bend angle of the whole path, rad: what the capstan loss in full slip depends on."""
         return float(self.piece_bend_rad.sum())
 
+    def with_extra_bend(self, extra_rad: float) -> "ConduitPath":
+        """The same path with bend added to every piece in proportion to its length."""
+        if extra_rad == 0:
+            return self
+        return ConduitPath(self.piece_length_m, self.piece_bend_rad + extra_rad * self.piece_length_m / self.length_m)
+
     def bend_at(self, x: NDArray) -> NDArray:
         """Bend angle phi(x) run through from the drive end to arc length `x` (m), rad; same shape as `x`."""
         x_corner = np.concatenate([[0.0], np.cumsum(self.piece_length_m)])

@@ -49,8 +49,8 @@ class Recording:
         The conduits' path.
     accuracy : mapping of str to float
         Accuracy stated for each measured channel, in the channel's unit; empty for a model.
-    encoder_step_rad : float or None
-        Angle of one count of the drive's encoder, rad; None where the drive angle was not counted.
+    encoder_step_rad : mapping of str to float
+        Angle of one count, rad, of each angle that was counted.
     excitation : mapping
         A note of what was asked of the drive, not of what happened.
     rest_s : float
@@ -71,7 +71,7 @@ class Recording:
     pretension_N: float
     path: ConduitPath
     accuracy: Mapping[str, float] = field(default_factory=dict)
-    encoder_step_rad: float | None = None
+    encoder_step_rad: Mapping[str, float] = field(default_factory=dict)
     excitation: Mapping = field(default_factory=dict)
     rest_s: float = 0.0
     settled_s: float = 0.0
@@ -133,12 +133,12 @@ def _to_dataset(recording: Recording) -> xr.Dataset:
         attributes = {"units": unit_of(name), "derived_from": recording.derived_from.get(name, "")}
         if name in recording.accuracy:
             attributes["accuracy"] = recording.accuracy[name]
+        if name in recording.encoder_step_rad:
+            attributes["encoder_step_rad"] = recording.encoder_step_rad[name]
         variables[name] = ("time_s", values, attributes)
     variables["piece_length_m"] = ("piece", recording.path.piece_length_m, {"units": "m"})
     variables["piece_bend_rad"] = ("piece", recording.path.piece_bend_rad, {"units": "rad"})
     attributes = {name: getattr(recording, name) for name in _SCALARS}
-    if recording.encoder_step_rad is not None:
-        attributes["encoder_step_rad"] = recording.encoder_step_rad
     attributes["excitation"] = json.dumps(dict(recording.excitation))
     attributes["warnings"] = json.dumps(list(recording.warnings))
     return xr.Dataset(variables, coords={"time_s": ("time_s", recording.time_s, {"units": "s"})}, attrs=attributes)
@@ -153,13 +153,17 @@ def _from_dataset(name: str, dataset: xr.Dataset) -> Recording:
         time_s=dataset["time_s"].values,
         channels=channels,
         derived_from={c: dataset[c].attrs["derived_from"] for c in channels},
-        accuracy={c: float(dataset[c].attrs["accuracy"]) for c in channels if "accuracy" in dataset[c].attrs},
+        accuracy=_numbers(dataset, channels, "accuracy"),
         path=ConduitPath(dataset["piece_length_m"].values, dataset["piece_bend_rad"].values),
-        encoder_step_rad=float(step) if (step := dataset.attrs.get("encoder_step_rad")) is not None else None,
+        encoder_step_rad=_numbers(dataset, channels, "encoder_step_rad"),
         excitation=json.loads(dataset.attrs["excitation"]),
         warnings=tuple(json.loads(dataset.attrs["warnings"])),
         **scalars,
     )
+
+
+def _numbers(dataset: xr.Dataset, channels, attribute: str) -> dict[str, float]:
+    return {c: float(dataset[c].attrs[attribute]) for c in channels if attribute in dataset[c].attrs}
 
 
 def unit_of(channel: str) -> str:

@@ -210,11 +210,19 @@ def test_phases_in_order_and_slack_through_a_reversal():
 def test_a_start_out_of_balance_settles_with_the_drive_at_rest():
     x = np.array([0, PATH.length_m])
     initial = InitialTension(x, [12.0, 9.0], [8.0, 7.0])
-    response = simulate_pair(transmission(), SpringLoad(0.003), np.array([0.0, 0.1]), initial)
+    response = simulate_pair(transmission(), TorqueLoad(np.full(2, 0.001)), np.array([0.0, 0.1]), initial)
     assert response.status is Status.OK
     assert response.theta_out_rad[0] > 0
-    assert response.tau_out_Nm == pytest.approx(0.003 * response.theta_out_rad, abs=1e-15)
+    assert response.tau_out_Nm == pytest.approx(0.001, abs=1e-15)
     assert 7.0 < response.T4_N[0] < response.T2_N[0] < 9.0
+
+
+def test_a_spring_starts_where_it_holds_the_initial_tensions():
+    initial = InitialTension(np.array([0, PATH.length_m]), [12.0, 9.0], [8.0, 7.0])
+    response = simulate_pair(transmission(), SpringLoad(0.003), np.array([0.0, 0.1]), initial)
+    assert tensions(response)[:, 0] == pytest.approx([12.0, 9.0, 8.0, 7.0], rel=1e-12)
+    assert response.theta_out_rad[0] == pytest.approx((9.0 - 7.0) * transmission().load_radius_m / 0.003, rel=1e-12)
+    assert response.tau_out_Nm == pytest.approx(0.003 * response.theta_out_rad, rel=1e-12)
 
 
 def test_inputs_that_cannot_be_are_refused():
@@ -237,9 +245,9 @@ def test_inputs_that_cannot_be_are_refused():
         InitialTension([0, 1.0], [0.0, 1.0], [1.0, 1.0])
 
 
-def test_a_start_far_out_of_balance_against_a_stiff_spring():
+def test_a_start_far_out_of_balance_settles_alike_on_a_path_in_more_pieces():
     initial = InitialTension([0.0, 5.0], [3.0, 3.0], 10.0 * np.exp([0.0, -0.03]))
     whole = ConduitPath(np.ones(5), [0.0, 0.0, 0.0, 1.0, 1.0])
     split = ConduitPath(np.full(10, 0.5), np.repeat([0.0, 0.0, 0.0, 0.5, 0.5], 2))
-    a, b = (simulate_pair(transmission(p, 0.03), SpringLoad(10.0), np.zeros(1), initial) for p in (whole, split))
+    a, b = (simulate_pair(transmission(p, 0.03), TorqueLoad(np.zeros(1)), np.zeros(1), initial) for p in (whole, split))
     assert tensions(a) == pytest.approx(tensions(b), rel=1e-13)

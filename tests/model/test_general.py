@@ -8,11 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ccmodel.geometry import ConduitPath
+from ccmodel.model.failure import ModelError
 from ccmodel.model.general import simulate
 from ccmodel.model.general.grid import make_grid
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, MechanicalLoad, SpringLoad, TorqueLoad
-from ccmodel.model.paper import ModelError, simulate_pair
+from ccmodel.model.paper import simulate_pair
 from general_runs import HALF_LOOP, K_E, MU, OUTPUTS, T0, TENSIONS, K, L, R, rms, run, sine, transmission
 
 LOOPS = ConduitPath([0.3, 0.5, 0.4], [0.0, 4.0, 1.0])

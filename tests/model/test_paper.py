@@ -6,9 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ccmodel.geometry import ConduitPath
+from ccmodel.model.failure import ModelError
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad, TorqueLoad
-from ccmodel.model.paper import ModelError, simulate_pair
+from ccmodel.model.paper import simulate_pair
 from ccmodel.model.transmission import Transmission
 
 R, K_E, T0 = 0.006, 0.05, 7.3

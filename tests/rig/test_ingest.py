@@ -454,7 +454,7 @@ def test_clock_coarser_than_half_a_step(bench):
 def test_step_of_the_drive_encoder_is_not_its_accuracy(bench):
     bench.described["rig"]["drive"]["encoder_accuracy_rad"] = 0.001
     (recording, _) = ingest_batch(bench.write().folder).recordings
-    assert recording.encoder_step_rad == pytest.approx(2 * np.pi / COUNTS)
+    assert recording.encoder_step_rad["theta_in_rad"] == pytest.approx(2 * np.pi / COUNTS)
     assert recording.accuracy["theta_in_rad"] == 0.001
 
 

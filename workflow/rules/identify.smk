@@ -18,7 +18,6 @@ rule fit:
         "../envs/ccmodel.yaml"
     params:
         problem=lambda wildcards: CONFIG.fits[wildcards.parameters].model_dump_json(),
-        sections=CONFIG.sections,
         sources=source_digest("ccmodel.stages.fit"),
     message:
         "Fitting parameters '{wildcards.parameters}' ({wildcards.scope})"

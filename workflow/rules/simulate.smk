@@ -16,7 +16,6 @@ rule simulate:
     conda:
         "../envs/ccmodel.yaml"
     params:
-        sections=CONFIG.sections,
         sources=source_digest("ccmodel.stages.simulate"),
     message:
         "Running the model on batch {wildcards.batch} with parameters '{wildcards.parameters}'"

@@ -10,7 +10,6 @@ with logged(snakemake.log[0]):
     fit_parameters(
         snakemake.wildcards.parameters,
         Fit.model_validate_json(snakemake.params.problem),
-        snakemake.params.sections,
         [Path(f) for f in snakemake.input.recordings],
         Path(snakemake.output[0]),
     )

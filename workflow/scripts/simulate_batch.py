@@ -9,7 +9,6 @@ with logged(snakemake.log[0]):
     simulate(
         Path(snakemake.input.recordings),
         Path(snakemake.input.fit) if snakemake.input.fit else None,
-        snakemake.params.sections,
         Path(snakemake.output.simulated),
         Path(snakemake.output.summary),
     )

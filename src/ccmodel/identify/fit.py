@@ -1,23 +1,23 @@
-"""Fit parameters of the model to recordings."""
+"""Solving a fit, and saying how it went."""
 
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from ccmodel.config import Fit
-from ccmodel.model.paper import ModelError
-from ccmodel.model.parameters import Parameters
-from ccmodel.model.run import PRESCRIBED, ModelInput, simulate
-from ccmodel.recording import Recording
+from ccmodel.identify.intervals import Interval, Undetermined, intervals, undetermined
+from ccmodel.identify.problem import Problem
+from ccmodel.model.failure import ModelError
 
-# Relative step of the derivatives. The paper's discretisation is smooth only down to what a front that moves by a
-# segment changes; smaller steps would differentiate that.
-DIFFERENCE_STEP = 1e-3
-# Far below what repeated recordings differ by (1 %).
-TOLERANCE = 1e-5
+# Relative. Far below what repeated recordings differ by, far above what the solvers round at.
+TOLERANCE = 1e-9
+MOST_EVALUATIONS = 100
+# Optima of several starts are one if no unknown differs by more than this share of its size.
+SAME = 1e-3
+START_SPREAD = 0.3
+SEED = 1
 # Why scipy's least_squares stops, by its status.
 STOPPED = {
     -1: "the optimiser was given improper input",
@@ -30,6 +30,36 @@ STOPPED = {
 
 
 @dataclass(frozen=True)
+class Solution:
+    """Where a search for the least cost ended.
+
+    Attributes
+    ----------
+    x : ndarray, shape (unknowns,)
+    residuals : ndarray, shape (rows,)
+    jacobian : ndarray, shape (rows, unknowns)
+    active : ndarray of int, shape (unknowns,)
+        -1 or 1 where an unknown is on its lower or upper bound.
+    converged : bool
+    message : str
+    evaluations : int
+    """
+
+    x: NDArray
+    residuals: NDArray
+    jacobian: NDArray
+    active: NDArray
+    converged: bool
+    message: str
+    evaluations: int
+
+    @property
+    def cost(self) -> float:
+        """Sum of squares."""
+        return float(self.residuals @ self.residuals)
+
+
+@dataclass(frozen=True)
 class FitResult:
     """What a fit found, or why there is none.
 
@@ -37,13 +67,20 @@ class FitResult:
     ----------
     succeeded : bool
     message : str
-        The optimiser's reason for stopping, or what went wrong.
+        Why the optimiser stopped, or what went wrong.
     values : dict
-        Fitted values by parameter name, SI units; empty where the fit failed.
+        Shared values by parameter name, SI units; empty where the fit failed.
+    intervals : dict
+        The 90 % interval of each shared value.
+    own : dict
+        By recording, its own values.
     at_bound : list of str
-        Parameters that ended on one of their bounds: the data, or the bounds, are not enough.
+        Unknowns that ended on one of their bounds: the data, or the bounds, are not enough.
+    undetermined : list of Undetermined
+        Unknowns that the recordings do not tell apart, with what they do tell.
+    warnings : list of str
     cost : float or None
-        Mean square of the errors, each over its channel's peak to peak.
+        Mean square of the errors over their noise.
     evaluations : int
     recordings : list of str
         What was fitted.
@@ -51,93 +88,115 @@ class FitResult:
 
     succeeded: bool
     message: str
-    values: dict[str, float]
-    at_bound: list[str]
-    cost: float | None
-    evaluations: int
-    recordings: list[str]
+    values: dict[str, float] = field(default_factory=dict)
+    intervals: dict[str, Interval] = field(default_factory=dict)
+    own: dict[str, dict[str, float]] = field(default_factory=dict)
+    at_bound: list[str] = field(default_factory=list)
+    undetermined: list[Undetermined] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    cost: float | None = None
+    evaluations: int = 0
+    recordings: list[str] = field(default_factory=list)
 
     def as_dict(self) -> dict:
         """Plain data for a JSON file."""
         return asdict(self)
 
 
-def fit(recordings: Iterable[tuple[Recording, Parameters]], problem: Fit, sections: int) -> FitResult:
-    """Least squares over all samples that are judged, every channel over its own peak to peak.
+def fit(problem: Problem, starts: int = 1) -> FitResult:
+    """Fit a problem, from several starts, and say how sure the values are.
 
     Parameters
     ----------
-    recordings : iterable of (Recording, Parameters)
-        Each with its batch's beforehand estimates; what is free is shared by all.
-    problem : Fit
-        What is free, between which bounds, compared in which channels.
-    sections : int
-        Segments a cable.
+    problem : Problem
+    starts : int
+        The configured one, and others drawn about it within 30 % of each unknown's size, from a fixed seed.
 
     Returns
     -------
     FitResult
         A failed fit is a result that says so, not an exception.
     """
-    given = [(ModelInput.of(r, problem.step_s), p) for r, p in recordings]
-    names = [f"{g.recording.batch}/{g.recording.id}" for g, _ in given]
-    if not given:
-        return FitResult(False, "no usable recording to fit", {}, [], None, 0, [])
-    start = _start(problem, given[0][1])
-    unknown = [name for name, value in start.items() if value is None]
-    if unknown:
-        text = f"{unknown[0]} needs a start in the configuration: the batch file has no estimate of it"
-        return FitResult(False, text, {}, [], None, 0, names)
-    low, high = (np.array([problem.free[n].bounds[i] for n in start]) for i in (0, 1))
-    x0 = np.array(list(start.values()))
-    if (outside := (x0 < low) | (x0 > high)).any():
-        name = list(start)[int(np.argmax(outside))]
-        return FitResult(False, f"{name} starts at {start[name]:.4g}, outside its bounds", {}, [], None, 0, names)
-
-    # Every parameter is searched for as z = 1 at its start and of the order of one, also where it starts at zero.
-    scale = np.where(x0 != 0, np.abs(x0), 0.01 * (high - low))
-
-    def physical(z: NDArray) -> dict[str, float]:
-        return dict(zip(start, (x0 + (z - 1) * scale).tolist(), strict=True))
-
-    def residuals(z: NDArray) -> NDArray:
-        values = physical(z)
-        return np.concatenate([_errors(g, p.with_values(values), problem.channels, sections) for g, p in given])
-
-    bounds = 1 + (low - x0) / scale, 1 + (high - x0) / scale
-    try:
-        found = least_squares(
-            residuals,
-            np.ones_like(x0),
-            bounds=bounds,
-            x_scale="jac",
-            diff_step=DIFFERENCE_STEP,
-            ftol=TOLERANCE,
-            xtol=TOLERANCE,
-        )
-    except (ModelError, ValueError) as error:
-        return FitResult(False, str(error), {}, [], None, 0, names)
-    at_bound = [n for n, active in zip(start, found.active_mask, strict=True) if active]
-    values = physical(found.x)
-    mean_square = float(np.mean(found.fun**2))
-    return FitResult(bool(found.success), STOPPED[found.status], values, at_bound, mean_square, int(found.nfev), names)
+    names = [e.name for e in problem.evidence]
+    if not names:
+        return FitResult(False, "no usable recording to fit")
+    low, high = problem.bounds
+    if (outside := (problem.start < low) | (problem.start > high)).any():
+        k = int(np.argmax(outside))
+        text = f"{problem.names[k]} starts at {problem.start[k]:.4g}, outside its bounds {low[k]:.4g} to {high[k]:.4g}"
+        return FitResult(False, text, recordings=names)
+    solutions, failures = [], []
+    for x in _starts(problem, starts):
+        try:
+            solutions.append(solve(problem, x))
+        except (ModelError, ValueError) as error:
+            failures.append(str(error))
+    if not solutions:
+        return FitResult(False, failures[0], recordings=names)
+    best = min(solutions, key=lambda s: s.cost)
+    if not np.isfinite(best.cost):
+        return FitResult(False, "the errors are not finite at the best values found", recordings=names)
+    return _result(problem, best, _warnings(problem, best, solutions, failures))
 
 
-def _start(problem: Fit, estimates: Parameters) -> dict[str, float]:
-    """Start values: as configured, else as estimated."""
-    return {
-        name: free.start if free.start is not None else getattr(estimates, name) for name, free in problem.free.items()
+def solve(problem: Problem, start: NDArray, most_evaluations: int = MOST_EVALUATIONS) -> Solution:
+    """The nearest least cost, by scipy's trust region within bounds.
+
+    Raises
+    ------
+    ModelError, ValueError
+        If the model cannot be run on the way.
+    """
+    found = least_squares(
+        problem.residuals,
+        start,
+        jac=problem.jacobian,
+        bounds=problem.bounds,
+        x_scale=problem.sizes,
+        ftol=TOLERANCE,
+        xtol=TOLERANCE,
+        gtol=TOLERANCE,
+        max_nfev=most_evaluations,
+    )
+    message = STOPPED[found.status]
+    return Solution(found.x, found.fun, found.jac, found.active_mask, bool(found.success), message, int(found.nfev))
+
+
+def _starts(problem: Problem, count: int) -> Sequence[NDArray]:
+    low, high = problem.bounds
+    inside = 1e-6 * np.where(np.isfinite(high - low), high - low, problem.sizes)
+    drawn = np.random.default_rng(SEED).uniform(-START_SPREAD, START_SPREAD, (count - 1, problem.start.size))
+    shared = np.arange(problem.start.size) < len(problem.shared)
+    others = problem.start + np.where(shared, drawn * problem.sizes, 0.0)
+    return [np.clip(x, low + inside, high - inside) for x in (problem.start, *others)]
+
+
+def _warnings(problem: Problem, best: Solution, solutions: list[Solution], failures: list[str]) -> list[str]:
+    said = [f"one of the starts failed: {text}" for text in failures]
+    shared = slice(0, len(problem.shared))
+    apart = [s for s in solutions if (np.abs(s.x - best.x)[shared] > SAME * problem.sizes[shared]).any()]
+    if apart:
+        said.append(f"{len(apart)} of {len(solutions)} starts ended elsewhere, at a higher or equal error")
+    return said
+
+
+def _result(problem: Problem, found: Solution, warnings: list[str]) -> FitResult:
+    shared = len(problem.shared)
+    values = dict(zip(problem.shared, found.x[:shared].tolist(), strict=True))
+    own = {
+        e.name: {n: problem.values_of(found.x, i)[n].item() for n in problem.own}
+        for i, e in enumerate(problem.evidence)
     }
-
-
-def _errors(given: ModelInput, parameters: Parameters, channels: list[str], sections: int) -> NDArray:
-    recording, simulated = given.recording, simulate(given, parameters, sections)
-    judged = recording.time_s >= max(recording.rest_s, recording.settled_s)
-    errors = [
-        (simulated[c][judged] - recording[c][judged]) / np.ptp(recording[c][judged])
-        for c in channels
-        if c in recording and simulated.derived_from[c] != PRESCRIBED
-    ]
-    if not errors:
-        raise ModelError(f"{recording.batch}/{recording.id}: none of {', '.join(channels)} was recorded")
-    return np.concatenate(errors)
+    return FitResult(
+        succeeded=found.converged,
+        message=found.message,
+        values=values,
+        intervals=intervals(problem, found.x, found.residuals, found.jacobian),
+        own=own if problem.own else {},
+        at_bound=[n for n, active in zip(problem.names, found.active, strict=True) if active],
+        undetermined=undetermined(problem, found.residuals, found.jacobian),
+        warnings=warnings,
+        cost=problem.mean_square(found.residuals),
+        evaluations=found.evaluations,
+        recordings=[e.name for e in problem.evidence],
+    )

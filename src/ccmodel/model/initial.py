@@ -80,6 +80,11 @@ class InitialTension:
             profiles.append(np.exp([mean - half, mean + half]))
         return cls(np.array([0.0, path.length_m]), *profiles)
 
+    def of_cable(self, name: str) -> "InitialTension":
+        """The profile of cable "A" or "B", as both cables', for runs of one cable alone."""
+        tension = {"A": self.tension_A_N, "B": self.tension_B_N}[name]
+        return InitialTension(self.x_m, tension, tension)
+
     def at(self, path: ConduitPath, x: NDArray) -> tuple[NDArray, NDArray]:
         """Tensions of A and B at arc lengths `x` (m), N; two arrays of the shape of `x`."""
         phi, corner_phi = path.bend_at(x), path.bend_at(self.x_m)

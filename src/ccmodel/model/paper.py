@@ -28,15 +28,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.kernel import kernel
+from ccmodel.model.failure import ModelError
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad, TorqueLoad
 from ccmodel.model.transmission import Transmission
 
 SECTIONS = 16  # of each cable, as in the paper's Section IV
-
-
-class ModelError(Exception):
-    """The model cannot be run, or its step has no solution; the text says where and what to do."""
 
 
 @dataclass(frozen=True)

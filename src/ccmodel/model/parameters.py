@@ -1,6 +1,9 @@
 """The numbers that a run of the model needs besides the recording it is compared with."""
 
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from ccmodel.model.general.run import Active
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,15 @@ class Parameters:
         Initial tension, the same all along both cables; None takes from each recording what its rest shows.
     tau_in_zero_Nm, tau_out_zero_Nm : float
         What the torque sensors read without a torque.
+    F_drive_zero_N, F_load_zero_N : float
+        What the load cells read without a tension.
+    extra_bend_rad : float
+        Bend beyond what the path states, spread evenly along it: slings, fittings, a conduit that is not laid straight.
+    friction_scale, pretension_scale : float
+        Friction and initial tension of one recording over what they are in the population, and over what its rest
+        shows.
+    mechanisms : tuple of Active
+        What acts besides the paper's physics.
     """
 
     stiffness_N_per_m: float
@@ -34,6 +46,17 @@ class Parameters:
     pretension_N: float | None = None
     tau_in_zero_Nm: float = 0.0
     tau_out_zero_Nm: float = 0.0
+    F_drive_zero_N: float = 0.0
+    F_load_zero_N: float = 0.0
+    extra_bend_rad: float = 0.0
+    friction_scale: float = 1.0
+    pretension_scale: float = 1.0
+    mechanisms: tuple[Active, ...] = ()
+
+    @property
+    def friction(self) -> float:
+        """Mu in this recording."""
+        return self.friction_coefficient * self.friction_scale
 
     @classmethod
     def estimated(cls, rig) -> "Parameters":
@@ -47,10 +70,66 @@ class Parameters:
             load_stiffness_Nm_per_rad=rig.load.spring_stiffness_Nm_per_rad,
         )
 
-    def with_values(self, values: dict[str, float]) -> "Parameters":
-        """The same with some of them replaced."""
-        return replace(self, **values)
+    def with_values(self, values: Mapping[str, float]) -> "Parameters":
+        """The same with some of them replaced.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            By the names of the attributes, and for a number of a mechanism by `mechanism_key`.
+
+        Raises
+        ------
+        ValueError
+            If no active mechanism has such a number.
+        """
+        own = {name: value for name, value in values.items() if mechanism_parameter(name) is None}
+        acting = {(m.name, m.place): dict(m.values) for m in self.mechanisms}
+        for key in values.keys() - own.keys():
+            name, place, parameter = mechanism_parameter(key)
+            if parameter not in acting.get((name, place), {}):
+                raise ValueError(f"{key}: the model has no {parameter} of {name} at {place}")
+            acting[name, place][parameter] = values[key]
+        mechanisms = tuple(Active(name, place, numbers) for (name, place), numbers in acting.items())
+        return replace(self, **own, mechanisms=mechanisms)
+
+    def value_of(self, name: str) -> float:
+        """One of them, by the names that `with_values` takes."""
+        if (parts := mechanism_parameter(name)) is None:
+            return getattr(self, name)
+        mechanism, place, parameter = parts
+        return next(m.values[parameter] for m in self.mechanisms if (m.name, m.place) == (mechanism, place))
 
 
-# What a fit may leave free; lengths and the drive radius only scale what is among these.
-FREE = tuple(f.name for f in fields(Parameters) if f.name not in ("reference_length_m", "drive_radius_m"))
+def mechanism_key(mechanism: str, place: str, parameter: str) -> str:
+    """The name under which a mechanism's number stands among the parameters."""
+    return f"{mechanism}/{place}/{parameter}"
+
+
+def mechanism_parameter(key: str) -> tuple[str, str, str] | None:
+    """Mechanism, place and parameter of a name that `mechanism_key` made; None for any other."""
+    parts = key.split("/")
+    return tuple(parts) if len(parts) == 3 else None
+
+
+# What each recording has of its own, and what all share; lengths and the drive radius only scale what is among these.
+OWN = (
+    "friction_scale",
+    "pretension_scale",
+    "tau_in_zero_Nm",
+    "tau_out_zero_Nm",
+    "F_drive_zero_N",
+    "F_load_zero_N",
+)
+FREE = (
+    "stiffness_N_per_m",
+    "friction_coefficient",
+    "extra_bend_rad",
+    "load_radius_m",
+    "load_stiffness_Nm_per_rad",
+    "pretension_N",
+    "tau_in_zero_Nm",
+    "tau_out_zero_Nm",
+    "F_drive_zero_N",
+    "F_load_zero_N",
+)

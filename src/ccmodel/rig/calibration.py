@@ -26,6 +26,8 @@ class Calibrated:
         What each was computed from.
     accuracy : dict of str to float
         Accuracy of each, in its unit.
+    encoder_step_rad : dict of str to float
+        Angle of one count of each angle, rad.
     rest_s : float
         Time up to which the drive has not moved yet, s; 0 where the recording begins in motion.
     missing : dict of str to str
@@ -35,6 +37,7 @@ class Calibrated:
     channels: dict[str, NDArray]
     derived_from: dict[str, str]
     accuracy: dict[str, float]
+    encoder_step_rad: dict[str, float]
     rest_s: float
     missing: dict[str, str]
 
@@ -58,7 +61,7 @@ def calibrate(table: pd.DataFrame, rig: Rig, limits: Limits = LIMITS) -> Calibra
     """
     time = table["time_s"].to_numpy()
     resting = _resting_samples(table, limits)
-    result = Calibrated({}, {}, {}, float(time[resting - 1]) if resting else 0.0, {})
+    result = Calibrated({}, {}, {}, {}, float(time[resting - 1]) if resting else 0.0, {})
     ends = (("drive", rig.drive, "in", ("T1_N", "T3_N")), ("load", rig.load, "out", ("T2_N", "T4_N")))
     for end, side, suffix, tensions in ends:
         _angle(result, table, end, side, f"theta_{suffix}_rad", resting, rig.accuracy)
@@ -100,6 +103,7 @@ def _angle(result: Calibrated, table, end: str, side: Side, channel: str, restin
         f"{_minus(side.encoder_sign)}({column} - {zero:g}, {where}) * 2 pi / {side.encoder_counts_per_rev:g}"
     )
     result.accuracy[channel] = side.encoder_accuracy_rad or accuracy.encoder_rad
+    result.encoder_step_rad[channel] = step
 
 
 def _torque(result: Calibrated, table, end: str, side: Side, channel: str, accuracy: Accuracy) -> None:

@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from ccmodel.recording import Recording
 from ccmodel.rig.batch import Batch, RecordingEntry, load_batch
 from ccmodel.rig.calibration import calibrate
@@ -125,7 +123,7 @@ def _recording(
         pretension_N=entry.pretension_N,
         path=entry.path,
         accuracy=calibrated.accuracy,
-        encoder_step_rad=2 * np.pi / batch.rig.drive.encoder_counts_per_rev,
+        encoder_step_rad=calibrated.encoder_step_rad,
         excitation=entry.excitation,
         rest_s=calibrated.rest_s,
         settled_s=entry.settled_s,

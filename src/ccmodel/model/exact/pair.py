@@ -90,7 +90,8 @@ class PairResponse:
     T1_N, T2_N, T3_N, T4_N : ndarray, shape (n,)
         Tensions at the cables' ends (A: 1 drive, 2 load; B: 3, 4), N.
     theta_out_rad : ndarray, shape (n,)
-        Angle of the load pulley; where the start is out of balance it begins where the load settled, not at zero.
+        Angle of the load pulley: from the neutral position of a spring load, else from the start; where the start is
+        out of balance it begins where the load settled.
     tau_in_Nm, tau_out_Nm : ndarray, shape (n,)
         (T1 - T3) R_i and (T2 - T4) R_o, N m.
     phase : ndarray of int8, shape (n,)
@@ -194,7 +195,8 @@ def simulate_pair(
     """Response of a pull-pull pair to a motion of its drive pulley, exactly, by Coulomb friction alone.
 
     The result does not depend on time, only on the order of the samples; between samples drive and load law are
-    linear. Where the start is out of balance with the load, the load settles first with the drive at rest.
+    linear. A spring starts where it holds the initial tensions; a given torque, or a load that turns freely, that does
+    not hold them settles first with the drive at rest.
 
     Parameters
     ----------
@@ -221,9 +223,12 @@ def simulate_pair(
     """
     theta_in = _series(theta_in_rad, "theta_in_rad")
     R_i, R_o = transmission.drive_radius_m, transmission.load_radius_m
-    given, stiffness = np.zeros(theta_in.size), 0.0
+    given, stiffness, start = np.zeros(theta_in.size), 0.0, 0.0
     if isinstance(load, SpringLoad):
         stiffness = load.stiffness_Nm_per_rad / R_o**2
+        if stiffness > 0:
+            given += initial.tension_A_N[-1] - initial.tension_B_N[-1]
+            start = given[0] / stiffness
     elif isinstance(load, TorqueLoad):
         given = _matching(load.torque_Nm / R_o, theta_in, "torque_Nm")
     elif isinstance(load, AngleLoad):
@@ -239,7 +244,7 @@ def simulate_pair(
         T2_N=T2,
         T3_N=T3,
         T4_N=T4,
-        theta_out_rad=displacement / R_o,
+        theta_out_rad=(start + displacement) / R_o,
         tau_in_Nm=(T1 - T3) * R_i,
         tau_out_Nm=(T2 - T4) * R_o,
         phase=run.phase - 1,

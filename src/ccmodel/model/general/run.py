@@ -12,11 +12,11 @@ from ccmodel.mechanisms.load_dependent_friction import FLOOR_N, REFERENCE_N
 from ccmodel.mechanisms.pulley_eccentricity import winding
 from ccmodel.mechanisms.pulley_friction import bearing
 from ccmodel.mechanisms.strand_settling import stretch_at
+from ccmodel.model.failure import ModelError
 from ccmodel.model.general import march as rows
 from ccmodel.model.general.grid import Grid, make_grid
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, MechanicalLoad, SpringLoad, TorqueLoad
-from ccmodel.model.paper import ModelError
 from ccmodel.model.transmission import Transmission
 
 ELEMENTS = 32
@@ -147,14 +147,7 @@ def simulate(
     """
     time_s, theta_in = (np.ascontiguousarray(a, dtype=float) for a in (time_s, theta_in))
     active = _active(mechanisms)
-    settings = Settings()
-    for a in active:
-        mechanism = registry.get(a.name)
-        if mechanism.enters is not None:
-            try:
-                mechanism.enters(settings, a.place, a.values)
-            except ValueError as e:
-                raise ModelError(str(e)) from None
+    settings = settings_of(active)
     series = _series(load, theta_in)
     _check(time_s, theta_in, series, elements)
 
@@ -188,6 +181,40 @@ def simulate(
     read = _read(active, time_s, channels, transmission)
     status = _status(solved, series.size, theta_in)
     return Response(status, time_s, T1, T2, T3, T4, theta_out, tau_in, tau_out, read, int(counts[0]), int(counts[1]))
+
+
+def settings_of(mechanisms: Mapping[str, Mapping] | Sequence[Active]) -> Settings:
+    """What mechanisms, given as to `simulate`, tell the solver."""
+    settings = Settings()
+    for a in _active(mechanisms):
+        mechanism = registry.get(a.name)
+        if mechanism.enters is not None:
+            try:
+                mechanism.enters(settings, a.place, a.values)
+            except ValueError as e:
+                raise ModelError(str(e)) from None
+    return settings
+
+
+def load_law(settings: Settings, stiffness: float, time_s: NDArray, theta: NDArray, start_Nm: float) -> NDArray:
+    """Torque (N m, shape (n,)) of a spring load with what acts on it, along a course of its pulley.
+
+    Parameters
+    ----------
+    settings : Settings
+    stiffness : float
+        K_e, N m/rad.
+    time_s, theta : ndarray, shape (n,)
+        The pulley's course; only its changes matter.
+    start_Nm : float
+        Torque before it.
+    """
+    K3 = settings.cubic_stiffness
+    z = _deflection(stiffness, K3, start_Nm)
+    angle = theta - theta[0] + z + np.sign(z) * settings.half_gap
+    beyond = np.sign(angle) * np.maximum(np.abs(angle) - settings.half_gap, 0.0)
+    acceleration = np.gradient(np.gradient(theta, time_s), time_s)
+    return stiffness * beyond + K3 * beyond**3 + settings.inertia * acceleration
 
 
 def _active(mechanisms) -> list[Active]:
@@ -332,17 +359,21 @@ def _load_angle(physics: rows.Physics, T: NDArray, load: Load, series: NDArray) 
     theta = 0.0
     for _ in range(50):
         R = physics.radius * winding(theta, physics.eccentricity, physics.phase)[1]
-        torque = R * (T[0, -1] - T[1, -1])
-        if K == 0:
-            z = np.cbrt(torque / K3)
-        else:
-            z = torque / K
-            for _ in range(50 if K3 else 0):
-                z -= (K * z + K3 * z**3 - torque) / (K + 3 * K3 * z * z)
+        z = _deflection(K, K3, R * (T[0, -1] - T[1, -1]))
         theta = z + np.sign(z) * physics.half_gap
         if physics.eccentricity == 0:
             break
     return float(theta)
+
+
+def _deflection(K: float, K3: float, torque: float) -> float:
+    """Angle (rad) at which K z + K3 z^3 is the torque; by Newton's method from the linear spring's."""
+    if K == 0:
+        return float(np.cbrt(torque / K3))
+    z = torque / K
+    for _ in range(50 if K3 else 0):
+        z -= (K * z + K3 * z**3 - torque) / (K + 3 * K3 * z * z)
+    return float(z)
 
 
 def _read(active: list[Active], time_s: NDArray, channels: dict[str, NDArray], transmission: Transmission):

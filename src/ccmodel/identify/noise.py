@@ -1,0 +1,58 @@
+"""What a right model would leave of a recording: the sensors' noise, the encoders' steps, the drive's unknown part."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from ccmodel.model.parameters import Parameters
+from ccmodel.model.run import ModelInput, simulate
+from ccmodel.recording import Recording
+
+# A rest of fewer samples than this does not show a sensor's noise; what the rig states then stands for it.
+FEWEST_AT_REST = 20
+# No sensor is trusted to be better than a tenth of its stated accuracy, however still its rest looks.
+BEST_SHARE = 0.1
+# Time over which the scatter of a few likely drive motions is averaged.
+ALIKE_S = 0.05
+
+
+def sensor_noise(recording: Recording) -> dict[str, float]:
+    """Standard deviation of each channel's noise, in its unit.
+
+    From the scatter about a straight line through the rest at the recording's start; from the stated accuracy where
+    there is no rest to speak of. A counted angle has the deviation of its step, whatever the rest shows, and a
+    channel without anything to go by a hundredth of its range.
+    """
+    resting = recording.time_s < recording.rest_s
+    found = {}
+    for channel, values in recording.channels.items():
+        if (step := recording.encoder_step_rad.get(channel)) is not None:
+            found[channel] = step / np.sqrt(12)
+            continue
+        stated = recording.accuracy.get(channel)
+        if resting.sum() >= FEWEST_AT_REST:
+            best = BEST_SHARE * stated if stated else 1e-6 * max(float(np.abs(values).max()), 1e-9)
+            found[channel] = max(_scatter(recording.time_s[resting], values[resting]), best)
+        else:
+            found[channel] = stated or 0.01 * max(float(np.ptp(values)), 1e-9)
+    return found
+
+
+def drive_noise(given: ModelInput, parameters: Parameters) -> dict[str, NDArray]:
+    """What is unknown of the drive's motion, as it shows in each channel: standard deviation, shape (n,)."""
+    said = simulate(given, parameters)
+    aside = [simulate(replace(given, theta_in=given.theta_in + d), parameters) for d in given.drive_deviations]
+    samples = max(1, round(ALIKE_S / float(np.median(np.diff(given.recording.time_s)))))
+    return {
+        channel: np.sqrt(uniform_filter1d(sum((a[channel] - said[channel]) ** 2 for a in aside) / len(aside), samples))
+        if aside
+        else np.zeros_like(said.time_s)
+        for channel in said.channels
+    }
+
+
+def _scatter(time_s: NDArray, values: NDArray) -> float:
+    line = np.polynomial.Polynomial.fit(time_s, values, 1)
+    return float(np.std(values - line(time_s), ddof=2))
