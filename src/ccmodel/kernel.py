@@ -1,11 +1,16 @@
 """Compiling kernels, with a cache on disk that knows of all their sources."""
 
 from functools import partial
+from uuid import uuid4
 
 from numba import njit, types
 from numba.extending import intrinsic
 
 from ccmodel.provenance import source_digest
+
+# numba numbers the files of a kernel's variants 1, 2, ... and two processes that compile at once, each another variant,
+# give both the same name: one would then run the other's code. With a name of each process this cannot be.
+_PROCESS = uuid4().hex[:8]
 
 
 def kernel(function=None, **options):
@@ -24,7 +29,11 @@ def kernel(function=None, **options):
     if function is None:
         return partial(kernel, **options)
     function.__qualname__ += f"_{source_digest(function.__module__)}"
-    return njit(cache=True, **options)(function)
+    compiled = njit(cache=True, **options)(function)
+    if cache := getattr(compiled, "_cache", None):
+        files = cache._cache_file
+        files._data_name_pattern = files._data_name_pattern.replace("{", f"{_PROCESS}-{{")
+    return compiled
 
 
 # Made part of whatever calls it: for what every sample goes through.
