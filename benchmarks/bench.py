@@ -46,11 +46,11 @@ ELEMENTS = np.array([8, 16, 32, 64, 128, 256])
 def exact_us(case: cases.Case, theta_in: np.ndarray) -> float:
     """Microseconds a sample of the exact solver."""
     return us_per_sample(
-        lambda: exact.simulate_pair(case.transmission, case.load, theta_in, case.initial), theta_in.size, repeats=9
+        lambda: exact.simulate_pair(case.transmission, case.load, theta_in, case.initial), theta_in.size, repeats=30
     )
 
 
-def general_us(theta_in: np.ndarray, active=(), elements: int = general.run.ELEMENTS, repeats: int = 7) -> float:
+def general_us(theta_in: np.ndarray, active=(), elements: int = general.run.ELEMENTS, repeats: int = 10) -> float:
     """Microseconds a sample of the general solver."""
     case = cases.half_loop()
     time_s = np.arange(theta_in.size) / cases.SAMPLES_A_CYCLE
@@ -74,7 +74,7 @@ def of_exact() -> dict[str, float]:
     figures["exact_noisy_us_per_sample"] = exact_us(cases.paper(), cases.noisy(20))
     figures["exact_jumping_us_per_sample"] = exact_us(cases.paper(), cases.jumping(20))
     out = np.empty((9, sine.size))
-    arithmetic = us_per_sample(lambda: least_arithmetic(sine, out), sine.size)
+    arithmetic = us_per_sample(lambda: least_arithmetic(sine, out), sine.size, repeats=60)
     figures["exact_vs_arithmetic"] = figures["exact_1_pieces_us_per_sample"] / arithmetic
     return figures
 

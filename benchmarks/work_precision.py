@@ -105,6 +105,7 @@ def draw(points: dict[str, Points], file: Path) -> None:
     axes.set_xlabel("time a sample (µs)")
     axes.set_ylabel("rms error of the drive-end tensions,\nby their rms (1)")
     axes.set_title("The paper's case, 1,000 samples a cycle; numbers are sections or elements a cable", fontsize=10)
+    axes.margins(x=0.1)
     axes.grid(alpha=0.3)
     figure.legend(loc="outside lower center", ncols=3, frameon=False)
     file.parent.mkdir(parents=True, exist_ok=True)
