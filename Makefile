@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 CORES ?= 2
 
-.PHONY: help results real data test lint lock clean
+.PHONY: help results real data test bench lint lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -40,6 +40,9 @@ data: $(VENV)/.ready  ## record data/raw again with the virtual rig
 test: $(VENV)/.ready  ## run the tests and the linters
 	$(BIN)/python -m pytest
 	$(MAKE) --no-print-directory lint
+
+bench: $(VENV)/.ready  ## measure speed and accuracy: results/bench.json, docs/figures/work-precision.png
+	$(BIN)/python benchmarks/bench.py
 
 lint: $(VENV)/.ready
 	$(BIN)/ruff check .

@@ -29,7 +29,8 @@ def source_digest(module: str) -> str:
     """Digest of a module of the package with all of the package that it imports, and the templates beside those.
 
     Snakemake sees when a script changes, not when the package behind it does; with this among a rule's params, it
-    reruns what depends on an edited file, and only that.
+    reruns what depends on an edited file, and only that. Compiled code is told from older code likewise
+    (`ccmodel.kernel`).
     """
     digest = hashlib.sha256()
     for file in sorted(sources_of(module)):
@@ -57,6 +58,7 @@ def _file_of(name: str) -> Path | None:
     return next((file for file in candidates if name and file.exists()), None)
 
 
+@cache
 def _imports(file: Path) -> list[str]:
     """What a file imports of the package; with `from a import b`, both a and a.b, as b may be a module."""
     names = []

@@ -8,12 +8,11 @@ Signature: the load's torque is flat around zero while the pulley turns.
 Mistaken for strands that settle. Torque near zero tells: backlash is there at any pretension.
 """
 
-from numba import njit
-
+from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def dead_zone(theta, half_gap):
     """Angle beyond the gap (rad) and its derivative by `theta`."""
     if theta > half_gap:

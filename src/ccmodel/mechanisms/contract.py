@@ -10,8 +10,7 @@
    neutral values gives the paper's model, or tends to it as a parameter with an open neutral value (a bristle
    length of zero, a speed of zero) gets there.
 5. An equation that the march over the samples needs at every step stands in the mechanism's file as a compiled
-   function that the solver imports. (Numba keys its disc cache on the caller's file: after a change of such a
-   function, empty the caller's ``__pycache__``.)
+   function that the solver imports (`ccmodel.kernel`).
 """
 
 from collections.abc import Callable, Mapping

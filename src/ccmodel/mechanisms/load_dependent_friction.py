@@ -11,8 +11,8 @@ the tension goes to zero, a power law does not.
 """
 
 import numpy as np
-from numba import njit
 
+from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 REFERENCE_N = 5.0
@@ -20,7 +20,7 @@ REFERENCE_N = 5.0
 FLOOR_N = 0.1
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def power_of_tension(tension, n):
     """Factor of mu at a tension (N), and its derivative by the tension (1/N)."""
     square = tension * tension + FLOOR_N * FLOOR_N

@@ -11,12 +11,12 @@ tell: with bristles the tension creeps from one of them to the next, with a term
 """
 
 import numpy as np
-from numba import njit
 
+from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def dahl(xi, slide, z0):
     """Bristle xi = z / z0 after sliding by `slide` (m) in one direction, and its derivative by `slide` (1/m)."""
     direction = 1.0 if slide >= 0.0 else -1.0

@@ -9,18 +9,18 @@ Mistaken for a load that stiffens. The phase of the angle tells: start the strok
 """
 
 import numpy as np
-from numba import njit
 
+from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter, side
 
 
-@njit(cache=True)
+@kernel
 def winding(theta, e, psi):
     """Way of the cable over R, the integral of the radius (rad); radius over R; and the derivative of the latter."""
     return theta - e * np.cos(theta + psi), 1.0 + e * np.sin(theta + psi), e * np.cos(theta + psi)
 
 
-@njit(cache=True)
+@kernel
 def wound(theta, turn, e, psi):
     """Way over R that a turn from theta makes (rad), without cancellation in a small turn."""
     return turn + 2.0 * e * np.sin(theta + psi + 0.5 * turn) * np.sin(0.5 * turn)

@@ -11,15 +11,15 @@ bearing's has the sign of the speed and one size.
 """
 
 import numpy as np
-from numba import njit
 
+from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter, side
 from ccmodel.mechanisms.presliding import dahl
 
 PRESLIDING_RAD = 2e-3
 
 
-@njit(cache=True)
+@kernel
 def bearing(theta):
     """Friction over friction torque (-1 to 1) along a course of angles (rad, shape (n,)) that starts unloaded."""
     share = np.zeros_like(theta)

@@ -11,12 +11,12 @@ Mistaken for a load cell that drifts. Both ends and both cables relax together; 
 """
 
 import numpy as np
-from numba import njit
 
+from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
-@njit(cache=True)
+@kernel
 def lag_weights(step_over_tau):
     """Weights (q, T_e before, T_e after) that make up q after a step, for T_e linear in the step."""
     y = step_over_tau

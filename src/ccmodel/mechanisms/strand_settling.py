@@ -10,12 +10,12 @@ itself, backlash on the torque of the load.
 """
 
 import numpy as np
-from numba import njit
 
+from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def settling_tension(stretch, lost, stiffness):
     """Tension (N) of a piece at a stretch (m) >= 0, and its stiffness (N/m); `lost` is u_s times its length (m)."""
     left = np.exp(-stretch / lost)

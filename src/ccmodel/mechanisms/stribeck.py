@@ -9,14 +9,14 @@ Mistaken for presliding and for viscous friction. A sweep of speeds tells.
 """
 
 import numpy as np
-from numba import njit
 
+from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 LAG_S = 2e-3
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def breakaway(speed, rise, vs):
     """Factor of mu at a sliding speed (m/s)."""
     return 1.0 + rise * np.exp(-((speed / vs) ** 2))

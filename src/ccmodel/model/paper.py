@@ -25,9 +25,9 @@ The load pulley couples the cables: its motion is what balances (T2 - T4) R_o ag
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ccmodel.kernel import kernel
 from ccmodel.model.failure import ModelError
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad, TorqueLoad
@@ -155,7 +155,7 @@ def _capstan_lines(x, phi, transmission):
     return E, np.concatenate([np.zeros((2, 1)), np.cumsum(stretch, axis=1)], axis=1)
 
 
-@njit(cache=True)
+@kernel
 def _drive_front(T, u, a, E, P, h):
     """Last moving node when the drive end is taken to displacement `a`; (segment in part moving, line constant c).
 
@@ -171,7 +171,7 @@ def _drive_front(T, u, a, E, P, h):
     return n, 0.0
 
 
-@njit(cache=True)
+@kernel
 def _load_front(T, u, b, E, P, h):
     """The same from the load end, taken to displacement `b`; segment -1 when it has arrived at the drive end."""
     n = h.size
@@ -184,7 +184,7 @@ def _load_front(T, u, b, E, P, h):
     return -1, 0.0
 
 
-@njit(cache=True)
+@kernel
 def _still_point(u, a, b, P_left, P_right, E_left, E_right):
     """Both ends drawn apart or let in: two lines from one still point; (node left of it, weight, tension there).
 
@@ -203,7 +203,7 @@ def _still_point(u, a, b, P_left, P_right, E_left, E_right):
     return (n - 1, 1.0) if abs(b - u[n]) < abs(a - u[0]) else (0, 0.0)
 
 
-@njit(cache=True)
+@kernel
 def _move_cable(T, u, a, b, drive, E, P, h, T_new, u_new):
     """New state of one cable with its ends taken to `a` and `b`; `drive` is what `_drive_front` gave for `a`.
 
@@ -257,7 +257,7 @@ def _move_cable(T, u, a, b, drive, E, P, h, T_new, u_new):
             u_new[i] = b - c_load * (P[row, n] - P[row, i])
 
 
-@njit(cache=True)
+@kernel
 def _slide_from_still_point(u, a, b, S_load, E, P, T_new, u_new):
     n = u.size - 1
     right = (S_load + 1) // 2
@@ -278,7 +278,7 @@ def _slide_from_still_point(u, a, b, S_load, E, P, T_new, u_new):
     u_new[n] = b
 
 
-@njit(cache=True)
+@kernel
 def _imbalance(theta, cables, step, load, lines):
     """Torque of the cables less that of the load when the load pulley stands at `theta`; leaves the new state there.
 
@@ -295,7 +295,7 @@ def _imbalance(theta, cables, step, load, lines):
     return (T_new[0, n] - T_new[1, n]) * R_o - (K_e * theta + torque)
 
 
-@njit(cache=True)
+@kernel
 def _balance(theta, guess, cables, step, load, lines):
     """Load angle at which the torques balance, by bracketing and false position (Illinois); and whether there is one.
 
@@ -330,7 +330,7 @@ def _balance(theta, guess, cables, step, load, lines):
     return upper, True
 
 
-@njit(cache=True)
+@kernel
 def _march(theta_in, torque, K_e, R_i, R_o, T_A0, T_B0, h, E, P):
     """Step through the samples; end tensions (4, n), load angle (n,) and the sample without a balance, or -1."""
     n = h.size

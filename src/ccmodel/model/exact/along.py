@@ -5,6 +5,7 @@ R_o theta_out solves T2 - T4 = given + stiffness Q, whose left side falls with Q
 whole, a quadratic a segment where it does not.
 """
 
+from ccmodel.kernel import kernel, small_kernel
 from ccmodel.model.exact.cable import (
     DRIVE,
     E0,
@@ -27,7 +28,6 @@ from ccmodel.model.exact.cable import (
     turn,
     walk,
 )
-from ccmodel.model.exact.kernel import kernel, small_kernel
 
 
 @kernel

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.model.exact.kernel import kernel, small_kernel
+from ccmodel.kernel import kernel, small_kernel
 from ccmodel.model.exact.path import LUMP, NODE, PASSED, PER_M
 
 FRONTS, WHOLE, STILL_POINT = 0, 1, 2
@@ -433,9 +433,21 @@ def is_slack(state, c):
     return state.kind[c, MODE] == WHOLE and elongation(state, c) <= 0.0
 
 
-@kernel
+@small_kernel
 def turn(path, state, c, sigma_drive, sigma_load):
     """Make cable `c` ready for its ends to move as pulls (+1) or releases (-1): what turns round leaves a corner."""
+    kind = state.kind
+    if kind[c, MODE] == FRONTS:
+        goes_on = kind[c, SIGMA] == sigma_drive and kind[c, SIGMA + 3] == sigma_load
+    else:
+        goes_on = kind[c, MODE] == WHOLE and sigma_load != sigma_drive and kind[c, LINE] == -sigma_drive
+    if not goes_on:
+        _turn(path, state, c, sigma_drive, sigma_load)
+
+
+@kernel
+def _turn(path, state, c, sigma_drive, sigma_load):
+    """As `turn`, where anything changes."""
     kind = state.kind
     if kind[c, MODE] == WHOLE:
         if sigma_load != sigma_drive:

@@ -1,5 +1,6 @@
 """The loop over samples: what kind of step each is, and what is written down of it."""
 
+from ccmodel.kernel import borrowed, kernel, small_kernel
 from ccmodel.model.exact.along import balance_lines, move_along, step_along
 from ccmodel.model.exact.cable import (
     D_START,
@@ -27,7 +28,6 @@ from ccmodel.model.exact.cable import (
     position,
     turn,
 )
-from ccmodel.model.exact.kernel import kernel, small_kernel
 from ccmodel.model.exact.path import NODE, X_PER_M, X_START
 
 # How `run` came to its end; APART: the next sample wants `still_point.step_apart` first.
@@ -67,6 +67,7 @@ def run(path, state, trials, progress, drive, angle_given, given, stiffness, pre
     phase : ndarray of int, shape (n,)
         1 to 3 for phases I to III, 4 for IVa, 5 for IVb.
     """
+    path, state, trials = borrowed(path), borrowed(state), borrowed(trials)
     for i in range(progress[0], drive.size):
         for c in range(2):
             if state.kind[c, FIRST] < MARGIN or state.kind[c, LAST] > state.corner.shape[2] - MARGIN:

@@ -13,6 +13,7 @@ from math import exp, inf
 
 import numpy as np
 
+from ccmodel.kernel import kernel
 from ccmodel.model.exact.along import balance_lines, both_fronts, one_front
 from ccmodel.model.exact.cable import (
     DRIVE,
@@ -45,7 +46,6 @@ from ccmodel.model.exact.cable import (
     turn,
     walk,
 )
-from ccmodel.model.exact.kernel import kernel
 from ccmodel.model.exact.path import LUMP, NODE, PASSED
 
 REACHED, STUCK = 0, 1

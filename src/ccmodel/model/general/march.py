@@ -18,8 +18,8 @@ from both drive ends at once. A conduit that gives way to its cable's mean tensi
 from collections import namedtuple
 
 import numpy as np
-from numba import njit
 
+from ccmodel.kernel import kernel
 from ccmodel.mechanisms.backlash import dead_zone
 from ccmodel.mechanisms.load_dependent_friction import power_of_tension
 from ccmodel.mechanisms.presliding import dahl
@@ -101,7 +101,7 @@ Physics = namedtuple(
 FAST = {"reassoc", "contract", "nsz", "arcp"}  # not nnan: a NaN must be seen
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _tanh(y):
     """Tanh for the half of mu phi of a cell, y >= 0: to rounding below 0.05, to 1e-6 at 1, at a tenth of the cost."""
     if y > 1.5:
@@ -110,7 +110,7 @@ def _tanh(y):
     return y * (945.0 + y2 * (105.0 + y2)) / (945.0 + y2 * (420.0 + 15.0 * y2))
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=FAST)
 def _tensions(ph, piece, slide, mean, weights):
     """Tension of each piece and its tangent stiffness for the slides of this step."""
     n1 = piece.shape[2]
@@ -145,7 +145,7 @@ def _tensions(ph, piece, slide, mean, weights):
             K[i] = share * tangent
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=FAST)
 def _nodes(ph, piece, node, slide, dt, bristle):
     """Balance of each node and its derivatives; the sum of squares of what is out of balance, N^2."""
     n = node.shape[2]
@@ -193,7 +193,7 @@ def _nodes(ph, piece, node, slide, dt, bristle):
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _load(ph, piece, load, turn, torque, dt):
     """Torque out of balance at the load pulley, its slope by the angle less what the cables add, and the radius."""
     n = piece.shape[2] - 1
@@ -220,7 +220,7 @@ def _load(ph, piece, load, turn, torque, dt):
     return R * difference - tau - ph.load_friction * bearing, slope - ph.radius * round_slope * difference, R
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=FAST)
 def _solve(piece, node, slide, G, slope, R, free):
     """Newton's step for the slides into `STEP`; returns the load pulley's turn.
 
@@ -249,7 +249,7 @@ def _solve(piece, node, slide, G, slope, R, free):
     return turn
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=FAST)
 def _solve_with_conduits(ph, piece, node, slide, mean, G, slope, R, free):
     """The same with both conduits' mean tensions unknown; their steps go into `MEAN_STEP`.
 
@@ -305,7 +305,7 @@ def _solve_with_conduits(ph, piece, node, slide, mean, G, slope, R, free):
     return turn
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _move(ph, node, slide, share, bristle):
     """Take the slides a share of Newton's step on, no node from sliding one way to sliding the other in one go.
 
@@ -330,7 +330,7 @@ def _move(ph, node, slide, share, bristle):
             slide[NOW, c, i] = new
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _mean_tension(piece, c):
     total = 0.0
     for i in range(piece.shape[2]):
@@ -338,7 +338,7 @@ def _mean_tension(piece, c):
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _evaluate(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, weights):
     """Everything that a step leaves out of balance: sum of squares (N^2), highest tension, and the load's terms."""
     n = node.shape[2]
@@ -357,7 +357,7 @@ def _evaluate(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, wei
     return error, max(highest, 1e-2), G, slope, R
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _newton(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, counts):
     """Solve a step from the slides in `NOW` and a turn of the load; (whether it converged, the load's turn)."""
     free = ph.kind == IMPEDANCE
@@ -409,7 +409,7 @@ def _newton(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, count
     return error <= (LOOSE_TOLERANCE * limit) ** 2, turn
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _commit(ph, piece, node, slide, mean, load, turn, dt):
     """Take over a solved step."""
     n = node.shape[2]
@@ -445,7 +445,7 @@ def _commit(ph, piece, node, slide, mean, load, turn, dt):
     load[BEARING] = load[BEARING_NEXT]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _set_grip(ph, node, course):
     """Friction of each node per sum of its tensions; with a power of tension only its argument, mu phi / 2."""
     for c in range(2):
@@ -456,7 +456,7 @@ def _set_grip(ph, node, course):
             node[GRIP, c, i] = y if ph.exponent != 0.0 else _tanh(y)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def march(ph, piece, node, slide, mean, load, time_s, way_in, course, series, out, counts):
     """Step through the samples.
 

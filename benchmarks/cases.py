@@ -1,0 +1,91 @@
+"""The runs that the benchmarks time."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ccmodel import mechanisms
+from ccmodel.geometry import ConduitPath
+from ccmodel.model.general import Active
+from ccmodel.model.initial import InitialTension
+from ccmodel.model.load import SpringLoad
+from ccmodel.model.transmission import Transmission
+
+SAMPLES_A_CYCLE = 1000
+# The paper's own step, 0.25 ms, at its 1 Hz.
+PAPER_SAMPLES_A_CYCLE = 4000
+PAPER_SECTIONS = 16
+
+
+@dataclass(frozen=True)
+class Case:
+    """A pair, its load and its initial tension.
+
+    Attributes
+    ----------
+    transmission : Transmission
+    load : SpringLoad
+    initial : InitialTension
+    """
+
+    transmission: Transmission
+    load: SpringLoad
+    initial: InitialTension
+
+
+def paper(loops: float = 3, pieces: int = 1) -> Case:
+    """The paper's Section IV: 2 m in three loops, 10 N, 1 kN/m; friction, pulleys and load, which it leaves open, ours.
+
+    `pieces` cuts the conduit into as many of equal length, bent more and less in turn.
+    """
+    share = 1 + 0.5 * np.cos(np.pi * np.arange(pieces)) if pieces > 1 else np.ones(1)
+    path = ConduitPath(np.full(pieces, 2.0 / pieces), 2 * np.pi * loops * share / share.sum())
+    return Case(
+        Transmission(path, 1000.0 * path.length_m, 0.147, 0.012, 0.012),
+        SpringLoad(0.03),
+        InitialTension.uniform(path, 10.0),
+    )
+
+
+def half_loop() -> Case:
+    """The paper's rig with half a loop (its Section V), against a softer spring."""
+    path = ConduitPath([1.2], [np.pi])
+    return Case(
+        Transmission(path, 7750 * 1.2, 0.156, 0.006, 0.006), SpringLoad(0.05), InitialTension.uniform(path, 7.3)
+    )
+
+
+def sine(cycles: int, amplitude: float = 1.0, samples_a_cycle: int = SAMPLES_A_CYCLE) -> NDArray:
+    """Drive angle, rad, shape (cycles * samples_a_cycle + 1,)."""
+    return amplitude * np.sin(2 * np.pi * np.arange(cycles * samples_a_cycle + 1) / samples_a_cycle)
+
+
+def after_nested_reversals(cycles: int, reversals: int = 1000) -> NDArray:
+    """Small cycles over a history of nested reversals that they never wipe out, rad."""
+    nested = 0.2 * np.linspace(1, 0.5, reversals) * (-1) ** np.arange(reversals)
+    return np.concatenate([nested, nested[-1] - 0.05 * np.sign(nested[-1]) * (1 - sine(cycles))])
+
+
+def noisy(cycles: int, amplitude: float = 0.6) -> NDArray:
+    """A sine with noise of half a coarse encoder's step, rad."""
+    theta_in = sine(cycles, amplitude)
+    theta_in[1:] += np.random.default_rng(1).normal(0, 1.5e-3, theta_in.size - 1)
+    return theta_in
+
+
+def jumping(cycles: int, amplitude: float = 0.6) -> NDArray:
+    """Another angle at every sample, anywhere within the amplitude, rad."""
+    theta_in = np.random.default_rng(1).uniform(-amplitude, amplitude, cycles * SAMPLES_A_CYCLE + 1)
+    theta_in[0] = 0.0
+    return theta_in
+
+
+def presliding() -> list[Active]:
+    """Presliding alone."""
+    return [Active("presliding", "conduit", {"z0": 50e-6})]
+
+
+def every_effect() -> list[Active]:
+    """Every mechanism at every place it can have, at its starting values."""
+    return [Active(n, p, mechanisms.get(n).start) for n in mechanisms.names() for p in mechanisms.get(n).places]

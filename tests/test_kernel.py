@@ -1,0 +1,60 @@
+"""Compiled code is not taken from the cache once a source it was made from has changed."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+import ccmodel
+from ccmodel import provenance
+from ccmodel.mechanisms.presliding import dahl
+from ccmodel.model.exact.run import run
+from ccmodel.model.general.march import march
+from ccmodel.model.paper import _march
+
+
+@pytest.mark.parametrize("function", [dahl, march, run, _march])
+def test_a_kernels_name_tells_of_its_sources(function):
+    assert function.py_func.__qualname__.endswith(provenance.source_digest(function.py_func.__module__))
+
+
+@pytest.fixture
+def digest_of_copy(tmp_path, monkeypatch):
+    """Digest of a module in a copy of the package, to be edited; and the copy's folder."""
+    copy = tmp_path / "ccmodel"
+    shutil.copytree(Path(ccmodel.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(provenance, "_ROOT", tmp_path)
+
+    def digest(module):
+        provenance._imports.cache_clear()
+        return provenance.source_digest.__wrapped__(module)
+
+    yield digest, copy
+    provenance._imports.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("module", "source"),
+    [
+        ("ccmodel.model.general.march", "mechanisms/presliding.py"),
+        ("ccmodel.model.general.march", "mechanisms/stribeck.py"),
+        ("ccmodel.model.general.march", "kernel.py"),
+        ("ccmodel.model.exact.run", "model/exact/cable.py"),
+        ("ccmodel.model.exact.run", "model/exact/path.py"),
+    ],
+)
+def test_a_change_of_an_imported_source_changes_the_digest(digest_of_copy, module, source):
+    digest, copy = digest_of_copy
+    before = digest(module)
+    assert digest(module) == before
+    with (copy / source).open("a") as file:
+        file.write("# a change\n")
+    assert digest(module) != before
+
+
+def test_a_change_elsewhere_does_not(digest_of_copy):
+    digest, copy = digest_of_copy
+    before = digest("ccmodel.model.general.march")
+    with (copy / "report" / "figures.py").open("a") as file:
+        file.write("# a change\n")
+    assert digest("ccmodel.model.general.march") == before
