@@ -12,12 +12,12 @@ from ccmodel.rig.bounded import fitted
 LINGER = 5.3
 # Orders of a start: a jump of acceleration (p = 2) or of jerk (p = 3), or neither.
 ORDERS = (2, 3, 4)
-TERMS = 3
+TERMS = 4
 # A series this short describes the first counts of a motion only.
 FIRST_COUNTS = 15
 SHORTEST = 4  # Samples that make a rest.
-STARTS = 10  # Times of start that are weighed against each other.
-ROUNDS = 20
+STARTS = 7  # Times of start that are weighed against each other.
+ROUNDS = 15
 DITHER = 0.1  # Noise that makes a resting encoder dither, in counts.
 WIDE = 3.0  # Standard deviation of a term at the end of what is looked at, in counts moved by then.
 UNKNOWN = (0.0, 1 / 12)  # Mean and variance of a place within a count of which nothing is known.
@@ -118,9 +118,10 @@ def _place(moved: NDArray, earliest: int) -> tuple[int, float, float]:
         return earliest, *UNKNOWN
     moved = moved[: int(np.flatnonzero(moved > wanted)[0])]
     starts = np.linspace(earliest, leaves - 1, STARTS)
-    # Along a rising curve the bounds at a count's first and last sample imply those between.
-    telling = np.flatnonzero(np.diff(moved))
-    telling = np.unique(np.concatenate([telling, telling + 1, [moved.size - 1]]))
+    # Along a rising curve the bounds at a count's first and last sample imply those between; the long first one gets a
+    # few more, for a series need not rise.
+    change = np.flatnonzero(np.diff(moved))
+    telling = np.unique(np.r_[np.linspace(0, leaves - 1, 6).astype(int), change, change + 1, moved.size - 1])
     tries = np.array([(begin, *_from(begin, order, telling, moved)) for begin in starts for order in ORDERS])
     begin, evidence, place, variance = tries[np.isfinite(tries).all(axis=1) & (abs(tries[:, 2]) < 0.6)].T
     if not begin.size:
