@@ -95,6 +95,7 @@ def drive_motion(time_s: NDArray, theta_counts_rad: NDArray, step_rad: float, re
     Returns
     -------
     DriveMotion
+        The motion and what is left of its uncertainty.
 
     Raises
     ------
@@ -103,7 +104,28 @@ def drive_motion(time_s: NDArray, theta_counts_rad: NDArray, step_rad: float, re
 
     Notes
     -----
-    Measured errors follow.
+    Rms error in counts on motions that start from rest, 0.18 deg a count at 250 Hz, eight places within a count each.
+    "moving" and "turns" (slower than 15 % of the peak) leave out the places of rests, "holds" are these, "from rest" is
+    `theta_rad` against the true angle from the first rest; in brackets the counts as they stand. "within" is the share
+    within 1.645 standard deviations of `theta_rad`, which should be 0.90.
+
+    ============================  ======  =====  =====  ===========  ======
+    motion                        moving  turns  holds  from rest    within
+    ============================  ======  =====  =====  ===========  ======
+    sine 0.6 rad, 0.5 Hz          0.02    0.03          0.07 (0.38)  1.00
+    sine 0.3 rad, 0.25 Hz         0.01    0.01          0.06 (0.38)  1.00
+    sine 0.05 rad, 0.5 Hz         0.03    0.04          0.21 (0.38)  0.88
+    growing sine 0.8 rad, 0.5 Hz  0.02    0.02          0.23 (0.39)  0.54
+    chirp 0.4 rad, 0.15 to 1 Hz   0.06    0.08          0.14 (0.38)  0.91
+    free form up to 1.5 Hz        0.03    0.03          0.14 (0.39)  0.96
+    triangle, reversals of 80 ms  0.04    0.06          0.26 (0.39)  0.73
+    triangle, reversals of 30 ms  0.04    0.17          0.20 (0.39)  1.00
+    steps of least jerk           0.05    0.08   0.14   0.21 (0.33)  0.89
+    steps of constant ramps       0.06    0.09   0.25   0.29 (0.33)  0.85
+    ============================  ======  =====  =====  ===========  ======
+
+    What is left is mostly the place of rests: fast starts pass too few samples a count to tell it. A common order of
+    start for all rests of a recording was tried and told next to nothing more.
     """
     time = np.asarray(time_s, dtype=float)
     counted = np.asarray(theta_counts_rad, dtype=float)
