@@ -143,12 +143,15 @@ def drive_motion(time_s: NDArray, theta_counts_rad: NDArray, step_rad: float, re
     latest = np.searchsorted(place, np.arange(seen.size), "right") - 1
     counts = np.round((counted[thinned][latest] - zero) / step_rad)
     rests = find_rests(counts, int(np.searchsorted(time[thinned], rest_s, "right")) if rest_s > 0 else 0)
-    curves = _curves(_Data.of(counts, seen, rests), ALIKE_S / step_s, from_rest=rest_s > 0)
+    angle, sigma, draws = _curves(_Data.of(counts, seen, rests), ALIKE_S / step_s, from_rest=rest_s > 0)
+    draws = [_straight_to_rest(angle + draw, counts, rests) for draw in draws]
+    angle = _straight_to_rest(angle, counts, rests)
     grid = time[0] + step_s * np.arange(seen.size)
-    angle, sigma, *draws = (np.interp(time, grid, curve) * step_rad for curve in curves)
+    draws = np.array([np.interp(time, grid, draw - angle) for draw in draws]) * step_rad
+    angle, sigma = (np.interp(time, grid, curve) * step_rad for curve in (angle, sigma))
     if rest_s > 0:
-        return DriveMotion(angle - angle[0], sigma, np.array(draws), angle[0] + zero)
-    return DriveMotion(angle + zero, sigma, np.array(draws), 0.0)
+        return DriveMotion(angle - angle[0], sigma, draws, angle[0] + zero)
+    return DriveMotion(angle + zero, sigma, draws, 0.0)
 
 
 def _samples_a_node(time: NDArray, counts: NDArray) -> int:
@@ -159,8 +162,8 @@ def _samples_a_node(time: NDArray, counts: NDArray) -> int:
     return max(1, most if fastest * most < 1 else int(1 / fastest))
 
 
-def _curves(data: "_Data", alike: float, from_rest: bool) -> NDArray:
-    """Angle, its standard deviation and likely deviations, in counts, shape (2 + DRAWS, samples)."""
+def _curves(data: "_Data", alike: float, from_rest: bool) -> tuple[NDArray, NDArray, NDArray]:
+    """Angle and its standard deviation, shape (samples,), and likely deviations, (DRAWS, samples), in counts."""
     tries = [_Estimate(data, prior, alike) for prior in PRIORS]
     for each in tries:
         each.rounds(FIRST_ROUNDS)
@@ -180,7 +183,29 @@ def _curves(data: "_Data", alike: float, from_rest: bool) -> NDArray:
     follow *= np.sqrt(data.variance)[:, None]
     draws += noise.standard_normal((DRAWS, data.rest.size)) @ follow
     sigma = np.sqrt(best.spread + (follow**2).sum(axis=0))
-    return np.vstack([best.mean, sigma, draws])[:, data.node]
+    return best.mean[data.node], sigma[data.node], draws[:, data.node]
+
+
+def _straight_to_rest(angle: NDArray, counts: NDArray, rests: list[Rest]) -> NDArray:
+    """The same curve without turning within the count in which it rests.
+
+    A tenth of a count of overshoot, which the counts allow, would be a reversal to the cables: a false loss of tension
+    that lasts as long as the rest.
+    """
+    angle = angle.copy()
+    changes = np.flatnonzero(np.diff(counts)) + 1
+    for rest in rests:
+        level = angle[rest.first]
+        before, after = changes[changes <= rest.first], changes[changes > rest.last]
+        if before.size:
+            come = slice(before[-1], rest.first)
+            side = np.sign(counts[before[-1]] - counts[before[-1] - 1])
+            angle[come] = side * np.maximum.accumulate(np.minimum(side * angle[come], side * level))
+        if after.size:
+            go = slice(rest.last, after[0])
+            side = np.sign(counts[after[0]] - counts[after[0] - 1])
+            angle[go] = side * np.maximum.accumulate(np.maximum(side * angle[go], side * level))
+    return angle
 
 
 @dataclass(frozen=True)
