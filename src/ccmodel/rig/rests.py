@@ -10,8 +10,8 @@ from ccmodel.rig.bounded import fitted
 # A motion s^p from rest stays in the first count at most 1 / (2^(1/p) - 1) times as long as in the next: 2.4 times at
 # constant acceleration, 5.3 where acceleration begins smoothly. Longer must have been a rest; a turn comes to 4.8.
 LINGER = 5.3
-# Orders of a start: a jump of acceleration or of jerk. What begins more smoothly still is in the terms that follow; when
-# there was an order 4 too, other starts were taken for it too often.
+# Orders of a start: a jump of acceleration or of jerk. What begins more smoothly still is in the terms that follow;
+# when there was an order 4 too, other starts were taken for it too often.
 ORDERS = (2, 3)
 TERMS = 4
 # A series this short describes the first counts of a motion only.
