@@ -117,7 +117,7 @@ def drive_motion(time_s: NDArray, theta_counts_rad: NDArray, step_rad: float, re
     sine 0.3 rad, 0.25 Hz         0.02    0.02          0.06 (0.38)  1.00    0.06 (0.81)
     sine 0.05 rad, 0.5 Hz         0.03    0.04          0.21 (0.38)  0.88    0.20 (0.96)
     growing sine 0.8 rad, 0.5 Hz  0.02    0.02          0.23 (0.39)  0.63    0.16 (0.70)
-    chirp 0.4 rad, 0.15 to 2 Hz   0.04    0.06          0.13 (0.38)  0.96    0.19 (0.75)
+    chirp 0.4 rad, 0.15 to 1 Hz   0.04    0.06          0.13 (0.38)  0.96    0.19 (0.75)
     free form up to 1.5 Hz        0.03    0.03          0.13 (0.39)  0.99    0.07 (0.77)
     triangle, reversals of 80 ms  0.04    0.06          0.22 (0.39)  0.85    0.11 (0.45)
     triangle, reversals of 30 ms  0.04    0.17          0.19 (0.39)  1.00    0.14 (0.43)
