@@ -116,6 +116,18 @@ def test_holds_are_constant(motion):
         assert np.ptp(estimate.deviations_rad[:, hold], axis=1).max() < 1e-3 * COARSE
 
 
+@pytest.mark.parametrize("motion", [steps, ramps])
+def test_no_false_reversal_before_a_hold(motion):
+    for seed in range(4):
+        time, _, counted, rest = recorded(motion, seed=seed)
+        estimate = drive_motion(time, counted, COARSE, rest)
+        first = time < REST + 1.8  # The first step and its hold.
+        for angle in (estimate.theta_rad, *(estimate.theta_rad + estimate.deviations_rad[:2])):
+            hold = angle[first][-1]
+            assert angle[first].max() <= hold + 1e-9
+            assert angle[first].min() >= angle[0] - 1e-9
+
+
 def test_rests_where_the_drive_rests():
     time, _, counted, rest = recorded(steps)
     estimate = drive_motion(time, counted, COARSE, rest)

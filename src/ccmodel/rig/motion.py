@@ -95,6 +95,7 @@ def drive_motion(time_s: NDArray, theta_counts_rad: NDArray, step_rad: float, re
     Returns
     -------
     DriveMotion
+        The motion and what is left of its uncertainty.
 
     Raises
     ------
@@ -103,7 +104,30 @@ def drive_motion(time_s: NDArray, theta_counts_rad: NDArray, step_rad: float, re
 
     Notes
     -----
-    Measured errors follow.
+    Rms error in counts on motions that start from rest, 0.18 deg a count at 250 Hz, eight places within a count each.
+    "moving" and "turns" (slower than 15 % of the peak) are without, "from rest" is with the error of the first rest's
+    place in its count. In brackets the counts as they stand. "within" is the share of samples within 1.645 standard
+    deviations, which should be 0.90. The last column is what that does to the drive torque of the exact model (7 N,
+    3.1 rad of bend, friction 0.156; three places within a count), rms in mN m.
+
+    ============================  ======  =====  =====  ===========  ======  ===========
+    motion                        moving  turns  holds  from rest    within  torque
+    ============================  ======  =====  =====  ===========  ======  ===========
+    sine 0.6 rad, 0.5 Hz          0.02    0.03          0.09 (0.38)  1.00    0.05 (0.50)
+    sine 0.3 rad, 0.25 Hz         0.02    0.02          0.06 (0.38)  1.00    0.06 (0.81)
+    sine 0.05 rad, 0.5 Hz         0.03    0.04          0.21 (0.38)  0.88    0.20 (0.96)
+    growing sine 0.8 rad, 0.5 Hz  0.02    0.02          0.23 (0.39)  0.63    0.16 (0.70)
+    chirp 0.4 rad, 0.15 to 1 Hz   0.04    0.06          0.13 (0.38)  0.96    0.19 (0.75)
+    free form up to 1.5 Hz        0.03    0.03          0.13 (0.39)  0.99    0.07 (0.77)
+    triangle, reversals of 80 ms  0.04    0.06          0.22 (0.39)  0.85    0.11 (0.45)
+    triangle, reversals of 30 ms  0.04    0.17          0.19 (0.39)  1.00    0.14 (0.43)
+    steps of least jerk           0.06    0.10   0.15   0.22 (0.33)  0.88    0.09 (0.28)
+    slow small steps, 0.05 rad    0.05    0.09   0.16   0.14 (0.41)  0.95    0.33 (0.85)
+    steps of constant ramps       0.06    0.10   0.22   0.27 (0.33)  0.87    0.15 (0.26)
+    ============================  ======  =====  =====  ===========  ======  ===========
+
+    What is left is mostly the place of rests: fast starts pass too few samples a count to tell it. A common order of
+    start for all rests of a recording was tried and told next to nothing more.
     """
     time = np.asarray(time_s, dtype=float)
     counted = np.asarray(theta_counts_rad, dtype=float)
@@ -121,12 +145,15 @@ def drive_motion(time_s: NDArray, theta_counts_rad: NDArray, step_rad: float, re
     latest = np.searchsorted(place, np.arange(seen.size), "right") - 1
     counts = np.round((counted[thinned][latest] - zero) / step_rad)
     rests = find_rests(counts, int(np.searchsorted(time[thinned], rest_s, "right")) if rest_s > 0 else 0)
-    curves = _curves(_Data.of(counts, seen, rests), ALIKE_S / step_s, from_rest=rest_s > 0)
+    angle, sigma, draws = _curves(_Data.of(counts, seen, rests), ALIKE_S / step_s, from_rest=rest_s > 0)
+    draws = [_straight_to_rest(angle + draw, counts, rests) for draw in draws]
+    angle = _straight_to_rest(angle, counts, rests)
     grid = time[0] + step_s * np.arange(seen.size)
-    angle, sigma, *draws = (np.interp(time, grid, curve) * step_rad for curve in curves)
+    draws = np.array([np.interp(time, grid, draw - angle) for draw in draws]) * step_rad
+    angle, sigma = (np.interp(time, grid, curve) * step_rad for curve in (angle, sigma))
     if rest_s > 0:
-        return DriveMotion(angle - angle[0], sigma, np.array(draws), angle[0] + zero)
-    return DriveMotion(angle + zero, sigma, np.array(draws), 0.0)
+        return DriveMotion(angle - angle[0], sigma, draws, angle[0] + zero)
+    return DriveMotion(angle + zero, sigma, draws, 0.0)
 
 
 def _samples_a_node(time: NDArray, counts: NDArray) -> int:
@@ -137,8 +164,8 @@ def _samples_a_node(time: NDArray, counts: NDArray) -> int:
     return max(1, most if fastest * most < 1 else int(1 / fastest))
 
 
-def _curves(data: "_Data", alike: float, from_rest: bool) -> NDArray:
-    """Angle, its standard deviation and likely deviations, in counts, shape (2 + DRAWS, samples)."""
+def _curves(data: "_Data", alike: float, from_rest: bool) -> tuple[NDArray, NDArray, NDArray]:
+    """Angle and its standard deviation, shape (samples,), and likely deviations, (DRAWS, samples), in counts."""
     tries = [_Estimate(data, prior, alike) for prior in PRIORS]
     for each in tries:
         each.rounds(FIRST_ROUNDS)
@@ -158,7 +185,29 @@ def _curves(data: "_Data", alike: float, from_rest: bool) -> NDArray:
     follow *= np.sqrt(data.variance)[:, None]
     draws += noise.standard_normal((DRAWS, data.rest.size)) @ follow
     sigma = np.sqrt(best.spread + (follow**2).sum(axis=0))
-    return np.vstack([best.mean, sigma, draws])[:, data.node]
+    return best.mean[data.node], sigma[data.node], draws[:, data.node]
+
+
+def _straight_to_rest(angle: NDArray, counts: NDArray, rests: list[Rest]) -> NDArray:
+    """The same curve without turning within the count in which it rests.
+
+    A tenth of a count of overshoot, which the counts allow, would be a reversal to the cables: a false loss of tension
+    that lasts as long as the rest.
+    """
+    angle = angle.copy()
+    changes = np.flatnonzero(np.diff(counts)) + 1
+    for rest in rests:
+        level = angle[rest.first]
+        before, after = changes[changes <= rest.first], changes[changes > rest.last]
+        if before.size:
+            come = slice(before[-1], rest.first)
+            side = np.sign(counts[before[-1]] - counts[before[-1] - 1])
+            angle[come] = side * np.maximum.accumulate(np.minimum(side * angle[come], side * level))
+        if after.size:
+            go = slice(rest.last, after[0])
+            side = np.sign(counts[after[0]] - counts[after[0] - 1])
+            angle[go] = side * np.maximum.accumulate(np.maximum(side * angle[go], side * level))
+    return angle
 
 
 @dataclass(frozen=True)

@@ -10,14 +10,15 @@ from ccmodel.rig.bounded import fitted
 # A motion s^p from rest stays in the first count at most 1 / (2^(1/p) - 1) times as long as in the next: 2.4 times at
 # constant acceleration, 5.3 where acceleration begins smoothly. Longer must have been a rest; a turn comes to 4.8.
 LINGER = 5.3
-# Orders of a start: a jump of acceleration (p = 2) or of jerk (p = 3), or neither.
-ORDERS = (2, 3, 4)
-TERMS = 3
+# Orders of a start: a jump of acceleration or of jerk. What begins more smoothly still is in the terms that follow;
+# when there was an order 4 too, other starts were taken for it too often.
+ORDERS = (2, 3)
+TERMS = 4
 # A series this short describes the first counts of a motion only.
 FIRST_COUNTS = 15
 SHORTEST = 4  # Samples that make a rest.
-STARTS = 10  # Times of start that are weighed against each other.
-ROUNDS = 20
+STARTS = 7  # Times of start that are weighed against each other.
+ROUNDS = 15
 DITHER = 0.1  # Noise that makes a resting encoder dither, in counts.
 WIDE = 3.0  # Standard deviation of a term at the end of what is looked at, in counts moved by then.
 UNKNOWN = (0.0, 1 / 12)  # Mean and variance of a place within a count of which nothing is known.
@@ -42,7 +43,7 @@ class Rest:
 
 
 def find_rests(counts: NDArray, resting: int) -> list[Rest]:
-    """Find where the drive rests.
+    """Find where the drive rests: where a count lasts longer than any motion through its neighbours could make it.
 
     Parameters
     ----------
@@ -118,9 +119,10 @@ def _place(moved: NDArray, earliest: int) -> tuple[int, float, float]:
         return earliest, *UNKNOWN
     moved = moved[: int(np.flatnonzero(moved > wanted)[0])]
     starts = np.linspace(earliest, leaves - 1, STARTS)
-    # Along a rising curve the bounds at a count's first and last sample imply those between.
-    telling = np.flatnonzero(np.diff(moved))
-    telling = np.unique(np.concatenate([telling, telling + 1, [moved.size - 1]]))
+    # Along a rising curve the bounds at a count's first and last sample imply those between; the long first one gets a
+    # few more, for a series need not rise.
+    change = np.flatnonzero(np.diff(moved))
+    telling = np.unique(np.r_[np.linspace(0, leaves - 1, 6).astype(int), change, change + 1, moved.size - 1])
     tries = np.array([(begin, *_from(begin, order, telling, moved)) for begin in starts for order in ORDERS])
     begin, evidence, place, variance = tries[np.isfinite(tries).all(axis=1) & (abs(tries[:, 2]) < 0.6)].T
     if not begin.size:
