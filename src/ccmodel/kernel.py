@@ -29,7 +29,7 @@ def kernel(function=None, **options):
     if function is None:
         return partial(kernel, **options)
     function.__qualname__ += f"_{source_digest(function.__module__)}"
-    compiled = njit(cache=True, **options)(function)
+    compiled = njit(cache=True, nogil=True, **options)(function)
     if cache := getattr(compiled, "_cache", None):
         files = cache._cache_file
         files._data_name_pattern = files._data_name_pattern.replace("{", f"{_PROCESS}-{{")
