@@ -49,6 +49,13 @@ def test_bounds_the_wrong_way_round_are_refused(edited):
         load_config(edited("[0.01, 0.6]", "[0.6, 0.01]"))
 
 
+def test_the_simulated_example_is_as_strict(edited):
+    with pytest.raises(InputError, match="unknown key 'pretension' in phases; did you mean 'pretension_N'"):
+        load_config(edited("pretension_N: 10.0", "pretension: 10.0"))
+    with pytest.raises(InputError, match="multiple of 4"):
+        load_config(edited("samples_per_cycle: 4000", "samples_per_cycle: 4001"))
+
+
 def test_a_study_with_unknown_parameters_is_refused(edited):
     with pytest.raises(InputError, match="asks for parameters 'guessed'; there are estimated, fitted"):
         load_config(edited("parameters: estimated", "parameters: guessed"))

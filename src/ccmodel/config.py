@@ -8,11 +8,13 @@ from pydantic import Field, model_validator
 from ccmodel.identify.problem import MEASURED
 from ccmodel.model.parameters import FREE, OWN
 from ccmodel.rig.batch import valid_name
-from ccmodel.typed import InputError, TypedModel, load_yaml_model
+from ccmodel.typed import InputError, Positive, TypedModel, load_yaml_model
 
 # What a study can vary: how the legend names a recording is in ccmodel.compare.studies.
 Variable = Literal["bend", "pretension", "radius", "frequency", "load_level", "recording"]
 Figure = Literal["transmission", "torque-loops", "torque-loops-apart", "drive-loops"]
+# The figures of a simulated example; how each is drawn is in ccmodel.report.phases.
+PHASE_FIGURES = ("response", "torque-loop", "profiles")
 EACH = "each"
 ESTIMATED = "estimated"
 
@@ -76,6 +78,21 @@ class Study(TypedModel):
         return self
 
 
+class PhaseExample(TypedModel):
+    """The simulated example of the paper's Figs. 5 to 7: a sine on a pair with a spring load, from rest."""
+
+    conduit_length_m: Positive = Field(description="arc length of the conduits, m")
+    conduit_bend_rad: Positive = Field(description="bend angle of the conduits, even along the way, rad")
+    cable_stiffness_N_per_m: Positive = Field(description="stiffness of one cable with its conduit, N/m")
+    friction_coefficient: Positive = Field(description="mu between cable and conduit")
+    pulley_radius_m: Positive = Field(description="radius of both pulleys, m")
+    load_stiffness_Nm_per_rad: Positive = Field(description="stiffness of the load's spring, N m/rad")
+    pretension_N: Positive = Field(description="initial tension all along both cables, N")
+    amplitude_rad: Positive = Field(description="amplitude of the drive angle, rad")
+    frequency_Hz: Positive = Field(description="frequency of the drive angle, Hz")
+    samples_per_cycle: int = Field(4000, ge=8, multiple_of=4, description="samples a cycle")
+
+
 class Config(TypedModel):
     """A pipeline run."""
 
@@ -83,6 +100,7 @@ class Config(TypedModel):
     results: str = Field("results", description="folder for all that the run makes")
     fits: dict[str, Fit] = Field(default_factory=dict, description="parameter sets fitted to recordings")
     studies: dict[str, Study] = Field(default_factory=dict, description="figures")
+    phases: PhaseExample | None = Field(None, description="simulated example of the paper's Figs. 5 to 7; absent: none")
 
     @model_validator(mode="after")
     def _names_known(self):

@@ -146,3 +146,31 @@ def test_a_far_force_a_cable_cannot_push_is_said():
     assert (
         simulate_cable(PATH, EA, MU, SpringEnd(0.0), np.zeros(3), InitialTension.uniform(PATH, 1.0)).status is Status.OK
     )
+
+
+def violent(seed, samples=40):
+    """A pair and a load that jumps about as much as the drive, by torque (odd seeds) or by angle."""
+    rng = np.random.default_rng(seed)
+    pieces = rng.integers(1, 6)
+    bends = rng.choice([0.0, 0.5, 1.0, 2.0, 4.0], pieces)
+    one = Transmission(ConduitPath(rng.uniform(0.05, 1, pieces), bends), EA, rng.choice([0.03, 0.1, 0.15, 0.3]), 0.012,
+                       0.01)  # fmt: skip
+    theta = rng.normal(size=samples) * rng.choice([0.1, 0.5, 2.0])
+    initial = InitialTension.uniform(one.path, rng.choice([0.5, 3.0, 10.0]))
+    load = rng.normal(size=samples)
+    if seed % 2:
+        return one, TorqueLoad(load * rng.choice([0.003, 0.02, 0.1])), theta, initial
+    return one, AngleLoad(load * rng.choice([0.1, 0.5, 2.0])), theta, initial
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_violent_loads_never_stop_it(seed):
+    one, load, theta, initial = violent(seed)
+    response = simulate_pair(one, load, theta, initial)
+    assert response.status is not Status.STUCK
+    tensions = np.stack([response.T1_N, response.T2_N, response.T3_N, response.T4_N])
+    assert np.isfinite(tensions).all() and (tensions >= 0).all()
+    bound = one.friction_coefficient * one.path.bend_rad
+    for near, far in (tensions[:2], tensions[2:]):
+        taut = (near > 1e-6) & (far > 1e-6)
+        assert (np.abs(np.log(near[taut] / far[taut])) <= bound + 1e-9).all()

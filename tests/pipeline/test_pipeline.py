@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 from builders import write_batch
+from ccmodel.config import PHASE_FIGURES, load_config
 from ccmodel.recording import read_recordings
 
 ROOT = Path(__file__).parents[2]
@@ -40,6 +41,7 @@ def write_config(folder: Path, **studies: dict) -> None:
                 "channels": ["theta_out_rad", "tau_in_Nm"],
             }
         },
+        "phases": load_config(ROOT / "config/config.yaml").phases.model_dump(),
         "studies": {
             "pretension": {"batches": ["tiny"], "variable": "pretension", "title": "pretension"},
             "one-run": {"batches": ["tiny"], "figure": "transmission"},
@@ -86,6 +88,16 @@ def test_it_makes_figures_tables_and_the_page(finished):
     assert csv["rmse"].to_numpy() == pytest.approx(parquet["rmse"].to_numpy(), rel=1e-4)
     assert set(parquet["parameters"]) == {"estimated", "fitted"}
     assert ccmodel("left-out", str(results)).returncode == 0
+
+
+def test_the_papers_simulated_figures_stand_under_a_heading_of_their_own(finished):
+    page = (finished / "results/index.html").read_text()
+    section = page[page.index('<h2 id="phases">Simulated') : page.index('<h2 id="fits">')]
+    for name in PHASE_FIGURES:
+        assert "simulated (no recording)" in (finished / f"results/figures/phases/{name}.svg").read_text()
+        assert (finished / f"results/figures/phases/{name}.png").stat().st_size > 10_000
+        assert f"figures/phases/{name}.png" in section
+    assert "figures/phases" not in page.replace(section, "")
 
 
 def test_it_recovers_the_truth_that_the_logs_were_made_with(finished):

@@ -4,7 +4,14 @@ from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
-from ccmodel.config import EACH, ESTIMATED, batches_in, expand_studies, load_config
+from ccmodel.config import (
+    EACH,
+    ESTIMATED,
+    PHASE_FIGURES,
+    batches_in,
+    expand_studies,
+    load_config,
+)
 from ccmodel.provenance import files_in, source_digest
 from ccmodel.typed import InputError
 

@@ -7,6 +7,7 @@ rule write_report:
             simulated.removesuffix(".nc") + ".json" for _, _, simulated in runs()
         ],
         figures=[f"{RESULTS}/figures/{study}.png" for study in STUDIES],
+        phases=rules.draw_phases.output if CONFIG.phases else [],
     output:
         page=f"{RESULTS}/index.html",
         left_out=f"{RESULTS}/left-out.json",

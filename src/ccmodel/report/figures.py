@@ -69,7 +69,7 @@ def transmission_figure(pairs: Sequence[Pair], study: Study) -> Figure:
                 _loop(ax, simulated, x, y, color="black", linewidth=1.0, label=_model_title([pairs[0]]))
             _name_axes(ax, x, y)
             ax.set_title(f"({letter})", loc="left")
-        _legend_below(figure, axes)
+        legend_below(figure, axes)
         figure.suptitle(f"{study.title}: {recorded.batch}/{recorded.id}")
     return figure
 
@@ -100,7 +100,7 @@ def loops_figure(pairs: Sequence[Pair], study: Study, x: str = "tau_in_Nm", y: s
                 _name_axes(ax, x, y)
                 _say_if_empty(ax, x, y)
                 ax.label_outer()
-        _legend_below(figure, axes)
+        legend_below(figure, axes)
         figure.suptitle(study.title)
     return figure
 
@@ -128,7 +128,7 @@ def loops_apart_figure(pairs: Sequence[Pair], study: Study) -> Figure:
             _name_axes(ax, x, y)
             _say_if_empty(ax, x, y)
             ax.tick_params(labelbottom=True)
-        _legend_below(figure, axes)
+        legend_below(figure, axes)
         figure.suptitle(study.title)
     return figure
 
@@ -197,7 +197,7 @@ def _name_axes(ax: Axes, x: str, y: str) -> None:
     ax.set_ylabel(AXIS[y][0])
 
 
-def _legend_below(figure: Figure, axes: NDArray) -> None:
+def legend_below(figure: Figure, axes: NDArray) -> None:
     """One legend for all panels, each label once, outside them where it cannot cover the data."""
     handles = {}
     for ax in axes.flat:

@@ -27,6 +27,15 @@ SYMBOL = {
 PAPER_TABLE_I = {"theta_out_rad": 3.7, "tau_in_Nm": 19.4, "tau_out_Nm": 3.7, "T1_N": 12.8, "T2_N": 4.1, "T3_N": 9.9,
                  "T4_N": 5.5}  # fmt: skip
 
+PHASE_CAPTIONS = {
+    "response": "As the paper's Fig. 5: tensions at both ends of cable A (a) and B (b), torques (c), angles (d); and"
+    " over time (e, f). Grey: the way from rest into the cycle.",
+    "torque-loop": "As the paper's Fig. 6: the torque loop and its phases. I: the load rests; II: one cable moves it"
+    " and pulls the other; III: both move it; IV: one hangs slack.",
+    "profiles": "As the paper's Fig. 7: tension along the cables at the instants, and halfway through phase II, where"
+    " the released cable's tension falls at the drive and rises at the load, with the hump between them.",
+}
+
 
 def write_page(
     file: Path, config: Config, studies: dict[str, Study], batches: Sequence[dict], errors: pd.DataFrame,
@@ -56,6 +65,8 @@ def write_page(
             origins=sorted({ORIGIN[o] for o in errors["origin"]}),
             recordings=sum(len(b["recordings"]) for b in batches),
             batches=batches,
+            phases=config.phases,
+            phase_captions=PHASE_CAPTIONS,
             studies={n: (s, config.parameters_of(s)) for n, s in studies.items()},
             symbols=[SYMBOL[c] for c in channels],
             summary=_summary(errors, channels),

@@ -29,6 +29,7 @@ from ccmodel.model.exact.cable import (
     turn,
 )
 from ccmodel.model.exact.path import NODE, X_PER_M, X_START
+from ccmodel.model.exact.still_point import is_at_load
 
 # How `run` came to its end; APART: the next sample wants `still_point.step_apart` first.
 DONE, STUCK, CORNERS_FULL, APART = range(4)
@@ -148,7 +149,7 @@ def _at_load(path, state, c, way):
     sigma = (1 - 2 * c) * way
     if state.kind[c, MODE] == WHOLE:
         return state.kind[c, LINE] == -sigma
-    return state.kind[c, MODE] == STILL_POINT and state.kind[c, LINE] == sigma and state.value[c, M_STILL] == path.total
+    return state.kind[c, LINE] == sigma and is_at_load(path, state, c)
 
 
 @kernel

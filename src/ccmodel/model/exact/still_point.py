@@ -9,7 +9,7 @@ ordinary differential equation, the one thing in the model whose result depends 
 move. In a straight stretch tension is the same all along, and m_still rests while the still point crosses it.
 """
 
-from math import exp, inf
+from math import exp, inf, sqrt
 
 import numpy as np
 
@@ -55,7 +55,14 @@ RIGID = 1e100
 # the cable is as good as slack. It counts as taut again from some hundred times that.
 FAINT, TAUT_AGAIN = 1e-12, 100.0
 TOLERANCE = 1e-13
+# A still point this near to the load, as part of the whole, is there.
+ARRIVED = 1e-11
+# And as far as this it goes straight when it leaves.
+SET_OUT = 1e-8
 MAX_EVENTS = 1000
+# Steps of integration after which a sample is given up, and after which one goes on with an implicit method: the
+# explicit one needs thousands where a still point near an end all but follows its balance.
+MAX_STEPS, STIFF_AFTER = 20_000, 400
 # What an integration step was ended by.
 NOTHING, BEND_LEFT, MEETING, UNPINNED, SLACK, TAUT = range(6)
 
@@ -92,17 +99,23 @@ def step_apart(path, state, trials, ends, stiffness, angle_given):
     way = _way(start, ends)
     turn(path, state, 0, way, way)
     turn(path, state, 1, -way, -way)
-    s = 0.0
+    s, steps = 0.0, 0
     for _ in range(MAX_EVENTS):
         if _settle_meetings(path, state, start, ends, stiffness, angle_given):
             return REACHED
         if s >= 1.0:
             return REACHED
+        if not angle_given and _both_at_load(path, state):
+            if _load_stays(path, state, 0, start, ends):
+                slide_whole(path, state, 0, -state.kind[0, LINE])
+                return REACHED
+            s = _leave_load(path, state, trials, s, start, ends, stiffness)
         if _is_still(state, 0) or _is_still(state, 1):
-            s, reached_load = _wander(path, state, trials, s, start, ends, stiffness, angle_given)
+            s, reached_load, taken = _wander(path, state, trials, s, start, ends, stiffness, angle_given)
             if reached_load:
                 return REACHED
-            if s < 0.0:
+            steps += taken
+            if steps >= MAX_STEPS:
                 return STUCK
         else:
             s = _move_fronts(path, state, trials, s, start, ends, stiffness, angle_given)
@@ -229,8 +242,7 @@ def _settle_meetings(path, state, start, ends, stiffness, angle_given):
             _find_balance_point(path, state, c, start, ends, stiffness, angle_given)
         else:
             continue
-        if _seat(path, state, c, start, ends, stiffness, angle_given):
-            slide_whole(path, state, c, -sigma)
+        if _leave(path, state, c, start, ends, stiffness, angle_given):
             return True
     return False
 
@@ -336,6 +348,8 @@ def _seat(path, state, c, start, ends, stiffness, angle_given):
             if node == last and path.table[0, LUMP, last] == 0.0:
                 state.kind[c, PINNED] = 0
                 state.kind[c, STILL_PIECE] = last - 1
+                if not angle_given:
+                    return _load_stays(path, state, c, start, ends)
                 _, drive, load = _rates(path, state, start, ends, stiffness, angle_given)
                 return sigma * (drive[c] - load[c]) >= 0.0
             needed = _needed(path, state, c, start, ends, stiffness, angle_given)
@@ -352,6 +366,76 @@ def _seat(path, state, c, start, ends, stiffness, angle_given):
     state.kind[c, PINNED] = 0
     state.kind[c, STILL_PIECE] = _piece_at(path, m)
     return False
+
+
+@kernel
+def _load_stays(path, state, c, start, ends):
+    """Whether the load no longer moves against the drive once the still point of `c` has come to it.
+
+    A load at rest gets nothing but what the cables bring whose still point is there. Of two that come near it, each
+    takes up the less of the load's torque the farther away it is, so that they arrive at once: were one of them let go
+    alone, it would be thrown back by what the other one is about to take.
+    """
+    push = -_way(start, ends) * (ends[1] - start[1])
+    for cable in range(2):
+        if cable == c or is_at_load(path, state, cable):
+            push += line_stiffness(path, state, cable)[1] * abs(ends[0] - start[0])
+    if push < 0.0:
+        return False
+    if is_at_load(path, state, 1 - c):
+        slide_whole(path, state, 1 - c, -state.kind[1 - c, LINE])
+    return True
+
+
+@kernel
+def is_at_load(path, state, c):
+    """Whether a cable has a still point that stands at the load, as nearly as it is known."""
+    if state.kind[c, MODE] != STILL_POINT:
+        return False
+    e = elongation(state, c)
+    known = ARRIVED * path.total * _looser(max(e, elongation(state, 1 - c)), e)
+    return path.total - state.value[c, M_STILL] <= known
+
+
+@kernel
+def _both_at_load(path, state):
+    """Whether two still points stand at the load, with no straight stretch there to lie in."""
+    return path.table[1, LUMP, 0] == 0.0 and is_at_load(path, state, 0) and is_at_load(path, state, 1)
+
+
+@kernel
+def _leave_load(path, state, trials, s, start, ends, stiffness):
+    """Let two still points set out from the load together, which neither could do alone; returns how far they get.
+
+    Cable A takes up a part p of the change of torque, and each the less of it the farther away its still point is, so
+    that these stand at distances as 1 - p to p. They keep going like that if their speeds are as 1 - p to p too: one
+    root, to which any other ratio is drawn. The first of the way is straight.
+    """
+    low = line_stiffness(path, state, 0)[1] * abs(ends[0] - start[0]) / abs(ends[1] - start[1])
+    high = 1.0 - line_stiffness(path, state, 1)[1] * abs(ends[0] - start[0]) / abs(ends[1] - start[1])
+    p = 0.5 * (low + high)
+    for _ in range(60):
+        if (1.0 - p) * _speed(path, state, 1, 1.0 - p, start, ends) > p * _speed(path, state, 0, p, start, ends):
+            low = p
+        else:
+            high = p
+        p = 0.5 * (low + high)
+    speed_A, speed_B = _speed(path, state, 0, p, start, ends), _speed(path, state, 1, 1.0 - p, start, ends)
+    step = min(SET_OUT * path.total / max(speed_A, speed_B), 1.0 - s)
+    for c in range(2):
+        state.value[c, M_STILL] = path.total - step * (speed_A if c == 0 else speed_B)
+        state.kind[c, PINNED] = 0
+        state.kind[c, STILL_PIECE] = path.table.shape[2] - 2
+    _place(path, state, trials[0], s + step, start, ends, stiffness, False)
+    return s + step
+
+
+@kernel
+def _speed(path, state, c, part, start, ends):
+    """How fast a still point leaves the load where its cable takes up a part of the change of torque, m per s."""
+    e = elongation(state, c)
+    pulled = part * abs(ends[1] - start[1]) / (line_stiffness(path, state, c)[1] * e)
+    return 0.5 * (pulled - abs(ends[0] - start[0]) / e)
 
 
 @kernel
@@ -427,9 +511,22 @@ STAGES = np.array(
 ERROR = np.array([71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
 
 
+# Radau's method of order 5.
+ROOT = sqrt(6.0)
+RADAU = np.array(
+    [
+        [(88 - 7 * ROOT) / 360, (296 - 169 * ROOT) / 1800, (-2 + 3 * ROOT) / 225],
+        [(296 + 169 * ROOT) / 1800, (88 + 7 * ROOT) / 360, (-2 - 3 * ROOT) / 225],
+        [(16 - ROOT) / 36, (16 + ROOT) / 36, 1 / 9],
+    ]
+)
+
+
 @kernel
-def _try_step(path, state, trials, y, h, start, ends, stiffness, angle_given, slopes, following):
+def _try_step(path, state, trials, y, h, stiff, start, ends, stiffness, angle_given, slopes, following):
     """One step of length h from y into `following`; returns the error by the tolerance."""
+    if stiff:
+        return _try_implicit(path, state, trials, y, h, start, ends, stiffness, angle_given, following)
     for stage in range(7):
         for i in range(3):
             total = 0.0
@@ -437,17 +534,64 @@ def _try_step(path, state, trials, y, h, start, ends, stiffness, angle_given, sl
                 total += STAGES[stage, j] * slopes[j, i]
             following[i] = y[i] + h * total
         _derivative(path, state, trials, following, start, ends, stiffness, angle_given, slopes[stage])
-    worst = 0.0
+    error = np.zeros(3)
+    for i in range(3):
+        for j in range(7):
+            error[i] += h * ERROR[j] * slopes[j, i]
+    return _by_tolerance(path, state, error)
+
+
+@kernel
+def _by_tolerance(path, state, error):
+    """The largest error by what is tolerated in it."""
     # What counts is tension: in a cable that is all but slack the still point need not be known so well.
     e_A, e_B = elongation(state, 0), elongation(state, 1)
     most = max(e_A, e_B)
-    scale = (path.total * _looser(most, e_A), path.total * _looser(most, e_B), 1.0)
+    worst = max(abs(error[0]) / _looser(most, e_A), abs(error[1]) / _looser(most, e_B)) / path.total
+    return max(worst, abs(error[2])) / TOLERANCE
+
+
+@kernel
+def _try_implicit(path, state, trials, y, h, start, ends, stiffness, angle_given, following):
+    """As `_try_step`, where a still point near an end all but follows its balance: two half steps against a whole."""
+    jacobian, base, moved, point = np.empty((3, 3)), np.empty(3), np.empty(3), y.copy()
+    _derivative(path, state, trials, y, start, ends, stiffness, angle_given, base)
+    for j in range(3):
+        step = 1e-7 * (path.total - y[j] if j < 2 and 0.0 < y[j] < path.total else 1.0)
+        if j < 2:
+            step = min(step, 1e-7 * y[j]) if y[j] > 0.0 else step
+        point[j] = y[j] + step
+        _derivative(path, state, trials, point, start, ends, stiffness, angle_given, moved)
+        for i in range(3):
+            jacobian[i, j] = (moved[i] - base[i]) / step
+        point[j] = y[j]
+    whole, half = np.empty(3), np.empty(3)
+    for step, begin, end in ((h, y, whole), (0.5 * h, y, half), (0.5 * h, half, following)):
+        if not _radau(path, state, trials, begin, step, start, ends, stiffness, angle_given, jacobian, end):
+            return inf
+    return _by_tolerance(path, state, (whole - following) / 31.0)
+
+
+@kernel
+def _radau(path, state, trials, y, h, start, ends, stiffness, angle_given, jacobian, following):
+    """One step of Radau's method into `following`; False where Newton's iteration finds no end."""
+    system, change, slopes = np.eye(9), np.zeros((3, 3)), np.empty((3, 3))
     for i in range(3):
-        error = 0.0
-        for j in range(7):
-            error += ERROR[j] * slopes[j, i]
-        worst = max(worst, abs(h * error) / scale[i])
-    return worst / TOLERANCE
+        for j in range(3):
+            system[3 * i : 3 * i + 3, 3 * j : 3 * j + 3] -= h * RADAU[i, j] * jacobian
+    inverse = np.linalg.inv(system)
+    for _ in range(20):
+        for i in range(3):
+            _derivative(path, state, trials, y + change[i], start, ends, stiffness, angle_given, slopes[i])
+        correction = inverse @ (h * (RADAU @ slopes) - change).ravel()
+        change += correction.reshape((3, 3))
+        largest = np.abs(correction).max()
+        if not largest < 1.0:
+            return False
+        if largest <= 2e-16:
+            break
+    following[:] = y + change[2]
+    return largest <= 1e-14
 
 
 @kernel
@@ -483,61 +627,65 @@ def _event(path, state, start, ends, stiffness, angle_given):
 
 @kernel
 def _wander(path, state, trials, s, start, ends, stiffness, angle_given):
-    """Integrate until s = 1 or something happens to a cable; returns s and whether a drive front reached the load.
+    """Integrate until s = 1 or something happens to a cable, for `MAX_STEPS` steps at most.
 
-    s is negative where the steps it took to get there would be too many.
+    Returns s, whether a drive front reached the load, and how many steps were taken.
     """
     before = trials[1]
     keep(state, before)
     y = np.array([state.value[0, M_STILL], state.value[1, M_STILL], s])
     following, slopes = np.empty(3), np.empty((7, 3))
     h = 1e-3
-    for _ in range(100_000):
-        error = _try_step(path, state, trials, y, h, start, ends, stiffness, angle_given, slopes, following)
+    for attempt in range(MAX_STEPS):
+        stiff = attempt >= STIFF_AFTER
+        error = _try_step(path, state, trials, y, h, stiff, start, ends, stiffness, angle_given, slopes, following)
         if not error <= 1.0:
             h *= max(0.1, 0.9 * error**-0.2) if error > 0.0 else 0.1
             continue
         _set(path, state, trials, following, start, ends, stiffness, angle_given)
         event, c = _event(path, state, start, ends, stiffness, angle_given)
         if event == NOTHING and following[2] < 1.0:
+            if not angle_given and _both_at_load(path, state) and _load_stays(path, state, 0, start, ends):
+                slide_whole(path, state, 0, -state.kind[0, LINE])
+                return following[2], True, attempt
             y[:] = following
             h *= min(5.0, 0.9 * max(error, 1e-10) ** -0.2)
             continue
         if event == NOTHING:
-            _hit_end(path, state, trials, y, h, start, ends, stiffness, angle_given, slopes, following)
+            _hit_end(path, state, trials, y, h, stiff, start, ends, stiffness, angle_given, slopes, following)
             _set(path, state, trials, following, start, ends, stiffness, angle_given)
-            return 1.0, False
+            return 1.0, False, attempt
         near, far = 0.0, h
         while True:
             middle = 0.5 * (near + far)
             if not near < middle < far or far - near < 1e-17:
                 break
-            _try_step(path, state, trials, y, middle, start, ends, stiffness, angle_given, slopes, following)
+            _try_step(path, state, trials, y, middle, stiff, start, ends, stiffness, angle_given, slopes, following)
             _set(path, state, trials, following, start, ends, stiffness, angle_given)
             tried, tried_c = _event(path, state, start, ends, stiffness, angle_given)
             if tried == NOTHING:
                 near = middle
             else:
                 far, event, c = middle, tried, tried_c
-        _try_step(path, state, trials, y, far, start, ends, stiffness, angle_given, slopes, following)
+        _try_step(path, state, trials, y, far, stiff, start, ends, stiffness, angle_given, slopes, following)
         if following[2] >= 1.0:
-            _try_step(path, state, trials, y, near, start, ends, stiffness, angle_given, slopes, following)
-            _hit_end(path, state, trials, y, far, start, ends, stiffness, angle_given, slopes, following)
+            _try_step(path, state, trials, y, near, stiff, start, ends, stiffness, angle_given, slopes, following)
+            _hit_end(path, state, trials, y, far, stiff, start, ends, stiffness, angle_given, slopes, following)
             _set(path, state, trials, following, start, ends, stiffness, angle_given)
-            return 1.0, False
+            return 1.0, False, attempt
         _set(path, state, trials, following, start, ends, stiffness, angle_given)
         reached = _handle(path, state, event, c, start, ends, stiffness, angle_given)
-        return following[2], reached
-    return -1.0, False
+        return following[2], reached, attempt
+    return y[2], False, MAX_STEPS
 
 
 @kernel
-def _hit_end(path, state, trials, y, h, start, ends, stiffness, angle_given, slopes, following):
+def _hit_end(path, state, trials, y, h, stiff, start, ends, stiffness, angle_given, slopes, following):
     """Shorten a step of length h so that it ends where s = 1 (regula falsi, Illinois)."""
     near, far = 0.0, h
     miss_near, miss_far = y[2] - 1.0, following[2] - 1.0
     if miss_far < 0.0:
-        _try_step(path, state, trials, y, h, start, ends, stiffness, angle_given, slopes, following)
+        _try_step(path, state, trials, y, h, stiff, start, ends, stiffness, angle_given, slopes, following)
         miss_far = following[2] - 1.0
     for _ in range(60):
         if abs(following[2] - 1.0) <= 2e-16:
@@ -545,7 +693,7 @@ def _hit_end(path, state, trials, y, h, start, ends, stiffness, angle_given, slo
         middle = far - miss_far * (far - near) / (miss_far - miss_near)
         if not near < middle < far:
             break
-        _try_step(path, state, trials, y, middle, start, ends, stiffness, angle_given, slopes, following)
+        _try_step(path, state, trials, y, middle, stiff, start, ends, stiffness, angle_given, slopes, following)
         miss = following[2] - 1.0
         if miss > 0.0:
             far, miss_far = middle, miss
@@ -576,7 +724,11 @@ def _handle(path, state, event, c, start, ends, stiffness, angle_given):
 
 @kernel
 def _leave(path, state, c, start, ends, stiffness, angle_given):
-    if _seat(path, state, c, start, ends, stiffness, angle_given):
-        slide_whole(path, state, c, -state.kind[c, LINE])
-        return True
+    """Let a still point go on from where it is; True if at the load. What it takes up decides on one that is pinned."""
+    for cable in (c, 1 - c):
+        if cable != c and not (_is_still(state, cable) and state.kind[cable, PINNED]):
+            continue
+        if _seat(path, state, cable, start, ends, stiffness, angle_given):
+            slide_whole(path, state, cable, -state.kind[cable, LINE])
+            return True
     return False
