@@ -1,7 +1,7 @@
 """The virtual rig's configuration, typed: every number of a campaign with its unit in its name.
 
-But for effects that are not there nothing has a default here. What a recording was made with stands in one file, and a key that is missing,
-misspelt or of no use is refused.
+What a recording was made with stands in one file: nothing has a default here but effects, which are not there unless
+they are given, and a key that is missing, misspelt or of no use is refused.
 """
 
 from pathlib import Path

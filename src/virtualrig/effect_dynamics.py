@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 
 from virtualrig.chain import initial_tension, stable_step
 from virtualrig.config import Numerics, Rig
-from virtualrig.effects import DahlPresliding, Effects, Eccentricity, IwanPresliding, PulleyFriction
+from virtualrig.effects import DahlPresliding, Eccentricity, Effects, IwanPresliding, PulleyFriction
 from virtualrig.grid import Grid
 from virtualrig.trajectory import Preparation, Trajectory, check_tensions
 
 SLOW_S = 1e-4
 # A conduit follows its cable's mean tension within this time: far below any motion, well above the time step.
 CONDUIT_LAG_S = 1e-4
-# Friction that depends on tension must not act below what a slack cable's ripple is.
-RIGID_RAD = 1.0
+# Over which a friction torque that is not there would build up.
+ANY_RAD = 1.0
 
 Physics = namedtuple(
     "Physics",
-    "bristle_length stribeck_rise stribeck_speed stribeck_exponent tension_exponent reference floor "
+    "bristle_length stribeck_rise stribeck_speed stribeck_exponent stribeck_renewal tension_exponent reference floor "
     "run_in_change run_in_scale run_in_by_travel bias wear_rise wear_period wear_phase "
     "has_settling settling_is_exponential conduit_compliance "
     "radius drive_share drive_phase load_share load_phase bearing_torque bearing_angle "
@@ -93,6 +93,7 @@ def _physics(rig: Rig, numerics: Numerics) -> Physics:
         stribeck_rise=e.stribeck.rise if e.stribeck else 0.0,
         stribeck_speed=e.stribeck.speed_m_per_s if e.stribeck else 1.0,
         stribeck_exponent=e.stribeck.exponent if e.stribeck else 1.0,
+        stribeck_renewal=e.stribeck.renewal_m if e.stribeck else 1.0,
         tension_exponent=e.load_dependent_friction.exponent if e.load_dependent_friction else 0.0,
         reference=e.load_dependent_friction.reference_N if e.load_dependent_friction else 1.0,
         floor=e.load_dependent_friction.floor_N if e.load_dependent_friction else 0.0,
@@ -112,14 +113,14 @@ def _physics(rig: Rig, numerics: Numerics) -> Physics:
         load_share=load.share,
         load_phase=load.phase_rad,
         bearing_torque=bearing.torque_Nm if bearing else 0.0,
-        bearing_angle=bearing.presliding_rad if bearing else RIGID_RAD,
+        bearing_angle=bearing.presliding_rad if bearing else ANY_RAD,
         spring=rig.load.spring_stiffness_Nm_per_rad,
         cubic=e.load.cubic_Nm_per_rad3,
         half_gap=e.load.half_gap_rad,
         damping=rig.load.damping_Nms_per_rad,
         inertia=rig.load.inertia_kg_m2 + e.load.inertia_kg_m2,
         hysteresis_torque=e.hysteretic_load.torque_Nm if e.hysteretic_load else 0.0,
-        hysteresis_angle=e.hysteretic_load.angle_rad if e.hysteretic_load else RIGID_RAD,
+        hysteresis_angle=e.hysteretic_load.angle_rad if e.hysteretic_load else ANY_RAD,
     )
 
 
@@ -283,23 +284,26 @@ def _set_strength(p, strength, half_bend, tension, time, travel, drive):
 
 
 @njit(cache=True, error_model="numpy")
-def _set_hold(p, hold, strength, drag, T, w):
-    """Friction (N) of one cable's nodes when their bristles are drawn in full; `w` is their speed."""
+def _set_hold(p, hold, strength, rested, drag, T):
+    """Friction (N) of one cable's nodes when their bristles are drawn in full."""
     n = hold.size
     for i in range(n):
-        hold[i] = strength[i] * (T[i] + T[i + 1])
-    if p.stribeck_rise > 0.0:
-        inverse = 1.0 / p.stribeck_speed
-        for i in range(n):
-            s = abs(w[i + 1]) * inverse
-            if p.stribeck_exponent == 2.0:
-                s = s * s
-            elif p.stribeck_exponent != 1.0:
-                s = s**p.stribeck_exponent
-            if s < 40.0:
-                hold[i] *= 1.0 + p.stribeck_rise * np.exp(-s)
-    for i in range(n):
-        hold[i] += drag[i]
+        hold[i] = strength[i] * (T[i] + T[i + 1]) * (1.0 + p.stribeck_rise * rested[i]) + drag[i]
+
+
+@njit(cache=True, error_model="numpy")
+def _renew(p, rested, w, dt):
+    """Let the contacts of one cable's nodes take on what their speed `w` makes of them, as they slide."""
+    inverse, renewal = 1.0 / p.stribeck_speed, dt / p.stribeck_renewal
+    for i in range(rested.size):
+        speed = abs(w[i + 1])
+        s = speed * inverse
+        if p.stribeck_exponent == 2.0:
+            s = s * s
+        elif p.stribeck_exponent != 1.0:
+            s = s**p.stribeck_exponent
+        share = speed * renewal
+        rested[i] = (rested[i] + share * np.exp(-s)) / (1.0 + share)
 
 
 @njit(cache=True, error_model="numpy")
@@ -360,6 +364,7 @@ def _run(
     bristle = bristles[0].copy()
     strength = np.empty((2, nodes))
     hold = np.empty(nodes)
+    rested = np.ones((2, nodes))
     start_mean = np.zeros(2)
     gives = np.zeros(2)
     for c in range(2):
@@ -422,10 +427,12 @@ def _run(
                 x = u[c]
                 w = v[c]
                 z = bristle[c]
-                _set_hold(p, hold, strength[c], drag, T, w)
+                _set_hold(p, hold, strength[c], rested[c], drag, T)
                 for i in range(nodes):
                     friction = hold[i] * z[i] * (1.0 + p.bias * z[i])
                     w[i + 1] = keep[i] * (w[i + 1] + dt * inverse_mass[i] * (T[i] - T[i + 1] - friction))
+                if p.stribeck_rise > 0.0:
+                    _renew(p, rested[c], w, dt)
                 if elements == 1:
                     for i in range(nodes):
                         z[i] = _bristle(z[i], w[i + 1] * dt / p.bristle_length)

@@ -39,11 +39,16 @@ class IwanPresliding(Strict):
 
 
 class Stribeck(Strict):
-    """Friction coefficient times 1 + rise exp(-(|v| / speed)^exponent), v the sliding speed."""
+    """Friction coefficient times 1 + rise exp(-(|v| / speed)^exponent), v the sliding speed.
+
+    A contact takes on what its speed makes of it as it slides `renewal_m` further. Friction that fell with speed at
+    once would have no such length, and a cable without one chatters ever faster on ever shorter pieces of itself.
+    """
 
     rise: NonNegative
     speed_m_per_s: PositiveFloat
     exponent: PositiveFloat = 1.0
+    renewal_m: PositiveFloat = 20e-6
 
 
 class LoadDependentFriction(Strict):

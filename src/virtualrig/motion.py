@@ -219,9 +219,7 @@ class StepAndHold(Strict):
         return angle, rate
 
 
-Excitation = Annotated[
-    Sine | Triangle | Chirp | GrowingSine | WanderingSine | StepAndHold, Field(discriminator="wave")
-]
+Excitation = Annotated[Sine | Triangle | Chirp | GrowingSine | WanderingSine | StepAndHold, Field(discriminator="wave")]
 
 
 def _swing(since, phase, phase_rate, start_up_s, motion) -> tuple[NDArray, NDArray]:
