@@ -39,7 +39,7 @@ FINEST = 1
 COARSEST_CELL_M = 0.0125
 SAMPLE_RATE_HZ = 1000.0
 RADIUS_M, SPRING_NM_PER_RAD, STIFFNESS_N_PER_M, LENGTH_M, MU = 0.006, 0.05, 7750.0, 1.2, 0.156
-REPORT = Path(__file__).parents[1] / "docs" / "verification.md"
+PAGE_PATH = Path(__file__).parents[1] / "docs" / "verification.md"
 PAGE = """# The general solver against explicit dynamics
 
 Written by `python benchmarks/against_dynamics.py` on {today}; do not edit.
@@ -369,33 +369,34 @@ def compare(case: Case) -> Row:
     return Row(case, difference_percent(solved, finer), float(effect), float(change), level)
 
 
-def table(rows: Sequence[Row]) -> str:
-    """The table as Markdown."""
-    lines = [
-        "| effect | parameters | T1 | T2 | T3 | T4 | the effect itself | the rig's last refinement | its cells | |",
-        "|---|---|---|---|---|---|---|---|---|---|",
-    ]
-    for row in rows:
-        errors = " | ".join(f"{e:.3f}" for e in row.error)
-        cells = round(LENGTH_M / COARSEST_CELL_M) * 2**row.level
-        numbers = f"{errors} | {row.effect:.2f} | {row.change:.3f} | {cells}"
-        lines.append(f"| {row.case.name} | {row.case.text} | {numbers} | {row.verdict} |")
-    return "\n".join(lines)
+HEAD = """| effect | parameters | T1 | T2 | T3 | T4 | the effect itself | the rig's last refinement | its cells | |
+|---|---|---|---|---|---|---|---|---|---|"""
 
 
-def report(rows: Sequence[Row]) -> str:
+def line(row: Row) -> str:
+    """A row of the table as Markdown."""
+    errors = " | ".join(f"{e:.3f}" for e in row.error)
+    cells = round(LENGTH_M / COARSEST_CELL_M) * 2**row.level
+    numbers = f"{errors} | {row.effect:.2f} | {row.change:.3f} | {cells}"
+    return f"| {row.case.name} | {row.case.text} | {numbers} | {row.verdict} |"
+
+
+def report(lines: Sequence[str]) -> str:
     """The page that holds the table."""
-    return PAGE.format(today=date.today(), limit=LIMIT_PERCENT, table=table(rows))
+    return PAGE.format(today=date.today(), limit=LIMIT_PERCENT, table="\n".join([HEAD, *lines]))
 
 
 def main() -> None:
-    """Compare every effect, or those named, and print the table; all of them together make the report."""
+    """Compare every effect, or those named, printing each line as it is known; all of them together make the page."""
     wanted = sys.argv[1:]
+    lines = []
+    print(HEAD, flush=True)
     with ProcessPoolExecutor(2) as pool:
-        rows = list(pool.map(compare, [c for c in cases() if not wanted or c.name in wanted]))
-    print(table(rows))
+        for row in pool.map(compare, [c for c in cases() if not wanted or c.name in wanted]):
+            lines.append(line(row))
+            print(lines[-1], flush=True)
     if not wanted:
-        REPORT.write_text(report(rows), encoding="utf-8")
+        PAGE_PATH.write_text(report(lines), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""A few effects of `benchmarks/against_dynamics.py` on a coarse grid: the general solver and explicit dynamics agree."""
+"""A few effects of `benchmarks/against_dynamics.py` on a coarse grid: the general solver agrees with dynamics."""
 
 import importlib.util
 import sys
