@@ -111,7 +111,7 @@ def cases() -> list[Case]:
     """Every effect that changes the motion, alone."""
     return [
         Case("none", "7.3 N"),
-        Case("none", "3.5 N, slack in part", pretension_N=3.5, amplitude_rad=1.0),
+        Case("none", "3.5 N, 1 rad, slack in part", pretension_N=3.5, amplitude_rad=1.0),
         *(
             _in_the_cable(
                 "presliding",
