@@ -16,9 +16,10 @@ from numpy.random import Generator, SeedSequence
 from numpy.typing import NDArray
 
 from virtualrig.config import BatchPlan, Campaign, RecordingPlan, Repeatability
-from virtualrig.dynamics import Preparation, Trajectory, simulate
+from virtualrig.dynamics import simulate
 from virtualrig.grid import make_grid
 from virtualrig.sensors import DECIMALS, log
+from virtualrig.trajectory import Preparation, Trajectory
 
 ORIGIN = "virtual-rig"
 
@@ -84,7 +85,7 @@ def record(campaign: Campaign, batch: str, plan: RecordingPlan) -> bytes:
     draw = recording_generator(campaign.seed, batch, plan.id)
     preparation = prepare(campaign, plan, draw)
     trajectory = run(campaign, plan, preparation)
-    return compress(log(trajectory, campaign.sensors, campaign.rig.pulley_radius_m, draw))
+    return compress(log(trajectory, campaign.sensors, campaign.rig, draw))
 
 
 def recording_generator(seed: int, batch: str, recording: str) -> Generator:

@@ -1,25 +1,18 @@
 """The virtual rig's configuration, typed: every number of a campaign with its unit in its name.
 
-Nothing has a default here. What a recording was made with stands in one file, and a key that is missing,
-misspelt or of no use is refused.
+What a recording was made with stands in one file: nothing has a default here but effects, which are not there unless
+they are given, and a key that is missing, misspelt or of no use is refused.
 """
 
 from pathlib import Path
 from typing import Annotated, Self
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, model_validator
+from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
-from virtualrig.motion import Sine
-
-NonNegative = Annotated[float, Field(ge=0)]
-Share = Annotated[float, Field(ge=0, le=1)]
-
-
-class Strict(BaseModel):
-    """A frozen model that refuses unknown keys."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
+from virtualrig.effects import Effects
+from virtualrig.motion import Excitation
+from virtualrig.strict import NonNegative, Share, Strict
 
 
 class Cable(Strict):
@@ -53,12 +46,13 @@ class Load(Strict):
 
 
 class Rig(Strict):
-    """Both pulleys, both cables and the load."""
+    """Both pulleys, both cables, the load, and what else the rig has: nothing, if `effects` is left out."""
 
     pulley_radius_m: PositiveFloat
     cable: Cable
     estimates: Estimates
     load: Load
+    effects: Effects = Effects()
 
 
 class Encoder(Strict):
@@ -133,7 +127,7 @@ class RecordingPlan(Strict):
     id: str
     pretension_N: PositiveFloat
     conduit: tuple[Piece, ...] = Field(min_length=1)
-    excitation: Sine
+    excitation: Excitation
 
 
 class Condition(Strict):
@@ -148,7 +142,7 @@ class BatchPlan(Strict):
     """A study: one excitation, the conditions it is applied under."""
 
     note: str
-    excitation: Sine
+    excitation: Excitation
     conditions: tuple[Condition, ...] = Field(min_length=1)
     repeats: Annotated[int, Field(ge=1, le=26)]
 

@@ -4,57 +4,20 @@ Each cable is a chain of masses and springs that carry no compression, with a br
 prescribed, the load ends hang on one pulley with its spring. Displacements count towards the drive end, so pulling at
 the drive is positive in the cable that is pulled. The integration is semi-implicit Euler with a step that the chain's
 own highest frequency sets.
-"""
 
-from dataclasses import dataclass
+This is the rig without effects, which most recordings are of. A rig with any runs in `virtualrig.effect_dynamics`,
+several times slower.
+"""
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.linalg import eigvalsh_tridiagonal
 
+from virtualrig import effect_dynamics
+from virtualrig.chain import initial_tension, node_grip, stable_step
 from virtualrig.config import Numerics, Rig
 from virtualrig.grid import Grid
-
-
-@dataclass(frozen=True)
-class Preparation:
-    """How the rig was strung for one run.
-
-    Attributes
-    ----------
-    friction_coefficient : float
-        Coefficient mu between cables and conduits in this run.
-    pretension_N : float
-        Tension of both cables, N, as the mean along the conduit.
-    profile_share : tuple of float
-        By which share of mu phi ln T falls from the drive end to the load end, for cables A and B.
-    """
-
-    friction_coefficient: float
-    pretension_N: float
-    profile_share: tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """What truly happened, before any sensor; every array has shape (samples,).
-
-    Tensions are those of the paper: T1, T2 of cable A and T3, T4 of cable B at the drive and the load end, N. Angles
-    are in rad; `theta_out_rad` counts from the load spring's neutral.
-    """
-
-    time_s: NDArray
-    theta_in_rad: NDArray
-    theta_out_rad: NDArray
-    T1_N: NDArray
-    T2_N: NDArray
-    T3_N: NDArray
-    T4_N: NDArray
-
-
-class SimulationError(RuntimeError):
-    """The simulation left the range its time step was chosen for."""
+from virtualrig.trajectory import Preparation, Trajectory, check_tensions
 
 
 def simulate(
@@ -87,6 +50,8 @@ def simulate(
     SimulationError
         If a tension is not finite or exceeds `numerics.tension_limit_N`.
     """
+    if rig.effects.are_in_the_motion:
+        return effect_dynamics.simulate(rig, grid, numerics, preparation, time_s, theta_in_rad, omega_in_rad_per_s)
     radius = rig.pulley_radius_m
     grip = node_grip(grid, preparation.friction_coefficient)
     bristle = np.repeat(np.array(preparation.profile_share)[:, None], grip.size, axis=1)
@@ -95,8 +60,10 @@ def simulate(
     mass = rig.cable.density_kg_per_m * grid.cell_length_m
 
     sample_s = time_s[1] - time_s[0]
-    steps = int(np.ceil(sample_s / stable_step(rig, stiffness, mass, grip, numerics)))
     load = rig.load
+    bristles = 2 * grip * numerics.tension_limit_N / numerics.bristle_length_m
+    spring, pulley_mass = load.spring_stiffness_Nm_per_rad / radius**2 / 2, load.inertia_kg_m2 / radius**2 / 2
+    steps = int(np.ceil(sample_s / stable_step(stiffness, mass, bristles, spring, pulley_mass, numerics)))
     theta_out = radius * (tension[0, -1] - tension[1, -1]) / load.spring_stiffness_Nm_per_rad
     channels = _run(
         theta_in_rad,
@@ -117,47 +84,9 @@ def simulate(
         load.damping_Nms_per_rad,
         load.inertia_kg_m2,
     )
-    # Written so that a NaN fails it too.
-    if not channels[1:].max() <= numerics.tension_limit_N:
-        raise SimulationError(
-            f"a tension left the {numerics.tension_limit_N} N that the time step was chosen for; "
-            "lower the amplitude or raise numerics.tension_limit_N"
-        )
-    return Trajectory(time_s, theta_in_rad, *channels)
-
-
-def node_grip(grid: Grid, friction_coefficient: float) -> NDArray:
-    """Friction at each node in full slip, per sum of the tensions on its two sides; shape (n,).
-
-    With (T_l - T_r) = tanh(mu phi / 2) (T_l + T_r) the ratio T_l / T_r is exp(mu phi) of the cell, without a
-    discretization error.
-    """
-    return np.tanh(friction_coefficient * grid.cell_bend_rad / 2)
-
-
-def initial_tension(grid: Grid, grip: NDArray, bristle: NDArray, pretension_N: float) -> NDArray:
-    """Tension of the segments (N, shape (n + 1,)) that the bristles hold in balance, `pretension_N` in the mean."""
-    held = grip * bristle
-    profile = np.cumprod(np.concatenate([[1.0], (1 - held) / (1 + held)]))
-    length = grid.segment_length_m
-    return pretension_N * profile * length.sum() / (profile @ length)
-
-
-def stable_step(rig: Rig, stiffness: NDArray, mass: NDArray, grip: NDArray, numerics: Numerics) -> float:
-    """Time step (s) below which the chain is stable, times the Courant share.
-
-    The highest frequency is that of one cable with every bristle stuck at the highest tension allowed, and half the
-    load pulley: in the mode where both cables work against each other, each carries a half.
-    """
-    pulley_mass = rig.load.inertia_kg_m2 / rig.pulley_radius_m**2 / 2
-    bristle = 2 * grip * numerics.tension_limit_N / numerics.bristle_length_m
-    spring = rig.load.spring_stiffness_Nm_per_rad / rig.pulley_radius_m**2 / 2
-    inertia = np.append(mass, pulley_mass)
-    diagonal = np.append(stiffness[:-1] + stiffness[1:] + bristle, stiffness[-1] + spring) / inertia
-    off_diagonal = -stiffness[1:] / np.sqrt(inertia[:-1] * inertia[1:])
-    (highest,) = eigvalsh_tridiagonal(diagonal, off_diagonal, select="i", select_range=(mass.size, mass.size))
-    damping = numerics.wave_damping
-    return numerics.courant * 2 / np.sqrt(highest) * (np.hypot(1, damping) - damping)
+    check_tensions(channels[1:], numerics.tension_limit_N)
+    _, T1, T2, T3, T4 = channels
+    return Trajectory(time_s, theta_in_rad, *channels, radius * (T1 - T3), radius * (T2 - T4))
 
 
 @njit(cache=True, error_model="numpy")

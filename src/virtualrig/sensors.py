@@ -1,11 +1,14 @@
 """From what truly happened to what the rig logs: counts, currents and voltages."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from virtualrig.config import Encoder, LoadCell, Sensors, TorqueSensor
-from virtualrig.dynamics import Trajectory
+from virtualrig.config import Encoder, LoadCell, Rig, Sensors, TorqueSensor
+from virtualrig.effects import SideSensors
+from virtualrig.trajectory import Trajectory
 
 # Columns of a log in the order of the format, each with as many decimals as leave rounding far below the noise.
 DECIMALS = {
@@ -23,7 +26,16 @@ class SensorRangeError(ValueError):
     """A quantity left the range of the sensor that was to record it."""
 
 
-def log(trajectory: Trajectory, sensors: Sensors, pulley_radius_m: float, draw: Generator) -> dict[str, NDArray]:
+@dataclass(frozen=True)
+class Side:
+    """What acts on the sensors of one side; arrays of shape (samples,)."""
+
+    angle_rad: NDArray
+    torque_Nm: NDArray
+    force_N: NDArray
+
+
+def log(trajectory: Trajectory, sensors: Sensors, rig: Rig, draw: Generator) -> dict[str, NDArray]:
     """What the sensors at both ends make of a trajectory.
 
     Returns
@@ -37,16 +49,31 @@ def log(trajectory: Trajectory, sensors: Sensors, pulley_radius_m: float, draw: 
         If a torque or a tension sum is beyond the sensor's range.
     """
     t = trajectory
-    tau_in, tau_out = pulley_radius_m * (t.T1_N - t.T3_N), pulley_radius_m * (t.T2_N - t.T4_N)
+    drive = sensed(t.time_s, Side(t.theta_in_rad, t.tau_in_Nm, t.T1_N + t.T3_N), rig, rig.effects.drive_sensors)
+    load = sensed(t.time_s, Side(t.theta_out_rad, t.tau_out_Nm, t.T2_N + t.T4_N), rig, rig.effects.load_sensors)
     return {
         "time_s": t.time_s,
-        "drive_encoder_counts": encode(t.theta_in_rad, sensors.encoder, draw),
-        "load_encoder_counts": encode(t.theta_out_rad, sensors.encoder, draw),
-        "drive_current_A": current(tau_in, sensors.torque, draw),
-        "load_current_A": current(tau_out, sensors.torque, draw),
-        "drive_load_cell_V": load_cell_voltage(t.T1_N + t.T3_N, sensors.load_cell, draw),
-        "load_load_cell_V": load_cell_voltage(t.T2_N + t.T4_N, sensors.load_cell, draw),
+        "drive_encoder_counts": encode(drive.angle_rad, sensors.encoder, draw),
+        "load_encoder_counts": encode(load.angle_rad, sensors.encoder, draw),
+        "drive_current_A": current(drive.torque_Nm, sensors.torque, draw),
+        "load_current_A": current(load.torque_Nm, sensors.torque, draw),
+        "drive_load_cell_V": load_cell_voltage(drive.force_N, sensors.load_cell, draw),
+        "load_load_cell_V": load_cell_voltage(load.force_N, sensors.load_cell, draw),
     }
+
+
+def sensed(time_s: NDArray, truth: Side, rig: Rig, faults: SideSensors) -> Side:
+    """What one side's sensors take for true; without faults that is the truth itself, bit for bit."""
+    if faults == SideSensors():
+        return truth
+    force = (
+        (1 + faults.load_cell_gain) * truth.force_N
+        + faults.load_cell_offset_N
+        + faults.load_cell_drift_N_per_s * (time_s - time_s[0])
+        + faults.load_cell_crosstalk * truth.torque_Nm / rig.pulley_radius_m
+    )
+    shown = (truth.angle_rad, (1 + faults.torque_gain) * truth.torque_Nm, force)
+    return Side(*(np.interp(time_s - faults.delay_s, time_s, values) for values in shown))
 
 
 def encode(angle_rad: NDArray, encoder: Encoder, draw: Generator) -> NDArray:

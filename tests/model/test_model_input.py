@@ -7,19 +7,34 @@ from builders import recording
 from ccmodel.model.run import ModelInput
 
 
-def test_the_drive_motion_comes_with_its_uncertainty():
+def test_the_drive_motion_comes_with_likely_deviations():
     step = np.pi / 1000
     counted = replace(
-        recording(theta_in_rad=lambda t: np.floor(np.sin(2 * np.pi * t) / step) * step), encoder_step_rad=step
+        recording(theta_in_rad=lambda t: np.floor(np.sin(2 * np.pi * t) / step) * step),
+        encoder_step_rad={"theta_in_rad": step},
     )
     whole, some = ModelInput.of(counted), ModelInput.of(counted, step_s=0.02)
-    assert some.drive.theta_rad == pytest.approx(whole.drive.theta_rad[::2], abs=0)
-    assert (some.theta_in == some.drive.theta_rad).all()
-    assert some.drive.sigma_rad.shape == some.recording.time_s.shape
-    assert some.drive.deviations_rad.shape[1:] == some.recording.time_s.shape
+    assert some.theta_in == pytest.approx(whole.theta_in[::2], abs=0)
+    assert some.drive_deviations == pytest.approx(whole.drive_deviations[:, ::2], abs=0)
+    assert 0 < np.sqrt(np.mean(some.drive_deviations**2)) < step
 
 
 def test_a_drive_that_was_not_counted_is_taken_as_it_is():
     given = ModelInput.of(recording())
-    assert given.drive is None
+    assert given.drive_deviations.shape[0] == 0
     assert (given.theta_in == given.recording["theta_in_rad"]).all()
+
+
+def test_the_rest_ends_when_the_drive_moves_not_when_its_count_does():
+    step, t = np.pi / 1000, np.arange(0, 3 + 1e-9, 0.01)
+    moving = 0.3 * (1 - np.cos(np.pi * np.clip(t - 0.5, 0, None)))
+    counts = np.floor(moving / step + 0.5)
+    first_count = t[np.argmax(counts != counts[0])]
+    counted = replace(
+        recording(theta_in_rad=lambda _: counts * step, tau_in_Nm=lambda _: 0.6 * moving),
+        encoder_step_rad={"theta_in_rad": step},
+        rest_s=float(first_count),
+    )
+    given = ModelInput.of(counted)
+    assert given.resting["tau_in_Nm"].size < first_count / 0.01
+    assert np.ptp(given.resting["tau_in_Nm"]) < 0.1 * 0.6 * step

@@ -5,8 +5,9 @@ import pytest
 from virtual_runs import changed, channels, plan_of, strung
 
 from virtualrig.campaign import run
-from virtualrig.dynamics import SimulationError, simulate
+from virtualrig.dynamics import simulate
 from virtualrig.grid import make_grid
+from virtualrig.trajectory import SimulationError
 
 # Standard deviations of the sensors' noise; for an encoder that of rounding to its step.
 NOISE = {"theta_out": 0.00314 / 12**0.5, "tau_in": 1e-4, "tau_out": 1e-4, "F_drive": 0.05, "F_load": 0.05}

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from virtualrig.dynamics import Preparation, Trajectory
+from virtualrig.trajectory import Preparation, Trajectory
 
 ROOT = Path(__file__).parents[2]
 

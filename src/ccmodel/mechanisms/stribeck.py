@@ -1,7 +1,12 @@
 """Stribeck: friction that is higher at rest than in motion.
 
-Equation: mu (1 + a exp(-(v / vs)^2)), v the sliding speed. Friction that falls with speed has no unique step without
-inertia. The speed in it therefore lags: dv_s/dt = (v - v_s) / LAG_S, the time that a contact needs to renew itself.
+Equation: mu (1 + a r), where r is what the contact remembers of its speed: 1 after a rest, and
+dr/ds = (exp(-(v / vs)^2) - r) / RENEWAL_M along the way s that it slides, v the sliding speed. In steady sliding this
+is mu (1 + a exp(-(v / vs)^2)).
+
+Without the way on which a contact renews itself, friction that falls with speed has no unique step, and not with
+inertia either: explicit dynamics then chatters on ever shorter pieces of cable the finer its grid, and its mean is
+that of mu alone, whatever a and vs (docs/verification.md). With it the course is smooth and unique.
 
 Signature: a peak at break-away, and a loss that falls with speed.
 
@@ -13,13 +18,15 @@ import numpy as np
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
-LAG_S = 2e-3
+RENEWAL_M = 2e-5
 
 
 @kernel(inline="always")
-def breakaway(speed, rise, vs):
-    """Factor of mu at a sliding speed (m/s)."""
-    return 1.0 + rise * np.exp(-((speed / vs) ** 2))
+def renewed(rested, slide, dt, vs):
+    """What the contact remembers (0 to 1) after it has slid by `slide` (m) within `dt` (s)."""
+    left = np.exp(-abs(slide) / RENEWAL_M)
+    ratio = slide / (dt * vs)
+    return rested * left + (1.0 - left) * np.exp(-ratio * ratio)
 
 
 def _enters(settings, place, values):

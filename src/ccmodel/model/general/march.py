@@ -27,7 +27,7 @@ from ccmodel.mechanisms.pulley_eccentricity import winding, wound
 from ccmodel.mechanisms.pulley_friction import PRESLIDING_RAD
 from ccmodel.mechanisms.relaxation import lag_weights
 from ccmodel.mechanisms.strand_settling import settling_tension
-from ccmodel.mechanisms.stribeck import LAG_S, breakaway
+from ccmodel.mechanisms.stribeck import renewed
 
 # Coulomb friction has no bristle; this one is a ten-millionth of the stretch of any cable worth pulling.
 COULOMB_BRISTLE_M = 1e-10
@@ -44,6 +44,10 @@ LOOSE_TOLERANCE = 1e-5
 # A node that is about to turn around in one go is left at the edge of sticking, where its friction is what it was.
 EDGE = 1.0 - 1e-9
 NEWTON_LIMIT = 60
+# Friction that remembers its speed is taken from the slides expected of a step. Where those found make it another by
+# more than this share, the step is solved once more.
+GRIP_TOLERANCE = 1e-3
+LOOKS = 2
 PATIENCE = 12
 SMALLEST_SHARE = 1.0 / 128
 SMALLEST_SUBSTEP = 1.0 / 4096
@@ -60,7 +64,8 @@ STIFFNESS, LOST, RELAXING, SHARE, STRETCH, LOST_TENSION, ELASTIC, TENSION, TANGE
     DRAG,
     VISCOUS,
     BRISTLE,
-    SPEED,
+    RESTED,
+    RESTED_NEXT,
     GRIP,
     BRISTLE_NEXT,
     NEAR,
@@ -70,7 +75,7 @@ STIFFNESS, LOST, RELAXING, SHARE, STRETCH, LOST_TENSION, ELASTIC, TENSION, TANGE
     ALPHA,
     BETA,
     ETA,
-) = range(14)
+) = range(15)
 # slide, shape (rows, 2, n + 2): drive end, nodes, load end, m. This step, Newton's step, and those before.
 NOW, STEP, SAVED, LAST, BEFORE = range(5)
 # mean, shape (rows, 2): mean tension of a cable that its conduit gives way to, N.
@@ -89,7 +94,7 @@ NOW, STEP, SAVED, LAST, BEFORE = range(5)
 ) = range(11)
 # load, shape (rows,): angle, last turn and step's length, speed, speed before, bristle of the bearing; the step's.
 ANGLE, TURN, DT, OMEGA, OMEGA_BEFORE, BEARING, OMEGA_NEXT, BEARING_NEXT, TORQUE = range(9)
-PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10, 14, 5, 11, 9
+PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10, 15, 5, 11, 9
 
 # Numbers of a run.
 Physics = namedtuple(
@@ -434,10 +439,9 @@ def _commit(ph, piece, node, slide, mean, load, turn, dt):
         for i in range(n):
             node[BRISTLE, c, i] = node[BRISTLE_NEXT, c, i]
     if ph.rise > 0.0 and dt > 0.0:
-        keep = np.exp(-dt / LAG_S)
         for c in range(2):
             for i in range(n):
-                node[SPEED, c, i] = keep * node[SPEED, c, i] + (1.0 - keep) * slide[NOW, c, i + 1] / dt
+                node[RESTED, c, i] = renewed(node[RESTED, c, i], slide[NOW, c, i + 1], dt, ph.vs)
     if dt > 0.0:
         load[TURN], load[DT] = turn, dt
         load[OMEGA_BEFORE], load[OMEGA] = load[OMEGA], load[OMEGA_NEXT]
@@ -446,14 +450,25 @@ def _commit(ph, piece, node, slide, mean, load, turn, dt):
 
 
 @kernel(error_model="numpy")
-def _set_grip(ph, node, course):
-    """Friction of each node per sum of its tensions; with a power of tension only its argument, mu phi / 2."""
+def _set_grip(ph, node, slide, course, dt):
+    """Friction of each node per sum of its tensions; with a power of tension only its argument, mu phi / 2.
+
+    What the contacts remember at the end of the step is taken from the slides in `NOW`, as far as these are known.
+    Returns by how much that changed friction at most, as a share of it.
+    """
+    change = 0.0
     for c in range(2):
         for i in range(node.shape[2]):
             y = node[HALF_BEND, c, i] * course
             if ph.rise > 0.0:
-                y *= breakaway(node[SPEED, c, i], ph.rise, ph.vs)
+                rested = node[RESTED, c, i]
+                if dt > 0.0:
+                    rested = renewed(rested, slide[NOW, c, i + 1], dt, ph.vs)
+                change = max(change, abs(rested - node[RESTED_NEXT, c, i]))
+                node[RESTED_NEXT, c, i] = rested
+                y *= 1.0 + ph.rise * rested
             node[GRIP, c, i] = y if ph.exponent != 0.0 else _tanh(y)
+    return ph.rise * change
 
 
 @kernel(error_model="numpy")
@@ -483,7 +498,8 @@ def march(ph, piece, node, slide, mean, load, time_s, way_in, course, series, ou
     """
     m, n = time_s.size, node.shape[2]
     last_turn, before_turn, last_pull, before_pull, last_dt = 0.0, 0.0, 0.0, 0.0, 0.0
-    _set_grip(ph, node, course[0])
+    node[RESTED] = 1.0
+    _set_grip(ph, node, slide, course[0], 0.0)
     fixed_grip = ph.rise == 0.0 and course.size == 1
     prescribed = ph.kind == PRESCRIBED_ANGLE
     for j in range(m):
@@ -493,8 +509,6 @@ def march(ph, piece, node, slide, mean, load, time_s, way_in, course, series, ou
         done, part, bristle = 0.0, 1.0, ph.bristle
         while done < 1.0:
             part = min(part, 1.0 - done)
-            if not fixed_grip:
-                _set_grip(ph, node, course[min(j, course.size - 1)])
             step_pull, step_dt = part * pull, part * dt
             # The start: what the last steps did, scaled to the drive's step while it goes the same way.
             expected = 2 * last_pull - before_pull
@@ -517,7 +531,16 @@ def march(ph, piece, node, slide, mean, load, time_s, way_in, course, series, ou
             if prescribed:
                 turn = value - load[ANGLE]
             torque = 0.0 if prescribed else value
-            solved, turn = _newton(ph, piece, node, slide, mean, load, turn, torque, step_dt, bristle, counts)
+            solved = False
+            for look in range(LOOKS):
+                # What contacts remember depends on the slides: on those expected first, then on those found.
+                if not fixed_grip:
+                    change = _set_grip(ph, node, slide, course[min(j, course.size - 1)], step_dt)
+                    if look > 0 and change < GRIP_TOLERANCE:  # as expected
+                        break
+                solved, turn = _newton(ph, piece, node, slide, mean, load, turn, torque, step_dt, bristle, counts)
+                if not solved or ph.rise == 0.0:
+                    break
             if not solved:
                 part *= 0.5
                 last_pull = 0.0

@@ -1,0 +1,29 @@
+"""A few effects of `benchmarks/against_dynamics.py` on a coarse grid: the general solver agrees with dynamics."""
+
+import importlib.util
+import sys
+
+import pytest
+from virtual_runs import ROOT
+
+
+def load_benchmark():
+    spec = importlib.util.spec_from_file_location("against_dynamics", ROOT / "benchmarks" / "against_dynamics.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+benchmark = load_benchmark()
+FEW = {("none", "7.3 N"), ("stribeck", "a 20 %, vs 2 mm/s"), ("conduit-compliance", "70 um/N"), ("backlash", "2 deg")}
+
+
+@pytest.mark.parametrize("case", [c for c in benchmark.cases() if (c.name, c.text) in FEW], ids=lambda c: c.name)
+def test_solver_agrees_with_the_rig(case):
+    rig = benchmark.rig_tensions(case, level=0, cell_m=0.05, rate_Hz=500.0)
+    error = benchmark.difference_percent(benchmark.solver_tensions(case, rate_Hz=500.0), rig).max()
+    assert error < 1.0
+    if case.mechanisms:
+        without = benchmark.solver_tensions(benchmark.Case("none", ""), rate_Hz=500.0)
+        assert error < benchmark.difference_percent(without, rig).max() / 2

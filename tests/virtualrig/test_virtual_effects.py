@@ -1,0 +1,227 @@
+"""Effects of the virtual rig: no trace where they are not, what is known of them where they are."""
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from virtual_runs import changed, channels, plan_of, strung
+
+from virtualrig import dynamics, effect_dynamics
+from virtualrig.campaign import run
+from virtualrig.config import Campaign
+from virtualrig.effects import Effects
+from virtualrig.grid import make_grid
+from virtualrig.sensors import Side, sensed
+from virtualrig.trajectory import Trajectory
+
+ALONE = {
+    "presliding-dahl": {"presliding": {"law": "dahl", "length_m": 1e-4}},
+    "presliding-iwan": {"presliding": {"law": "iwan", "shortest_m": 1e-5, "longest_m": 2e-4}},
+    "stribeck": {"stribeck": {"rise": 0.3, "speed_m_per_s": 3e-3}},
+    "viscous": {"viscous_Ns_per_m2": 200.0},
+    "load-dependent": {"load_dependent_friction": {"exponent": -0.3}},
+    "drag": {"drag_N": 1.0},
+    "kink": {"kinks": [{"bend_rad": 0.8, "place_share": 0.4}]},
+    "running-in": {"running_in": {"change": 0.3, "scale": 0.5}},
+    "running-in-by-travel": {"running_in": {"change": 0.3, "over": "travel_m", "scale": 5e-3}},
+    "friction-asymmetry": {"cable_asymmetry": {"friction_ratio": 1.3}},
+    "stiffness-asymmetry": {"cable_asymmetry": {"stiffness_ratio": 0.8}},
+    "relaxation": {
+        "relaxation": [{"share": 0.1, "time_constant_s": 0.3}, {"share": 0.1, "time_constant_s": 5.0}],
+    },
+    "settling": {"strand_settling": {"tension_scale_N": 3.0}},
+    "drive-termination": {"termination_compliance": {"drive_m_per_N": 5e-5}},
+    "load-termination": {"termination_compliance": {"load_m_per_N": 5e-5}},
+    "conduit": {"conduit_compliance_m_per_N": 4e-5},
+    "drive-bearing": {"drive_pulley": {"friction": {"torque_Nm": 4e-3}}},
+    "load-bearing": {"load_pulley": {"friction": {"torque_Nm": 4e-3}}},
+    "drive-eccentricity": {"drive_pulley": {"eccentricity": {"share": 0.05, "phase_rad": 0.5}}},
+    "load-eccentricity": {"load_pulley": {"eccentricity": {"share": 0.05, "phase_rad": 0.5}}},
+    "backlash": {"load": {"half_gap_rad": 0.03}},
+    "stiffening": {"load": {"cubic_Nm_per_rad3": 0.1}},
+    "inertia": {"load": {"inertia_kg_m2": 5e-4}},
+    "hysteretic-load": {"hysteretic_load": {"torque_Nm": 4e-3, "angle_rad": 0.1}},
+    "directional": {"directional_friction": {"bias": 0.2}},
+    "positional": {"positional_friction": {"rise": 0.2, "period_m": 0.01}},
+}
+TENSIONS = ("T1_N", "T2_N", "T3_N", "T4_N")
+
+
+@pytest.fixture(scope="module")
+def coarse(campaign):
+    """The committed rig on a quarter of the cells, which is fast, and right to a percent."""
+    return changed(
+        campaign,
+        numerics__cell_length_m=0.05,
+        numerics__cell_bend_rad=0.2,
+        numerics__bristle_length_m=4e-7,
+        numerics__tension_limit_N=40.0,
+    )
+
+
+@pytest.fixture(scope="module")
+def recorded(coarse):
+    """Call with effects by name for a run of them, over three quarters of a cycle; each is simulated once."""
+    made = {}
+
+    def simulated(name, profile_share=(0.2, 0.2), **excitation):
+        key = (name, profile_share, *excitation.items())
+        if key not in made:
+            kept = {"rest_s": 0.05, "start_up_cycles": 0.25, "cycles": 0.5} | excitation
+            plan = plan_of(coarse, "half-loop", "half-loop-7.3N-a", **kept)
+            rig = changed(coarse, rig__effects=Effects.model_validate(ALONE.get(name, {})))
+            made[key] = run(rig, plan, strung(rig, plan, profile_share))
+        return made[key]
+
+    return simulated
+
+
+def full_slip(t):
+    """A late stretch in which cable A is pulled: it slips over its whole length."""
+    rate = np.gradient(t.theta_in_rad, t.time_s)
+    return (rate > 0.5 * rate.max()) & (t.theta_in_rad > 0.5)
+
+
+def test_the_ideal_rig_is_the_same_with_and_without_the_paths_of_effects(coarse):
+    plan = plan_of(coarse, "half-loop", "half-loop-7.3N-a", rest_s=0.05, start_up_cycles=0.25, cycles=0.5)
+    numerics = coarse.numerics
+    grid = make_grid(plan.conduit, numerics.cell_length_m, numerics.cell_bend_rad)
+    time_s = np.arange(700) / 500
+    motion = plan.excitation.angle_and_rate(time_s)
+    plain, other = (
+        simulate(coarse.rig, grid, numerics, strung(coarse, plan), time_s, *motion)
+        for simulate in (dynamics.simulate, effect_dynamics.simulate)
+    )
+    for name in (*TENSIONS, "theta_out_rad", "tau_in_Nm", "tau_out_Nm"):
+        np.testing.assert_allclose(getattr(other, name), getattr(plain, name), atol=1e-5, err_msg=name)
+
+
+@pytest.mark.parametrize("name", ALONE)
+def test_it_rests_in_balance_and_then_acts(coarse, recorded, name):
+    t, ideal = recorded(name), recorded("none")
+    rest = t.time_s <= 0.05
+    # At rest tensions change where the cable relaxes, and hardly where bristles hold less from moment to moment.
+    settles = {"relaxation": 0.15, "running-in": 1e-3}.get(name, 1e-6)
+    for tension in TENSIONS:
+        assert np.ptp(getattr(t, tension)[rest]) < settles * 7.3, tension
+    seen, wanted = channels(coarse, t) | {"tau_in": t.tau_in_Nm}, channels(coarse, ideal)
+    assert max(np.abs(seen[c] - wanted[c]).max() / np.ptp(wanted[c]) for c in seen) > 0.01
+
+
+def test_friction_of_one_cable_shows_in_that_cable(campaign, recorded):
+    t = recorded("friction-asymmetry", cycles=1.0)
+    loss = campaign.rig.cable.friction_coefficient * np.pi
+    rate = np.gradient(t.theta_in_rad, t.time_s)
+    back = (rate < 0.7 * rate.min()) & (t.theta_in_rad < 0)
+    np.testing.assert_allclose(np.log(t.T1_N / t.T2_N)[full_slip(t)], loss, rtol=3e-3)
+    np.testing.assert_allclose(np.log(t.T3_N / t.T4_N)[back], 1.3 * loss, rtol=3e-3)
+
+
+def test_a_kink_adds_its_bend(campaign, recorded):
+    t = recorded("kink")
+    expected = campaign.rig.cable.friction_coefficient * (np.pi + 0.8)
+    np.testing.assert_allclose(np.log(t.T1_N / t.T2_N)[full_slip(t)], expected, rtol=3e-3)
+
+
+def test_friction_knows_its_direction(campaign, recorded):
+    t = recorded("directional")
+    slip, loss = full_slip(t), campaign.rig.cable.friction_coefficient * np.pi
+    np.testing.assert_allclose(np.log(t.T1_N / t.T2_N)[slip], 1.2 * loss, rtol=5e-3)
+    np.testing.assert_allclose(np.log(t.T4_N / t.T3_N)[slip], 0.8 * loss, rtol=5e-3)
+
+
+def test_relaxation_decays_with_both_time_constants(recorded):
+    t = recorded("relaxation", profile_share=(0.0, 0.0), rest_s=1.0, start_up_cycles=1e-3, cycles=1e-3)
+    rest = t.time_s <= 1.0
+    expected = 7.3 * (1 - 0.1 * -np.expm1(-t.time_s / 0.3) - 0.1 * -np.expm1(-t.time_s / 5.0))
+    for tension in TENSIONS:
+        np.testing.assert_allclose(getattr(t, tension)[rest], expected[rest], rtol=1e-4)
+
+
+def test_bearings_show_where_they_are(coarse, recorded):
+    ideal, drive, load = (recorded(name) for name in ("none", "drive-bearing", "load-bearing"))
+    slip = full_slip(ideal)
+    for tension in TENSIONS:
+        np.testing.assert_allclose(getattr(drive, tension), getattr(ideal, tension), atol=1e-4)
+    np.testing.assert_allclose((drive.tau_in_Nm - ideal.tau_in_Nm)[slip], 4e-3, rtol=1e-2)
+    spring = coarse.rig.load.spring_stiffness_Nm_per_rad * load.theta_out_rad
+    np.testing.assert_allclose(load.tau_out_Nm[slip], spring[slip], atol=1e-4)
+    across = coarse.rig.pulley_radius_m * (load.T2_N - load.T4_N) - load.tau_out_Nm
+    np.testing.assert_allclose(across[slip], 4e-3, rtol=1e-2)
+
+
+def test_a_hysteretic_spring_shows_in_the_loads_torque(coarse, recorded):
+    t = recorded("hysteretic-load", cycles=1.0)
+    over = t.tau_out_Nm - coarse.rig.load.spring_stiffness_Nm_per_rad * t.theta_out_rad
+    assert over[full_slip(t)].mean() == pytest.approx(4e-3, rel=0.05)
+    assert over.min() < -3e-3
+
+
+def test_nothing_turns_the_load_inside_its_gap(recorded):
+    t = recorded("backlash")
+    inside = np.abs(t.theta_out_rad) < 0.028
+    assert inside.sum() > 20
+    assert np.abs(t.tau_out_Nm[inside]).max() < 2e-4
+
+
+def test_all_effects_together_run_through_every_motion(coarse):
+    everything = {}
+    for effects in ALONE.values():
+        for name, value in effects.items():
+            both = isinstance(value, dict) and isinstance(everything.get(name), dict) and name != "presliding"
+            everything[name] = everything[name] | value if both else value
+    rig = changed(coarse, rig__effects=Effects.model_validate(everything))
+    plan = plan_of(
+        rig, "half-loop", "half-loop-7.3N-a", rest_s=0.05, start_up_cycles=0.25, cycles=0.5, amplitude_rad=0.6
+    )
+    t = run(rig, plan, strung(rig, plan))
+    for name in (*TENSIONS, "theta_out_rad", "tau_in_Nm", "tau_out_Nm"):
+        assert np.isfinite(getattr(t, name)).all()
+    assert np.ptp(t.theta_out_rad) > 0.1
+
+
+def test_sensors_err_as_they_are_told(campaign):
+    time_s = np.linspace(0, 2, 201)
+    truth = Side(np.sin(time_s), 0.03 * np.cos(time_s), 12 + time_s)
+    radius = campaign.rig.pulley_radius_m
+
+    def shown(**faults):
+        return sensed(time_s, truth, campaign.rig, Effects(drive_sensors=faults).drive_sensors)
+
+    assert shown() is truth
+    assert shown(torque_gain=0.05).torque_Nm == pytest.approx(1.05 * truth.torque_Nm)
+    assert shown(load_cell_gain=-0.1).force_N == pytest.approx(0.9 * truth.force_N)
+    drifting = shown(load_cell_offset_N=0.5, load_cell_drift_N_per_s=0.1)
+    assert drifting.force_N == pytest.approx(truth.force_N + 0.5 + 0.1 * time_s)
+    crossed = shown(load_cell_crosstalk=0.08)
+    assert crossed.force_N == pytest.approx(truth.force_N + 0.08 * truth.torque_Nm / radius)
+    late = shown(delay_s=0.05)
+    assert late.angle_rad[5:] == pytest.approx(truth.angle_rad[:-5])
+    assert late.force_N[5:] == pytest.approx(truth.force_N[:-5])
+
+
+def test_faults_of_sensors_leave_the_motion_alone():
+    assert not Effects(load_sensors={"torque_gain": 0.1}).are_in_the_motion
+    assert Effects(drag_N=0.1).are_in_the_motion
+
+
+@pytest.mark.parametrize(
+    ("effects", "named"),
+    [
+        ({"presliding": {"law": "iwan", "shortest_m": 2e-4, "longest_m": 1e-5}}, "below shortest_m"),
+        ({"kinks": [{"bend_rad": 0.5, "place_share": 1.5}]}, "place_share"),
+        ({"relaxation": [{"share": 0.6, "time_constant_s": 1.0}] * 2}, "less than 1 in all"),
+        ({"stribek": {}}, "stribek"),
+        ({"drag_N": float("inf")}, "drag_N"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_name(effects, named):
+    with pytest.raises(ValidationError, match=named):
+        Effects.model_validate(effects)
+
+
+def test_a_campaign_states_its_effects(campaign):
+    stated = campaign.model_dump(mode="json")
+    stated["rig"]["effects"] = {"drag_N": 0.7}
+    assert Campaign.model_validate(stated).rig.effects == Effects(drag_N=0.7)
+    assert campaign.rig.effects == Effects()
+    assert {f for f in Trajectory.__dataclass_fields__} >= {"tau_in_Nm", "tau_out_Nm"}
