@@ -22,8 +22,6 @@ change of the mean tension gives the change of the stretch: the same formula and
 The load pulley couples the cables: its motion is what balances (T2 - T4) R_o against the load (21).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,34 +29,10 @@ from ccmodel.kernel import kernel
 from ccmodel.model.failure import ModelError
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad, TorqueLoad
+from ccmodel.model.response import PairResponse, Status
 from ccmodel.model.transmission import Transmission
 
 SECTIONS = 16  # of each cable, as in the paper's Section IV
-
-
-@dataclass(frozen=True)
-class PairResponse:
-    """What the model says of a run; all arrays of shape (n,), in SI units and with the signs of the log format.
-
-    Attributes
-    ----------
-    T1_N, T2_N : ndarray
-        Tension of cable A at the drive and at the load end.
-    T3_N, T4_N : ndarray
-        Tension of cable B at the drive and at the load end.
-    theta_out_rad : ndarray
-        Angle of the load pulley: from the neutral position of a spring load, else from the start.
-    tau_in_Nm, tau_out_Nm : ndarray
-        Torque of the drive on the cables, and of the cables on the load.
-    """
-
-    T1_N: NDArray
-    T2_N: NDArray
-    T3_N: NDArray
-    T4_N: NDArray
-    theta_out_rad: NDArray
-    tau_in_Nm: NDArray
-    tau_out_Nm: NDArray
 
 
 def simulate_pair(
@@ -119,7 +93,17 @@ def simulate_pair(
         )
     R_i, R_o = transmission.drive_radius_m, transmission.load_radius_m
     T1, T2, T3, T4 = T
-    return PairResponse(T1, T2, T3, T4, theta_out, (T1 - T3) * R_i, (T2 - T4) * R_o)
+    return PairResponse(
+        T1_N=T1,
+        T2_N=T2,
+        T3_N=T3,
+        T4_N=T4,
+        theta_out_rad=theta_out,
+        tau_in_Nm=(T1 - T3) * R_i,
+        tau_out_Nm=(T2 - T4) * R_o,
+        status=Status.OK,
+        reached=theta_in.size,
+    )
 
 
 def _check(theta_in, torque, sections):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.model.exact import PHASES, PairResponse, simulate_pair
+from ccmodel.model.exact import PHASES, ExactResponse, simulate_pair
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad
 from ccmodel.model.transmission import Transmission
@@ -21,7 +21,7 @@ class PhaseStudy:
     ----------
     time_s, theta_in_rad : ndarray, shape (5 n / 4 + 1,)
         n samples a cycle.
-    response : PairResponse
+    response : ExactResponse
         What the pair does, with profiles at the samples of `instants` and `halfway`.
     phase : ndarray of int, shape (5 n / 4 + 1,)
         Index into `PAPERS_PHASES`.
@@ -34,7 +34,7 @@ class PhaseStudy:
 
     time_s: NDArray
     theta_in_rad: NDArray
-    response: PairResponse
+    response: ExactResponse
     phase: NDArray
     instants: dict[int, int]
     halfway: dict[int, int]
@@ -86,7 +86,7 @@ def simulate_phases(
     return PhaseStudy(i / (samples_per_cycle * frequency_Hz), theta_in, response, phase, instants, halfway)
 
 
-def papers_phases(response: PairResponse) -> NDArray:
+def papers_phases(response: ExactResponse) -> NDArray:
     """Phase of each sample as the paper's Figs. 5 to 7 call it, an index into `PAPERS_PHASES`; shape (n,).
 
     The paper lets phase I follow the reversal that ends phase IV: the load rests. One cable still hangs slack then,

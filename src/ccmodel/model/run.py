@@ -143,9 +143,7 @@ def _run(transmission, load, given: ModelInput, initial: InitialTension, paramet
         time_s = given.recording.time_s
         response = general.simulate(transmission, load, time_s, given.theta_in, initial, parameters.mechanisms)
         return dict(response.complete().read)
-    response = exact.simulate_pair(transmission, load, given.theta_in, initial)
-    if response.status is not exact.Status.OK:
-        raise ModelError(f"{response.status.name} at sample {response.reached}: {response.status.value}")
+    response = exact.simulate_pair(transmission, load, given.theta_in, initial).complete()
     return {
         "theta_in_rad": given.theta_in,
         "theta_out_rad": response.theta_out_rad,

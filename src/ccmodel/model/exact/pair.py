@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +39,7 @@ from ccmodel.model.exact.path import LUMP, NODE, PASSED, PER_M, X_PER_M, X_START
 from ccmodel.model.exact.still_point import REACHED, step_apart
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
+from ccmodel.model.response import PairResponse, Status
 from ccmodel.model.transmission import Transmission
 
 PHASES = ("I", "II", "III", "IVa", "IVb")
@@ -47,20 +47,6 @@ PHASES = ("I", "II", "III", "IVa", "IVb")
 MAX_FRICTION_ANGLE = 300.0
 # A load that balances to less than this part of the largest tension is balanced.
 BALANCE_TOLERANCE = 1e-9
-
-
-class Status(Enum):
-    """How a simulation ended; the text says what to do about it."""
-
-    OK = "every sample was reached"
-    STUCK = (
-        "the path between two samples did not come to an end within its number of events: sample the drive and the"
-        " load more finely around the first sample that is missing"
-    )
-    UNBALANCED = (
-        "the cables cannot hold the load that was given: a cable can only pull; check the sign of the given torque or"
-        " force and its zero"
-    )
 
 
 @dataclass(frozen=True)
@@ -81,19 +67,12 @@ class CableProfile:
     tension_N: NDArray
 
 
-@dataclass(frozen=True)
-class PairResponse:
-    """What a pair of cables did, sample by sample; after a failure the samples that were not reached are left out.
+@dataclass(frozen=True, kw_only=True)
+class ExactResponse(PairResponse):
+    """What the exact solver says beyond every solver's response; a start out of balance begins where it settled.
 
     Attributes
     ----------
-    T1_N, T2_N, T3_N, T4_N : ndarray, shape (n,)
-        Tensions at the cables' ends (A: 1 drive, 2 load; B: 3, 4), N.
-    theta_out_rad : ndarray, shape (n,)
-        Angle of the load pulley: from the neutral position of a spring load, else from the start; where the start is
-        out of balance it begins where the load settled.
-    tau_in_Nm, tau_out_Nm : ndarray, shape (n,)
-        (T1 - T3) R_i and (T2 - T4) R_o, N m.
     phase : ndarray of int8, shape (n,)
         Index into `PHASES`: I neither cable's drive-end front has reached the load, II one has, III both have, IVa a
         cable is slack while the drive goes on, IVb a cable stays slack through a reversal of the drive.
@@ -101,25 +80,13 @@ class PairResponse:
         Arc length up to which the cable has moved from its drive end, and from which on it has moved towards its
         load end, since that end last turned; stuck in between. (L, 0) where it slides as a whole; equal at a still
         point.
-    status : Status
-    reached : int
-        Number of samples that were reached.
     profiles : dict of int to (CableProfile, CableProfile)
         Profiles of A and B at the samples asked for.
     """
 
-    T1_N: NDArray
-    T2_N: NDArray
-    T3_N: NDArray
-    T4_N: NDArray
-    theta_out_rad: NDArray
-    tau_in_Nm: NDArray
-    tau_out_Nm: NDArray
     phase: NDArray
     moving_A_m: NDArray
     moving_B_m: NDArray
-    status: Status
-    reached: int
     profiles: dict
 
 
@@ -170,7 +137,7 @@ class CableResponse:
     far_displacement_m : ndarray, shape (n,)
         Displacement of the far end, positive into the conduit.
     moving_m : ndarray, shape (n, 2)
-        As `PairResponse.moving_A_m`.
+        As `ExactResponse.moving_A_m`.
     status : Status
     reached : int
     profiles : dict of int to CableProfile
@@ -191,7 +158,7 @@ def simulate_pair(
     theta_in_rad: NDArray,
     initial: InitialTension,
     record_profiles_at: Sequence[int] = (),
-) -> PairResponse:
+) -> ExactResponse:
     """Response of a pull-pull pair to a motion of its drive pulley, exactly, by Coulomb friction alone.
 
     The result does not depend on time, only on the order of the samples; between samples drive and load law are
@@ -213,7 +180,7 @@ def simulate_pair(
 
     Returns
     -------
-    PairResponse
+    ExactResponse
 
     Raises
     ------
@@ -239,7 +206,7 @@ def simulate_pair(
     run.simulate(R_i * theta_in, given, stiffness, isinstance(load, AngleLoad), record_profiles_at)
     T1, T2, T3, T4, displacement = run.out[:5]
     balance = T2 - T4 - given[: run.reached] - stiffness * displacement
-    return PairResponse(
+    return ExactResponse(
         T1_N=T1,
         T2_N=T2,
         T3_N=T3,

@@ -411,7 +411,10 @@ def _newton(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, count
     mean[MEAN_NEXT] = mean[MEAN_SAVED]
     turn = saved_turn
     error, limit, G, slope, R = _evaluate(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, weights)
-    return error <= (LOOSE_TOLERANCE * limit) ** 2, turn
+    accepted = error <= (LOOSE_TOLERANCE * limit) ** 2
+    if accepted:
+        counts[2] += 1
+    return accepted, turn
 
 
 @kernel(error_model="numpy")
@@ -488,8 +491,8 @@ def march(ph, piece, node, slide, mean, load, time_s, way_in, course, series, ou
         Factor of mu at each sample.
     out : ndarray, shape (7, m)
         Filled with T1, T2, T3, T4 (N), load angle (rad), the load's torque and the torque of its bearing (N m).
-    counts : ndarray of int, shape (2,)
-        Adds up Newton iterations and substeps.
+    counts : ndarray of int, shape (3,)
+        Adds up Newton iterations, substeps, and steps that were taken at the loose tolerance.
 
     Returns
     -------

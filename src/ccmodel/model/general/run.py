@@ -17,6 +17,7 @@ from ccmodel.model.general import march as rows
 from ccmodel.model.general.grid import Grid, make_grid
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, MechanicalLoad, SpringLoad, TorqueLoad
+from ccmodel.model.response import PairResponse, Status
 from ccmodel.model.transmission import Transmission
 
 ELEMENTS = 32
@@ -43,68 +44,26 @@ class Active:
     values: Mapping[str, float]
 
 
-@dataclass(frozen=True)
-class Status:
-    """How a run ended.
+@dataclass(frozen=True, kw_only=True)
+class GeneralResponse(PairResponse):
+    """What the general solver says beyond every solver's response; tau_out is the torque beyond the load's bearing.
 
     Attributes
     ----------
-    name : {"solved", "no-convergence"}
-    solved : int
-        Samples that were solved, from the first on.
-    advice : str
-        What to try next; empty for "solved".
-    """
-
-    name: str
-    solved: int
-    advice: str = ""
-
-
-@dataclass(frozen=True)
-class Response:
-    """What the model says of a run; arrays of shape (n,), or shorter where `status` says that the run broke off.
-
-    Attributes
-    ----------
-    status : Status
-    time_s : ndarray
-    T1_N, T2_N, T3_N, T4_N : ndarray
-        Tensions of cable A at the drive and the load end, and of cable B, as they are.
-    theta_out_rad : ndarray
-        Angle of the load pulley: from the neutral position of a spring load, else from the start.
-    tau_in_Nm, tau_out_Nm : ndarray
-        Torque of the drive on its pulley, and torque on the load (beyond its pulley's bearing).
+    time_s : ndarray, shape (n,)
     read : mapping of str to ndarray
         What the sensors would read: theta_in_rad, theta_out_rad, tau_in_Nm, tau_out_Nm, F_drive_N, F_load_N.
     newton_iterations, substeps : int
         Work done.
+    loose_steps : int
+        Steps that were taken though out of balance by up to 1e-5 of the highest tension.
     """
 
-    status: Status
     time_s: NDArray
-    T1_N: NDArray
-    T2_N: NDArray
-    T3_N: NDArray
-    T4_N: NDArray
-    theta_out_rad: NDArray
-    tau_in_Nm: NDArray
-    tau_out_Nm: NDArray
     read: Mapping[str, NDArray]
     newton_iterations: int
     substeps: int
-
-    def complete(self) -> "Response":
-        """Itself if every sample was solved.
-
-        Raises
-        ------
-        ModelError
-            With the status's advice, if not.
-        """
-        if self.status.name != "solved":
-            raise ModelError(f"{self.status.name} at sample {self.status.solved}: {self.status.advice}")
-        return self
+    loose_steps: int
 
 
 def simulate(
@@ -115,7 +74,7 @@ def simulate(
     initial: InitialTension,
     mechanisms: Mapping[str, Mapping] | Sequence[Active] = (),
     elements: int = ELEMENTS,
-) -> Response:
+) -> GeneralResponse:
     """Run the pair through a motion of the drive pulley.
 
     Parameters
@@ -135,7 +94,7 @@ def simulate(
 
     Returns
     -------
-    Response
+    GeneralResponse
         With a status: a step without a solution breaks the run off, and what was solved until then is returned.
 
     Raises
@@ -162,7 +121,7 @@ def simulate(
     slide = np.zeros((rows.SLIDE_ROWS, 2, node.shape[2] + 2))
     R_i = transmission.drive_radius_m
     way, round_, _ = winding(theta_in, *settings.drive_eccentricity)
-    out, counts = np.zeros((7, time_s.size)), np.zeros(2, dtype=np.int64)
+    out, counts = np.zeros((7, time_s.size)), np.zeros(3, dtype=np.int64)
     solved = rows.march(physics, piece, node, slide, mean, state, time_s, R_i * way, course, series, out, counts)
 
     time_s, theta_in, out = time_s[:solved], theta_in[:solved], out[:, :solved]
@@ -179,8 +138,22 @@ def simulate(
         "F_load_N": T2 + T4,
     }
     read = _read(active, time_s, channels, transmission)
-    status = _status(solved, series.size, theta_in)
-    return Response(status, time_s, T1, T2, T3, T4, theta_out, tau_in, tau_out, read, int(counts[0]), int(counts[1]))
+    return GeneralResponse(
+        T1_N=T1,
+        T2_N=T2,
+        T3_N=T3,
+        T4_N=T4,
+        theta_out_rad=theta_out,
+        tau_in_Nm=tau_in,
+        tau_out_Nm=tau_out,
+        status=Status.OK if solved == series.size else Status.NO_CONVERGENCE,
+        reached=solved,
+        time_s=time_s,
+        read=read,
+        newton_iterations=int(counts[0]),
+        substeps=int(counts[1]),
+        loose_steps=int(counts[2]),
+    )
 
 
 def settings_of(mechanisms: Mapping[str, Mapping] | Sequence[Active]) -> Settings:
@@ -392,15 +365,3 @@ def _read(active: list[Active], time_s: NDArray, channels: dict[str, NDArray], t
             sensing = Sensing(time_s, channels, transmission.drive_radius_m, transmission.load_radius_m)
             channels = channels | mechanism.reads(sensing, a.place, a.values)
     return channels
-
-
-def _status(solved: int, samples: int, theta_in: NDArray) -> Status:
-    if solved == samples:
-        return Status("solved", solved)
-    return Status(
-        "no-convergence",
-        solved,
-        "the cables and the load find no balance there, not in the smallest substep either: look at the load "
-        "torque and at the drive's step before this sample, keep parameters within their ranges, or give friction "
-        "a presliding length",
-    )
