@@ -21,6 +21,8 @@ from ccmodel.model.parameters import Parameters, mechanism_key
 from ccmodel.recording import Recording, unit_of
 
 FORMAT = 1
+# What no number of samples can promise: that the list of hypotheses holds the truth.
+MOST_CONFIDENT = 0.99
 # Enough for rates that such rigs run at; a third of the work.
 STEP_S = 0.008
 STIFFNESS_N_PER_M, FRICTION, LOAD = (1e2, 1e7), (0.005, 1.5), (1e-4, 10.0)
@@ -136,7 +138,7 @@ def _said(batch, judgement: Judgement, weighed, estimates: Parameters, not_judge
         "batch": batch,
         "verdict": judgement.verdict,
         "location": locate.location(judgement, weighed),
-        "mechanisms": [_mechanism(best, k, confidence[best.hypothesis]) for k in range(len(named))],
+        "mechanisms": [_mechanism(best, k, _confidence(acting, confidence)) for k, acting in enumerate(named)],
         "alternatives": alternatives,
         "fit": {
             "held_out": [w.evidence.given.recording.id for w in weighed] if len(weighed) > 1 else [],
@@ -152,13 +154,15 @@ def _said(batch, judgement: Judgement, weighed, estimates: Parameters, not_judge
 def _alternatives(judgement: Judgement, named, confidence) -> list[dict]:
     if judgement.verdict in ("agrees", "unexplained"):
         return []
-    best: dict[tuple[str, str], float] = {}
-    for hypothesis, p in confidence.items():
-        for name, place in hypothesis.acting:
-            if (name, place) not in named:
-                best[name, place] = best.get((name, place), 0.0) + p
-    ranked = sorted(best.items(), key=lambda item: -item[1])[:MOST_ALTERNATIVES]
+    others = {acting for hypothesis in confidence for acting in hypothesis.acting} - set(named)
+    ranked = sorted(((a, _confidence(a, confidence)) for a in sorted(others)), key=lambda item: -item[1])
+    ranked = ranked[:MOST_ALTERNATIVES]
     return [{"name": n, "place": p, "confidence": round(c, 4)} for (n, p), c in ranked if c > RIVAL]
+
+
+def _confidence(acting: tuple[str, str], confidence: Mapping[Hypothesis, float]) -> float:
+    """Probability that a mechanism acts: of all hypotheses together that have it, and never certainty."""
+    return min(MOST_CONFIDENT, sum(p for hypothesis, p in confidence.items() if acting in hypothesis.acting))
 
 
 def _mechanism(trial: Trial, k: int, confidence: float) -> dict:

@@ -29,7 +29,7 @@ PARTNERS = 3
 # What a right model leaves: the mean square of held-out recordings, and on top the share of the calibrated model's
 # excess that a mechanism's simple form may miss.
 RIGHT = 1.5
-FORM_SHARE = 0.04
+FORM_SHARE = 0.01
 # A second mechanism must halve what the first one leaves beyond noise.
 PAIR_SHARE = 0.5
 # Odds against naming something before anything is seen, and probability from which a name is given alone.
@@ -89,7 +89,7 @@ def judge(
     scores = score(weighed, base, singles())
     trials = _fit_all(weighed, calibrated, base, [s for s in scores if s.gain > WORTH_A_TRIAL][:TRIALS], tell)
     trials = sorted(trials, key=_left)
-    if trials and _left(trials[0]) > enough(base) and len(weighed) > 1:
+    if trials and _left(trials[0]) > RIGHT and len(weighed) > 1:
         trials = sorted([*trials, *_pairs(weighed, calibrated, trials[:2], tell)], key=_left)
     trials = [t for t in trials if _names_more(t, trials)]
     probability = _probabilities(weighed, base, trials)

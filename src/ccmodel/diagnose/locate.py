@@ -42,7 +42,8 @@ def location(judgement: Judgement, weighed: Sequence[Weighed]) -> dict:
     channels = [c for c, value in sorted(by_channel.items(), key=lambda i: -i[1]) if value > NAMED_SHARE * worst]
     by_part = {p: float(np.sqrt(np.nanmean([table[c][p] ** 2 for c in channels]))) for p in PARTS}
     parts = [p for p in PARTS if by_part[p] > 0.7 * max(by_part.values())]
-    text = f"The mismatch sits {TEXT[place]}: {', '.join(channels)} are off most, {' and '.join(parts)}."
+    verb = "is" if len(channels) == 1 else "are"
+    text = f"The mismatch sits {TEXT[place]}: {', '.join(channels)} {verb} off most, {' and '.join(parts)}."
     return {"place": place, "channels": channels, "phases": parts, "text": text}
 
 
@@ -55,11 +56,12 @@ def _place(judgement: Judgement) -> str:
 
 
 def mismatch(weighed: Sequence[Weighed], trial: Trial) -> dict[str, dict[str, float]]:
-    """Root mean square of the held-out errors over the noise, by channel and part of the motion."""
+    """Root mean square of the held-out errors over what a right model leaves, by channel and part of the motion."""
     sums: dict[str, dict[str, list]] = {}
     for i, w in enumerate(weighed):
         e = replace(w.evidence, parameters=trial.hypothesis.of(w.evidence.parameters))
-        errors = e.errors(trial.held_out[i])
+        floor = np.array([w.floor[c] for c in e.channels])[:, None]
+        errors = e.errors(trial.held_out[i]) * e.sigma / floor
         part = parts_of(e.given)[e.judged]
         for c, channel in enumerate(e.channels):
             by_part = sums.setdefault(channel.rsplit("_", 1)[0], {p: [] for p in PARTS})

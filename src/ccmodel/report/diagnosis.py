@@ -71,7 +71,8 @@ def write_diagnosis(file: Path, found: Diagnosis) -> None:
 def _rivals(found: Diagnosis) -> list[dict]:
     j = found.judgement
     rows = [{"what": "the calibrated model", "left": float(j.calibrated.left.mean()), "p": None, "why": ""}]
-    for trial, p in list(zip(j.trials, j.probability, strict=True))[:RIVALS]:
+    ranked = sorted(zip(j.trials, j.probability, strict=True), key=lambda item: item[0].left.mean())
+    for trial, p in ranked[:RIVALS]:
         left = float(trial.left.mean())
         why = "named" if trial is j.best else f"leaves {left / max(float(j.best.left.mean()), 1e-9):.3g} times as much"
         rows.append({"what": str(trial.hypothesis), "left": left, "p": p, "why": why})
