@@ -12,6 +12,7 @@ include: "workflow/rules/identify.smk"
 include: "workflow/rules/simulate.smk"
 include: "workflow/rules/compare.smk"
 include: "workflow/rules/phases.smk"
+include: "workflow/rules/diagnose.smk"
 include: "workflow/rules/report.smk"
 
 

@@ -98,6 +98,9 @@ class Config(TypedModel):
 
     raw: str = Field("data/raw", description="folder with a folder a batch")
     results: str = Field("results", description="folder for all that the run makes")
+    diagnose: list[str] | Literal["each"] = Field(
+        default_factory=list, description="batches to diagnose: what differs from the model, and why; or 'each'"
+    )
     fits: dict[str, Fit] = Field(default_factory=dict, description="parameter sets fitted to recordings")
     studies: dict[str, Study] = Field(default_factory=dict, description="figures")
     phases: PhaseExample | None = Field(None, description="simulated example of the paper's Figs. 5 to 7; absent: none")
@@ -166,6 +169,9 @@ def expand_studies(config: Config, batches: list[str]) -> dict[str, Study]:
                     raise InputError(
                         f"{kind}.{name}: there is no batch '{batch}' in {config.raw}; there are " + ", ".join(batches)
                     )
+    for batch in [] if config.diagnose == EACH else config.diagnose:
+        if batch not in batches:
+            raise InputError(f"diagnose: there is no batch '{batch}' in {config.raw}; there are " + ", ".join(batches))
     expanded = {}
     for name, study in config.studies.items():
         if study.batches == EACH:

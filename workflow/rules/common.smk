@@ -48,6 +48,11 @@ def fit_of(parameters, batch):
     return f"{RESULTS}/fits/{parameters}/{scope}.json"
 
 
+def diagnosed():
+    """Batches that are diagnosed."""
+    return BATCHES if CONFIG.diagnose == EACH else CONFIG.diagnose
+
+
 def fits():
     return sorted({fit_of(name, batch) for name in CONFIG.fits for batch in BATCHES})
 

@@ -7,6 +7,9 @@ rule write_report:
             simulated.removesuffix(".nc") + ".json" for _, _, simulated in runs()
         ],
         figures=[f"{RESULTS}/figures/{study}.png" for study in STUDIES],
+        diagnoses=[
+            f"{RESULTS}/diagnoses/{batch}/diagnosis.json" for batch in diagnosed()
+        ],
         phases=rules.draw_phases.output if CONFIG.phases else [],
     output:
         page=f"{RESULTS}/index.html",

@@ -14,6 +14,7 @@ with logged(snakemake.log[0]):
         [Path(f) for f in snakemake.input.fits],
         [Path(f) for f in snakemake.input.summaries],
         [Path(f) for f in snakemake.input.simulations],
+        [Path(f) for f in snakemake.input.diagnoses],
         list(snakemake.params.unusable),
         Path(snakemake.output.page),
     )

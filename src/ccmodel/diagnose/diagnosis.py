@@ -23,8 +23,8 @@ from ccmodel.recording import Recording, unit_of
 FORMAT = 1
 # What no number of samples can promise: that the list of hypotheses holds the truth.
 MOST_CONFIDENT = 0.99
-# Enough for rates that such rigs run at; a third of the work.
-STEP_S = 0.008
+# Enough samples for what such rigs do in a recording; more of them are more work and no more evidence.
+STEP_S, MOST_SAMPLES = 0.008, 2000
 STIFFNESS_N_PER_M, FRICTION, LOAD = (1e2, 1e7), (0.005, 1.5), (1e-4, 10.0)
 
 
@@ -80,13 +80,16 @@ def diagnose(
     evidence = []
     for recording in recordings:
         try:
-            evidence.append(Evidence.of(recording, estimates, step_s=STEP_S))
+            step_s = max(STEP_S, float(np.ptp(recording.time_s)) / MOST_SAMPLES)
+            evidence.append(Evidence.of(recording, estimates, step_s=step_s))
         except (ModelError, ValueError) as error:
             not_judged.append({"what": recording.id, "why": str(error)})
     if not evidence:
         raise ModelError("none of the recordings can be compared with the model: " + not_judged[0]["why"])
     not_judged += _what_is_missing(evidence)
-    calibrated = _calibrated(estimates)
+    calibrated = _calibrated(estimates, evidence)
+    estimates = estimates.with_values({name: free.start for name, free in calibrated.items()})
+    evidence = [replace(e, parameters=estimates) for e in evidence]
     tell(f"calibrating the paper's model on {len(evidence)} recordings")
     start = _first_fit(evidence, calibrated)
     fitted = estimates.with_values(start)
@@ -96,13 +99,23 @@ def diagnose(
     return Diagnosis(said, judgement, weighed, estimates)
 
 
-def _calibrated(estimates: Parameters) -> dict[str, Free]:
+def _calibrated(estimates: Parameters, evidence: Sequence[Evidence]) -> dict[str, Free]:
+    """What a calibration leaves free: stiffness, friction, the load's spring, and what no rest shows."""
     free = {
         "stiffness_N_per_m": Free(estimates.stiffness_N_per_m, *STIFFNESS_N_PER_M),
         "friction_coefficient": Free(estimates.friction_coefficient, *FRICTION),
     }
     if estimates.load_stiffness_Nm_per_rad is not None:
         free["load_stiffness_Nm_per_rad"] = Free(estimates.load_stiffness_Nm_per_rad, *LOAD)
+    if any("T1_N" not in e.given.resting or "T2_N" not in e.given.resting for e in evidence):
+        aimed_at = float(np.mean([e.given.recording.pretension_N for e in evidence]))
+        free["pretension_N"] = Free(aimed_at, 0.01 * aimed_at, 100 * aimed_at)
+        free["load_radius_m"] = Free(
+            estimates.load_radius_m, 0.3 * estimates.load_radius_m, 3 * estimates.load_radius_m
+        )
+        reach = max(float(np.ptp(e.given.recording["tau_in_Nm"])) for e in evidence if "tau_in_Nm" in e.channels)
+        free["tau_in_zero_Nm"] = Free(0.0, -reach, reach)
+        free["tau_out_zero_Nm"] = Free(0.0, -reach, reach)
     return free
 
 
@@ -118,6 +131,9 @@ def _what_is_missing(evidence: Sequence[Evidence]) -> list[dict[str, str]]:
     for channel in MEASURED:
         if channel not in recorded:
             found.append({"what": channel, "why": "not recorded, or the load's course had to be taken from it"})
+    if any("T1_N" not in e.given.resting or "T2_N" not in e.given.resting for e in evidence):
+        why = "no rest with load cells shows them: fitted, one value for all recordings"
+        found.append({"what": "pretension, ratio of the pulleys, zeros of the torques", "why": why})
     if len(evidence) == 1:
         found.append({"what": "held-out error", "why": "a single recording: nothing can be held out"})
     if len({round(e.given.recording.path.bend_rad, 3) for e in evidence}) == 1:

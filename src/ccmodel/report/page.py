@@ -39,7 +39,7 @@ PHASE_CAPTIONS = {
 
 def write_page(
     file: Path, config: Config, studies: dict[str, Study], batches: Sequence[dict], errors: pd.DataFrame,
-    fits: Sequence[dict], left_out: Sequence[str], warnings: Sequence[str],
+    fits: Sequence[dict], diagnoses: Sequence[dict], left_out: Sequence[str], warnings: Sequence[str],
 ) -> None:  # fmt: skip
     """Write the page; figures are looked for in `figures/` beside it.
 
@@ -53,7 +53,7 @@ def write_page(
         What ingest said of each batch.
     errors : DataFrame
         All errors, with the columns of `ccmodel.compare.errors.COLUMNS`.
-    fits : sequence of dict
+    fits, diagnoses : sequence of dict
     left_out, warnings : sequence of str
     """
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
@@ -76,6 +76,7 @@ def write_page(
             notes={b["batch"]["batch"]: b["batch"]["note"] for b in batches if b["batch"] and b["batch"].get("note")},
             rows=_rows(errors),
             fits=fits,
+            diagnoses=diagnoses,
             left_out=left_out,
             warnings=warnings,
         )

@@ -1,5 +1,6 @@
 """A batch -> diagnosis.json, a page for a person, and the two models that were compared."""
 
+import html
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,9 +10,10 @@ from ccmodel.diagnose.diagnosis import diagnose as run
 from ccmodel.model.failure import ModelError
 from ccmodel.model.files import model_as_dict
 from ccmodel.model.parameters import Parameters
+from ccmodel.recording import read_recordings
 from ccmodel.report.diagnosis import headline, write_diagnosis
 from ccmodel.rig.ingest import ingest_batch
-from ccmodel.stages.files import write_json
+from ccmodel.stages.files import estimates_of, write_json
 from ccmodel.typed import InputError
 
 
@@ -24,6 +26,9 @@ def diagnose(batch: Path, out: Path, tell: Callable[[str], None] = lambda text: 
         If the batch cannot be used.
     """
     ingested = ingest_batch(batch)
+    inputs = provenance.of_inputs(sorted(p for p in batch.iterdir() if p.is_file()))
+    # The same input gives the same files wherever it stands.
+    inputs["sha256"] = {Path(name).name: digest for name, digest in inputs["sha256"].items()}
     refused = [f for f in ingested.findings if f.severity == "refused"]
     if ingested.batch is None or not ingested.recordings:
         raise InputError("\n".join(map(str, refused)) or f"{batch}: no recording that can be used")
@@ -32,16 +37,29 @@ def diagnose(batch: Path, out: Path, tell: Callable[[str], None] = lambda text: 
         found = run(ingested.recordings, Parameters.estimated(ingested.batch.rig), not_judged, tell)
     except ModelError as error:
         raise InputError(f"{batch}: {error}") from None
-    out.mkdir(parents=True, exist_ok=True)
-    _write(found, batch, out)
+    _write(found, inputs, out)
     return headline(found.said)
 
 
-def _write(found: Diagnosis, batch: Path, out: Path) -> None:
-    inputs = provenance.of_inputs(sorted(p for p in batch.iterdir() if p.is_file()))
-    # The same input gives the same files wherever it stands.
-    inputs["sha256"] = {Path(name).name: digest for name, digest in inputs["sha256"].items()}
-    write_json(out / "diagnosis.json", found.said | {"provenance": inputs})
+def diagnose_recordings(recordings_file: Path, out: Path) -> None:
+    """The same for recordings that the pipeline has read; a batch that cannot be diagnosed has a file that says why."""
+    estimates, recordings = estimates_of(recordings_file), read_recordings(recordings_file)
+    inputs = provenance.of_inputs([recordings_file])
+    try:
+        if estimates is None or not recordings:
+            raise ModelError("no recording that can be used")
+        found = run(recordings, estimates)
+    except ModelError as error:
+        out.mkdir(parents=True, exist_ok=True)
+        write_json(out / "diagnosis.json", {"batch": recordings_file.stem, "verdict": None, "why": str(error)})
+        (out / "report.html").write_text(f"<p>{recordings_file.stem}: not diagnosed: {html.escape(str(error))}</p>\n")
+        return
+    _write(found, inputs, out)
+
+
+def _write(found: Diagnosis, inputs: dict, out: Path) -> None:
+    out.mkdir(parents=True, exist_ok=True)
+    write_json(out / "diagnosis.json", found.said | {"headline": headline(found.said), "provenance": inputs})
     for name, trial in (("calibrated", found.judgement.calibrated), ("model", found.judgement.best)):
         write_json(out / f"{name}.json", model_as_dict(found.model(trial), inputs))
     write_diagnosis(out / "report.html", found)

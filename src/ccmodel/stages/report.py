@@ -25,7 +25,8 @@ class LeftOut:
 
 def write_report(
     config: Config, studies: dict[str, Study], errors_file: Path, fit_files: Sequence[Path],
-    summary_files: Sequence[Path], simulation_files: Sequence[Path], unusable: Sequence[str], page_file: Path,
+    summary_files: Sequence[Path], simulation_files: Sequence[Path], diagnosis_files: Sequence[Path],
+    unusable: Sequence[str], page_file: Path,
 ) -> None:  # fmt: skip
     """Write the page that shows everything, and beside it what was left out.
 
@@ -49,7 +50,8 @@ def write_report(
         warnings=[str(f) for f in findings if f.severity == "warning"],
     )
     write_json(page_file.parent / LEFT_OUT, asdict(said))
-    write_page(page_file, config, studies, batches, pd.read_parquet(errors_file), fits, said.left_out, said.warnings)
+    errors, diagnoses = pd.read_parquet(errors_file), [read_json(f) for f in diagnosis_files]
+    write_page(page_file, config, studies, batches, errors, fits, diagnoses, said.left_out, said.warnings)
 
 
 def left_out_of(results: Path) -> LeftOut:

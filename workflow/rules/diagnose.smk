@@ -1,0 +1,19 @@
+rule diagnose:
+    input:
+        recordings=lambda wildcards: recordings_of(wildcards.batch),
+    output:
+        f"{RESULTS}/diagnoses/{{batch}}/diagnosis.json",
+        f"{RESULTS}/diagnoses/{{batch}}/report.html",
+    log:
+        f"{RESULTS}/logs/diagnose/{{batch}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/diagnose/{{batch}}.tsv"
+    conda:
+        "../envs/ccmodel.yaml"
+    threads: 2
+    params:
+        sources=source_digest("ccmodel.stages.diagnose"),
+    message:
+        "Diagnosing batch {wildcards.batch}"
+    script:
+        "../scripts/diagnose_batch.py"
