@@ -1,0 +1,119 @@
+"""The command on small batches: what it writes, and what it does with bad ones."""
+
+import gzip
+import io
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from builders import write_batch
+from ccmodel import cli
+from ccmodel.model.files import read_model
+from ccmodel.typed import InputError
+
+RUBBING_NM = 4e-3
+# As the paper's sensors: the noise that makes the recordings ones.
+NOISE = {"drive_current_A": 1e-4 / 0.0234, "load_current_A": 1e-4 / 0.0234}
+NOISE |= {"drive_load_cell_V": 0.005, "load_load_cell_V": 0.005}
+
+
+def spoil(folder, change=lambda table: table, seed=0):
+    """Give the logs of a batch noise, and change them."""
+    random = np.random.default_rng(seed)
+    for file in sorted(folder.glob("*.csv.gz")):
+        table = pd.read_csv(file)
+        for column, sd in NOISE.items():
+            table[column] += sd * random.standard_normal(len(table))
+        text = io.StringIO()
+        change(table).to_csv(text, index=False, float_format="%.7g")
+        with gzip.open(file, "wt") as f:
+            f.write(text.getvalue())
+    return folder
+
+
+def rubbing(table):
+    """A bearing at the drive: a torque against the motion, built up over 2 mrad, that the cables know nothing of."""
+    theta = 0.6 * np.sin(2 * np.pi * np.maximum(table["time_s"].to_numpy() - 0.5, 0))
+    share = np.zeros_like(theta)
+    for k, turn in enumerate(np.diff(theta), start=1):
+        way = np.sign(turn)
+        share[k] = way + (share[k - 1] - way) * np.exp(-abs(turn) / 2e-3)
+    table["drive_current_A"] += share * RUBBING_NM / 0.0234
+    return table
+
+
+def run(*arguments):
+    return CliRunner().invoke(cli.app, [str(a) for a in arguments])
+
+
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("raw")
+    batch = spoil(write_batch(folder / "clean", pretensions=(7.0, 6.0, 5.0)))
+    assert run("diagnose", batch, "--out", folder / "out").exit_code == 0
+    return batch, folder / "out"
+
+
+def test_recordings_of_the_model_itself_agree_with_it(clean):
+    said = json.loads((clean[1] / "diagnosis.json").read_text())
+    assert said["verdict"] == "agrees"
+    assert said["mechanisms"] == []
+    found = read_model(clean[1] / "calibrated.json")
+    assert found.stiffness_N_per_m == pytest.approx(7750, rel=0.01)
+    assert found.friction_coefficient == pytest.approx(0.156, rel=0.01)
+    assert "agrees" in (clean[1] / "report.html").read_text()
+
+
+def test_the_same_input_gives_the_same_json(clean, tmp_path):
+    assert run("diagnose", clean[0], "--out", tmp_path).exit_code == 0
+    assert (tmp_path / "diagnosis.json").read_bytes() == (clean[1] / "diagnosis.json").read_bytes()
+
+
+def test_the_model_predicts_recordings(clean, tmp_path):
+    assert run("predict", clean[0], "--model", clean[1] / "model.json", "--out", tmp_path).exit_code == 0
+    said, log = pd.read_csv(tmp_path / "t-7N.csv"), pd.read_csv(clean[0] / "t-7N.csv.gz")
+    assert list(said.columns) == [
+        "time_s", "theta_in_rad", "theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N",
+        "T1_N", "T2_N", "T3_N", "T4_N",
+    ]  # fmt: skip
+    error = said["tau_in_Nm"] - 0.0234 * log["drive_current_A"]
+    assert np.sqrt(np.mean(error**2)) < 0.01 * np.ptp(said["tau_in_Nm"])
+
+
+def test_a_bearing_that_rubs_is_named(tmp_path):
+    batch = spoil(write_batch(tmp_path / "rubbing", pretensions=(7.0, 6.0, 5.0)), rubbing)
+    assert run("diagnose", batch, "--out", tmp_path / "out").exit_code == 0
+    said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert said["verdict"] == "explained"
+    (named,) = said["mechanisms"]
+    assert (named["name"], named["place"]) == ("pulley-friction", "drive-pulley")
+    assert named["parameters"][0]["value"] == pytest.approx(RUBBING_NM, rel=0.1)
+    assert said["location"]["place"] == "drive-pulley"
+    assert said["fit"]["error"]["tau_in"]["after"] < 0.3 * said["fit"]["error"]["tau_in"]["before"]
+
+
+def test_a_single_recording_without_load_cells_gets_a_verdict_that_says_what_it_cannot(tmp_path):
+    folder = write_batch(tmp_path / "poor", pretensions=(7.0,))
+    spoil(folder, lambda table: table.drop(columns=["drive_load_cell_V", "load_load_cell_V"]))
+    stated = yaml.safe_load((folder / "batch.yaml").read_text())
+    for end in ("drive", "load"):
+        del stated["rig"][end]["load_cell"]
+    (folder / "batch.yaml").write_text(yaml.safe_dump(stated))
+    assert run("diagnose", folder, "--out", tmp_path / "out").exit_code == 0
+    said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert {"F_drive_N", "F_load_N", "held-out error"} <= {n["what"] for n in said["not_judged"]}
+    assert not any(m["confidence"] > 0.8 for m in said["mechanisms"])
+
+
+def test_what_is_no_batch_is_one_line(tmp_path):
+    (tmp_path / "empty").mkdir()
+    found = run("diagnose", tmp_path / "empty", "--out", tmp_path / "out")
+    assert isinstance(found.exception, InputError)
+    assert len(str(found.exception).splitlines()) == 1
+    (tmp_path / "m.json").write_text("{}")
+    found = run("predict", tmp_path / "empty", "--model", tmp_path / "m.json", "--out", tmp_path / "out")
+    assert "m.json" in str(found.exception)

@@ -1,0 +1,48 @@
+import numpy as np
+import pytest
+
+from ccmodel import mechanisms
+from ccmodel.diagnose.hypothesis import Hypothesis, plausible, singles
+from ccmodel.diagnose.trial import scaled
+from ccmodel.model.parameters import mechanism_parameter
+
+
+def test_every_mechanism_is_asked_at_each_of_its_places():
+    asked = {h.acting[0] for h in singles()}
+    assert asked == {(name, place) for name in mechanisms.names() for place in mechanisms.get(name).places}
+
+
+@pytest.mark.parametrize("hypothesis", singles(), ids=str)
+def test_probes_are_plausible_and_within_reach_of_a_fit(hypothesis):
+    probes = list(hypothesis.probes())
+    assert probes
+    for probe in probes:
+        assert plausible(hypothesis, probe)
+        for key, free in hypothesis.free(probe).items():
+            assert free.low <= probe[key] <= free.high
+            assert free.start == probe[key]
+
+
+def test_a_probe_is_scaled_about_the_neutral_value():
+    drag = Hypothesis((("constant-drag", "conduit"),))
+    probe = next(drag.probes())
+    ((key, value),) = probe.items()
+    assert scaled(drag, probe, 2.0)[key] == pytest.approx(2 * value)
+    assert scaled(drag, probe, -1.0) is None
+    gain = Hypothesis((("torque-scale", "load-sensor"),))
+    ((key, value),) = next(gain.probes()).items()
+    assert scaled(gain, {key: value}, -1.0)[key] == pytest.approx(-value)
+    uneven = Hypothesis((("cable-asymmetry", "cable"),))
+    for probe in uneven.probes():
+        back = scaled(uneven, probe, -1.0)
+        for key, value in probe.items():
+            assert back[key] - 1 == pytest.approx(1 - value)
+
+
+def test_a_number_far_out_of_its_range_is_not_plausible():
+    friction = Hypothesis((("pulley-friction", "drive-pulley"),))
+    key = "pulley-friction/drive-pulley/friction_torque"
+    assert mechanism_parameter(key) == ("pulley-friction", "drive-pulley", "friction_torque")
+    assert plausible(friction, {key: 5e-3})
+    assert not plausible(friction, {key: 5.0})
+    assert not plausible(friction, {key: np.float64(1e-6)})

@@ -1,0 +1,71 @@
+"""The verdict from what trials leave, without any model run."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.diagnose.judge import _names_more, _probabilities, _verdict, nested_errors
+from ccmodel.diagnose.trial import Trial
+
+FRICTION, SCALE = ("pulley-friction", "drive-pulley"), ("torque-scale", "drive-sensor")
+BASE_VALUES = {"friction_coefficient": 0.15}
+VALUES = {"pulley-friction/drive-pulley/friction_torque": 4e-3, "torque-scale/drive-sensor/gain": 0.05}
+CHANNELS = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N")
+WEIGHED = [SimpleNamespace(evidence=SimpleNamespace(channels=CHANNELS))] * 8
+
+
+def trial(left, *acting, **values):
+    own = {k: v for k, v in VALUES.items() if any(k.startswith(name) for name, _ in acting)} | values
+    left = np.broadcast_to(np.asarray(left, float), 8)
+    return Trial(Hypothesis(acting), BASE_VALUES | own, [], [], np.eye(1), [BASE_VALUES] * 8, left)
+
+
+def verdict(base, *trials):
+    trials = sorted(trials, key=lambda t: t.left.mean())
+    return _verdict(base, trials, _probabilities(WEIGHED, base, trials), [])
+
+
+def test_nothing_missing():
+    assert verdict(trial(0.95), trial(0.94, FRICTION), trial(0.95, SCALE)).verdict == "agrees"
+    assert verdict(trial(1.1)).verdict == "agrees"
+
+
+def test_one_mechanism_brings_it_down_to_noise_and_nothing_else_does():
+    found = verdict(trial(6.0), trial(1.0, FRICTION), trial(4.0, SCALE))
+    assert found.verdict == "explained"
+    assert found.best.hypothesis.acting == (FRICTION,)
+    assert found.probability[0] > 0.99
+
+
+def test_two_that_do_as_well_are_not_told_apart():
+    found = verdict(trial(6.0), trial(1.0, FRICTION), trial(1.0005, SCALE))
+    assert found.verdict == "undecided"
+    assert sum(found.probability) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_what_no_mechanism_brings_down_is_unexplained():
+    assert verdict(trial(40.0), trial(30.0, FRICTION), trial(35.0, SCALE)).verdict == "unexplained"
+    assert verdict(trial(5.0)).verdict == "unexplained"
+
+
+def test_a_value_out_of_its_range_explains_nothing():
+    wild = trial(1.0, FRICTION, **{"pulley-friction/drive-pulley/friction_torque": 0.5})
+    assert verdict(trial(6.0), wild).verdict == "unexplained"
+
+
+def test_a_pair_must_halve_what_its_members_leave():
+    alone = trial(1.9, FRICTION)
+    assert not _names_more(trial(1.6, FRICTION, SCALE), [alone])
+    assert _names_more(trial(1.2, FRICTION, SCALE), [alone])
+
+
+def test_a_recording_is_judged_by_what_the_others_chose():
+    base = trial(6.0)
+    # The first recording alone speaks for the friction; without it the other one wins.
+    friction = trial([0.0, *[1.5] * 7], FRICTION)
+    scale = trial([9.0, *[1.4] * 7], SCALE)
+    chosen = nested_errors(verdict(base, friction, scale))
+    assert chosen[0].hypothesis.acting == (SCALE,)
+    assert chosen[1].hypothesis.acting == (FRICTION,)
