@@ -58,5 +58,5 @@ def size_of(name: str, value: float) -> float:
         return abs(value)
     if (parts := mechanism_parameter(name)) is not None:
         mechanism, _, parameter = parts
-        return next(p.start for p in registry.get(mechanism).parameters if p.name == parameter)
+        return next(p.start for p in registry.get(mechanism).parameters if p.name == parameter) or 1.0
     return next((size for end, size in SIZE_AT_ZERO.items() if name.endswith(end)), 1.0)
