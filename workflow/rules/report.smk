@@ -7,6 +7,8 @@ rule write_report:
             simulated.removesuffix(".nc") + ".json" for _, _, simulated in runs()
         ],
         figures=[f"{RESULTS}/figures/{study}.png" for study in STUDIES],
+        claims=[f"{RESULTS}/tables/claims.json"] if CONFIG.claims else [],
+        accuracy=[f"{RESULTS}/tables/accuracy.json"] if CONFIG.accuracy else [],
     output:
         page=f"{RESULTS}/index.html",
         left_out=f"{RESULTS}/left-out.json",

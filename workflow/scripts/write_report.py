@@ -15,5 +15,6 @@ with logged(snakemake.log[0]):
         [Path(f) for f in snakemake.input.summaries],
         [Path(f) for f in snakemake.input.simulations],
         list(snakemake.params.unusable),
+        [Path(f) for f in (*snakemake.input.claims, *snakemake.input.accuracy)],
         Path(snakemake.output.page),
     )

@@ -7,7 +7,8 @@ of, and otherwise not determined.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -82,10 +83,6 @@ class Claim:
     borne_out: str
     sentence: str
     rows: list[Row] = field(default_factory=list)
-
-    def as_dict(self) -> dict:
-        """Plain data for a JSON file."""
-        return asdict(self)
 
 
 @dataclass(frozen=True)
@@ -196,7 +193,7 @@ def _goes(means: Sequence[Estimate], way: int, claims: Claims) -> str:
     """Whether values rise (way +1) or fall from one to the next."""
     if len(means) < 2 or not means[0].freedom:
         return OPEN
-    steps = [difference(a, b) for a, b in zip(means[:-1], means[1:], strict=True)]
+    steps = [difference(a, b) for a, b in pairwise(means)]
     if all(way * s.value > s.reach(claims.coverage) for s in steps):
         return YES
     whole = difference(means[0], means[-1])
@@ -294,7 +291,7 @@ def _model_inside(series: Mapping[str, _Series]) -> str:
     return f"The model lies within {inside} of {len(rows)} intervals." if rows else ""
 
 
-# ---------------------------------------------------------------------------------------------------- of the model alone
+# --------------------------------------------------------------------------------------------------- of the model alone
 
 
 def _model_claims(parameters: Parameters | None, claims: Claims, how: Measuring) -> list[Claim]:
@@ -399,7 +396,9 @@ def _sections(parameters: Parameters, claims: Claims) -> Claim:
             for n in study.sections
         }
         name = label_of(bend, "bend")
-        rows += [Row("sections_error", "%", f"{name}, {n} sections", n, MODEL_STUDY, model=e) for n, e in errors.items()]
+        rows += [
+            Row("sections_error", "%", f"{name}, {n} sections", n, MODEL_STUDY, model=e) for n, e in errors.items()
+        ]
         needed = model_study.sections_needed(errors, study.sections_error_percent)
         said = f"more than {max(errors)}" if needed is None else str(needed)
         own = f"; the paper's {PAPER_SECTIONS} leave {errors[PAPER_SECTIONS]:.2g} %" if PAPER_SECTIONS in errors else ""

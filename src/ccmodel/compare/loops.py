@@ -90,7 +90,7 @@ def width(cycle: Cycle, loop: tuple[str, str] = TORQUE_LOOP) -> float:
 
 
 def slope(cycle: Cycle, loop: tuple[str, str] = TORQUE_LOOP) -> float:
-    """dy / dx in the middle of y's range, mean of the two branches."""
+    """Gradient dy / dx in the middle of y's range, mean of the two branches."""
     return float(np.mean([1 / gradient for _, gradient in _middle_lines(cycle, loop)]))
 
 
@@ -133,7 +133,7 @@ def slack_before_turn_share(cycle: Cycle) -> float:
 
 
 def slack_slope(cycle: Cycle) -> float:
-    """d tau_out / d tau_in while one cable is slack and the drive goes on, mean of the two branches."""
+    """Gradient of tau_out over tau_in while one cable is slack and the drive goes on, mean of the two branches."""
     tau_in, tau_out = (cycle[c] for c in TORQUE_LOOP)
     found = []
     for branch in cycle.branches:

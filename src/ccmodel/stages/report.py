@@ -25,11 +25,13 @@ class LeftOut:
 
 def write_report(
     config: Config, studies: dict[str, Study], errors_file: Path, fit_files: Sequence[Path],
-    summary_files: Sequence[Path], simulation_files: Sequence[Path], unusable: Sequence[str], page_file: Path,
+    summary_files: Sequence[Path], simulation_files: Sequence[Path], unusable: Sequence[str],
+    judgement_files: Sequence[Path], page_file: Path,
 ) -> None:  # fmt: skip
     """Write the page that shows everything, and beside it what was left out.
 
-    `unusable` are lines on folders that cannot be a batch at all.
+    `unusable` are lines on folders that cannot be a batch at all, `judgement_files` what was asked for of claims.json
+    and accuracy.json.
     """
     batches = [read_json(f) for f in summary_files]
     fits = [read_json(f) for f in fit_files]
@@ -49,7 +51,9 @@ def write_report(
         warnings=[str(f) for f in findings if f.severity == "warning"],
     )
     write_json(page_file.parent / LEFT_OUT, asdict(said))
-    write_page(page_file, config, studies, batches, pd.read_parquet(errors_file), fits, said.left_out, said.warnings)
+    judged = {file.stem: read_json(file) for file in judgement_files}
+    errors = pd.read_parquet(errors_file)
+    write_page(page_file, config, studies, batches, errors, fits, said.left_out, said.warnings, judged)
 
 
 def left_out_of(results: Path) -> LeftOut:
