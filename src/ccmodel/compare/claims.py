@@ -247,10 +247,7 @@ def _radius(pairs: Sequence[Pair], claims: Claims, how: Measuring) -> Claim:
         small = claims.small_percent
         verdicts.append(YES if high < small else NO if low > small else OPEN)
         rows.append(Row(*place, sum(e.count for e in s.estimates), value, low, high, model))
-        told.append(
-            f"{QUANTITIES[quantity].text} {value:.2g} % (at most {high:.2g} %; model"
-            f" {'–' if model is None else format(model, '.2g')} %)"
-        )
+        told.append(f"{QUANTITIES[quantity].text} {value:.2g} % (at most {high:.2g} %; model {_small(model)} %)")
     sentence = "Between the radii the means differ by: " + "; ".join(told) + "." if told else "Nothing to compare."
     return Claim("radius", "V-C", "at one angle of bend the loop's radius makes next to no difference",
                  _joint(verdicts), sentence, rows)  # fmt: skip
@@ -275,14 +272,22 @@ def _told(quantity: str, rows: Sequence[Row]) -> str:
     q = QUANTITIES[quantity]
     parts = []
     for row in rows:
-        model = "–" if row.model is None else f"{row.model:.3g}"
+        model = _three_digits(row.model)
         if row.value is None:
             parts.append(f"{row.condition}: – ({row.gap}; model {model})")
         else:
-            reach = "" if row.low is None else f" ({row.low:.3g} to {row.high:.3g})"
-            parts.append(f"{row.condition}: {row.value:.3g}{reach}, model {model}")
+            reach = "" if row.low is None else f" ({_three_digits(row.low)} to {_three_digits(row.high)})"
+            parts.append(f"{row.condition}: {_three_digits(row.value)}{reach}, model {model}")
     unit = "" if q.unit == "1" else f" ({q.unit})"
     return f"{q.text[0].upper()}{q.text[1:]}{unit}: " + "; ".join(parts) + "."
+
+
+def _three_digits(value: float | None) -> str:
+    """A number with three digits that count, trailing zeros among them."""
+    if value is None:
+        return "–"
+    before = int(np.floor(np.log10(abs(value)))) if abs(value) >= 1e-3 else 0
+    return f"{value:.{max(0, 2 - before)}f}"
 
 
 def _model_inside(series: Mapping[str, _Series]) -> str:
@@ -381,7 +386,7 @@ def _placement(parameters: Parameters, claims: Claims, how: Measuring) -> Claim:
 
 
 def _number(values: Mapping[str, float], quantity: str) -> str:
-    return format(values[quantity], ".3g") if quantity in values else "–"
+    return _three_digits(values.get(quantity))
 
 
 def _sections(parameters: Parameters, claims: Claims) -> Claim:
@@ -408,7 +413,8 @@ def _sections(parameters: Parameters, claims: Claims) -> Claim:
         f"Sections for an error below {study.sections_error_percent:g} % of peak to peak in the worst channel, against"
         " the exact solver: " + "; ".join(tell) + "."
     )
-    return Claim("sections", "III-B and IV", f"{PAPER_SECTIONS} sections are enough for a simulation",
+    says = f"simulates with {PAPER_SECTIONS} sections of each cable, and names no error"
+    return Claim("sections", "III-B and IV", says,
                  YES if all(enough) else PART if any(enough) else NO, sentence, rows)  # fmt: skip
 
 

@@ -32,6 +32,9 @@ class Cycle:
     Attributes
     ----------
     channels : dict of str to ndarray, shape (n,)
+    slack : ndarray of bool, shape (2, n), or None
+        Whether cable A and B hang slack: tension at both ends below the threshold, at most of the samples around, not
+        in their mean, which would end every slack early. None where a tension was not recorded.
     branches : tuple of ndarray of int
         Samples of each branch in the order of time, from one turn of the drive to the next; the one that the cycle's
         beginning cuts in two is put together again.
@@ -39,6 +42,7 @@ class Cycle:
     """
 
     channels: dict[str, NDArray]
+    slack: NDArray | None
     branches: tuple[NDArray, NDArray]
     how: Measuring
 
@@ -65,7 +69,9 @@ class Cycle:
         up, down = int(theta.argmax()), int(theta.argmin())
         if not up < down:
             raise NotMeasurableError("the drive does not go up and down once in its cycle")
-        return cls(channels, (np.arange(up, down + 1), np.r_[down:n, 0 : up + 1]), how)
+        slack = _slack(recording, how, size)
+        slack = None if slack is None else slack[:, window]
+        return cls(channels, slack, (np.arange(up, down + 1), np.r_[down:n, 0 : up + 1]), how)
 
     def __getitem__(self, channel: str) -> NDArray:
         if channel not in self.channels:
@@ -73,9 +79,18 @@ class Cycle:
         return self.channels[channel]
 
     @property
-    def slack(self) -> NDArray:
-        """Whether cable A and B hang slack, tension at both ends below the threshold; shape (2, n), bool."""
-        return np.stack([np.maximum(self[near], self[far]) < self.how.slack_below_N for near, far in CABLES])
+    def slack_cables(self) -> NDArray:
+        """`slack`, where it is known."""
+        if self.slack is None:
+            raise NotMeasurableError("a tension was not recorded")
+        return self.slack
+
+
+def _slack(recording: Recording, how: Measuring, size: int) -> NDArray | None:
+    if not all(c in recording for c in TENSIONS):
+        return None
+    below = [np.maximum(recording[near], recording[far]) < how.slack_below_N for near, far in CABLES]
+    return uniform_filter1d(np.array(below, dtype=float), size, axis=1) > 0.5
 
 
 def peak_to_peak(cycle: Cycle, channel: str) -> float:
@@ -114,12 +129,12 @@ def deadband(cycle: Cycle, loop: tuple[str, str] = TORQUE_LOOP) -> float:
 
 def slack_share(cycle: Cycle) -> float:
     """Share of the cycle's samples at which a cable hangs slack."""
-    return float(cycle.slack.any(axis=0).mean())
+    return float(cycle.slack_cables.any(axis=0).mean())
 
 
 def slack_through_turn_share(cycle: Cycle) -> float:
     """Share of the cycle at which a cable still hangs slack from before the turn, while the load follows: phase IVb."""
-    y, slack = cycle["tau_out_Nm"], cycle.slack
+    y, slack = cycle["tau_out_Nm"], cycle.slack_cables
     span, count = float(np.ptp(y)), 0
     for branch in cycle.branches:
         still = np.logical_and.accumulate(slack[:, branch], axis=1).any(axis=0)
@@ -259,6 +274,6 @@ def _line(u: NDArray, v: NDArray, at: float, how: Measuring) -> tuple[float, flo
 def _slack_to_the_turn(cycle: Cycle, branch: NDArray) -> NDArray:
     """The last samples of a branch at all of which the same cable hangs slack, while the load follows."""
     y = cycle["tau_out_Nm"]
-    to_the_turn = np.logical_and.accumulate(cycle.slack[:, branch[::-1]], axis=1)[:, ::-1].any(axis=0)
+    to_the_turn = np.logical_and.accumulate(cycle.slack_cables[:, branch[::-1]], axis=1)[:, ::-1].any(axis=0)
     follows = np.abs(y[branch] - y[branch[0]]) > cycle.how.moved_share * float(np.ptp(y))
     return branch[to_the_turn & follows]

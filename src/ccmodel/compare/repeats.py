@@ -21,12 +21,13 @@ def pooled_scatter(groups: Sequence[Sequence[float]], relative: bool) -> tuple[f
     """Standard deviation of a single recording about the mean of its condition, and its degrees of freedom.
 
     Two repeats say little by themselves; all conditions are taken to scatter alike, relative to their means or, for
-    shares that may be zero, absolutely. Without a repeat anywhere there is none: (0, 0).
+    shares that may be zero, absolutely. A condition of zeros only is no witness of any scatter. Without a repeat
+    anywhere there is none: (0, 0).
     """
     square, freedom = 0.0, 0
     for group in groups:
         values = np.asarray(group, dtype=float)
-        if values.size > 1:
+        if values.size > 1 and values.any():
             scale = abs(values.mean()) if relative else 1.0
             square += float(((values - values.mean()) ** 2).sum()) / (scale**2 if scale > 0 else 1.0)
             freedom += values.size - 1
