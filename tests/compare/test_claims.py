@@ -40,7 +40,7 @@ def found():
 
 
 @pytest.mark.parametrize(
-    "name", ["backlash-and-bend", "slack-and-bend", "backlash-and-pretension", "slack-and-pretension",
+    "name", ["backlash-and-bend", "slope-and-bend", "slack-and-bend", "backlash-and-pretension", "slack-and-pretension",
              "phases-and-pretension", "radius", "loop-placement"]
 )  # fmt: skip
 def test_what_the_model_does_is_borne_out(found, name):

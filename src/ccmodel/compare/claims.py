@@ -17,6 +17,7 @@ from ccmodel.compare.loops import QUANTITIES, measure
 from ccmodel.compare.repeats import Estimate, difference, estimates
 from ccmodel.compare.studies import label_of, labelled, origins_of, value_of
 from ccmodel.config import Claims, Measuring, ModelStudies
+from ccmodel.geometry import ConduitPath
 from ccmodel.model.failure import ModelError
 from ccmodel.model.paper import SECTIONS as PAPER_SECTIONS
 from ccmodel.model.parameters import Parameters
@@ -87,7 +88,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class _Trend:
-    """A claim that quantities rise (+1) or fall (-1) with what a study varies."""
+    """A claim that quantities rise (+1) or fall (-1) with what a study varies; `beside` are told, but judge nothing."""
 
     name: str
     section: str
@@ -95,14 +96,13 @@ class _Trend:
     variable: str
     quantities: tuple[str, ...]
     way: int
+    beside: tuple[str, ...] = ()
 
 
 _TRENDS = (
     _Trend("backlash-and-bend", "V-A", "the backlash widens with the angle of bend", "bend", ("backlash", "width"), 1),
-    _Trend(
-        "slope-and-bend", "V-A", "the slope of the torque loop falls with the angle of bend, above all while a cable"
-        " is slack", "bend", ("slack_slope", "slope"), -1,
-    ),
+    _Trend("slope-and-bend", "V-A", "with more bend the loop is less steep while a cable is slack", "bend",
+           ("slack_slope",), -1, beside=("slope",)),
     _Trend("slack-and-bend", "V-A", "more bend keeps a cable slack for longer", "bend", ("slack_share",), 1),
     _Trend("backlash-and-pretension", "V-B", "the backlash widens with pretension", "pretension",
            ("backlash", "width"), 1),
@@ -127,7 +127,7 @@ def claims_of(
     """
     found = [_trend(trend, pairs[trend.variable], claims, how) for trend in _TRENDS]
     found.append(_phases(pairs["pretension"], claims, how))
-    found.append(_radius(pairs["radius"], claims, how))
+    found.append(_radius(pairs["radius"], parameters, claims, how))
     return found + _model_claims(parameters, claims, how)
 
 
@@ -182,8 +182,9 @@ def _numbers(recordings: Sequence[Recording], quantity: str, how: Measuring) -> 
 
 
 def _trend(trend: _Trend, pairs: Sequence[Pair], claims: Claims, how: Measuring) -> Claim:
-    series = {q: _series(pairs, trend.variable, q, claims, how) for q in trend.quantities}
-    verdicts = [_goes(s.estimates, trend.way, claims) for s in series.values()]
+    told = trend.quantities + trend.beside
+    series = {q: _series(pairs, trend.variable, q, claims, how) for q in told}
+    verdicts = [_goes(series[q].estimates, trend.way, claims) for q in trend.quantities]
     sentence = " ".join(_told(q, s.rows) for q, s in series.items()) + " " + _model_inside(series)
     rows = [row for s in series.values() for row in s.rows]
     return Claim(trend.name, trend.section, trend.says, _joint(verdicts), sentence, rows)
@@ -228,7 +229,7 @@ def _phases(pairs: Sequence[Pair], claims: Claims, how: Measuring) -> Claim:
     return Claim("phases-and-pretension", "V-B", says, verdict, sentence, rows)
 
 
-def _radius(pairs: Sequence[Pair], claims: Claims, how: Measuring) -> Claim:
+def _radius(pairs: Sequence[Pair], parameters: Parameters | None, claims: Claims, how: Measuring) -> Claim:
     """How far the largest and the smallest of the radii's means lie apart."""
     series = {q: _series(pairs, "radius", q, claims, how) for q in ("backlash", "width", "slope")}
     verdicts, told, rows = [], [], []
@@ -249,8 +250,25 @@ def _radius(pairs: Sequence[Pair], claims: Claims, how: Measuring) -> Claim:
         rows.append(Row(*place, sum(e.count for e in s.estimates), value, low, high, model))
         told.append(f"{QUANTITIES[quantity].text} {value:.2g} % (at most {high:.2g} %; model {_small(model)} %)")
     sentence = "Between the radii the means differ by: " + "; ".join(told) + "." if told else "Nothing to compare."
+    alone = _spread_percent(_alone([r.path for r, _ in pairs], parameters, claims.model, how))
+    if alone is not None:
+        rows.append(Row("backlash_spread", "%", "all radii, one pretension", np.nan, MODEL_STUDY, model=alone))
+        sentence += f" At one and the same pretension the model's backlash differs by {_small(alone)} %."
     return Claim("radius", "V-C", "at one angle of bend the loop's radius makes next to no difference",
                  _joint(verdicts), sentence, rows)  # fmt: skip
+
+
+def _alone(
+    paths: Sequence[ConduitPath], parameters: Parameters | None, study: ModelStudies, how: Measuring
+) -> list[float]:
+    """Backlash of the model alone on some paths, all at the study's pretension; none where it cannot be run."""
+    if parameters is None or parameters.load_stiffness_Nm_per_rad is None:
+        return []
+    try:
+        runs = [model_study.run(parameters, path, parameters.load_stiffness_Nm_per_rad, study) for path in paths]
+    except ModelError:
+        return []
+    return [v for run in runs for v in measure(run, ["backlash"], how)[0].values()]
 
 
 def _spread(series: _Series, claims: Claims) -> tuple[float, float] | None:
