@@ -99,3 +99,24 @@ def test_a_quantity_with_too_few_recordings_says_so():
     (line, *_) = summary(comparison_table(cases()[:2], ASKED, HOW), ASKED)
     assert line["gap"] == "2 pairs, fewer than the 3 that a scatter takes"
     assert line["delta"] is None
+
+
+def test_an_input_that_is_not_determined_is_named():
+    (case, *_) = cases()
+    table = comparison_table([replace(case, input_sd={"friction_coefficient": np.inf})], ASKED, HOW)
+    assert (table["inputs_left_out"] == "friction_coefficient").all()
+    assert (table["u_input"] == 0).all()
+
+
+def test_repeats_count_as_far_as_the_model_was_not_told_of_them():
+    """Two recordings of one condition that differ as the model says they do, and two that differ by more."""
+    a, b = cases()[:2]
+    told = [replace(c, recorded=replace(c.recorded, id=f"r-{x}")) for c, x in ((a, "a"), (b, "b"))]
+    table = comparison_table(told, ASKED, HOW)
+    assert table["u_repeat"].max() < 1e-3 * table["recorded"].max()
+    louder = dict(b.recorded.channels) | {"tau_in_Nm": 1.02 * b.recorded["tau_in_Nm"]}
+    told[1] = replace(told[1], recorded=replace(told[1].recorded, channels=louder))
+    table = comparison_table(told, ASKED, HOW).set_index("quantity")
+    assert table.loc["tau_in", "u_repeat"].iloc[0] == pytest.approx(
+        np.log(1.02) / np.sqrt(2) * table.loc["tau_in", "recorded"].iloc[0], rel=0.01
+    )

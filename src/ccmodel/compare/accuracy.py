@@ -27,8 +27,9 @@ import pandas as pd
 from scipy.stats import t
 
 from ccmodel.compare.loops import QUANTITIES, Quantity, measure
-from ccmodel.compare.repeats import condition_of, pooled_scatter
+from ccmodel.compare.repeats import condition_of, pooled_scatter, without_repeat
 from ccmodel.config import Accuracy, Measuring
+from ccmodel.model.failure import ModelError
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import PRESCRIBED, ModelInput, simulate
 from ccmodel.recording import Recording
@@ -42,6 +43,7 @@ BY_RECORDING = {
     "batch": str, "recording": str, "origin": str, "quantity": str, "unit": str, "recorded": float, "modelled": float,
     "E": float, "u_num": float, "u_input": float, "u_sensor": float, "u_repeat": float, "u_D": float, "u_val": float,
     "within": bool, "fitted": bool,
+    "inputs_left_out": str,
 }  # fmt: skip
 
 
@@ -116,7 +118,8 @@ class Case:
     parameters : Parameters
         What the model ran with.
     input_sd : mapping of str to float
-        Standard deviations of fitted parameters, taken as independent of each other.
+        Standard deviations of fitted parameters, taken as independent of each other; infinite where the recordings
+        do not determine one.
     fitted : bool
         Whether the parameters were fitted on this very recording.
     """
@@ -187,7 +190,7 @@ def _rows(case: Case, how: Measuring) -> list[dict]:
     judged = [q for q, sd in sensors.items() if sd is not None]
     if not judged:
         return []
-    u_num, u_input = _model_uncertainty(case, judged, how)
+    u_num, u_input, left_out = _model_uncertainty(case, judged, how)
     return [
         {
             "batch": recorded.batch,
@@ -203,6 +206,7 @@ def _rows(case: Case, how: Measuring) -> list[dict]:
             "u_input": u_input[q],
             "u_sensor": sensors[q],
             "fitted": case.fitted,
+            "inputs_left_out": " ".join(left_out),
         }
         for q in judged
     ]
@@ -214,29 +218,37 @@ def _prescribed(quantity: Quantity, modelled: Recording) -> bool:
     return not given.isdisjoint(quantity.channels)
 
 
-def _model_uncertainty(case: Case, names: Sequence[str], how: Measuring) -> tuple[dict, dict]:
-    """Standard uncertainties of modelled quantities by the numerical solution and by the inputs.
+def _model_uncertainty(case: Case, names: Sequence[str], how: Measuring) -> tuple[dict, dict, list[str]]:
+    """Standard uncertainties of modelled quantities by the numerical solution and by the inputs; inputs left out.
 
     Numerical: what changes with every other sample left out; the exact solver has no grid but that of the samples.
     Inputs: each parameter one standard deviation aside, one at a time, and the tension read at rest by its accuracy.
+    One that has no such deviation, or with which the model cannot be run, is left out.
     """
     given = ModelInput.of(case.recorded)
     base = measure(simulate(given, case.parameters), names, how)[0]
     coarse = measure(simulate(_every_other(given), case.parameters), names, how)[0]
-    squares = dict.fromkeys(names, 0.0)
-    for values in _aside(case):
-        said = measure(simulate(given, case.parameters.with_values(values)), names, how)[0]
+    squares, left_out = dict.fromkeys(names, 0.0), []
+    for name, value in _aside(case).items():
+        try:
+            if not np.isfinite(value):
+                raise ModelError(f"{name} is not determined")
+            said = measure(simulate(given, case.parameters.with_values({name: value})), names, how)[0]
+        except (ModelError, ValueError):
+            left_out.append(name)
+            continue
         for q in names:
             squares[q] += (said.get(q, base[q]) - base[q]) ** 2
-    return {q: abs(coarse.get(q, base[q]) - base[q]) for q in names}, {q: float(np.sqrt(s)) for q, s in squares.items()}
+    u_num = {q: abs(coarse.get(q, base[q]) - base[q]) for q in names}
+    return u_num, {q: float(np.sqrt(square)) for q, square in squares.items()}, left_out
 
 
-def _aside(case: Case) -> list[dict[str, float]]:
-    aside = [{name: case.parameters.value_of(name) + sd} for name, sd in case.input_sd.items()]
+def _aside(case: Case) -> dict[str, float]:
+    """Values one standard deviation aside, by parameter."""
+    aside = {name: case.parameters.value_of(name) + sd for name, sd in case.input_sd.items()}
     read = [case.recorded.accuracy.get(f"T{i}_N") for i in (1, 2, 3, 4)]
     if case.parameters.pretension_N is None and all(read) and case.recorded.rest_s > 0:
-        scale = case.parameters.pretension_scale
-        aside.append({"pretension_scale": scale * (1 + max(read) / case.recorded.pretension_N)})
+        aside["pretension_scale"] = case.parameters.pretension_scale * (1 + max(read) / case.recorded.pretension_N)
     return aside
 
 
@@ -262,6 +274,8 @@ def summary(table: pd.DataFrame, settings: Accuracy) -> list[dict]:
             line |= vars(bias_and_scatter(group["modelled"], group["recorded"], sigma_E, settings.coverage))
         except ValueError as gap:
             line["gap"] = str(gap)
+        repeats = len(group) - len(set(group["batch"] + "/" + group["recording"].map(without_repeat)))
+        line |= {"repeats": repeats, "inputs_left_out": sorted(set(" ".join(group["inputs_left_out"]).split()))}
         line |= {"E_mean": float(group["E"].mean()), "within": int(group["within"].sum())}
         line |= {f"{u}_rms": float(np.sqrt((group[u] ** 2).mean())) for u in ("E", "u_num", "u_input", "u_D", "u_val")}
         lines.append(line)

@@ -14,7 +14,12 @@ _REPEAT = re.compile(r"-[a-z]$")
 
 def condition_of(recording: Recording) -> str:
     """Batch and condition of a recording: its name without the letter (-a, -b, ...) that repeats differ by."""
-    return f"{recording.batch}/{_REPEAT.sub('', recording.id)}"
+    return f"{recording.batch}/{without_repeat(recording.id)}"
+
+
+def without_repeat(name: str) -> str:
+    """A recording's name without the letter that repeats differ by."""
+    return _REPEAT.sub("", name)
 
 
 def pooled_scatter(groups: Sequence[Sequence[float]], relative: bool) -> tuple[float, int]:

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from ccmodel import provenance
@@ -23,7 +22,8 @@ def judge_accuracy(
     table = comparison_table([case for run in runs for case in _cases(*run)], settings, how)
     lines = summary(table, settings)
     table.to_csv(by_recording_file, index=False, float_format="%.6g")
-    pd.DataFrame(lines).to_csv(csv_file, index=False, float_format="%.6g")
+    flat = [line | {"inputs_left_out": " ".join(line["inputs_left_out"])} for line in lines]
+    pd.DataFrame(flat).to_csv(csv_file, index=False, float_format="%.6g")
     inputs = provenance.of_inputs({file for run in runs for file in run if file is not None})
     write_json(summary_file, {"settings": settings.model_dump(), "quantities": lines, "provenance": inputs})
     for draw, files in ((scatter_figure, scatter_files), (ratio_figure, ratio_files)):
@@ -38,10 +38,9 @@ def _cases(recordings_file: Path, simulated_file: Path, fit_file: Path | None) -
     if estimates is None or not fit["succeeded"]:
         return []
     sds = {name: interval["sd"] for name, interval in fit.get("intervals", {}).items()}
-    input_sd = {name: sd for name, sd in sds.items() if sd is not None and np.isfinite(sd)}
     parameters = estimates.with_values(fit["values"])
     return [
-        Case(recorded, said, parameters, input_sd, f"{recorded.batch}/{recorded.id}" in fit["recordings"])
+        Case(recorded, said, parameters, sds, f"{recorded.batch}/{recorded.id}" in fit["recordings"])
         for recorded, said in read_pairs(recordings_file, simulated_file)
         if said is not None
     ]
