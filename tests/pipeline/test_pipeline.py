@@ -126,8 +126,9 @@ def test_claims_and_accuracy_have_numbers_or_say_why_not(finished):
     tables = finished / "results/tables"
     claims = pd.read_csv(tables / "claims.csv")
     assert (claims[["value", "model", "gap"]].notna().any(axis=1)).all()
-    # The tiny batch repeats nothing.
-    assert claims.loc[claims["recordings"] > 0, "gap"].eq("no repeats: no interval").all()
+    # One recording a pretension; over bend and radius both are one condition.
+    told = claims[claims["claim"].str.contains("pretension") & (claims["recordings"] > 0)]
+    assert len(told) and told["gap"].eq("no repeats: no interval").all()
     assert not claims["source"].str.contains("measured").any()
     accuracy, each = pd.read_csv(tables / "accuracy.csv"), pd.read_csv(tables / "accuracy-by-recording.csv")
     assert accuracy["gap"].eq("2 pairs, fewer than the 3 that a scatter takes").all()
