@@ -84,3 +84,18 @@ def test_every_visible_folder_is_a_batch_or_named_as_none(tmp_path):
 def test_a_folder_without_batches_is_refused(tmp_path):
     with pytest.raises(InputError, match="no batch here"):
         batches_in(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("  bend: loops\n", "  bend: lops\n", "claims.bend: 'lops' is no study"),
+        ("  bend: loops\n", "  bend: radius\n", "claims.bend: study 'radius' varies radius"),
+        ("slack_below_N", "slack_bellow_N", "did you mean 'slack_below_N'"),
+        ("coverage_factor: 2.0", "coverage_factor: 0", "coverage_factor: must be above 0"),
+        ("  coverage: 0.9\n  coverage_factor", "  parameters: guess\n  coverage_factor", "parameters 'guess'"),
+    ],
+)
+def test_claims_and_accuracy_that_cannot_be_judged_are_refused(edited, old, new, said):
+    with pytest.raises(InputError, match=said):
+        load_config(edited(old, new))

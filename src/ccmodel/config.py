@@ -93,6 +93,66 @@ class PhaseExample(TypedModel):
     samples_per_cycle: int = Field(4000, ge=8, multiple_of=4, description="samples a cycle")
 
 
+class Measuring(TypedModel):
+    """How loops are measured; the same for recordings and models."""
+
+    smoothing_share: float = Field(
+        0.02, ge=0, lt=0.2, description="share of a cycle that the moving mean over every channel takes"
+    )
+    middle_share: float = Field(
+        0.1, gt=0, lt=0.5, description="width and slope: half the band about the middle, as a share of peak to peak"
+    )
+    moved_share: float = Field(
+        0.1, gt=0, lt=0.33, description="the load follows when it has gone this share of its peak to peak since a turn"
+    )
+    closed_share: float = Field(
+        0.05, gt=0, lt=1, description="a cycle ends where it began, to this share of the drive's peak to peak"
+    )
+    slack_below_N: float = Field(0.1, gt=0, description="a cable with less tension than this at both ends is slack, N")
+    fewest_samples: int = Field(10, ge=3, description="samples that a line takes at least")
+
+
+class ModelStudies(TypedModel):
+    """Runs of the model alone, for what no recording varies; a drive that moves as a sine."""
+
+    pretension_N: float = Field(gt=0, description="tension before the drive moves, N")
+    amplitude_rad: float = Field(gt=0, description="amplitude of the drive, rad")
+    cycles: int = Field(3, ge=2, description="cycles of the drive; the last one counts")
+    samples_a_cycle: int = Field(1000, ge=100, description="samples a cycle")
+    conduit_length_m: float = Field(gt=0, description="length of the conduit, m")
+    bend_rad: float = Field(gt=0, description="bend of the one loop, rad")
+    loop_radius_m: float = Field(gt=0, description="radius of the one loop where it is placed along the conduit, m")
+    load_stiffness_Nm_per_rad: list[float] = Field(min_length=2, description="springs at the load, N m/rad")
+    sections: list[int] = Field(min_length=2, description="sections of a cable in the paper's discretisation")
+    sections_bend_rad: list[float] = Field(min_length=1, description="bends that the sections are counted for, rad")
+    sections_error_percent: float = Field(gt=0, description="error that is small enough, % of peak to peak")
+
+
+class Claims(TypedModel):
+    """What the paper says in words, to be put in numbers."""
+
+    bend: str = Field(description="study in which the number of loops varies")
+    pretension: str = Field(description="study in which the pretension varies")
+    radius: str = Field(description="study in which the loop radius varies")
+    coverage: float = Field(0.9, gt=0, lt=1, description="probability that an interval holds")
+    small_percent: float = Field(gt=0, description="a change below this is none to speak of, % of the mean")
+    seen_percent: float = Field(1.0, gt=0, description="a phase that takes less of the cycle is not seen, %")
+    model: ModelStudies = Field(description="runs of the model alone")
+
+    @property
+    def studies(self) -> dict[str, str]:
+        """Name of the study that each variable varies in."""
+        return {"bend": self.bend, "pretension": self.pretension, "radius": self.radius}
+
+
+class Accuracy(TypedModel):
+    """How near the model is to the recordings, by the measures that other fields report."""
+
+    parameters: str | None = Field(None, description="parameter set of the model; absent: the first fit's")
+    coverage: float = Field(0.9, gt=0, lt=1, description="probability that an interval holds")
+    coverage_factor: float = Field(2.0, gt=0, description="standard uncertainties that an error may have")
+
+
 class Config(TypedModel):
     """A pipeline run."""
 
@@ -104,6 +164,21 @@ class Config(TypedModel):
     fits: dict[str, Fit] = Field(default_factory=dict, description="parameter sets fitted to recordings")
     studies: dict[str, Study] = Field(default_factory=dict, description="figures")
     phases: PhaseExample | None = Field(None, description="simulated example of the paper's Figs. 5 to 7; absent: none")
+    measuring: Measuring = Field(default_factory=Measuring, description="how loops are measured")
+    claims: Claims | None = Field(None, description="the paper's words in numbers; absent: not asked")
+    accuracy: Accuracy | None = Field(None, description="bias, scatter and comparison errors; absent: not asked")
+
+    @model_validator(mode="after")
+    def _claims_and_accuracy_known(self):
+        for variable, study in (self.claims.studies if self.claims else {}).items():
+            if study not in self.studies or self.studies[study].batches == EACH:
+                raise ValueError(f"claims.{variable}: '{study}' is no study of named batches")
+            if self.studies[study].variable != variable:
+                raise ValueError(f"claims.{variable}: study '{study}' varies {self.studies[study].variable}")
+        wanted = self.accuracy.parameters if self.accuracy else None
+        if wanted is not None and wanted not in self.parameter_sets:
+            raise ValueError(f"accuracy asks for parameters '{wanted}'; there are " + ", ".join(self.parameter_sets))
+        return self
 
     @model_validator(mode="after")
     def _names_known(self):
@@ -122,8 +197,8 @@ class Config(TypedModel):
         """The batches' own estimates, then the fits."""
         return [ESTIMATED, *self.fits]
 
-    def parameters_of(self, study: Study) -> str:
-        """Name of the parameter set that a study is drawn with."""
+    def parameters_of(self, study: Study | Accuracy) -> str:
+        """Name of the parameter set that a study is drawn with, or the accuracy is that of."""
         return study.parameters or self.parameter_sets[min(1, len(self.fits))]
 
 

@@ -45,8 +45,29 @@ def write_config(folder: Path, **studies: dict) -> None:
         "studies": {
             "pretension": {"batches": ["tiny"], "variable": "pretension", "title": "pretension"},
             "one-run": {"batches": ["tiny"], "figure": "transmission"},
+            # The claims' other two studies; a drawing of each comes with them.
+            "bend": {"batches": ["tiny"], "variable": "bend"},
+            "radius": {"batches": ["tiny"], "variable": "radius"},
             **studies,
         },
+        "claims": {
+            "bend": "bend",
+            "pretension": "pretension",
+            "radius": "radius",
+            "small_percent": 5,
+            "model": {
+                "pretension_N": 7.0,
+                "amplitude_rad": 0.6,
+                "conduit_length_m": 1.2,
+                "bend_rad": 3.1416,
+                "loop_radius_m": 0.06,
+                "load_stiffness_Nm_per_rad": [0.02, 0.05],
+                "sections": [8, 16],
+                "sections_bend_rad": [3.1416],
+                "sections_error_percent": 1,
+            },
+        },
+        "accuracy": {},
     }
     (folder / "config.yaml").write_text(yaml.safe_dump(config))
 
@@ -84,6 +105,9 @@ def test_it_makes_figures_tables_and_the_page(finished):
         assert (results / f"figures/{name}.png").stat().st_size > 10_000
         assert "<svg" in (results / f"figures/{name}.svg").read_text()
         assert f"figures/{name}.png" in (results / "index.html").read_text()
+    for name in ("claims", "claims-model", "accuracy", "accuracy-ratio"):
+        assert f"figures/{name}.png" in (results / "index.html").read_text()
+        assert (results / f"figures/{name}.png").stat().st_size > 10_000
     csv, parquet = pd.read_csv(results / "tables/errors.csv"), pd.read_parquet(results / "tables/errors.parquet")
     assert csv["rmse"].to_numpy() == pytest.approx(parquet["rmse"].to_numpy(), rel=1e-4)
     assert set(parquet["parameters"]) == {"estimated", "fitted"}
@@ -108,6 +132,20 @@ def test_it_recovers_the_truth_that_the_logs_were_made_with(finished):
     errors = pd.read_parquet(finished / "results/tables/errors.parquet")
     means = errors.groupby("parameters")["nrmse_percent"].mean()
     assert means["fitted"] < 0.5 < means["estimated"]
+
+
+def test_claims_and_accuracy_have_numbers_or_say_why_not(finished):
+    tables = finished / "results/tables"
+    claims = pd.read_csv(tables / "claims.csv")
+    assert (claims[["value", "model", "gap"]].notna().any(axis=1)).all()
+    # One recording a pretension; over bend and radius both are one condition.
+    told = claims[claims["claim"].str.contains("pretension") & (claims["recordings"] > 0)]
+    assert len(told) and told["gap"].eq("no repeats: no interval").all()
+    assert not claims["source"].str.contains("measured").any()
+    accuracy, each = pd.read_csv(tables / "accuracy.csv"), pd.read_csv(tables / "accuracy-by-recording.csv")
+    assert accuracy["gap"].eq("2 pairs, fewer than the 3 that a scatter takes").all()
+    assert each["u_val"].gt(0).all()
+    assert each.groupby("quantity")["recording"].count().eq(2).all()
 
 
 def test_simulated_data_are_never_called_measured(finished):

@@ -64,3 +64,17 @@ def runs():
         for p in CONFIG.parameter_sets
         for b in BATCHES
     ]
+
+
+def fit_if_any(parameters, batch):
+    """The fit's file in a list; an empty one for what a batch states beforehand."""
+    return [] if parameters == ESTIMATED else [fit_of(parameters, batch)]
+
+
+def claim_runs():
+    """Every (variable, parameter set, batch) of the studies that the claims are judged by."""
+    return [
+        (variable, CONFIG.parameters_of(STUDIES[study]), batch)
+        for variable, study in CONFIG.claims.studies.items()
+        for batch in STUDIES[study].batches
+    ]

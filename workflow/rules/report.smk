@@ -11,6 +11,8 @@ rule write_report:
             f"{RESULTS}/diagnoses/{batch}/diagnosis.json" for batch in diagnosed()
         ],
         phases=rules.draw_phases.output if CONFIG.phases else [],
+        claims=[f"{RESULTS}/tables/claims.json"] if CONFIG.claims else [],
+        accuracy=[f"{RESULTS}/tables/accuracy.json"] if CONFIG.accuracy else [],
     output:
         page=f"{RESULTS}/index.html",
         left_out=f"{RESULTS}/left-out.json",

@@ -16,5 +16,6 @@ with logged(snakemake.log[0]):
         [Path(f) for f in snakemake.input.simulations],
         [Path(f) for f in snakemake.input.diagnoses],
         list(snakemake.params.unusable),
+        [Path(f) for f in (*snakemake.input.claims, *snakemake.input.accuracy)],
         Path(snakemake.output.page),
     )

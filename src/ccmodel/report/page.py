@@ -1,12 +1,11 @@
 """The page of a run: figures, error tables, fits, and what was left out."""
 
 from collections.abc import Sequence
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from jinja2 import Environment, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ccmodel.config import Config, Study
 from ccmodel.recording import CHANNELS, ORIGIN
@@ -40,6 +39,7 @@ PHASE_CAPTIONS = {
 def write_page(
     file: Path, config: Config, studies: dict[str, Study], batches: Sequence[dict], errors: pd.DataFrame,
     fits: Sequence[dict], diagnoses: Sequence[dict], left_out: Sequence[str], warnings: Sequence[str],
+    judged: dict[str, dict],
 ) -> None:  # fmt: skip
     """Write the page; figures are looked for in `figures/` beside it.
 
@@ -55,9 +55,14 @@ def write_page(
         All errors, with the columns of `ccmodel.compare.errors.COLUMNS`.
     fits, diagnoses : sequence of dict
     left_out, warnings : sequence of str
+    judged : dict of str to dict
+        Under "claims" and "accuracy" what these steps said, as far as they were asked for.
     """
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    template = environment.from_string(files("ccmodel.report").joinpath("page.html.j2").read_text())
+    environment = Environment(
+        loader=PackageLoader("ccmodel.report", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+    template = environment.get_template("page.html.j2")
     channels = [c for c in CHANNELS if c in set(errors["channel"])]
     file.write_text(
         template.render(
@@ -79,6 +84,9 @@ def write_page(
             diagnoses=diagnoses,
             left_out=left_out,
             warnings=warnings,
+            claims=judged.get("claims"),
+            accuracy=judged.get("accuracy"),
+            origin=ORIGIN,
         )
     )
 

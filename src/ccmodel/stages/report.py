@@ -26,11 +26,12 @@ class LeftOut:
 def write_report(
     config: Config, studies: dict[str, Study], errors_file: Path, fit_files: Sequence[Path],
     summary_files: Sequence[Path], simulation_files: Sequence[Path], diagnosis_files: Sequence[Path],
-    unusable: Sequence[str], page_file: Path,
+    unusable: Sequence[str], judgement_files: Sequence[Path], page_file: Path,
 ) -> None:  # fmt: skip
     """Write the page that shows everything, and beside it what was left out.
 
-    `unusable` are lines on folders that cannot be a batch at all.
+    `unusable` are lines on folders that cannot be a batch at all, `judgement_files` what was asked for of claims.json
+    and accuracy.json.
     """
     batches = [read_json(f) for f in summary_files]
     fits = [read_json(f) for f in fit_files]
@@ -50,8 +51,9 @@ def write_report(
         warnings=[str(f) for f in findings if f.severity == "warning"],
     )
     write_json(page_file.parent / LEFT_OUT, asdict(said))
+    judged = {file.stem: read_json(file) for file in judgement_files}
     errors, diagnoses = pd.read_parquet(errors_file), [read_json(f) for f in diagnosis_files]
-    write_page(page_file, config, studies, batches, errors, fits, diagnoses, said.left_out, said.warnings)
+    write_page(page_file, config, studies, batches, errors, fits, diagnoses, said.left_out, said.warnings, judged)
 
 
 def left_out_of(results: Path) -> LeftOut:
