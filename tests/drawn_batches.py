@@ -65,9 +65,7 @@ def problem_of(drawn: Drawn, own=SPREAD, **more: Free) -> Problem:
     """The fit of a drawn batch, from estimates that are a fifth off."""
     start = {n: v * (1.2 if n.startswith("stiff") else 0.8) for n, v in drawn.shared.items()}
     free = {n: Free(v, 0.2 * v, 5 * v) for n, v in start.items()} | more
-    parameters = Parameters(
-        reference_length_m=1.2, drive_radius_m=0.006, load_radius_m=0.006, **start
-    )
+    parameters = Parameters(reference_length_m=1.2, drive_radius_m=0.006, load_radius_m=0.006, **start)
     evidence = [Evidence.of(r, parameters) for r in drawn.recordings]
     at = {"friction_scale": 1.0, "pretension_scale": 1.0}
     return Problem(evidence, free, {name: Free(at.get(name, 0.0), spread=own[name]) for name in own})

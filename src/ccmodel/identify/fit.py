@@ -160,9 +160,7 @@ def _result(problem: Problem, found: Solution, warnings: list[str], profiled: Se
         message=found.message,
         values=dict(zip(problem.shared, found.x.tolist(), strict=False)),
         intervals=known,
-        profiles={
-            name: profile(problem, found, name, variance) for name in profiled if isfinite(known[name].sd)
-        },
+        profiles={name: profile(problem, found, name, variance) for name in profiled if isfinite(known[name].sd)},
         own={e.name: {n: problem.values_of(found.x, i)[n] for n in problem.own} for i, e in enumerate(problem.evidence)}
         if problem.own
         else {},

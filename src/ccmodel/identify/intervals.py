@@ -6,7 +6,6 @@ of one run are not thirty thousand experiments. What the sensors' noise and the 
 from the residuals as they are, correlated in time.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,7 +85,7 @@ class Scatter:
 
 
 def covariance(problem: Problem, solution: Solution) -> NDArray:
-    """Covariance of all unknowns about what they truly are, shape (unknowns, unknowns); infinite where nothing is known.
+    """Covariance of all unknowns about the truth, shape (unknowns, unknowns); infinite where nothing is known.
 
     Inverse information, corrected for residuals that are correlated in time, on either side of which stands the
     noise that the residuals show and the drive's unknown part makes.
@@ -194,7 +193,9 @@ def undetermined(problem: Problem, solution: Solution) -> list[Undetermined]:
     found = []
     for k in np.flatnonzero(lost):
         involved = np.flatnonzero(np.abs(vectors[:, k]) > INVOLVED)
-        text = _known_instead([names[j] for j in involved], vectors[involved, k] / alone[involved], solution.x[involved])
+        text = _known_instead(
+            [names[j] for j in involved], vectors[involved, k] / alone[involved], solution.x[involved]
+        )
         found.append(Undetermined([names[j] for j in involved], text))
     return found
 

@@ -222,9 +222,9 @@ class Problem:
         r = self.residuals(x)
         return float(r @ r)
 
-    def blocks(self, x: NDArray) -> list[Block]:
-        """Every recording about `x`: only what belongs to a recording runs it again."""
-        return self._each(lambda i: self._block(x, i))
+    def blocks(self, x: NDArray, step: float = STEP) -> list[Block]:
+        """Every recording about `x`, by differences over `step` sizes: only what belongs to it runs it again."""
+        return self._each(lambda i: self._block(x, i, step))
 
     def drive_errors(self, x: NDArray) -> list[NDArray]:
         """By recording, likely errors for want of the drive's true motion; shape (draws, channels, samples)."""
@@ -235,12 +235,18 @@ class Problem:
         total = sum(float((e**2).sum()) / self._weight(i) for i, e in enumerate(self.errors(x)))
         return total / sum(e.measured.size for e in self.evidence)
 
-    def _block(self, x: NDArray, i: int) -> Block:
+    @cached_property
+    def independent_looks(self) -> float:
+        """Number of independent errors that the cost is worth: what it comes to if the model is right."""
+        return sum(e.measured.size * self._weight(i) for i, e in enumerate(self.evidence))
+
+    def _block(self, x: NDArray, i: int, relative: float) -> Block:
         columns = np.r_[0 : len(self.shared), self.own_columns(i)].astype(int)
         base = self._weighed(x, i)
         derivatives = np.empty((*base.shape, columns.size))
         for place, k in enumerate(columns):
-            step = STEP * self.sizes[k] * (-1 if x[k] + STEP * self.sizes[k] > self.free[k].high else 1)
+            step = relative * self.sizes[k]
+            step = -step if x[k] + step > self.free[k].high else step
             aside = x.copy()
             aside[k] += step
             derivatives[..., place] = (self._weighed(aside, i) - base) / step

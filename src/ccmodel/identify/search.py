@@ -12,16 +12,20 @@ from numpy.typing import NDArray
 
 from ccmodel.identify.problem import Block, Problem
 from ccmodel.model.failure import ModelError
+from ccmodel.model.sensitivity import STEP
 
 # A search has converged when a full step would lessen the cost by less than this share of it. A cost of thousands is
 # then known to 1e-8, its place to a ten-thousandth of a standard deviation.
 TOLERANCE = 1e-12
-# Differences are wrong by 1e-4 of a sensitivity (`ccmodel.model.sensitivity`), so close to the optimum no step may help
-# though one seems to be left. Beyond this share of the cost that excuse does not hold.
-EXCUSED = 1e-7
+# The model has corners (`ccmodel.model.sensitivity`), and so has the cost: its least may lie on one, where a slope says
+# little. When no step helps, differences are taken more broadly; when still none does, what a step promises, in squares
+# of a standard deviation, decides whether the corner is the optimum: a tenth shifts an unknown by a third of one at most.
+BROAD = 1e-3
+EXCUSED = 0.1
 MOST_EVALUATIONS = 100
-FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e9
+FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e6
 CONVERGED = "converged: the error no longer falls"
+ON_CORNER = "converged: the least error lies on a corner of it, within a third of a standard deviation"
 ON_BOUNDS = "converged: every unknown is on one of its bounds"
 STOPPED = "stopped at the largest number of evaluations without converging"
 STALLED = "stalled: no step lessens the error although its slope says that one should"
@@ -81,7 +85,8 @@ def solve(
     x, cost = np.array(start, float), problem.cost(start)
     if not np.isfinite(cost):
         raise ModelError("the errors are not finite at the start")
-    blocks, damping, evaluations, said = problem.blocks(x), FIRST_DAMPING, 1, STOPPED
+    difference, damping, evaluations, said = STEP, FIRST_DAMPING, 1, STOPPED
+    blocks = problem.blocks(x)
     while evaluations < most_evaluations:
         information, slope = information_and_slope(problem, x, blocks)
         movable = ~(((x <= low) & (slope > 0)) | ((x >= high) & (slope < 0)))
@@ -98,14 +103,16 @@ def solve(
             tried = _stepped(problem, x, information, slope, movable, damping)
             lower, evaluations = _cost_or_infinite(problem, tried), evaluations + 1
             damping = damping / 10 if lower < cost else damping * 5
-        if lower >= cost:
-            if damping >= MOST_DAMPING:
-                said = CONVERGED if promised <= EXCUSED * cost else STALLED
+        if lower < cost:
+            x, cost = tried, lower
+        elif damping >= MOST_DAMPING and difference == BROAD:
+            said = ON_CORNER if promised <= EXCUSED * cost / problem.independent_looks else STALLED
             break
-        x, cost = tried, lower
-        blocks = problem.blocks(x)
+        elif damping >= MOST_DAMPING:
+            difference, damping = BROAD, FIRST_DAMPING
+        blocks = problem.blocks(x, difference)
     active = np.where(x <= low, -1, np.where(x >= high, 1, 0))
-    return Solution(x, cost, blocks, active, said in (CONVERGED, ON_BOUNDS), said, evaluations)
+    return Solution(x, cost, blocks, active, said in (CONVERGED, ON_CORNER, ON_BOUNDS), said, evaluations)
 
 
 def information_and_slope(problem: Problem, x: NDArray, blocks: Sequence[Block]) -> tuple[NDArray, NDArray]:

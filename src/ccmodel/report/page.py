@@ -48,6 +48,7 @@ def write_page(
     left_out, warnings : sequence of str
     """
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters |= {"interval": interval, "about": about, "number": number}
     template = environment.from_string(files("ccmodel.report").joinpath("page.html.j2").read_text())
     channels = [c for c in CHANNELS if c in set(errors["channel"])]
     file.write_text(
@@ -114,3 +115,31 @@ def _rows(errors: pd.DataFrame) -> list[dict]:
 
 def _or_none(value: float) -> float | None:
     return None if np.isnan(value) else float(value)
+
+
+def number(value: float | None) -> str:
+    """Three digits; a dash for what is not known."""
+    return "–" if value is None else f"{value:.3g}"
+
+
+def interval(of: dict) -> str:
+    """Ends of an interval, in as many digits as tell them apart."""
+    if of["sd"] is None or of["low"] is None or of["high"] is None:
+        return "not determined"
+    return f"{_rounded(of['low'], of['sd'])} to {_rounded(of['high'], of['sd'])}"
+
+
+def about(of: dict) -> str:
+    """Middle of an interval and its reach."""
+    if of["sd"] is None or of["low"] is None or of["high"] is None:
+        return "not determined"
+    reach = (of["high"] - of["low"]) / 2
+    return f"{_rounded((of['high'] + of['low']) / 2, of['sd'])} ± {reach:.1g}"
+
+
+def _rounded(value: float, sd: float) -> str:
+    """A value to a tenth of its standard deviation."""
+    if not sd or not value:
+        return f"{value:.5g}"
+    digits = int(np.ceil(np.log10(abs(value) / sd))) + 2
+    return f"{value:.{min(max(digits, 1), 12)}g}"
