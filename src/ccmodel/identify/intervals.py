@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import fftconvolve
-from scipy.stats import chi2, norm
+from scipy.stats import chi2, norm, t
 
 from ccmodel.identify.problem import Block, Problem
 from ccmodel.identify.search import Solution, information_and_slope, solve
@@ -92,8 +92,11 @@ def covariance(problem: Problem, solution: Solution) -> NDArray:
     """
     information, _ = information_and_slope(problem, solution.x, solution.blocks)
     noise = np.diag((problem.expected * scatter_scale(problem, solution)) ** 2)
-    for block, drive in zip(solution.blocks, problem.drive_errors(solution.x), strict=True):
-        noise[np.ix_(block.columns, block.columns)] += noise_of(block) + _noise_of_drive(block, drive)
+    drives = problem.drive_errors(solution.x)
+    # A variance from a few draws is itself uncertain: Student's reach over that of the normal distribution.
+    few = (t.ppf(0.5 + COVERAGE / 2, max(sum(map(len, drives)), 1)) / REACH) ** 2
+    for block, drive in zip(solution.blocks, drives, strict=True):
+        noise[np.ix_(block.columns, block.columns)] += noise_of(block) + few * _noise_of_drive(block, drive)
     alone, values, vectors = _directions(information)
     known = values > ROUNDING
     inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(alone, alone)
@@ -135,7 +138,8 @@ def _noise_of_drive(block: Block, errors: NDArray) -> NDArray:
     """The same by what is unknown of the drive's motion.
 
     Where in its count the drive rests is an error that lasts all recording long. The fit takes it for something else,
-    and what is left does not show it.
+    and what is left does not show it. What is left does show some of the rest of the drive's errors, which therefore
+    count twice: intervals that these govern are too wide rather than too narrow.
     """
     scores = np.einsum("csk,dcs->dk", block.derivatives, errors)
     return scores.T @ scores / max(len(errors), 1)
