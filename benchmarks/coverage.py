@@ -17,10 +17,9 @@ from scipy.stats import binom
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from drawn_batches import CONDITIONS, draw, problem_of  # noqa: E402
-
 from ccmodel.identify.fit import fit  # noqa: E402
 from ccmodel.identify.intervals import COVERAGE  # noqa: E402
+from drawn_batches import CONDITIONS, draw, problem_of  # noqa: E402
 
 FIRST_SEED = 10_000
 DURATION_S = 2.4

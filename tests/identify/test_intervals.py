@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from drawn_batches import CONDITIONS, SPREAD, draw, problem_of
 from ccmodel.identify import intervals
 from ccmodel.identify.fit import fit
 from ccmodel.identify.intervals import REACH, bootstrap, covariance, profile
 from ccmodel.identify.problem import Block, Free, Problem
 from ccmodel.identify.search import solve
+from drawn_batches import CONDITIONS, SPREAD, draw, problem_of
 
 EXTRA_BEND = Free(0.0, -1.0, 3.0)
 FEW = {name: SPREAD[name] for name in ("friction_scale", "theta_out_zero_rad")}

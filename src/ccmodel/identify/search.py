@@ -19,7 +19,7 @@ from ccmodel.model.sensitivity import STEP
 TOLERANCE = 1e-12
 # The model has corners (`ccmodel.model.sensitivity`), and so has the cost: its least may lie on one, where a slope says
 # little. When no step helps, differences are taken more broadly; when still none does, what a step promises, in squares
-# of a standard deviation, decides whether the corner is the optimum: a tenth shifts an unknown by a third of one at most.
+# of a standard deviation, decides whether the corner is the optimum: a tenth of one is a third of a deviation aside.
 BROAD = 1e-3
 EXCUSED = 0.1
 MOST_EVALUATIONS = 100
