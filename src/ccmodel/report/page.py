@@ -139,7 +139,4 @@ def about(of: dict) -> str:
 
 def _rounded(value: float, sd: float) -> str:
     """A value to a tenth of its standard deviation."""
-    if not sd or not value:
-        return f"{value:.5g}"
-    digits = int(np.ceil(np.log10(abs(value) / sd))) + 2
-    return f"{value:.{min(max(digits, 1), 12)}g}"
+    return f"{value:.{max(1 - int(np.floor(np.log10(sd))), 0)}f}" if sd > 0 else f"{value:.5g}"
