@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from math import isfinite
+from math import inf, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -152,7 +152,9 @@ def _warnings(problem: Problem, best: Solution, solutions: list[Solution], failu
 def _result(problem: Problem, found: Solution, warnings: list[str], profiled: Sequence[str]) -> FitResult:
     spread = covariance(problem, found)
     variance = np.diag(spread)
-    known = intervals(problem, found, variance)
+    lost = undetermined(problem, found)
+    nowhere = {name: Interval(-inf, inf, inf) for group in lost for name in group.parameters}
+    known = intervals(problem, found, variance) | nowhere
     scattered = scatter(problem, found)
     resampled = bootstrap(problem, found) if len(problem.evidence) >= ENOUGH_RECORDINGS else {}
     return FitResult(
@@ -168,7 +170,7 @@ def _result(problem: Problem, found: Solution, warnings: list[str], profiled: Se
         scatter=scattered,
         resampled=resampled,
         at_bound=[n for n, active in zip(problem.names, found.active, strict=True) if active],
-        undetermined=undetermined(problem, found),
+        undetermined=lost,
         warnings=[*warnings, *_unlikely(scattered), *_disagreeing(known, resampled)],
         cost=problem.mean_square(found.x),
         evaluations=found.evaluations,

@@ -136,9 +136,12 @@ def _stepped(problem: Problem, x: NDArray, information, slope, movable, damping:
 
 
 def _promised(problem: Problem, x: NDArray, information, slope, movable) -> float:
-    """By how much a step almost without damping would lessen the cost, were the errors linear."""
-    step = _stepped(problem, x, information, slope, movable, 1e-9) - x
-    return float(-2 * slope @ step - step @ information @ step)
+    """By how much a step would lessen the cost at best, were the errors linear.
+
+    A full step that a bound cuts off may lead uphill where a damped one does not.
+    """
+    steps = [_stepped(problem, x, information, slope, movable, damping) - x for damping in (1e-9, 1e-2, 1e2)]
+    return max(float(-2 * slope @ step - step @ information @ step) for step in steps)
 
 
 def _cost_or_infinite(problem: Problem, x: NDArray) -> float:
