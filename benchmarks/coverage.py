@@ -66,7 +66,8 @@ def report(found, refused: list[str], batches: int, took_s: float, command: str)
     failed = "".join(f"\n- {text}" for text in refused) or " none."
     return f"""# Coverage of the fits' intervals
 
-Made by `{command}` on {date.today().isoformat()}: {batches} batches in {took_s / 60:.0f} minutes.
+Made by `{command}` on {date.today().isoformat()}: 
+{batches} batches in {took_s / 60:.0f} minutes.
 
 Each batch is {len(CONDITIONS)} recordings of {round(DURATION_S * 200)} samples at 200 Hz, made with the exact solver:
 a half loop and a whole one at 7 and 4 N, with stiffness, friction and load spring drawn for the batch. Each recording
@@ -109,7 +110,7 @@ def main() -> None:
             if took > 60 * arguments.minutes:
                 pool.shutdown(wait=False, cancel_futures=True)
                 break
-    command = " ".join(["python benchmarks/coverage.py", *sys.argv[1:]])
+    command = f"python benchmarks/coverage.py --batches {arguments.batches} --minutes {arguments.minutes:g}"
     text = report(found, refused, done, time.perf_counter() - began, command)
     arguments.out.write_text(text)
     print(text)

@@ -179,9 +179,10 @@ def test_nine_recordings_of_2000_samples_in_under_ten_seconds():
                 rate_Hz=250.0)  # fmt: skip
     assert nine.recordings[0].time_s.size == 2000
     problem = problem_of(nine)
-    began = time.perf_counter()
+    # Of all threads together, so no less than the time on free cores; a clock would show what else the machine does.
+    began = time.process_time()
     said = fit(problem)
-    taken = time.perf_counter() - began
+    taken = time.process_time() - began
     assert said.succeeded
     assert len(said.own) == 9
     assert taken < 10, f"{taken:.1f} s"
