@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 CORES ?= 2
 
-.PHONY: help results real data test bench lint lock clean
+.PHONY: help results real data test bench coverage lint lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -43,6 +43,9 @@ test: $(VENV)/.ready  ## run the tests and the linters
 
 bench: $(VENV)/.ready  ## measure speed and accuracy: results/bench.json, docs/figures/work-precision.png
 	$(BIN)/python benchmarks/bench.py
+
+coverage: $(VENV)/.ready  ## count how often the fits' 90 % intervals hold the truth: docs/coverage.md
+	$(BIN)/python benchmarks/coverage.py
 
 lint: $(VENV)/.ready
 	$(BIN)/ruff check .

@@ -35,7 +35,7 @@ def test_committed_schema_is_that_of_the_typed_config():
 
 
 def test_an_unknown_key_is_refused_with_the_nearest_name(edited):
-    with pytest.raises(InputError, match="line 25.*unknown key 'varable' in studies.loops; did you mean 'variable'"):
+    with pytest.raises(InputError, match="line 32.*unknown key 'varable' in studies.loops; did you mean 'variable'"):
         load_config(edited("variable: bend", "varable: bend"))
 
 
@@ -99,3 +99,24 @@ def test_a_folder_without_batches_is_refused(tmp_path):
 def test_claims_and_accuracy_that_cannot_be_judged_are_refused(edited, old, new, said):
     with pytest.raises(InputError, match=said):
         load_config(edited(old, new))
+
+
+FIT = {"batches": ["b"], "free": {"stiffness_N_per_m": {"bounds": [1e3, 1e5]}}}
+
+
+@pytest.mark.parametrize(
+    "change, text",
+    [
+        (
+            {"free": {"tau_in_zero_Nm": {"bounds": [-1, 1]}}, "per_recording": {"tau_in_zero_Nm": {"spread": 1}}},
+            "either",
+        ),
+        ({"per_recording": {"friction_scale": {"spread": 0.01, "bounds": [2, 1]}}}, "lowest then highest"),
+        ({"per_recording": {"friction_scale": {"spread": 0}}}, "greater than 0"),
+        ({"profile": ["friction_coefficient"]}, "friction_coefficient is not free"),
+    ],
+)
+def test_a_fit_that_makes_no_sense_is_refused(change, text):
+    Config.model_validate({"fits": {"f": FIT}}, strict=False)
+    with pytest.raises(ValueError, match=text):
+        Config.model_validate({"fits": {"f": FIT | change}}, strict=False)

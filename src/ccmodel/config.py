@@ -1,5 +1,6 @@
 """The typed configuration of a pipeline run: which batches, what is fitted, which studies are drawn."""
 
+from math import inf
 from pathlib import Path
 from typing import Literal
 
@@ -39,6 +40,15 @@ class OwnParameter(TypedModel):
     """A parameter of each recording by itself."""
 
     spread: float = Field(gt=0, description="standard deviation from recording to recording, SI units")
+    start: float | None = Field(None, description="where it is expected, SI units; absent: the batch's own estimate")
+    bounds: tuple[float, float] | None = Field(None, description="lowest and highest value, SI units; absent: any")
+
+    @model_validator(mode="after")
+    def _ordered(self):
+        low, high = self.bounds or (-inf, inf)
+        if not low < high:
+            raise ValueError(f"bounds must be lowest then highest; got {low} and {high}")
+        return self
 
 
 class Fit(TypedModel):
@@ -59,6 +69,17 @@ class Fit(TypedModel):
     )
     starts: int = Field(1, ge=1, description="starts of the search, the configured one and others about it")
     step_s: float | None = Field(None, gt=0, description="take a sample every so often, s; absent: every sample")
+    profile: list[Literal[FREE]] = Field(
+        default_factory=list, description="what the interval of is also taken from its profile likelihood"
+    )
+
+    @model_validator(mode="after")
+    def _each_has_one_part(self):
+        if both := self.free.keys() & self.per_recording.keys():
+            raise ValueError(f"{', '.join(sorted(both))}: either shared (free) or each recording's own (per_recording)")
+        if unknown := set(self.profile) - self.free.keys():
+            raise ValueError(f"profile: {', '.join(sorted(unknown))} is not free")
+        return self
 
 
 class Study(TypedModel):

@@ -2,61 +2,35 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
+from math import inf, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
-from ccmodel.identify.intervals import Interval, Undetermined, intervals, undetermined
+from ccmodel.identify.intervals import (
+    Interval,
+    Scatter,
+    Undetermined,
+    bootstrap,
+    covariance,
+    intervals,
+    own_intervals,
+    profile,
+    scatter,
+    undetermined,
+)
 from ccmodel.identify.problem import Problem
+from ccmodel.identify.search import Solution, solve
 from ccmodel.model.failure import ModelError
 
-# Relative. Far below what repeated recordings differ by, far above what the solvers round at.
-TOLERANCE = 1e-9
-MOST_EVALUATIONS = 100
 # Optima of several starts are one if no unknown differs by more than this share of its size.
 SAME = 1e-3
 START_SPREAD = 0.3
 SEED = 1
-# Why scipy's least_squares stops, by its status.
-STOPPED = {
-    -1: "the optimiser was given improper input",
-    0: "stopped at the largest number of evaluations without converging",
-    1: "converged: no direction leads downhill",
-    2: "converged: the error no longer falls",
-    3: "converged: the parameters no longer change",
-    4: "converged: neither the error falls nor the parameters change",
-}
-
-
-@dataclass(frozen=True)
-class Solution:
-    """Where a search for the least cost ended.
-
-    Attributes
-    ----------
-    x : ndarray, shape (unknowns,)
-    residuals : ndarray, shape (rows,)
-    jacobian : ndarray, shape (rows, unknowns)
-    active : ndarray of int, shape (unknowns,)
-        -1 or 1 where an unknown is on its lower or upper bound.
-    converged : bool
-    message : str
-    evaluations : int
-    """
-
-    x: NDArray
-    residuals: NDArray
-    jacobian: NDArray
-    active: NDArray
-    converged: bool
-    message: str
-    evaluations: int
-
-    @property
-    def cost(self) -> float:
-        """Sum of squares."""
-        return float(self.residuals @ self.residuals)
+# From so many recordings on, drawing sets of them anew says something of how they differ.
+ENOUGH_RECORDINGS = 6
+# Beyond this ratio of what resampled recordings and the intervals say, the intervals are not to be trusted.
+DISAGREE = 2.0
 
 
 @dataclass(frozen=True)
@@ -67,13 +41,19 @@ class FitResult:
     ----------
     succeeded : bool
     message : str
-        Why the optimiser stopped, or what went wrong.
+        Why the search stopped, or what went wrong.
     values : dict
         Shared values by parameter name, SI units; empty where the fit failed.
     intervals : dict
-        The 90 % interval of each shared value.
-    own : dict
-        By recording, its own values.
+        The 90 % interval of each shared value: of the population, where recordings differ in it.
+    profiles : dict
+        The same from the profile of those that were asked for.
+    own, own_intervals : dict
+        By recording, its own values and their intervals; `friction` among the latter is the recording's own mu.
+    scatter : dict
+        By parameter, how far the recordings' own values differ, beside what was expected.
+    resampled : dict
+        Standard deviation of each shared value over resampled sets of recordings; empty where there are too few.
     at_bound : list of str
         Unknowns that ended on one of their bounds: the data, or the bounds, are not enough.
     undetermined : list of Undetermined
@@ -90,7 +70,11 @@ class FitResult:
     message: str
     values: dict[str, float] = field(default_factory=dict)
     intervals: dict[str, Interval] = field(default_factory=dict)
+    profiles: dict[str, Interval] = field(default_factory=dict)
     own: dict[str, dict[str, float]] = field(default_factory=dict)
+    own_intervals: dict[str, dict[str, Interval]] = field(default_factory=dict)
+    scatter: dict[str, Scatter] = field(default_factory=dict)
+    resampled: dict[str, float] = field(default_factory=dict)
     at_bound: list[str] = field(default_factory=list)
     undetermined: list[Undetermined] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -99,11 +83,19 @@ class FitResult:
     recordings: list[str] = field(default_factory=list)
 
     def as_dict(self) -> dict:
-        """Plain data for a JSON file."""
-        return asdict(self)
+        """Plain data for a JSON file: None for what is infinite, which JSON cannot say."""
+        return _finite(asdict(self))
 
 
-def fit(problem: Problem, starts: int = 1) -> FitResult:
+def _finite(data):
+    if isinstance(data, dict):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, list):
+        return [_finite(value) for value in data]
+    return None if isinstance(data, float) and not isfinite(data) else data
+
+
+def fit(problem: Problem, starts: int = 1, profiled: Sequence[str] = ()) -> FitResult:
     """Fit a problem, from several starts, and say how sure the values are.
 
     Parameters
@@ -111,6 +103,8 @@ def fit(problem: Problem, starts: int = 1) -> FitResult:
     problem : Problem
     starts : int
         The configured one, and others drawn about it within 30 % of each unknown's size, from a fixed seed.
+    profiled : sequence of str
+        Shared unknowns whose intervals are taken from their profile, too.
 
     Returns
     -------
@@ -134,43 +128,16 @@ def fit(problem: Problem, starts: int = 1) -> FitResult:
     if not solutions:
         return FitResult(False, failures[0], recordings=names)
     best = min(solutions, key=lambda s: s.cost)
-    if not np.isfinite(best.cost):
-        return FitResult(False, "the errors are not finite at the best values found", recordings=names)
-    return _result(problem, best, _warnings(problem, best, solutions, failures))
-
-
-def solve(
-    problem: Problem, start: NDArray, most_evaluations: int = MOST_EVALUATIONS, tolerance: float = TOLERANCE
-) -> Solution:
-    """The nearest least cost, by scipy's trust region within bounds.
-
-    Raises
-    ------
-    ModelError, ValueError
-        If the model cannot be run on the way.
-    """
-    found = least_squares(
-        problem.residuals,
-        start,
-        jac=problem.jacobian,
-        bounds=problem.bounds,
-        x_scale=problem.sizes,
-        ftol=tolerance,
-        xtol=tolerance,
-        gtol=tolerance,
-        max_nfev=most_evaluations,
-    )
-    message = STOPPED[found.status]
-    return Solution(found.x, found.fun, found.jac, found.active_mask, bool(found.success), message, int(found.nfev))
+    if not best.converged:
+        return FitResult(False, best.message, evaluations=best.evaluations, recordings=names)
+    return _result(problem, best, _warnings(problem, best, solutions, failures), profiled)
 
 
 def _starts(problem: Problem, count: int) -> Sequence[NDArray]:
-    low, high = problem.bounds
-    inside = 1e-6 * np.where(np.isfinite(high - low), high - low, problem.sizes)
     drawn = np.random.default_rng(SEED).uniform(-START_SPREAD, START_SPREAD, (count - 1, problem.start.size))
     shared = np.arange(problem.start.size) < len(problem.shared)
     others = problem.start + np.where(shared, drawn * problem.sizes, 0.0)
-    return [np.clip(x, low + inside, high - inside) for x in (problem.start, *others)]
+    return [np.clip(x, *problem.bounds) for x in (problem.start, *others)]
 
 
 def _warnings(problem: Problem, best: Solution, solutions: list[Solution], failures: list[str]) -> list[str]:
@@ -182,23 +149,47 @@ def _warnings(problem: Problem, best: Solution, solutions: list[Solution], failu
     return said
 
 
-def _result(problem: Problem, found: Solution, warnings: list[str]) -> FitResult:
-    shared = len(problem.shared)
-    values = dict(zip(problem.shared, found.x[:shared].tolist(), strict=True))
-    own = {
-        e.name: {n: problem.values_of(found.x, i)[n].item() for n in problem.own}
-        for i, e in enumerate(problem.evidence)
-    }
+def _result(problem: Problem, found: Solution, warnings: list[str], profiled: Sequence[str]) -> FitResult:
+    spread = covariance(problem, found)
+    variance = np.diag(spread)
+    lost = undetermined(problem, found)
+    nowhere = {name: Interval(-inf, inf, inf) for group in lost for name in group.parameters}
+    known = intervals(problem, found, variance) | nowhere
+    scattered = scatter(problem, found)
+    resampled = bootstrap(problem, found) if len(problem.evidence) >= ENOUGH_RECORDINGS else {}
     return FitResult(
-        succeeded=found.converged,
+        succeeded=True,
         message=found.message,
-        values=values,
-        intervals=intervals(problem, found.x, found.residuals, found.jacobian),
-        own=own if problem.own else {},
+        values=dict(zip(problem.shared, found.x.tolist(), strict=False)),
+        intervals=known,
+        profiles={name: profile(problem, found, name, variance) for name in profiled if isfinite(known[name].sd)},
+        own={e.name: {n: problem.values_of(found.x, i)[n] for n in problem.own} for i, e in enumerate(problem.evidence)}
+        if problem.own
+        else {},
+        own_intervals=own_intervals(problem, found, spread) if problem.own else {},
+        scatter=scattered,
+        resampled=resampled,
         at_bound=[n for n, active in zip(problem.names, found.active, strict=True) if active],
-        undetermined=undetermined(problem, found.residuals, found.jacobian),
-        warnings=warnings,
-        cost=problem.mean_square(found.residuals),
+        undetermined=lost,
+        warnings=[*warnings, *_unlikely(scattered), *_disagreeing(known, resampled)],
+        cost=problem.mean_square(found.x),
         evaluations=found.evaluations,
         recordings=[e.name for e in problem.evidence],
     )
+
+
+def _unlikely(scattered: dict[str, Scatter]) -> list[str]:
+    return [
+        f"{name} differs by {s.found:.3g} from recording to recording where {s.expected:.3g} was expected; intervals "
+        "are wider for it"
+        for name, s in scattered.items()
+        if s.widens
+    ]
+
+
+def _disagreeing(known: dict[str, Interval], resampled: dict[str, float]) -> list[str]:
+    return [
+        f"{name}: resampled recordings scatter by {sd:.3g}, its interval says {known[name].sd:.3g}"
+        for name, sd in resampled.items()
+        if sd > DISAGREE * known[name].sd
+    ]

@@ -7,106 +7,146 @@ from the residuals as they are, correlated in time.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import fftconvolve
-from scipy.stats import chi2, norm
+from scipy.stats import chi2, norm, t
 
-if TYPE_CHECKING:
-    from ccmodel.identify.problem import Problem
+from ccmodel.identify.problem import Block, Problem
+from ccmodel.identify.search import Solution, information_and_slope, solve
 
 COVERAGE = 0.90
+REACH = float(norm.ppf(0.5 + COVERAGE / 2))  # Standard deviations from the middle to the end of an interval.
 # Residuals further apart in time than this share of a recording are taken to know nothing of each other.
 CORRELATED_SHARE = 0.05
-# A direction among the unknowns whose standard deviation exceeds the unknowns' own size is not determined.
-UNDETERMINED_SD = 1.0
-# Part that an unknown must have in such a direction to be called undetermined by it.
-INVOLVED = 0.2
+# What a fit leaves has lost what the unknowns took up, and its covariance is itself an estimate: by how much intervals
+# must be wider at this share (Kiefer and Vogelsang, Econometric Theory 21, 2005, table 1: Bartlett's window, 95 %).
+WIDER = 1 + (2.1859 * CORRELATED_SHARE + 0.3142 * CORRELATED_SHARE**2 - 0.3427 * CORRELATED_SHARE**3) / 1.6449
 # Scatter from recording to recording that is less likely than this, were it what is expected, widens the intervals.
 UNLIKELY_SCATTER = 0.01
+# Directions known worse than this, relative to what each unknown would be known by alone, are rounding.
+ROUNDING = 1e-12
+# Part that an unknown must have in a direction that is not known to be named with it.
+INVOLVED = 0.1
+PROFILE_STEPS = 8
+PROFILE_TOLERANCE = 0.01  # In standard deviations.
 
 
 @dataclass(frozen=True)
 class Interval:
-    """A 90 % interval and the standard deviation behind it, in the unknown's unit."""
+    """A 90 % interval and the standard deviation behind it, in the unknown's unit; infinite where nothing is known."""
 
     low: float
     high: float
     sd: float
 
+    @classmethod
+    def about(cls, value: float, sd: float) -> "Interval":
+        """The interval of a normally distributed estimate."""
+        return cls(float(value - REACH * sd), float(value + REACH * sd), float(sd))
+
 
 @dataclass(frozen=True)
 class Undetermined:
-    """Unknowns that the recordings do not tell apart.
+    """Shared unknowns that the recordings do not tell apart.
 
     Attributes
     ----------
     parameters : list of str
-    determined : str
-        The combination of their relative changes that is determined; empty where none is.
+    text : str
+        For people: which, and what is known in their stead.
     """
 
     parameters: list[str]
-    determined: str
+    text: str
 
 
 @dataclass(frozen=True)
-class Part:
-    """One recording's say on the shared unknowns, its own unknowns taken out.
+class Scatter:
+    """How far an unknown differs from recording to recording: as expected, and as found.
 
     Attributes
     ----------
-    information : ndarray, shape (shared, shared)
-    score : ndarray, shape (shared,)
-        Gradient of half the sum of squares.
-    noise : ndarray, shape (shared, shared)
-        Covariance of the score by the noise in this recording, as its residuals show it, and by the expected scatter.
+    expected, found : float
+        Standard deviations; `found` is about the expected value.
+    likelihood : float
+        Of a scatter this large, were the expected one true.
     """
 
-    information: NDArray
-    score: NDArray
-    noise: NDArray
+    expected: float
+    found: float
+    likelihood: float
+
+    @property
+    def widens(self) -> bool:
+        """Whether chance does not explain it."""
+        return self.likelihood < UNLIKELY_SCATTER
 
 
-def parts(problem: "Problem", residuals: NDArray, jacobian: NDArray) -> list[Part]:
-    """Every recording's say, in the order of the problem's evidence."""
-    shared = len(problem.shared)
-    found = []
-    for i, (data, expected) in enumerate(problem.rows):
-        at = np.r_[data, expected]
-        A, B, r = jacobian[at, :shared], jacobian[at][:, problem.own_columns(i)], residuals[at]
-        if B.shape[1]:
-            Q, _ = np.linalg.qr(B)
-            A, r = A - Q @ (Q.T @ A), r - Q @ (Q.T @ r)
-        samples = problem.evidence[i].measured.shape
-        rows = A[: data.size].reshape(*samples, shared), r[: data.size].reshape(samples)
-        noise = sum(_correlated(a, e) for a, e in zip(*rows, strict=True))
-        own = A[data.size :]
-        found.append(Part(A.T @ A, A.T @ r, noise + own.T @ own))
+def covariance(problem: Problem, solution: Solution) -> NDArray:
+    """Covariance of all unknowns about the truth, shape (unknowns, unknowns); infinite where nothing is known.
+
+    Inverse information, corrected for residuals that are correlated in time, on either side of which stands the
+    noise that the residuals show and the drive's unknown part makes.
+    """
+    information, _ = information_and_slope(problem, solution.x, solution.blocks)
+    noise = np.diag((problem.expected * scatter_scale(problem, solution)) ** 2)
+    drives = problem.drive_errors(solution.x)
+    # A variance from a few draws is itself uncertain: Student's reach over that of the normal distribution.
+    few = (t.ppf(0.5 + COVERAGE / 2, max(sum(map(len, drives)), 1)) / REACH) ** 2
+    for block, drive in zip(solution.blocks, drives, strict=True):
+        noise[np.ix_(block.columns, block.columns)] += noise_of(block) + few * _noise_of_drive(block, drive)
+    alone, values, vectors = _directions(information)
+    known = values > ROUNDING
+    inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(alone, alone)
+    found = inverse @ noise @ inverse
+    lost = (np.abs(vectors[:, ~known]) > INVOLVED).any(axis=1)
+    found[lost, lost] = np.inf
     return found
 
 
-def intervals(problem: "Problem", x: NDArray, residuals: NDArray, jacobian: NDArray) -> dict[str, Interval]:
-    """The 90 % interval of each shared unknown at the optimum; unbounded where the recordings say nothing."""
-    said = parts(problem, residuals, jacobian)
-    covariance = _covariance(said, len(problem.shared)) * scatter_scale(problem, x) ** 2
-    reach = norm.ppf(0.5 + COVERAGE / 2)
+def intervals(problem: Problem, solution: Solution, variance: NDArray) -> dict[str, Interval]:
+    """The 90 % interval of each shared unknown, from the variance of all."""
+    sd = np.sqrt(variance)
+    return {name: Interval.about(solution.x[k], sd[k]) for k, name in enumerate(problem.shared)}
+
+
+def own_intervals(problem: Problem, solution: Solution, spread: NDArray) -> dict[str, dict[str, Interval]]:
+    """The same of each recording's own unknowns, and of its friction where it has one; from the covariance of all."""
     found = {}
-    for k, name in enumerate(problem.shared):
-        sd = float(np.sqrt(covariance[k, k]))
-        found[name] = Interval(float(x[k] - reach * sd), float(x[k] + reach * sd), sd)
+    shared = list(problem.shared)
+    for i, e in enumerate(problem.evidence):
+        at = np.arange(len(problem.names))[problem.own_columns(i)]
+        own = dict(zip(problem.own, at, strict=True))
+        found[e.name] = {name: Interval.about(solution.x[k], np.sqrt(spread[k, k])) for name, k in own.items()}
+        if "friction_scale" in own and "friction_coefficient" in shared:
+            pair = [shared.index("friction_coefficient"), own["friction_scale"]]
+            mu, scale = solution.x[pair]
+            weights = np.array([scale, mu])
+            variance = weights @ spread[np.ix_(pair, pair)] @ weights
+            found[e.name]["friction"] = Interval.about(mu * scale, np.sqrt(variance))
     return found
 
 
-def _covariance(said: list[Part], shared: int) -> NDArray:
-    inverse = np.linalg.pinv(sum((p.information for p in said), np.zeros((shared, shared))), rcond=1e-14)
-    return inverse @ sum(p.noise for p in said) @ inverse
+def noise_of(block: Block) -> NDArray:
+    """Covariance of a recording's score by the noise in it, as its residuals show it; shape (k, k)."""
+    return WIDER**2 * sum(_correlated(a, e) for a, e in zip(block.derivatives, block.errors, strict=True))
+
+
+def _noise_of_drive(block: Block, errors: NDArray) -> NDArray:
+    """The same by what is unknown of the drive's motion.
+
+    Where in its count the drive rests is an error that lasts all recording long. The fit takes it for something else,
+    and what is left does not show it. What is left does show some of the rest of the drive's errors, which therefore
+    count twice: intervals that these govern are too wide rather than too narrow.
+    """
+    scores = np.einsum("csk,dcs->dk", block.derivatives, errors)
+    return scores.T @ scores / max(len(errors), 1)
 
 
 def _correlated(sensitivity: NDArray, residual: NDArray) -> NDArray:
-    """Sum over pairs of samples of sensitivity x covariance of the residuals x sensitivity; shape (shared, shared)."""
+    """Sum over pairs of samples of sensitivity x covariance of the residuals x sensitivity."""
     n = residual.size
     lags = max(1, int(CORRELATED_SHARE * n))
     own = fftconvolve(residual, residual[::-1])[n - 1 : n + lags] / n
@@ -119,51 +159,139 @@ def _correlated(sensitivity: NDArray, residual: NDArray) -> NDArray:
     return (vector * np.maximum(value, 0.0)) @ vector.T
 
 
-def scatter_scale(problem: "Problem", x: NDArray) -> float:
-    """How many times the expected scatter the recordings' own values scatter; 1 unless chance does not explain it."""
-    worst, n = 1.0, len(problem.evidence)
-    for name, free in problem.own.items():
-        if free.spread is None or n < 2:
+def scatter(problem: Problem, solution: Solution) -> dict[str, Scatter]:
+    """How the recordings' own values scatter, for those of which something is expected; by parameter."""
+    n, found = len(problem.evidence), {}
+    for place, (name, free) in enumerate(problem.own.items()):
+        if free.spread is None:
             continue
-        own = np.array([problem.values_of(x, i)[name] for i in range(n)])
-        square = float(((own - free.start) ** 2).sum() / free.spread**2)
-        if chi2.sf(square, n) < UNLIKELY_SCATTER:
-            worst = max(worst, np.sqrt(square / n))
-    return worst
-
-
-def undetermined(problem: "Problem", residuals: NDArray, jacobian: NDArray) -> list[Undetermined]:
-    """Groups of shared unknowns that the recordings do not tell apart."""
-    shared = len(problem.shared)
-    if not shared:
-        return []
-    sizes = problem.sizes[:shared]
-    information = sum(p.information for p in parts(problem, residuals, jacobian)) * np.outer(sizes, sizes)
-    value, vector = np.linalg.eigh(information)
-    names = np.array(list(problem.shared))
-    found = []
-    for k in np.flatnonzero(value < 1 / UNDETERMINED_SD**2):
-        involved = np.flatnonzero(np.abs(vector[:, k]) > INVOLVED)
-        known = ""
-        if involved.size == 2:
-            # Across the direction that is not known lies the one that is.
-            first, second = involved
-            share = -vector[first, k] / vector[second, k]
-            known = f"d {names[first]} / {sizes[first]:.3g} {share:+.2f} d {names[second]} / {sizes[second]:.3g}"
-        found.append(Undetermined(names[involved].tolist(), known))
+        at = len(problem.shared) + place + len(problem.own) * np.arange(n)
+        square = float((problem.unexpected(solution.x)[at] ** 2).sum())
+        found[name] = Scatter(free.spread, free.spread * float(np.sqrt(square / n)), float(chi2.sf(square, n)))
     return found
 
 
-def bootstrap(said: list[Part], draws: int, seed: int) -> NDArray:
-    """Standard deviation of each shared unknown over resampled sets of recordings, shape (shared,).
+def scatter_scale(problem: Problem, solution: Solution) -> NDArray:
+    """How many times the expected scatter each unknown scatters; 1 unless chance does not explain it."""
+    scale = np.ones(len(problem.names))
+    for name, said in scatter(problem, solution).items():
+        if said.widens:
+            place = len(problem.shared) + list(problem.own).index(name)
+            scale[place :: len(problem.own)] = said.found / said.expected
+    return scale
+
+
+def undetermined(problem: Problem, solution: Solution) -> list[Undetermined]:
+    """Shared unknowns that the recordings do not tell apart.
+
+    An unknown is not determined if its interval is wider than what its bounds leave anyway, or than itself where it
+    has none.
+    """
+    names, n = list(problem.shared), len(problem.shared)
+    information = sum((i for i, _ in shared_parts(problem, solution)), np.diag(problem.expected[:n] ** 2))
+    alone, values, vectors = _directions(information)
+    low, high = (b[:n] for b in problem.bounds)
+    extent = np.where(np.isfinite(high - low), high - low, 2 * problem.sizes[:n])
+    sd = np.abs(vectors) / alone[:, None] / np.sqrt(np.maximum(values, np.finfo(float).tiny))
+    lost = (2 * REACH * sd > extent[:, None]).any(axis=0)
+    found = []
+    for k in np.flatnonzero(lost):
+        involved = np.flatnonzero(np.abs(vectors[:, k]) > INVOLVED)
+        text = _known_instead(
+            [names[j] for j in involved], vectors[involved, k] / alone[involved], solution.x[involved]
+        )
+        found.append(Undetermined([names[j] for j in involved], text))
+    return found
+
+
+def _known_instead(names: list[str], direction: NDArray, values: NDArray) -> str:
+    """A sentence on unknowns that can change together along `direction` without being noticed."""
+    if len(names) == 1:
+        return f"{names[0]} is not determined by these recordings"
+    together = f"{', '.join(names[:-1])} and {names[-1]} are not determined apart"
+    if len(names) > 2:
+        return f"{together}; each can make up for the others"
+    weight = -direction[0] / direction[1]
+    known = values[0] + weight * values[1]
+    sign = "+" if weight > 0 else "-"
+    return f"{together}; known is {names[0]} {sign} {abs(weight):.4g} x {names[1]} = {known:.5g}"
+
+
+def _directions(information: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Information with each unknown measured by what it alone would be known by: that, eigenvalues, eigenvectors."""
+    alone = np.sqrt(np.diag(information))
+    # What no recording depends on at all is a direction of its own, without information.
+    alone = np.where(alone > 0, alone, 1.0)
+    values, vectors = np.linalg.eigh(information / np.outer(alone, alone))
+    return alone, values, vectors
+
+
+def shared_parts(problem: Problem, solution: Solution) -> list[tuple[NDArray, NDArray]]:
+    """Every recording's say on the shared unknowns, its own taken out: information and score."""
+    n, found = len(problem.shared), []
+    for block in solution.blocks:
+        own = block.columns[n:]
+        H, g = block.information, block.score
+        H[n:, n:] += np.diag(problem.expected[own] ** 2)
+        g[n:] += (problem.unexpected(solution.x) * problem.expected)[own]
+        out = H[:n, n:] @ np.linalg.pinv(H[n:, n:], rcond=1e-14, hermitian=True)
+        found.append((H[:n, :n] - out @ H[n:, :n], g[:n] - out @ g[n:]))
+    return found
+
+
+def bootstrap(problem: Problem, solution: Solution, draws: int = 500, seed: int = 1) -> dict[str, float]:
+    """Standard deviation of each shared unknown over resampled sets of recordings.
 
     One step of Newton's method from the optimum stands for each refit. A check of `intervals`: it knows of no
     expected scatter, only of what the recordings did, and wants half a dozen of them.
     """
+    said = shared_parts(problem, solution)
     random = np.random.default_rng(seed)
     steps = []
     for _ in range(draws):
         drawn = [said[i] for i in random.integers(len(said), size=len(said))]
-        information = sum(p.information for p in drawn)
-        steps.append(-np.linalg.pinv(information, rcond=1e-14) @ sum(p.score for p in drawn))
-    return np.std(steps, axis=0, ddof=1)
+        information, score = (sum(each) for each in zip(*drawn, strict=True))
+        alone, values, vectors = _directions(information)
+        known = values > ROUNDING
+        steps.append(-(vectors[:, known] / values[known]) @ (vectors[:, known].T @ (score / alone)) / alone)
+    return dict(zip(problem.shared, np.std(steps, axis=0, ddof=1).tolist(), strict=True))
+
+
+def profile(problem: Problem, solution: Solution, name: str, variance: NDArray) -> Interval:
+    """The interval of a shared unknown from its profile: all others are fitted anew for each of its values.
+
+    The cost may rise as far as it does along one standard deviation of the linear theory (which knows of correlated
+    residuals, as the cost does not), times the interval's reach squared. What it adds is how the cost bends on the way.
+
+    Parameters
+    ----------
+    problem : Problem
+    solution : Solution
+    name : str
+    variance : ndarray, shape (unknowns,)
+        From `covariance`.
+    """
+    k = problem.names.index(name)
+    sd = float(np.sqrt(variance[k]))
+    information, _ = information_and_slope(problem, solution.x, solution.blocks)
+    plain = float(np.linalg.pinv(information, rcond=1e-14, hermitian=True)[k, k])
+    unit = sd**2 / plain
+    low, high = (_profile_end(problem, solution, k, side * sd, unit) for side in (-1, 1))
+    return Interval(low, high, sd)
+
+
+def _profile_end(problem: Problem, solution: Solution, k: int, sd: float, unit: float) -> float:
+    """Where the root of the rise of cost, which is nearly linear, comes to the interval's reach; or the bound."""
+    low, high = (b[k] for b in problem.bounds)
+    reach, x = REACH, solution.x
+    for _ in range(PROFILE_STEPS):
+        value = float(np.clip(solution.x[k] + reach * sd, low, high))
+        start = x.copy()
+        start[k] = value
+        found = solve(problem, start, fixed=[k])
+        x = found.x
+        risen = np.sqrt(max(found.cost - solution.cost, 0.0) / unit)
+        if abs(risen - REACH) < PROFILE_TOLERANCE or (value in (low, high) and risen < REACH):
+            return value
+        reach *= REACH / max(risen, 0.2 * REACH)
+    return value

@@ -38,15 +38,19 @@ def sensor_noise(given: ModelInput) -> dict[str, float]:
     return found
 
 
-def drive_noise(given: ModelInput, parameters: Parameters) -> dict[str, NDArray]:
-    """What is unknown of the drive's motion, as it shows in each channel: standard deviation, shape (n,)."""
+def drive_errors(given: ModelInput, parameters: Parameters) -> dict[str, NDArray]:
+    """What is unknown of the drive's motion, as it shows in each channel: a few likely errors, shape (draws, n)."""
     said = simulate(given, parameters)
     aside = [simulate(replace(given, theta_in=given.theta_in + d), parameters) for d in given.drive_deviations]
-    samples = max(1, round(ALIKE_S / float(np.median(np.diff(given.recording.time_s)))))
-    if not aside:
-        return {channel: np.zeros_like(said.time_s) for channel in said.channels}
-    square = {c: sum((a[c] - said[c]) ** 2 for a in aside) / len(aside) for c in said.channels}
-    return {c: np.sqrt(np.maximum(uniform_filter1d(values, samples), 0.0)) for c, values in square.items()}
+    return {c: np.array([a[c] - said[c] for a in aside]).reshape(-1, said.time_s.size) for c in said.channels}
+
+
+def size_over_time(errors: NDArray, time_s: NDArray) -> NDArray:
+    """Standard deviation of a few likely errors at each sample, averaged over a while; shape (n,)."""
+    if not errors.size:
+        return np.zeros_like(time_s)
+    samples = max(1, round(ALIKE_S / float(np.median(np.diff(time_s)))))
+    return np.sqrt(np.maximum(uniform_filter1d((errors**2).mean(axis=0), samples), 0.0))
 
 
 def _scatter(values: NDArray) -> float:

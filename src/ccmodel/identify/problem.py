@@ -5,7 +5,7 @@ What belongs to a recording may be expected to lie about a value with a spread: 
 to run, zeros are good to the sensors' accuracy. Such an expectation is one more residual.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.identify.noise import drive_noise, sensor_noise
+from ccmodel.identify.noise import drive_errors, sensor_noise, size_over_time
 from ccmodel.model.failure import ModelError
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import PRESCRIBED, ModelInput, simulate
@@ -91,9 +91,9 @@ class Evidence:
             raise ModelError(f"{recording.batch}/{recording.id}: none of {', '.join(channels)} was recorded")
         time_s = given.recording.time_s
         judged = time_s >= max(recording.rest_s, recording.settled_s)
-        sensors, drive = sensor_noise(given), drive_noise(given, parameters)
+        sensors, drive = sensor_noise(given), drive_errors(given, parameters)
         measured = np.stack([given.recording[c][judged] for c in used])
-        sigma = np.stack([np.hypot(sensors[c], drive[c][judged]) for c in used])
+        sigma = np.stack([np.hypot(sensors[c], size_over_time(drive[c], time_s)[judged]) for c in used])
         sigma = np.hypot(sigma, allowance * np.ptp(measured, axis=1, keepdims=True))
         return cls(given, parameters, used, judged, measured, sigma)
 
@@ -103,16 +103,46 @@ class Evidence:
         return f"{self.given.recording.batch}/{self.given.recording.id}"
 
     def modelled(self, values: Mapping[str, float]) -> NDArray:
-        """What the model says with some parameters replaced, shape (channels, judged samples).
-
-        A counted angle has no zero of its own: it is compared about what it reads at the rest.
-        """
+        """What the model says with some parameters replaced, shape (channels, judged samples)."""
         said = simulate(self.given, self.parameters.with_values(values))
         return np.stack([said[c][self.judged] for c in self.channels])
 
     def errors(self, values: Mapping[str, float]) -> NDArray:
         """Model less recording over the noise, shape (channels, judged samples)."""
         return (self.modelled(values) - self.measured) / self.sigma
+
+    def drive_errors(self, values: Mapping[str, float]) -> NDArray:
+        """Likely errors over the noise that the drive's unknown part makes, shape (draws, channels, judged samples)."""
+        found = drive_errors(self.given, self.parameters.with_values(values))
+        return np.stack([found[c][:, self.judged] for c in self.channels], axis=1) / self.sigma
+
+
+@dataclass(frozen=True)
+class Block:
+    """One recording about a point: its errors over their noise, and how they answer to the unknowns it depends on.
+
+    Attributes
+    ----------
+    columns : ndarray of int, shape (k,)
+        Which of the problem's unknowns these are: the shared ones, then the recording's own.
+    errors : ndarray, shape (channels, samples)
+    derivatives : ndarray, shape (channels, samples, k)
+    """
+
+    columns: NDArray
+    errors: NDArray
+    derivatives: NDArray
+
+    @property
+    def information(self) -> NDArray:
+        """Shape (k, k)."""
+        J = self.derivatives.reshape(-1, self.columns.size)
+        return J.T @ J
+
+    @property
+    def score(self) -> NDArray:
+        """Gradient of half the sum of squares, shape (k,)."""
+        return self.derivatives.reshape(-1, self.columns.size).T @ self.errors.ravel()
 
 
 @dataclass(frozen=True)
@@ -150,85 +180,84 @@ class Problem:
         plain = [*self.shared, *(name for _ in self.evidence for name in self.own)]
         return np.array([f.spread or size_of(n, f.start) for n, f in zip(plain, self.free, strict=True)])
 
-    @property
+    @cached_property
     def start(self) -> NDArray:
         """Starting values, shape (unknowns,)."""
         return np.array([f.start for f in self.free])
 
-    @property
+    @cached_property
     def bounds(self) -> tuple[NDArray, NDArray]:
         """Lowest and highest values, each of shape (unknowns,)."""
         return np.array([f.low for f in self.free]), np.array([f.high for f in self.free])
 
     @cached_property
-    def rows(self) -> list[tuple[NDArray, NDArray]]:
-        """Rows of `residuals` that are each recording's: its data, and what is expected of its own unknowns."""
-        sizes = [e.measured.size for e in self.evidence]
-        starts = np.concatenate([[0], np.cumsum(sizes)])
-        expected = sum(f.spread is not None for f in self.own.values())
-        first = starts[-1] + sum(f.spread is not None for f in self.shared.values())
-        return [
-            (np.arange(starts[i], starts[i + 1]), first + i * expected + np.arange(expected)) for i in range(len(sizes))
-        ]
+    def expected(self) -> NDArray:
+        """One over the spread of each unknown, 0 where nothing is expected of it; shape (unknowns,)."""
+        return np.array([0.0 if f.spread is None else 1 / f.spread for f in self.free])
 
-    def mean_square(self, residuals: NDArray) -> float:
-        """Mean square of the errors over their noise, every sample alike."""
-        total = sum(residuals[data] @ residuals[data] / self._weight(i) for i, (data, _) in enumerate(self.rows))
-        return float(total / sum(e.measured.size for e in self.evidence))
-
-    def values_of(self, x: NDArray, recording: int) -> dict[str, float]:
-        """Parameters of one of the recordings, by name."""
-        own = x[self.own_columns(recording)]
-        return dict(zip(self.shared, x[: len(self.shared)], strict=True)) | dict(zip(self.own, own, strict=True))
-
-    def residuals(self, x: NDArray) -> NDArray:
-        """All errors over their noise, each weighed as its channel's looks, and all expectations; shape (rows,)."""
-        parts = self._each(lambda i: self._weigh(i, self.evidence[i].errors(self.values_of(x, i))))
-        return np.concatenate([*parts, self._unexpected(x)])
-
-    def jacobian(self, x: NDArray) -> NDArray:
-        """Derivatives of `residuals`, shape (rows, unknowns): only what belongs to a recording runs it again."""
-        shared = len(self.shared)
-        parts = self._each(lambda i: self._derivatives(x, i))
-        rows = sum(p.shape[0] for p in parts)
-        expected = self._unexpected(x).size
-        J = np.zeros((rows + expected, x.size))
-        row = 0
-        for i, part in enumerate(parts):
-            J[row : row + part.shape[0], :shared] = part[:, :shared]
-            J[row : row + part.shape[0], self.own_columns(i)] = part[:, shared:]
-            row += part.shape[0]
-        for k, free in enumerate(self.free):
-            if free.spread is not None:
-                J[row, k] = 1 / free.spread
-                row += 1
-        return J
-
-    def _derivatives(self, x: NDArray, i: int) -> NDArray:
-        at = [*range(len(self.shared)), *range(*self.own_columns(i).indices(x.size))]
-        base = self.evidence[i].errors(self.values_of(x, i))
-        columns = []
-        for k in at:
-            step = STEP * self.sizes[k] * (-1 if x[k] + STEP * self.sizes[k] > self.free[k].high else 1)
-            aside = x.copy()
-            aside[k] += step
-            columns.append(self._weigh(i, self.evidence[i].errors(self.values_of(aside, i)) - base) / step)
-        return np.stack(columns, axis=1)
-
-    def _weigh(self, i: int, errors: NDArray) -> NDArray:
-        return (errors * np.sqrt(self._weight(i))).ravel()
-
-    def _weight(self, i: int) -> float:
-        return min(1.0, self.looks / self.evidence[i].measured.shape[1])
-
-    def _unexpected(self, x: NDArray) -> NDArray:
-        return np.array([(v - f.start) / f.spread for v, f in zip(x, self.free, strict=True) if f.spread is not None])
+    def unexpected(self, x: NDArray) -> NDArray:
+        """How far each unknown lies from where it is expected, over its spread; shape (unknowns,)."""
+        return (x - self.start) * self.expected
 
     def own_columns(self, i: int) -> slice:
         """Where the unknowns of one recording stand."""
         first = len(self.shared) + i * len(self.own)
         return slice(first, first + len(self.own))
 
-    def _each(self, work) -> list[NDArray]:
+    def values_of(self, x: NDArray, i: int) -> dict[str, float]:
+        """Parameters of one of the recordings, by name."""
+        shared, own = x[: len(self.shared)].tolist(), x[self.own_columns(i)].tolist()
+        return dict(zip(self.shared, shared, strict=True)) | dict(zip(self.own, own, strict=True))
+
+    def errors(self, x: NDArray) -> list[NDArray]:
+        """By recording, its errors over their noise, weighed as its channels' looks; shape (channels, samples)."""
+        return self._each(lambda i: self._weighed(x, i))
+
+    def residuals(self, x: NDArray) -> NDArray:
+        """All errors and all expectations, whose sum of squares is the cost; shape (rows,)."""
+        return np.concatenate([*(e.ravel() for e in self.errors(x)), self.unexpected(x)])
+
+    def cost(self, x: NDArray) -> float:
+        """Sum of squares of `residuals`."""
+        r = self.residuals(x)
+        return float(r @ r)
+
+    def blocks(self, x: NDArray, step: float = STEP) -> list[Block]:
+        """Every recording about `x`, by differences over `step` sizes: only what belongs to it runs it again."""
+        return self._each(lambda i: self._block(x, i, step))
+
+    def drive_errors(self, x: NDArray) -> list[NDArray]:
+        """By recording, likely errors for want of the drive's true motion; shape (draws, channels, samples)."""
+        return self._each(lambda i: self.evidence[i].drive_errors(self.values_of(x, i)) * np.sqrt(self._weight(i)))
+
+    def mean_square(self, x: NDArray) -> float:
+        """Mean square of the errors over their noise, every sample alike."""
+        total = sum(float((e**2).sum()) / self._weight(i) for i, e in enumerate(self.errors(x)))
+        return total / sum(e.measured.size for e in self.evidence)
+
+    @cached_property
+    def independent_looks(self) -> float:
+        """Number of independent errors that the cost is worth: what it comes to if the model is right."""
+        return sum(e.measured.size * self._weight(i) for i, e in enumerate(self.evidence))
+
+    def _block(self, x: NDArray, i: int, relative: float) -> Block:
+        columns = np.r_[0 : len(self.shared), self.own_columns(i)].astype(int)
+        base = self._weighed(x, i)
+        derivatives = np.empty((*base.shape, columns.size))
+        for place, k in enumerate(columns):
+            step = relative * self.sizes[k]
+            step = -step if x[k] + step > self.free[k].high else step
+            aside = x.copy()
+            aside[k] += step
+            derivatives[..., place] = (self._weighed(aside, i) - base) / step
+        return Block(columns, base, derivatives)
+
+    def _weighed(self, x: NDArray, i: int) -> NDArray:
+        return self.evidence[i].errors(self.values_of(x, i)) * np.sqrt(self._weight(i))
+
+    def _weight(self, i: int) -> float:
+        return min(1.0, self.looks / self.evidence[i].measured.shape[1])
+
+    def _each(self, work: Callable) -> list:
         with ThreadPoolExecutor(CORES) as pool:
             return list(pool.map(work, range(len(self.evidence))))

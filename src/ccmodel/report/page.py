@@ -62,6 +62,7 @@ def write_page(
         loader=PackageLoader("ccmodel.report", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
+    environment.filters |= {"interval": interval, "about": about, "number": number}
     template = environment.get_template("page.html.j2")
     channels = [c for c in CHANNELS if c in set(errors["channel"])]
     file.write_text(
@@ -134,3 +135,28 @@ def _rows(errors: pd.DataFrame) -> list[dict]:
 
 def _or_none(value: float) -> float | None:
     return None if np.isnan(value) else float(value)
+
+
+def number(value: float | None) -> str:
+    """Three digits; a dash for what is not known."""
+    return "–" if value is None else f"{value:.3g}"
+
+
+def interval(of: dict) -> str:
+    """Ends of an interval, in as many digits as tell them apart."""
+    if of["sd"] is None or of["low"] is None or of["high"] is None:
+        return "not determined"
+    return f"{_rounded(of['low'], of['sd'])} to {_rounded(of['high'], of['sd'])}"
+
+
+def about(of: dict) -> str:
+    """Middle of an interval and its reach."""
+    if of["sd"] is None or of["low"] is None or of["high"] is None:
+        return "not determined"
+    reach = (of["high"] - of["low"]) / 2
+    return f"{_rounded((of['high'] + of['low']) / 2, of['sd'])} ± {reach:.1g}"
+
+
+def _rounded(value: float, sd: float) -> str:
+    """A value to a tenth of its standard deviation."""
+    return f"{value:.{max(1 - int(np.floor(np.log10(sd))), 0)}f}" if sd > 0 else f"{value:.5g}"

@@ -1,6 +1,7 @@
 """Recordings of a fit's batches -> fitted values."""
 
 from collections.abc import Sequence
+from math import inf
 from pathlib import Path
 
 from ccmodel import provenance
@@ -36,16 +37,13 @@ def _fit(stated: Fit, recordings_files: Sequence[Path]) -> FitResult:
         ]
     except (ModelError, ValueError) as error:
         return FitResult(False, str(error), recordings=[f"{r.batch}/{r.id}" for r, _ in pairs])
-    own = {
-        name: Free(getattr(pairs[0][1], name), spread=expected.spread)
-        for name, expected in stated.per_recording.items()
-    }
-    return fit(Problem(evidence, shared, own), stated.starts)
+    own = {name: _start(name, each, pairs[0][1], each.spread) for name, each in stated.per_recording.items()}
+    return fit(Problem(evidence, shared, own), stated.starts, stated.profile)
 
 
-def _start(name: str, free, estimates: Parameters) -> Free:
+def _start(name: str, free, estimates: Parameters, spread: float | None = None) -> Free:
     """As configured, else as estimated."""
     start = free.start if free.start is not None else getattr(estimates, name)
     if start is None:
         raise ModelError(f"{name} needs a start in the configuration: the batch file has no estimate of it")
-    return Free(start, *free.bounds)
+    return Free(start, *(free.bounds or (-inf, inf)), spread)
