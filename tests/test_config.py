@@ -35,8 +35,11 @@ def test_committed_schema_is_that_of_the_typed_config():
 
 
 def test_an_unknown_key_is_refused_with_the_nearest_name(edited):
-    with pytest.raises(InputError, match="line 32.*unknown key 'varable' in studies.loops; did you mean 'variable'"):
-        load_config(edited("variable: bend", "varable: bend"))
+    file = edited("variable: bend", "varable: bend")
+    line = next(n for n, text in enumerate(file.read_text().splitlines(), start=1) if "varable" in text)
+    told = f"line {line}: unknown key 'varable' in studies.loops; did you mean 'variable'"
+    with pytest.raises(InputError, match=told):
+        load_config(file)
 
 
 def test_an_unknown_parameter_cannot_be_free(edited):

@@ -33,7 +33,7 @@ def page(tmp_path):
     def write(result: FitResult) -> str:
         errors = pd.DataFrame([], columns=list(COLUMNS)).astype(COLUMNS)
         fits = [{"fit": "fitted", **result.as_dict()}]
-        write_page(tmp_path / "index.html", Config(), {}, [], errors, fits, [], [])
+        write_page(tmp_path / "index.html", Config(), {}, [], errors, fits, [], [], [], {})
         return (tmp_path / "index.html").read_text()
 
     return write
