@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from ccmodel.compare import model_study
-from ccmodel.compare.claims import NO, OPEN, YES, claims_of
+from ccmodel.compare.claims import NO, OPEN, YES, claims_of, loop_placements
 from ccmodel.compare.repeats import condition_of, estimates, pooled_scatter
 from ccmodel.config import Claims, Measuring
+from ccmodel.report.claims import model_figure, recordings_figure
+from ccmodel.report.figures import save_figure
 from model_runs import CABLE, STUDY
 
 CLAIMS = Claims(bend="bend", pretension="pretension", radius="radius", small_percent=5.0, model=STUDY)
@@ -69,6 +71,21 @@ def test_a_trend_the_other_way_is_not_borne_out():
 def test_without_recordings_nothing_is_determined_and_no_number_is_made_up():
     claims = claims_of({"bend": [], "pretension": [], "radius": []}, None, CLAIMS, HOW)
     assert {claim.borne_out for claim in claims} == {OPEN}
+
+
+def test_without_recordings_the_figures_can_still_be_drawn(tmp_path):
+    claims = claims_of({"bend": [], "pretension": [], "radius": []}, None, CLAIMS, HOW)
+    for name, figure in (("a", recordings_figure(claims)), ("b", model_figure(claims, {}))):
+        save_figure(figure, tmp_path / f"{name}.png")
+        save_figure(figure, tmp_path / f"{name}.svg")
+    assert "could not be run" in (tmp_path / "b.svg").read_text()
+
+
+def test_the_figures_call_the_virtual_rig_what_it_is(found, tmp_path):
+    save_figure(recordings_figure(list(found.values())), tmp_path / "a.svg")
+    save_figure(model_figure(list(found.values()), loop_placements(CABLE, STUDY)), tmp_path / "b.svg")
+    assert "virtual rig, simulated" in (tmp_path / "a.svg").read_text()
+    assert "loop at the drive end" in (tmp_path / "b.svg").read_text()
 
 
 def test_without_repeats_there_is_no_interval_and_it_is_said():

@@ -60,7 +60,8 @@ def recordings_figure(claims: Sequence[Claim]) -> Figure:
             ax.set_ylabel(ylabel)
             ax.set_ylim(bottom=-0.03 * ax.get_ylim()[1])
             ax.set_title(f"({letter})", loc="left")
-            ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, fontsize=8, handletextpad=0.3)
+            if ax.get_legend_handles_labels()[0]:
+                ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, fontsize=8, handletextpad=0.3)
         said = " and ".join(sorted(sources)) or "no recording"
         figure.suptitle(f"Points: {said}; bars: interval of the mean over repeats; black: the model of them")
     return figure
@@ -92,16 +93,29 @@ def model_figure(claims: Sequence[Claim], loops: Mapping[str, Recording]) -> Fig
         figure, axes = plt.subplots(2, 2, figsize=(10, 7.8))
         for ax, letter in zip(axes.flat, "abcd", strict=True):
             ax.set_title(f"({letter})", loc="left")
-        _load_panel(axes[0, 0], rows_of.get("deadband-and-load", []))
-        _sections_panel(axes[0, 1], rows_of.get("sections", []))
-        _placement_panels(axes[1, 0], axes[1, 1], loops)
+        for panel, ax, name in (
+            (_load_panel, axes[0, 0], "deadband-and-load"),
+            (_sections_panel, axes[0, 1], "sections"),
+        ):
+            rows = [row for row in rows_of.get(name, []) if row.model is not None]
+            panel(ax, rows) if rows else _say_not_run(ax)
+        if loops:
+            _placement_panels(axes[1, 0], axes[1, 1], loops)
+        else:
+            _say_not_run(axes[1, 0])
+            _say_not_run(axes[1, 1])
         figure.suptitle("Model alone: load, sections of the paper's discretisation, place of the loop")
     return figure
 
 
+def _say_not_run(ax: Axes) -> None:
+    """An axis of logarithms cannot be drawn without a value."""
+    ax.text(0.5, 0.5, "the model could not be run", ha="center", va="center", transform=ax.transAxes)
+
+
 def _load_panel(ax: Axes, rows: Sequence[Row]) -> None:
     for i, quantity in enumerate(("lost_motion", "slack_share")):
-        mine = [row for row in rows if row.quantity == quantity and row.model is not None]
+        mine = [row for row in rows if row.quantity == quantity]
         # Two units in one panel: the share of the cycle on an axis of its own, to the right.
         side = ax if i == 0 else ax.twinx()
         line = {"color": COLOURS[i], "marker": MARKERS[i], "ls": LINES[i], "ms": 4.5}
@@ -128,8 +142,7 @@ def _sections_panel(ax: Axes, rows: Sequence[Row]) -> None:
     ticks = sorted({int(row.at) for row in rows})
     ax.set_xticks(ticks, [str(t) for t in ticks])
     ax.minorticks_off()
-    if by_bend:
-        ax.legend()
+    ax.legend()
 
 
 def _placement_panels(torque: Axes, motion: Axes, loops: Mapping[str, Recording]) -> None:
@@ -143,5 +156,4 @@ def _placement_panels(torque: Axes, motion: Axes, loops: Mapping[str, Recording]
     torque.set_ylabel(AXIS["tau_out_Nm"][0])
     motion.set_xlabel(AXIS["theta_in_rad"][0])
     motion.set_ylabel(r"$\theta_{in} - \theta_{out}$ (rad)")
-    if loops:
-        torque.legend(loc="upper left", fontsize=8)
+    torque.legend(loc="upper left", fontsize=8)
