@@ -1,0 +1,108 @@
+"""The paper's Table I beside the patterns of the effects that come nearest, and how near every effect comes."""
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ccmodel.compare.table_one.cases import NORMS
+from ccmodel.compare.table_one.rank import flat_distance, target
+from ccmodel.compare.table_one.settings import CHANNELS, TableOne
+from ccmodel.report.figures import COLOURS, STYLE, plt
+
+SYMBOLS = {
+    "theta_out_rad": r"$\theta_{out}$",
+    "tau_in_Nm": r"$\tau_{in}$",
+    "tau_out_Nm": r"$\tau_{out}$",
+    "T1_N": "$T_1$",
+    "T2_N": "$T_2$",
+    "T3_N": "$T_3$",
+    "T4_N": "$T_4$",
+}
+MARKERS = dict(zip(NORMS, "osD", strict=True))
+# How many patterns are drawn of each kind, and how many courses in the plane of stiffness and friction.
+NEAREST = {"single": 3, "pair": 2}
+COURSES = 5
+
+
+def table_one_figure(ranked: pd.DataFrame, singles: pd.DataFrame, study: TableOne) -> Figure:
+    """Table I with the nearest patterns by each normalisation, the fitted parameters, and the ranking."""
+    with plt.rc_context(STYLE):
+        figure = plt.figure(figsize=(13, 10.5))
+        grid = figure.add_gridspec(2, 6, height_ratios=(1, 1.45))
+        for i, norm in enumerate(NORMS):
+            _patterns(figure.add_subplot(grid[0, 2 * i : 2 * i + 2]), ranked, norm, study)
+        _fitted(figure.add_subplot(grid[1, :3]), ranked, singles, study)
+        _ranking(figure.add_subplot(grid[1, 3:]), ranked, study)
+        figure.suptitle(
+            "Which left-out effect errs as the paper's Table I does? Bars: the paper's; all else is simulated"
+        )
+    return figure
+
+
+def _patterns(ax: Axes, ranked: pd.DataFrame, norm: str, study: TableOne) -> None:
+    """Table I as bars, the nearest effects' errors as points."""
+    wanted, at = target(study), range(len(CHANNELS))
+    ax.bar(at, wanted, color="#d0d0d0", width=0.8, label="paper, Table I")
+    colours = iter(COLOURS)
+    for kind, count in NEAREST.items():
+        table = ranked[(ranked["ranking"] == norm) & (ranked["kind"] == kind)].head(count)
+        for (_, row), colour in zip(table.iterrows(), colours, strict=False):
+            errors = [row[f"error_{c}"] for c in CHANNELS]
+            label = f"{_short(row['effect'])} ({row['distance']:.2f})"
+            ax.plot(at, errors, "o-" if kind == "single" else "s--", ms=4, lw=0.9, color=colour, label=label)
+    ax.set_yscale("log")
+    ax.set_ylim(0.3, 60)
+    ax.set_yticks([0.5, 1, 2, 5, 10, 20, 50], labels=["0.5", "1", "2", "5", "10", "20", "50"])
+    ax.set_xticks(at, [SYMBOLS[c] for c in CHANNELS])
+    ax.set_ylabel("rms error (%)")
+    ax.set_title(f"errors over {norm}", loc="left")
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), fontsize=7)
+
+
+def _fitted(ax: Axes, ranked: pd.DataFrame, singles: pd.DataFrame, study: TableOne) -> None:
+    """Fitted stiffness and friction of the effects that come nearest to the paper's, over all conditions."""
+    fitted, measured = study.rig.fitted, study.rig.measured
+    table = ranked[(ranked["ranking"] == "stiffness") & (ranked["kind"] == "single")].head(COURSES)
+    cases = singles[singles["plausible"] & (singles["rig"] == "measured")]
+    for (_, row), colour in zip(table.iterrows(), COLOURS, strict=False):
+        own = cases[cases["effect"] == row["effect"]]
+        label = f"{_short(row['effect'])} ({row['distance']:.2f})"
+        ax.plot(own["stiffness_ratio"], own["friction_ratio"], ".", ms=4, color=colour, alpha=0.7, label=label)
+    paper = (
+        fitted.stiffness_N_per_m / measured.stiffness_N_per_m,
+        fitted.friction_coefficient / measured.friction_coefficient,
+    )
+    ax.plot(*paper, "k*", ms=14, label="paper: fitted over measured")
+    ax.plot(1, 1, "k+", ms=10, label="nothing left out")
+    ax.set(
+        xlim=(0.3, 1.15),
+        ylim=(0.8, 1.35),
+        xlabel="fitted stiffness over the rig's",
+        ylabel="fitted friction over the rig's",
+    )
+    ax.set_title("plain model fitted to rigs with the measured stiffness", loc="left")
+    ax.legend(loc="upper right", fontsize=7)
+
+
+def _ranking(ax: Axes, ranked: pd.DataFrame, study: TableOne) -> None:
+    """Distance of every effect to Table I by each normalisation; nearest on top."""
+    table = ranked[(ranked["kind"] == "single") & ranked["ranking"].isin(NORMS)]
+    distances = table.pivot(index="effect", columns="ranking", values="distance")
+    distances = distances.loc[distances.min(axis=1).sort_values(kind="stable").index[::-1]]
+    at = range(len(distances))
+    ax.hlines(at, distances.min(axis=1), distances.max(axis=1), color="#c0c0c0", lw=1)
+    for (norm, marker), colour in zip(MARKERS.items(), COLOURS, strict=False):
+        ax.plot(distances[norm], at, marker, ms=4, color=colour, label=f"errors over {norm}")
+    flat = flat_distance(target(study))
+    ax.axvline(flat, color="black", lw=0.8, ls="--", label=f"the same error everywhere ({flat:.2f})")
+    ax.set_yticks(at, [_short(e) for e in distances.index], fontsize=7)
+    ax.set_ylim(-0.7, len(distances) - 0.3)
+    ax.set_xlim(0, None)
+    ax.set_xlabel("distance to Table I: rms of ln (error / the paper's)")
+    ax.set_title("every effect at its nearest", loc="left")
+    ax.legend(loc="lower left", fontsize=7)
+
+
+def _short(effect: str) -> str:
+    """An effect in few words."""
+    return effect.replace(" at ", ", ").replace(" + ", "\n+ ") if "+" in effect else effect.replace(" at ", ", ")
