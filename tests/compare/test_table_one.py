@@ -45,15 +45,17 @@ def written(folder, **changes):
 def tiny_file(tmp_path_factory):
     """Settings of a study of seconds."""
     open_ = {"load_stiffness_Nm_per_rad": [0.05], "amplitude_rad": [1.0], "frequency_Hz": [1.0], "rigs": ["measured"]}
+    open_["fit_over"] = ["peak-to-peak", "rms"]
     return written(
         tmp_path_factory.mktemp("settings"),
         not_stated=open_ | {"load_stiffness_Nm_per_rad": [0.05, 1.0]},
         grid__strengths=2,
         grid__finer=1,
+        grid__beyond=1.0,
         grid__shapes=[0.5],
         grid__set_up_differences=[0.1],
         rig__motion={"cycles": 2, "samples_per_cycle": 60},
-        pairs={"singles": 1, "shares": [0.5, 1.0], "not_stated": open_},
+        pairs={"singles": 2, "shares": [0.5, 1.0], "not_stated": open_},
     )
 
 
@@ -194,7 +196,7 @@ def test_a_ranking_is_the_same_however_the_work_is_shared(tiny, tiny_file):
 
 def test_a_ranking_names_every_effect_once_nearest_first(tiny, tiny_file):
     ranked = rank.rankings(tiny.singles, tiny.pairs, load_yaml_model(tiny_file, TableOne))
-    for _, table in ranked.groupby(["ranking", "kind"]):
+    for _, table in ranked.groupby(["by", "norm", "kind"]):
         assert table["distance"].is_monotonic_increasing
         assert table["effect"].is_unique
     assert tiny.left_out == 1
@@ -217,5 +219,6 @@ def test_a_tiny_run_writes_tables_and_figure(tiny_file, tmp_path):
         "summary.json",
     }
     ranked = pd.read_csv(tmp_path / "out/ranking.csv")
-    assert set(ranked["ranking"]) == {"peak-to-peak", "maximum", "rms", "stiffness"}
+    assert set(ranked["by"]) == {"errors", "errors and fit", "fit"}
+    assert set(ranked["norm"]) == {"peak-to-peak", "maximum", "rms"}
     assert {f"error_{c}" for c in CHANNELS} < set(ranked.columns)

@@ -4,8 +4,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ccmodel.compare.table_one.cases import NORMS
 from ccmodel.compare.table_one.rank import flat_distance, target
+from ccmodel.compare.table_one.refit import NORMS
 from ccmodel.compare.table_one.settings import CHANNELS, TableOne
 from ccmodel.report.figures import COLOURS, STYLE, plt
 
@@ -19,20 +19,26 @@ SYMBOLS = {
     "T4_N": "$T_4$",
 }
 MARKERS = dict(zip(NORMS, "osD", strict=True))
-# How many patterns are drawn of each kind, and how many courses in the plane of stiffness and friction.
-NEAREST = {"single": 3, "pair": 2}
-COURSES = 5
+# Patterns that are drawn: by which ranking, of one effect or two, how many, and how.
+DRAWN = (
+    ("errors", "single", 3, {"marker": "o", "linestyle": "-"}),
+    ("errors and fit", "single", 1, {"marker": "s", "linestyle": "--"}),
+    ("errors and fit", "pair", 1, {"marker": "D", "linestyle": ":"}),
+)
+# Effects in the plane of stiffness and friction.
+CLOUDS = 6
 
 
 def table_one_figure(ranked: pd.DataFrame, singles: pd.DataFrame, study: TableOne) -> Figure:
     """Table I with the nearest patterns by each normalisation, the fitted parameters, and the ranking."""
     with plt.rc_context(STYLE):
-        figure = plt.figure(figsize=(13, 10.5))
-        grid = figure.add_gridspec(2, 6, height_ratios=(1, 1.45))
-        for i, norm in enumerate(NORMS):
-            _patterns(figure.add_subplot(grid[0, 2 * i : 2 * i + 2]), ranked, norm, study)
-        _fitted(figure.add_subplot(grid[1, :3]), ranked, singles, study)
-        _ranking(figure.add_subplot(grid[1, 3:]), ranked, study)
+        figure = plt.figure(figsize=(13, 11))
+        above, below = figure.subfigures(2, 1, height_ratios=(1, 1.3))
+        for ax, norm in zip(above.subplots(1, len(NORMS)), NORMS, strict=True):
+            _patterns(ax, ranked, norm, study)
+        left, right = below.subplots(1, 2)
+        _fitted(left, ranked, singles, study)
+        _ranking(right, ranked, study)
         figure.suptitle(
             "Which left-out effect errs as the paper's Table I does? Bars: the paper's; all else is simulated"
         )
@@ -44,12 +50,12 @@ def _patterns(ax: Axes, ranked: pd.DataFrame, norm: str, study: TableOne) -> Non
     wanted, at = target(study), range(len(CHANNELS))
     ax.bar(at, wanted, color="#d0d0d0", width=0.8, label="paper, Table I")
     colours = iter(COLOURS)
-    for kind, count in NEAREST.items():
-        table = ranked[(ranked["ranking"] == norm) & (ranked["kind"] == kind)].head(count)
+    for by, kind, count, style in DRAWN:
+        table = ranked[(ranked["by"] == by) & (ranked["norm"] == norm) & (ranked["kind"] == kind)].head(count)
         for (_, row), colour in zip(table.iterrows(), colours, strict=False):
             errors = [row[f"error_{c}"] for c in CHANNELS]
-            label = f"{_short(row['effect'])} ({row['distance']:.2f})"
-            ax.plot(at, errors, "o-" if kind == "single" else "s--", ms=4, lw=0.9, color=colour, label=label)
+            label = f"by {by}: {_short(row['effect'])} ({row['distance']:.2f})"
+            ax.plot(at, errors, ms=4, lw=1, color=colour, label=label, **style)
     ax.set_yscale("log")
     ax.set_ylim(0.3, 60)
     ax.set_yticks([0.5, 1, 2, 5, 10, 20, 50], labels=["0.5", "1", "2", "5", "10", "20", "50"])
@@ -62,7 +68,7 @@ def _patterns(ax: Axes, ranked: pd.DataFrame, norm: str, study: TableOne) -> Non
 def _fitted(ax: Axes, ranked: pd.DataFrame, singles: pd.DataFrame, study: TableOne) -> None:
     """Fitted stiffness and friction of the effects that come nearest to the paper's, over all conditions."""
     fitted, measured = study.rig.fitted, study.rig.measured
-    table = ranked[(ranked["ranking"] == "stiffness") & (ranked["kind"] == "single")].head(COURSES)
+    table = ranked[(ranked["by"] == "fit") & (ranked["kind"] == "single")].head(CLOUDS)
     cases = singles[singles["plausible"] & (singles["rig"] == "measured")]
     for (_, row), colour in zip(table.iterrows(), COLOURS, strict=False):
         own = cases[cases["effect"] == row["effect"]]
@@ -86,8 +92,8 @@ def _fitted(ax: Axes, ranked: pd.DataFrame, singles: pd.DataFrame, study: TableO
 
 def _ranking(ax: Axes, ranked: pd.DataFrame, study: TableOne) -> None:
     """Distance of every effect to Table I by each normalisation; nearest on top."""
-    table = ranked[(ranked["kind"] == "single") & ranked["ranking"].isin(NORMS)]
-    distances = table.pivot(index="effect", columns="ranking", values="distance")
+    table = ranked[(ranked["kind"] == "single") & (ranked["by"] == "errors")]
+    distances = table.pivot(index="effect", columns="norm", values="distance")
     distances = distances.loc[distances.min(axis=1).sort_values(kind="stable").index[::-1]]
     at = range(len(distances))
     ax.hlines(at, distances.min(axis=1), distances.max(axis=1), color="#c0c0c0", lw=1)

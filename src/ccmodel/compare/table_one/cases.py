@@ -5,22 +5,16 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from itertools import combinations, product
 
-import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from ccmodel.compare.table_one.effects import Effect, all_effects, knows_time, scaled
-from ccmodel.compare.table_one.refit import refit
+from ccmodel.compare.table_one.refit import NORMS, refit
 from ccmodel.compare.table_one.rigs import Condition, conditions, recorded, within_ranges
 from ccmodel.compare.table_one.settings import CHANNELS, NotStated, TableOne
 from ccmodel.model.failure import ModelError
 
-# What an error can be given over; the paper does not say which it took.
-NORMS = {
-    "peak-to-peak": lambda values: np.ptp(values, axis=1),
-    "maximum": lambda values: np.abs(values).max(axis=1),
-    "rms": lambda values: np.sqrt((values**2).mean(axis=1)),
-}
-CONDITION = ("rig", "load_stiffness_Nm_per_rad", "amplitude_rad", "frequency_Hz")
+CONDITION = ("rig", "load_stiffness_Nm_per_rad", "amplitude_rad", "frequency_Hz", "fit_over")
 Case = tuple[Condition, tuple[Effect, ...]]
 Tell = Callable[[str], None]
 
@@ -64,10 +58,10 @@ def run(study: TableOne, groups: Sequence[Sequence[Case]], cores: int, tell: Tel
 
 
 def _parts(cases: Sequence[Case]) -> list[list[int]]:
-    """Where the cases of each condition stand."""
+    """Where the cases of each condition stand, whatever is done in the fit."""
     parts: dict[Condition, list[int]] = {}
     for i, (condition, _) in enumerate(cases):
-        parts.setdefault(condition, []).append(i)
+        parts.setdefault(condition.without_fit, []).append(i)
     return list(parts.values())
 
 
@@ -86,10 +80,24 @@ def _under(usable: Sequence[Condition], acting: Sequence[tuple[Effect, ...]]) ->
 
 
 def _rows(study: TableOne, cases: Sequence[Case]) -> list[dict]:
-    return [_row(study, condition, effects) for condition, effects in cases]
+    """Rows of cases; a rig that is fitted in several ways one after the other is made up once."""
+    rows, before, made_up = [], None, None
+    for condition, effects in cases:
+        if (condition.without_fit, effects) != before:
+            before, made_up = (condition.without_fit, effects), _made_up(study, condition, effects)
+        rows.append(_row(study, condition, effects, made_up))
+    return rows
 
 
-def _row(study: TableOne, condition: Condition, effects: tuple[Effect, ...]) -> dict:
+def _made_up(study: TableOne, condition: Condition, effects: tuple[Effect, ...]) -> NDArray | str:
+    """What the rig shows, or why there is no such rig."""
+    try:
+        return recorded(study.rig, condition, effects)
+    except (ModelError, ValueError) as error:
+        return str(error)
+
+
+def _row(study: TableOne, condition: Condition, effects: tuple[Effect, ...], made_up: NDArray | str) -> dict:
     row = {
         "effect": " + ".join(f"{e.name} at {e.place}" for e in effects),
         "numbers": "; ".join(" ".join(f"{k}={v:.6g}" for k, v in e.values.items()) for e in effects),
@@ -97,8 +105,9 @@ def _row(study: TableOne, condition: Condition, effects: tuple[Effect, ...]) -> 
         **{name: getattr(condition, name) for name in CONDITION},
         "failed": "",
     }
+    if isinstance(made_up, str):
+        return row | {"failed": made_up}
     try:
-        made_up = recorded(study.rig, condition, effects)
         found = refit(study.rig, condition, made_up)
     except (ModelError, ValueError) as error:
         return row | {"failed": str(error)}

@@ -11,13 +11,17 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ccmodel.compare.table_one.cases import CONDITION, NORMS
-from ccmodel.compare.table_one.settings import CHANNELS, Rig, TableOne
+from ccmodel.compare.table_one.cases import CONDITION
+from ccmodel.compare.table_one.refit import NORMS
+from ccmodel.compare.table_one.settings import CHANNELS, Cable, Rig, TableOne
 
 MEASURED_RIGS = ("measured", "measured-free")
-STIFFNESS = "to_stiffness"
-# What effects are ranked by.
-RANKINGS = (*(f"noisy_{norm}" for norm in NORMS), STIFFNESS)
+# What effects are ranked by: column, what it compares, and over which norm.
+RANKINGS = (
+    *((f"noisy_{norm}", "errors", norm) for norm in NORMS),
+    *((f"both_{norm}", "errors and fit", norm) for norm in NORMS),
+    ("fit", "fit", "maximum"),
+)
 
 
 def target(study: TableOne) -> NDArray:
@@ -53,35 +57,37 @@ def patterns(table: pd.DataFrame, study: TableOne, norm: str, noise: bool) -> ND
 def scored(table: pd.DataFrame, study: TableOne) -> pd.DataFrame:
     """The cases that ran, with a distance to Table I for each norm, bare and with noise, and one to the stiffness.
 
-    ``both`` is the distance over nine numbers, the errors with noise over each norm and the two fitted parameters'
-    ratios; NaN on rigs that have the fitted parameters to begin with.
+    ``fit`` compares the fitted stiffness and friction with the paper's, on rigs that have the measured ones; NaN on
+    the others. ``both`` compares nine numbers: the errors with noise, and the two fitted parameters.
     """
     table = table[table["failed"] == ""]
-    wanted = target(study)
-    ratios = table[["stiffness_ratio", "friction_ratio"]].to_numpy()
-    fitted, measured = study.rig.fitted, study.rig.measured
-    asked = np.array(
-        [
-            fitted.stiffness_N_per_m / measured.stiffness_N_per_m,
-            fitted.friction_coefficient / measured.friction_coefficient,
-        ]
-    )
-    known = table["rig"].isin(MEASURED_RIGS).to_numpy()
-    added = {STIFFNESS: np.where(known, distance(ratios, asked), np.nan)}
+    wanted, parameters, asked = target(study), _fitted(table, study), _of(study.rig.fitted)
+    measured = table["rig"].isin(MEASURED_RIGS)
+    added = {"fit": np.where(measured, distance(parameters, asked), np.nan)}
     for norm in NORMS:
-        bare, noisy = (patterns(table, study, norm, noise) for noise in (False, True))
-        nine = np.concatenate([noisy, ratios], axis=1), np.concatenate([wanted, asked])
-        added[f"bare_{norm}"] = distance(bare, wanted)
+        noisy = patterns(table, study, norm, noise=True)
+        nine = np.concatenate([noisy, parameters], axis=1), np.concatenate([wanted, asked])
+        added[f"bare_{norm}"] = distance(patterns(table, study, norm, noise=False), wanted)
         added[f"noisy_{norm}"] = distance(noisy, wanted)
-        added[f"both_{norm}"] = np.where(known, distance(*nine), np.nan)
+        added[f"both_{norm}"] = distance(*nine)
     return table.assign(**added)
 
 
-def nearest(table: pd.DataFrame, by: str, plausible: bool = True) -> pd.DataFrame:
-    """The best case of every effect by a column, nearest first; ties go to the case tried first."""
-    chosen = table[table["plausible"]] if plausible else table
-    chosen = chosen[chosen[by].notna()].sort_values(by, kind="stable")
-    return chosen.drop_duplicates("effect")
+def _fitted(table: pd.DataFrame, study: TableOne) -> NDArray:
+    """Fitted stiffness (N/m) and friction coefficient of each case, shape (cases, 2)."""
+    is_fitted = (table["rig"] == "fitted").to_numpy()[:, None]
+    own = np.where(is_fitted, _of(study.rig.fitted), _of(study.rig.measured))
+    return table[["stiffness_ratio", "friction_ratio"]].to_numpy() * own
+
+
+def _of(cable: Cable) -> NDArray:
+    return np.array([cable.stiffness_N_per_m, cable.friction_coefficient])
+
+
+def nearest(table: pd.DataFrame, column: str) -> pd.DataFrame:
+    """The best plausible case of every effect by a column, nearest first; ties go to the case tried first."""
+    chosen = table[table["plausible"] & table[column].notna()]
+    return chosen.sort_values(column, kind="stable").drop_duplicates("effect")
 
 
 def torque_allowed(pattern: Mapping[str, float], sizes: Mapping[str, float], radius_m: float) -> float:
@@ -117,26 +123,26 @@ def rankings(singles: pd.DataFrame, pairs: pd.DataFrame, study: TableOne) -> pd.
     Returns
     -------
     DataFrame
-        ``ranking`` (a key of `NORMS`, or "stiffness"), ``kind``, ``rank``, ``effect``, ``numbers``, ``distance``,
-        the condition, both ratios, and ``error_...`` in % (over the maximum for "stiffness").
+        ``by`` and ``norm`` as in `RANKINGS`, ``kind``, ``rank``, ``effect``, ``numbers``, ``distance``, the condition,
+        both ratios, and ``error_...`` in % over the norm, with the sensors' noise.
     """
-    tables = []
-    for by in RANKINGS:
-        name = "stiffness" if by == STIFFNESS else by.removeprefix("noisy_")
-        norm = "maximum" if by == STIFFNESS else name
-        for kind, table in (("single", singles), ("pair", pairs)):
-            best = nearest(table, by)
-            errors = patterns(best, study, norm, noise=True)
-            columns = {
-                "ranking": name,
-                "kind": kind,
-                "rank": np.arange(1, len(best) + 1),
-                "effect": best["effect"],
-                "numbers": best["numbers"],
-                "distance": best[by],
-                "bare": np.nan if by == STIFFNESS else best[f"bare_{norm}"],
-                **{c: best[c] for c in (*CONDITION, "stiffness_ratio", "friction_ratio")},
-                **{f"error_{c}": errors[:, i] for i, c in enumerate(CHANNELS)},
-            }
-            tables.append(pd.DataFrame(columns))
-    return pd.concat(tables, ignore_index=True)
+    kinds = (("single", singles), ("pair", pairs))
+    return pd.concat([_ranking(table, kind, *r, study) for r in RANKINGS for kind, table in kinds], ignore_index=True)
+
+
+def _ranking(table: pd.DataFrame, kind: str, column: str, by: str, norm: str, study: TableOne) -> pd.DataFrame:
+    best = nearest(table, column)
+    errors = patterns(best, study, norm, noise=True)
+    columns = {
+        "by": by,
+        "norm": norm,
+        "kind": kind,
+        "rank": np.arange(1, len(best) + 1),
+        "effect": best["effect"],
+        "numbers": best["numbers"],
+        "distance": best[column],
+        "bare_errors": best[f"bare_{norm}"],
+        **{c: best[c] for c in (*CONDITION, "stiffness_ratio", "friction_ratio")},
+        **{f"error_{c}": errors[:, i] for i, c in enumerate(CHANNELS)},
+    }
+    return pd.DataFrame(columns)

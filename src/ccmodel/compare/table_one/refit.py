@@ -10,6 +10,12 @@ from scipy.optimize import least_squares
 from ccmodel.compare.table_one.rigs import Condition, plain
 from ccmodel.compare.table_one.settings import Rig
 
+# What an error can be given over, shape (channels,); the paper does not say which it took.
+NORMS = {
+    "peak-to-peak": lambda values: np.ptp(values, axis=1),
+    "maximum": lambda values: np.abs(values).max(axis=1),
+    "rms": lambda values: np.sqrt((values**2).mean(axis=1)),
+}
 # A fit may go this far from the rig's own values, as a factor.
 REACH = 30.0
 TOLERANCE = 1e-5
@@ -36,21 +42,21 @@ class Refit:
 
 
 def refit(rig: Rig, condition: Condition, recorded: NDArray) -> Refit:
-    """Least squares over all channels of Table I, each over its peak to peak.
+    """Least squares over all channels of Table I, each over what the condition says.
 
     Raises
     ------
     ModelError
         If the model cannot be run on the way.
     """
-    span = np.ptp(recorded, axis=1, keepdims=True)
+    span = NORMS[condition.fit_over](recorded)[:, None]
     reach = np.log(REACH)
 
     def errors(x: NDArray) -> NDArray:
         return _plain_at(rig, condition, *x) - recorded
 
     def jacobian(x: NDArray) -> NDArray:
-        derivatives = _derivatives(rig, condition, *np.round(x / LATTICE).astype(int).tolist())
+        derivatives = _derivatives(rig, condition.without_fit, *np.round(x / LATTICE).astype(int).tolist())
         return (derivatives / span).reshape(2, -1).T
 
     found = least_squares(

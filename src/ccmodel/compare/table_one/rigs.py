@@ -1,7 +1,7 @@
 """A made-up rig's last cycle, and what the plain model says of it: arrays of shape (channels, samples)."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -29,6 +29,12 @@ class Condition:
     load_stiffness_Nm_per_rad: float
     amplitude_rad: float
     frequency_Hz: float
+    fit_over: str = "peak-to-peak"
+
+    @property
+    def without_fit(self) -> "Condition":
+        """The same for everything but the fit."""
+        return replace(self, fit_over="")
 
     def cable(self, rig: Rig) -> Cable:
         """Stiffness and friction of the rig's cables in their conduits."""
@@ -37,7 +43,7 @@ class Condition:
 
 def conditions(open_: NotStated) -> list[Condition]:
     """Every combination."""
-    choices = (open_.rigs, open_.load_stiffness_Nm_per_rad, open_.amplitude_rad, open_.frequency_Hz)
+    choices = (open_.rigs, open_.load_stiffness_Nm_per_rad, open_.amplitude_rad, open_.frequency_Hz, open_.fit_over)
     return [Condition(*choice) for choice in product(*choices)]
 
 

@@ -11,6 +11,7 @@ CHANNELS = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "T1_N", "T2_N", "T3_N", 
 
 Some = Annotated[list[Positive], Field(min_length=1)]
 RigName = Literal["measured", "measured-free", "fitted"]
+Norm = Literal["peak-to-peak", "maximum", "rms"]
 
 
 class Cable(TypedModel):
@@ -65,6 +66,7 @@ class NotStated(TypedModel):
     amplitude_rad: Some
     frequency_Hz: Some
     rigs: list[RigName] = Field(min_length=1)
+    fit_over: list[Norm] = Field(min_length=1)
 
 
 class Grid(TypedModel):

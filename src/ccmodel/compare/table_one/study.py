@@ -34,7 +34,7 @@ class Outcome:
 
 def run_study(study: TableOne, cores: int = 1, tell: Tell = lambda text: None) -> Outcome:
     """Try everything; the same settings give the same tables, however many processes share the work."""
-    usable = usable_conditions(study, study.not_stated)
+    stated, usable = conditions(study.not_stated), usable_conditions(study, study.not_stated)
     groups = single_cases(study, usable)
     coarse = _run(study, groups, cores, tell, "effects")
     cases = [case for group in groups for case in group]
@@ -47,7 +47,7 @@ def run_study(study: TableOne, cores: int = 1, tell: Tell = lambda text: None) -
     failed = pd.concat([singles, pairs], ignore_index=True)
     failed = failed[failed["failed"] != ""]
     ran = scored(pairs, study) if len(pairs) else found.iloc[:0]
-    return Outcome(found, ran, failed, len(conditions(study.not_stated)) - len(usable))
+    return Outcome(found, ran, failed, len({c.without_fit for c in stated} - {c.without_fit for c in usable}))
 
 
 def _run(study: TableOne, groups: Sequence[Sequence[Case]], cores: int, tell: Tell, what: str) -> pd.DataFrame:
@@ -57,7 +57,7 @@ def _run(study: TableOne, groups: Sequence[Sequence[Case]], cores: int, tell: Te
 
 def _best_rows(found: pd.DataFrame) -> list[int]:
     """Cases at which any effect comes nearest by any ranking, in the order tried."""
-    return sorted({int(i) for by in RANKINGS for i in nearest(found, by).index})
+    return sorted({int(i) for column, *_ in RANKINGS for i in nearest(found, column).index})
 
 
 def _around(study: TableOne, case: Case) -> list[Case]:
@@ -68,8 +68,8 @@ def _around(study: TableOne, case: Case) -> list[Case]:
 def _leading(study: TableOne, found: pd.DataFrame, cases: Sequence[Case]) -> list[Effect]:
     """The nearest effects by each ranking, at the numbers at which they come nearest; each once."""
     leading: dict[tuple, Effect] = {}
-    for by in RANKINGS:
-        for i in nearest(found, by).index[: study.pairs.singles]:
+    for column, *_ in RANKINGS:
+        for i in nearest(found, column).index[: study.pairs.singles]:
             (effect,) = cases[i][1]
             leading.setdefault((effect.name, effect.place), effect)
     return list(leading.values())
