@@ -22,8 +22,8 @@ MARKERS = dict(zip(NORMS, "osD", strict=True))
 # Patterns that are drawn: by which ranking, of one effect or two, how many, and how.
 DRAWN = (
     ("errors", "single", 3, {"marker": "o", "linestyle": "-"}),
-    ("errors and fit", "single", 1, {"marker": "s", "linestyle": "--"}),
     ("errors and fit", "pair", 1, {"marker": "D", "linestyle": ":"}),
+    ("errors at the paper's fit", "single", 1, {"marker": "s", "linestyle": "--"}),
 )
 # Effects in the plane of stiffness and friction.
 CLOUDS = 6

@@ -16,12 +16,17 @@ from ccmodel.compare.table_one.refit import NORMS
 from ccmodel.compare.table_one.settings import CHANNELS, Cable, Rig, TableOne
 
 MEASURED_RIGS = ("measured", "measured-free")
-# What effects are ranked by: column, what it compares, and over which norm.
+# A fit whose stiffness and friction are this near to the paper's, as a distance, is taken to be the paper's fit.
+SAME_FIT = 0.15
+# What effects are ranked by: column, what it compares, and over which norm. These are followed up, more finely and in
+# pairs.
 RANKINGS = (
     *((f"noisy_{norm}", "errors", norm) for norm in NORMS),
     *((f"both_{norm}", "errors and fit", norm) for norm in NORMS),
     ("fit", "fit", "maximum"),
 )
+# These are only read off: the errors of those cases whose fit is the paper's.
+READ_OFF = tuple((f"held_{norm}", "errors at the paper's fit", norm) for norm in NORMS)
 
 
 def target(study: TableOne) -> NDArray:
@@ -59,6 +64,7 @@ def scored(table: pd.DataFrame, study: TableOne) -> pd.DataFrame:
 
     ``fit`` compares the fitted stiffness and friction with the paper's, on rigs that have the measured ones; NaN on
     the others. ``both`` compares nine numbers: the errors with noise, and the two fitted parameters.
+    ``held`` is the distance of the errors where ``fit`` is below `SAME_FIT`, else NaN.
     """
     table = table[table["failed"] == ""]
     wanted, parameters, asked = target(study), _fitted(table, study), _of(study.rig.fitted)
@@ -70,6 +76,7 @@ def scored(table: pd.DataFrame, study: TableOne) -> pd.DataFrame:
         added[f"bare_{norm}"] = distance(patterns(table, study, norm, noise=False), wanted)
         added[f"noisy_{norm}"] = distance(noisy, wanted)
         added[f"both_{norm}"] = distance(*nine)
+        added[f"held_{norm}"] = np.where(added["fit"] < SAME_FIT, added[f"noisy_{norm}"], np.nan)
     return table.assign(**added)
 
 
@@ -123,11 +130,17 @@ def rankings(singles: pd.DataFrame, pairs: pd.DataFrame, study: TableOne) -> pd.
     Returns
     -------
     DataFrame
-        ``by`` and ``norm`` as in `RANKINGS`, ``kind``, ``rank``, ``effect``, ``numbers``, ``distance``, the condition,
-        both ratios, and ``error_...`` in % over the norm, with the sensors' noise.
+        ``by`` and ``norm`` as in `RANKINGS` and `READ_OFF`, ``kind``, ``rank``, ``effect``, ``numbers``, ``distance``,
+        the condition, both ratios, and ``error_...`` in % over the norm, with the sensors' noise.
     """
-    kinds = (("single", singles), ("pair", pairs))
-    return pd.concat([_ranking(table, kind, *r, study) for r in RANKINGS for kind, table in kinds], ignore_index=True)
+    return pd.concat(
+        [
+            _ranking(table, kind, *ranking, study)
+            for ranking in (*RANKINGS, *READ_OFF)
+            for kind, table in (("single", singles), ("pair", pairs))
+        ],
+        ignore_index=True,
+    )
 
 
 def _ranking(table: pd.DataFrame, kind: str, column: str, by: str, norm: str, study: TableOne) -> pd.DataFrame:
