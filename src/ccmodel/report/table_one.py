@@ -86,8 +86,8 @@ def _fitted(ax: Axes, ranked: pd.DataFrame, singles: pd.DataFrame, study: TableO
         xlabel="fitted stiffness over the rig's",
         ylabel="fitted friction over the rig's",
     )
-    ax.set_title("plain model fitted to rigs with the measured stiffness", loc="left")
-    ax.legend(loc="upper right", fontsize=7)
+    ax.set_title("plain model fitted to rigs of the measured stiffness, no free cable", loc="left")
+    ax.legend(loc="upper left", fontsize=7)
 
 
 def _ranking(ax: Axes, ranked: pd.DataFrame, study: TableOne) -> None:
