@@ -4,10 +4,10 @@ VENV := .venv
 BIN := $(VENV)/bin
 CORES ?= 2
 
-.PHONY: help results real data test bench coverage lint lock clean
+.PHONY: help results real data test bench table-one coverage lint lock clean
 
 help:  ## list the targets
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
 # `--require-hashes` refuses whatever is not pinned in requirements.lock; the package itself then needs no download.
 $(VENV)/.ready: requirements.lock pyproject.toml
@@ -46,6 +46,10 @@ bench: $(VENV)/.ready  ## measure speed and accuracy: results/bench.json, docs/f
 
 coverage: $(VENV)/.ready  ## count how often the fits' 90 % intervals hold the truth: docs/coverage.md
 	$(BIN)/python benchmarks/coverage.py
+
+table-one: $(VENV)/.ready  ## ask which left-out effect errs as the paper's Table I does: docs/table-one.md
+	$(BIN)/ccmodel table-one config/table-one.yaml --out results/table-one --figure docs/figures/table-one.png \
+	  --cores $(CORES)
 
 lint: $(VENV)/.ready
 	$(BIN)/ruff check .

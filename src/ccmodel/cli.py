@@ -84,6 +84,19 @@ def predict(
         raise typer.Exit(1)
 
 
+@app.command("table-one")
+def table_one(
+    settings: Annotated[Path, typer.Argument(help="config/table-one.yaml or one like it.")],
+    out: Annotated[Path, typer.Option(help="Folder that gets the tables.")],
+    figure: Annotated[Path, typer.Option(help="File that gets the figure, PNG or SVG.")],
+    cores: Annotated[int, typer.Option(min=1, help="Processes to share the work.")] = 1,
+) -> None:
+    """Ask which left-out effect, and of which size, errs as the paper's Table I does."""
+    from ccmodel.stages.table_one import table_one as run
+
+    typer.echo(run(settings, out, figure, cores, tell=lambda text: _err.print(text, style="dim", markup=False)))
+
+
 @app.command()
 def schema() -> None:
     """Print the JSON schema of the configuration."""

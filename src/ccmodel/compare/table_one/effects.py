@@ -1,0 +1,143 @@
+"""What is tried: every mechanism at each of its places over its range, and what may have been set up wrongly."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from ccmodel import mechanisms as registry
+from ccmodel.compare.table_one.settings import Grid
+from ccmodel.diagnose.hypothesis import singles
+from ccmodel.mechanisms import Parameter
+
+# Not physics that was left out, but a rig that is not what the model was told; each with the number that differs.
+SET_UP = ("pretension", "load-stiffness")
+SET_UP_PLACE = "set-up"
+DIFFERENCE = "difference"
+
+# Effects that know the time; all others see only the order of the samples, and one rate stands for all.
+KNOWS_TIME = (
+    "load-cell-drift",
+    "load-inertia",
+    "relaxation",
+    "running-in",
+    "stribeck",
+    "time-skew",
+    "viscous-friction",
+)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect with its numbers.
+
+    Attributes
+    ----------
+    name, place : str
+        A mechanism and one of its places, or one of `SET_UP`.
+    values : mapping of str to float
+        By parameter; the first one tried is its strength.
+    plausible : bool
+        Whether the strength lies in the mechanism's range.
+    """
+
+    name: str
+    place: str
+    values: Mapping[str, float]
+    plausible: bool
+
+    def __str__(self) -> str:
+        numbers = " ".join(f"{k}={v:.4g}" for k, v in self.values.items())
+        return f"{self.name} at {self.place}, {numbers}"
+
+    @property
+    def is_set_up(self) -> bool:
+        """Whether it is a rig set up otherwise than the model was told."""
+        return self.place == SET_UP_PLACE
+
+
+def all_effects(grid: Grid) -> list[list[Effect]]:
+    """A list for every mechanism at each place and every thing set up wrongly, over all strengths and shapes."""
+    found = [_of_mechanism(*hypothesis.acting[0], grid) for hypothesis in singles()]
+    differences = grid.set_up_differences
+    found += [[Effect(n, SET_UP_PLACE, {DIFFERENCE: d}, True) for d in differences] for n in SET_UP if differences]
+    return found
+
+
+def scaled(effect: Effect, factor: float) -> Effect:
+    """The same with its strength, the distance from where it is not there, times a factor."""
+    if effect.is_set_up:
+        return replace(effect, values={DIFFERENCE: factor * effect.values[DIFFERENCE]})
+    p = _strength_of(effect)
+    value = _away(p) + factor * (effect.values[p.name] - _away(p))
+    return replace(effect, values={**effect.values, p.name: value}, plausible=_is_plausible(p, value))
+
+
+def finer(effect: Effect, grid: Grid) -> list[Effect]:
+    """Strengths between an effect's neighbours on the grid."""
+    step = np.log(_step(effect, grid))
+    return [scaled(effect, float(f)) for f in np.exp(np.linspace(-step, step, grid.finer + 2)[1:-1])]
+
+
+def _step(effect: Effect, grid: Grid) -> float:
+    """Factor between an effect's strength and its neighbours on the grid."""
+    if effect.is_set_up:
+        return 2.0
+    p = _strength_of(effect)
+    sizes = np.sort([abs(v - _away(p)) for v in _strengths(p, grid)])
+    return float((sizes[-1] / sizes[0]) ** (1 / (grid.strengths - 1)))
+
+
+def _of_mechanism(name: str, place: str, grid: Grid) -> list[Effect]:
+    strength, *shapes = registry.get(name).parameters
+    if strength.neutral == 1:  # ratios: each by itself
+        alone = [(p, v) for p in (strength, *shapes) for v in _strengths(p, grid)]
+        neutral = registry.get(name).neutral
+        return [Effect(name, place, {**neutral, p.name: v}, _is_plausible(p, v)) for p, v in alone]
+    lists = [_strengths(strength, grid), *([_within(p, share) for share in grid.shapes] for p in shapes)]
+    names = [p.name for p in (strength, *shapes)]
+    return [
+        Effect(name, place, dict(zip(names, values, strict=True)), _is_plausible(strength, values[0]))
+        for values in product(*lists)
+    ]
+
+
+def _strength_of(effect: Effect) -> Parameter:
+    first, *others = registry.get(effect.name).parameters
+    if first.neutral == 1:
+        return next(p for p in (first, *others) if effect.values[p.name] != 1)
+    return first
+
+
+def _strengths(parameter: Parameter, grid: Grid) -> list[float]:
+    """Values of a strength, evenly in the logarithm of its distance from neutral, on every side that it has."""
+    if parameter.neutral == 1:
+        sizes = np.geomspace(grid.smallest_difference, parameter.high - 1, grid.strengths)
+        return [*(1 - sizes[::-1]).tolist(), *(1 + sizes).tolist()]
+    low, high = sorted((abs(parameter.low), abs(parameter.high)))
+    sizes = np.geomspace(low / grid.beyond, high * grid.beyond, grid.strengths)
+    if parameter.signed:
+        return [*(-sizes[::-1]).tolist(), *sizes.tolist()]
+    return (np.sign(parameter.low) * sizes).tolist()
+
+
+def _within(parameter: Parameter, share: float) -> float:
+    low, high = parameter.low, parameter.high
+    return float(low * (high / low) ** share if parameter.scale == "log" else low + share * (high - low))
+
+
+def _away(parameter: Parameter) -> float:
+    """Where a strength is counted from."""
+    return 1.0 if parameter.neutral == 1 else 0.0
+
+
+def _is_plausible(parameter: Parameter, value: float) -> bool:
+    low, high = sorted((parameter.low, parameter.high))
+    size = abs(value) if parameter.signed else value
+    return bool(low * (1 - 1e-9 * np.sign(low)) <= size <= high * (1 + 1e-9 * np.sign(high)))
+
+
+def knows_time(effects: Sequence[Effect]) -> bool:
+    """Whether the rate matters to any of them."""
+    return any(e.name in KNOWS_TIME for e in effects)
