@@ -110,7 +110,7 @@ def main() -> None:
             if took > 60 * arguments.minutes:
                 pool.shutdown(wait=False, cancel_futures=True)
                 break
-    command = f"python benchmarks/coverage.py --batches {arguments.batches} --minutes {arguments.minutes:g}"
+    command = f"python benchmarks/interval_coverage.py --batches {arguments.batches} --minutes {arguments.minutes:g}"
     text = report(found, refused, done, time.perf_counter() - began, command)
     arguments.out.write_text(text)
     print(text)
