@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
 from ccmodel.identify.fit import fit  # noqa: E402
-from ccmodel.identify.intervals import COVERAGE  # noqa: E402
+from ccmodel.identify.intervals import COVERAGE, REACH  # noqa: E402
 from drawn_batches import CONDITIONS, draw, problem_of  # noqa: E402
 
 FIRST_SEED = 10_000
@@ -27,7 +27,7 @@ UNLIKELY = 0.01  # A count outside limits that chance would leave so seldom coun
 
 
 def one_batch(seed: int) -> dict[str, list[float]] | str:
-    """By parameter, errors over their standard deviation, infinite outside of all reach; or why there is no fit."""
+    """By parameter, errors over their standard deviation; or why there is no fit."""
     drawn = draw(seed, duration_s=DURATION_S)
     problem = problem_of(drawn)
     said = fit(problem)
@@ -60,8 +60,6 @@ def table(found: dict[str, list[float]], reach: float) -> list[str]:
 
 def report(found, refused: list[str], batches: int, took_s: float, command: str) -> str:
     """The page."""
-    from ccmodel.identify.intervals import REACH
-
     rows = "\n".join(table(found, REACH))
     failed = "".join(f"\n- {text}" for text in refused) or " none."
     return f"""# Coverage of the fits' intervals
