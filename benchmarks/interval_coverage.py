@@ -72,7 +72,7 @@ a half loop and a whole one at 7 and 4 N, with stiffness, friction and load spri
 has its own friction (1 %), pretension (1 %), tension profile in each cable (5 to 40 % of what friction holds), sensor
 zeros (anywhere within the paper's accuracy) and noise (0.1 mN m, 0.05 N), and both angles are counted (0.18 deg). The
 fit starts a fifth off and finds three values for the batch and seven for each recording. Seeds from {FIRST_SEED} on;
-none of them was looked at while the intervals were made.
+nothing about the intervals was chosen by them.
 
 A 90 % interval should hold the truth in 90 % of the batches: within the limits in all but {UNLIKELY:.0%} of such tests.
 "mean" and "sd" are of the error over its stated standard deviation, which should be 0 and 1. Values of a recording's
