@@ -133,6 +133,16 @@ def test_a_model_that_cannot_be_run_on_the_way_makes_the_search_turn_back(proble
     assert fit(problem).values["stiffness_N_per_m"] == pytest.approx(drawn.shared["stiffness_N_per_m"], rel=0.005)
 
 
+def test_a_profile_that_the_model_cannot_be_run_along_is_said(problem, monkeypatch):
+    def unable(*_):
+        raise ModelError("too soft")
+
+    monkeypatch.setattr("ccmodel.identify.fit.profile", unable)
+    said = fit(problem, profiled=["stiffness_N_per_m"])
+    assert said.succeeded
+    assert "no profile of stiffness_N_per_m: too soft" in said.warnings
+
+
 def test_a_stalled_search_is_refused_with_its_reason(problem, monkeypatch):
     """A slope that points uphill: no step along it can help."""
     real = Problem.blocks

@@ -155,6 +155,7 @@ def _result(problem: Problem, found: Solution, warnings: list[str], profiled: Se
     lost = undetermined(problem, found)
     nowhere = {name: Interval(-inf, inf, inf) for group in lost for name in group.parameters}
     known = intervals(problem, found, variance) | nowhere
+    profiles, lost_on_the_way = _profiles(problem, found, [n for n in profiled if isfinite(known[n].sd)], variance)
     scattered = scatter(problem, found)
     resampled = bootstrap(problem, found) if len(problem.evidence) >= ENOUGH_RECORDINGS else {}
     return FitResult(
@@ -162,20 +163,36 @@ def _result(problem: Problem, found: Solution, warnings: list[str], profiled: Se
         message=found.message,
         values=dict(zip(problem.shared, found.x.tolist(), strict=False)),
         intervals=known,
-        profiles={name: profile(problem, found, name, variance) for name in profiled if isfinite(known[name].sd)},
-        own={e.name: {n: problem.values_of(found.x, i)[n] for n in problem.own} for i, e in enumerate(problem.evidence)}
-        if problem.own
-        else {},
+        profiles=profiles,
+        own=_own(problem, found.x) if problem.own else {},
         own_intervals=own_intervals(problem, found, spread) if problem.own else {},
         scatter=scattered,
         resampled=resampled,
         at_bound=[n for n, active in zip(problem.names, found.active, strict=True) if active],
         undetermined=lost,
-        warnings=[*warnings, *_unlikely(scattered), *_disagreeing(known, resampled)],
+        warnings=[*warnings, *lost_on_the_way, *_unlikely(scattered), *_disagreeing(known, resampled)],
         cost=problem.mean_square(found.x),
         evaluations=found.evaluations,
         recordings=[e.name for e in problem.evidence],
     )
+
+
+def _own(problem: Problem, x: NDArray) -> dict[str, dict[str, float]]:
+    values = (problem.values_of(x, i) for i in range(len(problem.evidence)))
+    return {e.name: {n: v[n] for n in problem.own} for e, v in zip(problem.evidence, values, strict=True)}
+
+
+def _profiles(
+    problem: Problem, found: Solution, names: Sequence[str], variance: NDArray
+) -> tuple[dict[str, Interval], list[str]]:
+    """Intervals from profiles, and a line on each that the model could not be run along."""
+    profiles, said = {}, []
+    for name in names:
+        try:
+            profiles[name] = profile(problem, found, name, variance)
+        except (ModelError, ValueError) as error:
+            said.append(f"no profile of {name}: {error}")
+    return profiles, said
 
 
 def _unlikely(scattered: dict[str, Scatter]) -> list[str]:

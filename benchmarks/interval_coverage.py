@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
 from ccmodel.identify.fit import fit  # noqa: E402
-from ccmodel.identify.intervals import COVERAGE  # noqa: E402
+from ccmodel.identify.intervals import COVERAGE, REACH  # noqa: E402
 from drawn_batches import CONDITIONS, draw, problem_of  # noqa: E402
 
 FIRST_SEED = 10_000
@@ -27,7 +27,7 @@ UNLIKELY = 0.01  # A count outside limits that chance would leave so seldom coun
 
 
 def one_batch(seed: int) -> dict[str, list[float]] | str:
-    """By parameter, errors over their standard deviation, infinite outside of all reach; or why there is no fit."""
+    """By parameter, errors over their standard deviation; or why there is no fit."""
     drawn = draw(seed, duration_s=DURATION_S)
     problem = problem_of(drawn)
     said = fit(problem)
@@ -60,8 +60,6 @@ def table(found: dict[str, list[float]], reach: float) -> list[str]:
 
 def report(found, refused: list[str], batches: int, took_s: float, command: str) -> str:
     """The page."""
-    from ccmodel.identify.intervals import REACH
-
     rows = "\n".join(table(found, REACH))
     failed = "".join(f"\n- {text}" for text in refused) or " none."
     return f"""# Coverage of the fits' intervals
@@ -74,7 +72,7 @@ a half loop and a whole one at 7 and 4 N, with stiffness, friction and load spri
 has its own friction (1 %), pretension (1 %), tension profile in each cable (5 to 40 % of what friction holds), sensor
 zeros (anywhere within the paper's accuracy) and noise (0.1 mN m, 0.05 N), and both angles are counted (0.18 deg). The
 fit starts a fifth off and finds three values for the batch and seven for each recording. Seeds from {FIRST_SEED} on;
-none of them was looked at while the intervals were made.
+nothing about the intervals was chosen by them.
 
 A 90 % interval should hold the truth in 90 % of the batches: within the limits in all but {UNLIKELY:.0%} of such tests.
 "mean" and "sd" are of the error over its stated standard deviation, which should be 0 and 1. Values of a recording's
@@ -110,7 +108,7 @@ def main() -> None:
             if took > 60 * arguments.minutes:
                 pool.shutdown(wait=False, cancel_futures=True)
                 break
-    command = f"python benchmarks/coverage.py --batches {arguments.batches} --minutes {arguments.minutes:g}"
+    command = f"python benchmarks/interval_coverage.py --batches {arguments.batches} --minutes {arguments.minutes:g}"
     text = report(found, refused, done, time.perf_counter() - began, command)
     arguments.out.write_text(text)
     print(text)
