@@ -58,7 +58,7 @@ def weigh(evidence: Evidence, parameters: Parameters) -> Weighed:
         spread * (_stack(e, parameters.with_values({name: value + step})) - said) / step
         for name, value, spread, step in _nuisances(e, parameters)
     ]
-    given, judged = e.given, e.judged
+    given = e.given
     drawn = [
         _stack(replace(e, given=replace(given, theta_in=given.theta_in + deviation)), parameters) - said
         for deviation in given.drive_deviations
@@ -67,7 +67,6 @@ def weigh(evidence: Evidence, parameters: Parameters) -> Weighed:
     floor = np.sqrt((e.sigma**2).mean(axis=1) + sum((c**2).mean(axis=1) for c in columns[:1]))
     N = np.stack([(c / e.sigma).ravel() for c in columns], axis=1)
     U, s, _ = np.linalg.svd(N, full_matrices=False)
-    assert judged.shape == given.theta_in.shape
     return Weighed(e, U, 1 - 1 / np.hypot(1, s), dict(zip(e.channels, floor.tolist(), strict=True)))
 
 
