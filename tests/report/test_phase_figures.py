@@ -47,4 +47,6 @@ def test_profiles_are_drawn_curved_as_friction_curves_them():
 def test_a_motion_without_all_phases_is_drawn_too():
     small = study_of(EXAMPLE.model_copy(update={"amplitude_rad": 0.05, "samples_per_cycle": 80}))
     for draw in DRAW.values():
-        plt.close(draw(small))
+        figure = draw(small)
+        assert all(axes.lines for axes in figure.axes)
+        plt.close(figure)

@@ -12,9 +12,9 @@ from ccmodel.diagnose import experiment, locate
 from ccmodel.diagnose.evidence import Weighed, weigh
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.diagnose.judge import MOST_ALTERNATIVES, RIVAL, Judgement, judge, nested_errors
-from ccmodel.diagnose.trial import Trial, each
+from ccmodel.diagnose.trial import Trial
 from ccmodel.identify.intervals import COVERAGE
-from ccmodel.identify.problem import MEASURED, Evidence, Free, Problem
+from ccmodel.identify.problem import MEASURED, Evidence, Free, Problem, each
 from ccmodel.identify.search import solve
 from ccmodel.model.failure import ModelError
 from ccmodel.model.parameters import Parameters, mechanism_key

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from ccmodel.identify.problem import Evidence
 from ccmodel.model.parameters import Parameters
-from ccmodel.model.run import simulate
 from ccmodel.model.sensitivity import STEP, size_of
 
 FRICTION_SPREAD = 0.01  # of itself, from run to run (docs/rig-log-format.md)
@@ -53,26 +52,18 @@ class Weighed:
 def weigh(evidence: Evidence, parameters: Parameters) -> Weighed:
     """Work out what may differ from run to run, about a model that is fitted already."""
     e = replace(evidence, parameters=parameters)
-    said = _stack(e, parameters)
-    columns = [
-        spread * (_stack(e, parameters.with_values({name: value + step})) - said) / step
+    said = e.modelled({})
+    differ = [
+        spread * (e.modelled({name: value + step}) - said) / step
         for name, value, spread, step in _nuisances(e, parameters)
     ]
-    given = e.given
-    drawn = [
-        _stack(replace(e, given=replace(given, theta_in=given.theta_in + deviation)), parameters) - said
-        for deviation in given.drive_deviations
-    ]
-    columns += [d / np.sqrt(len(drawn)) for d in drawn]
-    floor = np.sqrt((e.sigma**2).mean(axis=1) + sum((c**2).mean(axis=1) for c in columns[:1]))
-    N = np.stack([(c / e.sigma).ravel() for c in columns], axis=1)
+    drawn = e.drive_errors({})
+    friction = differ[0]
+    floor = np.sqrt((e.sigma**2).mean(axis=1) + (friction**2).mean(axis=1))
+    columns = [*(d / e.sigma for d in differ), *(d / np.sqrt(len(drawn)) for d in drawn)]
+    N = np.stack([c.ravel() for c in columns], axis=1)
     U, s, _ = np.linalg.svd(N, full_matrices=False)
     return Weighed(e, U, 1 - 1 / np.hypot(1, s), dict(zip(e.channels, floor.tolist(), strict=True)))
-
-
-def _stack(e: Evidence, parameters: Parameters) -> NDArray:
-    said = simulate(e.given, parameters)
-    return np.stack([said[c][e.judged] for c in e.channels])
 
 
 def _nuisances(e: Evidence, parameters: Parameters) -> Sequence[tuple[str, float, float, float]]:

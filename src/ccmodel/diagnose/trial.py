@@ -1,7 +1,6 @@
 """Trying a hypothesis: a quick score against the calibrated model, a full refit, and recordings held out in turn."""
 
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +10,7 @@ from scipy.optimize import least_squares
 from ccmodel import mechanisms as registry
 from ccmodel.diagnose.evidence import Weighed
 from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.identify.problem import CORES, Free
+from ccmodel.identify.problem import Free, each
 from ccmodel.model.failure import ModelError
 from ccmodel.model.parameters import mechanism_key
 from ccmodel.model.sensitivity import STEP, size_of
@@ -46,17 +45,6 @@ class Trial:
     covariance: NDArray
     held_out: list[dict[str, float]]
     left: NDArray
-
-    @property
-    def mean_square(self) -> float:
-        """Mean square of what the fit leaves, recordings alike."""
-        return float(np.mean([(w**2).mean() for w in self.whitened]))
-
-
-def each(weighed: Sequence[Weighed], work: Callable) -> list:
-    """Some work on every recording with its number."""
-    with ThreadPoolExecutor(CORES) as pool:
-        return list(pool.map(work, range(len(weighed)), weighed))
 
 
 def errors(one: Weighed, values: Mapping[str, float]) -> NDArray:
@@ -107,8 +95,9 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
         residuals, x0, jac=jacobian, bounds=(low, high), x_scale=sizes, ftol=TOLERANCE, xtol=TOLERANCE, gtol=TOLERANCE,
         max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
-    J = _jacobians(acting, found.x, names, sizes, high)
-    r = each(acting, lambda i, w: errors(w, named(found.x)))
+    ends = np.cumsum(counts)[:-1]
+    J = [part * np.sqrt(n) for part, n in zip(np.split(found.jac, ends), counts, strict=True)]
+    r = [part * np.sqrt(n) for part, n in zip(np.split(found.fun, ends), counts, strict=True)]
     information = [j.T @ j / n for j, n in zip(J, counts, strict=True)]
     score = [j.T @ e / n for j, e, n in zip(J, r, counts, strict=True)]
     total = sum(information)

@@ -259,5 +259,10 @@ class Problem:
         return min(1.0, self.looks / self.evidence[i].measured.shape[1])
 
     def _each(self, work: Callable) -> list:
-        with ThreadPoolExecutor(CORES) as pool:
-            return list(pool.map(work, range(len(self.evidence))))
+        return each(self.evidence, lambda i, evidence: work(i))
+
+
+def each(recordings: Sequence, work: Callable) -> list:
+    """Some work on every recording with its number, side by side; results in their order."""
+    with ThreadPoolExecutor(CORES) as pool:
+        return list(pool.map(work, range(len(recordings)), recordings))
