@@ -60,12 +60,14 @@ def left_out(results: Folder) -> None:
 
 @app.command()
 def diagnose(
-    batch: Folder, out: Annotated[Path, typer.Option(help="Folder that gets diagnosis.json, the page and two models.")]
+    batch: Folder,
+    out: Annotated[Path, typer.Option(help="Folder that gets diagnosis.json, the page and two models.")],
+    without: Annotated[list[str], typer.Option(help="A mechanism that is not to be asked for; may be repeated.")] = [],  # noqa: B006
 ) -> None:
     """Say whether the calibrated model explains a batch, and if not: where it fails and what was left out."""
     from ccmodel.stages.diagnose import diagnose as run
 
-    typer.echo(run(batch, out, tell=lambda text: _err.print(text, style="dim", markup=False)))
+    typer.echo(run(batch, out, without, tell=lambda text: _err.print(text, style="dim", markup=False)))
 
 
 @app.command()

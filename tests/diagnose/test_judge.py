@@ -7,6 +7,7 @@ import pytest
 
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.diagnose.judge import _names_more, _probabilities, _verdict, nested_errors
+from ccmodel.diagnose.structure import Structure
 from ccmodel.diagnose.trial import Trial
 
 FRICTION, SCALE = ("pulley-friction", "drive-pulley"), ("torque-scale", "drive-sensor")
@@ -19,12 +20,16 @@ WEIGHED = [SimpleNamespace(evidence=SimpleNamespace(channels=CHANNELS))] * 8
 def trial(left, *acting, **values):
     own = {k: v for k, v in VALUES.items() if any(k.startswith(name) for name, _ in acting)} | values
     left = np.broadcast_to(np.asarray(left, float), 8)
-    return Trial(Hypothesis(acting), BASE_VALUES | own, [], [], np.eye(1), [BASE_VALUES] * 8, left)
+    return Trial(
+        Hypothesis(acting), {}, BASE_VALUES | own, [], [], np.eye(1), [BASE_VALUES] * 8, list(np.sqrt(left)[:, None])
+    )
 
 
-def verdict(base, *trials):
+def verdict(base, *trials, learnable=0.0):
+    """Of trials that leave what they leave, and in that something to be learnt, the same in every recording."""
     trials = sorted(trials, key=lambda t: t.left.mean())
-    return _verdict(base, trials, _probabilities(WEIGHED, base, trials), [])
+    unlearnt = {t.hypothesis: Structure(np.full(8, learnable)) for t in (base, *trials)}
+    return _verdict(base, trials, _probabilities(WEIGHED, base, trials), [], unlearnt)
 
 
 def test_nothing_missing():
@@ -48,6 +53,11 @@ def test_two_that_do_as_well_are_not_told_apart():
 def test_what_no_mechanism_brings_down_is_unexplained():
     assert verdict(trial(40.0), trial(30.0, FRICTION), trial(35.0, SCALE)).verdict == "unexplained"
     assert verdict(trial(5.0)).verdict == "unexplained"
+
+
+def test_what_leaves_something_to_be_learnt_is_not_the_explanation():
+    assert verdict(trial(1.3), learnable=0.2).verdict == "unexplained"
+    assert verdict(trial(3.0), trial(1.2, FRICTION), learnable=0.3).verdict == "unexplained"
 
 
 def test_a_value_out_of_its_range_explains_nothing():

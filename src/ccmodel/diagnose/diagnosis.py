@@ -1,6 +1,6 @@
 """A batch's recordings -> a diagnosis, as plain data."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ from scipy.stats import norm
 from ccmodel import mechanisms as registry
 from ccmodel.diagnose import experiment, locate
 from ccmodel.diagnose.evidence import Weighed, weigh
-from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.diagnose.hypothesis import Hypothesis, singles
 from ccmodel.diagnose.judge import MOST_ALTERNATIVES, RIVAL, Judgement, judge, nested_errors
 from ccmodel.diagnose.trial import Trial
 from ccmodel.identify.intervals import COVERAGE
@@ -56,6 +56,7 @@ def diagnose(
     recordings: Sequence[Recording],
     estimates: Parameters,
     not_judged: Sequence[Mapping[str, str]] = (),
+    without: Collection[str] = (),
     tell: Callable[[str], None] = lambda text: None,
 ) -> Diagnosis:
     """Say whether the calibrated model explains recordings, and if not, where and why.
@@ -68,6 +69,8 @@ def diagnose(
         The batch's own.
     not_judged : sequence of {"what", "why"}
         What could not be judged, as far as is known already.
+    without : collection of str
+        Mechanisms that are not asked for: what a diagnosis says when the truth is not on its list.
     tell : callable
         Is told how the work goes on.
 
@@ -94,7 +97,7 @@ def diagnose(
     start = _first_fit(evidence, calibrated)
     fitted = estimates.with_values(start)
     weighed = each(evidence, lambda i, e: weigh(e, fitted))
-    judgement = judge(weighed, calibrated, start, tell)
+    judgement = judge(weighed, calibrated, start, singles(without), tell)
     said = _said(recordings[0].batch, judgement, weighed, estimates, not_judged)
     return Diagnosis(said, judgement, weighed, estimates)
 

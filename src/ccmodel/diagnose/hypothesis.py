@@ -1,6 +1,6 @@
 """What could be missing: nothing, one mechanism at one of its places, or two of them."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -63,9 +63,10 @@ class Hypothesis:
             yield dict(zip(keys, values, strict=True))
 
 
-def singles() -> list[Hypothesis]:
-    """Every mechanism at each of its places."""
-    return [Hypothesis(((name, place),)) for name in registry.names() for place in registry.get(name).places]
+def singles(without: Collection[str] = ()) -> list[Hypothesis]:
+    """Every mechanism at each of its places, but those that are not to be known."""
+    names = [name for name in registry.names() if name not in without]
+    return [Hypothesis(((name, place),)) for name in names for place in registry.get(name).places]
 
 
 def plausible(hypothesis: Hypothesis, values: Mapping[str, float], slack: float = 1.5) -> bool:

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.diagnose.evidence import Weighed
-from ccmodel.diagnose.hypothesis import Hypothesis, plausible, singles
+from ccmodel.diagnose.hypothesis import Hypothesis, plausible
+from ccmodel.diagnose.structure import Structure, structure
 from ccmodel.diagnose.trial import Score, Trial, fit, score
 from ccmodel.identify.problem import Free
 from ccmodel.model.failure import ModelError
@@ -26,10 +27,14 @@ WORTH_A_NAME = 0.05
 # Trials after the screening, and partners tried with each of the best two for a pair.
 TRIALS = 6
 PARTNERS = 3
-# What a right model leaves: the mean square of held-out recordings, and on top the share of the calibrated model's
-# excess that a mechanism's simple form may miss.
+# What a right model leaves: the mean square of held-out recordings, and in that next to nothing to be learnt by more
+# than chance. On top of either, the share of the calibrated model's excess that the simple form of a mechanism may
+# miss; of a pair, which can bend itself to much that neither of the two is, far less.
 RIGHT = 1.5
-FORM_SHARE = 0.01
+LEARNABLE = 0.03
+MISSED = (0.0, 0.08, 0.005)
+# Trials that are asked what could still be learnt of what they leave.
+CONTENDERS = 4
 # A second mechanism must halve what the first one leaves beyond noise.
 PAIR_SHARE = 0.5
 # Odds against naming something before anything is seen, and probability from which a name is given alone.
@@ -56,6 +61,8 @@ class Judgement:
         Of each of these.
     scores : list of Score
         The screening.
+    learnable : mapping of Hypothesis to Structure
+        What a flexible model could still learn of what the calibrated model and the leading trials leave.
     """
 
     verdict: str
@@ -64,12 +71,14 @@ class Judgement:
     trials: list[Trial]
     probability: list[float]
     scores: list[Score]
+    learnable: Mapping[Hypothesis, Structure]
 
 
 def judge(
     weighed: Sequence[Weighed],
     calibrated: Mapping[str, Free],
     start: Mapping[str, float],
+    known: Sequence[Hypothesis],
     tell: Callable[[str], None] = lambda text: None,
 ) -> Judgement:
     """Try all hypotheses and come to a verdict.
@@ -81,24 +90,31 @@ def judge(
         What a calibration of the paper's model leaves free.
     start : mapping of str to float
         Values of these from a first fit.
+    known : sequence of Hypothesis
+        Single mechanisms that may be missing.
     tell : callable
         Is told how the work goes on, a line at a time.
     """
     base = fit(weighed, Hypothesis(), calibrated, start)
     tell(f"the calibrated model leaves {_left(base):.2f} of the noise's mean square; asking every mechanism")
-    scores = score(weighed, base, singles())
+    scores = score(weighed, base, known)
     trials = _fit_all(weighed, calibrated, base, [s for s in scores if s.gain > WORTH_A_TRIAL][:TRIALS], tell)
     trials = sorted(trials, key=_left)
-    if trials and _left(trials[0]) > RIGHT and len(weighed) > 1:
-        trials = sorted([*trials, *_pairs(weighed, calibrated, trials[:2], tell)], key=_left)
-    trials = [t for t in trials if _names_more(t, trials)]
+    learnable = {t.hypothesis: structure(weighed, t) for t in [base, *trials[:CONTENDERS]]}
+    if trials and not is_right(trials[0], base, learnable):
+        trials = sorted([*trials, *_pairs(weighed, calibrated, trials[:2], known, tell)], key=_left)
+        trials = [t for t in trials if _names_more(t, trials)]
+        fresh = [t for t in trials[:CONTENDERS] if t.hypothesis not in learnable]
+        learnable |= {t.hypothesis: structure(weighed, t) for t in fresh}
     probability = _probabilities(weighed, base, trials)
-    return _verdict(base, trials, probability, scores)
+    return _verdict(base, trials, probability, scores, learnable)
 
 
-def enough(base: Trial) -> float:
-    """Mean square that a hypothesis may leave and still be the explanation."""
-    return RIGHT + FORM_SHARE * max(_left(base) - 1.0, 0.0)
+def is_right(trial: Trial, base: Trial, learnable: Mapping[Hypothesis, Structure]) -> bool:
+    """Whether a hypothesis leaves what a right one would: little, and nothing that could still be learnt."""
+    unlearnt = learnable.get(trial.hypothesis)
+    missed = MISSED[len(trial.hypothesis.acting)] * max(_left(base) - 1.0, 0.0)
+    return _left(trial) <= RIGHT + missed and unlearnt is not None and unlearnt.surely <= LEARNABLE + missed
 
 
 def _left(trial: Trial) -> float:
@@ -119,11 +135,11 @@ def _fit_all(weighed, calibrated, base: Trial, chosen: Sequence[Score], tell) ->
     return trials
 
 
-def _pairs(weighed, calibrated, firsts: Sequence[Trial], tell) -> list[Trial]:
+def _pairs(weighed, calibrated, firsts: Sequence[Trial], known, tell) -> list[Trial]:
     tell("one mechanism is not enough; trying pairs")
     found, seen = [], set()
     for first in firsts:
-        partners = [h for h in singles() if h.acting[0] not in first.hypothesis.acting]
+        partners = [h for h in known if h.acting[0] not in first.hypothesis.acting]
         chosen = []
         for s in score(weighed, first, partners):
             pair = frozenset(first.hypothesis.acting + s.hypothesis.acting)
@@ -157,19 +173,19 @@ def _probabilities(weighed, base: Trial, trials: Sequence[Trial]) -> list[float]
     return (weight / weight.sum())[1:].tolist()
 
 
-def _verdict(base: Trial, trials: list[Trial], probability: list[float], scores) -> Judgement:
+def _verdict(base: Trial, trials: list[Trial], probability: list[float], scores, learnable) -> Judgement:
     agrees = 1.0 - sum(probability)
     best = trials[0] if trials else base
     matters = trials and _left(base) - _left(best) > WORTH_A_NAME * max(1.0, _left(base))
     if not matters or agrees > 0.5:
-        verdict = "agrees" if _left(base) <= RIGHT else "unexplained"
-        return Judgement(verdict, base, base, trials, probability, scores)
+        verdict = "agrees" if is_right(base, base, learnable) else "unexplained"
+        return Judgement(verdict, base, base, trials, probability, scores, learnable)
     order = np.argsort(probability)[::-1]
     trials, probability = [trials[k] for k in order], [probability[k] for k in order]
-    if _left(trials[0]) > enough(base) or not plausible(trials[0].hypothesis, trials[0].values):
-        return Judgement("unexplained", base, base, trials, probability, scores)
+    if not is_right(trials[0], base, learnable) or not plausible(trials[0].hypothesis, trials[0].values):
+        return Judgement("unexplained", base, base, trials, probability, scores, learnable)
     verdict = "explained" if probability[0] >= SURE else "undecided"
-    return Judgement(verdict, base, trials[0], trials, probability, scores)
+    return Judgement(verdict, base, trials[0], trials, probability, scores, learnable)
 
 
 def nested_errors(judgement: Judgement) -> list[Trial]:

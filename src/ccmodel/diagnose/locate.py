@@ -5,18 +5,32 @@ from dataclasses import replace
 
 import numpy as np
 
-from ccmodel.diagnose.evidence import Weighed
+from ccmodel.diagnose.evidence import Weighed, weigh
 from ccmodel.diagnose.judge import Judgement
-from ccmodel.diagnose.trial import Trial
+from ccmodel.diagnose.travel import is_moving, since_reversal
+from ccmodel.diagnose.trial import Trial, fit
+from ccmodel.identify.problem import each
 from ccmodel.model.run import ModelInput
 
 # Parts of a motion by what the drive does.
 PARTS = ("at rest", "after a reversal", "under way")
 # A reversal's mark is looked for over this share of the drive's stroke after it.
 AFTER_REVERSAL = 0.25
-STILL_SHARE = 0.02
 # A channel is named if it carries this share of the error that the worst one does, in units of its noise.
 NAMED_SHARE = 0.35
+
+
+# A channel is guilty alone if without it no more than this share of the mismatch is left; then it sits at one of the
+# channel's places, likeliest first, and else at one of those in between.
+ALONE = 0.05
+PLACES_OF = {
+    "theta_out_rad": ("load-sensor", "load-pulley"),
+    "tau_in_Nm": ("drive-pulley", "drive-sensor"),
+    "tau_out_Nm": ("load", "load-pulley", "load-sensor"),
+    "F_drive_N": ("drive-sensor",),
+    "F_load_N": ("load-sensor",),
+}
+BETWEEN = ("conduit", "cable", "drive-end", "load-end", "load-pulley", "load")
 
 TEXT = {
     "drive-pulley": "at the drive pulley, between its torque and the cables",
@@ -35,7 +49,7 @@ def location(judgement: Judgement, weighed: Sequence[Weighed]) -> dict:
     """Place, channels and parts of the motion that carry the mismatch, and a sentence."""
     if judgement.verdict == "agrees":
         return {"place": None, "channels": [], "phases": [], "text": "model and recordings agree within the noise"}
-    place = _place(judgement)
+    place = judgement.best.hypothesis.acting[0][1] if judgement.best.hypothesis.acting else _place(judgement, weighed)
     table = mismatch(weighed, judgement.calibrated)
     by_channel = {c: float(np.sqrt(np.nanmean(np.square(list(parts.values()))))) for c, parts in table.items()}
     worst = max(by_channel.values())
@@ -47,12 +61,31 @@ def location(judgement: Judgement, weighed: Sequence[Weighed]) -> dict:
     return {"place": place, "channels": channels, "phases": parts, "text": text}
 
 
-def _place(judgement: Judgement) -> str:
-    """The place of the mechanism that is named, or at which mechanisms explain most."""
-    if judgement.verdict in ("explained", "undecided") or judgement.trials:
-        best = judgement.best if judgement.best.hypothesis.acting else judgement.trials[0]
-        return best.hypothesis.acting[0][1]
-    return judgement.scores[0].hypothesis.acting[0][1]
+def _place(judgement: Judgement, weighed: Sequence[Weighed]) -> str:
+    """Where the mismatch sits as far as it can be said without a mechanism that accounts for it.
+
+    A sensor or pulley at fault spoils one channel, and the calibrated model is right in all others once that channel
+    is not fitted. What spoils several lies between them, and where along the way the screening knows best.
+    """
+    left = {c: excess_without(c, weighed, judgement.calibrated) for c in _channels(weighed)}
+    guilty = min(left, key=left.get)
+    alone = left[guilty] < ALONE * float(judgement.calibrated.left.mean() - 1.0)
+    suspects = PLACES_OF[guilty] if alone else BETWEEN
+    found = [s.hypothesis.acting[0][1] for s in judgement.scores if s.hypothesis.acting[0][1] in suspects and s.values]
+    return found[0] if found else suspects[0]
+
+
+def excess_without(channel: str, weighed: Sequence[Weighed], calibrated: Trial) -> float:
+    """Mean square beyond noise of the other channels, if the paper's model is calibrated to these alone."""
+    rest = [e for w in weighed if (e := w.evidence.without(channel)).channels]
+    fitted = rest[0].parameters.with_values(calibrated.values)
+    lighter = each(rest, lambda i, e: weigh(e, fitted))
+    free = {name: replace(free, start=calibrated.values[name]) for name, free in calibrated.free.items()}
+    return float(fit(lighter, calibrated.hypothesis, free, calibrated.values).left.mean()) - 1.0
+
+
+def _channels(weighed: Sequence[Weighed]) -> list[str]:
+    return list(dict.fromkeys(c for w in weighed for c in w.evidence.channels))
 
 
 def mismatch(weighed: Sequence[Weighed], trial: Trial) -> dict[str, dict[str, float]]:
@@ -74,18 +107,9 @@ def mismatch(weighed: Sequence[Weighed], trial: Trial) -> dict[str, dict[str, fl
 
 def parts_of(given: ModelInput) -> np.ndarray:
     """Index into `PARTS` of every sample, shape (n,)."""
-    theta, time_s = given.theta_in, given.recording.time_s
-    speed = np.gradient(theta, time_s)
-    moving = np.abs(speed) > STILL_SHARE * np.abs(speed).max() if np.ptp(theta) > 0 else np.zeros(theta.size, bool)
-    part = np.where(moving, 2, 0)
-    reach = AFTER_REVERSAL * np.ptp(theta)
-    turned_at, way = theta[0], 0.0
-    for i in np.flatnonzero(moving):
-        if np.sign(speed[i]) != way:
-            turned_at, way = theta[i], np.sign(speed[i])
-        if abs(theta[i] - turned_at) < reach:
-            part[i] = 1
-    return part
+    moving = is_moving(given)
+    just_turned = np.abs(since_reversal(given)[0]) < AFTER_REVERSAL * np.ptp(given.theta_in)
+    return np.where(moving, np.where(just_turned, 1, 2), 0)
 
 
 def _rms(values: np.ndarray) -> float:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,8 @@ class Trial:
     Attributes
     ----------
     hypothesis : Hypothesis
+    free : dict of str to Free
+        What a calibration of the paper's model leaves free.
     values : dict of str to float
     whitened : list of ndarray, each of shape (rows,)
         By recording, what the fit leaves.
@@ -34,17 +37,23 @@ class Trial:
         By how much the recordings disagree about the values.
     held_out : list of dict
         By recording, the values that the other recordings ask for.
-    left : ndarray, shape (recordings,)
-        Mean square of what these leave of the recording.
+    aside : list of ndarray, each of shape (rows,)
+        By recording, what these leave of it, whitened.
     """
 
     hypothesis: Hypothesis
+    free: Mapping[str, Free]
     values: dict[str, float]
     whitened: list[NDArray]
     jacobian: list[NDArray]
     covariance: NDArray
     held_out: list[dict[str, float]]
-    left: NDArray
+    aside: list[NDArray]
+
+    @cached_property
+    def left(self) -> NDArray:
+        """Mean square of `aside`, shape (recordings,)."""
+        return np.array([np.mean(e**2) for e in self.aside])
 
 
 def errors(one: Weighed, values: Mapping[str, float]) -> NDArray:
@@ -108,8 +117,8 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
         np.clip(found.x + _inverse(total - H, sizes) @ g, low, high) for H, g in zip(information, score, strict=True)
     ]
     held_out = [named(x) for x in aside]
-    left = each(acting, lambda i, w: float((errors(w, held_out[i]) ** 2).mean()))
-    return Trial(hypothesis, named(found.x), r, J, scatter, held_out, np.array(left))
+    left = each(acting, lambda i, w: errors(w, held_out[i]))
+    return Trial(hypothesis, calibrated, named(found.x), r, J, scatter, held_out, left)
 
 
 def _inverse(information: NDArray, sizes: NDArray) -> NDArray:

@@ -7,7 +7,7 @@ to run, zeros are good to the sensors' accuracy. Such an expectation is one more
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -96,6 +96,12 @@ class Evidence:
         sigma = np.stack([np.hypot(sensors[c], size_over_time(drive[c], time_s)[judged]) for c in used])
         sigma = np.hypot(sigma, allowance * np.ptp(measured, axis=1, keepdims=True))
         return cls(given, parameters, used, judged, measured, sigma)
+
+    def without(self, channel: str) -> "Evidence":
+        """The same without one of the channels."""
+        kept = [k for k, c in enumerate(self.channels) if c != channel]
+        channels = tuple(self.channels[k] for k in kept)
+        return replace(self, channels=channels, measured=self.measured[kept], sigma=self.sigma[kept])
 
     @property
     def name(self) -> str:

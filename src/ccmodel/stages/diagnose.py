@@ -1,9 +1,10 @@
 """A batch -> diagnosis.json, a page for a person, and the two models that were compared."""
 
 import html
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from ccmodel import mechanisms as registry
 from ccmodel import provenance
 from ccmodel.diagnose.diagnosis import Diagnosis
 from ccmodel.diagnose.diagnosis import diagnose as run
@@ -17,14 +18,21 @@ from ccmodel.stages.files import estimates_of, write_json
 from ccmodel.typed import InputError
 
 
-def diagnose(batch: Path, out: Path, tell: Callable[[str], None] = lambda text: None) -> str:
+def diagnose(
+    batch: Path, out: Path, without: Sequence[str] = (), tell: Callable[[str], None] = lambda text: None
+) -> str:
     """Diagnose a batch folder; the sentence that its page opens with.
 
     Raises
     ------
     InputError
-        If the batch cannot be used.
+        If the batch cannot be used, or there is no mechanism of a name in `without`.
     """
+    try:
+        for name in without:
+            registry.get(name)
+    except registry.UnknownMechanismError as error:
+        raise InputError(f"--without: {error}") from None
     ingested = ingest_batch(batch)
     inputs = provenance.of_inputs(sorted(p for p in batch.iterdir() if p.is_file()))
     # The same input gives the same files wherever it stands.
@@ -34,7 +42,7 @@ def diagnose(batch: Path, out: Path, tell: Callable[[str], None] = lambda text: 
         raise InputError("\n".join(map(str, refused)) or f"{batch}: no recording that can be used")
     not_judged = [{"what": Path(f.file).name, "why": f.text} for f in refused]
     try:
-        found = run(ingested.recordings, Parameters.estimated(ingested.batch.rig), not_judged, tell)
+        found = run(ingested.recordings, Parameters.estimated(ingested.batch.rig), not_judged, without, tell)
     except ModelError as error:
         raise InputError(f"{batch}: {error}") from None
     _write(found, inputs, out)

@@ -1,0 +1,42 @@
+"""The place of a mismatch that no mechanism accounts for."""
+
+import numpy as np
+import pytest
+
+from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.diagnose.judge import Judgement
+from ccmodel.diagnose.locate import location
+from ccmodel.diagnose.trial import fit
+from ccmodel.identify.problem import Free
+from made_evidence import NOISE, PARAMETERS, batch
+
+CALIBRATED = {
+    "stiffness_N_per_m": Free(PARAMETERS.stiffness_N_per_m, 1e2, 1e7),
+    "friction_coefficient": Free(PARAMETERS.friction_coefficient, 0.005, 1.5),
+    "load_stiffness_Nm_per_rad": Free(PARAMETERS.load_stiffness_Nm_per_rad, 1e-4, 10.0),
+}
+
+
+def wave(said, channel):
+    """What no spring, cable or friction does: a ripple of the drive angle."""
+    return {channel: 10 * NOISE[channel] * np.sin(25 * said["theta_in_rad"])}
+
+
+@pytest.mark.parametrize(
+    "channel, place",
+    [("tau_in_Nm", "drive-pulley"), ("F_drive_N", "drive-sensor"), ("F_load_N", "load-sensor"), ("tau_out_Nm", "load")],
+)
+def test_a_channel_that_is_off_alone_gives_its_place_away(channel, place):
+    recordings = batch(lambda said: wave(said, channel))
+    start = {name: free.start for name, free in CALIBRATED.items()}
+    base = fit(recordings, Hypothesis(), CALIBRATED, start)
+    found = location(Judgement("unexplained", base, base, [], [], [], {}), recordings)
+    assert found["place"] == place
+    assert found["channels"][0] == channel.rsplit("_", 1)[0]
+
+
+def test_a_ripple_of_both_torques_sits_in_between():
+    recordings = batch(lambda said: wave(said, "tau_in_Nm") | wave(said, "tau_out_Nm") | wave(said, "theta_out_rad"))
+    start = {name: free.start for name, free in CALIBRATED.items()}
+    base = fit(recordings, Hypothesis(), CALIBRATED, start)
+    assert location(Judgement("unexplained", base, base, [], [], [], {}), recordings)["place"] == "conduit"

@@ -1,0 +1,44 @@
+"""Recordings of the paper's model with noise, weighed: a diagnosis's evidence without logs."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from builders import recording
+from ccmodel.diagnose.evidence import weigh
+from ccmodel.identify.problem import Evidence
+from ccmodel.model.parameters import Parameters
+from ccmodel.model.run import ModelInput, simulate
+
+PARAMETERS = Parameters(9000.0, 1.2, 0.15, 0.006, 0.006, 0.05)
+NOISE = {"tau_in_Nm": 1e-4, "tau_out_Nm": 1e-4, "F_drive_N": 0.05, "F_load_N": 0.05, "theta_out_rad": 1e-3}
+ACCURACY = {"tau_in_Nm": 1e-4, "tau_out_Nm": 1e-4, "F_drive_N": 0.1, "F_load_N": 0.1}
+
+
+def weighed(amplitude=0.6, frequency=1.0, pretension_N=7.0, seed=0, spoil=lambda said: {}):
+    """One recording; `spoil` says what is added to channels of what the model says."""
+    random = np.random.default_rng(seed)
+    drive = recording(
+        id=f"r{seed}",
+        pretension_N=pretension_N,
+        theta_in_rad=lambda t: amplitude * np.sin(2 * np.pi * frequency * np.clip(t - 0.3, 0, None)),
+    )
+    said = simulate(ModelInput.of(drive), PARAMETERS)
+    added = spoil(said)
+    channels = {c: v + added.get(c, 0.0) for c, v in said.channels.items()}
+    channels |= {c: channels[c] + sd * random.standard_normal(channels[c].size) for c, sd in NOISE.items()}
+    measured = replace(
+        said,
+        channels=channels,
+        origin="virtual-rig",
+        derived_from=dict.fromkeys(channels, "made by hand"),
+        accuracy=ACCURACY,
+        rest_s=0.3,
+    )
+    return weigh(Evidence.of(measured, PARAMETERS), PARAMETERS)
+
+
+def batch(spoil=lambda said: {}):
+    """Four recordings of different motions and pretensions."""
+    conditions = ((0.6, 1.0, 7.0), (0.4, 0.7, 7.0), (0.6, 1.0, 5.0), (0.5, 1.3, 6.0))
+    return [weighed(*condition, seed=k, spoil=spoil) for k, condition in enumerate(conditions)]
