@@ -150,7 +150,7 @@ def _tensions(ph, piece, slide, mean, weights):
 
 @kernel(error_model="numpy", fastmath=FAST)
 def _settle(piece, c):
-    """Pull and tangent stiffness of each piece of a cable whose strands settle, from the stretch that stands in `TENSION`.
+    """Pull and tangent stiffness of each piece of a cable whose strands settle, from its stretch in row `TENSION`.
 
     This and the other loops that call elementary functions do nothing else, so that they take several nodes at a time.
     """
