@@ -61,9 +61,11 @@ ARRIVED = 1e-11
 # And as far as this it goes straight when it leaves.
 SET_OUT = 1e-8
 MAX_EVENTS = 1000
-# Steps of integration, tries included, after which a sample is given up, and after which one goes on with an implicit
-# method: the explicit one needs thousands where a still point near an end all but follows its balance.
+# Steps of integration after which a sample is given up, and after which one goes on with an implicit method: the
+# explicit one needs thousands where a still point near an end all but follows its balance. Finding an event counts as
+# so many steps that a sample has no more than `MAX_EVENTS`.
 MAX_STEPS, STIFF_AFTER = 20_000, 400
+EVENT_STEPS = MAX_STEPS // MAX_EVENTS
 # What an integration step was ended by.
 NOTHING, BEND_LEFT, MEETING, UNPINNED, SLACK, TAUT = range(6)
 
@@ -668,7 +670,7 @@ def _event(path, state, start, ends, stiffness, angle_given):
 def _wander(path, state, trials, s, start, ends, stiffness, angle_given, most_steps):
     """Integrate until s = 1 or something happens to a cable, for `most_steps` steps at most.
 
-    Returns s, whether a drive front reached the load, and how many steps were taken, those towards an event included.
+    Returns s, whether a drive front reached the load, and how many steps were taken.
     """
     before = trials[1]
     keep(state, before)
@@ -694,14 +696,13 @@ def _wander(path, state, trials, s, start, ends, stiffness, angle_given, most_st
             _hit_end(path, state, trials, y, h, stiff, start, ends, stiffness, angle_given, slopes, following)
             _set(path, state, trials, following, start, ends, stiffness, angle_given)
             return 1.0, False, attempt + 1
-        near, far, tries = 0.0, h, attempt + 1
+        near, far, taken = 0.0, h, attempt + EVENT_STEPS
         while True:
             middle = 0.5 * (near + far)
             if not near < middle < far or far - near < 1e-17:
                 break
             _try_step(path, state, trials, y, middle, stiff, start, ends, stiffness, angle_given, slopes, following)
             _set(path, state, trials, following, start, ends, stiffness, angle_given)
-            tries += 1
             tried, tried_c = _event(path, state, start, ends, stiffness, angle_given)
             if tried == NOTHING:
                 near = middle
@@ -712,10 +713,10 @@ def _wander(path, state, trials, s, start, ends, stiffness, angle_given, most_st
             _try_step(path, state, trials, y, near, stiff, start, ends, stiffness, angle_given, slopes, following)
             _hit_end(path, state, trials, y, far, stiff, start, ends, stiffness, angle_given, slopes, following)
             _set(path, state, trials, following, start, ends, stiffness, angle_given)
-            return 1.0, False, tries
+            return 1.0, False, taken
         _set(path, state, trials, following, start, ends, stiffness, angle_given)
         reached = _handle(path, state, event, c, start, ends, stiffness, angle_given)
-        return following[2], reached, tries
+        return following[2], reached, taken
     return y[2], False, most_steps
 
 
