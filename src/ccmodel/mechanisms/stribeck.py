@@ -29,6 +29,8 @@ def renewed(rested, slide, dt, vs):
 
 
 def _enters(settings, place, values):
+    if not values["vs"] > 0:
+        raise ValueError(f"the speed at which friction has fallen, vs, is above zero; got {values['vs']} m/s")
     settings.stribeck_rise = values["a"]
     settings.stribeck_speed = values["vs"]
 

@@ -37,14 +37,13 @@ from ccmodel.model.exact.cable import (
 )
 from ccmodel.model.exact.path import LUMP, NODE, PASSED, PER_M, X_PER_M, X_START, PathTables, tabulate
 from ccmodel.model.exact.still_point import MAX_STEPS, REACHED, step_apart
+from ccmodel.model.failure import ModelError
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
+from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad, series
 from ccmodel.model.response import PairResponse, Status
-from ccmodel.model.transmission import Transmission
+from ccmodel.model.transmission import Transmission, check_friction
 
 PHASES = ("I", "II", "III", "IVa", "IVb")
-# Beyond this mu phi the capstan factor leaves what double precision can carry.
-MAX_FRICTION_ANGLE = 300.0
 # A load that balances to less than this part of the largest tension is balanced.
 BALANCE_TOLERANCE = 1e-9
 
@@ -109,7 +108,7 @@ class SpringEnd:
 
     def __post_init__(self):
         if not (np.isfinite(self.stiffness_N_per_m) and self.stiffness_N_per_m >= 0):
-            raise ValueError(f"a far spring's stiffness is finite and not negative; got {self.stiffness_N_per_m}")
+            raise ModelError(f"a far spring's stiffness is finite and not negative; got {self.stiffness_N_per_m}")
 
 
 @dataclass(frozen=True)
@@ -184,11 +183,11 @@ def simulate_pair(
 
     Raises
     ------
-    ValueError
+    ModelError
         If an input is not finite, a load series does not match the drive's samples, or friction cannot hold the
         initial tension.
     """
-    theta_in = _series(theta_in_rad, "theta_in_rad")
+    theta_in = series(theta_in_rad, "theta_in_rad")
     R_i, R_o = transmission.drive_radius_m, transmission.load_radius_m
     given, stiffness, start = (np.zeros(1), 1.0), 0.0, 0.0
     if isinstance(load, SpringLoad):
@@ -262,11 +261,10 @@ def simulate_cable(
     -------
     CableResponse
     """
-    if not (np.isfinite(axial_rigidity_N) and axial_rigidity_N > 0):
-        raise ValueError(f"axial_rigidity_N must be positive; got {axial_rigidity_N}")
-    if not friction_coefficient >= 0:
-        raise ValueError(f"friction_coefficient must not be negative; got {friction_coefficient}")
-    drive = _series(displacement_m, "displacement_m")
+    if not 0 < axial_rigidity_N < np.inf:
+        raise ModelError(f"axial_rigidity_N must be positive and finite; got {axial_rigidity_N}")
+    check_friction(friction_coefficient, path)
+    drive = series(displacement_m, "displacement_m")
     given, stiffness, moves = np.zeros(1), 0.0, isinstance(far_end, FixedEnd | MotionEnd)
     if isinstance(far_end, SpringEnd):
         given, stiffness = initial.tension_A_N[-1:].copy(), far_end.stiffness_N_per_m
@@ -293,11 +291,6 @@ class _Run:
     """State and outputs of one simulation, between the kernels' calls."""
 
     def __init__(self, path, friction_coefficient, axial_rigidity_N, initial, single=False):
-        if friction_coefficient * path.bend_rad > MAX_FRICTION_ANGLE:
-            raise ValueError(
-                f"mu phi = {friction_coefficient * path.bend_rad:.4g} is beyond {MAX_FRICTION_ANGLE}:"
-                " the capstan factor exp(mu phi) is out of range; check the unit of the bend angles"
-            )
         self.path = path
         self.friction = friction_coefficient
         self.tables: PathTables = tabulate(path, friction_coefficient, axial_rigidity_N)
@@ -323,7 +316,7 @@ class _Run:
             self._settle(kernels.at_sample(given, 0), stiffness)
         stops = [*sorted({int(i) for i in record_at}), n - 1]
         if stops[0] < 0 or stops[-1] >= n or max(stops) > n - 1:
-            raise ValueError(f"record_profiles_at names samples from 0 to {n - 1}")
+            raise ModelError(f"record_profiles_at names samples from 0 to {n - 1}")
         code = kernels.DONE
         for stop in stops:
             up_to_stop = drive[0][: stop + 1], drive[1]
@@ -476,15 +469,8 @@ def _corners(state: State, tables: PathTables, c: int):
     return np.array([p[0] for p in points]), np.array([p[1] for p in points])
 
 
-def _series(values, name: str) -> NDArray:
-    values = np.ascontiguousarray(values, dtype=float)
-    if values.ndim != 1 or values.size == 0 or not np.isfinite(values).all():
-        raise ValueError(f"{name} is one finite value a sample; got an array of shape {values.shape}")
-    return values
-
-
 def _matching(values, drive: NDArray, name: str) -> NDArray:
-    values = _series(values, name)
+    values = series(values, name)
     if values.size != drive.size:
-        raise ValueError(f"{name} has {values.size} samples, the drive has {drive.size}")
+        raise ModelError(f"{name} has {values.size} samples, the drive has {drive.size}")
     return values

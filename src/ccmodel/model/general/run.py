@@ -233,7 +233,7 @@ def _check(time_s, theta_in, series, elements):
     if elements < 1:
         raise ModelError(f"each cable needs at least one element; got {elements}")
     if theta_in.ndim != 1 or theta_in.size == 0:
-        raise ModelError(f"theta_in must be one row of samples; got shape {theta_in.shape}")
+        raise ModelError(f"theta_in is one row of samples, at least one; got an array of shape {theta_in.shape}")
     given = {"time_s": time_s, "theta_in": theta_in}
     if series is not None:
         given["the load's series"] = series
