@@ -136,6 +136,7 @@ def of_paper(exact_us_per_sample: float) -> dict[str, float]:
 def bytes_per_sample_beyond_outputs(simulate: Callable[[np.ndarray], object]) -> float:
     """Growth of the peak of what Python and numpy hold during a run, less the growth of what it returns."""
     beyond = []
+    simulate(cases.sine(1, 0.6))  # what a first run leaves in memory does not count
     for cycles in (20, 100):
         theta_in = cases.sine(cycles, 0.6)
         gc.collect()

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.failure import ModelError
+
 
 @dataclass(frozen=True)
 class ConduitPath:
@@ -22,7 +24,7 @@ class ConduitPath:
 
     Raises
     ------
-    ValueError
+    ModelError
         If there is no piece, the two arrays differ in shape, a length is not positive, a bend is negative or
         a value is not finite.
     """
@@ -34,15 +36,18 @@ class ConduitPath:
         length = np.atleast_1d(np.asarray(self.piece_length_m, dtype=float))
         bend = np.atleast_1d(np.asarray(self.piece_bend_rad, dtype=float))
         if length.ndim != 1 or length.shape != bend.shape or length.size == 0:
-            raise ValueError(
+            raise ModelError(
                 f"a conduit needs as many bends as lengths, at least one of each; got {bend.shape} and {length.shape}"
             )
         if not (np.isfinite(length).all() and np.isfinite(bend).all()):
-            raise ValueError("a conduit's lengths and bends must be finite")
+            raise ModelError("a conduit's lengths and bends must be finite")
         if (length <= 0).any():
-            raise ValueError(f"every piece of a conduit has a positive length; got {length.min()} m")
+            raise ModelError(
+                f"every piece of a conduit has a positive length; got {length.min()} m: leave out what has none, and"
+                " give a sharp corner as the mechanism `kink`"
+            )
         if (bend < 0).any():
-            raise ValueError(f"bend angles are counted positive whichever way they turn; got {bend.min()} rad")
+            raise ModelError(f"bend angles are counted positive whichever way they turn; got {bend.min()} rad")
         object.__setattr__(self, "piece_length_m", length)
         object.__setattr__(self, "piece_bend_rad", bend)
 

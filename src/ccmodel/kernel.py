@@ -29,11 +29,28 @@ def kernel(function=None, **options):
     if function is None:
         return partial(kernel, **options)
     function.__qualname__ += f"_{source_digest(function.__module__)}"
-    compiled = njit(cache=True, nogil=True, **options)(function)
+    compiled = njit(cache=True, nogil=True, no_cfunc_wrapper=True, **options)(function)
+    if hasattr(compiled, "get_call_template"):  # not where numba is switched off
+        _take_values(compiled)
     if cache := getattr(compiled, "_cache", None):
         files = cache._cache_file
         files._data_name_pattern = files._data_name_pattern.replace("{", f"{_PROCESS}-{{")
     return compiled
+
+
+def _take_values(compiled):
+    """Have one variant of a kernel serve all constants that others call it with.
+
+    numba would compile a cable's kernels anew for cable 0, cable 1 and either of them, and likewise for its ends.
+    """
+    template_of = compiled.get_call_template
+
+    def by_type(args, kws):
+        return template_of(
+            tuple(map(types.unliteral, args)), {name: types.unliteral(kind) for name, kind in kws.items()}
+        )
+
+    compiled.get_call_template = by_type
 
 
 # Made part of whatever calls it: for what every sample goes through.

@@ -7,7 +7,8 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 from ccmodel.geometry import ConduitPath
-from ccmodel.model.exact import MotionEnd, SpringEnd, Status, simulate_cable, simulate_pair
+from ccmodel.model.exact import MotionEnd, SpringEnd, Status, pair, simulate_cable, simulate_pair
+from ccmodel.model.failure import ModelError
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
 from ccmodel.model.transmission import Transmission
@@ -163,7 +164,7 @@ def violent(seed, samples=40):
     return one, AngleLoad(load * rng.choice([0.1, 0.5, 2.0])), theta, initial
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", [*range(40), 205, 299, 383])
 def test_violent_loads_never_stop_it(seed):
     one, load, theta, initial = violent(seed)
     response = simulate_pair(one, load, theta, initial)
@@ -174,3 +175,14 @@ def test_violent_loads_never_stop_it(seed):
     for near, far in (tensions[:2], tensions[2:]):
         taut = (near > 1e-6) & (far > 1e-6)
         assert (np.abs(np.log(near[taut] / far[taut])) <= bound + 1e-9).all()
+
+
+@pytest.mark.parametrize("seed", [9, 15, 293])
+def test_a_sample_that_wants_too_many_steps_is_given_up_with_advice(seed, monkeypatch):
+    monkeypatch.setattr(pair, "MAX_STEPS", 100)
+    response = simulate_pair(*violent(seed))
+    assert response.status is Status.STUCK
+    assert response.reached == response.T1_N.size < 40
+    assert np.isfinite(response.T1_N).all()
+    with pytest.raises(ModelError, match=f"stuck at sample {response.reached}: .*sample the drive"):
+        response.complete()

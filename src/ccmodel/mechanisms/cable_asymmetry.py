@@ -11,6 +11,8 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
 def _enters(settings, place, values):
+    if not values["K_ratio"] > 0:
+        raise ValueError(f"both cables have some stiffness, so K_ratio is above zero; got {values['K_ratio']}")
     settings.friction_ratio_B = values["ratio"]
     settings.stiffness_ratio_B = values["K_ratio"]
 

@@ -10,8 +10,7 @@ Mistaken for constant drag, which also weighs more at low tension. Three pretens
 the tension goes to zero, a power law does not.
 """
 
-import numpy as np
-
+from ccmodel.elementary import quick_exp, quick_log
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
@@ -24,7 +23,7 @@ FLOOR_N = 0.1
 def power_of_tension(tension, n):
     """Factor of mu at a tension (N), and its derivative by the tension (1/N)."""
     square = tension * tension + FLOOR_N * FLOOR_N
-    factor = np.exp(0.5 * n * np.log(square / (REFERENCE_N * REFERENCE_N)))
+    factor = quick_exp(0.5 * n * quick_log(square / (REFERENCE_N * REFERENCE_N)))
     return factor, n * factor * tension / square
 
 

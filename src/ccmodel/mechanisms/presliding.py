@@ -10,8 +10,7 @@ Mistaken for termination compliance, which also softens the start of a stroke. N
 tell: with bristles the tension creeps from one of them to the next, with a termination the small loops close.
 """
 
-import numpy as np
-
+from ccmodel.elementary import quick_exp
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
@@ -20,7 +19,7 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 def dahl(xi, slide, z0):
     """Bristle xi = z / z0 after sliding by `slide` (m) in one direction, and its derivative by `slide` (1/m)."""
     direction = 1.0 if slide >= 0.0 else -1.0
-    left = np.exp(-abs(slide) / z0)
+    left = quick_exp(-abs(slide) / z0)
     return direction + (xi - direction) * left, (1.0 - direction * xi) * left / z0
 
 

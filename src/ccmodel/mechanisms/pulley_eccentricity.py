@@ -27,6 +27,8 @@ def wound(theta, turn, e, psi):
 
 
 def _enters(settings, place, values):
+    if not abs(values["e"]) < 1:
+        raise ValueError(f"a pulley turns about a point within it, so e is below 1; got {values['e']}")
     if side(place) == "drive":
         settings.drive_eccentricity = (values["e"], values["psi"])
     else:

@@ -29,6 +29,10 @@ def lag_weights(step_over_tau):
 
 
 def _enters(settings, place, values):
+    if not values["r"] < 1:
+        raise ValueError(f"a cable relaxes by a share r of its tension below 1; got {values['r']}")
+    if not values["tau"] > 0:
+        raise ValueError(f"a cable relaxes with a time constant above zero; got tau = {values['tau']} s")
     settings.relaxing_share = values["r"]
     settings.relaxing_time_s = values["tau"]
 

@@ -13,6 +13,11 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
 def _enters(settings, place, values):
+    if not values["change"] > -1:
+        raise ValueError(f"running in leaves some friction, so its change is above -1; got {values['change']}")
+    if not values["tau"] > 0:
+        raise ValueError(f"running in takes some time; got tau = {values['tau']} s")
+
     def course(time_s):
         return 1 + values["change"] * -np.expm1(-(time_s - time_s[0]) / values["tau"])
 

@@ -11,6 +11,7 @@ itself, backlash on the torque of the load.
 
 import numpy as np
 
+from ccmodel.elementary import quick_exp
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
@@ -18,7 +19,7 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 @kernel(inline="always")
 def settling_tension(stretch, lost, stiffness):
     """Tension (N) of a piece at a stretch (m) >= 0, and its stiffness (N/m); `lost` is u_s times its length (m)."""
-    left = np.exp(-stretch / lost)
+    left = quick_exp(-stretch / lost)
     return stiffness * (stretch - lost * (1.0 - left)), stiffness * (1.0 - left)
 
 

@@ -13,8 +13,7 @@ Signature: a peak at break-away, and a loss that falls with speed.
 Mistaken for presliding and for viscous friction. A sweep of speeds tells.
 """
 
-import numpy as np
-
+from ccmodel.elementary import quick_exp
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
@@ -24,12 +23,14 @@ RENEWAL_M = 2e-5
 @kernel(inline="always")
 def renewed(rested, slide, dt, vs):
     """What the contact remembers (0 to 1) after it has slid by `slide` (m) within `dt` (s)."""
-    left = np.exp(-abs(slide) / RENEWAL_M)
+    left = quick_exp(-abs(slide) / RENEWAL_M)
     ratio = slide / (dt * vs)
-    return rested * left + (1.0 - left) * np.exp(-ratio * ratio)
+    return rested * left + (1.0 - left) * quick_exp(-ratio * ratio)
 
 
 def _enters(settings, place, values):
+    if not values["vs"] > 0:
+        raise ValueError(f"the speed at which friction has fallen, vs, is above zero; got {values['vs']} m/s")
     settings.stribeck_rise = values["a"]
     settings.stribeck_speed = values["vs"]
 

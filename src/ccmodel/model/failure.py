@@ -1,5 +1,5 @@
 """How a model says that it could not be run."""
 
+from ccmodel.failure import ModelError
 
-class ModelError(Exception):
-    """The model cannot be run, or its step has no solution; the text says where and what to do."""
+__all__ = ["ModelError"]

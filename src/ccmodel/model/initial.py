@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.geometry import ConduitPath
+from ccmodel.model.failure import ModelError
 
 # A profile may exceed the friction bound by what printing and reading numbers back costs, no more.
 BOUND_TOLERANCE = 1e-9
@@ -24,7 +25,7 @@ class InitialTension:
 
     Raises
     ------
-    ValueError
+    ModelError
         If shapes differ, a value is not finite, positions do not increase or tensions are not positive.
     """
 
@@ -36,16 +37,16 @@ class InitialTension:
         for name in ("x_m", "tension_A_N", "tension_B_N"):
             values = np.atleast_1d(np.asarray(getattr(self, name), dtype=float))
             if values.ndim != 1 or not np.isfinite(values).all():
-                raise ValueError(f"{name} must be a finite, one-dimensional array")
+                raise ModelError(f"{name} must be a finite, one-dimensional array")
             object.__setattr__(self, name, values)
         if not self.x_m.shape == self.tension_A_N.shape == self.tension_B_N.shape or self.x_m.size < 2:
-            raise ValueError("an initial profile has at least two corners and a tension of A and of B at each")
+            raise ModelError("an initial profile has at least two corners and a tension of A and of B at each")
         if (np.diff(self.x_m) <= 0).any():
-            raise ValueError("the corners of an initial profile go from the drive end to the load end")
+            raise ModelError("the corners of an initial profile go from the drive end to the load end")
         for name in ("tension_A_N", "tension_B_N"):
             tension = getattr(self, name)
             if not ((tension > 0).all() or (tension == 0).all()):
-                raise ValueError(f"{name} must be positive along the whole cable, or zero along the whole cable")
+                raise ModelError(f"{name} must be positive along the whole cable, or zero along the whole cable")
 
     @classmethod
     def uniform(cls, path: ConduitPath, tension_N: float) -> "InitialTension":
@@ -102,7 +103,7 @@ class InitialTension:
         """
         length = path.length_m
         if abs(self.x_m[0]) > 1e-9 * length or abs(self.x_m[-1] - length) > 1e-9 * length:
-            raise ValueError(f"the initial profile must cover the conduit, 0 to {length} m; got {self.x_m[[0, -1]]}")
+            raise ModelError(f"the initial profile must cover the conduit, 0 to {length} m; got {self.x_m[[0, -1]]}")
         m = friction_coefficient * path.bend_at(self.x_m)
         m[-1] = friction_coefficient * path.bend_rad
         return m, _slopes(m, self.tension_A_N, "A"), _slopes(m, self.tension_B_N, "B")
@@ -115,7 +116,7 @@ def _slopes(m: NDArray, tension: NDArray, cable: str) -> NDArray:
     excess = np.abs(rise) - run
     worst = int(excess.argmax())
     if excess[worst] > BOUND_TOLERANCE:
-        raise ValueError(
+        raise ModelError(
             f"cable {cable}: friction cannot hold the initial tension between corners {worst} and {worst + 1},"
             f" |d ln T| = {abs(rise[worst]):.6g} where mu d phi = {run[worst]:.6g}"
         )

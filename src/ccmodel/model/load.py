@@ -1,9 +1,12 @@
 """Loads that the transmission can work against."""
 
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ccmodel.model.failure import ModelError
 
 
 @dataclass(frozen=True)
@@ -18,7 +21,7 @@ class SpringLoad:
 
     def __post_init__(self):
         if not (np.isfinite(self.stiffness_Nm_per_rad) and self.stiffness_Nm_per_rad >= 0):
-            raise ValueError(
+            raise ModelError(
                 f"a load spring's stiffness is finite and not negative; got {self.stiffness_Nm_per_rad}"
                 " (for a blocked load use AngleLoad with a constant angle)"
             )
@@ -47,10 +50,10 @@ class MechanicalLoad:
 
     def __post_init__(self):
         for name in ("stiffness_Nm_per_rad", "damping_Nms_per_rad", "inertia_kg_m2"):
-            if not getattr(self, name) >= 0:
-                raise ValueError(f"a load's {name} must not be negative; got {getattr(self, name)}")
+            if not 0 <= getattr(self, name) < inf:
+                raise ModelError(f"a load's {name} must be finite and not negative; got {getattr(self, name)}")
         if not np.isfinite(self.cubic_Nm_per_rad3):
-            raise ValueError(f"a load's cubic_Nm_per_rad3 must be finite; got {self.cubic_Nm_per_rad3}")
+            raise ModelError(f"a load's cubic_Nm_per_rad3 must be finite; got {self.cubic_Nm_per_rad3}")
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,7 @@ class TorqueLoad:
     torque_Nm: NDArray
 
     def __post_init__(self):
-        object.__setattr__(self, "torque_Nm", _series(self.torque_Nm, "torque_Nm"))
+        object.__setattr__(self, "torque_Nm", series(self.torque_Nm, "torque_Nm"))
 
 
 @dataclass(frozen=True)
@@ -82,11 +85,15 @@ class AngleLoad:
     angle_rad: NDArray
 
     def __post_init__(self):
-        object.__setattr__(self, "angle_rad", _series(self.angle_rad, "angle_rad"))
+        object.__setattr__(self, "angle_rad", series(self.angle_rad, "angle_rad"))
 
 
-def _series(values, name: str) -> NDArray:
+def series(values, name: str) -> NDArray:
+    """`values` as one finite number a sample, at least one; `ModelError` where they are not."""
     values = np.ascontiguousarray(values, dtype=float)
-    if values.ndim != 1 or values.size == 0 or not np.isfinite(values).all():
-        raise ValueError(f"{name} is one finite value a sample; got an array of shape {values.shape}")
+    if values.ndim != 1 or values.size == 0:
+        raise ModelError(f"{name} is one row of samples, at least one; got an array of shape {values.shape}")
+    if not np.isfinite(values).all():
+        at = np.flatnonzero(~np.isfinite(values))[0]
+        raise ModelError(f"{name} is not finite at sample {at}: leave the sample out, or fill the gap")
     return values

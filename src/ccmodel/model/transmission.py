@@ -1,8 +1,13 @@
 """What the model needs to know of a transmission: the pair of cables, the two pulleys and the load."""
 
 from dataclasses import dataclass
+from math import inf
 
 from ccmodel.geometry import ConduitPath
+from ccmodel.model.failure import ModelError
+
+# Beyond this mu phi the capstan factor leaves what double precision can carry.
+MAX_FRICTION_ANGLE = 300.0
 
 
 @dataclass(frozen=True)
@@ -30,7 +35,20 @@ class Transmission:
 
     def __post_init__(self):
         for name in ("axial_rigidity_N", "drive_radius_m", "load_radius_m"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive; got {getattr(self, name)}")
-        if not self.friction_coefficient >= 0:
-            raise ValueError(f"friction_coefficient must not be negative; got {self.friction_coefficient}")
+            if not 0 < getattr(self, name) < inf:
+                raise ModelError(f"{name} must be positive and finite; got {getattr(self, name)}: look at its unit")
+        check_friction(self.friction_coefficient, self.path)
+
+
+def check_friction(friction_coefficient: float, path: ConduitPath) -> None:
+    """Refuse a coefficient that no cable in `path` can have, by `ModelError`."""
+    if not 0 <= friction_coefficient < inf:
+        raise ModelError(
+            f"friction_coefficient must be finite and not negative; got {friction_coefficient}: in a fit, give it a"
+            " lower bound of 0"
+        )
+    if friction_coefficient * path.bend_rad > MAX_FRICTION_ANGLE:
+        raise ModelError(
+            f"mu phi = {friction_coefficient * path.bend_rad:.4g} is beyond {MAX_FRICTION_ANGLE}: the capstan factor"
+            " exp(mu phi) is out of range; check the unit of the bend angles"
+        )

@@ -22,6 +22,7 @@ from ccmodel.model.exact.cable import (
     end_compliance,
     has_met,
     keep,
+    keep_fronts,
     line_stiffness,
     pull_line,
     slide_whole,
@@ -113,10 +114,10 @@ def one_front(path, state, kept, c, given, stiffness):
     k = line_stiffness(path, state, other)[1]
     stretch = state.value[other, E0] - sign * state.value[PAIR, DRIVE]
     if k > 0.0:
-        keep(state, kept)
+        keep_fronts(state, kept, c)
         walk(path, state, c, 1, 1.0, k + stiffness, k * stretch + sign * given)
         if stretch - state.front[2 * c + 1, D] < 0.0:
-            keep(kept, state)
+            keep_fronts(kept, state, c)
             k = 0.0
     if k == 0.0:
         walk(path, state, c, 1, 1.0, stiffness, sign * given)
@@ -140,7 +141,8 @@ def both_fronts(path, state, kept, way, given, stiffness):
     high = start - way * (given + stiffness * state.value[PAIR, LOAD])
     tension = 0.5 * (low + high)
     for attempt in range(300):
-        keep(kept, state)
+        keep_fronts(kept, state, 0)
+        keep_fronts(kept, state, 1)
         walk(path, state, pulled, 1, 1.0, 0.0, tension)
         load = (2 * pulled - 1) * state.front[2 * pulled + 1, D]
         wanted = tension + way * (given + stiffness * load)

@@ -85,6 +85,16 @@ def keep(state, kept):
 
 
 @small_kernel
+def keep_fronts(state, kept, c):
+    """The same of what walking the fronts of cable `c` may change."""
+    for i in range(13):
+        kept.front[2 * c, i] = state.front[2 * c, i]
+        kept.front[2 * c + 1, i] = state.front[2 * c + 1, i]
+    for i in range(14):
+        kept.kind[c, i] = state.kind[c, i]
+
+
+@small_kernel
 def elongation(state, c):
     """End-to-end elongation of cable `c` beyond its natural length, m."""
     sign = 1.0 - 2.0 * c

@@ -36,15 +36,14 @@ from ccmodel.model.exact.cable import (
     position,
 )
 from ccmodel.model.exact.path import LUMP, NODE, PASSED, PER_M, X_PER_M, X_START, PathTables, tabulate
-from ccmodel.model.exact.still_point import REACHED, step_apart
+from ccmodel.model.exact.still_point import MAX_STEPS, REACHED, step_apart
+from ccmodel.model.failure import ModelError
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
+from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad, series
 from ccmodel.model.response import PairResponse, Status
-from ccmodel.model.transmission import Transmission
+from ccmodel.model.transmission import Transmission, check_friction
 
 PHASES = ("I", "II", "III", "IVa", "IVb")
-# Beyond this mu phi the capstan factor leaves what double precision can carry.
-MAX_FRICTION_ANGLE = 300.0
 # A load that balances to less than this part of the largest tension is balanced.
 BALANCE_TOLERANCE = 1e-9
 
@@ -109,7 +108,7 @@ class SpringEnd:
 
     def __post_init__(self):
         if not (np.isfinite(self.stiffness_N_per_m) and self.stiffness_N_per_m >= 0):
-            raise ValueError(f"a far spring's stiffness is finite and not negative; got {self.stiffness_N_per_m}")
+            raise ModelError(f"a far spring's stiffness is finite and not negative; got {self.stiffness_N_per_m}")
 
 
 @dataclass(frozen=True)
@@ -184,43 +183,50 @@ def simulate_pair(
 
     Raises
     ------
-    ValueError
+    ModelError
         If an input is not finite, a load series does not match the drive's samples, or friction cannot hold the
         initial tension.
     """
-    theta_in = _series(theta_in_rad, "theta_in_rad")
+    theta_in = series(theta_in_rad, "theta_in_rad")
     R_i, R_o = transmission.drive_radius_m, transmission.load_radius_m
-    given, stiffness, start = np.zeros(theta_in.size), 0.0, 0.0
+    given, stiffness, start = (np.zeros(1), 1.0), 0.0, 0.0
     if isinstance(load, SpringLoad):
         stiffness = load.stiffness_Nm_per_rad / R_o**2
         if stiffness > 0:
-            given += initial.tension_A_N[-1] - initial.tension_B_N[-1]
-            start = given[0] / stiffness
+            held = initial.tension_A_N[-1] - initial.tension_B_N[-1]
+            given, start = (np.array([held]), 1.0), held / stiffness
     elif isinstance(load, TorqueLoad):
-        given = _matching(load.torque_Nm / R_o, theta_in, "torque_Nm")
+        given = _matching(load.torque_Nm, theta_in, "torque_Nm"), 1 / R_o
     elif isinstance(load, AngleLoad):
-        given = _matching(load.angle_rad * R_o, theta_in, "angle_rad")
+        given = _matching(load.angle_rad, theta_in, "angle_rad"), R_o
     else:
         raise TypeError(f"a load is a SpringLoad, a TorqueLoad or an AngleLoad; got {type(load).__name__}")
     run = _Run(transmission.path, transmission.friction_coefficient, transmission.axial_rigidity_N, initial)
-    run.simulate(R_i * theta_in, given, stiffness, isinstance(load, AngleLoad), record_profiles_at)
-    T1, T2, T3, T4, displacement = run.out[:5]
-    balance = T2 - T4 - given[: run.reached] - stiffness * displacement
+    run.simulate((theta_in, R_i), given, stiffness, isinstance(load, AngleLoad), record_profiles_at)
+    T1, T2, T3, T4, theta_out = run.out[:5]
+    theta_out += start
+    theta_out /= R_o
     return ExactResponse(
         T1_N=T1,
         T2_N=T2,
         T3_N=T3,
         T4_N=T4,
-        theta_out_rad=(start + displacement) / R_o,
-        tau_in_Nm=(T1 - T3) * R_i,
-        tau_out_Nm=(T2 - T4) * R_o,
-        phase=run.phase - 1,
+        theta_out_rad=theta_out,
+        tau_in_Nm=_torque(T1, T3, R_i),
+        tau_out_Nm=_torque(T2, T4, R_o),
+        phase=run.phase,
         moving_A_m=run.out[5:7].T,
         moving_B_m=run.out[7:9].T,
-        status=run.status(balance, isinstance(load, AngleLoad)),
+        status=run.status(),
         reached=run.reached,
         profiles=run.profiles,
     )
+
+
+def _torque(pulled: NDArray, released: NDArray, radius: float) -> NDArray:
+    torque = pulled - released
+    torque *= radius
+    return torque
 
 
 def simulate_cable(
@@ -255,14 +261,13 @@ def simulate_cable(
     -------
     CableResponse
     """
-    if not (np.isfinite(axial_rigidity_N) and axial_rigidity_N > 0):
-        raise ValueError(f"axial_rigidity_N must be positive; got {axial_rigidity_N}")
-    if not friction_coefficient >= 0:
-        raise ValueError(f"friction_coefficient must not be negative; got {friction_coefficient}")
-    drive = _series(displacement_m, "displacement_m")
-    given, stiffness, moves = np.zeros(drive.size), 0.0, isinstance(far_end, FixedEnd | MotionEnd)
+    if not 0 < axial_rigidity_N < np.inf:
+        raise ModelError(f"axial_rigidity_N must be positive and finite; got {axial_rigidity_N}")
+    check_friction(friction_coefficient, path)
+    drive = series(displacement_m, "displacement_m")
+    given, stiffness, moves = np.zeros(1), 0.0, isinstance(far_end, FixedEnd | MotionEnd)
     if isinstance(far_end, SpringEnd):
-        given, stiffness = np.full(drive.size, initial.tension_A_N[-1]), far_end.stiffness_N_per_m
+        given, stiffness = initial.tension_A_N[-1:].copy(), far_end.stiffness_N_per_m
     elif isinstance(far_end, ForceEnd):
         given = _matching(far_end.tension_N, drive, "tension_N")
     elif isinstance(far_end, MotionEnd):
@@ -270,14 +275,13 @@ def simulate_cable(
     elif not isinstance(far_end, FixedEnd):
         raise TypeError(f"a far end is a FixedEnd, SpringEnd, ForceEnd or MotionEnd; got {type(far_end).__name__}")
     run = _Run(path, friction_coefficient, axial_rigidity_N, initial, single=True)
-    run.simulate(drive, given, stiffness, moves, record_profiles_at)
-    balance = run.out[1] - given[: run.reached] - stiffness * run.out[4]
+    run.simulate((drive, 1.0), (given, 1.0), stiffness, moves, record_profiles_at)
     return CableResponse(
         T_near_N=run.out[0],
         T_far_N=run.out[1],
         far_displacement_m=run.out[4],
         moving_m=run.out[5:7].T,
-        status=run.status(balance, moves),
+        status=run.status(),
         reached=run.reached,
         profiles={i: profiles[0] for i, profiles in run.profiles.items()},
     )
@@ -287,11 +291,6 @@ class _Run:
     """State and outputs of one simulation, between the kernels' calls."""
 
     def __init__(self, path, friction_coefficient, axial_rigidity_N, initial, single=False):
-        if friction_coefficient * path.bend_rad > MAX_FRICTION_ANGLE:
-            raise ValueError(
-                f"mu phi = {friction_coefficient * path.bend_rad:.4g} is beyond {MAX_FRICTION_ANGLE}:"
-                " the capstan factor exp(mu phi) is out of range; check the unit of the bend angles"
-            )
         self.path = path
         self.friction = friction_coefficient
         self.tables: PathTables = tabulate(path, friction_coefficient, axial_rigidity_N)
@@ -309,18 +308,19 @@ class _Run:
         self.state.value[PAIR, GIVEN] = self.state.value[0, T_LOAD] - self.state.value[1, T_LOAD]
 
     def simulate(self, drive, given, stiffness, angle_given, record_at):
-        n = drive.size
+        n = drive[0].size
         out, phase = np.empty((9, n)), np.empty(n, dtype=np.int8)
         progress = np.array([0, 0, 0])
-        self.profiles = {}
+        self.profiles, self.balance = {}, np.zeros(2)
         if not angle_given:
-            self._settle(given[0], stiffness)
+            self._settle(kernels.at_sample(given, 0), stiffness)
         stops = [*sorted({int(i) for i in record_at}), n - 1]
         if stops[0] < 0 or stops[-1] >= n or max(stops) > n - 1:
-            raise ValueError(f"record_profiles_at names samples from 0 to {n - 1}")
+            raise ModelError(f"record_profiles_at names samples from 0 to {n - 1}")
         code = kernels.DONE
         for stop in stops:
-            code = self._advance(progress, drive[: stop + 1], given, stiffness, angle_given, out, phase)
+            up_to_stop = drive[0][: stop + 1], drive[1]
+            code = self._advance(progress, up_to_stop, given, stiffness, angle_given, out, phase)
             if code != kernels.DONE:
                 break
             if stop in record_at:
@@ -331,11 +331,13 @@ class _Run:
     def _settle(self, given, stiffness):
         """Let the load find its balance before the drive moves."""
         out, phase = np.empty((9, 1)), np.empty(1, dtype=np.int8)
-        self._advance(np.array([0, 0, 0]), np.zeros(1), np.array([given]), stiffness, False, out, phase)
+        at_rest, given = (np.zeros(1), 1.0), (np.array([given]), 1.0)
+        self._advance(np.array([0, 0, 0]), at_rest, given, stiffness, False, out, phase)
+        self.balance[:] = 0.0
 
     def _advance(self, progress, drive, given, stiffness, angle_given, out, phase):
         trials = (_trial(self.state), _trial(self.state))
-        apart_at, times = -1, 0
+        apart_at, times, steps = -1, 0, 0
         while True:
             code = kernels.run(
                 self.tables,
@@ -349,14 +351,19 @@ class _Run:
                 self.present,
                 out,
                 phase,
+                self.balance,
             )
             if code == kernels.APART:
                 i = progress[0]
-                apart_at, times = i, times + 1 if i == apart_at else 1
-                if times > kernels.MAX_EVENTS:
-                    return kernels.STUCK
-                code = step_apart(self.tables, self.state, trials, (drive[i], given[i]), stiffness, angle_given)
-                if code != REACHED:
+                if i != apart_at:
+                    apart_at, times, steps = i, 0, 0
+                times += 1
+                ends = kernels.at_sample(drive, i), kernels.at_sample(given, i)
+                code, taken = step_apart(
+                    self.tables, self.state, trials, ends, stiffness, angle_given, MAX_STEPS - steps
+                )
+                steps += taken
+                if code != REACHED or times > kernels.MAX_EVENTS or steps >= MAX_STEPS:
                     return kernels.STUCK
             elif code == kernels.CORNERS_FULL:
                 self.state = _with_room(self.state)
@@ -364,14 +371,12 @@ class _Run:
             else:
                 return code
 
-    def status(self, balance, angle_given):
+    def status(self):
         """Whether every sample was reached, and the load balanced at each."""
         if self.code != kernels.DONE:
             return Status.STUCK
-        scale = np.abs(self.out[:4]).max() if self.reached else 1.0
-        if not angle_given and (np.abs(balance) > BALANCE_TOLERANCE * max(scale, 1e-9)).any():
-            return Status.UNBALANCED
-        return Status.OK
+        out_of_balance, highest = self.balance
+        return Status.UNBALANCED if out_of_balance > BALANCE_TOLERANCE * max(highest, 1e-9) else Status.OK
 
     def _profile(self, c) -> CableProfile:
         m, tension = _corners(self.state, self.tables, c)
@@ -464,15 +469,8 @@ def _corners(state: State, tables: PathTables, c: int):
     return np.array([p[0] for p in points]), np.array([p[1] for p in points])
 
 
-def _series(values, name: str) -> NDArray:
-    values = np.ascontiguousarray(values, dtype=float)
-    if values.ndim != 1 or values.size == 0 or not np.isfinite(values).all():
-        raise ValueError(f"{name} is one finite value a sample; got an array of shape {values.shape}")
-    return values
-
-
 def _matching(values, drive: NDArray, name: str) -> NDArray:
-    values = _series(values, name)
+    values = series(values, name)
     if values.size != drive.size:
-        raise ValueError(f"{name} has {values.size} samples, the drive has {drive.size}")
+        raise ModelError(f"{name} has {values.size} samples, the drive has {drive.size}")
     return values

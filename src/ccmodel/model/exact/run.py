@@ -1,7 +1,7 @@
 """The loop over samples: what kind of step each is, and what is written down of it."""
 
 from ccmodel.kernel import borrowed, kernel, small_kernel
-from ccmodel.model.exact.along import balance_lines, move_along, step_along
+from ccmodel.model.exact.along import balance_lines, excess, move_along, step_along
 from ccmodel.model.exact.cable import (
     D_START,
     DRIVE,
@@ -40,8 +40,10 @@ MAX_EVENTS = 1000
 
 
 @kernel
-def run(path, state, trials, progress, drive, angle_given, given, stiffness, present, out, phase):
+def run(path, state, trials, progress, drive, angle_given, given, stiffness, present, out, phase, balance):
     """Simulate from sample progress[0] on; stops early where the list of corners wants more room.
+
+    A course is a series with the factor that brings it to the unit below, so that no copy of an input need be made.
 
     Parameters
     ----------
@@ -53,12 +55,13 @@ def run(path, state, trials, progress, drive, angle_given, given, stiffness, pre
         Room for what was before a trial.
     progress : ndarray of int, shape (3,)
         Next sample, direction of the last stroke, whether slack has lasted through a reversal; carried on.
-    drive : ndarray, shape (n,)
-        Displacement of the drive pulley's rim, m.
+    drive : tuple of ndarray, shape (n,), and float
+        Course of the drive pulley's rim, m.
     angle_given : bool
         Whether the load's displacement is given, not its law.
-    given : ndarray, shape (n,)
-        The load law's constant part (N), or the load's displacement (m) where `angle_given`.
+    given : tuple of ndarray, shape (n,) or (1,), and float
+        Course of the load law's constant part (N), or of the load's displacement (m) where `angle_given`; a single
+        value holds throughout.
     stiffness : float
         The load law's stiffness, N/m.
     present : ndarray of bool, shape (2,)
@@ -66,27 +69,30 @@ def run(path, state, trials, progress, drive, angle_given, given, stiffness, pre
     out : ndarray, shape (9, n)
         T1, T2, T3, T4, Q, and arc length of the moving stretches' limits: A at drive and load, B likewise.
     phase : ndarray of int, shape (n,)
-        1 to 3 for phases I to III, 4 for IVa, 5 for IVb.
+        0 to 2 for phases I to III, 3 for IVa, 4 for IVb.
+    balance : ndarray, shape (2,)
+        Most that the load was out of balance at a sample, and highest tension at a cable's end, N; carried on.
     """
     path, state, trials = borrowed(path), borrowed(state), borrowed(trials)
-    for i in range(progress[0], drive.size):
+    for i in range(progress[0], drive[0].size):
         for c in range(2):
             if state.kind[c, FIRST] < MARGIN or state.kind[c, LAST] > state.corner.shape[2] - MARGIN:
                 progress[0] = i
                 return CORNERS_FULL
-        move = drive[i] - state.value[PAIR, DRIVE]
+        drive_now, given_now = at_sample(drive, i), at_sample(given, i)
+        move = drive_now - state.value[PAIR, DRIVE]
         way = 1 if move > 0.0 else -1
         if move != 0.0:
             if way == -progress[1]:
                 progress[2] = _any_slack(state, present)
             progress[1] = way
-        if move != 0.0 or given[i] != state.value[PAIR, LOAD if angle_given else GIVEN]:
+        if move != 0.0 or given_now != state.value[PAIR, LOAD if angle_given else GIVEN]:
             if angle_given:
-                status = _step_angle(path, state, way, drive[i], given[i])
-            elif given[i] != state.value[PAIR, GIVEN]:
-                status = _step_given(path, state, trials, drive[i], given[i], stiffness)
+                status = _step_angle(path, state, way, drive_now, given_now)
+            elif given_now != state.value[PAIR, GIVEN]:
+                status = _step_given(path, state, trials, drive_now, given_now, stiffness)
             else:
-                step_along(path, state, trials[0], way, drive[i], given[i], stiffness)
+                step_along(path, state, trials[0], way, drive_now, given_now, stiffness)
                 status = DONE
             if status != DONE:
                 progress[0] = i
@@ -99,8 +105,17 @@ def run(path, state, trials, progress, drive, angle_given, given, stiffness, pre
         for c in range(2):
             out[5 + 2 * c, i], out[6 + 2 * c, i] = moving(path, state, c)
         phase[i] = _phase(state, present, progress)
-    progress[0] = drive.size
+        if not angle_given:
+            balance[0] = max(balance[0], abs(excess(state, given_now, stiffness)))
+            balance[1] = max(balance[1], out[0, i], out[1, i], out[2, i], out[3, i])
+    progress[0] = drive[0].size
     return DONE
+
+
+@small_kernel
+def at_sample(course, i):
+    """Value of a course at a sample, in the kernels' units."""
+    return course[0][min(i, course[0].size - 1)] * course[1]
 
 
 @kernel
@@ -194,15 +209,15 @@ def _any_slack(state, present):
 
 @small_kernel
 def _phase(state, present, progress):
-    """1 to 3 for phases I to III, 4 for IVa, 5 for IVb."""
+    """0 to 2 for phases I to III, 3 for IVa, 4 for IVb."""
     if _any_slack(state, present):
-        return 5 if progress[2] else 4
+        return 4 if progress[2] else 3
     progress[2] = 0
     reached = 0
     for c in range(2):
         if present[c] and state.kind[c, MODE] == WHOLE and state.kind[c, LINE] == (2 * c - 1) * progress[1]:
             reached += 1
-    return 1 + reached
+    return reached
 
 
 @small_kernel

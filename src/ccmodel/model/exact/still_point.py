@@ -39,6 +39,7 @@ from ccmodel.model.exact.cable import (
     elongation,
     end_compliance,
     keep,
+    keep_fronts,
     line_stiffness,
     position,
     pull_line,
@@ -61,8 +62,10 @@ ARRIVED = 1e-11
 SET_OUT = 1e-8
 MAX_EVENTS = 1000
 # Steps of integration after which a sample is given up, and after which one goes on with an implicit method: the
-# explicit one needs thousands where a still point near an end all but follows its balance.
+# explicit one needs thousands where a still point near an end all but follows its balance. Finding an event counts as
+# so many steps that a sample has no more than `MAX_EVENTS`.
 MAX_STEPS, STIFF_AFTER = 20_000, 400
+EVENT_STEPS = MAX_STEPS // MAX_EVENTS
 # What an integration step was ended by.
 NOTHING, BEND_LEFT, MEETING, UNPINNED, SLACK, TAUT = range(6)
 
@@ -71,7 +74,7 @@ NOTHING, BEND_LEFT, MEETING, UNPINNED, SLACK, TAUT = range(6)
 
 
 @kernel
-def step_apart(path, state, trials, ends, stiffness, angle_given):
+def step_apart(path, state, trials, ends, stiffness, angle_given, most_steps):
     """Move the load against the drive until `ends` is reached, or until a cable's drive front reaches the load.
 
     Parameters
@@ -89,11 +92,15 @@ def step_apart(path, state, trials, ends, stiffness, angle_given):
         The load law's stiffness, N/m.
     angle_given : bool
         Whether the load's displacement is given, not its law.
+    most_steps : int
+        Steps of integration that may be taken.
 
     Returns
     -------
     status : int
         REACHED (either of the two) or STUCK.
+    steps : int
+        Steps of integration that were taken.
     """
     start = (state.value[PAIR, DRIVE], state.value[PAIR, LOAD] if angle_given else state.value[PAIR, GIVEN])
     way = _way(start, ends)
@@ -102,24 +109,25 @@ def step_apart(path, state, trials, ends, stiffness, angle_given):
     s, steps = 0.0, 0
     for _ in range(MAX_EVENTS):
         if _settle_meetings(path, state, start, ends, stiffness, angle_given):
-            return REACHED
+            return REACHED, steps
         if s >= 1.0:
-            return REACHED
+            return REACHED, steps
         if not angle_given and _both_at_load(path, state):
             if _load_stays(path, state, 0, start, ends):
                 slide_whole(path, state, 0, -state.kind[0, LINE])
-                return REACHED
+                return REACHED, steps
             s = _leave_load(path, state, trials, s, start, ends, stiffness)
         if _is_still(state, 0) or _is_still(state, 1):
-            s, reached_load, taken = _wander(path, state, trials, s, start, ends, stiffness, angle_given)
-            if reached_load:
-                return REACHED
+            left = most_steps - steps
+            s, reached_load, taken = _wander(path, state, trials, s, start, ends, stiffness, angle_given, left)
             steps += taken
-            if steps >= MAX_STEPS:
-                return STUCK
+            if reached_load:
+                return REACHED, steps
+            if steps >= most_steps:
+                return STUCK, steps
         else:
             s = _move_fronts(path, state, trials, s, start, ends, stiffness, angle_given)
-    return STUCK
+    return STUCK, steps
 
 
 @kernel
@@ -488,11 +496,7 @@ def _set(path, state, trials, y, start, ends, stiffness, angle_given):
         if state.kind[c, MODE] == STILL_POINT:
             state.value[c, M_STILL] = y[c]
         elif state.kind[c, MODE] == FRONTS:
-            for i in range(13):
-                state.front[2 * c, i] = before.front[2 * c, i]
-                state.front[2 * c + 1, i] = before.front[2 * c + 1, i]
-            for i in range(14):
-                state.kind[c, i] = before.kind[c, i]
+            keep_fronts(before, state, c)
     _place(path, state, trials[0], y[2], start, ends, stiffness, angle_given)
 
 
@@ -569,29 +573,66 @@ def _try_implicit(path, state, trials, y, h, start, ends, stiffness, angle_given
     for step, begin, end in ((h, y, whole), (0.5 * h, y, half), (0.5 * h, half, following)):
         if not _radau(path, state, trials, begin, step, start, ends, stiffness, angle_given, jacobian, end):
             return inf
-    return _by_tolerance(path, state, (whole - following) / 31.0)
+    for i in range(3):
+        whole[i] = (whole[i] - following[i]) / 31.0
+    return _by_tolerance(path, state, whole)
 
 
 @kernel
 def _radau(path, state, trials, y, h, start, ends, stiffness, angle_given, jacobian, following):
     """One step of Radau's method into `following`; False where Newton's iteration finds no end."""
-    system, change, slopes = np.eye(9), np.zeros((3, 3)), np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            system[3 * i : 3 * i + 3, 3 * j : 3 * j + 3] -= h * RADAU[i, j] * jacobian
-    inverse = np.linalg.inv(system)
+    change, slopes, point, missing = np.zeros(9), np.empty((3, 3)), np.empty(3), np.empty(9)
+    inverse = np.zeros((9, 18))
+    for i in range(9):
+        inverse[i, i] = inverse[i, 9 + i] = 1.0
+        for j in range(9):
+            inverse[i, j] -= h * RADAU[i // 3, j // 3] * jacobian[i % 3, j % 3]
+    _invert(inverse)
     for _ in range(20):
         for i in range(3):
-            _derivative(path, state, trials, y + change[i], start, ends, stiffness, angle_given, slopes[i])
-        correction = inverse @ (h * (RADAU @ slopes) - change).ravel()
-        change += correction.reshape((3, 3))
-        largest = np.abs(correction).max()
-        if not largest < 1.0:
-            return False
+            for j in range(3):
+                point[j] = y[j] + change[3 * i + j]
+            _derivative(path, state, trials, point, start, ends, stiffness, angle_given, slopes[i])
+        for i in range(9):
+            missing[i] = -change[i]
+            for j in range(3):
+                missing[i] += h * RADAU[i // 3, j] * slopes[j, i % 3]
+        largest = 0.0
+        for i in range(9):
+            correction = 0.0
+            for j in range(9):
+                correction += inverse[i, 9 + j] * missing[j]
+            change[i] += correction
+            if not abs(correction) < 1.0:
+                return False
+            largest = max(largest, abs(correction))
         if largest <= 2e-16:
             break
-    following[:] = y + change[2]
+    for i in range(3):
+        following[i] = y[i] + change[6 + i]
     return largest <= 1e-14
+
+
+@kernel
+def _invert(rows):
+    """Gauss and Jordan's elimination: `rows`, a square matrix beside the unit matrix, becomes that beside its inverse.
+
+    numpy's own would take longer to compile than all else here.
+    """
+    n = rows.shape[0]
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(rows[i, k]) > abs(rows[pivot, k]):
+                pivot = i
+        scale = 1.0 / rows[pivot, k] if rows[pivot, k] != 0.0 else inf
+        for j in range(2 * n):
+            rows[pivot, j], rows[k, j] = rows[k, j], rows[pivot, j] * scale
+        for i in range(n):
+            factor = rows[i, k]
+            if i != k and factor != 0.0:
+                for j in range(2 * n):
+                    rows[i, j] -= factor * rows[k, j]
 
 
 @kernel
@@ -626,8 +667,8 @@ def _event(path, state, start, ends, stiffness, angle_given):
 
 
 @kernel
-def _wander(path, state, trials, s, start, ends, stiffness, angle_given):
-    """Integrate until s = 1 or something happens to a cable, for `MAX_STEPS` steps at most.
+def _wander(path, state, trials, s, start, ends, stiffness, angle_given, most_steps):
+    """Integrate until s = 1 or something happens to a cable, for `most_steps` steps at most.
 
     Returns s, whether a drive front reached the load, and how many steps were taken.
     """
@@ -636,7 +677,7 @@ def _wander(path, state, trials, s, start, ends, stiffness, angle_given):
     y = np.array([state.value[0, M_STILL], state.value[1, M_STILL], s])
     following, slopes = np.empty(3), np.empty((7, 3))
     h = 1e-3
-    for attempt in range(MAX_STEPS):
+    for attempt in range(most_steps):
         stiff = attempt >= STIFF_AFTER
         error = _try_step(path, state, trials, y, h, stiff, start, ends, stiffness, angle_given, slopes, following)
         if not error <= 1.0:
@@ -647,15 +688,15 @@ def _wander(path, state, trials, s, start, ends, stiffness, angle_given):
         if event == NOTHING and following[2] < 1.0:
             if not angle_given and _both_at_load(path, state) and _load_stays(path, state, 0, start, ends):
                 slide_whole(path, state, 0, -state.kind[0, LINE])
-                return following[2], True, attempt
+                return following[2], True, attempt + 1
             y[:] = following
             h *= min(5.0, 0.9 * max(error, 1e-10) ** -0.2)
             continue
         if event == NOTHING:
             _hit_end(path, state, trials, y, h, stiff, start, ends, stiffness, angle_given, slopes, following)
             _set(path, state, trials, following, start, ends, stiffness, angle_given)
-            return 1.0, False, attempt
-        near, far = 0.0, h
+            return 1.0, False, attempt + 1
+        near, far, taken = 0.0, h, attempt + EVENT_STEPS
         while True:
             middle = 0.5 * (near + far)
             if not near < middle < far or far - near < 1e-17:
@@ -672,11 +713,11 @@ def _wander(path, state, trials, s, start, ends, stiffness, angle_given):
             _try_step(path, state, trials, y, near, stiff, start, ends, stiffness, angle_given, slopes, following)
             _hit_end(path, state, trials, y, far, stiff, start, ends, stiffness, angle_given, slopes, following)
             _set(path, state, trials, following, start, ends, stiffness, angle_given)
-            return 1.0, False, attempt
+            return 1.0, False, taken
         _set(path, state, trials, following, start, ends, stiffness, angle_given)
         reached = _handle(path, state, event, c, start, ends, stiffness, angle_given)
-        return following[2], reached, attempt
-    return y[2], False, MAX_STEPS
+        return following[2], reached, taken
+    return y[2], False, most_steps
 
 
 @kernel

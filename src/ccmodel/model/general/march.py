@@ -19,7 +19,8 @@ from collections import namedtuple
 
 import numpy as np
 
-from ccmodel.kernel import kernel
+from ccmodel.elementary import quick_tanh
+from ccmodel.kernel import borrowed, kernel
 from ccmodel.mechanisms.backlash import dead_zone
 from ccmodel.mechanisms.load_dependent_friction import power_of_tension
 from ccmodel.mechanisms.presliding import dahl
@@ -75,7 +76,10 @@ STIFFNESS, LOST, RELAXING, SHARE, STRETCH, LOST_TENSION, ELASTIC, TENSION, TANGE
     ALPHA,
     BETA,
     ETA,
-) = range(15)
+    GAMMA,
+    GRIP_NOW,
+    GRIP_SLOPE,
+) = range(18)
 # slide, shape (rows, 2, n + 2): drive end, nodes, load end, m. This step, Newton's step, and those before.
 NOW, STEP, SAVED, LAST, BEFORE = range(5)
 # mean, shape (rows, 2): mean tension of a cable that its conduit gives way to, N.
@@ -94,7 +98,7 @@ NOW, STEP, SAVED, LAST, BEFORE = range(5)
 ) = range(11)
 # load, shape (rows,): angle, last turn and step's length, speed, speed before, bristle of the bearing; the step's.
 ANGLE, TURN, DT, OMEGA, OMEGA_BEFORE, BEARING, OMEGA_NEXT, BEARING_NEXT, TORQUE = range(9)
-PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10, 15, 5, 11, 9
+PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10, 18, 5, 11, 9
 
 # Numbers of a run.
 Physics = namedtuple(
@@ -104,15 +108,6 @@ Physics = namedtuple(
 )
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}  # not nnan: a NaN must be seen
-
-
-@kernel(inline="always")
-def _tanh(y):
-    """Tanh for the half of mu phi of a cell, y >= 0: to rounding below 0.05, to 1e-6 at 1, at a tenth of the cost."""
-    if y > 1.5:
-        return np.tanh(y)
-    y2 = y * y
-    return y * (945.0 + y2 * (105.0 + y2)) / (945.0 + y2 * (420.0 + 15.0 * y2))
 
 
 @kernel(error_model="numpy", fastmath=FAST)
@@ -130,12 +125,15 @@ def _tensions(ph, piece, slide, mean, weights):
             continue
         gives = ph.conduit_compliance * (mean[MEAN_NEXT, c] - mean[MEAN, c])
         for i in range(n1):
-            stretch = e[i] + (d[i] - d[i + 1]) - gives * piece[SHARE, c, i]
-            pull, tangent = k[i] * stretch, k[i]
-            if piece[LOST, c, i] > 0.0 and stretch > 0.0:
-                pull, tangent = settling_tension(stretch, piece[LOST, c, i], k[i])
-                tangent = max(tangent, SLACK_SHARE * k[i])
-            piece[PULL, c, i] = pull
+            T[i] = e[i] + (d[i] - d[i + 1]) - gives * piece[SHARE, c, i]
+        if ph.has_settling:
+            _settle(piece, c)
+        else:
+            for i in range(n1):
+                piece[PULL, c, i] = k[i] * T[i]
+                K[i] = k[i]
+        for i in range(n1):
+            pull, tangent = piece[PULL, c, i], K[i]
             if ph.has_relaxation:
                 r = piece[RELAXING, c, i]
                 q = (
@@ -148,6 +146,38 @@ def _tensions(ph, piece, slide, mean, weights):
             share = 1.0 if pull > 0.0 else SLACK_SHARE
             T[i] = share * pull
             K[i] = share * tangent
+
+
+@kernel(error_model="numpy", fastmath=FAST)
+def _settle(piece, c):
+    """Pull and tangent stiffness of each piece of a cable whose strands settle, from its stretch in row `TENSION`.
+
+    This and the other loops that call elementary functions do nothing else, so that they take several nodes at a time.
+    """
+    stretch, k, lost, pulls, K = (
+        piece[TENSION, c],
+        piece[STIFFNESS, c],
+        piece[LOST, c],
+        piece[PULL, c],
+        piece[TANGENT, c],
+    )
+    for i in range(piece.shape[2]):
+        settles = lost[i] > 0.0 and stretch[i] > 0.0
+        pull, tangent = settling_tension(stretch[i], lost[i] if settles else 1.0, k[i])
+        pulls[i] = pull if settles else k[i] * stretch[i]
+        K[i] = max(tangent, SLACK_SHARE * k[i]) if settles else k[i]
+
+
+@kernel(error_model="numpy", fastmath=FAST)
+def _set_hold(ph, piece, node, c):
+    """Friction per sum of a node's tensions where it depends on these, and its derivative by half that sum times it."""
+    T, grip, now, slope = piece[TENSION, c], node[GRIP, c], node[GRIP_NOW, c], node[GRIP_SLOPE, c]
+    for i in range(node.shape[2]):
+        half = 0.5 * (max(T[i], 0.0) + max(T[i + 1], 0.0))
+        factor, by_tension = power_of_tension(half, ph.exponent)
+        g = quick_tanh(grip[i] * factor)
+        now[i] = g
+        slope[i] = half * (1.0 - g * g) * grip[i] * by_tension
 
 
 @kernel(error_model="numpy", fastmath=FAST)
@@ -180,14 +210,12 @@ def _nodes(ph, piece, node, slide, dt, bristle):
                 fd[i] *= hold
                 r[i] = T[i] - T[i + 1] - x * hold
         else:
+            if ph.exponent != 0.0:
+                _set_hold(ph, piece, node, c)
+                grip = node[GRIP_NOW, c]
             for i in range(n):
-                x, g, slope = node[BRISTLE_NEXT, c, i], grip[i], 0.0
-                both = max(T[i], 0.0) + max(T[i + 1], 0.0)
-                if ph.exponent != 0.0:
-                    factor, by_tension = power_of_tension(0.5 * both, ph.exponent)
-                    g = _tanh(grip[i] * factor)
-                    slope = 0.5 * both * (1.0 - g * g) * grip[i] * by_tension
-                hold = g * both + node[DRAG, c, i]
+                x, g, slope = node[BRISTLE_NEXT, c, i], grip[i], node[GRIP_SLOPE, c, i]
+                hold = g * (max(T[i], 0.0) + max(T[i + 1], 0.0)) + node[DRAG, c, i]
                 p[i] = K[i] * (1.0 - x * (g + slope))
                 q[i] = K[i + 1] * (1.0 + x * (g + slope))
                 drag = node[VISCOUS, c, i] * rate
@@ -263,16 +291,21 @@ def _solve_with_conduits(ph, piece, node, slide, mean, G, slope, R, free):
     """
     n = node.shape[2]
     C = ph.conduit_compliance
-    for c in range(2):
-        a, g, h = 0.0, 1.0, 0.0
-        for i in range(n):
+    # Both cables by turns: their divisions need not wait for each other.
+    for i in range(n):
+        for c in range(2):
+            a, g, h = 0.0, 1.0, 0.0
+            if i > 0:
+                a, g, h = node[ALPHA, c, i - 1], node[GAMMA, c, i - 1], node[ETA, c, i - 1]
             p, q = node[NEAR, c, i], node[FAR, c, i]
             f = p * g + node[GIVES, c, i]
             inverse = 1.0 / (f + q)
-            a = (node[EXCESS, c, i] + p * a) * inverse
-            h = (C * (q * piece[SHARE, c, i + 1] - p * piece[SHARE, c, i]) + p * h) * inverse
-            g = f * inverse
-            node[ALPHA, c, i], node[BETA, c, i], node[ETA, c, i] = a, q * inverse, h
+            node[ALPHA, c, i] = (node[EXCESS, c, i] + p * a) * inverse
+            node[BETA, c, i] = q * inverse
+            node[ETA, c, i] = (C * (q * piece[SHARE, c, i + 1] - p * piece[SHARE, c, i]) + p * h) * inverse
+            node[GAMMA, c, i] = f * inverse
+    for c in range(2):
+        a, g, h = node[ALPHA, c, n - 1], node[GAMMA, c, n - 1], node[ETA, c, n - 1]
         # From the load end back: sums of share * K * (stretch of the piece) for the three parts.
         A, B, H = 0.0, 1.0, 0.0
         sum_A, sum_B, sum_H, stiff = 0.0, 0.0, 0.0, 0.0
@@ -362,6 +395,19 @@ def _evaluate(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, wei
     return error, max(highest, 1e-2), G, slope, R
 
 
+@kernel
+def _copy(slide, to, source):
+    """Copy a row of slides to another; numpy's way takes several times as long for so few."""
+    for c in range(2):
+        for i in range(slide.shape[2]):
+            slide[to, c, i] = slide[source, c, i]
+
+
+@kernel
+def _copy_means(mean, to, source):
+    mean[to, 0], mean[to, 1] = mean[source, 0], mean[source, 1]
+
+
 @kernel(error_model="numpy")
 def _newton(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, counts):
     """Solve a step from the slides in `NOW` and a turn of the load; (whether it converged, the load's turn)."""
@@ -381,20 +427,20 @@ def _newton(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, count
             return False, turn
         if iteration == patience and error > best:
             # Full steps lead nowhere: from the best point on, only steps that lessen the error count.
-            slide[NOW] = slide[SAVED]
-            mean[MEAN_NEXT] = mean[MEAN_SAVED]
+            _copy(slide, NOW, SAVED)
+            _copy_means(mean, MEAN_NEXT, MEAN_SAVED)
             turn, best = saved_turn, np.inf
             continue
         if iteration > patience and error > best and share > SMALLEST_SHARE:
             share *= 0.5
-            slide[NOW] = slide[SAVED]
-            mean[MEAN_NEXT] = mean[MEAN_SAVED]
+            _copy(slide, NOW, SAVED)
+            _copy_means(mean, MEAN_NEXT, MEAN_SAVED)
             turn = saved_turn
         else:
             if error < best or iteration > patience:
                 best = error
-                slide[SAVED] = slide[NOW]
-                mean[MEAN_SAVED] = mean[MEAN_NEXT]
+                _copy(slide, SAVED, NOW)
+                _copy_means(mean, MEAN_SAVED, MEAN_NEXT)
                 saved_turn = turn
             share = 1.0
             if soft:
@@ -407,8 +453,8 @@ def _newton(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, count
             for c in range(2):
                 mean[MEAN_NEXT, c] += share * mean[MEAN_STEP, c]
     # Sliding and sticking may take turns at a node or two for ever; what they disagree about is then next to nothing.
-    slide[NOW] = slide[SAVED]
-    mean[MEAN_NEXT] = mean[MEAN_SAVED]
+    _copy(slide, NOW, SAVED)
+    _copy_means(mean, MEAN_NEXT, MEAN_SAVED)
     turn = saved_turn
     error, limit, G, slope, R = _evaluate(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, weights)
     accepted = error <= (LOOSE_TOLERANCE * limit) ** 2
@@ -443,8 +489,7 @@ def _commit(ph, piece, node, slide, mean, load, turn, dt):
             node[BRISTLE, c, i] = node[BRISTLE_NEXT, c, i]
     if ph.rise > 0.0 and dt > 0.0:
         for c in range(2):
-            for i in range(n):
-                node[RESTED, c, i] = renewed(node[RESTED, c, i], slide[NOW, c, i + 1], dt, ph.vs)
+            _renew(ph, node, slide, c, dt, RESTED)
     if dt > 0.0:
         load[TURN], load[DT] = turn, dt
         load[OMEGA_BEFORE], load[OMEGA] = load[OMEGA], load[OMEGA_NEXT]
@@ -452,7 +497,15 @@ def _commit(ph, piece, node, slide, mean, load, turn, dt):
     load[BEARING] = load[BEARING_NEXT]
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", fastmath=FAST)
+def _renew(ph, node, slide, c, dt, into):
+    """What the contacts of a cable remember after the slides in `NOW`, into row `into`."""
+    rested, d, following = node[RESTED, c], slide[NOW, c], node[into, c]
+    for i in range(node.shape[2]):
+        following[i] = renewed(rested[i], d[i + 1], dt, ph.vs)
+
+
+@kernel(error_model="numpy", fastmath=FAST)
 def _set_grip(ph, node, slide, course, dt):
     """Friction of each node per sum of its tensions; with a power of tension only its argument, mu phi / 2.
 
@@ -461,21 +514,24 @@ def _set_grip(ph, node, slide, course, dt):
     """
     change = 0.0
     for c in range(2):
+        before, rested, half_bend, grip = node[RESTED_NEXT, c], node[ALPHA, c], node[HALF_BEND, c], node[GRIP, c]
+        if ph.rise > 0.0 and dt > 0.0:
+            _renew(ph, node, slide, c, dt, ALPHA)
+        else:
+            rested[:] = node[RESTED, c]
         for i in range(node.shape[2]):
-            y = node[HALF_BEND, c, i] * course
-            if ph.rise > 0.0:
-                rested = node[RESTED, c, i]
-                if dt > 0.0:
-                    rested = renewed(rested, slide[NOW, c, i + 1], dt, ph.vs)
-                change = max(change, abs(rested - node[RESTED_NEXT, c, i]))
-                node[RESTED_NEXT, c, i] = rested
-                y *= 1.0 + ph.rise * rested
-            node[GRIP, c, i] = y if ph.exponent != 0.0 else _tanh(y)
+            change = max(change, abs(rested[i] - before[i]))
+            before[i] = rested[i]
+        for i in range(node.shape[2]):
+            grip[i] = half_bend[i] * course * (1.0 + ph.rise * rested[i])
+        if ph.exponent == 0.0:
+            for i in range(node.shape[2]):
+                grip[i] = quick_tanh(grip[i])
     return ph.rise * change
 
 
 @kernel(error_model="numpy")
-def march(ph, piece, node, slide, mean, load, time_s, way_in, course, series, out, counts):
+def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, course, series, out, counts):
     """Step through the samples.
 
     Parameters
@@ -484,13 +540,16 @@ def march(ph, piece, node, slide, mean, load, time_s, way_in, course, series, ou
     piece, node, slide, mean, load : ndarray
         Constants and the state before the first sample, in the rows named above. The first sample is solved at the
         drive's first position, which brings a start that is out of balance into balance.
-    time_s, way_in, series : ndarray, shape (m,)
-        Times (s), way of the cables at the drive pulley (m), and what is prescribed at the load: a torque (N m) on
-        top of the load's own, or the angle (rad).
-    course : ndarray, shape (m,) or (1,)
-        Factor of mu at each sample.
+    time_s, theta_in : ndarray, shape (m,)
+        Times (s), and angle of the drive pulley (rad).
+    drive : tuple of float
+        The drive pulley's radius (m), eccentricity, and the latter's angle (rad).
+    course, series : ndarray, shape (m,) or (1,)
+        Factor of mu, and what is prescribed at the load: a torque (N m) on top of the load's own, or the angle (rad).
+        A single value holds throughout.
     out : ndarray, shape (7, m)
-        Filled with T1, T2, T3, T4 (N), load angle (rad), the load's torque and the torque of its bearing (N m).
+        Filled with T1, T2, T3, T4 (N), load angle (rad), the load's torque and that of the cables on the drive
+        pulley (N m).
     counts : ndarray of int, shape (3,)
         Adds up Newton iterations, substeps, and steps that were taken at the loose tolerance.
 
@@ -499,15 +558,19 @@ def march(ph, piece, node, slide, mean, load, time_s, way_in, course, series, ou
     int
         Samples that were solved.
     """
+    piece, node, slide, mean, load = borrowed((piece, node, slide, mean, load))
     m, n = time_s.size, node.shape[2]
     last_turn, before_turn, last_pull, before_pull, last_dt = 0.0, 0.0, 0.0, 0.0, 0.0
     node[RESTED] = 1.0
     _set_grip(ph, node, slide, course[0], 0.0)
     fixed_grip = ph.rise == 0.0 and course.size == 1
     prescribed = ph.kind == PRESCRIBED_ANGLE
+    way_before = winding(theta_in[0], drive[1], drive[2])[0]
     for j in range(m):
-        pull = way_in[j] - way_in[j - 1] if j > 0 else 0.0
-        rise = series[j] - series[j - 1] if j > 0 else 0.0
+        way, round_, _ = winding(theta_in[j], drive[1], drive[2])
+        pull, way_before = drive[0] * (way - way_before), way
+        wanted = series[min(j, series.size - 1)]
+        rise = wanted - series[min(j - 1, series.size - 1)] if j > 0 else 0.0
         dt = time_s[j] - time_s[j - 1] if j > 0 else 0.0
         done, part, bristle = 0.0, 1.0, ph.bristle
         while done < 1.0:
@@ -530,7 +593,7 @@ def march(ph, piece, node, slide, mean, load, time_s, way_in, course, series, ou
                     mean[MEAN_NEXT, c] = mean[MEAN, c] + ratio * mean[MEAN_LAST, c]
                 turn = ratio * last_turn
             slide[NOW, 0, 0], slide[NOW, 1, 0] = step_pull, -step_pull
-            value = series[j] - (1.0 - done - part) * rise
+            value = wanted - (1.0 - done - part) * rise
             if prescribed:
                 turn = value - load[ANGLE]
             torque = 0.0 if prescribed else value
@@ -553,8 +616,8 @@ def march(ph, piece, node, slide, mean, load, time_s, way_in, course, series, ou
                     bristle *= 10.0
                     part = 1.0
                 continue
-            slide[BEFORE] = slide[LAST]
-            slide[LAST] = slide[NOW]
+            _copy(slide, BEFORE, LAST)
+            _copy(slide, LAST, NOW)
             before_turn, last_turn = last_turn, turn
             before_pull, last_pull, last_dt = last_pull, step_pull, step_dt
             _commit(ph, piece, node, slide, mean, load, turn, step_dt)
@@ -570,5 +633,5 @@ def march(ph, piece, node, slide, mean, load, time_s, way_in, course, series, ou
             out[5, j] = R * (out[1, j] - out[3, j]) - bearing
         else:
             out[5, j] = load[TORQUE]
-        out[6, j] = bearing
+        out[6, j] = drive[0] * round_ * (out[0, j] - out[2, j])
     return m

@@ -107,8 +107,9 @@ def simulate(
     time_s, theta_in = (np.ascontiguousarray(a, dtype=float) for a in (time_s, theta_in))
     active = _active(mechanisms)
     settings = settings_of(active)
-    series = _series(load, theta_in)
+    series = _series(load)
     _check(time_s, theta_in, series, elements)
+    series = np.zeros(1) if series is None else series
 
     grid = make_grid(transmission.path, elements, settings.kinks)
     physics = _physics(transmission, load, settings)
@@ -119,16 +120,17 @@ def simulate(
     mean[rows.MEAN] = (piece[rows.SHARE] * T).sum(axis=1)
     state[rows.ANGLE] = _load_angle(physics, T, load, series)
     slide = np.zeros((rows.SLIDE_ROWS, 2, node.shape[2] + 2))
-    R_i = transmission.drive_radius_m
-    way, round_, _ = winding(theta_in, *settings.drive_eccentricity)
-    out, counts = np.zeros((7, time_s.size)), np.zeros(3, dtype=np.int64)
-    solved = rows.march(physics, piece, node, slide, mean, state, time_s, R_i * way, course, series, out, counts)
+    drive = tuple(map(float, (transmission.drive_radius_m, *settings.drive_eccentricity)))
+    out, counts = np.empty((7, time_s.size)), np.zeros(3, dtype=np.int64)
+    solved = rows.march(physics, piece, node, slide, mean, state, time_s, theta_in, drive, course, series, out, counts)
 
+    status = Status.OK if solved == time_s.size else Status.NO_CONVERGENCE
     time_s, theta_in, out = time_s[:solved], theta_in[:solved], out[:, :solved]
-    T1, T2, T3, T4, theta_out, tau_out, _ = out
-    tau_in = (T1 - T3) * R_i * (round_ if np.ndim(round_) == 0 else round_[:solved])
+    T1, T2, T3, T4, theta_out, tau_out, tau_in = out
     if settings.drive_friction_Nm != 0.0:
-        tau_in = tau_in + settings.drive_friction_Nm * bearing(theta_in)
+        rubs = bearing(theta_in)
+        rubs *= settings.drive_friction_Nm
+        tau_in += rubs
     channels = {
         "theta_in_rad": theta_in,
         "theta_out_rad": theta_out,
@@ -146,7 +148,7 @@ def simulate(
         theta_out_rad=theta_out,
         tau_in_Nm=tau_in,
         tau_out_Nm=tau_out,
-        status=Status.OK if solved == series.size else Status.NO_CONVERGENCE,
+        status=status,
         reached=solved,
         time_s=time_s,
         read=read,
@@ -219,23 +221,25 @@ def _active(mechanisms) -> list[Active]:
     return given
 
 
-def _series(load: Load, theta_in: NDArray) -> NDArray:
+def _series(load: Load) -> NDArray | None:
     if isinstance(load, TorqueLoad):
         return np.ascontiguousarray(load.torque_Nm, dtype=float)
     if isinstance(load, AngleLoad):
         return np.ascontiguousarray(load.angle_rad, dtype=float)
-    return np.zeros_like(theta_in)
+    return None
 
 
 def _check(time_s, theta_in, series, elements):
     if elements < 1:
         raise ModelError(f"each cable needs at least one element; got {elements}")
     if theta_in.ndim != 1 or theta_in.size == 0:
-        raise ModelError(f"theta_in must be one row of samples; got shape {theta_in.shape}")
-    for name, values in (("time_s", time_s), ("the load's series", series)):
+        raise ModelError(f"theta_in is one row of samples, at least one; got an array of shape {theta_in.shape}")
+    given = {"time_s": time_s, "theta_in": theta_in}
+    if series is not None:
+        given["the load's series"] = series
+    for name, values in given.items():
         if values.shape != theta_in.shape:
             raise ModelError(f"{name} has {values.size} samples, the drive angle {theta_in.size}")
-    for name, values in (("time_s", time_s), ("theta_in", theta_in), ("the load's series", series)):
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size:
             raise ModelError(f"{name} is not finite at sample {bad[0]}")
