@@ -177,6 +177,10 @@ def test_violent_loads_never_stop_it(seed):
         assert (np.abs(np.log(near[taut] / far[taut])) <= bound + 1e-9).all()
 
 
+def test_a_front_that_sets_out_beside_a_still_point_at_the_load_takes_many_events_but_not_for_ever():
+    assert simulate_pair(*violent(383, 1000)).status is Status.OK
+
+
 @pytest.mark.parametrize("seed", [9, 15, 293])
 def test_a_sample_that_wants_too_many_steps_is_given_up_with_advice(seed, monkeypatch):
     monkeypatch.setattr(pair, "MAX_STEPS", 100)

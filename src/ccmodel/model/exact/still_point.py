@@ -63,9 +63,8 @@ SET_OUT = 1e-8
 MAX_EVENTS = 1000
 # Steps of integration after which a sample is given up, and after which one goes on with an implicit method: the
 # explicit one needs thousands where a still point near an end all but follows its balance. Finding an event counts as
-# so many steps that a sample has no more than `MAX_EVENTS`.
-MAX_STEPS, STIFF_AFTER = 20_000, 400
-EVENT_STEPS = MAX_STEPS // MAX_EVENTS
+# some of them.
+MAX_STEPS, STIFF_AFTER, EVENT_STEPS = 40_000, 400, 20
 # What an integration step was ended by.
 NOTHING, BEND_LEFT, MEETING, UNPINNED, SLACK, TAUT = range(6)
 
