@@ -1,0 +1,126 @@
+"""Cases on disk: the batch that a diagnosis is given, and what only the scorer sees."""
+
+import hashlib
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proof.cases import Case
+from virtualrig.campaign import as_yaml, compress, description, log_name, prepare, recording_generator, run
+from virtualrig.config import Campaign, RecordingPlan
+from virtualrig.sensors import Side, log, sensed
+from virtualrig.trajectory import Preparation, SimulationError, Trajectory
+
+NOTE = "recordings of a simulated rig; its physics is not disclosed"
+RAISE = 1.5
+HIGHEST_LIMIT_N = 2000.0
+# By which friction differs from run to run: what a model with the right physics cannot know of a recording.
+FLOOR_FRICTION = 1.01
+
+Log = dict[str, NDArray]
+
+
+def build(case: Case, out: Path) -> dict:
+    """Write a case's batch to `out`/cases and what is kept back to `out`/kept-back.
+
+    Returns
+    -------
+    dict
+        The manifest's entry: digests of the key, the batch and what is kept back. No answer.
+    """
+    batch, kept = out / "cases" / case.name, out / "kept-back" / case.name
+    _write(case, case.recordings, batch)
+    floor = _write(case, case.kept_back, kept, with_floor=True)
+    (kept / "floor.json").write_text(json.dumps(floor, indent=1), encoding="utf-8")
+    return {"key": case.digest, "batch": folder_digest(batch), "kept-back": folder_digest(kept)}
+
+
+def folder_digest(folder: Path) -> str:
+    """Digest of a folder's files, names included."""
+    digest = hashlib.sha256()
+    for file in sorted(folder.iterdir()):
+        digest.update(file.name.encode() + b"\0" + hashlib.sha256(file.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+def simulate(campaign: Campaign, plan: RecordingPlan, preparation: Preparation) -> Trajectory:
+    """Run a recording with the lowest tension limit, and so the longest time step, that holds it."""
+    limit = campaign.numerics.tension_limit_N
+    while True:
+        numerics = campaign.numerics.model_copy(update={"tension_limit_N": limit})
+        try:
+            return run(campaign.model_copy(update={"numerics": numerics}), plan, preparation)
+        except SimulationError:
+            limit *= RAISE
+            if limit > HIGHEST_LIMIT_N:
+                raise
+
+
+def shown(campaign: Campaign, trajectory: Trajectory) -> dict[str, NDArray]:
+    """Channels as faulty sensors without noise would show them."""
+    t, rig = trajectory, campaign.rig
+    drive = sensed(t.time_s, Side(t.theta_in_rad, t.tau_in_Nm, t.T1_N + t.T3_N), rig, rig.effects.drive_sensors)
+    load = sensed(t.time_s, Side(t.theta_out_rad, t.tau_out_Nm, t.T2_N + t.T4_N), rig, rig.effects.load_sensors)
+    return {
+        "theta_out_rad": load.angle_rad,
+        "tau_in_Nm": drive.torque_Nm,
+        "tau_out_Nm": load.torque_Nm,
+        "F_drive_N": drive.force_N,
+        "F_load_N": load.force_N,
+    }
+
+
+def floor_of(campaign: Campaign, plan: RecordingPlan, preparation: Preparation, truth: Trajectory) -> dict[str, float]:
+    """Root mean square error that the true physics would leave in each channel of a recording.
+
+    It does not know this run's friction to better than one per cent, the sensors' noise, the zeros of the torques
+    (those of the load cells enter the pretension that the rest shows), and where in their counts the two encoders
+    stood at rest: the load's twice over, as its own zero is taken from the same rest, and the drive's because the load
+    follows it.
+    """
+    other = Preparation(
+        preparation.friction_coefficient * FLOOR_FRICTION, preparation.pretension_N, preparation.profile_share
+    )
+    a, b = shown(campaign, truth), shown(campaign, simulate(campaign, plan, other))
+    friction = {name: float(np.mean((a[name] - b[name]) ** 2)) for name in a}
+    sensors = campaign.sensors
+    count = (2 * np.pi / sensors.encoder.counts_per_rev) ** 2 / 12
+    torque = _variance(sensors.torque.noise_Nm, sensors.torque.slow_noise, sensors.torque.accuracy_Nm)
+    force = _variance(sensors.load_cell.noise_N, sensors.load_cell.slow_noise, 0.0)
+    spring = campaign.rig.load.spring_stiffness_Nm_per_rad
+    unknown = {
+        "theta_out_rad": 3 * count,
+        "tau_in_Nm": torque,
+        "tau_out_Nm": torque + spring**2 * count,
+        "F_drive_N": force,
+        "F_load_N": force,
+    }
+    return {name: float(np.sqrt(friction[name] + unknown[name])) for name in a}
+
+
+def _variance(noise, slow, accuracy) -> float:
+    ratio = slow.ratio if slow else 0.0
+    return noise**2 * (1 + ratio**2) + accuracy**2 / 3
+
+
+def _write(
+    case: Case, plans: tuple[RecordingPlan, ...], folder: Path, with_floor: bool = False
+) -> dict[str, dict[str, float]]:
+    """Record into a folder of its own; the floors by recording, where they are asked for."""
+    # What a build that was stopped left behind.
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    campaign, floors = case.campaign, {}
+    for plan in plans:
+        draw = recording_generator(case.seed, case.name, plan.id)
+        preparation = prepare(campaign, plan, draw)
+        trajectory = simulate(campaign, plan, preparation)
+        (folder / log_name(plan)).write_bytes(compress(log(trajectory, campaign.sensors, campaign.rig, draw)))
+        if with_floor:
+            floors[plan.id] = floor_of(campaign, plan, preparation, trajectory)
+    described = description(campaign, case.name, NOTE, plans)
+    (folder / "batch.yaml").write_text(as_yaml(described), encoding="utf-8")
+    return floors
