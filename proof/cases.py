@@ -135,9 +135,7 @@ def draw(seed: int, kind: str | None = None, effect: str | None = None) -> Case:
     protocol_name = _protocol_of(kind, plan, random)
     protocol = plan.protocols[protocol_name]
     spring = log_uniform(plan.rig.load_stiffness_Nm_per_rad, random)
-    hidden = [
-        _effect(name, spec, strength, spring, random) for name, spec, strength in _chosen(kind, effect, plan, random)
-    ]
+    hidden = [_effect(*chosen, spring, random) for chosen in _chosen(kind, effect, plan, random)]
     truth = tuple(t for t, _ in hidden)
     campaign = _campaign(seed, plan, spring, Effects.model_validate(merged([e for _, e in hidden])), random)
     pretension_N = random.uniform(*plan.rig.pretension_N)

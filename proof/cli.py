@@ -43,9 +43,8 @@ def build(
         started = time.process_time()
         manifest[case.name] = build_case(case, out)
         manifest_file.write_text(json.dumps(manifest, indent=1), encoding="utf-8")
-        typer.echo(
-            f"{case.name}: {len(case.recordings)} recordings in {time.process_time() - started:.0f} s of one core"
-        )
+        took_s = time.process_time() - started
+        typer.echo(f"{case.name}: {len(case.recordings)} recordings in {took_s:.0f} s of one core")
     if with_keys:
         _add_keys(cases, out)
 

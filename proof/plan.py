@@ -123,7 +123,7 @@ class EffectPlan(Strict):
     size: Range
     unit: str
     signed: bool = False
-    also: dict[str, Range] = {}
+    also: dict[str, Range] = Field(default_factory=dict)
 
 
 class Plan(Strict):
