@@ -3,6 +3,7 @@
 import hashlib
 import json
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +21,6 @@ HIGHEST_LIMIT_N = 2000.0
 # By which friction differs from run to run: what a model with the right physics cannot know of a recording.
 FLOOR_FRICTION = 1.01
 
-Log = dict[str, NDArray]
-
 
 def build(case: Case, out: Path) -> dict:
     """Write a case's batch to `out`/cases and what is kept back to `out`/kept-back.
@@ -32,9 +31,9 @@ def build(case: Case, out: Path) -> dict:
         The manifest's entry: digests of the key, the batch and what is kept back. No answer.
     """
     batch, kept = out / "cases" / case.name, out / "kept-back" / case.name
-    _write(case, case.recordings, batch)
-    floor = _write(case, case.kept_back, kept, with_floor=True)
-    (kept / "floor.json").write_text(json.dumps(floor, indent=1), encoding="utf-8")
+    record(case, case.recordings, batch)
+    record(case, case.kept_back, kept)
+    (kept / "floor.json").write_text(json.dumps(floors_of(case), indent=1), encoding="utf-8")
     return {"key": case.digest, "batch": folder_digest(batch), "kept-back": folder_digest(kept)}
 
 
@@ -73,7 +72,7 @@ def shown(campaign: Campaign, trajectory: Trajectory) -> dict[str, NDArray]:
     }
 
 
-def floor_of(campaign: Campaign, plan: RecordingPlan, preparation: Preparation, truth: Trajectory) -> dict[str, float]:
+def floor_of(campaign: Campaign, plan: RecordingPlan, preparation: Preparation) -> dict[str, float]:
     """Root mean square error that the true physics would leave in each channel of a recording.
 
     It does not know this run's friction to better than one per cent, the sensors' noise, the zeros of the torques
@@ -84,7 +83,7 @@ def floor_of(campaign: Campaign, plan: RecordingPlan, preparation: Preparation, 
     other = Preparation(
         preparation.friction_coefficient * FLOOR_FRICTION, preparation.pretension_N, preparation.profile_share
     )
-    a, b = shown(campaign, truth), shown(campaign, simulate(campaign, plan, other))
+    a, b = (shown(campaign, simulate(campaign, plan, run_)) for run_ in (preparation, other))
     friction = {name: float(np.mean((a[name] - b[name]) ** 2)) for name in a}
     sensors = campaign.sensors
     count = (2 * np.pi / sensors.encoder.counts_per_rev) ** 2 / 12
@@ -106,21 +105,24 @@ def _variance(noise, slow, accuracy) -> float:
     return noise**2 * (1 + ratio**2) + accuracy**2 / 3
 
 
-def _write(
-    case: Case, plans: tuple[RecordingPlan, ...], folder: Path, with_floor: bool = False
-) -> dict[str, dict[str, float]]:
-    """Record into a folder of its own; the floors by recording, where they are asked for."""
+def record(case: Case, plans: Sequence[RecordingPlan], folder: Path) -> None:
+    """Write a batch of some of a case's recordings into a folder of its own."""
     # What a build that was stopped left behind.
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    campaign, floors = case.campaign, {}
+    campaign = case.campaign
     for plan in plans:
         draw = recording_generator(case.seed, case.name, plan.id)
-        preparation = prepare(campaign, plan, draw)
-        trajectory = simulate(campaign, plan, preparation)
+        trajectory = simulate(campaign, plan, prepare(campaign, plan, draw))
         (folder / log_name(plan)).write_bytes(compress(log(trajectory, campaign.sensors, campaign.rig, draw)))
-        if with_floor:
-            floors[plan.id] = floor_of(campaign, plan, preparation, trajectory)
     described = description(campaign, case.name, NOTE, plans)
     (folder / "batch.yaml").write_text(as_yaml(described), encoding="utf-8")
-    return floors
+
+
+def floors_of(case: Case) -> dict[str, dict[str, float]]:
+    """Floors of the kept-back recordings by their ids (`floor_of`)."""
+    prepared = {
+        plan.id: prepare(case.campaign, plan, recording_generator(case.seed, case.name, plan.id))
+        for plan in case.kept_back
+    }
+    return {plan.id: floor_of(case.campaign, plan, prepared[plan.id]) for plan in case.kept_back}

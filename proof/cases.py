@@ -68,6 +68,8 @@ class Case:
     name : str
         Says nothing.
     seed : int
+    asked : dict
+        Kind and effect that were asked for, None where they were drawn.
     kind : str
         clean, single, pair, unlisted, removed or poor.
     protocol : str
@@ -83,6 +85,7 @@ class Case:
 
     name: str
     seed: int
+    asked: dict[str, str | None]
     kind: str
     protocol: str
     truth: tuple[Truth, ...]
@@ -130,6 +133,7 @@ def draw(seed: int, kind: str | None = None, effect: str | None = None) -> Case:
         The effect of a single or removed case, by its name in the list; drawn where none is given.
     """
     plan = read_plan()
+    asked = {"kind": kind, "effect": effect}
     random = np.random.default_rng(np.random.SeedSequence([seed, 0xCA5E]))
     kind = kind or _one_of(plan.kinds, random)
     protocol_name = _protocol_of(kind, plan, random)
@@ -148,6 +152,7 @@ def draw(seed: int, kind: str | None = None, effect: str | None = None) -> Case:
     return Case(
         name=_name(seed, kind, effect),
         seed=seed,
+        asked=asked,
         kind=kind,
         protocol=protocol_name,
         truth=truth,
