@@ -53,16 +53,21 @@ class Ran:
     tampering: tuple[str, ...]
 
 
+def digest_of(sources: Path = SOURCES) -> str:
+    """Digest of every file of a package, compiled ones aside."""
+    digest = hashlib.sha256()
+    for file in sorted(f for f in sources.rglob("*") if f.is_file() and "__pycache__" not in f.parts):
+        digest.update(str(file.relative_to(sources)).encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
 def stage(sources: Path = SOURCES) -> Path:
     """A copy of the diagnosis's package alone, in a folder that goes by its digest, so that it compiles once."""
-    digest = hashlib.sha256()
-    files = sorted(f for f in sources.rglob("*") if f.is_file() and "__pycache__" not in f.parts)
-    for file in files:
-        digest.update(str(file.relative_to(sources)).encode() + b"\0" + file.read_bytes())
-    staged = Path(tempfile.gettempdir()) / f"ccmodel-alone-{os.getuid()}" / digest.hexdigest()[:16]
+    staged = Path(tempfile.gettempdir()) / f"ccmodel-alone-{os.getuid()}" / digest_of(sources)
     if not staged.exists():
         fresh = Path(tempfile.mkdtemp(dir=_made(staged.parent)))
-        shutil.copytree(sources, fresh / "ccmodel", ignore=shutil.ignore_patterns("__pycache__"))
+        # With what is compiled already: that knows its sources by their time stamps, which are kept.
+        shutil.copytree(sources, fresh / "ccmodel")
         (fresh / "caches").mkdir()
         # Another process may have been faster; its copy is the same.
         try:

@@ -48,17 +48,17 @@ def judge(case: Case, out: Path, sources: Path = conceal.SOURCES, tell: Callable
         digest = folder_digest(batch)
         ran = conceal.diagnose(batch, out, case.without, sources)
         diagnosis = _read(out / "diagnosis.json") if ran.code == 0 and not ran.tampering else None
-        errors = {}
+        tampering, errors = list(ran.tampering), {}
         if diagnosis is not None:
             record(case, case.kept_back, kept)
-            errors = _errors(case, kept, out, sources)
+            errors = _errors(case, kept, out, sources, tampering)
     result = {
         "case": case.name,
         "seed": case.seed,
         "asked": case.asked,
         "key": case.digest,
         "batch": digest,
-        "tampering": list(ran.tampering),
+        "tampering": tampering,
         "why": None if diagnosis is not None else f"exit code {ran.code}: {ran.said.strip()[-500:]}",
         "diagnosis": diagnosis,
         "errors": errors,
@@ -92,10 +92,11 @@ def _claim(said: dict) -> dict:
     }
 
 
-def _errors(case: Case, kept: Path, out: Path, sources: Path) -> dict[str, dict[str, float]]:
+def _errors(case: Case, kept: Path, out: Path, sources: Path, tampering: list[str]) -> dict[str, dict[str, float]]:
     """By channel, the kept-back recordings' errors before and after the diagnosis and their floor, root mean square.
 
-    Empty where a model of the diagnosis says nothing of one of the recordings.
+    Empty where a model of the diagnosis says nothing of one of the recordings. What a prediction tried to reach is
+    added to `tampering`.
     """
     squares = {"floor": [[floor[c] ** 2 for c in CHANNELS] for floor in floors_of(case).values()]}
     with tempfile.TemporaryDirectory(prefix="blinded-") as folder:
@@ -103,7 +104,7 @@ def _errors(case: Case, kept: Path, out: Path, sources: Path) -> dict[str, dict[
         blind(kept, blinded)
         for which, model in MODELS.items():
             said = Path(folder) / which
-            conceal.predict(blinded, out / model, said, sources)
+            tampering += conceal.predict(blinded, out / model, said, sources).tampering
             try:
                 squares[which] = [error_squares(kept, plan.id, said / f"{plan.id}.csv") for plan in case.kept_back]
             except (OSError, KeyError, ValueError):

@@ -126,6 +126,21 @@ class EffectPlan(Strict):
     also: dict[str, Range] = Field(default_factory=dict)
 
 
+class Asked(Strict):
+    """A case with a seed of its own."""
+
+    seed: PositiveInt
+    kind: str
+    effect: str | None = None
+
+
+class Full(Strict):
+    """The full proof: how many cases, and of these how many the page is of where nothing else is said."""
+
+    cases: PositiveInt
+    part: PositiveInt
+
+
 class Plan(Strict):
     """All of it."""
 
@@ -142,6 +157,8 @@ class Plan(Strict):
     kept_back: KeptBackPlan
     effects: dict[str, EffectPlan]
     unlisted: dict[str, EffectPlan]
+    quick: tuple[Asked, ...]
+    full: Full
 
     @model_validator(mode="after")
     def _shares_are_whole(self) -> Self:
