@@ -82,9 +82,10 @@ def full(
 
 @app.command()
 def part(n: Annotated[int | None, typer.Option(min=1, help="How many; else as planned.")] = None) -> None:
-    """Print the digest of the diagnosis's sources and the numbers of the cases that make up N of the full proof."""
+    """Print digests of the diagnosis and of what makes cases, and the numbers of the cases of N of the full proof."""
     digest = conceal.digest_of()
-    typer.echo(json.dumps({"digest": digest, "cases": part_of(digest, n or read_plan().full.part)}))
+    cases = part_of(digest, n or read_plan().full.part)
+    typer.echo(json.dumps({"digest": digest, "builder": conceal.builder_digest(), "cases": cases}))
 
 
 @app.command()
@@ -95,6 +96,7 @@ def score(
     figures: Annotated[Path, typer.Option(help="Folder of the page's figures.")],
     command: Annotated[str, typer.Option(help="What made the results, for the page.")] = "python -m proof run",
     of: Annotated[str, typer.Option(help="Which cases these are, for the page.")] = "",
+    numbers: Annotated[str | None, typer.Option(help="Only these folders, by comma; else all.")] = None,
 ) -> None:
     """Score results against keys made again from their seeds."""
     from proof.figures import write_figures
@@ -102,7 +104,7 @@ def score(
     from proof.score import read_outcomes
     from proof.score import score as score_of
 
-    outcomes = read_outcomes(results)
+    outcomes = read_outcomes(results, numbers.split(",") if numbers else None)
     if not outcomes:
         raise typer.BadParameter(f"there is no result below {results}")
     scored = score_of(outcomes)

@@ -18,6 +18,7 @@ from proof.build import folder_digest
 
 SOURCES = Path(__file__).parents[1] / "src" / "ccmodel"
 GUARD = Path(__file__).with_name("guard.py")
+BUILDER = ("proof.yaml", "plan.py", "effects.py", "cases.py", "build.py", "judge.py", "conceal.py", "guard.py")
 TIMEOUT_S = 1800
 # Where libraries keep data, and devices such as /dev/urandom; no home, no folder that this project is in.
 SYSTEM = (
@@ -59,6 +60,13 @@ def digest_of(sources: Path = SOURCES) -> str:
     for file in sorted(f for f in sources.rglob("*") if f.is_file() and "__pycache__" not in f.parts):
         digest.update(str(file.relative_to(sources)).encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def builder_digest() -> str:
+    """Digest of all that makes a case and its result: the rig, the plan, and the way from there to here."""
+    files = [Path(__file__).with_name(name) for name in BUILDER]
+    parts = [digest_of(SOURCES.with_name("virtualrig")).encode(), *(file.read_bytes() for file in files)]
+    return hashlib.sha256(b"\0".join(parts)).hexdigest()[:8]
 
 
 def stage(sources: Path = SOURCES) -> Path:

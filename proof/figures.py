@@ -6,6 +6,7 @@ import matplotlib
 import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 # Okabe and Ito's colours, told apart by all kinds of eyes; shapes differ too.
 BLUE, ORANGE, GREY, GREEN = "#0072B2", "#E69F00", "#999999", "#009E73"
@@ -45,13 +46,19 @@ def _detection(detection: dict) -> Figure:
         for label, (colour, marker, belongs) in marks.items():
             some = [p for p in found["points"] if belongs(p)]
             panel.plot([p["size"] for p in some], [p["noticed"] for p in some], marker, color=colour, ms=4, label=label)
-        sizes = [p["size"] for p in found["points"]]
         if found["half_size"]:
-            x = np.geomspace(min(sizes), max(sizes), 60)
+            x = np.geomspace(*found["drawn"], 60)
             panel.plot(x, 1 / (1 + (x / found["half_size"]) ** -found["slope"]), color="black", lw=0.8)
-        panel.set(xscale="log", ylim=(-0.15, 1.15), yticks=[0, 1], yticklabels=["missed", "noticed"])
+        panel.set(
+            xscale="log",
+            xlim=(found["drawn"][0] / 1.3, found["drawn"][1] * 1.3),
+            ylim=(-0.15, 1.15),
+            yticks=[0, 1],
+            yticklabels=["missed", "noticed"],
+        )
         panel.set_title(name, fontsize=8)
-        panel.set_xlabel(found["points"][0]["unit"].removeprefix("1") or "share", fontsize=7)
+        panel.set_xlabel({"1": "share"}.get(found["unit"], found["unit"]), fontsize=7)
+        panel.xaxis.set_minor_formatter(NullFormatter())
     for panel in panels.flat[len(detection) :]:
         panel.set_axis_off()
     figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3, frameon=False)
@@ -106,7 +113,8 @@ def _confusion(table: dict[str, dict[str, int]]) -> Figure:
     panel.imshow(shown, cmap="Blues", norm=LogNorm(0.5, max(counts.max(), 2) * 2), aspect="auto")
     for (i, j), n in np.ndenumerate(counts):
         if n:
-            panel.text(j, i, n, ha="center", va="center", fontsize=7)
+            dark = n > counts.max() / 4
+            panel.text(j, i, n, ha="center", va="center", fontsize=7, color="white" if dark else "black")
     panel.set_xticks(range(len(said)), [{"none": "no diagnosis"}.get(n, n) for n in said], rotation=90)
     panel.set_yticks(range(len(table)), [{"none": "clean"}.get(n, n) for n in table])
     panel.set(xlabel="called", ylabel="hidden")

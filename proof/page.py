@@ -132,7 +132,7 @@ def _missed(scored) -> str:
 def _detection_rows(detection):
     for name, found in detection.items():
         points = found["points"]
-        half = "" if found["half_size"] is None else f"{found['half_size']:.2g} {points[0]['unit']}".removesuffix(" 1")
+        half = "" if found["half_size"] is None else f"{found['half_size']:.2g} {found['unit']}".removesuffix(" 1")
         yield [name, len(points), sum(p["noticed"] for p in points), sum(p["named"] for p in points), half]
 
 

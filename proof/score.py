@@ -16,6 +16,7 @@ from scipy.optimize import minimize
 from scipy.stats import binomtest
 
 from proof.cases import draw
+from proof.plan import read_plan
 
 SURE = 0.8
 MOST = 2
@@ -129,9 +130,12 @@ def outcome(result: dict) -> Outcome:
     return Outcome(case.key, said, why, errors, result["took_s"])
 
 
-def read_outcomes(folder: Path) -> list[Outcome]:
-    """Outcomes of every ``result.json`` below a folder, in the order of their paths."""
-    return [outcome(json.loads(file.read_text())) for file in sorted(folder.glob("*/result.json"))]
+def read_outcomes(folder: Path, names: Sequence[str] | None = None) -> list[Outcome]:
+    """Outcomes of the ``result.json`` of each named folder in a folder, or of all; in the order of their names."""
+    files = (
+        sorted(folder.glob("*/result.json")) if names is None else [folder / n / "result.json" for n in sorted(names)]
+    )
+    return [outcome(json.loads(file.read_text())) for file in files]
 
 
 def same_place(a: str | None, b: str | None) -> bool:
@@ -291,7 +295,9 @@ def statistics(outcomes: Sequence[Outcome]) -> list[dict]:
         bootstrap("clean: error after, over the floor, worst channel, median", clean, np.median),
         bootstrap("values: relative error, median", off, np.median),
         bootstrap("undecided: alternatives, mean", sizes, np.mean),
-        bootstrap("seconds a case, rig and predictions included, median", [o.took_s for o in outcomes], np.median),
+        bootstrap(
+            "seconds of one core a case, rig and predictions included, median", [o.took_s for o in outcomes], np.median
+        ),
     ]
 
 
@@ -324,22 +330,27 @@ def confusion(outcomes: Iterable[Outcome]) -> dict[str, dict[str, int]]:
 
 
 def detection(outcomes: Iterable[Outcome]) -> dict[str, dict]:
-    """By effect: sizes, what was noticed and named, and the size at which half would be noticed."""
+    """By effect: unit, the sizes it is drawn from, what was noticed and named, and where half would be noticed."""
+    plan = read_plan()
+    drawn = {**plan.effects, **plan.unlisted}
     points = defaultdict(list)
     for o in outcomes:
-        if o.key["kind"] in ("single", "unlisted", "removed"):
+        if o.key["kind"] in ("single", "unlisted"):
             (truth,) = o.key["truth"]
             points[truth["name"]].append(
                 {
                     "strength": truth["strength"],
                     "size": abs(truth["size"]),
-                    "unit": truth["unit"],
                     "over_floor": None if np.isnan(o.size) else o.size,
                     "noticed": o.verdict not in ("agrees", "none"),
                     "named": o.first in o.names,
                 }
             )
-    return {name: {"points": sorted(p, key=lambda q: q["size"]), **_half(p)} for name, p in sorted(points.items())}
+    return {
+        name: {"unit": drawn[name].unit, "drawn": drawn[name].size, "points": sorted(p, key=lambda q: q["size"])}
+        | _half(p)
+        for name, p in sorted(points.items())
+    }
 
 
 def _half(points: list[dict]) -> dict:

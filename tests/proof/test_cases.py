@@ -2,11 +2,13 @@ import numpy as np
 import pytest
 import yaml
 from scipy.stats import binom
+from typer.testing import CliRunner
 
 from ccmodel import mechanisms
 from proof import convergence
 from proof.build import folder_digest, record
 from proof.cases import Case, draw
+from proof.cli import app, part_of, seed_of
 from proof.effects import ENTRIES, merged
 from proof.plan import read_plan
 from virtualrig.effects import Effects
@@ -112,3 +114,32 @@ def test_a_case_is_recorded_the_same_again(poor, tmp_path):
 def test_the_rig_is_fine_enough():
     left = convergence.measure(2)
     assert max(left.values()) < 0.5
+
+
+def test_the_full_proof_has_other_cases_for_other_sources():
+    assert seed_of("0123456789abcdef", 3) != seed_of("0123456789abcdee", 3)
+    assert seed_of("0123456789abcdef", 3) != seed_of("0123456789abcdef", 4)
+
+
+def test_a_larger_part_holds_the_smaller():
+    small, large = part_of("0123456789abcdef", 20), part_of("0123456789abcdef", 60)
+    assert set(small) < set(large)
+    assert len(set(large)) == 60
+    assert part_of("0123456789abcdee", 20) != small
+    assert part_of("0123456789abcdef", PLAN.full.cases) == list(range(PLAN.full.cases))
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        (["--kind", "sinlge"], "no kind 'sinlge'"),
+        (["--kind", "single", "--effect", "dahl"], "no effect 'dahl'"),
+        (["--effect", "kink"], "needs --kind"),
+        (["--kind", "unlisted", "--effect", "kink"], "not an effect of a case of kind unlisted"),
+    ],
+)
+def test_what_cannot_be_built_is_said(asked, told, tmp_path):
+    ran = CliRunner().invoke(app, ["build", "--out", str(tmp_path), *asked])
+    assert ran.exit_code == 2
+    assert told in " ".join(ran.output.replace("│", " ").split())
+    assert not list(tmp_path.iterdir())
