@@ -4,6 +4,7 @@ import hashlib
 import json
 import shutil
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,8 @@ from numpy.typing import NDArray
 
 from proof.cases import Case
 from virtualrig.campaign import as_yaml, compress, description, log_name, prepare, recording_generator, run
-from virtualrig.config import Campaign, RecordingPlan
+from virtualrig.config import Campaign, LoadCell, RecordingPlan, TorqueSensor
+from virtualrig.motion import Excitation, smooth_step
 from virtualrig.sensors import Side, log, sensed
 from virtualrig.trajectory import Preparation, SimulationError, Trajectory
 
@@ -20,6 +22,8 @@ RAISE = 1.5
 HIGHEST_LIMIT_N = 2000.0
 # By which friction differs from run to run: what a model with the right physics cannot know of a recording.
 FLOOR_FRICTION = 1.01
+# Within which a drive that stood elsewhere in its count comes to where the counts say.
+DISPLACED_IN_S = 0.3
 
 
 def build(case: Case, out: Path) -> dict:
@@ -72,37 +76,55 @@ def shown(campaign: Campaign, trajectory: Trajectory) -> dict[str, NDArray]:
     }
 
 
+@dataclass(frozen=True)
+class Displaced:
+    """A motion that begins by as much more as the drive's first count leaves open."""
+
+    motion: Excitation
+    by_rad: float
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the whole motion, s."""
+        return self.motion.duration_s
+
+    def angle_and_rate(self, time_s: NDArray) -> tuple[NDArray, NDArray]:
+        """Drive angle (rad) and its rate (rad/s) at `time_s` (s)."""
+        angle, rate = self.motion.angle_and_rate(time_s)
+        way, slope = smooth_step((time_s - self.motion.rest_s) / DISPLACED_IN_S)
+        return angle + self.by_rad * way, rate + self.by_rad * slope / DISPLACED_IN_S
+
+
 def floor_of(campaign: Campaign, plan: RecordingPlan, preparation: Preparation) -> dict[str, float]:
     """Root mean square error that the true physics would leave in each channel of a recording.
 
-    It does not know this run's friction to better than one per cent, the sensors' noise, the zeros of the torques
-    (those of the load cells enter the pretension that the rest shows), and where in their counts the two encoders
-    stood at rest: the load's twice over, as its own zero is taken from the same rest, and the drive's because the load
-    follows it.
+    It does not know this run's friction to better than one per cent, where in its count the drive stood at rest, the
+    sensors' noise and the zeros of the torques. Where in its count the load stood counts twice, as its zero is taken
+    from the same rest. The pretension is what two load cells show at rest: each is then off by half of what their
+    zeros differ by.
     """
-    other = Preparation(
-        preparation.friction_coefficient * FLOOR_FRICTION, preparation.pretension_N, preparation.profile_share
-    )
-    a, b = (shown(campaign, simulate(campaign, plan, run_)) for run_ in (preparation, other))
-    friction = {name: float(np.mean((a[name] - b[name]) ** 2)) for name in a}
     sensors = campaign.sensors
     count = (2 * np.pi / sensors.encoder.counts_per_rev) ** 2 / 12
-    torque = _variance(sensors.torque.noise_Nm, sensors.torque.slow_noise, sensors.torque.accuracy_Nm)
-    force = _variance(sensors.load_cell.noise_N, sensors.load_cell.slow_noise, 0.0)
-    spring = campaign.rig.load.spring_stiffness_Nm_per_rad
+    other = replace(preparation, friction_coefficient=preparation.friction_coefficient * FLOOR_FRICTION)
+    moved = plan.model_copy(update={"excitation": Displaced(plan.excitation, np.sqrt(count))})
+    a = shown(campaign, simulate(campaign, plan, preparation))
+    b = shown(campaign, simulate(campaign, moved, other))
+    torque = _variance(sensors.torque) + sensors.torque.accuracy_Nm**2 / 3
+    force = _variance(sensors.load_cell) + sensors.load_cell.accuracy_N**2 / 6
     unknown = {
-        "theta_out_rad": 3 * count,
+        "theta_out_rad": 2 * count,
         "tau_in_Nm": torque,
-        "tau_out_Nm": torque + spring**2 * count,
+        "tau_out_Nm": torque,
         "F_drive_N": force,
         "F_load_N": force,
     }
-    return {name: float(np.sqrt(friction[name] + unknown[name])) for name in a}
+    return {name: float(np.sqrt(np.mean((a[name] - b[name]) ** 2) + unknown[name])) for name in a}
 
 
-def _variance(noise, slow, accuracy) -> float:
-    ratio = slow.ratio if slow else 0.0
-    return noise**2 * (1 + ratio**2) + accuracy**2 / 3
+def _variance(sensor: TorqueSensor | LoadCell) -> float:
+    """Of white and slow noise, in the sensor's unit squared."""
+    noise = sensor.noise_Nm if isinstance(sensor, TorqueSensor) else sensor.noise_N
+    return noise**2 * (1 + (sensor.slow_noise.ratio if sensor.slow_noise else 0.0) ** 2)
 
 
 def record(case: Case, plans: Sequence[RecordingPlan], folder: Path) -> None:
