@@ -20,6 +20,9 @@ Seed = Annotated[int, typer.Option(min=0, help="Seed of the first case; the othe
 Count = Annotated[int, typer.Option(min=1, help="How many cases.")]
 Kind = Annotated[str | None, typer.Option(help="clean, single, pair, unlisted, removed or poor; else by shares.")]
 Effect = Annotated[str | None, typer.Option(help="The effect of a single, removed, poor or unlisted case.")]
+Rivals = Annotated[
+    bool, typer.Option("--rivals", help="Hold the rivals to the same recordings; needs the extra 'proof'.")
+]
 Out = Annotated[Path, typer.Option(help="Folder that gets a folder a case.")]
 
 
@@ -60,24 +63,26 @@ def run(
     count: Count = 1,
     kind: Kind = None,
     effect: Effect = None,
+    rivals: Rivals = False,
 ) -> None:
     """Record cases and have each diagnosed where nothing else is in reach; cases that have a result are kept."""
-    _judge_each(cases_of(seed, count, kind, effect), out)
+    _judge_each(cases_of(seed, count, kind, effect), out, rivals)
 
 
 @app.command()
 def quick(out: Out) -> None:
     """The handful of cases whose seeds never change."""
-    _judge_each([draw(q.seed, q.kind, q.effect) for q in read_plan().quick], out)
+    _judge_each([draw(q.seed, q.kind, q.effect) for q in read_plan().quick], out, False)
 
 
 @app.command()
 def full(
     out: Annotated[Path, typer.Option(help="Folder of this one case.")],
     index: Annotated[int, typer.Option(min=0, help="Number of the case in the full proof.")],
+    rivals: Rivals = False,
 ) -> None:
     """One case of the full proof, whose seed follows from the diagnosis's sources and its number."""
-    _judge(draw(seed_of(conceal.digest_of(), index)), out)
+    _judge(draw(seed_of(conceal.digest_of(), index)), out, rivals)
 
 
 @app.command()
@@ -138,16 +143,16 @@ def part_of(digest: str, n: int) -> list[int]:
     return sorted(map(int, order[:n]))
 
 
-def _judge_each(cases: list[Case], out: Path) -> None:
+def _judge_each(cases: list[Case], out: Path, rivals: bool) -> None:
     for case in cases:
         if not (out / case.name / "result.json").exists():
-            _judge(case, out / case.name)
+            _judge(case, out / case.name, rivals)
 
 
-def _judge(case: Case, out: Path) -> None:
+def _judge(case: Case, out: Path, rivals: bool) -> None:
     from proof.judge import judge
 
-    result = judge(case, out, tell=typer.echo)
+    result = judge(case, out, tell=typer.echo, with_rivals=rivals)
     if result["tampering"]:
         typer.echo(f"{case.name} is refused: {'; '.join(result['tampering'])}", err=True)
 

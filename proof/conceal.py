@@ -18,7 +18,17 @@ from proof.build import folder_digest
 
 SOURCES = Path(__file__).parents[1] / "src" / "ccmodel"
 GUARD = Path(__file__).with_name("guard.py")
-BUILDER = ("proof.yaml", "plan.py", "effects.py", "cases.py", "build.py", "judge.py", "conceal.py", "guard.py")
+BUILDER = (
+    "proof.yaml",
+    "plan.py",
+    "effects.py",
+    "cases.py",
+    "build.py",
+    "judge.py",
+    "measured.py",
+    "conceal.py",
+    "guard.py",
+)
 TIMEOUT_S = 1800
 # Where libraries keep data, and devices such as /dev/urandom; no home, no folder that this project is in.
 SYSTEM = (

@@ -9,19 +9,23 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import yaml
 
-from proof import conceal
+from proof import conceal, rivals
 from proof.build import floors_of, folder_digest, record
 from proof.cases import Case
+from proof.measured import CHANNELS, error_squares
 
-REST_S = 0.3
-CHANNELS = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N")
 DRIVE = ("time_s", "drive_encoder_counts")
 MODELS = {"before": "calibrated.json", "after": "model.json"}
 
 
-def judge(case: Case, out: Path, sources: Path = conceal.SOURCES, tell: Callable[[str], None] = print) -> dict:
+def judge(
+    case: Case,
+    out: Path,
+    sources: Path = conceal.SOURCES,
+    tell: Callable[[str], None] = print,
+    with_rivals: bool = False,
+) -> dict:
     """Record a case, have it diagnosed where nothing else is, then record what is kept back and hold predictions to it.
 
     Parameters
@@ -33,6 +37,8 @@ def judge(case: Case, out: Path, sources: Path = conceal.SOURCES, tell: Callable
         The diagnosis's package.
     tell : callable
         Takes a line on how it went.
+    with_rivals : bool
+        Whether `proof.rivals` are held to the same recordings.
 
     Returns
     -------
@@ -48,10 +54,14 @@ def judge(case: Case, out: Path, sources: Path = conceal.SOURCES, tell: Callable
         digest = folder_digest(batch)
         ran = conceal.diagnose(batch, out, case.without, sources)
         diagnosis = _read(out / "diagnosis.json") if ran.code == 0 and not ran.tampering else None
-        tampering, errors = list(ran.tampering), {}
+        tampering, errors, rivalled = list(ran.tampering), {}, {}
         if diagnosis is not None:
             record(case, case.kept_back, kept)
-            errors = _errors(case, kept, out, sources, tampering)
+            predictions = {which: Path(folder) / which for which in MODELS}
+            errors = _errors(case, kept, out, predictions, sources, tampering)
+            if errors and with_rivals:
+                conceal.predict(batch, out / MODELS["before"], Path(folder) / "fitted", sources)
+                rivalled = rivals.errors(batch, Path(folder) / "fitted", kept, predictions["before"])
     result = {
         "case": case.name,
         "seed": case.seed,
@@ -62,6 +72,7 @@ def judge(case: Case, out: Path, sources: Path = conceal.SOURCES, tell: Callable
         "why": None if diagnosis is not None else f"exit code {ran.code}: {ran.said.strip()[-500:]}",
         "diagnosis": diagnosis,
         "errors": errors,
+        "rivals": rivalled,
         "took_s": round(_core_s() - started, 1),
     }
     (out / "result.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
@@ -97,18 +108,20 @@ def _claim(said: dict) -> dict:
     }
 
 
-def _errors(case: Case, kept: Path, out: Path, sources: Path, tampering: list[str]) -> dict[str, dict[str, float]]:
+def _errors(
+    case: Case, kept: Path, out: Path, predictions: dict[str, Path], sources: Path, tampering: list[str]
+) -> dict[str, dict[str, float]]:
     """By channel, the kept-back recordings' errors before and after the diagnosis and their floor, root mean square.
 
-    Empty where a model of the diagnosis says nothing of one of the recordings. What a prediction tried to reach is
-    added to `tampering`.
+    Empty where a model of the diagnosis says nothing of one of the recordings. Predictions go to the folders of
+    `predictions`; what one tried to reach is added to `tampering`.
     """
     squares = {"floor": [[floor[c] ** 2 for c in CHANNELS] for floor in floors_of(case).values()]}
     with tempfile.TemporaryDirectory(prefix="blinded-") as folder:
         blinded = Path(folder) / kept.name
         blind(kept, blinded)
         for which, model in MODELS.items():
-            said = Path(folder) / which
+            said = predictions[which]
             tampering += conceal.predict(blinded, out / model, said, sources).tampering
             try:
                 squares[which] = [error_squares(kept, plan.id, said / f"{plan.id}.csv") for plan in case.kept_back]
@@ -139,28 +152,3 @@ def _rest_s(log: pd.DataFrame) -> float:
     """When the drive's count first changes, s."""
     counts = log["drive_encoder_counts"]
     return float(log["time_s"][int(np.argmax(counts != counts[0]))])
-
-
-def error_squares(batch: Path, recording: str, prediction: Path) -> list[float]:
-    """Mean square of predicted less recorded in each channel; the load's encoder counts from its rest."""
-    measured = in_si(batch, recording)
-    said = pd.read_csv(prediction)
-    off = [np.interp(measured["time_s"], said["time_s"], said[c]) - measured[c] for c in CHANNELS]
-    off[0] = off[0] - off[0][measured["time_s"] < REST_S].mean()
-    means = [float(np.mean(values**2)) for values in off]
-    if not np.all(np.isfinite(means)):
-        raise ValueError(f"{prediction} is not finite")
-    return means
-
-
-def in_si(batch: Path, recording: str) -> dict[str, np.ndarray]:
-    """A raw log in SI units, by its batch's constants."""
-    rig = yaml.safe_load((batch / "batch.yaml").read_text(encoding="utf-8"))["rig"]
-    log = pd.read_csv(batch / f"{recording}.csv.gz")
-    step = 2 * np.pi / rig["load"]["encoder_counts_per_rev"]
-    columns = {"time_s": log["time_s"], "theta_out_rad": log["load_encoder_counts"] * step}
-    for end, torque, force in (("drive", "tau_in_Nm", "F_drive_N"), ("load", "tau_out_Nm", "F_load_N")):
-        side, cell = rig[end], rig[end]["load_cell"]
-        columns[torque] = log[f"{end}_current_A"] * side["torque_constant_Nm_per_A"]
-        columns[force] = (log[f"{end}_load_cell_V"] - cell["zero_V"]) / cell["sensitivity_V_per_N"]
-    return {name: values.to_numpy() for name, values in columns.items()}

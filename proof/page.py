@@ -53,7 +53,7 @@ one per cent of friction.
 {_table(["", "over", "value", "95 % (bootstrap)", "must be", ""], map(_statistic_row, scored["statistics"]))}
 
 {_missed(scored)}
-
+{_rivals(scored["rivals"])}
 ## Figures
 
 {pictures}
@@ -127,6 +127,29 @@ def _missed(scored) -> str:
     if not rates + sizes:
         return "Nothing that there are cases for is missed."
     return "Missed: " + "; ".join(rates + sizes) + ". The cases behind it are listed below."
+
+
+def _rivals(rows) -> str:
+    """The section on rivals; nothing where none was held to these cases."""
+    if not rows:
+        return ""
+    head = ["", "says what and where", "clean", "visible", "share of the gap closed, visible"]
+    lines = [
+        [r["rival"], "yes" if r is rows[-1] else "no", *map(_value, (r["clean"], r["visible"], r["closed"]))]
+        for r in rows
+    ]
+    return f"""
+## Rivals under the same data
+
+Each starts from the calibrated model. Errors on kept-back recordings over the floor in the worst channel, and the share
+of the gap to the floor closed in the channel that was off most: medians, with bootstrap intervals.
+
+{_table(head, lines)}
+"""
+
+
+def _value(s) -> str:
+    return "" if s["value"] is None else f"{s['value']:.2f} ({s['low']:.2f} to {s['high']:.2f}), {s['n']} cases"
 
 
 def _detection_rows(detection):

@@ -44,6 +44,8 @@ class Outcome:
     errors : dict
         By channel, "before", "after" and "floor" on kept-back recordings.
     took_s : float
+    rivals : dict
+        By rival and channel, errors on kept-back recordings.
     """
 
     key: dict
@@ -51,6 +53,7 @@ class Outcome:
     why: str = ""
     errors: dict = field(default_factory=dict)
     took_s: float = 0.0
+    rivals: dict = field(default_factory=dict)
 
     @property
     def names(self) -> set[str]:
@@ -127,7 +130,7 @@ def outcome(result: dict) -> Outcome:
     elif result["key"] != case.digest or result["case"] != case.name:
         said, why = None, "refused: the key made from the seed is not the one whose digest was left"
     errors = result["errors"] if said else {}
-    return Outcome(case.key, said, why, errors, result["took_s"])
+    return Outcome(case.key, said, why, errors, result["took_s"], result["rivals"] if said else {})
 
 
 def read_outcomes(folder: Path, names: Sequence[str] | None = None) -> list[Outcome]:
@@ -301,6 +304,43 @@ def statistics(outcomes: Sequence[Outcome]) -> list[dict]:
     ]
 
 
+def rivalry(outcomes: Iterable[Outcome]) -> list[dict]:
+    """Each rival beside recalibration alone and the diagnosis, on the cases that it was held to.
+
+    The error is that over the floor in the worst channel; the gap is closed as `Outcome.closed` has it.
+    """
+    held = [o for o in outcomes if o.rivals]
+    if not held:
+        return []
+    rows = []
+    for name in ("recalibration alone", *held[0].rivals, "this diagnosis"):
+        row = {"rival": name}
+        for what, some in (
+            ("clean", [o for o in held if o.key["kind"] == "clean"]),
+            ("visible", [o for o in held if o.names and o.is_visible]),
+        ):
+            row[what] = bootstrap(what, [max(_over_floor(o, name)) for o in some], np.median)
+            if what == "visible":
+                row["closed"] = bootstrap("closed", [_closed_by(o, name) for o in some], np.median)
+        rows.append(row)
+    return rows
+
+
+def _after(o: Outcome, rival: str) -> dict[str, float]:
+    """By channel, the error on kept-back recordings that a rival leaves."""
+    which = {"recalibration alone": "before", "this diagnosis": "after"}.get(rival)
+    return {c: e[which] for c, e in o.errors.items()} if which else o.rivals[rival]
+
+
+def _over_floor(o: Outcome, rival: str) -> list[float]:
+    return [error / o.errors[c]["floor"] for c, error in _after(o, rival).items()]
+
+
+def _closed_by(o: Outcome, rival: str) -> float:
+    channel, e = max(o.errors.items(), key=lambda item: item[1]["before"] / item[1]["floor"])
+    return (e["before"] - _after(o, rival)[channel]) / (e["before"] - e["floor"])
+
+
 def reliability(outcomes: Iterable[Outcome]) -> list[dict]:
     """Stated probabilities in tenths: how many, their mean, and how often they were right."""
     claims = [c for o in outcomes for c in o.claims]
@@ -413,6 +453,7 @@ def score(outcomes: Sequence[Outcome]) -> dict:
         "kinds": dict(Counter(o.key["kind"] for o in outcomes)),
         "rates": rates(outcomes),
         "statistics": statistics(outcomes),
+        "rivals": rivalry(outcomes),
         "reliability": reliability(outcomes),
         "detection": detection(outcomes),
         "confusion": confusion(outcomes),

@@ -9,6 +9,7 @@ import pytest
 from proof import judge as judging
 from proof.build import record
 from proof.cases import draw
+from proof.measured import REST_S
 from proof.score import outcome
 
 # Says that nothing is missing, and predicts what the rest shows, with the load following the drive.
@@ -101,7 +102,7 @@ def test_what_is_kept_back_is_not_to_be_seen_in_a_blinded_copy(case, tmp_path):
     judging.blind(tmp_path / "kept", tmp_path / "blinded")
     name = f"{case.kept_back[0].id}.csv.gz"
     whole, blinded = (pd.read_csv(tmp_path / folder / name) for folder in ("kept", "blinded"))
-    rest = whole["time_s"] < judging.REST_S
+    rest = whole["time_s"] < REST_S
     later = whole["time_s"] > 2
     for column in ("drive_current_A", "load_current_A", "load_encoder_counts", "drive_load_cell_V", "load_load_cell_V"):
         np.testing.assert_allclose(blinded[column][rest], whole[column][rest], rtol=1e-6)
