@@ -6,6 +6,7 @@ were kept back. None of them knows mechanisms, so none can name one or its place
 held to those of prediction alone.
 """
 
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -171,6 +172,7 @@ def sparse(quantities: Quantities, left: NDArray, which: NDArray) -> Corrects:
 
 def process(quantities: Quantities, left: NDArray, which: NDArray) -> Corrects:
     """scikit-learn's Gaussian process for the discrepancy, as Kennedy and O'Hagan put it beside a calibrated model."""
+    from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
@@ -181,5 +183,8 @@ def process(quantities: Quantities, left: NDArray, which: NDArray) -> Corrects:
         1.0, (1e-4, 10)
     )
     scale = left.std() or 1.0
-    fitted = GaussianProcessRegressor(kernel, random_state=0).fit(columns[rows, 1:], left[rows] / scale)
+    with warnings.catch_warnings():
+        # A length at its upper bound is a quantity that does not matter.
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        fitted = GaussianProcessRegressor(kernel, random_state=0).fit(columns[rows, 1:], left[rows] / scale)
     return lambda other: fitted.predict(of(other)[:, 1:]) * scale
