@@ -54,10 +54,10 @@ table-one: $(VENV)/.ready  ## ask which left-out effect errs as the paper's Tabl
 proof: $(VENV)/.ready  ## diagnose a handful of concealed cases and score them: results/proof/quick.md
 	$(BIN)/python -m proof quick --out results/proof/quick
 	$(BIN)/python -m proof score results/proof/quick --out results/proof/quick.json --page results/proof/quick.md \
-	  --figures results/proof/figures --command "make proof" --of "A handful whose seeds never change."
+	  --figures results/proof/figures --command "make proof" --of "A handful whose seeds never change." --strict
 
 proof-full: $(VENV)/.ready  ## the full proof, or N cases of it drawn at random: docs/proof.md; goes on where it was stopped
-	$(BIN)/snakemake --snakefile proof/Snakefile --cores $(CORES) --keep-going $(if $(N),--config cases=$(N))
+	$(BIN)/snakemake --snakefile proof/Snakefile --cores $(CORES) --keep-going $(if $(N)$(RIVALS),--config $(if $(N),cases=$(N)) $(if $(RIVALS),rivals=true))
 
 lint: $(VENV)/.ready
 	$(BIN)/ruff check .

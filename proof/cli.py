@@ -102,6 +102,7 @@ def score(
     command: Annotated[str, typer.Option(help="What made the results, for the page.")] = "python -m proof run",
     of: Annotated[str, typer.Option(help="Which cases these are, for the page.")] = "",
     numbers: Annotated[str | None, typer.Option(help="Only these folders, by comma; else all.")] = None,
+    strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 where a case was missed.")] = False,
 ) -> None:
     """Score results against keys made again from their seeds."""
     from proof.figures import write_figures
@@ -121,6 +122,11 @@ def score(
         if rate["n"]:
             typer.echo(f"{rate['what']:60s}{rate['k']:5d}/{rate['n']:<5d}{rate['rate']:7.1%}")
     typer.echo(str(page))
+    for miss in scored["misses"] if strict else []:
+        hidden = ", ".join(miss["truth"]) or "nothing"
+        typer.echo(f"missed {miss['case']}: {hidden} was called {miss['verdict']} {', '.join(miss['named'])}", err=True)
+    if strict and scored["misses"]:
+        raise typer.Exit(1)
 
 
 @app.command()
