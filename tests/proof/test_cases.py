@@ -5,13 +5,14 @@ from scipy.stats import binom
 from typer.testing import CliRunner
 
 from ccmodel import mechanisms
-from proof import convergence
+from proof import build, convergence
 from proof.build import folder_digest, record
 from proof.cases import Case, draw
 from proof.cli import app, part_of, seed_of
 from proof.effects import ENTRIES, merged
 from proof.plan import read_plan
 from virtualrig.effects import Effects
+from virtualrig.trajectory import Preparation, Trajectory
 
 PLAN = read_plan()
 
@@ -143,3 +144,22 @@ def test_what_cannot_be_built_is_said(asked, told, tmp_path):
     assert ran.exit_code == 2
     assert told in " ".join(ran.output.replace("│", " ").split())
     assert not list(tmp_path.iterdir())
+
+
+def test_the_floor_is_what_noise_and_the_runs_own_friction_leave(poor, monkeypatch):
+    plan, time_s = poor.kept_back[0], np.linspace(0, 5, 500)
+
+    def simulated(campaign, plan, preparation):
+        torque = preparation.friction_coefficient * np.ones_like(time_s)
+        angle, _ = plan.excitation.angle_and_rate(time_s)
+        return Trajectory(time_s, angle, angle, *(np.zeros_like(time_s) for _ in range(4)), torque, torque)
+
+    monkeypatch.setattr(build, "simulate", simulated)
+    campaign = poor.campaign.model_copy(update={"rig": poor.campaign.rig.model_copy(update={"effects": Effects()})})
+    floor = build.floor_of(campaign, plan, Preparation(1.0, 7.0, (0.2, 0.2)))
+    noise, slow = campaign.sensors.torque.noise_Nm, campaign.sensors.torque.slow_noise.ratio
+    expected = np.sqrt(0.01**2 + noise**2 * (1 + slow**2) + campaign.sensors.torque.accuracy_Nm**2 / 3)
+    assert floor["tau_in_Nm"] == pytest.approx(expected, rel=1e-6)
+    count = 2 * np.pi / 2000 / np.sqrt(12)
+    # Twice for the load's count and, once the drive has moved, once for the drive's.
+    assert floor["theta_out_rad"] == pytest.approx(np.sqrt(3) * count, rel=0.05)
