@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 CORES ?= 2
 
-.PHONY: help results real data test bench table-one coverage lint lock clean
+.PHONY: help results real data test bench table-one coverage proof proof-full lint lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -51,10 +51,18 @@ table-one: $(VENV)/.ready  ## ask which left-out effect errs as the paper's Tabl
 	$(BIN)/ccmodel table-one config/table-one.yaml --out results/table-one --figure docs/figures/table-one.png \
 	  --cores $(CORES)
 
+proof: $(VENV)/.ready  ## diagnose a handful of concealed cases and score them: results/proof/quick.md
+	$(BIN)/python -m proof quick --out results/proof/quick
+	$(BIN)/python -m proof score results/proof/quick --out results/proof/quick.json --page results/proof/quick.md \
+	  --figures results/proof/figures --command "make proof" --of "A handful whose seeds never change." --strict
+
+proof-full: $(VENV)/.ready  ## the full proof, or N cases of it drawn at random: docs/proof.md; goes on where it was stopped
+	$(BIN)/snakemake --snakefile proof/Snakefile --cores $(CORES) --keep-going $(if $(N)$(RIVALS),--config $(if $(N),cases=$(N)) $(if $(RIVALS),rivals=true))
+
 lint: $(VENV)/.ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/snakefmt --check Snakefile workflow
+	$(BIN)/snakefmt --check Snakefile proof/Snakefile workflow
 	$(BIN)/lint-imports --no-cache
 
 lock:  ## pin the newest versions that fit pyproject.toml (needs uv)

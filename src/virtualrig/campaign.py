@@ -4,7 +4,7 @@ import gzip
 import io
 import shutil
 import zlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
@@ -124,6 +124,11 @@ def compress(columns: dict[str, NDArray]) -> bytes:
 def describe(campaign: Campaign, name: str) -> dict:
     """The batch.yaml of one batch: what the experimenter knows, beforehand estimates and not the cables' truth."""
     batch: BatchPlan = campaign.batches[name]
+    return description(campaign, name, batch.note, batch.recordings)
+
+
+def description(campaign: Campaign, name: str, note: str, plans: Sequence[RecordingPlan]) -> dict:
+    """The batch.yaml of any recordings made on a campaign's rig."""
     rig, sensors = campaign.rig, campaign.sensors
     side = {
         "pulley_radius_m": rig.pulley_radius_m,
@@ -138,7 +143,7 @@ def describe(campaign: Campaign, name: str) -> dict:
         "format": 1,
         "batch": name,
         "origin": ORIGIN,
-        "note": batch.note,
+        "note": note,
         "rig": {
             "drive": side,
             "load": side | {"spring_stiffness_Nm_per_rad": rig.load.spring_stiffness_Nm_per_rad},
@@ -157,7 +162,7 @@ def describe(campaign: Campaign, name: str) -> dict:
                 "conduit": [piece.model_dump() for piece in plan.conduit],
                 "excitation": plan.excitation.asked,
             }
-            for plan in batch.recordings
+            for plan in plans
         ],
     }
 
@@ -172,8 +177,12 @@ def _record_to(path: Path, campaign: Campaign, batch: str, plan: RecordingPlan) 
 
 
 def _write_description(campaign: Campaign, name: str, folder: Path) -> None:
-    text = yaml.dump(describe(campaign, name), Dumper=_PlainDumper, sort_keys=False)
-    (folder / "batch.yaml").write_text(text, encoding="utf-8")
+    (folder / "batch.yaml").write_text(as_yaml(describe(campaign, name)), encoding="utf-8")
+
+
+def as_yaml(described: dict) -> str:
+    """The text of a batch.yaml."""
+    return yaml.dump(described, Dumper=_PlainDumper, sort_keys=False)
 
 
 class _PlainDumper(yaml.SafeDumper):

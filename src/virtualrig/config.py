@@ -1,7 +1,7 @@
 """The virtual rig's configuration, typed: every number of a campaign with its unit in its name.
 
-What a recording was made with stands in one file: nothing has a default here but effects, which are not there unless
-they are given, and a key that is missing, misspelt or of no use is refused.
+What a recording was made with stands in one file: nothing has a default here but effects and slow noise, which are not
+there unless they are given, and a key that is missing, misspelt or of no use is refused.
 """
 
 from pathlib import Path
@@ -62,6 +62,16 @@ class Encoder(Strict):
     accuracy_rad: PositiveFloat
 
 
+class SlowNoise(Strict):
+    """Noise that wanders, besides the white: its standard deviation over that of the white, and how long it lasts.
+
+    Its correlation falls to 1/e over `lasts_samples`.
+    """
+
+    ratio: NonNegative
+    lasts_samples: PositiveFloat
+
+
 class TorqueSensor(Strict):
     """A motor current that stands for the pulley's torque."""
 
@@ -69,6 +79,7 @@ class TorqueSensor(Strict):
     accuracy_Nm: PositiveFloat
     noise_Nm: NonNegative
     range_Nm: PositiveFloat
+    slow_noise: SlowNoise | None = None
 
 
 class LoadCell(Strict):
@@ -79,10 +90,11 @@ class LoadCell(Strict):
     accuracy_N: PositiveFloat
     noise_N: NonNegative
     range_N: PositiveFloat
+    slow_noise: SlowNoise | None = None
 
 
 class Sensors(Strict):
-    """One set at each end; `noise` is a standard deviation, white at the sampling rate."""
+    """One set at each end; `noise` is a standard deviation, white at the sampling rate; `slow_noise` comes on top."""
 
     sample_rate_Hz: PositiveFloat
     encoder: Encoder

@@ -143,7 +143,9 @@ class SideSensors(Strict):
     """What can be wrong with the sensors of one side.
 
     A torque reads (1 + torque_gain) times as much; a load cell reads (1 + gain) F + offset + drift t + crosstalk
-    tau / R; all channels of the side show at t what was at t - delay.
+    tau / R; all channels of the side show at t what was at t - delay. Neither of these stands in a list that a
+    diagnosis may know: an encoder's disc that is off its axis, so that the angle reads theta + runout
+    sin(theta + phase); a torque that reads (1 + curvature tau^2) times as much.
     """
 
     torque_gain: float = 0.0
@@ -152,6 +154,9 @@ class SideSensors(Strict):
     load_cell_drift_N_per_s: float = 0.0
     load_cell_crosstalk: float = 0.0
     delay_s: float = 0.0
+    angle_runout_rad: float = 0.0
+    angle_runout_phase_rad: float = 0.0
+    torque_curvature_per_Nm2: float = 0.0
 
 
 class HystereticLoad(Strict):
@@ -179,7 +184,7 @@ class PositionalFriction(Strict):
 
 
 class Effects(Strict):
-    """Every effect of a rig. The last three stand in no list that a diagnosis may know."""
+    """Every effect of a rig. The last three, and two of the sensors', stand in no list that a diagnosis may know."""
 
     presliding: Annotated[DahlPresliding | IwanPresliding, Field(discriminator="law")] | None = None
     stribeck: Stribeck | None = None

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
-from virtualrig.config import Encoder, LoadCell, Rig, Sensors, TorqueSensor
+from virtualrig.config import Encoder, LoadCell, Rig, Sensors, SlowNoise, TorqueSensor
 from virtualrig.effects import SideSensors
 from virtualrig.trajectory import Trajectory
 
@@ -72,7 +73,9 @@ def sensed(time_s: NDArray, truth: Side, rig: Rig, faults: SideSensors) -> Side:
         + faults.load_cell_drift_N_per_s * (time_s - time_s[0])
         + faults.load_cell_crosstalk * truth.torque_Nm / rig.pulley_radius_m
     )
-    shown = (truth.angle_rad, (1 + faults.torque_gain) * truth.torque_Nm, force)
+    angle = truth.angle_rad + faults.angle_runout_rad * np.sin(truth.angle_rad + faults.angle_runout_phase_rad)
+    torque = (1 + faults.torque_gain + faults.torque_curvature_per_Nm2 * truth.torque_Nm**2) * truth.torque_Nm
+    shown = (angle, torque, force)
     return Side(*(np.interp(time_s - faults.delay_s, time_s, values) for values in shown))
 
 
@@ -86,7 +89,7 @@ def current(torque_Nm: NDArray, sensor: TorqueSensor, draw: Generator) -> NDArra
     """Current (A) that is read for a torque (N m): noise, and a zero that is off within the accuracy."""
     _check_range("torque", torque_Nm, sensor.range_Nm, "N m")
     zero_Nm = draw.uniform(-sensor.accuracy_Nm, sensor.accuracy_Nm)
-    read_Nm = torque_Nm + zero_Nm + draw.normal(0, sensor.noise_Nm, torque_Nm.shape)
+    read_Nm = torque_Nm + zero_Nm + noise(torque_Nm.size, sensor.noise_Nm, sensor.slow_noise, draw)
     return read_Nm / sensor.constant_Nm_per_A
 
 
@@ -94,8 +97,20 @@ def load_cell_voltage(force_N: NDArray, cell: LoadCell, draw: Generator) -> NDAr
     """Voltage (V) that is read for a tension sum (N): noise, and a zero that is off within the accuracy."""
     _check_range("tension sum", force_N, cell.range_N, "N")
     zero_N = draw.uniform(-cell.accuracy_N, cell.accuracy_N)
-    read_N = force_N + zero_N + draw.normal(0, cell.noise_N, force_N.shape)
+    read_N = force_N + zero_N + noise(force_N.size, cell.noise_N, cell.slow_noise, draw)
     return cell.zero_V + cell.sensitivity_V_per_N * read_N
+
+
+def noise(samples: int, deviation: float, slow: SlowNoise | None, draw: Generator) -> NDArray:
+    """White noise, and slow noise on top where a sensor has it; shape (samples,), in the unit of `deviation`."""
+    white = draw.normal(0, deviation, samples)
+    if slow is None:
+        return white
+    keep = np.exp(-1 / slow.lasts_samples)
+    kicks = draw.normal(0, slow.ratio * deviation, samples)
+    # In its steady state from the first sample on.
+    kicks[1:] *= np.sqrt(1 - keep**2)
+    return white + lfilter([1.0], [1.0, -keep], kicks)
 
 
 def _check_range(name: str, values: NDArray, limit: float, unit: str) -> None:

@@ -2,7 +2,9 @@ import numpy as np
 import pytest
 from virtual_runs import changed
 
-from virtualrig.sensors import SensorRangeError, current, encode, load_cell_voltage
+from virtualrig.config import SlowNoise
+from virtualrig.effects import SideSensors
+from virtualrig.sensors import SensorRangeError, Side, current, encode, load_cell_voltage, noise, sensed
 
 
 @pytest.fixture
@@ -49,3 +51,28 @@ def test_unknown_keys_are_refused(campaign):
     with pytest.raises(ValueError, match="sede"):
         type(campaign).model_validate(broken)
     assert changed(campaign, seed=3).seed == 3
+
+
+def test_slow_noise_lasts_and_white_noise_does_not(draw):
+    slow = SlowNoise(ratio=2.0, lasts_samples=50.0)
+    made = noise(200_000, 0.5, slow, draw)
+    assert made.std() == pytest.approx(0.5 * np.sqrt(5), rel=0.05)
+    lagged = np.mean(made[50:] * made[:-50]) / np.mean(made**2)
+    assert lagged == pytest.approx(0.8 / np.e, abs=0.05)
+    white = noise(200_000, 0.5, None, draw)
+    assert abs(np.mean(white[50:] * white[:-50])) < 0.01
+
+
+def test_a_sensor_without_slow_noise_draws_as_ever():
+    plain, with_it = (np.random.default_rng(3) for _ in range(2))
+    assert noise(5, 1.0, None, plain).tolist() == with_it.normal(0, 1.0, 5).tolist()
+    assert plain.random() == with_it.random()
+
+
+def test_an_encoder_off_its_axis_and_a_bent_torque(campaign):
+    t, angle, torque = np.linspace(0, 1, 50), np.linspace(-1, 1, 50), np.linspace(-0.1, 0.1, 50)
+    faults = SideSensors(angle_runout_rad=0.02, angle_runout_phase_rad=0.5, torque_curvature_per_Nm2=10.0)
+    shown = sensed(t, Side(angle, torque, np.ones(50)), campaign.rig, faults)
+    np.testing.assert_allclose(shown.angle_rad, angle + 0.02 * np.sin(angle + 0.5))
+    np.testing.assert_allclose(shown.torque_Nm, torque + 10 * torque**3)
+    np.testing.assert_array_equal(shown.force_N, 1.0)

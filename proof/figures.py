@@ -1,0 +1,121 @@
+"""Figures of the proof's page."""
+
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
+
+# Okabe and Ito's colours, told apart by all kinds of eyes; shapes differ too.
+BLUE, ORANGE, GREY, GREEN = "#0072B2", "#E69F00", "#999999", "#009E73"
+COLUMNS = 4
+KINDS = {"clean": ("o", GREY), "single": ("s", BLUE), "pair": ("^", GREEN), "unlisted": ("D", ORANGE)}
+
+
+def write_figures(scored: dict, folder: Path) -> list[str]:
+    """Draw all figures that there are results for; their file names."""
+    folder.mkdir(parents=True, exist_ok=True)
+    drawn = {
+        "proof-detection.png": (_detection, scored["detection"]),
+        "proof-reliability.png": (_reliability, scored["reliability"]),
+        "proof-kept-back.png": (_kept_back, scored["kept_back"]),
+        "proof-confusion.png": (_confusion, scored["confusion"]),
+    }
+    names = []
+    for name, (draw, data) in drawn.items():
+        if data:
+            with matplotlib.rc_context({"font.size": 8, "axes.spines.top": False, "axes.spines.right": False}):
+                draw(data).savefig(folder / name, dpi=130)
+            names.append(name)
+    return names
+
+
+def _detection(detection: dict) -> Figure:
+    """A panel an effect: each case at its size, and the curve of noticing."""
+    rows = -(-len(detection) // COLUMNS)
+    figure = Figure(figsize=(9, 0.6 + 1.35 * rows), layout="constrained")
+    panels = figure.subplots(rows, COLUMNS, squeeze=False, sharey=True)
+    marks = {
+        "named first": (BLUE, "o", lambda p: p["named"]),
+        "noticed only": (ORANGE, "^", lambda p: p["noticed"] and not p["named"]),
+        "not noticed": (GREY, "x", lambda p: not p["noticed"]),
+    }
+    for panel, (name, found) in zip(panels.flat, detection.items(), strict=False):
+        for label, (colour, marker, belongs) in marks.items():
+            some = [p for p in found["points"] if belongs(p)]
+            panel.plot([p["size"] for p in some], [p["noticed"] for p in some], marker, color=colour, ms=4, label=label)
+        if found["half_size"]:
+            x = np.geomspace(*found["drawn"], 60)
+            panel.plot(x, 1 / (1 + (x / found["half_size"]) ** -found["slope"]), color="black", lw=0.8)
+        panel.set(
+            xscale="log",
+            xlim=(found["drawn"][0] / 1.3, found["drawn"][1] * 1.3),
+            ylim=(-0.15, 1.15),
+            yticks=[0, 1],
+            yticklabels=["missed", "noticed"],
+        )
+        panel.set_title(name, fontsize=8)
+        panel.set_xlabel({"1": "share"}.get(found["unit"], found["unit"]), fontsize=7)
+        panel.xaxis.set_minor_formatter(NullFormatter())
+    for panel in panels.flat[len(detection) :]:
+        panel.set_axis_off()
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3, frameon=False)
+    return figure
+
+
+def _reliability(bins: list[dict]) -> Figure:
+    """How often a name was right against the probability stated for it."""
+    figure = Figure(figsize=(4, 4), layout="constrained")
+    panel = figure.subplots()
+    stated, right = [b["stated"] for b in bins], np.array([b["rate"] for b in bins])
+    reach = np.clip([right - [b["low"] for b in bins], [b["high"] for b in bins] - right], 0, None)
+    panel.plot([0, 1], [0, 1], color=GREY, lw=0.8, ls="--", label="as stated")
+    panel.errorbar(stated, right, reach, fmt="o", color=BLUE, ms=4, capsize=2, label="right, 95 % Wilson")
+    for b in bins:
+        panel.annotate(f" {b['n']}", (b["stated"], b["rate"]), fontsize=7, va="top")
+    panel.set(xlim=(0, 1.03), ylim=(-0.03, 1.03), xlabel="probability stated", ylabel="share that was right")
+    figure.legend(loc="outside upper center", ncols=2, frameon=False)
+    return figure
+
+
+def _kept_back(errors: list[dict]) -> Figure:
+    """Errors on kept-back recordings, in floors, before and after."""
+    figure = Figure(figsize=(4.5, 4.2), layout="constrained")
+    panel = figure.subplots()
+    for kind, (marker, colour) in KINDS.items():
+        some = [e for e in errors if (e["kind"] if e["kind"] in KINDS else _shown_as(e["kind"])) == kind]
+        panel.plot([e["before"] for e in some], [e["after"] for e in some], marker, color=colour, ms=3.5, label=kind)
+    ends = [0.5, max(max(e["before"], e["after"]) for e in errors) * 1.3]
+    panel.plot(ends, ends, color=GREY, lw=0.8, ls="--")
+    panel.axhline(1, color=GREY, lw=0.8)
+    panel.set(xscale="log", yscale="log", xlim=ends, ylim=ends)
+    panel.set(xlabel="after recalibration alone, times the floor", ylabel="after the diagnosis, times the floor")
+    figure.legend(loc="outside upper center", ncols=4, frameon=False)
+    return figure
+
+
+def _shown_as(kind: str) -> str:
+    return {"removed": "unlisted", "poor": "single"}[kind]
+
+
+def _confusion(table: dict[str, dict[str, int]]) -> Figure:
+    """What each single effect was called."""
+    ends = ["agrees", "undecided", "unexplained", "none"]
+    said = [*(n for n in table if n != "none"), *ends]
+    said += [n for row in table.values() for n in row if n not in said]
+    said = list(dict.fromkeys(n for n in said if any(n in row for row in table.values())))
+    counts = np.array([[row.get(name, 0) for name in said] for row in table.values()])
+    figure = Figure(figsize=(2.6 + 0.24 * len(said), 1.8 + 0.2 * len(table)), layout="constrained")
+    panel = figure.subplots()
+    shown = np.ma.masked_equal(counts, 0)
+    panel.imshow(shown, cmap="Blues", norm=LogNorm(0.5, max(counts.max(), 2) * 2), aspect="auto")
+    for (i, j), n in np.ndenumerate(counts):
+        if n:
+            dark = n > counts.max() / 4
+            panel.text(j, i, n, ha="center", va="center", fontsize=7, color="white" if dark else "black")
+    panel.set_xticks(range(len(said)), [{"none": "no diagnosis"}.get(n, n) for n in said], rotation=90)
+    panel.set_yticks(range(len(table)), [{"none": "clean"}.get(n, n) for n in table])
+    panel.set(xlabel="called", ylabel="hidden")
+    return figure

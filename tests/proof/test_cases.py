@@ -1,0 +1,165 @@
+import numpy as np
+import pytest
+import yaml
+from scipy.stats import binom
+from typer.testing import CliRunner
+
+from ccmodel import mechanisms
+from proof import build, convergence
+from proof.build import folder_digest, record
+from proof.cases import Case, draw
+from proof.cli import app, part_of, seed_of
+from proof.effects import ENTRIES, merged
+from proof.plan import read_plan
+from virtualrig.effects import Effects
+from virtualrig.trajectory import Preparation, Trajectory
+
+PLAN = read_plan()
+
+
+def test_the_plan_has_every_effect_of_the_list_at_all_its_places():
+    listed = {name: set(mechanisms.get(name).places) for name in mechanisms.names()}
+    assert {name: set(spec.places) for name, spec in PLAN.effects.items()} == listed
+    assert set(ENTRIES) == {*PLAN.effects, *PLAN.unlisted}
+
+
+def test_values_of_an_answer_have_names_of_the_list():
+    for name in PLAN.effects:
+        (truth,) = draw(3, "single", name).truth
+        assert set(truth.values) <= {p.name for p in mechanisms.get(name).parameters}
+
+
+@pytest.mark.parametrize("name", [*PLAN.effects, *PLAN.unlisted])
+def test_an_effect_enters_the_rig(name):
+    kind = "unlisted" if name in PLAN.unlisted else "single"
+    case = draw(11, kind, name)
+    effects = case.campaign.rig.effects
+    assert effects != Effects()
+    (truth,) = case.truth
+    low, high = {**PLAN.effects, **PLAN.unlisted}[name].size
+    assert low <= abs(truth.size) <= high
+    assert truth.place in {**PLAN.effects, **PLAN.unlisted}[name].places
+    assert effects.model_dump() != draw(12, kind, name).campaign.rig.effects.model_dump()
+
+
+def test_a_seed_gives_one_case_and_another_seed_another():
+    assert draw(5) == draw(5)
+    assert draw(5).digest == draw(5).digest
+    assert draw(5).digest != draw(6).digest
+    assert draw(5, "clean").name != draw(5, "single").name
+
+
+def test_kinds_come_in_their_shares():
+    kinds = [draw(seed).kind for seed in range(400)]
+    for kind, share in PLAN.kinds.items():
+        low, high = binom.ppf([1e-4, 1 - 1e-4], len(kinds), share)
+        assert low <= kinds.count(kind) <= high
+
+
+def test_strengths_are_even_in_the_logarithm():
+    strengths = [draw(seed, "single", "backlash").truth[0].strength for seed in range(300)]
+    assert np.histogram(strengths, 3, (0, 1))[0].min() > 70
+    assert np.median([draw(s, "single", "backlash").truth[0].size for s in range(300)]) == pytest.approx(
+        8.4e-3, rel=0.3
+    )
+
+
+def test_a_pair_is_two_and_a_removed_one_is_told_off_the_list():
+    assert len({t.name for t in draw(4, "pair").truth}) == 2
+    removed = draw(4, "removed", "kink")
+    assert removed.without == ("kink",)
+    assert [t.name for t in removed.truth] == ["unlisted-kink"]
+    assert draw(4, "clean").truth == ()
+
+
+def test_estimates_are_off_some_of_them_by_much():
+    off = [draw(s, "clean").campaign.rig for s in range(100)]
+    shares = np.array([abs(np.log(r.estimates.stiffness_N_per_m / r.cable.stiffness_N_per_m)) for r in off])
+    assert shares.min() > np.log(1.09)
+    assert 5 <= (shares > np.log(1.3)).sum() <= 40
+
+
+def test_two_effects_share_a_pulley_but_no_number():
+    friction, eccentricity = {"load_pulley": {"friction": 1}}, {"load_pulley": {"eccentricity": 2}}
+    assert merged([friction, eccentricity]) == {"load_pulley": {"friction": 1, "eccentricity": 2}}
+    with pytest.raises(ValueError, match="friction"):
+        merged([friction, friction])
+
+
+@pytest.fixture(scope="module")
+def poor() -> Case:
+    """A case of a single recording."""
+    return next(c for c in (draw(s, "poor", "torque-scale") for s in range(50)) if c.protocol == "one")
+
+
+def test_a_batch_says_nothing_of_its_answer(poor, tmp_path):
+    record(poor, poor.recordings, tmp_path / poor.name)
+    text = (tmp_path / poor.name / "batch.yaml").read_text()
+    described = yaml.safe_load(text)
+    assert described["origin"] == "virtual-rig"
+    assert described["batch"] == poor.name
+    assert not any(word in text for word in [*ENTRIES, *PLAN.kinds, "unlisted"])
+    cable = described["rig"]["cable"]
+    assert cable["stiffness_N_per_m"] != pytest.approx(poor.campaign.rig.cable.stiffness_N_per_m, rel=0.05)
+
+
+def test_a_case_is_recorded_the_same_again(poor, tmp_path):
+    for name in ("a", "b"):
+        record(poor, poor.recordings, tmp_path / name)
+    assert folder_digest(tmp_path / "a") == folder_digest(tmp_path / "b")
+    file = next((tmp_path / "b").glob("*.gz"))
+    file.write_bytes(file.read_bytes() + b"\0")
+    assert folder_digest(tmp_path / "a") != folder_digest(tmp_path / "b")
+
+
+def test_the_rig_is_fine_enough():
+    left = convergence.measure(2)
+    assert max(left.values()) < 0.5
+
+
+def test_the_full_proof_has_other_cases_for_other_sources():
+    assert seed_of("0123456789abcdef", 3) != seed_of("0123456789abcdee", 3)
+    assert seed_of("0123456789abcdef", 3) != seed_of("0123456789abcdef", 4)
+
+
+def test_a_larger_part_holds_the_smaller():
+    small, large = part_of("0123456789abcdef", 20), part_of("0123456789abcdef", 60)
+    assert set(small) < set(large)
+    assert len(set(large)) == 60
+    assert part_of("0123456789abcdee", 20) != small
+    assert part_of("0123456789abcdef", PLAN.full.cases) == list(range(PLAN.full.cases))
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        (["--kind", "sinlge"], "no kind 'sinlge'"),
+        (["--kind", "single", "--effect", "dahl"], "no effect 'dahl'"),
+        (["--effect", "kink"], "needs --kind"),
+        (["--kind", "unlisted", "--effect", "kink"], "not an effect of a case of kind unlisted"),
+    ],
+)
+def test_what_cannot_be_built_is_said(asked, told, tmp_path):
+    ran = CliRunner().invoke(app, ["build", "--out", str(tmp_path), *asked])
+    assert ran.exit_code == 2
+    assert told in " ".join(ran.output.replace("│", " ").split())
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_floor_is_what_noise_and_the_runs_own_friction_leave(poor, monkeypatch):
+    plan, time_s = poor.kept_back[0], np.linspace(0, 5, 500)
+
+    def simulated(campaign, plan, preparation):
+        torque = preparation.friction_coefficient * np.ones_like(time_s)
+        angle, _ = plan.excitation.angle_and_rate(time_s)
+        return Trajectory(time_s, angle, angle, *(np.zeros_like(time_s) for _ in range(4)), torque, torque)
+
+    monkeypatch.setattr(build, "simulate", simulated)
+    campaign = poor.campaign.model_copy(update={"rig": poor.campaign.rig.model_copy(update={"effects": Effects()})})
+    floor = build.floor_of(campaign, plan, Preparation(1.0, 7.0, (0.2, 0.2)))
+    noise, slow = campaign.sensors.torque.noise_Nm, campaign.sensors.torque.slow_noise.ratio
+    expected = np.sqrt(0.01**2 + noise**2 * (1 + slow**2) + campaign.sensors.torque.accuracy_Nm**2 / 3)
+    assert floor["tau_in_Nm"] == pytest.approx(expected, rel=1e-6)
+    count = 2 * np.pi / 2000 / np.sqrt(12)
+    # Twice for the load's count and, once the drive has moved, once for the drive's.
+    assert floor["theta_out_rad"] == pytest.approx(np.sqrt(3) * count, rel=0.05)
