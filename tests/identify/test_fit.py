@@ -1,4 +1,4 @@
-"""Fits of drawn batches, whose truth is known: what is found, what is refused, and that another optimiser agrees."""
+"""Fits of drawn batches, whose truth is known: what is found, what is refused, and that fewer rows do."""
 
 import json
 from dataclasses import replace
@@ -64,8 +64,8 @@ def test_every_recording_has_values_of_its_own_within_what_their_intervals_say(d
         assert (intervals["friction"].low + intervals["friction"].high) / 2 == pytest.approx(mu)
 
 
-def test_another_optimiser_finds_the_same(problem):
-    """Scipy's trust region on the same cost and the same differences."""
+def test_all_rows_give_the_same(problem):
+    """Scipy's trust region on every row of the same cost, where ours gives it a root of their products."""
     problem = Problem(problem.evidence[:2], problem.shared, problem.own)
     ours = solve(problem, problem.start)
     assert ours.message.startswith("converged")
