@@ -32,6 +32,7 @@ CONDITIONS = ((np.pi, 7.0), (2 * np.pi, 7.0), (np.pi, 4.0), (2 * np.pi, 4.0))
 SPREAD = {
     "friction_scale": FRICTION,
     "pretension_scale": PRETENSION,
+    "drive_place": 1.0,
     "theta_out_zero_rad": STEP_RAD / np.sqrt(12),
     "tau_in_zero_Nm": ZERO_TORQUE_NM / np.sqrt(3),
     "tau_out_zero_Nm": ZERO_TORQUE_NM / np.sqrt(3),
@@ -66,7 +67,7 @@ def problem_of(drawn: Drawn, own=SPREAD, **more: Free) -> Problem:
     start = {n: v * (1.2 if n.startswith("stiff") else 0.8) for n, v in drawn.shared.items()}
     free = {n: Free(v, 0.2 * v, 5 * v) for n, v in start.items()} | more
     parameters = Parameters(reference_length_m=1.2, drive_radius_m=0.006, load_radius_m=0.006, **start)
-    evidence = [Evidence.of(r, parameters) for r in drawn.recordings]
+    evidence = [Evidence.of(r, parameters, placed="drive_place" in own) for r in drawn.recordings]
     at = {"friction_scale": 1.0, "pretension_scale": 1.0}
     return Problem(evidence, free, {name: Free(at.get(name, 0.0), spread=own[name]) for name in own})
 

@@ -19,7 +19,7 @@ def said():
     """One, two and three half loops, each twice."""
     batch = ingest_batch(LOOPS)
     estimates = Parameters.estimated(batch.batch.rig)
-    evidence = [Evidence.of(r, estimates, step_s=0.004) for r in batch.recordings]
+    evidence = [Evidence.of(r, estimates, step_s=0.004, placed=True) for r in batch.recordings]
     free = {
         "stiffness_N_per_m": Free(estimates.stiffness_N_per_m, 1e3, 1e5),
         "friction_coefficient": Free(estimates.friction_coefficient, 0.01, 0.6),

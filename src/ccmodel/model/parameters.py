@@ -28,6 +28,8 @@ class Parameters:
         What the torque sensors read without a torque.
     theta_out_zero_rad : float
         Angle of the load that its encoder shows as none: where in its count it rests.
+    drive_place : float
+        Where in its count the drive first rests, in standard deviations of what its motion says of that.
     F_drive_zero_N, F_load_zero_N : float
         What the load cells read without a tension.
     extra_bend_rad : float
@@ -49,6 +51,7 @@ class Parameters:
     tau_in_zero_Nm: float = 0.0
     tau_out_zero_Nm: float = 0.0
     theta_out_zero_rad: float = 0.0
+    drive_place: float = 0.0
     F_drive_zero_N: float = 0.0
     F_load_zero_N: float = 0.0
     extra_bend_rad: float = 0.0
@@ -119,6 +122,7 @@ def mechanism_parameter(key: str) -> tuple[str, str, str] | None:
 OWN = (
     "friction_scale",
     "pretension_scale",
+    "drive_place",
     "theta_out_zero_rad",
     "tau_in_zero_Nm",
     "tau_out_zero_Nm",
