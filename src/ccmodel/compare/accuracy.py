@@ -27,12 +27,12 @@ import pandas as pd
 from scipy.stats import t
 
 from ccmodel.compare.loops import QUANTITIES, Quantity, measure
-from ccmodel.compare.repeats import condition_of, pooled_scatter, without_repeat
 from ccmodel.config import Accuracy, Measuring
 from ccmodel.model.failure import ModelError
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import PRESCRIBED, ModelInput, simulate
 from ccmodel.recording import Recording
+from ccmodel.repeats import condition_of, pooled_scatter, without_repeat
 
 JUDGED = (
     "theta_out", "tau_in", "tau_out", "F_drive", "F_load", "T1", "T2", "T3", "T4", "width", "backlash", "lost_motion",
