@@ -64,6 +64,17 @@ def test_every_recording_has_values_of_its_own_within_what_their_intervals_say(d
         assert (intervals["friction"].low + intervals["friction"].high) / 2 == pytest.approx(mu)
 
 
+def test_an_initial_tension_that_bends_between_the_ends_is_found():
+    """The rest shows the ends alone; taken for straight, a profile like this would be taken for something else."""
+    drawn = draw(4, conditions=CONDITIONS[:2], duration_s=2.4, bow=0.5)
+    said = fit(problem_of(drawn, SPREAD | {"profile_bow_A": 0.3, "profile_bow_B": 0.3}))
+    straight = fit(problem_of(drawn))
+    assert straight.cost > 1.5 * said.cost
+    for own in said.own_intervals.values():
+        for name, true in (("profile_bow_A", 0.5), ("profile_bow_B", 0.0)):
+            assert (own[name].low + own[name].high) / 2 == pytest.approx(true, abs=0.1)
+
+
 def test_where_the_drive_rests_is_told_by_more_than_its_motion(found):
     """All that its counts say of the first rest is one standard deviation; torques and tensions say more."""
     for own in found.own_intervals.values():

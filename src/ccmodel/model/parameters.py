@@ -37,6 +37,9 @@ class Parameters:
     friction_scale, pretension_scale : float
         Friction and initial tension of one recording over what they are in the population, and over what its rest
         shows.
+    profile_bow_A, profile_bow_B : float
+        How each cable's initial tension bends between the ends that its rest shows, of what friction can hold, -1 to
+        1 (`ccmodel.model.initial.InitialTension.between_ends`).
     mechanisms : tuple of Active
         What acts besides the paper's physics.
     """
@@ -57,6 +60,8 @@ class Parameters:
     extra_bend_rad: float = 0.0
     friction_scale: float = 1.0
     pretension_scale: float = 1.0
+    profile_bow_A: float = 0.0
+    profile_bow_B: float = 0.0
     mechanisms: tuple[Active, ...] = ()
 
     @property
@@ -122,6 +127,8 @@ def mechanism_parameter(key: str) -> tuple[str, str, str] | None:
 OWN = (
     "friction_scale",
     "pretension_scale",
+    "profile_bow_A",
+    "profile_bow_B",
     "drive_place",
     "theta_out_zero_rad",
     "tau_in_zero_Nm",

@@ -178,7 +178,8 @@ def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension
     drive, load = tau_in / parameters.drive_radius_m, tau_out / parameters.load_radius_m
     T1, T3 = scale * (F_drive + drive) / 2, scale * (F_drive - drive) / 2
     T2, T4 = scale * (F_load + load) / 2, scale * (F_load - load) / 2
-    return InitialTension.between_ends(path, parameters.friction, (T1, T2), (T3, T4))
+    bows = parameters.profile_bow_A, parameters.profile_bow_B
+    return InitialTension.between_ends(path, parameters.friction, (T1, T2), (T3, T4), bows)
 
 
 def _load(given: ModelInput, parameters: Parameters, load_from: LoadFrom) -> SpringLoad | TorqueLoad | AngleLoad:
