@@ -133,13 +133,13 @@ def drive_motion(time_s: NDArray, theta_counts_rad: NDArray, step_rad: float, re
     What is left is mostly the place of rests: fast starts pass too few samples a count to tell it. A common order of
     start for all rests of a recording was tried and told next to nothing more.
 
-    Over 24 places within a count, the first rest's is wrong by 0.15 (steps of least jerk) and 0.23 (constant ramps),
-    0.19 of it as stated. Were it known, what moves would be right to 0.06 and 0.05, holds to 0.14 and 0.21, for the same
-    reason. It is the law of the start that counts do not tell: where it is known to be constant acceleration, 30 counts
-    of a ramp tell its rest to 0.05; to expect starts as simple as that whenever counts allow them makes ramps right to
-    0.13, and steps, sines and triangles wrong by 0.2 to 0.3. What does tell it is what the cables do: a fit of torques
-    and sums finds the first rest's place (`Parameters.drive_place`) to an eighth of its deviation here, on sines 0.02
-    to 0.03 counts.
+    Over 24 places within a count, the first rest's is wrong by 0.15 (steps of least jerk) and 0.23 (constant ramps)
+    where 0.19 is stated. Were it known, what moves would be right to 0.06 and 0.05, holds to 0.14 and 0.21, for the
+    same reason. It is the law of the start that counts do not tell: where it is known to be constant acceleration, 30
+    counts of a ramp tell its rest to 0.05; to expect starts as simple as that whenever counts allow them makes ramps
+    right to 0.13, and steps, sines and triangles wrong by 0.2 to 0.3. What does tell it is what the cables do: a fit of
+    torques and sums finds the first rest's place (`Parameters.drive_place`) to an eighth of its stated deviation on
+    the sines of `data/raw/loops`, which is 0.02 to 0.03 counts.
     """
     time = np.asarray(time_s, dtype=float)
     counted = np.asarray(theta_counts_rad, dtype=float)
