@@ -61,6 +61,15 @@ class ConduitPath:
         """Bend angle of the whole path, rad: what the capstan loss in full slip depends on."""
         return float(self.piece_bend_rad.sum())
 
+    @property
+    def halfway_m(self) -> float:
+        """Arc length at which half of the bend is behind, m; half of the length of a path without any."""
+        if self.bend_rad == 0:
+            return self.length_m / 2
+        x = np.concatenate([[0.0], np.cumsum(self.piece_length_m)])
+        bend = np.concatenate([[0.0], np.cumsum(self.piece_bend_rad)])
+        return float(np.interp(self.bend_rad / 2, bend, x))
+
     def with_extra_bend(self, extra_rad: float) -> "ConduitPath":
         """The same path with bend added to every piece in proportion to its length."""
         if extra_rad == 0:

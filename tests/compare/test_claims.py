@@ -7,8 +7,8 @@ import pytest
 
 from ccmodel.compare import model_study
 from ccmodel.compare.claims import NO, OPEN, YES, claims_of, loop_placements
-from ccmodel.compare.repeats import condition_of, estimates, pooled_scatter
 from ccmodel.config import Claims, Measuring
+from ccmodel.repeats import condition_of, estimates, pooled_scatter
 from ccmodel.report.claims import model_figure, recordings_figure
 from ccmodel.report.figures import save_figure
 from model_runs import CABLE, STUDY

@@ -1,4 +1,4 @@
-"""Fits of drawn batches, whose truth is known: what is found, what is refused, and that another optimiser agrees."""
+"""Fits of drawn batches, whose truth is known: what is found, what is refused, and that fewer rows do."""
 
 import json
 from dataclasses import replace
@@ -64,8 +64,26 @@ def test_every_recording_has_values_of_its_own_within_what_their_intervals_say(d
         assert (intervals["friction"].low + intervals["friction"].high) / 2 == pytest.approx(mu)
 
 
-def test_another_optimiser_finds_the_same(problem):
-    """Scipy's trust region on the same cost and the same differences."""
+def test_an_initial_tension_that_bends_between_the_ends_is_found():
+    """The rest shows the ends alone; taken for straight, a profile like this would be taken for something else."""
+    drawn = draw(4, conditions=CONDITIONS[:2], duration_s=2.4, bow=0.5)
+    said = fit(problem_of(drawn, SPREAD | {"profile_bow_A": 0.3, "profile_bow_B": 0.3}))
+    straight = fit(problem_of(drawn))
+    assert straight.cost > 1.5 * said.cost
+    for own in said.own_intervals.values():
+        for name, true in (("profile_bow_A", 0.5), ("profile_bow_B", 0.0)):
+            assert (own[name].low + own[name].high) / 2 == pytest.approx(true, abs=0.1)
+
+
+def test_where_the_drive_rests_is_told_by_more_than_its_motion(found):
+    """All that its counts say of the first rest is one standard deviation; torques and tensions say more."""
+    for own in found.own_intervals.values():
+        assert own["drive_place"].sd < 0.9
+        assert abs(own["drive_place"].low + own["drive_place"].high) / 2 < 4
+
+
+def test_all_rows_give_the_same(problem):
+    """Scipy's trust region on every row of the same cost, where ours gives it a root of their products."""
     problem = Problem(problem.evidence[:2], problem.shared, problem.own)
     ours = solve(problem, problem.start)
     assert ours.message.startswith("converged")
@@ -189,6 +207,7 @@ def test_own_values_of_which_less_scatter_is_expected_than_there_is_widen_the_in
     said = fit(problem_of(drawn, {"friction_scale": 0.01, "theta_out_zero_rad": SPREAD["theta_out_zero_rad"]}))
     scatter = said.scatter["friction_scale"]
     assert scatter.expected == 0.01
+    assert scatter.of_repeats is None  # Every recording is a condition of its own.
     assert scatter.found > 0.02
     assert any("friction_scale differs" in w for w in said.warnings)
     # Were the scatter as expected: 1 % over the root of four recordings, at the least.

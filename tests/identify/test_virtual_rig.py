@@ -19,7 +19,7 @@ def said():
     """One, two and three half loops, each twice."""
     batch = ingest_batch(LOOPS)
     estimates = Parameters.estimated(batch.batch.rig)
-    evidence = [Evidence.of(r, estimates, step_s=0.004) for r in batch.recordings]
+    evidence = [Evidence.of(r, estimates, step_s=0.004, placed=True) for r in batch.recordings]
     free = {
         "stiffness_N_per_m": Free(estimates.stiffness_N_per_m, 1e3, 1e5),
         "friction_coefficient": Free(estimates.friction_coefficient, 0.01, 0.6),
@@ -40,6 +40,9 @@ def test_stiffness_friction_and_load_are_what_the_rig_was_made_with(said):
 def test_friction_scatters_as_the_rig_was_told_to(said):
     """1 %; six recordings tell it to a third."""
     assert 0.4 < said.scatter["friction_scale"].found / 0.01 < 1.8
+    # Each of three conditions was recorded twice: three degrees of freedom, of the rig's friction alone.
+    assert said.scatter["friction_scale"].freedom == 3
+    assert 0.2 < said.scatter["friction_scale"].of_repeats / 0.01 < 2.1
     own = [each["friction"] for each in said.own_intervals.values()]
     middle = np.array([(i.low + i.high) / 2 for i in own])
     assert np.std(middle) / np.mean(middle) == pytest.approx(said.scatter["friction_scale"].found, rel=0.3)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from builders import recording
-from ccmodel.model.run import ModelInput
+from ccmodel.model.parameters import Parameters
+from ccmodel.model.run import ModelInput, simulate
 
 
 def test_the_drive_motion_comes_with_likely_deviations():
@@ -17,6 +18,26 @@ def test_the_drive_motion_comes_with_likely_deviations():
     assert some.theta_in == pytest.approx(whole.theta_in[::2], abs=0)
     assert some.drive_deviations == pytest.approx(whole.drive_deviations[:, ::2], abs=0)
     assert 0 < np.sqrt(np.mean(some.drive_deviations**2)) < step
+
+
+def test_where_the_drive_rests_shifts_all_that_follows():
+    step, t = np.pi / 1000, np.arange(0, 3 + 1e-9, 0.01)
+    moving = 0.3 * (1 - np.cos(np.pi * np.clip(t - 0.5, 0, None)))
+    counted = replace(
+        recording(theta_in_rad=lambda _: np.floor(moving / step + 0.3) * step),
+        encoder_step_rad={"theta_in_rad": step},
+        rest_s=0.5,
+    )
+    given = ModelInput.of(counted)
+    parameters = Parameters(7750.0, 1.2, 0.156, 0.006, 0.006, load_stiffness_Nm_per_rad=0.05, pretension_N=7.0)
+    shift = simulate(given, replace(parameters, drive_place=2.0))["theta_in_rad"] - given.theta_in
+    assert shift == pytest.approx(2 * given.drive_place)
+    assert shift[t < 0.4] == pytest.approx(0, abs=1e-3 * step)
+    later = given.drive_place[t > 1]
+    assert later == pytest.approx(later[0], rel=0.02)
+    assert 0 < abs(later[0]) < step / np.sqrt(12) * 1.01
+    # Once that is known, less is unknown.
+    assert (given.placed_deviations**2).mean() < (given.drive_deviations**2).mean()
 
 
 def test_a_drive_that_was_not_counted_is_taken_as_it_is():

@@ -27,12 +27,12 @@ import pandas as pd
 from scipy.stats import t
 
 from ccmodel.compare.loops import QUANTITIES, Quantity, measure
-from ccmodel.compare.repeats import condition_of, pooled_scatter, without_repeat
 from ccmodel.config import Accuracy, Measuring
 from ccmodel.model.failure import ModelError
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import PRESCRIBED, ModelInput, simulate
 from ccmodel.recording import Recording
+from ccmodel.repeats import condition_of, pooled_scatter, without_repeat
 
 JUDGED = (
     "theta_out", "tau_in", "tau_out", "F_drive", "F_load", "T1", "T2", "T3", "T4", "width", "backlash", "lost_motion",
@@ -253,7 +253,7 @@ def _aside(case: Case) -> dict[str, float]:
 
 
 def _every_other(given: ModelInput) -> ModelInput:
-    thin = {n: v[..., ::2] for n in ("theta_in", "drive_deviations", "theta_out", "tau_out")
+    thin = {n: v[..., ::2] for n in ("theta_in", "drive_deviations", "drive_place", "theta_out", "tau_out")
             if (v := getattr(given, n)) is not None}  # fmt: skip
     return replace(given, recording=given.recording[::2], **thin)
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from ccmodel.compare import model_study
 from ccmodel.compare.loops import QUANTITIES, measure
-from ccmodel.compare.repeats import Estimate, difference, estimates
 from ccmodel.compare.studies import label_of, labelled, origins_of, value_of
 from ccmodel.config import Claims, Measuring, ModelStudies
 from ccmodel.geometry import ConduitPath
@@ -22,6 +21,7 @@ from ccmodel.model.failure import ModelError
 from ccmodel.model.paper import SECTIONS as PAPER_SECTIONS
 from ccmodel.model.parameters import Parameters
 from ccmodel.recording import Recording
+from ccmodel.repeats import Estimate, difference, estimates
 
 Pair = tuple[Recording, Recording | None]
 YES, PART, NO, OPEN = "yes", "in part", "no", "not determined"

@@ -6,6 +6,7 @@ of one run are not thirty thousand experiments. What the sensors' noise and the 
 from the residuals as they are, correlated in time.
 """
 
+from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ from scipy.stats import chi2, norm, t
 
 from ccmodel.identify.problem import Block, Problem
 from ccmodel.identify.search import Solution, information_and_slope, solve
+from ccmodel.repeats import condition_of, pooled_scatter
 
 COVERAGE = 0.90
 REACH = float(norm.ppf(0.5 + COVERAGE / 2))  # Standard deviations from the middle to the end of an interval.
@@ -72,11 +74,18 @@ class Scatter:
         Standard deviations; `found` is about the expected value.
     likelihood : float
         Of a scatter this large, were the expected one true.
+    of_repeats : float or None
+        Standard deviation among repeats of a condition alone, pooled over the conditions; None without repeats. What
+        differs between conditions, which a model may get wrong, is not in it.
+    freedom : int
+        Degrees of freedom behind `of_repeats`.
     """
 
     expected: float
     found: float
     likelihood: float
+    of_repeats: float | None = None
+    freedom: int = 0
 
     @property
     def widens(self) -> bool:
@@ -137,9 +146,9 @@ def noise_of(block: Block) -> NDArray:
 def _noise_of_drive(block: Block, errors: NDArray) -> NDArray:
     """The same by what is unknown of the drive's motion.
 
-    Where in its count the drive rests is an error that lasts all recording long. The fit takes it for something else,
-    and what is left does not show it. What is left does show some of the rest of the drive's errors, which therefore
-    count twice: intervals that these govern are too wide rather than too narrow.
+    Unless it is an unknown of the fit, where in its count the drive rests is an error that lasts all recording long:
+    the fit takes it for something else, and what is left does not show it. What is left does show some of the other
+    errors of the drive, which therefore count twice: intervals that these govern are too wide rather than too narrow.
     """
     scores = np.einsum("csk,dcs->dk", block.derivatives, errors)
     return scores.T @ scores / max(len(errors), 1)
@@ -167,7 +176,12 @@ def scatter(problem: Problem, solution: Solution) -> dict[str, Scatter]:
             continue
         at = len(problem.shared) + place + len(problem.own) * np.arange(n)
         square = float((problem.unexpected(solution.x)[at] ** 2).sum())
-        found[name] = Scatter(free.spread, free.spread * float(np.sqrt(square / n)), float(chi2.sf(square, n)))
+        alike = defaultdict(list)
+        for e, value in zip(problem.evidence, solution.x[at].tolist(), strict=True):
+            alike[condition_of(e.given.recording)].append(value)
+        of_repeats, freedom = pooled_scatter(list(alike.values()), relative=False)
+        about = float(np.sqrt(square / n)), float(chi2.sf(square, n))
+        found[name] = Scatter(free.spread, free.spread * about[0], about[1], of_repeats if freedom else None, freedom)
     return found
 
 

@@ -56,6 +56,8 @@ class Evidence:
     judged : ndarray of bool, shape (n,)
     measured, sigma : ndarray, shape (channels, judged samples)
         Values and their standard deviation, in the channels' units.
+    placed : bool
+        Whether where in its count the drive first rests is an unknown of the fit, and not part of the noise.
     """
 
     given: ModelInput
@@ -64,6 +66,7 @@ class Evidence:
     judged: NDArray
     measured: NDArray
     sigma: NDArray
+    placed: bool = False
 
     @classmethod
     def of(
@@ -73,6 +76,7 @@ class Evidence:
         channels: Sequence[str] = MEASURED,
         step_s: float | None = None,
         allowance: float = 0.0,
+        placed: bool = False,
     ) -> "Evidence":
         """Evidence from a recording, a sample every `step_s` of it.
 
@@ -91,11 +95,11 @@ class Evidence:
             raise ModelError(f"{recording.batch}/{recording.id}: none of {', '.join(channels)} was recorded")
         time_s = given.recording.time_s
         judged = time_s >= max(recording.rest_s, recording.settled_s)
-        sensors, drive = sensor_noise(given), drive_errors(given, parameters)
+        sensors, drive = sensor_noise(given), drive_errors(given, parameters, placed)
         measured = np.stack([given.recording[c][judged] for c in used])
         sigma = np.stack([np.hypot(sensors[c], size_over_time(drive[c], time_s)[judged]) for c in used])
         sigma = np.hypot(sigma, allowance * np.ptp(measured, axis=1, keepdims=True))
-        return cls(given, parameters, used, judged, measured, sigma)
+        return cls(given, parameters, used, judged, measured, sigma, placed)
 
     def without(self, channel: str) -> "Evidence":
         """The same without one of the channels."""
@@ -119,7 +123,7 @@ class Evidence:
 
     def drive_errors(self, values: Mapping[str, float]) -> NDArray:
         """Likely errors over the noise that the drive's unknown part makes, shape (draws, channels, judged samples)."""
-        found = drive_errors(self.given, self.parameters.with_values(values))
+        found = drive_errors(self.given, self.parameters.with_values(values), self.placed)
         return np.stack([found[c][:, self.judged] for c in self.channels], axis=1) / self.sigma
 
 

@@ -1,7 +1,8 @@
-"""Searching for the least cost of a fit: Levenberg and Marquardt's steps, kept within bounds.
+"""Searching for the least cost of a fit: scipy's trust region within bounds, on a cost of few rows.
 
-Made for this cost because its Jacobian is mostly empty: a recording's own unknowns touch no other recording. Only each
-recording's small normal matrix is kept, where a general optimiser would decompose all rows by all unknowns.
+Scipy asks for all errors and all derivatives and decomposes them whole, although of a fit's tens of thousands of rows
+only their products with one another count, and a recording's own unknowns touch no other recording. Here it is given
+a root of these products, with as many rows as there are unknowns and one more: the same cost, slope and curvature.
 """
 
 from collections.abc import Sequence
@@ -9,24 +10,30 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import OptimizeResult, least_squares, lsq_linear
 
 from ccmodel.identify.problem import Block, Problem
 from ccmodel.model.failure import ModelError
 from ccmodel.model.sensitivity import STEP
 
-# A search has converged when a full step would lessen the cost by less than this share of it. A cost of thousands is
-# then known to 1e-8, its place to a ten-thousandth of a standard deviation.
-TOLERANCE = 1e-12
+# A search has converged when a step lessens the cost by less than this share of it: its place is then known to a
+# thousandth of a standard deviation, and mostly far better, since the last step is the least.
+TOLERANCE = 1e-10
 # The model has corners (`ccmodel.model.sensitivity`), and so has the cost: its least may lie on one, where a slope says
-# little. When no step helps, differences are taken more broadly; when still none does, what a step promises, in squares
-# of a standard deviation, decides whether the corner is the optimum: a tenth of one is a third of a deviation aside.
+# little. When not even so short a step helps, in sizes, what a step promises, in squares of a standard deviation,
+# decides whether the corner is the optimum: a tenth of one is a third of a deviation aside. Where it promises more,
+# differences are once taken more broadly.
+SHORTEST = 1e-7
 BROAD = 1e-3
 EXCUSED = 0.1
+# Share by which the curvature along each unknown is taken for more than it is: what recordings do not tell apart stays
+# where it is, since its slope is that of rounding.
+DAMPING = 1e-9
+ON_BOUND = 1e-6  # The search stays inside its bounds; so near one, in sizes, it means the bound.
 MOST_EVALUATIONS = 100
-FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e6
+STUCK = 3  # scipy's status where no step longer than the shortest helps
 CONVERGED = "converged: the error no longer falls"
 ON_CORNER = "converged: the least error lies on a corner of it, within a third of a standard deviation"
-ON_BOUNDS = "converged: every unknown is on one of its bounds"
 STOPPED = "stopped at the largest number of evaluations without converging"
 STALLED = "stalled: no step lessens the error although its slope says that one should"
 
@@ -72,7 +79,7 @@ def solve(
     start : ndarray, shape (unknowns,)
     most_evaluations : int
     tolerance : float
-        Share of the cost that a full step must promise to be worth taking.
+        Share of the cost that a step must take off to be worth another.
     fixed : sequence of int
         Unknowns that stay at their start.
 
@@ -81,38 +88,37 @@ def solve(
     ModelError, ValueError
         If the model cannot be run at the start, or its errors are not finite there.
     """
+    movable = np.setdiff1d(np.arange(problem.start.size), fixed)
+    y, evaluations = np.zeros(movable.size), 0
+    for difference in (STEP, BROAD):
+        reduced = _Reduced(problem, start, movable, difference)
+        found = least_squares(
+            reduced.residuals, y, reduced.jacobian, reduced.bounds, ftol=tolerance, xtol=SHORTEST, gtol=None,
+            max_nfev=max(most_evaluations - evaluations, 1),
+        )  # fmt: skip
+        y, evaluations, message = found.x, evaluations + found.nfev, _message(found, reduced, tolerance)
+        if message != STALLED:
+            break
+    x, active = _on_bounds(problem, reduced.place(y))
+    converged = message in (CONVERGED, ON_CORNER)
+    return Solution(x, problem.cost(x), problem.blocks(x), active, converged, message, evaluations)
+
+
+def _message(found: OptimizeResult, reduced: "_Reduced", tolerance: float) -> str:
+    if found.status != STUCK:
+        return CONVERGED if found.success else STOPPED
+    promised = 2 * (found.cost - lsq_linear(found.jac, found.jac @ found.x - found.fun, reduced.bounds).cost)
+    if promised <= tolerance * 2 * found.cost:
+        return CONVERGED
+    return ON_CORNER if promised <= EXCUSED * 2 * found.cost / reduced.problem.independent_looks else STALLED
+
+
+def _on_bounds(problem: Problem, x: NDArray) -> tuple[NDArray, NDArray]:
+    """The search ends short of a bound: unknowns put on it, and which are."""
     low, high = problem.bounds
-    x, cost = np.array(start, float), problem.cost(start)
-    if not np.isfinite(cost):
-        raise ModelError("the errors are not finite at the start")
-    difference, damping, evaluations, said = STEP, FIRST_DAMPING, 1, STOPPED
-    blocks = problem.blocks(x)
-    while evaluations < most_evaluations:
-        information, slope = information_and_slope(problem, x, blocks)
-        movable = ~(((x <= low) & (slope > 0)) | ((x >= high) & (slope < 0)))
-        movable[list(fixed)] = False
-        if not movable.any():
-            said = ON_BOUNDS
-            break
-        promised = _promised(problem, x, information, slope, movable)
-        if promised <= tolerance * cost:
-            said = CONVERGED
-            break
-        tried, lower = x, cost
-        while lower >= cost and damping < MOST_DAMPING and evaluations < most_evaluations:
-            tried = _stepped(problem, x, information, slope, movable, damping)
-            lower, evaluations = _cost_or_infinite(problem, tried), evaluations + 1
-            damping = damping / 10 if lower < cost else damping * 5
-        if lower < cost:
-            x, cost = tried, lower
-        elif damping >= MOST_DAMPING and difference == BROAD:
-            said = ON_CORNER if promised <= EXCUSED * cost / problem.independent_looks else STALLED
-            break
-        elif damping >= MOST_DAMPING:
-            difference, damping = BROAD, FIRST_DAMPING
-        blocks = problem.blocks(x, difference)
-    active = np.where(x <= low, -1, np.where(x >= high, 1, 0))
-    return Solution(x, cost, blocks, active, said in (CONVERGED, ON_CORNER, ON_BOUNDS), said, evaluations)
+    near = ON_BOUND * problem.sizes
+    active = np.where(x <= low + near, -1, np.where(x >= high - near, 1, 0))
+    return np.where(active < 0, low, np.where(active > 0, high, x)), active
 
 
 def information_and_slope(problem: Problem, x: NDArray, blocks: Sequence[Block]) -> tuple[NDArray, NDArray]:
@@ -124,30 +130,48 @@ def information_and_slope(problem: Problem, x: NDArray, blocks: Sequence[Block])
     return information, slope
 
 
-def _stepped(problem: Problem, x: NDArray, information, slope, movable, damping: float) -> NDArray:
-    """Where a damped step leads, in unknowns measured by their sizes, and clipped to the bounds."""
-    at, size = np.ix_(movable, movable), problem.sizes[movable]
-    H, g = information[at] * np.outer(size, size), slope[movable] * size
-    # What no recording depends on stays where it is.
-    H[np.diag_indices_from(H)] += damping * np.diag(H) + 1e-14 * np.diag(H).max() + np.finfo(float).tiny
-    stepped = x.copy()
-    stepped[movable] -= np.linalg.solve(H, g) * size
-    return np.clip(stepped, *problem.bounds)
+class _Reduced:
+    """The cost in few rows, over how far those unknowns that may move lie from their start, in their sizes."""
 
+    def __init__(self, problem: Problem, start: NDArray, movable: NDArray, difference: float):
+        self.problem, self.start, self.movable, self.difference = problem, start, movable, difference
+        self.sizes = problem.sizes[movable]
+        self.bounds = tuple((b - start)[movable] / self.sizes for b in problem.bounds)
+        self.of, self.rows = np.zeros(movable.size), self._rows(start)
 
-def _promised(problem: Problem, x: NDArray, information, slope, movable) -> float:
-    """By how much a step would lessen the cost at best, were the errors linear.
+    def place(self, y: NDArray) -> NDArray:
+        """All unknowns in their units."""
+        x = np.array(self.start, float)
+        x[self.movable] += y * self.sizes
+        return x
 
-    A full step that a bound cuts off may lead uphill where a damped one does not.
-    """
-    steps = [_stepped(problem, x, information, slope, movable, damping) - x for damping in (1e-9, 1e-2, 1e2)]
-    return max(float(-2 * slope @ step - step @ information @ step) for step in steps)
+    def residuals(self, y: NDArray) -> NDArray:
+        """Infinite where the model cannot be run, so that the search turns back."""
+        try:
+            return self._at(y)[:, -1]
+        except (ModelError, ValueError):
+            return np.full(self.rows.shape[0], np.inf)
 
+    def jacobian(self, y: NDArray) -> NDArray:
+        """Of `residuals`, up to a rotation that both share."""
+        return self._at(y)[:, self.movable] * self.sizes
 
-def _cost_or_infinite(problem: Problem, x: NDArray) -> float:
-    """Cost of a try; infinite where the model cannot be run, so that the search turns back."""
-    try:
-        cost = problem.cost(x)
-    except (ModelError, ValueError):
-        return np.inf
-    return cost if np.isfinite(cost) else np.inf
+    def _at(self, y: NDArray) -> NDArray:
+        if not np.array_equal(y, self.of):
+            self.rows, self.of = self._rows(self.place(y)), y.copy()
+        return self.rows
+
+    def _rows(self, x: NDArray) -> NDArray:
+        """Derivatives by all unknowns, and the errors: a root of all their products; shape (rows, unknowns + 1)."""
+        blocks = self.problem.blocks(x, self.difference)
+        information, slope = information_and_slope(self.problem, x, blocks)
+        cost = sum(float((b.errors**2).sum()) for b in blocks) + float((self.problem.unexpected(x) ** 2).sum())
+        information[np.diag_indices_from(information)] *= 1 + DAMPING
+        products = np.block([[information, slope[:, None]], [slope, cost]])
+        if not np.isfinite(products).all():
+            raise ModelError("the errors are not finite")
+        # Each measured by itself, so that rounding takes the same share of small ones and large ones.
+        alone = np.sqrt(np.diag(products))
+        alone = np.where(alone > 0, alone, 1.0)
+        value, vector = np.linalg.eigh(products / np.outer(alone, alone))
+        return np.sqrt(np.maximum(value, 0.0))[:, None] * vector.T * alone

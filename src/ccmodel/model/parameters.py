@@ -28,6 +28,8 @@ class Parameters:
         What the torque sensors read without a torque.
     theta_out_zero_rad : float
         Angle of the load that its encoder shows as none: where in its count it rests.
+    drive_place : float
+        Where in its count the drive first rests, in standard deviations of what its motion says of that.
     F_drive_zero_N, F_load_zero_N : float
         What the load cells read without a tension.
     extra_bend_rad : float
@@ -35,6 +37,9 @@ class Parameters:
     friction_scale, pretension_scale : float
         Friction and initial tension of one recording over what they are in the population, and over what its rest
         shows.
+    profile_bow_A, profile_bow_B : float
+        How each cable's initial tension bends between the ends that its rest shows, of what friction can hold, -1 to
+        1 (`ccmodel.model.initial.InitialTension.between_ends`).
     mechanisms : tuple of Active
         What acts besides the paper's physics.
     """
@@ -49,11 +54,14 @@ class Parameters:
     tau_in_zero_Nm: float = 0.0
     tau_out_zero_Nm: float = 0.0
     theta_out_zero_rad: float = 0.0
+    drive_place: float = 0.0
     F_drive_zero_N: float = 0.0
     F_load_zero_N: float = 0.0
     extra_bend_rad: float = 0.0
     friction_scale: float = 1.0
     pretension_scale: float = 1.0
+    profile_bow_A: float = 0.0
+    profile_bow_B: float = 0.0
     mechanisms: tuple[Active, ...] = ()
 
     @property
@@ -119,6 +127,9 @@ def mechanism_parameter(key: str) -> tuple[str, str, str] | None:
 OWN = (
     "friction_scale",
     "pretension_scale",
+    "profile_bow_A",
+    "profile_bow_B",
+    "drive_place",
     "theta_out_zero_rad",
     "tau_in_zero_Nm",
     "tau_out_zero_Nm",

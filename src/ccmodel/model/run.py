@@ -1,7 +1,7 @@
 """Run the model beside a recording: the same drive motion, load and initial state; what would the sensors read?"""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -16,7 +16,7 @@ from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.transmission import Transmission
 from ccmodel.recording import Recording, stride
-from ccmodel.rig.motion import drive_motion
+from ccmodel.rig.motion import SIDES, drive_motion
 
 # A load torque that was measured is the load's course and the sensor's noise. The noise would rock the load end; a
 # hand, a spring or a brake does nothing above this frequency at the rates that rigs run at (0.1 to 1 Hz).
@@ -40,6 +40,8 @@ class ModelInput:
         The drive's motion behind its encoder's counts, rad; 0 at the rest at the start where there is one.
     drive_deviations : ndarray, shape (draws, n)
         Likely deviations of that motion from the true one, rad; no draws where the drive's angle was not counted.
+    drive_place : ndarray, shape (n,)
+        One standard deviation of where in its count the drive first rests, as it shows in its motion, rad.
     theta_out : ndarray, shape (n,), or None
         The load's motion behind its encoder's counts, rad; None where it was not recorded.
     tau_out : ndarray, shape (n,), or None
@@ -51,6 +53,7 @@ class ModelInput:
     recording: Recording
     theta_in: NDArray
     drive_deviations: NDArray
+    drive_place: NDArray
     theta_out: NDArray | None
     tau_out: NDArray | None
     resting: Mapping[str, NDArray]
@@ -58,14 +61,19 @@ class ModelInput:
     @classmethod
     def of(cls, recording: Recording, step_s: float | None = None) -> "ModelInput":
         """Input from a recording; from a sample every `step_s` of it, once every sample has served its part."""
-        theta_in, deviations = _motion(recording, "theta_in_rad")
+        theta_in, deviations, place = _motion(recording, "theta_in_rad")
         theta_out = _motion(recording, "theta_out_rad")[0] if "theta_out_rad" in recording else None
         tau_out = _without_noise(recording["tau_out_Nm"], recording.time_s) if "tau_out_Nm" in recording else None
         rest = _rest(recording, theta_in)
         every = stride(recording, step_s)
-        series = (theta_in, deviations, theta_out, tau_out)
+        series = (theta_in, deviations, place, theta_out, tau_out)
         thinned = (None if values is None else values[..., ::every] for values in series)
         return cls(recording[::every], *thinned, {c: values[rest] for c, values in recording.channels.items()})
+
+    @property
+    def placed_deviations(self) -> NDArray:
+        """`drive_deviations` where it is known where in its count the drive first rests."""
+        return self.drive_deviations - SIDES[: len(self.drive_deviations), None] * self.drive_place
 
 
 def simulate_recording(recording: Recording, parameters: Parameters) -> Recording:
@@ -109,6 +117,8 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
     )
     load = _load(given, parameters, load_from)
     initial = initial_tension(given, parameters)
+    if parameters.drive_place:
+        given = replace(given, theta_in=given.theta_in + parameters.drive_place * given.drive_place)
     read = _run(transmission, load, given, initial, parameters)
     tau_in, tau_out = (read[f"tau_{end}_Nm"] + getattr(parameters, f"tau_{end}_zero_Nm") for end in ("in", "out"))
     F_drive, F_load = (read[f"F_{end}_N"] + getattr(parameters, f"F_{end}_zero_N") for end in ("drive", "load"))
@@ -168,7 +178,8 @@ def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension
     drive, load = tau_in / parameters.drive_radius_m, tau_out / parameters.load_radius_m
     T1, T3 = scale * (F_drive + drive) / 2, scale * (F_drive - drive) / 2
     T2, T4 = scale * (F_load + load) / 2, scale * (F_load - load) / 2
-    return InitialTension.between_ends(path, parameters.friction, (T1, T2), (T3, T4))
+    bows = parameters.profile_bow_A, parameters.profile_bow_B
+    return InitialTension.between_ends(path, parameters.friction, (T1, T2), (T3, T4), bows)
 
 
 def _load(given: ModelInput, parameters: Parameters, load_from: LoadFrom) -> SpringLoad | TorqueLoad | AngleLoad:
@@ -187,13 +198,13 @@ def _load(given: ModelInput, parameters: Parameters, load_from: LoadFrom) -> Spr
     return TorqueLoad(given.tau_out - parameters.tau_out_zero_Nm)
 
 
-def _motion(recording: Recording, channel: str) -> tuple[NDArray, NDArray]:
-    """The motion behind an encoder's counts, and likely deviations from it."""
+def _motion(recording: Recording, channel: str) -> tuple[NDArray, NDArray, NDArray]:
+    """The motion behind an encoder's counts, likely deviations from it, and what the place of its first rest does."""
     if channel not in recording.encoder_step_rad:
-        return recording[channel], np.zeros((0, recording.time_s.size))
+        return recording[channel], np.zeros((0, recording.time_s.size)), np.zeros(recording.time_s.size)
     step_rad = recording.encoder_step_rad[channel]
     found = drive_motion(recording.time_s, recording[channel], step_rad, recording.rest_s)
-    return found.theta_rad, found.deviations_rad
+    return found.theta_rad, found.deviations_rad, found.place_rad
 
 
 def _rest(recording: Recording, theta_in: NDArray) -> slice:

@@ -31,9 +31,11 @@ def _fit(stated: Fit, recordings_files: Sequence[Path]) -> FitResult:
         return FitResult(False, "no usable recording to fit")
     try:
         shared = {name: _start(name, free, pairs[0][1]) for name, free in stated.free.items()}
+        placed = "drive_place" in stated.per_recording
         at_start = {name: free.start for name, free in shared.items()}
         evidence = [
-            Evidence.of(r, p.with_values(at_start), stated.channels, stated.step_s, stated.allowance) for r, p in pairs
+            Evidence.of(r, p.with_values(at_start), stated.channels, stated.step_s, stated.allowance, placed)
+            for r, p in pairs
         ]
     except (ModelError, ValueError) as error:
         return FitResult(False, str(error), recordings=[f"{r.batch}/{r.id}" for r, _ in pairs])
