@@ -1,6 +1,7 @@
 """The path of a conduit: pieces of constant curvature, from the drive end to the load end."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 from ccmodel.failure import ModelError
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ConduitPath:
     """A conduit as pieces of constant curvature, drive end first; a straight piece has no bend.
 
@@ -51,17 +52,17 @@ class ConduitPath:
         object.__setattr__(self, "piece_length_m", length)
         object.__setattr__(self, "piece_bend_rad", bend)
 
-    @property
+    @cached_property
     def length_m(self) -> float:
         """Arc length of the whole path, m."""
         return float(self.piece_length_m.sum())
 
-    @property
+    @cached_property
     def bend_rad(self) -> float:
         """Bend angle of the whole path, rad: what the capstan loss in full slip depends on."""
         return float(self.piece_bend_rad.sum())
 
-    @property
+    @cached_property
     def halfway_m(self) -> float:
         """Arc length at which half of the bend is behind, m; half of the length of a path without any."""
         if self.bend_rad == 0:

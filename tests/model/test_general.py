@@ -231,7 +231,7 @@ def test_bad_input_is_refused_by_name():
 
 
 def test_grid_respects_corners_and_kinks():
-    grid = make_grid(LOOPS, 32, kinks=[(0.5, 0.7)])
+    grid = make_grid(LOOPS, 32, kinks=((0.5, 0.7),))
     for corner in (0.3, 0.8, 0.6):
         assert np.abs(grid.boundary_m - corner).min() < 1e-12
     assert grid.boundary_rad[-1] == pytest.approx(LOOPS.bend_rad + 0.7)

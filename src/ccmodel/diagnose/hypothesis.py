@@ -34,6 +34,11 @@ class Hypothesis:
     def __str__(self) -> str:
         return " + ".join(f"{name} at {place}" for name, place in self.acting) or "the paper's model"
 
+    @property
+    def missed(self) -> float:
+        """Share of what it does to recordings that the simple forms of its mechanisms may miss."""
+        return max((registry.get(name).missed for name, _ in self.acting), default=0.0)
+
     def of(self, parameters: Parameters) -> Parameters:
         """Parameters with the mechanisms in them, at their starting values."""
         acting = tuple(Active(name, place, registry.get(name).start) for name, place in self.acting)

@@ -28,11 +28,9 @@ WORTH_A_NAME = 0.05
 TRIALS = 6
 PARTNERS = 3
 # What a right model leaves: the mean square of held-out recordings, and in that next to nothing to be learnt by more
-# than chance. On top of either, the share of the calibrated model's excess that the simple form of a mechanism may
-# miss; of a pair, which can bend itself to much that neither of the two is, far less.
+# than chance. On top of either comes what the simple form of a mechanism may miss of the calibrated model's excess.
 RIGHT = 1.5
 LEARNABLE = 0.03
-MISSED = (0.0, 0.08, 0.005)
 # Trials that are asked what could still be learnt of what they leave.
 CONTENDERS = 4
 # A second mechanism must halve what the first one leaves beyond noise.
@@ -113,7 +111,7 @@ def judge(
 def is_right(trial: Trial, base: Trial, learnable: Mapping[Hypothesis, Structure]) -> bool:
     """Whether a hypothesis leaves what a right one would: little, and nothing that could still be learnt."""
     unlearnt = learnable.get(trial.hypothesis)
-    missed = MISSED[len(trial.hypothesis.acting)] * max(_left(base) - 1.0, 0.0)
+    missed = trial.hypothesis.missed * max(_left(base) - 1.0, 0.0)
     return _left(trial) <= RIGHT + missed and unlearnt is not None and unlearnt.surely <= LEARNABLE + missed
 
 

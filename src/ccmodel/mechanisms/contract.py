@@ -165,6 +165,8 @@ class Mechanism:
         One line for tables and pages.
     mistaken_for, separated_by : str
         What looks like it, and the experiment that tells.
+    missed : float
+        Share of what the effect does to recordings (in mean square) that this simple form of it may miss on a rig.
     """
 
     name: str
@@ -173,6 +175,7 @@ class Mechanism:
     summary: str
     mistaken_for: str
     separated_by: str
+    missed: float = 0.003
     enters: Callable[[Settings, str, Mapping[str, float]], None] | None = None
     reads: Callable[[Sensing, str, Mapping[str, float]], dict[str, NDArray]] | None = None
 

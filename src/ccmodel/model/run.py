@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -69,6 +70,11 @@ class ModelInput:
         series = (theta_in, deviations, place, theta_out, tau_out)
         thinned = (None if values is None else values[..., ::every] for values in series)
         return cls(recording[::every], *thinned, {c: values[rest] for c, values in recording.channels.items()})
+
+    @cached_property
+    def resting_mean(self) -> dict[str, float]:
+        """What each channel read on average while the drive did not move; empty without a rest."""
+        return {c: float(values.mean()) for c, values in self.resting.items() if values.size}
 
     @property
     def placed_deviations(self) -> NDArray:
@@ -170,7 +176,7 @@ def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension
     scale = parameters.pretension_scale
     if parameters.pretension_N is not None:
         return InitialTension.uniform(path, scale * parameters.pretension_N)
-    read = {c: values.mean() for c, values in given.resting.items() if values.size}
+    read = given.resting_mean
     if not all(f"T{i}_N" in read for i in (1, 2, 3, 4)):
         return InitialTension.uniform(path, scale * given.recording.pretension_N)
     tau_in, tau_out = (read[f"tau_{end}_Nm"] - getattr(parameters, f"tau_{end}_zero_Nm") for end in ("in", "out"))

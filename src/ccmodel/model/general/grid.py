@@ -1,7 +1,7 @@
 """Cells along the conduit: a friction node in the middle of each, a piece of cable from node to node."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,24 +25,26 @@ class Grid:
     boundary_m: NDArray
     boundary_rad: NDArray
 
-    @property
+    @cached_property
     def cell_m(self) -> NDArray:
         """Length of each cell, m, shape (n,)."""
         return np.diff(self.boundary_m)
 
-    @property
+    @cached_property
     def cell_rad(self) -> NDArray:
         """Bend of each cell, rad, shape (n,)."""
         return np.diff(self.boundary_rad)
 
-    @property
+    @cached_property
     def segment_m(self) -> NDArray:
         """Length of cable from node to node, the two end pieces included, m, shape (n + 1,)."""
         half = np.concatenate([[0.0], self.cell_m, [0.0]]) / 2
         return half[:-1] + half[1:]
 
 
-def make_grid(path: ConduitPath, elements: int, kinks: Sequence[tuple[float, float]] = ()) -> Grid:
+# A fit runs the same few paths thousands of times.
+@lru_cache(maxsize=256)
+def make_grid(path: ConduitPath, elements: int, kinks: tuple[tuple[float, float], ...] = ()) -> Grid:
     """About `elements` cells, finer towards both ends, none across a corner of the path or a kink.
 
     A front that runs in from an end by X needs a pull of the order X^2, so the tension at that end rises as a square
@@ -54,14 +56,14 @@ def make_grid(path: ConduitPath, elements: int, kinks: Sequence[tuple[float, flo
     path : ConduitPath
     elements : int
         Cells wanted; a path of many pieces gets at least one a piece.
-    kinks : sequence of (float, float)
+    kinks : tuple of (float, float)
         Share of the length, in (0, 1), and extra bend (rad) of each.
     """
     length, bend = path.length_m, path.bend_rad
-    kinks = sorted((share * length, extra) for share, extra in kinks)
+    places = sorted((share * length, extra) for share, extra in kinks)
     corners = np.concatenate([[0.0], np.cumsum(path.piece_length_m)])
     corners[-1] = length
-    corners = np.union1d(corners, [x for x, _ in kinks])
+    corners = np.union1d(corners, [x for x, _ in places])
     weight = BEND_WEIGHT if bend > 0 else 0.0
 
     def coordinate(x):
@@ -77,7 +79,7 @@ def make_grid(path: ConduitPath, elements: int, kinks: Sequence[tuple[float, flo
         keep &= np.abs(x - corner) > 0.4 * own
     x = np.union1d(x[keep], corners)
     phi = path.bend_at(x)
-    for place, extra in kinks:
+    for place, extra in places:
         i = int(np.searchsorted(x, place))
         x = np.insert(x, i + 1, x[i])
         phi = np.insert(phi, i + 1, phi[i])

@@ -111,7 +111,7 @@ def simulate(
     _check(time_s, theta_in, series, elements)
     series = np.zeros(1) if series is None else series
 
-    grid = make_grid(transmission.path, elements, settings.kinks)
+    grid = make_grid(transmission.path, elements, tuple(settings.kinks))
     physics = _physics(transmission, load, settings)
     piece, node = _constants(transmission, settings, grid)
     course = np.ones(1) if settings.friction_course is None else settings.friction_course(time_s)
@@ -314,7 +314,8 @@ def _initial_state(physics, piece, node, settings, profiles, course) -> NDArray:
         T = np.concatenate([T, T[:, -1:]], axis=1)
     stretch = T / piece[rows.STIFFNESS]
     settles = piece[rows.LOST] > 0
-    stretch[settles] = stretch_at(T[settles], piece[rows.LOST][settles], piece[rows.STIFFNESS][settles])
+    if settles.any():
+        stretch[settles] = stretch_at(T[settles], piece[rows.LOST][settles], piece[rows.STIFFNESS][settles])
     piece[rows.STRETCH], piece[rows.ELASTIC] = stretch, T
     both = T[:, :-1] + T[:, 1:]
     factor = course * (1 + physics.rise)
