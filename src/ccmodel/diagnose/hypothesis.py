@@ -75,19 +75,13 @@ def singles(without: Collection[str] = ()) -> list[Hypothesis]:
 
 
 def plausible(hypothesis: Hypothesis, values: Mapping[str, float], slack: float = 1.5) -> bool:
-    """Whether every number lies in its mechanism's range, or not further than a factor from it."""
-    return all(
-        _is_plausible(parameter, values[mechanism_key(name, place, parameter.name)], slack)
-        for name, place in hypothesis.acting
-        for parameter in registry.get(name).parameters
-    )
-
-
-def _is_plausible(parameter: Parameter, value: float, slack: float) -> bool:
-    if parameter.scale == "linear" or parameter.low < 0 or parameter.neutral != 0:
-        return True
-    size = abs(value) if parameter.signed else value
-    return parameter.low / slack <= size <= parameter.high * slack
+    """Whether no mechanism is stronger than its range has it by more than a factor; weaker ones are still there."""
+    for name, place in hypothesis.acting:
+        strength = registry.get(name).parameters[0]
+        has_range = strength.low > 0 and strength.neutral == 0 and strength.scale == "log"
+        if has_range and abs(values[mechanism_key(name, place, strength.name)]) > slack * strength.high:
+            return False
+    return True
 
 
 def _asymmetries(name: str, place: str) -> Iterator[dict[str, float]]:

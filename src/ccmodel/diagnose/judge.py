@@ -23,14 +23,15 @@ LOOKS = 20
 # A mechanism is worth a trial if it takes this share off the calibrated model's mean square, and a naming if it takes
 # more than this off what is left of held-out recordings.
 WORTH_A_TRIAL = 0.01
-WORTH_A_NAME = 0.05
+WORTH_A_NAME = 0.03
 # Trials after the screening, and partners tried with each of the best two for a pair.
 TRIALS = 6
 PARTNERS = 3
-# What a right model leaves: the mean square of held-out recordings, and in that next to nothing to be learnt by more
-# than chance. On top of either comes what the simple form of a mechanism may miss of the calibrated model's excess.
+# What a right model leaves: the mean square of held-out recordings, with a share of the calibrated model's excess on
+# top, and in that next to nothing to be learnt by more than chance, with what the simple form of a mechanism may miss.
 RIGHT = 1.5
-LEARNABLE = 0.03
+RIGHT_SHARE = 0.05
+LEARNABLE = 0.01
 # Trials that are asked what could still be learnt of what they leave.
 CONTENDERS = 4
 # A second mechanism must halve what the first one leaves beyond noise.
@@ -111,8 +112,11 @@ def judge(
 def is_right(trial: Trial, base: Trial, learnable: Mapping[Hypothesis, Structure]) -> bool:
     """Whether a hypothesis leaves what a right one would: little, and nothing that could still be learnt."""
     unlearnt = learnable.get(trial.hypothesis)
-    missed = trial.hypothesis.missed * max(_left(base) - 1.0, 0.0)
-    return _left(trial) <= RIGHT + missed and unlearnt is not None and unlearnt.surely <= LEARNABLE + missed
+    excess, missed = max(_left(base) - 1.0, 0.0), trial.hypothesis.missed
+    if unlearnt is None or (trial is base and _left(base) > RIGHT):
+        return False
+    is_small = _left(trial) <= RIGHT + max(RIGHT_SHARE, missed) * excess
+    return is_small and unlearnt.surely <= LEARNABLE + missed * excess
 
 
 def _left(trial: Trial) -> float:

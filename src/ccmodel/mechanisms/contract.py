@@ -175,7 +175,7 @@ class Mechanism:
     summary: str
     mistaken_for: str
     separated_by: str
-    missed: float = 0.003
+    missed: float = 0.001
     enters: Callable[[Settings, str, Mapping[str, float]], None] | None = None
     reads: Callable[[Sensing, str, Mapping[str, float]], dict[str, NDArray]] | None = None
 
