@@ -86,7 +86,7 @@ def _apart(experiment: Experiment, rivals: Sequence[Trial], template, estimates:
         rest_s=0.2,
         settled_s=0.0,
     )
-    given = ModelInput(recording, experiment.theta_in, np.zeros((0, n)), None, None, {})
+    given = ModelInput.prescribed(recording, experiment.theta_in)
     noise = np.median(template.sigma, axis=1, keepdims=True)
     try:
         said = [simulate(given, t.hypothesis.of(estimates).with_values(t.values)) for t in rivals]

@@ -71,6 +71,11 @@ class ModelInput:
         thinned = (None if values is None else values[..., ::every] for values in series)
         return cls(recording[::every], *thinned, {c: values[rest] for c, values in recording.channels.items()})
 
+    @classmethod
+    def prescribed(cls, recording: Recording, theta_in: NDArray) -> "ModelInput":
+        """Input of a motion that nobody recorded: known exactly, begun without a rest."""
+        return cls(recording, theta_in, np.zeros((0, theta_in.size)), np.zeros(theta_in.size), None, None, {})
+
     @cached_property
     def resting_mean(self) -> dict[str, float]:
         """What each channel read on average while the drive did not move; empty without a rest."""

@@ -16,8 +16,10 @@ from matplotlib.figure import Figure
 
 from ccmodel import mechanisms as registry
 from ccmodel.diagnose.diagnosis import Diagnosis
-from ccmodel.diagnose.judge import nested_errors
+from ccmodel.diagnose.hypothesis import plausible
+from ccmodel.diagnose.judge import LEARNABLE, is_right, nested_errors
 from ccmodel.diagnose.locate import PARTS, mismatch
+from ccmodel.diagnose.trial import Trial
 from ccmodel.recording import ORIGIN
 from ccmodel.report.figures import AXIS, COLOURS, STYLE
 
@@ -70,13 +72,33 @@ def write_diagnosis(file: Path, found: Diagnosis) -> None:
 
 def _rivals(found: Diagnosis) -> list[dict]:
     j = found.judgement
-    rows = [{"what": "the calibrated model", "left": float(j.calibrated.left.mean()), "p": None, "why": ""}]
     ranked = sorted(zip(j.trials, j.probability, strict=True), key=lambda item: item[0].left.mean())
-    for trial, p in ranked[:RIVALS]:
-        left = float(trial.left.mean())
-        why = "named" if trial is j.best else f"leaves {left / max(float(j.best.left.mean()), 1e-9):.3g} times as much"
-        rows.append({"what": str(trial.hypothesis), "left": left, "p": p, "why": why})
-    return rows
+    rows = [(j.calibrated, None), *ranked[:RIVALS]]
+    return [
+        {
+            "what": str(trial.hypothesis) if trial.hypothesis.acting else "the calibrated model",
+            "left": float(trial.left.mean()),
+            "learnable": j.learnable[trial.hypothesis].mean if trial.hypothesis in j.learnable else None,
+            "p": p,
+            "why": _why(trial, found),
+        }
+        for trial, p in rows
+    ]
+
+
+def _why(trial: Trial, found: Diagnosis) -> str:
+    """Why a hypothesis was not taken, or that it was."""
+    j = found.judgement
+    if trial is j.best:
+        return "agrees" if not trial.hypothesis.acting and found.said["verdict"] == "agrees" else "the best"
+    if not plausible(trial.hypothesis, trial.values):
+        return "only with more of it than there can be"
+    if is_right(trial, j.calibrated, j.learnable):
+        return f"would do, but leaves {trial.left.mean() / j.best.left.mean():.3g} times as much"
+    learnable = j.learnable.get(trial.hypothesis)
+    if learnable is not None and learnable.surely > LEARNABLE:
+        return "what it leaves follows laws that it does not know"
+    return "leaves too much"
 
 
 def _map(found: Diagnosis) -> Figure:
