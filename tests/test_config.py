@@ -70,6 +70,15 @@ def test_a_study_of_a_batch_that_is_not_there_is_refused(edited):
         expand_studies(config, ["half-loop", "loops", "pretension", "radius"])
 
 
+def test_a_study_of_what_no_diagnosis_finds_is_refused():
+    study = {"s": {"batches": ["b"], "parameters": "extended"}}
+    with pytest.raises(ValueError, match=r"asks for parameters .extended.; there are estimated \["):
+        Config.model_validate({"studies": study})
+    config = Config.model_validate({"diagnose": ["a"], "studies": study})
+    with pytest.raises(InputError, match="studies.s: 'extended' parameters of b, which no one diagnoses"):
+        expand_studies(config, ["a", "b"])
+
+
 def test_each_becomes_a_study_a_batch():
     config = Config.model_validate({"studies": {"load": {"batches": "each"}}})
     assert {n: s.batches for n, s in expand_studies(config, ["a", "b"]).items()} == {"load-a": ["a"], "load-b": ["b"]}

@@ -18,6 +18,7 @@ Figure = Literal["transmission", "torque-loops", "torque-loops-apart", "drive-lo
 PHASE_FIGURES = ("response", "torque-loop", "profiles")
 EACH = "each"
 ESTIMATED = "estimated"
+EXTENDED = "extended"
 
 
 class FreeParameter(TypedModel):
@@ -203,8 +204,9 @@ class Config(TypedModel):
 
     @model_validator(mode="after")
     def _names_known(self):
-        if ESTIMATED in self.fits:
-            raise ValueError(f"'{ESTIMATED}' names the batches' own estimates; call the fit something else")
+        for name, means in ((ESTIMATED, "the batches' own estimates"), (EXTENDED, "what their diagnoses found")):
+            if name in self.fits:
+                raise ValueError(f"'{name}' names {means}; call the fit something else")
         for name, study in self.studies.items():
             if study.parameters is not None and study.parameters not in self.parameter_sets:
                 raise ValueError(
@@ -215,8 +217,8 @@ class Config(TypedModel):
 
     @property
     def parameter_sets(self) -> list[str]:
-        """The batches' own estimates, then the fits."""
-        return [ESTIMATED, *self.fits]
+        """The batches' own estimates, the fits, and, where batches are diagnosed, what their diagnoses found."""
+        return [ESTIMATED, *self.fits, *([EXTENDED] if self.diagnose else [])]
 
     def parameters_of(self, study: Study | Accuracy) -> str:
         """Name of the parameter set that a study is drawn with, or the accuracy is that of."""
@@ -265,9 +267,14 @@ def expand_studies(config: Config, batches: list[str]) -> dict[str, Study]:
                     raise InputError(
                         f"{kind}.{name}: there is no batch '{batch}' in {config.raw}; there are " + ", ".join(batches)
                     )
-    for batch in [] if config.diagnose == EACH else config.diagnose:
+    diagnosed = batches if config.diagnose == EACH else config.diagnose
+    for batch in diagnosed:
         if batch not in batches:
             raise InputError(f"diagnose: there is no batch '{batch}' in {config.raw}; there are " + ", ".join(batches))
+    for name, study in config.studies.items():
+        wanted = batches if study.batches == EACH else study.batches
+        if study.parameters == EXTENDED and (aside := [b for b in wanted if b not in diagnosed]):
+            raise InputError(f"studies.{name}: '{EXTENDED}' parameters of {', '.join(aside)}, which no one diagnoses")
     expanded = {}
     for name, study in config.studies.items():
         if study.batches == EACH:

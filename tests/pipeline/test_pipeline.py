@@ -41,10 +41,11 @@ def write_config(folder: Path, **studies: dict) -> None:
                 "channels": ["theta_out_rad", "tau_in_Nm"],
             }
         },
+        "diagnose": "each",
         "phases": load_config(ROOT / "config/config.yaml").phases.model_dump(),
         "studies": {
             "pretension": {"batches": ["tiny"], "variable": "pretension", "title": "pretension"},
-            "one-run": {"batches": ["tiny"], "figure": "transmission"},
+            "one-run": {"batches": ["tiny"], "figure": "transmission", "parameters": "extended"},
             # The claims' other two studies; a drawing of each comes with them.
             "bend": {"batches": ["tiny"], "variable": "bend"},
             "radius": {"batches": ["tiny"], "variable": "radius"},
@@ -110,7 +111,8 @@ def test_it_makes_figures_tables_and_the_page(finished):
         assert (results / f"figures/{name}.png").stat().st_size > 10_000
     csv, parquet = pd.read_csv(results / "tables/errors.csv"), pd.read_parquet(results / "tables/errors.parquet")
     assert csv["rmse"].to_numpy() == pytest.approx(parquet["rmse"].to_numpy(), rel=1e-4)
-    assert set(parquet["parameters"]) == {"estimated", "fitted"}
+    assert set(parquet["parameters"]) == {"estimated", "fitted", "extended"}
+    assert json.loads((results / "diagnoses/tiny/diagnosis.json").read_text())["verdict"] == "agrees"
     assert ccmodel("left-out", str(results)).returncode == 0
 
 

@@ -7,6 +7,7 @@ from snakemake.exceptions import WorkflowError
 from ccmodel.config import (
     EACH,
     ESTIMATED,
+    EXTENDED,
     PHASE_FIGURES,
     batches_in,
     expand_studies,
@@ -43,7 +44,9 @@ def simulated_of(parameters, batch):
 
 
 def fit_of(parameters, batch):
-    """The fit that a batch is simulated with: its own, or the one that all share."""
+    """What a batch is simulated with: the fit of its own, the one that all share, or the model that its diagnosis found."""
+    if parameters == EXTENDED:
+        return f"{RESULTS}/diagnoses/{batch}/model.json"
     scope = batch if CONFIG.fits[parameters].batches == EACH else "shared"
     return f"{RESULTS}/fits/{parameters}/{scope}.json"
 
@@ -62,7 +65,7 @@ def runs():
     return [
         (p, recordings_of(b), simulated_of(p, b))
         for p in CONFIG.parameter_sets
-        for b in BATCHES
+        for b in (diagnosed() if p == EXTENDED else BATCHES)
     ]
 
 

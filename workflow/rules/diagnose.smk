@@ -4,6 +4,8 @@ rule diagnose:
     output:
         f"{RESULTS}/diagnoses/{{batch}}/diagnosis.json",
         f"{RESULTS}/diagnoses/{{batch}}/report.html",
+        f"{RESULTS}/diagnoses/{{batch}}/calibrated.json",
+        f"{RESULTS}/diagnoses/{{batch}}/model.json",
     log:
         f"{RESULTS}/logs/diagnose/{{batch}}.log",
     benchmark:

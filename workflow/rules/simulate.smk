@@ -1,11 +1,7 @@
 rule simulate:
     input:
         recordings=lambda wildcards: recordings_of(wildcards.batch),
-        fit=lambda wildcards: (
-            []
-            if wildcards.parameters == ESTIMATED
-            else fit_of(wildcards.parameters, wildcards.batch)
-        ),
+        fit=lambda wildcards: fit_if_any(wildcards.parameters, wildcards.batch),
     output:
         simulated=f"{RESULTS}/simulated/{{parameters}}/{{batch}}.nc",
         summary=f"{RESULTS}/simulated/{{parameters}}/{{batch}}.json",

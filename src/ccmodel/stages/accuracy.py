@@ -10,7 +10,7 @@ from ccmodel.compare.accuracy import Case, comparison_table, summary
 from ccmodel.config import Accuracy, Measuring
 from ccmodel.report.accuracy import ratio_figure, scatter_figure
 from ccmodel.report.figures import save_figure
-from ccmodel.stages.files import estimates_of, read_json, read_pairs, write_json
+from ccmodel.stages.files import fitted, read_pairs, write_json
 
 
 def judge_accuracy(
@@ -33,14 +33,11 @@ def judge_accuracy(
 
 
 def _cases(recordings_file: Path, simulated_file: Path, fit_file: Path | None) -> list[Case]:
-    estimates = estimates_of(recordings_file)
-    fit = read_json(fit_file) if fit_file else {"succeeded": True, "values": {}, "recordings": []}
-    if estimates is None or not fit["succeeded"]:
+    fit = fitted(recordings_file, fit_file)
+    if fit.parameters is None:
         return []
-    sds = {name: interval["sd"] for name, interval in fit.get("intervals", {}).items()}
-    parameters = estimates.with_values(fit["values"])
     return [
-        Case(recorded, said, parameters, sds, f"{recorded.batch}/{recorded.id}" in fit["recordings"])
+        Case(recorded, said, fit.parameters, fit.sds, f"{recorded.batch}/{recorded.id}" in fit.recordings)
         for recorded, said in read_pairs(recordings_file, simulated_file)
         if said is not None
     ]

@@ -13,7 +13,7 @@ from ccmodel.model.failure import ModelError
 from ccmodel.model.parameters import Parameters
 from ccmodel.report.claims import model_figure, recordings_figure
 from ccmodel.report.figures import save_figure
-from ccmodel.stages.files import estimates_of, read_json, read_pairs, write_json
+from ccmodel.stages.files import fitted, read_pairs, write_json
 
 _STATED = ("name", "section", "says", "borne_out")
 
@@ -68,10 +68,8 @@ def _line(claim: Claim, row: Row) -> dict:
 
 
 def _parameters(recordings_files: Sequence[Path], fit_file: Path | None) -> Parameters | None:
-    found = (estimates_of(file) for file in recordings_files)
-    estimates = next((e for e in found if e is not None), None)
-    fit = read_json(fit_file) if fit_file else {"succeeded": True, "values": {}}
-    return estimates.with_values(fit["values"]) if estimates and fit["succeeded"] else None
+    found = (fitted(file, fit_file).parameters for file in recordings_files)
+    return next((parameters for parameters in found if parameters is not None), None)
 
 
 def _loops(parameters: Parameters | None, claims: Claims) -> dict:

@@ -60,6 +60,8 @@ def diagnose_recordings(recordings_file: Path, out: Path) -> None:
     except ModelError as error:
         out.mkdir(parents=True, exist_ok=True)
         write_json(out / "diagnosis.json", {"batch": recordings_file.stem, "verdict": None, "why": str(error)})
+        for name in ("calibrated", "model"):
+            write_json(out / f"{name}.json", {"succeeded": False, "message": str(error)})
         (out / "report.html").write_text(f"<p>{recordings_file.stem}: not diagnosed: {html.escape(str(error))}</p>\n")
         return
     _write(found, inputs, out)

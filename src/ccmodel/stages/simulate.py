@@ -6,20 +6,19 @@ from ccmodel import provenance
 from ccmodel.model.failure import ModelError
 from ccmodel.model.run import simulate_recording
 from ccmodel.recording import read_recordings, write_recordings
-from ccmodel.stages.files import estimates_of, read_json, write_json
+from ccmodel.stages.files import fitted, write_json
 
 
 def simulate(recordings_file: Path, fit_file: Path | None, simulated_file: Path, summary_file: Path) -> None:
-    """Run the model beside every recording of a batch; with the batch's own estimates, or with those fitted.
+    """Run the model beside every recording of a batch; with its own estimates, or with what a fit or diagnosis found.
 
     What the model cannot be run on has no simulation, and a line in the summary.
     """
-    estimates = estimates_of(recordings_file)
-    found = {"succeeded": True, "values": {}} if fit_file is None else read_json(fit_file)
+    parameters = fitted(recordings_file, fit_file).parameters
     simulated, failures = [], []
-    for recording in read_recordings(recordings_file) if found["succeeded"] else []:
+    for recording in read_recordings(recordings_file) if parameters is not None else []:
         try:
-            simulated.append(simulate_recording(recording, estimates.with_values(found["values"])))
+            simulated.append(simulate_recording(recording, parameters))
         except (ModelError, ValueError) as error:
             failures.append(str(error))
     inputs = [recordings_file] + ([] if fit_file is None else [fit_file])
