@@ -38,7 +38,7 @@ data: $(VENV)/.ready  ## record data/raw again with the virtual rig
 	$(BIN)/virtualrig record config/virtual-rig.yaml --out data/raw
 
 test: $(VENV)/.ready  ## run the tests and the linters
-	$(BIN)/python -m pytest -n $(CORES) --dist loadfile
+	$(BIN)/python -m pytest -n $(CORES) --dist loadfile --no-loadscope-reorder
 	$(MAKE) --no-print-directory lint
 
 bench: $(VENV)/.ready  ## measure speed and accuracy: results/bench.json, docs/figures/work-precision.png
