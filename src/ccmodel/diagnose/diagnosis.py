@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
+from scipy.stats import t as student
 
 from ccmodel import mechanisms as registry
 from ccmodel.diagnose import experiment, locate
@@ -187,7 +188,8 @@ def _confidence(acting: tuple[str, str], confidence: Mapping[Hypothesis, float])
 def _mechanism(trial: Trial, k: int, confidence: float) -> dict:
     name, place = trial.hypothesis.acting[k]
     names = list(trial.values)
-    reach = norm.ppf(0.5 + COVERAGE / 2)
+    count = len(trial.held_out)
+    reach = student.ppf(0.5 + COVERAGE / 2, count - 1) if count > 1 else norm.ppf(0.5 + COVERAGE / 2)
     parameters = []
     for p in registry.get(name).parameters:
         key = mechanism_key(name, place, p.name)

@@ -16,6 +16,8 @@ from ccmodel.identify.problem import Evidence
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.sensitivity import STEP, size_of
 
+# Independent looks that a channel of a recording gives at a hypothesis: samples are far more, and alike.
+LOOKS = 20
 FRICTION_SPREAD = 0.01  # of itself, from run to run (docs/rig-log-format.md)
 
 

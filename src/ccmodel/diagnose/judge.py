@@ -11,15 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.diagnose.evidence import Weighed
+from ccmodel.diagnose.evidence import LOOKS, Weighed
 from ccmodel.diagnose.hypothesis import Hypothesis, plausible
 from ccmodel.diagnose.structure import Structure, structure
 from ccmodel.diagnose.trial import Score, Trial, fit, score
 from ccmodel.identify.problem import Free
 from ccmodel.model.failure import ModelError
 
-# Independent looks that a channel of a recording gives at a hypothesis.
-LOOKS = 20
 # A mechanism is worth a trial if it takes this share off the calibrated model's mean square, and a naming if it takes
 # more than this off what is left of held-out recordings.
 WORTH_A_TRIAL = 0.01

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from ccmodel import mechanisms as registry
-from ccmodel.diagnose.evidence import Weighed
+from ccmodel.diagnose.evidence import LOOKS, Weighed
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.identify.problem import Free, each
 from ccmodel.model.failure import ModelError
@@ -34,7 +34,7 @@ class Trial:
         By recording, what the fit leaves.
     jacobian : list of ndarray, each of shape (rows, unknowns)
     covariance : ndarray, shape (unknowns, unknowns)
-        By how much the recordings disagree about the values.
+        By how much the recordings disagree about the values; of a single one, what its noise says.
     held_out : list of dict
         By recording, the values that the other recordings ask for.
     aside : list of ndarray, each of shape (rows,)
@@ -110,15 +110,21 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
     information = [j.T @ j / n for j, n in zip(J, counts, strict=True)]
     score = [j.T @ e / n for j, e, n in zip(J, r, counts, strict=True)]
     total = sum(information)
-    count = len(acting)
-    inverse = _inverse(total, sizes)
-    scatter = inverse @ sum(np.outer(g, g) for g in score) @ inverse * count / max(count - 1, 1)
     aside = [
         np.clip(found.x + _inverse(total - H, sizes) @ g, low, high) for H, g in zip(information, score, strict=True)
     ]
     held_out = [named(x) for x in aside]
+    if len(acting) > 1:
+        scatter = _jackknife(np.array(aside) - found.x)
+    else:
+        scatter = _inverse(total, sizes) / (LOOKS * len(acting[0].evidence.channels))
     left = each(acting, lambda i, w: errors(w, held_out[i]))
     return Trial(hypothesis, calibrated, named(found.x), r, J, scatter, held_out, left)
+
+
+def _jackknife(aside: NDArray) -> NDArray:
+    """Covariance of a fit from how far it moves as each recording is left out, shape (unknowns, unknowns)."""
+    return aside.T @ aside * (len(aside) - 1) / len(aside)
 
 
 def _inverse(information: NDArray, sizes: NDArray) -> NDArray:
