@@ -18,7 +18,7 @@ WEIGHED = [SimpleNamespace(evidence=SimpleNamespace(channels=CHANNELS))] * 8
 
 
 def trial(left, *acting, **values):
-    own = {k: v for k, v in VALUES.items() if any(k.startswith(name) for name, _ in acting)} | values
+    own = {k: v for k, v in VALUES.items() if any(k.startswith(f"{n}/{p}/") for n, p in acting)} | values
     left = np.broadcast_to(np.asarray(left, float), 8)
     return Trial(
         Hypothesis(acting), {}, BASE_VALUES | own, [], [], np.eye(1), [BASE_VALUES] * 8, list(np.sqrt(left)[:, None])
@@ -48,6 +48,13 @@ def test_two_that_do_as_well_are_not_told_apart():
     found = verdict(trial(6.0), trial(1.0, FRICTION), trial(1.0005, SCALE))
     assert found.verdict == "undecided"
     assert sum(found.probability) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_mechanism_that_could_be_at_either_of_two_places_is_named():
+    values = {"torque-scale/load-sensor/gain": 0.05}
+    found = verdict(trial(6.0), trial(1.0, SCALE), trial(1.0005, ("torque-scale", "load-sensor"), **values))
+    assert found.verdict == "explained"
+    assert max(found.probability) < 0.8
 
 
 def test_what_no_mechanism_brings_down_is_unexplained():

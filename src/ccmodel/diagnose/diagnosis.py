@@ -158,7 +158,7 @@ def _said(batch, judgement: Judgement, weighed, estimates: Parameters, not_judge
         "batch": batch,
         "verdict": judgement.verdict,
         "location": locate.location(judgement, weighed),
-        "mechanisms": [_mechanism(best, k, _confidence(acting, confidence)) for k, acting in enumerate(named)],
+        "mechanisms": [_mechanism(best, k, _named(name, confidence)) for k, (name, _) in enumerate(named)],
         "alternatives": alternatives,
         "fit": {
             "held_out": [w.evidence.given.recording.id for w in weighed] if len(weighed) > 1 else [],
@@ -180,8 +180,13 @@ def _alternatives(judgement: Judgement, named, confidence) -> list[dict]:
     return [{"name": n, "place": p, "confidence": round(c, 4)} for (n, p), c in ranked if c > RIVAL]
 
 
+def _named(name: str, confidence: Mapping[Hypothesis, float]) -> float:
+    """Probability that a mechanism acts at any of its places, and never certainty."""
+    return min(MOST_CONFIDENT, sum(p for hypothesis, p in confidence.items() if name in hypothesis.names))
+
+
 def _confidence(acting: tuple[str, str], confidence: Mapping[Hypothesis, float]) -> float:
-    """Probability that a mechanism acts: of all hypotheses together that have it, and never certainty."""
+    """Probability that a mechanism acts at a place: of all hypotheses together that have it there."""
     return min(MOST_CONFIDENT, sum(p for hypothesis, p in confidence.items() if acting in hypothesis.acting))
 
 

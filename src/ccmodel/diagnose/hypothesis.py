@@ -35,6 +35,11 @@ class Hypothesis:
         return " + ".join(f"{name} at {place}" for name, place in self.acting) or "the paper's model"
 
     @property
+    def names(self) -> frozenset[str]:
+        """Names of its mechanisms, wherever they act."""
+        return frozenset(name for name, _ in self.acting)
+
+    @property
     def missed(self) -> float:
         """Share of what it does to recordings that the simple forms of its mechanisms may miss."""
         return max((registry.get(name).missed for name, _ in self.acting), default=0.0)

@@ -184,7 +184,10 @@ def _verdict(base: Trial, trials: list[Trial], probability: list[float], scores,
     trials, probability = [trials[k] for k in order], [probability[k] for k in order]
     if not is_right(trials[0], base, learnable) or not plausible(trials[0].hypothesis, trials[0].values):
         return Judgement("unexplained", base, base, trials, probability, scores, learnable)
-    verdict = "explained" if probability[0] >= SURE else "undecided"
+    # A mechanism that could be at either of two places is named all the same.
+    names = trials[0].hypothesis.names
+    sure = sum(p for t, p in zip(trials, probability, strict=True) if t.hypothesis.names == names)
+    verdict = "explained" if sure >= SURE else "undecided"
     return Judgement(verdict, base, trials[0], trials, probability, scores, learnable)
 
 

@@ -26,7 +26,7 @@ def _reads(sensing, place, values):
 MECHANISM = Mechanism(
     name="time-skew",
     places=("drive-sensor", "load-sensor"),
-    parameters=(Parameter("delay", "s", 2e-3, 50e-3, 10e-3, signed=True),),
+    parameters=(Parameter("delay", "s", 2e-3, 50e-3, 10e-3),),
     summary="one side's clock is late",
     mistaken_for="viscous-friction, load-inertia",
     separated_by="a chirp",
