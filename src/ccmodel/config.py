@@ -174,6 +174,17 @@ class Accuracy(TypedModel):
     coverage_factor: float = Field(2.0, gt=0, description="standard uncertainties that an error may have")
 
 
+class Diagnosing(TypedModel):
+    """How finely a diagnosis looks."""
+
+    allowance: float = Field(
+        0.0, ge=0, lt=0.5, description="share of a channel's peak to peak that a right model may leave besides noise"
+    )
+    step_s: float | None = Field(
+        None, gt=0, description="compare a sample every so often, s; absent: as finely as ever"
+    )
+
+
 class Config(TypedModel):
     """A pipeline run."""
 
@@ -182,6 +193,7 @@ class Config(TypedModel):
     diagnose: list[str] | Literal["each"] = Field(
         default_factory=list, description="batches to diagnose: what differs from the model, and why; or 'each'"
     )
+    diagnosing: Diagnosing = Field(default_factory=Diagnosing, description="how finely these are looked at")
     fits: dict[str, Fit] = Field(default_factory=dict, description="parameter sets fitted to recordings")
     studies: dict[str, Study] = Field(default_factory=dict, description="figures")
     phases: PhaseExample | None = Field(None, description="simulated example of the paper's Figs. 5 to 7; absent: none")

@@ -58,6 +58,8 @@ def diagnose(
     not_judged: Sequence[Mapping[str, str]] = (),
     without: Collection[str] = (),
     tell: Callable[[str], None] = lambda text: None,
+    allowance: float = 0.0,
+    step_s: float = STEP_S,
 ) -> Diagnosis:
     """Say whether the calibrated model explains recordings, and if not, where and why.
 
@@ -73,6 +75,10 @@ def diagnose(
         Mechanisms that are not asked for: what a diagnosis says when the truth is not on its list.
     tell : callable
         Is told how the work goes on.
+    allowance : float
+        Share of a channel's peak to peak that a right model may leave, besides the noise: what is finer is not judged.
+    step_s : float
+        Time from one sample that is compared to the next, at least.
 
     Raises
     ------
@@ -83,14 +89,17 @@ def diagnose(
     evidence = []
     for recording in recordings:
         try:
-            step_s = max(STEP_S, float(np.ptp(recording.time_s)) / MOST_SAMPLES)
-            evidence.append(Evidence.of(recording, estimates, step_s=step_s))
+            step = max(step_s, float(np.ptp(recording.time_s)) / MOST_SAMPLES)
+            evidence.append(Evidence.of(recording, estimates, step_s=step, allowance=allowance))
         except (ModelError, ValueError) as error:
             not_judged.append({"what": recording.id, "why": str(error)})
     if not evidence:
         raise ModelError("none of the recordings can be compared with the model: " + not_judged[0]["why"])
     not_judged += _what_is_missing(evidence)
-    calibrated = _calibrated(estimates, evidence)
+    if allowance:
+        why = "as the run was asked to: part of what the noise is taken to be"
+        not_judged.append({"what": f"errors below {100 * allowance:g} % of a channel's peak to peak", "why": why})
+    calibrated = calibration(estimates, evidence)
     estimates = estimates.with_values({name: free.start for name, free in calibrated.items()})
     evidence = [replace(e, parameters=estimates) for e in evidence]
     tell(f"calibrating the paper's model on {len(evidence)} recordings")
@@ -102,7 +111,7 @@ def diagnose(
     return Diagnosis(said, judgement, weighed, estimates)
 
 
-def _calibrated(estimates: Parameters, evidence: Sequence[Evidence]) -> dict[str, Free]:
+def calibration(estimates: Parameters, evidence: Sequence[Evidence]) -> dict[str, Free]:
     """What a calibration leaves free: stiffness, friction, the load's spring, and what no rest shows."""
     free = {
         "stiffness_N_per_m": Free(estimates.stiffness_N_per_m, *STIFFNESS_N_PER_M),
@@ -110,6 +119,10 @@ def _calibrated(estimates: Parameters, evidence: Sequence[Evidence]) -> dict[str
     }
     if estimates.load_stiffness_Nm_per_rad is not None:
         free["load_stiffness_Nm_per_rad"] = Free(estimates.load_stiffness_Nm_per_rad, *LOAD)
+    elif all("tau_in_Nm" in e.channels for e in evidence):
+        # A batch that states no spring may have one all the same, which the torque measured at the load does not feel.
+        size = float(np.median([np.ptp(e.given.recording["tau_in_Nm"]) / np.ptp(e.given.theta_in) for e in evidence]))
+        free["spring_beside_load_Nm_per_rad"] = Free(0.1 * size, 0.0, 10 * size)
     if any("T1_N" not in e.given.resting or "T2_N" not in e.given.resting for e in evidence):
         aimed_at = float(np.mean([e.given.recording.pretension_N for e in evidence]))
         free["pretension_N"] = Free(aimed_at, 0.01 * aimed_at, 100 * aimed_at)
