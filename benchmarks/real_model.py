@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from real_regressor import STEP_S, TARGETS, VARIED, folds
 
 from ccmodel.config import load_config
-from ccmodel.diagnose.diagnosis import calibration
+from ccmodel.diagnose.diagnosis import calibration, first_cycles
 from ccmodel.diagnose.evidence import weigh
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.diagnose.travel import since_reversal
@@ -40,13 +40,16 @@ CONFIG = Path(__file__).parents[1] / "config" / "real.yaml"
 COUNTS = 2
 
 
-def held_out(evidence: Sequence[Evidence], model: Parameters, varied: str) -> list[NDArray]:
-    """By recording, what the model errs by with values from those that do not share its load level or its rate."""
+def held_out(fitted: Sequence[Evidence], evidence: Sequence[Evidence], model: Parameters, varied: str) -> list[NDArray]:
+    """By recording, what the model errs by with values from those that do not share its load level or its rate.
+
+    It is fitted to as much of them as a diagnosis takes, and judged on all of the others.
+    """
     hypothesis = Hypothesis(tuple((m.name, m.place) for m in model.mechanisms))
     free = calibration(evidence[0].parameters, evidence)
     start = {name: model.value_of(name) for name in free}
     start |= {f"{m.name}/{m.place}/{k}": v for m in model.mechanisms for k, v in m.values.items()}
-    weighed = each(evidence, lambda i, e: weigh(e, replace(model, mechanisms=())))
+    weighed = each(fitted, lambda i, e: weigh(e, replace(model, mechanisms=())))
     errors: list = [None] * len(evidence)
     for _, out in folds([e.given.recording for e in evidence], varied):
         known = [w for w, aside in zip(weighed, out, strict=True) if not aside]
@@ -78,8 +81,10 @@ def rows(batch: Path, model_file: Path) -> tuple[list[dict], list[Evidence], dic
     stated = load_config(CONFIG).diagnosing
     model = read_model(model_file)
     estimates = Parameters.estimated(ingested.batch.rig)
-    evidence = [Evidence.of(r, estimates, step_s=STEP_S, allowance=stated.allowance) for r in ingested.recordings]
-    by_varied = {varied: held_out(evidence, model, varied) for varied in VARIED}
+    evidence = [Evidence.of(r, estimates, step_s=STEP_S) for r in ingested.recordings]
+    short = [first_cycles(r, stated.cycles) for r in ingested.recordings]
+    fitted = [Evidence.of(r, estimates, step_s=STEP_S, allowance=stated.allowance) for r in short]
+    by_varied = {varied: held_out(fitted, evidence, model, varied) for varied in VARIED}
     found = []
     for channel, varied in product(TARGETS, VARIED):
         errors = [e[evidence[0].channels.index(channel)] for e in by_varied[varied]]

@@ -60,6 +60,8 @@ def diagnose(
     tell: Callable[[str], None] = lambda text: None,
     allowance: float = 0.0,
     step_s: float = STEP_S,
+    cycles: int | None = None,
+    suspects: Sequence[Sequence[str]] = (),
 ) -> Diagnosis:
     """Say whether the calibrated model explains recordings, and if not, where and why.
 
@@ -79,6 +81,10 @@ def diagnose(
         Share of a channel's peak to peak that a right model may leave, besides the noise: what is finer is not judged.
     step_s : float
         Time from one sample that is compared to the next, at least.
+    cycles : int, optional
+        Cycles of a sine that are compared, once it has settled; further ones are more work and the same again.
+    suspects : sequence of sequence of str
+        One or two mechanisms, each as "name at place", that are fitted in full whatever the screening says of them.
 
     Raises
     ------
@@ -90,7 +96,7 @@ def diagnose(
     for recording in recordings:
         try:
             step = max(step_s, float(np.ptp(recording.time_s)) / MOST_SAMPLES)
-            evidence.append(Evidence.of(recording, estimates, step_s=step, allowance=allowance))
+            evidence.append(Evidence.of(first_cycles(recording, cycles), estimates, step_s=step, allowance=allowance))
         except (ModelError, ValueError) as error:
             not_judged.append({"what": recording.id, "why": str(error)})
     if not evidence:
@@ -106,9 +112,22 @@ def diagnose(
     start = _first_fit(evidence, calibrated)
     fitted = estimates.with_values(start)
     weighed = each(evidence, lambda i, e: weigh(e, fitted))
-    judgement = judge(weighed, calibrated, start, singles(without), tell)
+    judgement = judge(weighed, calibrated, start, singles(without), tell, [_suspect(s) for s in suspects])
     said = _said(recordings[0].batch, judgement, weighed, estimates, not_judged)
     return Diagnosis(said, judgement, weighed, estimates)
+
+
+def _suspect(stated: Sequence[str]) -> Hypothesis:
+    return Hypothesis(tuple(tuple(one.split(" at ", 1)) for one in stated))
+
+
+def first_cycles(recording: Recording, cycles: int | None) -> Recording:
+    """A recording up to so many cycles after it settled; all of it where it is no sine or none are asked for."""
+    frequency = recording.excitation.get("frequency_Hz")
+    if cycles is None or not frequency or recording.excitation.get("wave") != "sine":
+        return recording
+    wanted = recording.time_s <= recording.time_s[0] + max(recording.settled_s, recording.rest_s) + cycles / frequency
+    return recording[: int(wanted.sum())]
 
 
 def calibration(estimates: Parameters, evidence: Sequence[Evidence]) -> dict[str, Free]:
@@ -172,6 +191,7 @@ def _said(batch, judgement: Judgement, weighed, estimates: Parameters, not_judge
         "location": locate.location(judgement, weighed),
         "mechanisms": [_mechanism(best, k, _confidence(acting, confidence)) for k, acting in enumerate(named)],
         "alternatives": alternatives,
+        "nearest": _nearest(judgement),
         "fit": {
             "held_out": [w.evidence.given.recording.id for w in weighed] if len(weighed) > 1 else [],
             "calibrated": base.values,
@@ -180,6 +200,17 @@ def _said(batch, judgement: Judgement, weighed, estimates: Parameters, not_judge
         },
         "next_experiment": next_experiment,
         "not_judged": list(not_judged),
+    }
+
+
+def _nearest(judgement: Judgement) -> dict | None:
+    """Where nothing explains a batch: what came nearest, and what it left of the noise's mean square on held-out."""
+    if judgement.verdict != "unexplained" or (trial := judgement.nearest) is None:
+        return None
+    acting = [_mechanism(trial, k, 0.0) for k in range(len(trial.hypothesis.acting))]
+    return {
+        "mechanisms": [{key: value for key, value in m.items() if key != "confidence"} for m in acting],
+        "mean_square": float(trial.left.mean()),
     }
 
 

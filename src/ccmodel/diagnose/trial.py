@@ -19,8 +19,8 @@ from ccmodel.model.sensitivity import STEP, size_of
 TOLERANCE = 1e-4
 MOST_EVALUATIONS = 25
 # Where no rest shows the pretension the errors have valleys of their own: both cables taut all along, or one of them
-# slack on its way. A fit then starts in either, at shares of the pretension, and takes longer.
-PRETENSION_SHARES, MOST_EVALUATIONS_EACH = (1.0, 0.2), 40
+# slack on its way. A fit then feels its way from either, at shares of the pretension, and goes on from the better.
+PRETENSION_SHARES, FEELING = (1.0, 0.2), 8
 
 
 @dataclass(frozen=True)
@@ -103,16 +103,14 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
         parts = _jacobians(acting, x, names, sizes, high)
         return np.concatenate([J / np.sqrt(n) for J, n in zip(parts, counts, strict=True)])
 
-    starts = _starts(names, x0, low, high)
-    most = MOST_EVALUATIONS if len(starts) == 1 else MOST_EVALUATIONS_EACH
-
-    def solved(x):
+    def solved(x, most=MOST_EVALUATIONS):
         return least_squares(
             residuals, x, jac=jacobian, bounds=(low, high), x_scale=sizes, ftol=TOLERANCE, xtol=TOLERANCE,
             gtol=TOLERANCE, max_nfev=most,
         )  # fmt: skip
 
-    found = _best(solved, starts)
+    starts = _starts(names, x0, low, high)
+    found = solved(x0) if len(starts) == 1 else solved(_best(lambda x: solved(x, FEELING), starts).x)
     ends = np.cumsum(counts)[:-1]
     J = [part * np.sqrt(n) for part, n in zip(np.split(found.jac, ends), counts, strict=True)]
     r = [part * np.sqrt(n) for part, n in zip(np.split(found.fun, ends), counts, strict=True)]

@@ -80,4 +80,6 @@ def _write(found: Diagnosis, inputs: dict, out: Path) -> None:
     write_json(out / "diagnosis.json", found.said | {"headline": headline(found.said), "provenance": inputs})
     for name, trial in (("calibrated", found.judgement.calibrated), ("model", found.judgement.best)):
         write_json(out / f"{name}.json", model_as_dict(found.model(trial), inputs))
+    if found.said["nearest"]:
+        write_json(out / "nearest.json", model_as_dict(found.model(found.judgement.nearest), inputs))
     write_diagnosis(out / "report.html", found)
