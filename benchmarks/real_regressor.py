@@ -77,6 +77,8 @@ def held_out(inputs: Sequence[ModelInput], channel: str, varied: str) -> NDArray
     for _, out in folds(recordings, varied):
         known = np.flatnonzero(~out)
         groups = [where[known] for _, where in folds(recordings, varied) if where[known].any()]
+        # With one value left there is no other to search by; then every recording is by itself.
+        groups = groups if len(groups) > 1 else list(np.eye(known.size, dtype=bool))
         searched = [_searched(settings, X, y, known, groups) for settings in SETTINGS]
         best = int(np.argmin([s.min() for s in searched]))
         model = _learnt(SETTINGS[best], X, y, known, 1 + int(searched[best].argmin()))
