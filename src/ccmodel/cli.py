@@ -63,11 +63,18 @@ def diagnose(
     batch: Folder,
     out: Annotated[Path, typer.Option(help="Folder that gets diagnosis.json, the page and two models.")],
     without: Annotated[list[str], typer.Option(help="A mechanism that is not to be asked for; may be repeated.")] = [],  # noqa: B006
+    allowance: Annotated[
+        float, typer.Option(min=0.0, max=0.49, help="Share of peak to peak that a right model may leave.")
+    ] = 0.0,
+    step: Annotated[float | None, typer.Option(min=1e-4, help="Compare a sample every so often, s.")] = None,
+    cycles: Annotated[int | None, typer.Option(min=1, help="Compare so many cycles of a sine.")] = None,
 ) -> None:
     """Say whether the calibrated model explains a batch, and if not: where it fails and what was left out."""
+    from ccmodel.config import Diagnosing
     from ccmodel.stages.diagnose import diagnose as run
 
-    typer.echo(run(batch, out, without, tell=lambda text: _err.print(text, style="dim", markup=False)))
+    judged = Diagnosing(allowance=allowance, step_s=step, cycles=cycles)
+    typer.echo(run(batch, out, without, lambda text: _err.print(text, style="dim", markup=False), judged))
 
 
 @app.command()

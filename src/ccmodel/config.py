@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
+from ccmodel import mechanisms
 from ccmodel.identify.problem import MEASURED
 from ccmodel.model.parameters import FREE, OWN
 from ccmodel.rig.batch import valid_name
@@ -175,6 +176,30 @@ class Accuracy(TypedModel):
     coverage_factor: float = Field(2.0, gt=0, description="standard uncertainties that an error may have")
 
 
+class Diagnosing(TypedModel):
+    """How finely a diagnosis looks."""
+
+    allowance: float = Field(
+        0.0, ge=0, lt=0.5, description="share of a channel's peak to peak that a right model may leave besides noise"
+    )
+    step_s: float | None = Field(None, gt=0, description="compare a sample every so often, s; absent: finely")
+    cycles: int | None = Field(None, ge=1, description="cycles of a sine that are compared once settled; absent: all")
+    suspects: list[list[str]] = Field(
+        default_factory=list,
+        description="one or two mechanisms each, 'name at place', to fit in full whatever the screening says",
+    )
+
+    @model_validator(mode="after")
+    def _suspects_known(self):
+        for one in (s for suspect in self.suspects for s in suspect):
+            name, _, place = one.partition(" at ")
+            if name not in mechanisms.names() or place not in mechanisms.get(name).places:
+                raise ValueError(f"suspects: there is no mechanism '{one}'; one is stated as 'name at place'")
+        if any(len(suspect) not in (1, 2) for suspect in self.suspects):
+            raise ValueError("suspects: each is a list of one mechanism or of two")
+        return self
+
+
 class Config(TypedModel):
     """A pipeline run."""
 
@@ -183,6 +208,7 @@ class Config(TypedModel):
     diagnose: list[str] | Literal["each"] = Field(
         default_factory=list, description="batches to diagnose: what differs from the model, and why; or 'each'"
     )
+    diagnosing: Diagnosing = Field(default_factory=Diagnosing, description="how finely these are looked at")
     fits: dict[str, Fit] = Field(default_factory=dict, description="parameter sets fitted to recordings")
     studies: dict[str, Study] = Field(default_factory=dict, description="figures")
     phases: PhaseExample | None = Field(None, description="simulated example of the paper's Figs. 5 to 7; absent: none")

@@ -73,6 +73,8 @@ def effect(place="conduit", **values):
         (lambda: SpringLoad(-1.0), "finite and not negative"),
         (lambda: MechanicalLoad(inertia_kg_m2=np.inf), "inertia_kg_m2 must be finite"),
         (lambda: TorqueLoad([0.0, np.nan]), "torque_Nm is not finite at sample 1: leave"),
+        (lambda: TorqueLoad([0.0], -1.0), "a spring beside a load is finite and not negative; got -1"),
+        (lambda: by_exact(load=TorqueLoad(np.zeros(50), 0.1)), "takes the general solver"),
         (lambda: AngleLoad([]), "at least one"),
         (lambda: InitialTension.uniform(PATH, -1.0), "positive along the whole cable"),
         (lambda: InitialTension.uniform(PATH, np.nan), "finite"),

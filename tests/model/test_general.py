@@ -109,6 +109,16 @@ def test_prescribed_torque_of_the_spring_gives_the_spring_back():
     assert rms(torque.T1_N, spring.T1_N) < 1e-3
 
 
+def test_a_spring_beside_the_measured_torque_shares_the_load():
+    """The sensor feels a part of the spring; a stiffness that it does not feel makes up for the rest."""
+    theta = sine()
+    spring = run(theta)
+    shared = run(theta, load=TorqueLoad(0.25 * spring.tau_out_Nm, 0.75 * K_E))
+    assert shared.theta_out_rad == pytest.approx(spring.theta_out_rad, abs=1e-5)
+    assert rms(shared.T1_N, spring.T1_N) < 1e-3
+    assert (shared.tau_out_Nm == 0.25 * spring.tau_out_Nm).all()
+
+
 def test_prescribed_angle_of_the_spring_gives_the_spring_back():
     theta = sine()
     spring = run(theta)

@@ -14,6 +14,7 @@ rule diagnose:
         "../envs/ccmodel.yaml"
     threads: 2
     params:
+        judged=CONFIG.diagnosing.model_dump_json(),
         sources=source_digest("ccmodel.stages.diagnose"),
     message:
         "Diagnosing batch {wildcards.batch}"

@@ -2,8 +2,10 @@
 
 from pathlib import Path
 
+from ccmodel.config import Diagnosing
 from ccmodel.jobs import logged
 from ccmodel.stages.diagnose import diagnose_recordings
 
+judged = Diagnosing.model_validate_json(snakemake.params.judged)
 with logged(snakemake.log[0]):
-    diagnose_recordings(Path(snakemake.input.recordings), Path(snakemake.output[0]).parent)
+    diagnose_recordings(Path(snakemake.input.recordings), Path(snakemake.output[0]).parent, judged)

@@ -59,6 +59,10 @@ def diagnose(
     not_judged: Sequence[Mapping[str, str]] = (),
     without: Collection[str] = (),
     tell: Callable[[str], None] = lambda text: None,
+    allowance: float = 0.0,
+    step_s: float = STEP_S,
+    cycles: int | None = None,
+    suspects: Sequence[Sequence[str]] = (),
 ) -> Diagnosis:
     """Say whether the calibrated model explains recordings, and if not, where and why.
 
@@ -74,6 +78,14 @@ def diagnose(
         Mechanisms that are not asked for: what a diagnosis says when the truth is not on its list.
     tell : callable
         Is told how the work goes on.
+    allowance : float
+        Share of a channel's peak to peak that a right model may leave, besides the noise: what is finer is not judged.
+    step_s : float
+        Time from one sample that is compared to the next, at least.
+    cycles : int, optional
+        Cycles of a sine that are compared, once it has settled; further ones are more work and the same again.
+    suspects : sequence of sequence of str
+        One or two mechanisms, each as "name at place", that are fitted in full whatever the screening says of them.
 
     Raises
     ------
@@ -84,26 +96,42 @@ def diagnose(
     evidence = []
     for recording in recordings:
         try:
-            step_s = max(STEP_S, float(np.ptp(recording.time_s)) / MOST_SAMPLES)
-            evidence.append(Evidence.of(recording, estimates, step_s=step_s))
+            step = max(step_s, float(np.ptp(recording.time_s)) / MOST_SAMPLES)
+            evidence.append(Evidence.of(first_cycles(recording, cycles), estimates, step_s=step, allowance=allowance))
         except (ModelError, ValueError) as error:
             not_judged.append({"what": recording.id, "why": str(error)})
     if not evidence:
         raise ModelError("none of the recordings can be compared with the model: " + not_judged[0]["why"])
     not_judged += _what_is_missing(evidence)
-    calibrated = _calibrated(estimates, evidence)
+    if allowance:
+        why = "as the run was asked to: part of what the noise is taken to be"
+        not_judged.append({"what": f"errors below {100 * allowance:g} % of a channel's peak to peak", "why": why})
+    calibrated = calibration(estimates, evidence)
     estimates = estimates.with_values({name: free.start for name, free in calibrated.items()})
     evidence = [replace(e, parameters=estimates) for e in evidence]
     tell(f"calibrating the paper's model on {len(evidence)} recordings")
     start = _first_fit(evidence, calibrated)
     fitted = estimates.with_values(start)
     weighed = each(evidence, lambda i, e: weigh(e, fitted))
-    judgement = judge(weighed, calibrated, start, singles(without), tell)
+    judgement = judge(weighed, calibrated, start, singles(without), tell, [_suspect(s) for s in suspects])
     said = _said(recordings[0].batch, judgement, weighed, estimates, not_judged)
     return Diagnosis(said, judgement, weighed, estimates)
 
 
-def _calibrated(estimates: Parameters, evidence: Sequence[Evidence]) -> dict[str, Free]:
+def _suspect(stated: Sequence[str]) -> Hypothesis:
+    return Hypothesis(tuple(tuple(one.split(" at ", 1)) for one in stated))
+
+
+def first_cycles(recording: Recording, cycles: int | None) -> Recording:
+    """A recording up to so many cycles after it settled; all of it where it is no sine or none are asked for."""
+    frequency = recording.excitation.get("frequency_Hz")
+    if cycles is None or not frequency or recording.excitation.get("wave") != "sine":
+        return recording
+    wanted = recording.time_s <= recording.time_s[0] + max(recording.settled_s, recording.rest_s) + cycles / frequency
+    return recording[: int(wanted.sum())]
+
+
+def calibration(estimates: Parameters, evidence: Sequence[Evidence]) -> dict[str, Free]:
     """What a calibration leaves free: stiffness, friction, the load's spring, and what no rest shows."""
     free = {
         "stiffness_N_per_m": Free(estimates.stiffness_N_per_m, *STIFFNESS_N_PER_M),
@@ -111,6 +139,10 @@ def _calibrated(estimates: Parameters, evidence: Sequence[Evidence]) -> dict[str
     }
     if estimates.load_stiffness_Nm_per_rad is not None:
         free["load_stiffness_Nm_per_rad"] = Free(estimates.load_stiffness_Nm_per_rad, *LOAD)
+    elif all("tau_in_Nm" in e.channels for e in evidence):
+        # A batch that states no spring may have one all the same, which the torque measured at the load does not feel.
+        size = float(np.median([np.ptp(e.given.recording["tau_in_Nm"]) / np.ptp(e.given.theta_in) for e in evidence]))
+        free["spring_beside_load_Nm_per_rad"] = Free(0.1 * size, 0.0, 10 * size)
     if any("T1_N" not in e.given.resting or "T2_N" not in e.given.resting for e in evidence):
         aimed_at = float(np.mean([e.given.recording.pretension_N for e in evidence]))
         free["pretension_N"] = Free(aimed_at, 0.01 * aimed_at, 100 * aimed_at)
@@ -160,6 +192,7 @@ def _said(batch, judgement: Judgement, weighed, estimates: Parameters, not_judge
         "location": locate.location(judgement, weighed),
         "mechanisms": [_mechanism(best, k, _named(name, confidence)) for k, (name, _) in enumerate(named)],
         "alternatives": alternatives,
+        "nearest": _nearest(judgement),
         "fit": {
             "held_out": [w.evidence.given.recording.id for w in weighed] if len(weighed) > 1 else [],
             "calibrated": base.values,
@@ -168,6 +201,17 @@ def _said(batch, judgement: Judgement, weighed, estimates: Parameters, not_judge
         },
         "next_experiment": next_experiment,
         "not_judged": list(not_judged),
+    }
+
+
+def _nearest(judgement: Judgement) -> dict | None:
+    """Where nothing explains a batch: what came nearest, and what it left of the noise's mean square on held-out."""
+    if judgement.verdict != "unexplained" or (trial := judgement.nearest) is None:
+        return None
+    acting = [_mechanism(trial, k, 0.0) for k in range(len(trial.hypothesis.acting))]
+    return {
+        "mechanisms": [{key: value for key, value in m.items() if key != "confidence"} for m in acting],
+        "mean_square": float(trial.left.mean()),
     }
 
 

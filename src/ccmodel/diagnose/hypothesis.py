@@ -49,6 +49,15 @@ class Hypothesis:
         acting = tuple(Active(name, place, registry.get(name).start) for name, place in self.acting)
         return replace(parameters, mechanisms=acting)
 
+    @property
+    def start(self) -> dict[str, float]:
+        """The mechanisms' starting values, by the names of the unknowns."""
+        return {
+            mechanism_key(name, place, key): value
+            for name, place in self.acting
+            for key, value in registry.get(name).start.items()
+        }
+
     def free(self, start: Mapping[str, float]) -> dict[str, Free]:
         """The mechanisms' numbers as unknowns, from `start`."""
         found = {}

@@ -70,6 +70,11 @@ class Judgement:
     scores: list[Score]
     learnable: Mapping[Hypothesis, Structure]
 
+    @property
+    def nearest(self) -> Trial | None:
+        """The trial that leaves the least, right or not; None where none was worth fitting."""
+        return min(self.trials, key=_left, default=None)
+
 
 def judge(
     weighed: Sequence[Weighed],
@@ -77,6 +82,7 @@ def judge(
     start: Mapping[str, float],
     known: Sequence[Hypothesis],
     tell: Callable[[str], None] = lambda text: None,
+    suspects: Sequence[Hypothesis] = (),
 ) -> Judgement:
     """Try all hypotheses and come to a verdict.
 
@@ -91,15 +97,20 @@ def judge(
         Single mechanisms that may be missing.
     tell : callable
         Is told how the work goes on, a line at a time.
+    suspects : sequence of Hypothesis
+        Singles or pairs that are fitted in full whatever the screening says of them.
     """
     base = fit(weighed, Hypothesis(), calibrated, start)
     tell(f"the calibrated model leaves {_left(base):.2f} of the noise's mean square; asking every mechanism")
     scores = score(weighed, base, known)
-    trials = _fit_all(weighed, calibrated, base, [s for s in scores if s.gain > WORTH_A_TRIAL][:TRIALS], tell)
+    leading = [s for s in scores if s.gain > WORTH_A_TRIAL][:TRIALS]
+    asked = [Score(h, 0.0, h.start) for h in suspects if h not in [s.hypothesis for s in leading]]
+    trials = _fit_all(weighed, calibrated, base, [*leading, *asked], tell)
     trials = sorted(trials, key=_left)
     learnable = {t.hypothesis: structure(weighed, t) for t in [base, *trials[:CONTENDERS]]}
     if trials and not is_right(trials[0], base, learnable):
-        trials = sorted([*trials, *_pairs(weighed, calibrated, trials[:2], known, tell)], key=_left)
+        firsts = [t for t in trials if len(t.hypothesis.acting) == 1][:2]
+        trials = sorted([*trials, *_pairs(weighed, calibrated, firsts, known, tell)], key=_left)
         trials = [t for t in trials if _names_more(t, trials)]
         fresh = [t for t in trials[:CONTENDERS] if t.hypothesis not in learnable]
         learnable |= {t.hypothesis: structure(weighed, t) for t in fresh}

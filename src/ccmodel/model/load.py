@@ -64,12 +64,23 @@ class TorqueLoad:
     ----------
     torque_Nm : ndarray, shape (n,)
         tau_out, the torque of the cables on the load.
+    beside_Nm_per_rad : float
+        A spring that holds the load pulley too and that the torque's sensor does not feel, slack where a run starts;
+        >= 0. Only the general solver knows it.
     """
 
     torque_Nm: NDArray
+    beside_Nm_per_rad: float = 0.0
 
     def __post_init__(self):
+        if not 0 <= self.beside_Nm_per_rad < inf:
+            raise ModelError(f"a spring beside a load is finite and not negative; got {self.beside_Nm_per_rad}")
         object.__setattr__(self, "torque_Nm", series(self.torque_Nm, "torque_Nm"))
+
+    def check_alone(self) -> None:
+        """For solvers that know no spring beside the torque."""
+        if self.beside_Nm_per_rad:
+            raise ModelError("a spring beside a measured torque takes the general solver")
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,8 @@ class Parameters:
         Pulley radii.
     load_stiffness_Nm_per_rad : float or None
         K_e of the spring load; None where the load is what was measured at the load pulley.
+    spring_beside_load_Nm_per_rad : float
+        Where the load is a measured torque: a spring at the load pulley that the torque's sensor does not feel.
     pretension_N : float or None
         Initial tension, the same all along both cables; None takes from each recording what its rest shows.
     tau_in_zero_Nm, tau_out_zero_Nm : float
@@ -50,6 +52,7 @@ class Parameters:
     drive_radius_m: float
     load_radius_m: float
     load_stiffness_Nm_per_rad: float | None = None
+    spring_beside_load_Nm_per_rad: float = 0.0
     pretension_N: float | None = None
     tau_in_zero_Nm: float = 0.0
     tau_out_zero_Nm: float = 0.0
@@ -142,6 +145,7 @@ FREE = (
     "extra_bend_rad",
     "load_radius_m",
     "load_stiffness_Nm_per_rad",
+    "spring_beside_load_Nm_per_rad",
     "pretension_N",
     "tau_in_zero_Nm",
     "tau_out_zero_Nm",

@@ -111,7 +111,7 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
     Recording
         Of origin "model", with the recording's own times and all ten channels, as the sensors would show them: the
         tensions, as in a recording, from torques and sums. theta_out is zeroed as the recording's is: at rest, or,
-        where there is none, to the same mean over what is judged.
+        where there is none or only one before a start-up transient, to the same mean over what is judged.
 
     Raises
     ------
@@ -206,7 +206,7 @@ def _load(given: ModelInput, parameters: Parameters, load_from: LoadFrom) -> Spr
             f"{name}: the batch states no load spring and no torque was measured at the load pulley; one of the two "
             "is needed to know the load"
         )
-    return TorqueLoad(given.tau_out - parameters.tau_out_zero_Nm)
+    return TorqueLoad(given.tau_out - parameters.tau_out_zero_Nm, parameters.spring_beside_load_Nm_per_rad)
 
 
 def _motion(recording: Recording, channel: str) -> tuple[NDArray, NDArray, NDArray]:
@@ -232,7 +232,8 @@ def _without_noise(torque: NDArray, time_s: NDArray) -> NDArray:
 
 
 def _zeroed(theta_out: NDArray, recording: Recording) -> NDArray:
-    if recording.rest_s > 0 or "theta_out_rad" not in recording:
+    from_rest = recording.rest_s > 0 and recording.settled_s <= recording.rest_s
+    if from_rest or "theta_out_rad" not in recording:
         return theta_out - theta_out[0]
     judged = recording.time_s >= recording.settled_s
     return theta_out - theta_out[judged].mean() + recording["theta_out_rad"][judged].mean()

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from ccmodel import mechanisms as registry
 from ccmodel import provenance
+from ccmodel.config import Diagnosing
 from ccmodel.diagnose.diagnosis import Diagnosis
 from ccmodel.diagnose.diagnosis import diagnose as run
 from ccmodel.model.failure import ModelError
@@ -19,7 +20,11 @@ from ccmodel.typed import InputError
 
 
 def diagnose(
-    batch: Path, out: Path, without: Sequence[str] = (), tell: Callable[[str], None] = lambda text: None
+    batch: Path,
+    out: Path,
+    without: Sequence[str] = (),
+    tell: Callable[[str], None] = lambda text: None,
+    judged: Diagnosing | None = None,
 ) -> str:
     """Diagnose a batch folder; the sentence that its page opens with.
 
@@ -42,21 +47,26 @@ def diagnose(
         raise InputError("\n".join(map(str, refused)) or f"{batch}: no recording that can be used")
     not_judged = [{"what": Path(f.file).name, "why": f.text} for f in refused]
     try:
-        found = run(ingested.recordings, Parameters.estimated(ingested.batch.rig), not_judged, without, tell)
+        estimates = Parameters.estimated(ingested.batch.rig)
+        found = run(ingested.recordings, estimates, not_judged, without, tell, **_options(judged))
     except ModelError as error:
         raise InputError(f"{batch}: {error}") from None
     _write(found, inputs, out)
     return headline(found.said)
 
 
-def diagnose_recordings(recordings_file: Path, out: Path) -> None:
+def _options(judged: Diagnosing | None) -> dict:
+    return (judged or Diagnosing()).model_dump(exclude_none=True)
+
+
+def diagnose_recordings(recordings_file: Path, out: Path, judged: Diagnosing | None = None) -> None:
     """The same for recordings that the pipeline has read; a batch that cannot be diagnosed has a file that says why."""
     estimates, recordings = estimates_of(recordings_file), read_recordings(recordings_file)
     inputs = provenance.of_inputs([recordings_file])
     try:
         if estimates is None or not recordings:
             raise ModelError("no recording that can be used")
-        found = run(recordings, estimates)
+        found = run(recordings, estimates, **_options(judged))
     except ModelError as error:
         out.mkdir(parents=True, exist_ok=True)
         write_json(out / "diagnosis.json", {"batch": recordings_file.stem, "verdict": None, "why": str(error)})
@@ -72,4 +82,6 @@ def _write(found: Diagnosis, inputs: dict, out: Path) -> None:
     write_json(out / "diagnosis.json", found.said | {"headline": headline(found.said), "provenance": inputs})
     for name, trial in (("calibrated", found.judgement.calibrated), ("model", found.judgement.best)):
         write_json(out / f"{name}.json", model_as_dict(found.model(trial), inputs))
+    if found.said["nearest"]:
+        write_json(out / "nearest.json", model_as_dict(found.model(found.judgement.nearest), inputs))
     write_diagnosis(out / "report.html", found)

@@ -196,6 +196,7 @@ def simulate_pair(
             held = initial.tension_A_N[-1] - initial.tension_B_N[-1]
             given, start = (np.array([held]), 1.0), held / stiffness
     elif isinstance(load, TorqueLoad):
+        load.check_alone()
         given = _matching(load.torque_Nm, theta_in, "torque_Nm"), 1 / R_o
     elif isinstance(load, AngleLoad):
         given = _matching(load.angle_rad, theta_in, "angle_rad"), R_o

@@ -127,6 +127,8 @@ def simulate(
     status = Status.OK if solved == time_s.size else Status.NO_CONVERGENCE
     time_s, theta_in, out = time_s[:solved], theta_in[:solved], out[:, :solved]
     T1, T2, T3, T4, theta_out, tau_out, tau_in = out
+    if isinstance(load, TorqueLoad) and load.beside_Nm_per_rad:
+        tau_out = series[:solved]  # what the sensor feels
     if settings.drive_friction_Nm != 0.0:
         rubs = bearing(theta_in)
         rubs *= settings.drive_friction_Nm
@@ -276,6 +278,7 @@ def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tu
 def _physics(transmission: Transmission, load: Load, settings: Settings) -> rows.Physics:
     is_mechanical = isinstance(load, MechanicalLoad)
     K_e = load.stiffness_Nm_per_rad if isinstance(load, SpringLoad | MechanicalLoad) else 0.0
+    K_e = load.beside_Nm_per_rad if isinstance(load, TorqueLoad) else K_e
     return rows.Physics(
         has_settling=settings.settling_N > 0,
         has_relaxation=settings.relaxing_share != 0,

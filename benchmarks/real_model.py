@@ -1,0 +1,160 @@
+"""What a diagnosis names, against the yardstick: the same recordings held out, the model refitted to the others.
+
+The model of a diagnosis is refitted without all recordings of one load level, then of one rate, and says what the
+sensors would have read there. Refits start from the values of all recordings together: which valley of the errors is
+the right one is not asked again.
+
+    python benchmarks/real_model.py results/real/diagnoses/Tool_4_Maryland_L_2/model.json \
+        results/real/raw/Tool_4_Maryland_L_2 --yardstick yardstick.json --figure held-out.png
+"""
+
+import argparse
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+from numpy.typing import NDArray
+from real_regressor import STEP_S, TARGETS, VARIED, folds
+
+from ccmodel.config import load_config
+from ccmodel.diagnose.diagnosis import calibration, first_cycles
+from ccmodel.diagnose.evidence import weigh
+from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.diagnose.travel import since_reversal
+from ccmodel.diagnose.trial import fit
+from ccmodel.identify.problem import Evidence, each
+from ccmodel.model.files import read_model
+from ccmodel.model.parameters import Parameters
+from ccmodel.rig.ingest import ingest_batch
+
+CONFIG = Path(__file__).parents[1] / "config" / "real.yaml"
+# A count of the drive's encoder hides where in it the drive turns; so far from there it no longer matters.
+COUNTS = 2
+
+
+def held_out(fitted: Sequence[Evidence], evidence: Sequence[Evidence], model: Parameters, varied: str) -> list[NDArray]:
+    """By recording, what the model errs by with values from those that do not share its load level or its rate.
+
+    It is fitted to as much of them as a diagnosis takes, and judged on all of the others.
+    """
+    hypothesis = Hypothesis(tuple((m.name, m.place) for m in model.mechanisms))
+    free = calibration(evidence[0].parameters, evidence)
+    start = {name: model.value_of(name) for name in free}
+    start |= {f"{m.name}/{m.place}/{k}": v for m in model.mechanisms for k, v in m.values.items()}
+    weighed = each(fitted, lambda i, e: weigh(e, replace(model, mechanisms=())))
+    errors: list = [None] * len(evidence)
+    for _, out in folds([e.given.recording for e in evidence], varied):
+        known = [w for w, aside in zip(weighed, out, strict=True) if not aside]
+        values = fit(known, hypothesis, free, start).values
+        for i in np.flatnonzero(out):
+            e = replace(evidence[i], parameters=hypothesis.of(evidence[i].parameters))
+            errors[i] = e.modelled(values) - e.measured
+    return errors
+
+
+def is_resolved(e: Evidence) -> NDArray:
+    """Samples at which the drive has gone some counts since it last turned round or has them to go, shape (judged,)."""
+    forth, back = (np.abs(t) for t in (since_reversal(e.given)[0], _until_reversal(e)))
+    return (np.minimum(forth, back) > COUNTS * e.given.recording.encoder_step_rad["theta_in_rad"])[e.judged]
+
+
+def _until_reversal(e: Evidence) -> NDArray:
+    recording = e.given.recording
+    turned = recording.with_channels({}, {}, "model")
+    backwards = replace(
+        e.given, recording=replace(turned, time_s=-recording.time_s[::-1]), theta_in=e.given.theta_in[::-1]
+    )
+    return since_reversal(backwards)[0][::-1]
+
+
+def rows(batch: Path, model_file: Path) -> tuple[list[dict], list[Evidence], dict]:
+    """One row for each channel and each thing held out, as the yardstick has them; what they rest on."""
+    ingested = ingest_batch(batch)
+    stated = load_config(CONFIG).diagnosing
+    model = read_model(model_file)
+    estimates = Parameters.estimated(ingested.batch.rig)
+    evidence = [Evidence.of(r, estimates, step_s=STEP_S) for r in ingested.recordings]
+    short = [first_cycles(r, stated.cycles) for r in ingested.recordings]
+    fitted = [Evidence.of(r, estimates, step_s=STEP_S, allowance=stated.allowance) for r in short]
+    by_varied = {varied: held_out(fitted, evidence, model, varied) for varied in VARIED}
+    found = []
+    for channel, varied in product(TARGETS, VARIED):
+        errors = [e[evidence[0].channels.index(channel)] for e in by_varied[varied]]
+        away = [e[is_resolved(v)] for e, v in zip(errors, evidence, strict=True)]
+        found.append(
+            {
+                "batch": batch.name,
+                "channel": channel,
+                "held_out": varied,
+                "rms": _rms(errors),
+                "rms_away_from_turns": _rms(away),
+                "by_recording": {v.given.recording.id: _rms([e]) for v, e in zip(evidence, errors, strict=True)},
+            }
+        )
+    return found, evidence, by_varied
+
+
+def _rms(errors: Sequence[NDArray]) -> float:
+    return float(np.sqrt(np.mean([np.mean(e**2) for e in errors])))
+
+
+def draw(file: Path, evidence: Sequence[Evidence], errors: Sequence[NDArray]) -> None:
+    """Drive torque over drive angle, recorded and predicted: slowest and fastest, at the least and the most load."""
+
+    def key(i):
+        x = evidence[i].given.recording.excitation
+        return x["load_level"], x["frequency_Hz"]
+
+    order = sorted(range(len(evidence)), key=key)
+    loads = sorted({key(i)[0] for i in order})
+    shown = [i for load in (loads[0], loads[-1]) for i in _ends([i for i in order if key(i)[0] == load])]
+    figure, axes = plt.subplots(1, 4, figsize=(13, 3.4), sharey=True)
+    for ax, i in zip(axes, shown, strict=True):
+        e = evidence[i]
+        c = e.channels.index("tau_in_Nm")
+        theta = e.given.theta_in[e.judged]
+        ax.plot(theta, 1e3 * e.measured[c], color="#9a9a9a", lw=2.2, label="recording (measured)")
+        ax.plot(theta, 1e3 * (e.measured[c] + errors[i][c]), lw=1.0, label="model, held out")
+        ax.set_title(f"load level {key(i)[0]:g}, {key(i)[1]:g} Hz", fontsize=9)
+        ax.set_xlabel("drive angle (rad)")
+    axes[0].set_ylabel("drive torque (mN m)")
+    axes[0].legend(fontsize=7)
+    figure.tight_layout()
+    figure.savefig(file, dpi=110)
+
+
+def _ends(items: list) -> tuple:
+    return items[0], items[-1]
+
+
+def main() -> None:
+    """Print what the model leaves, and its ratio to the yardstick's where that is given."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("model", type=Path, help="model.json of a diagnosis")
+    parser.add_argument("batch", type=Path, help="the imported batch that it is of")
+    parser.add_argument("--yardstick", type=Path, help="what real_regressor.py wrote with --out")
+    parser.add_argument("--figure", type=Path, help="draw held-out loops here")
+    asked = parser.parse_args()
+    yardstick = json.loads(asked.yardstick.read_text()) if asked.yardstick else []
+    found, evidence, errors = rows(asked.batch, asked.model)
+    for row in found:
+        same = ("batch", "channel", "held_out")
+        its = next((y for y in yardstick if all(y[k] == row[k] for k in same)), None)
+        unit = "mN m" if row["channel"].startswith("tau") else "mrad"
+        text = f"{row['batch']}  {row['channel']}  other {row['held_out']}: {1e3 * row['rms']:.2f} {unit}"
+        text += f" ({1e3 * row['rms_away_from_turns']:.2f} away from turns)"
+        print(text + (f", {row['rms'] / its['rms']:.2f} times the yardstick" if its else ""), flush=True)
+    if asked.figure:
+        draw(asked.figure, evidence, errors["load_level"])
+
+
+if __name__ == "__main__":
+    main()

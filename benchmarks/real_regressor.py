@@ -1,0 +1,141 @@
+"""The yardstick on measured recordings: what a flexible regressor with memory makes of those it has not seen.
+
+Gradient boosting learns each measured channel from what the model is given too: the drive's angle and the torque at
+the load, now and a while ago, the drive's speed and direction, and how far it has gone since it last turned round. No
+physics is in it. All recordings of one load level, then of one rate, are held out in turn; the settings are searched
+on the other recordings alone, by levels held out among these in the same way.
+
+    python benchmarks/real_regressor.py results/real/raw/Tool_4_Maryland_L_2
+"""
+
+import argparse
+import json
+from collections.abc import Iterator, Sequence
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.ensemble import HistGradientBoostingRegressor
+
+from ccmodel.diagnose.travel import since_reversal, speed
+from ccmodel.model.run import ModelInput
+from ccmodel.recording import Recording
+from ccmodel.rig.ingest import ingest_batch
+
+STEP_S = 0.04
+LAGS_S = (0.04, 0.08, 0.16, 0.32, 0.64, 1.28)
+VARIED = ("load_level", "frequency_Hz")
+TARGETS = ("tau_in_Nm", "theta_out_rad")
+# Settings that are searched: how many leaves a tree has, how many samples a leaf, and then how many trees.
+SETTINGS = [
+    {"max_leaf_nodes": leaves, "min_samples_leaf": least, "learning_rate": 0.1}
+    for leaves, least in product((6, 20), (20, 80))
+]
+MOST_TREES = 300
+SEED = 0
+
+
+def features(given: ModelInput) -> NDArray:
+    """What is known of every sample, shape (n, features)."""
+    theta, torque, time_s = given.theta_in, given.tau_out, given.recording.time_s
+    omega = speed(given)
+    travel, since_s = since_reversal(given)
+    lagged = [_earlier(values, time_s, lag) - values for values in (theta, torque) for lag in LAGS_S]
+    earlier_speeds = [_earlier(omega, time_s, lag) for lag in LAGS_S]
+    return np.column_stack([theta, omega, np.sign(omega), travel, since_s, torque, *lagged, *earlier_speeds])
+
+
+def _earlier(values: NDArray, time_s: NDArray, lag: float) -> NDArray:
+    return np.interp(time_s - lag, time_s, values)
+
+
+def target(given: ModelInput, channel: str) -> NDArray:
+    """What is learnt of every sample: an angle, which has no zero of its own here, about its mean; shape (n,)."""
+    values, judged = given.recording[channel], is_judged(given)
+    return values - values[judged].mean() if channel.startswith("theta") else values
+
+
+def is_judged(given: ModelInput) -> NDArray:
+    """Samples that count, shape (n,)."""
+    return given.recording.time_s >= max(given.recording.settled_s, given.recording.rest_s)
+
+
+def folds(recordings: Sequence[Recording], varied: str) -> Iterator[tuple[float, NDArray]]:
+    """Every value of what was varied, and which recordings have it."""
+    values = np.array([r.excitation[varied] for r in recordings])
+    for value in np.unique(values):
+        yield float(value), values == value
+
+
+def held_out(inputs: Sequence[ModelInput], channel: str, varied: str) -> NDArray:
+    """Mean square by recording of what the regressor errs by, each predicted without all that share its value."""
+    recordings = [g.recording for g in inputs]
+    X = [features(g)[is_judged(g)] for g in inputs]
+    y = [target(g, channel)[is_judged(g)] for g in inputs]
+    square = np.empty(len(inputs))
+    for _, out in folds(recordings, varied):
+        known = np.flatnonzero(~out)
+        groups = [where[known] for _, where in folds(recordings, varied) if where[known].any()]
+        # With one value left there is no other to search by; then every recording is by itself.
+        groups = groups if len(groups) > 1 else list(np.eye(known.size, dtype=bool))
+        searched = [_searched(settings, X, y, known, groups) for settings in SETTINGS]
+        best = int(np.argmin([s.min() for s in searched]))
+        model = _learnt(SETTINGS[best], X, y, known, 1 + int(searched[best].argmin()))
+        for i in np.flatnonzero(out):
+            square[i] = np.mean((model.predict(X[i]) - y[i]) ** 2)
+    return square
+
+
+def _searched(settings: dict, X, y, known: NDArray, groups: Sequence[NDArray]) -> NDArray:
+    """Mean square by number of trees on the groups, each held out of the known recordings in turn."""
+    found = []
+    for group in groups:
+        model = _learnt(settings, X, y, known[~group], MOST_TREES)
+        for i in known[group]:
+            found.append([np.mean((said - y[i]) ** 2) for said in model.staged_predict(X[i])])
+    return np.mean(found, axis=0)
+
+
+def _learnt(settings: dict, X, y, which: NDArray, trees: int) -> HistGradientBoostingRegressor:
+    model = HistGradientBoostingRegressor(**settings, max_iter=trees, early_stopping=False, random_state=SEED)
+    return model.fit(np.concatenate([X[i] for i in which]), np.concatenate([y[i] for i in which]))
+
+
+def yardstick(batch: Path) -> list[dict]:
+    """One row for each channel and each thing held out: rms error, and peak to peak of the typical recording."""
+    inputs = [ModelInput.of(r, STEP_S) for r in ingest_batch(batch).recordings]
+    rows = []
+    for channel, varied in product(TARGETS, VARIED):
+        span = float(np.median([np.ptp(g.recording[channel][is_judged(g)]) for g in inputs]))
+        square = held_out(inputs, channel, varied)
+        by_recording = {g.recording.id: float(np.sqrt(s)) for g, s in zip(inputs, square, strict=True)}
+        rms = float(np.sqrt(square.mean()))
+        row = {"batch": batch.name, "channel": channel, "held_out": varied, "rms": rms, "peak_to_peak": span}
+        rows.append(row | {"by_recording": by_recording})
+    return rows
+
+
+def main() -> None:
+    """Print the yardstick of every batch named on the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("batches", nargs="+", type=Path, help="folders that `ccmodel import-mis-tool` wrote")
+    parser.add_argument("--out", type=Path, help="write the rows here, JSON")
+    asked = parser.parse_args()
+    rows = []
+    for batch in asked.batches:
+        for row in yardstick(batch):
+            unit = "mN m" if row["channel"].startswith("tau") else "mrad"
+            share = 100 * row["rms"] / row["peak_to_peak"]
+            print(
+                f"{row['batch']}  {row['channel']}  other {row['held_out']}: {1e3 * row['rms']:.2f} {unit},"
+                f" {share:.2f} % of peak to peak",
+                flush=True,
+            )
+            rows.append(row)
+    if asked.out:
+        asked.out.write_text(json.dumps(rows, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

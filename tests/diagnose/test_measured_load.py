@@ -1,0 +1,104 @@
+"""What measured recordings of an instrument need: a jaw whose torque is measured, no rest, no load cells."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from builders import recording
+from ccmodel.config import Config, load_config
+from ccmodel.diagnose.diagnosis import calibration, first_cycles
+from ccmodel.diagnose.evidence import Weighed
+from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.diagnose.judge import judge
+from ccmodel.diagnose.trial import fit
+from ccmodel.identify.problem import Evidence, Free
+from ccmodel.model.parameters import Parameters
+from ccmodel.model.run import ModelInput, simulate
+
+TRUE = Parameters(20000.0, 1.2, 0.15, 0.006, 0.006, spring_beside_load_Nm_per_rad=0.02, pretension_N=1.5)
+CHANNELS = ("theta_out_rad", "tau_in_Nm")
+
+
+def jaw(load_Nm, id="r", **extra):
+    """A recording of `TRUE` against a torque that stays nearly the same, without noise."""
+    drive = recording(id=id, tau_out_Nm=lambda t: load_Nm + 0.002 * np.sin(2 * np.pi * t), settled_s=1.0)
+    said = simulate(ModelInput.of(drive), TRUE)
+    measured = {c: said[c] for c in CHANNELS} | {c: drive[c] for c in ("theta_in_rad", "tau_out_Nm")}
+    made = drive.with_channels(measured, dict.fromkeys(measured, "made by hand"), "rig")
+    return replace(made, **extra)
+
+
+def weighed(recorded, sigma=(1e-3, 1e-4)):
+    e = Evidence.of(recorded, replace(TRUE, spring_beside_load_Nm_per_rad=0.0), CHANNELS, step_s=0.02)
+    e = replace(e, sigma=np.repeat(np.array(sigma)[:, None], e.measured.shape[1], axis=1))
+    rows = e.measured.size
+    return Weighed(e, np.zeros((rows, 1)), np.zeros(1), dict(zip(e.channels, sigma, strict=True)))
+
+
+def test_a_fit_finds_the_valley_in_which_a_cable_goes_slack():
+    """From ten times the pretension, where no cable ever goes slack."""
+    batch = [weighed(jaw(load, str(k))) for k, load in enumerate((-0.005, -0.04))]
+    free = {
+        "pretension_N": Free(15.0, 0.1, 100.0),
+        "friction_coefficient": Free(0.15, 0.01, 1.0),
+        "spring_beside_load_Nm_per_rad": Free(0.01, 0.0, 1.0),
+    }
+    found = fit(batch, Hypothesis(), free, {name: f.start for name, f in free.items()})
+    assert found.values["pretension_N"] == pytest.approx(1.5, rel=0.02)
+    assert found.values["friction_coefficient"] == pytest.approx(0.15, rel=0.02)
+    assert found.values["spring_beside_load_Nm_per_rad"] == pytest.approx(0.02, rel=0.05)
+
+
+def test_the_spring_beside_the_load_is_asked_for_only_where_the_load_was_measured():
+    e = weighed(jaw(-0.01)).evidence
+    assert "spring_beside_load_Nm_per_rad" in calibration(e.parameters, [e])
+    assert "spring_beside_load_Nm_per_rad" not in calibration(replace(e.parameters, load_stiffness_Nm_per_rad=0.1), [e])
+
+
+def test_a_rest_before_the_start_up_transient_says_nothing_of_the_jaws_zero():
+    """The model's angle goes to the mean of what is judged, as without any rest."""
+    shifted = jaw(-0.01, rest_s=0.05)
+    shifted = replace(shifted, channels=dict(shifted.channels, theta_out_rad=shifted["theta_out_rad"] + 0.3))
+    said = simulate(ModelInput.of(shifted), TRUE)
+    judged = shifted.time_s >= shifted.settled_s
+    assert said["theta_out_rad"][judged] == pytest.approx(shifted["theta_out_rad"][judged], abs=1e-3)
+
+
+def test_so_many_cycles_of_a_sine_are_compared_and_all_of_anything_else():
+    r = jaw(-0.01, excitation={"wave": "sine", "frequency_Hz": 2.0})
+    assert first_cycles(r, 3).time_s[-1] == pytest.approx(1.0 + 3 / 2.0)
+    assert first_cycles(r, None) is r
+    steps = jaw(-0.01, excitation={"wave": "steps", "frequency_Hz": 2.0})
+    assert first_cycles(steps, 3) is steps
+
+
+def test_a_suspect_is_fitted_in_full_though_the_screening_passes_it_over():
+    batch = [weighed(jaw(load, str(k))) for k, load in enumerate((-0.004, -0.008))]
+    free = {"friction_coefficient": Free(0.15, 0.01, 1.0), "spring_beside_load_Nm_per_rad": Free(0.02, 0.0, 1.0)}
+    start = {name: f.start for name, f in free.items()}
+    suspect = Hypothesis((("pulley-friction", "drive-pulley"),))
+    found = judge(batch, free, start, known=[], suspects=[suspect])
+    assert [t.hypothesis for t in found.trials] == [suspect]
+    assert found.nearest is found.trials[0]
+    assert judge(batch, free, start, known=[]).nearest is None
+
+
+@pytest.mark.parametrize(
+    "suspects, said",
+    [
+        ([["friction"]], "there is no mechanism 'friction'"),
+        ([["presliding at load"]], "there is no mechanism 'presliding at load'"),
+        ([[]], "one mechanism or of two"),
+    ],
+)
+def test_a_suspect_that_is_not_known_is_refused(suspects, said):
+    with pytest.raises(ValueError, match=said):
+        Config(diagnosing={"suspects": suspects})
+
+
+def test_the_configuration_for_the_public_recordings_diagnoses_them():
+    config = load_config(Path(__file__).parents[2] / "config" / "real.yaml")
+    assert config.diagnose == "each"
+    assert 0 < config.diagnosing.allowance < 0.05
