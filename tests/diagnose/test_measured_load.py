@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,8 +13,9 @@ from ccmodel.diagnose.diagnosis import calibration, first_cycles
 from ccmodel.diagnose.evidence import Weighed
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.diagnose.judge import judge
-from ccmodel.diagnose.trial import fit
+from ccmodel.diagnose.trial import _best, _starts, fit
 from ccmodel.identify.problem import Evidence, Free
+from ccmodel.model.failure import ModelError
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 
@@ -37,7 +39,7 @@ def weighed(recorded, sigma=(1e-3, 1e-4)):
     return Weighed(e, np.zeros((rows, 1)), np.zeros(1), dict(zip(e.channels, sigma, strict=True)))
 
 
-def test_a_fit_finds_the_valley_in_which_a_cable_goes_slack():
+def test_a_fit_finds_pretension_friction_and_spring_without_a_rest():
     """From ten times the pretension, where no cable ever goes slack."""
     batch = [weighed(jaw(load, str(k))) for k, load in enumerate((-0.005, -0.04))]
     free = {
@@ -102,3 +104,23 @@ def test_the_configuration_for_the_public_recordings_diagnoses_them():
     config = load_config(Path(__file__).parents[2] / "config" / "real.yaml")
     assert config.diagnose == "each"
     assert 0 < config.diagnosing.allowance < 0.05
+
+
+def test_a_fit_feels_its_way_from_a_slack_cable_too_where_the_pretension_is_not_known():
+    x0, low, high = np.array([2.0, 10.0]), np.array([0.0, 3.0]), np.array([5.0, 50.0])
+    taut, slack = _starts(["friction_coefficient", "pretension_N"], x0, low, high)
+    assert taut == pytest.approx(x0)
+    assert slack[0] == 2.0
+    assert low[1] < slack[1] == pytest.approx(3.0)  # a fifth would lie below what is allowed
+    assert len(_starts(["friction_coefficient"], x0[:1], low[:1], high[:1])) == 1
+
+
+def test_the_better_start_is_taken_and_one_that_cannot_be_run_only_if_none_can():
+    def solved(x):
+        if x < 0:
+            raise ModelError("cannot be run")
+        return SimpleNamespace(x=x, cost=abs(x - 3.0))
+
+    assert _best(solved, [-1.0, 7.0, 2.0]).x == 2.0
+    with pytest.raises(ModelError):
+        _best(solved, [-1.0])
