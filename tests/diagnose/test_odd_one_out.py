@@ -1,0 +1,51 @@
+"""A recording that is not what its batch file says."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ccmodel.diagnose.diagnosis import odd_one_out
+from ccmodel.diagnose.evidence import weigh
+from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.diagnose.judge import Judgement
+from ccmodel.diagnose.trial import fit
+from ccmodel.geometry import ConduitPath
+from ccmodel.identify.problem import Free
+from made_evidence import PARAMETERS, batch
+
+CALIBRATED = {
+    "stiffness_N_per_m": Free(PARAMETERS.stiffness_N_per_m, 1e2, 1e7),
+    "friction_coefficient": Free(PARAMETERS.friction_coefficient, 0.005, 1.5),
+    "load_stiffness_Nm_per_rad": Free(PARAMETERS.load_stiffness_Nm_per_rad, 1e-4, 10.0),
+}
+
+
+def judged(recordings):
+    base = fit(recordings, Hypothesis(), CALIBRATED, {name: free.start for name, free in CALIBRATED.items()})
+    return Judgement("unexplained", base, base, [], [], [], {})
+
+
+@pytest.fixture(scope="module")
+def contradicting():
+    """Four recordings, of which the batch says that the third was bent twice as much as it was."""
+    recordings = batch()
+    e = recordings[2].evidence
+    stated = replace(e.given.recording, path=ConduitPath([1.2], [2 * np.pi]))
+    recordings[2] = weigh(replace(e, given=replace(e.given, recording=stated)), PARAMETERS)
+    return recordings
+
+
+def test_it_is_named(contradicting):
+    (found,) = odd_one_out(judged(contradicting), contradicting)
+    assert found["what"] == "r2"
+    assert "check its bend" in found["why"]
+
+
+def test_where_all_are_off_none_is():
+    recordings = batch(lambda said: {"tau_in_Nm": 2e-3 * np.sin(25 * said["theta_in_rad"])})
+    assert odd_one_out(judged(recordings), recordings) == []
+
+
+def test_three_recordings_do_not_say_which(contradicting):
+    assert odd_one_out(judged(contradicting[:3]), contradicting[:3]) == []
