@@ -122,7 +122,7 @@ def diagnose(
 
 
 def odd_one_out(judgement: Judgement, weighed: Sequence[Weighed]) -> list[dict[str, str]]:
-    """Of an unexplained batch, the recording without which the paper's model would do: it may not be what it is said to."""
+    """Of an unexplained batch, the recording without which the paper's model would do."""
     base = judgement.calibrated
     if judgement.verdict != "unexplained" or len(weighed) < FEWEST_TO_CONTRADICT:
         return []
