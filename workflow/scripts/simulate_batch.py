@@ -8,7 +8,7 @@ from ccmodel.stages.simulate import simulate
 with logged(snakemake.log[0]):
     simulate(
         Path(snakemake.input.recordings),
-        Path(snakemake.input.fit) if snakemake.input.fit else None,
+        Path(snakemake.input.fit[0]) if snakemake.input.fit else None,
         Path(snakemake.output.simulated),
         Path(snakemake.output.summary),
     )
