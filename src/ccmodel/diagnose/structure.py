@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import t as student
 
 from ccmodel.diagnose.evidence import Weighed
 from ccmodel.diagnose.travel import since_reversal, speed
@@ -50,8 +51,9 @@ class Structure:
 
     @property
     def surely(self) -> float:
-        """Two standard errors below the mean: what can be learnt by more than chance."""
-        return self.mean - 2 * float(self.gain.std(ddof=1)) / np.sqrt(self.gain.size)
+        """What can be learnt by more than chance: the lower end of the mean's 95 % interval, wide where there are few."""
+        n = self.gain.size
+        return self.mean - float(student.ppf(0.975, n - 1) * self.gain.std(ddof=1) / np.sqrt(n))
 
 
 def structure(weighed: Sequence[Weighed], trial: Trial) -> Structure:
