@@ -51,7 +51,7 @@ class Structure:
 
     @property
     def surely(self) -> float:
-        """What can be learnt by more than chance: the lower end of the mean's 95 % interval, wide where there are few."""
+        """What can be learnt by more than chance: the lower end of the mean's 95 % interval."""
         n = self.gain.size
         return self.mean - float(student.ppf(0.975, n - 1) * self.gain.std(ddof=1) / np.sqrt(n))
 
