@@ -14,7 +14,7 @@ from proof.cases import Case
 from virtualrig.campaign import as_yaml, compress, description, log_name, prepare, recording_generator, run
 from virtualrig.config import Campaign, LoadCell, RecordingPlan, TorqueSensor
 from virtualrig.motion import Excitation, smooth_step
-from virtualrig.sensors import Side, log, sensed
+from virtualrig.sensors import log, sensed_sides
 from virtualrig.trajectory import Preparation, SimulationError, Trajectory
 
 NOTE = "recordings of a simulated rig; its physics is not disclosed"
@@ -64,9 +64,7 @@ def simulate(campaign: Campaign, plan: RecordingPlan, preparation: Preparation) 
 
 def shown(campaign: Campaign, trajectory: Trajectory) -> dict[str, NDArray]:
     """Channels as faulty sensors without noise would show them."""
-    t, rig = trajectory, campaign.rig
-    drive = sensed(t.time_s, Side(t.theta_in_rad, t.tau_in_Nm, t.T1_N + t.T3_N), rig, rig.effects.drive_sensors)
-    load = sensed(t.time_s, Side(t.theta_out_rad, t.tau_out_Nm, t.T2_N + t.T4_N), rig, rig.effects.load_sensors)
+    drive, load = sensed_sides(trajectory, campaign.rig)
     return {
         "theta_out_rad": load.angle_rad,
         "tau_in_Nm": drive.torque_Nm,

@@ -6,7 +6,9 @@ import numpy as np
 
 from builders import recording
 from ccmodel.diagnose.evidence import weigh
-from ccmodel.identify.problem import Evidence
+from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.diagnose.trial import fit
+from ccmodel.identify.problem import Evidence, Free
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 
@@ -42,3 +44,13 @@ def batch(spoil=lambda said: {}):
     """Four recordings of different motions and pretensions."""
     conditions = ((0.6, 1.0, 7.0), (0.4, 0.7, 7.0), (0.6, 1.0, 5.0), (0.5, 1.3, 6.0))
     return [weighed(*condition, seed=k, spoil=spoil) for k, condition in enumerate(conditions)]
+
+
+def calibrated(recordings):
+    """The paper's model, fitted to recordings."""
+    free = {
+        "stiffness_N_per_m": Free(PARAMETERS.stiffness_N_per_m, 1e2, 1e7),
+        "friction_coefficient": Free(PARAMETERS.friction_coefficient, 0.005, 1.5),
+        "load_stiffness_Nm_per_rad": Free(PARAMETERS.load_stiffness_Nm_per_rad, 1e-4, 10.0),
+    }
+    return fit(recordings, Hypothesis(), free, {name: one.start for name, one in free.items()})

@@ -6,6 +6,15 @@ from ccmodel.config import ModelStudies
 from ccmodel.model.parameters import Parameters
 
 CABLE = Parameters(7750.0, 1.2, 0.156, 0.006, 0.006, 0.05)
+PULLED = Parameters(
+    stiffness_N_per_m=9000.0,
+    reference_length_m=1.2,
+    friction_coefficient=0.15,
+    drive_radius_m=0.006,
+    load_radius_m=0.006,
+    load_stiffness_Nm_per_rad=0.05,
+    pretension_N=7.0,
+)
 STUDY = ModelStudies(
     pretension_N=7.3,
     amplitude_rad=1.0,

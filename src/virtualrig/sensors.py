@@ -49,11 +49,9 @@ def log(trajectory: Trajectory, sensors: Sensors, rig: Rig, draw: Generator) -> 
     SensorRangeError
         If a torque or a tension sum is beyond the sensor's range.
     """
-    t = trajectory
-    drive = sensed(t.time_s, Side(t.theta_in_rad, t.tau_in_Nm, t.T1_N + t.T3_N), rig, rig.effects.drive_sensors)
-    load = sensed(t.time_s, Side(t.theta_out_rad, t.tau_out_Nm, t.T2_N + t.T4_N), rig, rig.effects.load_sensors)
+    drive, load = sensed_sides(trajectory, rig)
     return {
-        "time_s": t.time_s,
+        "time_s": trajectory.time_s,
         "drive_encoder_counts": encode(drive.angle_rad, sensors.encoder, draw),
         "load_encoder_counts": encode(load.angle_rad, sensors.encoder, draw),
         "drive_current_A": current(drive.torque_Nm, sensors.torque, draw),
@@ -61,6 +59,14 @@ def log(trajectory: Trajectory, sensors: Sensors, rig: Rig, draw: Generator) -> 
         "drive_load_cell_V": load_cell_voltage(drive.force_N, sensors.load_cell, draw),
         "load_load_cell_V": load_cell_voltage(load.force_N, sensors.load_cell, draw),
     }
+
+
+def sensed_sides(trajectory: Trajectory, rig: Rig) -> tuple[Side, Side]:
+    """What the sensors of the drive's and of the load's side take for true, without noise."""
+    t = trajectory
+    drive = sensed(t.time_s, Side(t.theta_in_rad, t.tau_in_Nm, t.T1_N + t.T3_N), rig, rig.effects.drive_sensors)
+    load = sensed(t.time_s, Side(t.theta_out_rad, t.tau_out_Nm, t.T2_N + t.T4_N), rig, rig.effects.load_sensors)
+    return drive, load
 
 
 def sensed(time_s: NDArray, truth: Side, rig: Rig, faults: SideSensors) -> Side:

@@ -53,25 +53,22 @@ def test_peak_to_peak_is_not_that_of_the_noise():
     assert values["tau_in"] == pytest.approx(200.0, rel=0.005)
 
 
+def slack_at_times(t):
+    """A tension that is there for half of a cycle of one second."""
+    return np.maximum(50 * np.sin(2 * np.pi * t), 0)
+
+
+def taut(t):
+    return np.full_like(t, 5.0)
+
+
 def test_a_cable_that_is_slack_for_half_the_cycle_is_slack_for_half_the_cycle():
-    def tension(t):
-        return np.maximum(50 * np.sin(2 * np.pi * t), 0)
-
-    def taut(t):
-        return np.full_like(t, 5.0)
-
-    r = fine(T1_N=tension, T2_N=tension, T3_N=taut, T4_N=taut)
+    r = fine(T1_N=slack_at_times, T2_N=slack_at_times, T3_N=taut, T4_N=taut)
     assert measure(r, ["slack_share"], HOW)[0]["slack_share"] == pytest.approx(50.0, abs=1.0)
 
 
 def test_a_cable_is_slack_only_if_both_of_its_ends_are():
-    def tension(t):
-        return np.maximum(50 * np.sin(2 * np.pi * t), 0)
-
-    def taut(t):
-        return np.full_like(t, 5.0)
-
-    r = fine(T1_N=tension, T2_N=taut, T3_N=taut, T4_N=taut)
+    r = fine(T1_N=slack_at_times, T2_N=taut, T3_N=taut, T4_N=taut)
     assert measure(r, ["slack_share"], HOW)[0]["slack_share"] == 0
 
 

@@ -3,18 +3,9 @@
 import numpy as np
 import pytest
 
-from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.diagnose.judge import Judgement
 from ccmodel.diagnose.locate import location
-from ccmodel.diagnose.trial import fit
-from ccmodel.identify.problem import Free
-from made_evidence import NOISE, PARAMETERS, batch
-
-CALIBRATED = {
-    "stiffness_N_per_m": Free(PARAMETERS.stiffness_N_per_m, 1e2, 1e7),
-    "friction_coefficient": Free(PARAMETERS.friction_coefficient, 0.005, 1.5),
-    "load_stiffness_Nm_per_rad": Free(PARAMETERS.load_stiffness_Nm_per_rad, 1e-4, 10.0),
-}
+from made_evidence import NOISE, batch, calibrated
 
 
 def wave(said, channel):
@@ -28,8 +19,7 @@ def wave(said, channel):
 )
 def test_a_channel_that_is_off_alone_gives_its_place_away(channel, place):
     recordings = batch(lambda said: wave(said, channel))
-    start = {name: free.start for name, free in CALIBRATED.items()}
-    base = fit(recordings, Hypothesis(), CALIBRATED, start)
+    base = calibrated(recordings)
     found = location(Judgement("unexplained", base, base, [], [], [], {}), recordings)
     assert found["place"] == place
     assert found["channels"][0] == channel.rsplit("_", 1)[0]
@@ -37,6 +27,5 @@ def test_a_channel_that_is_off_alone_gives_its_place_away(channel, place):
 
 def test_a_ripple_of_both_torques_sits_in_between():
     recordings = batch(lambda said: wave(said, "tau_in_Nm") | wave(said, "tau_out_Nm") | wave(said, "theta_out_rad"))
-    start = {name: free.start for name, free in CALIBRATED.items()}
-    base = fit(recordings, Hypothesis(), CALIBRATED, start)
+    base = calibrated(recordings)
     assert location(Judgement("unexplained", base, base, [], [], [], {}), recordings)["place"] == "conduit"

@@ -14,8 +14,8 @@ from ccmodel.diagnose.evidence import Weighed
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.diagnose.judge import judge
 from ccmodel.diagnose.trial import _best, _starts, fit
+from ccmodel.failure import ModelError
 from ccmodel.identify.problem import Evidence, Free
-from ccmodel.model.failure import ModelError
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 

@@ -7,22 +7,13 @@ import pytest
 
 from ccmodel.diagnose.diagnosis import odd_one_out
 from ccmodel.diagnose.evidence import weigh
-from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.diagnose.judge import Judgement
-from ccmodel.diagnose.trial import fit
 from ccmodel.geometry import ConduitPath
-from ccmodel.identify.problem import Free
-from made_evidence import PARAMETERS, batch
-
-CALIBRATED = {
-    "stiffness_N_per_m": Free(PARAMETERS.stiffness_N_per_m, 1e2, 1e7),
-    "friction_coefficient": Free(PARAMETERS.friction_coefficient, 0.005, 1.5),
-    "load_stiffness_Nm_per_rad": Free(PARAMETERS.load_stiffness_Nm_per_rad, 1e-4, 10.0),
-}
+from made_evidence import PARAMETERS, batch, calibrated
 
 
 def judged(recordings):
-    base = fit(recordings, Hypothesis(), CALIBRATED, {name: free.start for name, free in CALIBRATED.items()})
+    base = calibrated(recordings)
     return Judgement("unexplained", base, base, [], [], [], {})
 
 

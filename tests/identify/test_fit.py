@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from ccmodel.failure import ModelError
 from ccmodel.identify.fit import fit
 from ccmodel.identify.problem import Evidence, Free, Problem
 from ccmodel.identify.search import solve
-from ccmodel.model.failure import ModelError
 from ccmodel.recording import TENSIONS
 from drawn_batches import CONDITIONS, SPREAD, draw, problem_of
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
+from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.model.exact import MotionEnd, SpringEnd, Status, pair, simulate_cable, simulate_pair
-from ccmodel.model.failure import ModelError
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
 from ccmodel.model.transmission import Transmission

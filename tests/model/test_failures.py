@@ -6,30 +6,21 @@ import numpy as np
 import pytest
 
 from builders import recording
+from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.model import exact, general
-from ccmodel.model.failure import ModelError
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, MechanicalLoad, SpringLoad, TorqueLoad
-from ccmodel.model.parameters import Parameters
 from ccmodel.model.response import Status
 from ccmodel.model.run import ModelInput, simulate
 from ccmodel.model.transmission import Transmission
+from model_runs import PULLED
 
 PATH = ConduitPath([1.2], [np.pi])
 PAIR = Transmission(PATH, 9300.0, 0.15, 0.006, 0.006)
 INITIAL = InitialTension.uniform(PATH, 7.3)
 SPRING = SpringLoad(0.05)
 DRIVE = 0.3 * np.sin(np.linspace(0, 6, 50))
-PARAMETERS = Parameters(
-    stiffness_N_per_m=9000.0,
-    reference_length_m=1.2,
-    friction_coefficient=0.15,
-    drive_radius_m=0.006,
-    load_radius_m=0.006,
-    load_stiffness_Nm_per_rad=0.05,
-    pretension_N=7.0,
-)
 
 
 def by_exact(drive=DRIVE, load=SPRING, one=PAIR, initial=INITIAL):
@@ -43,7 +34,7 @@ def by_general(drive=DRIVE, load=SPRING, one=PAIR, initial=INITIAL, **mechanisms
 
 def as_model(**changes):
     given = ModelInput.of(recording(theta_in_rad=lambda t: 0.3 * np.sin(t)))
-    return simulate(given, replace(PARAMETERS, **changes))
+    return simulate(given, replace(PULLED, **changes))
 
 
 def with_gap(values, at=3, gap=np.nan):

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
-from ccmodel.model.failure import ModelError
 from ccmodel.model.general import simulate
 from ccmodel.model.general.grid import make_grid
 from ccmodel.model.initial import InitialTension

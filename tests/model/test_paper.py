@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
-from ccmodel.model.failure import ModelError
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad, TorqueLoad
 from ccmodel.model.paper import simulate_pair

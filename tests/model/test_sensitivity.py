@@ -8,19 +8,10 @@ import pytest
 from builders import recording
 from ccmodel.geometry import ConduitPath
 from ccmodel.model.general.run import Active
-from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 from ccmodel.model.sensitivity import sensitivities
+from model_runs import PULLED
 
-PARAMETERS = Parameters(
-    stiffness_N_per_m=9000.0,
-    reference_length_m=1.2,
-    friction_coefficient=0.15,
-    drive_radius_m=0.006,
-    load_radius_m=0.006,
-    load_stiffness_Nm_per_rad=0.05,
-    pretension_N=7.0,
-)
 PRESLIDING = Active("presliding", "conduit", {"z0": 3e-5})
 CHANNELS = ("T1_N", "T2_N", "T3_N", "T4_N", "theta_out_rad", "tau_in_Nm")
 
@@ -51,7 +42,7 @@ def careful(given, parameters, name, step=2e-4):
     ],
 )
 def test_right_to_a_ten_thousandth(given, mechanisms, names):
-    parameters = replace(PARAMETERS, mechanisms=mechanisms)
+    parameters = replace(PULLED, mechanisms=mechanisms)
     found = sensitivities(given, parameters, names)
     for name in names:
         expected = careful(given, parameters, name)
@@ -61,7 +52,7 @@ def test_right_to_a_ten_thousandth(given, mechanisms, names):
 
 
 def test_a_zero_of_the_torque_sensor_adds_itself(given):
-    found = sensitivities(given, PARAMETERS, ["tau_in_zero_Nm"])["tau_in_zero_Nm"]
+    found = sensitivities(given, PULLED, ["tau_in_zero_Nm"])["tau_in_zero_Nm"]
     assert found["tau_in_Nm"] == pytest.approx(1.0, rel=1e-6)
     assert found["T1_N"] == pytest.approx(0.5 / 0.006, rel=1e-6)
     assert (found["F_drive_N"] == 0).all()
@@ -71,12 +62,12 @@ def test_full_slip_answers_to_friction_as_the_capstan_does():
     """Pulled on and on against a spring both cables slip: ln(T1/T2) = mu phi, so its derivative by mu is phi."""
     path = ConduitPath([1.2], [np.pi])
     ramp = recording(duration=1.0, theta_in_rad=lambda t: 2.0 * t)
-    found = sensitivities(ModelInput.of(ramp), PARAMETERS, ["friction_coefficient"])["friction_coefficient"]
-    said = simulate(ModelInput.of(ramp), PARAMETERS)
+    found = sensitivities(ModelInput.of(ramp), PULLED, ["friction_coefficient"])["friction_coefficient"]
+    said = simulate(ModelInput.of(ramp), PULLED)
     slope = found["T1_N"] / said["T1_N"] - found["T2_N"] / said["T2_N"]
     assert slope[-1] == pytest.approx(path.bend_rad, rel=1e-4)
 
 
 def test_a_number_of_a_mechanism_that_does_not_act_is_refused(given):
     with pytest.raises(ValueError, match="no z0 of presliding"):
-        PARAMETERS.with_values({"presliding/conduit/z0": 1e-5})
+        PULLED.with_values({"presliding/conduit/z0": 1e-5})

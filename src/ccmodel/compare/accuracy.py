@@ -28,7 +28,7 @@ from scipy.stats import t
 
 from ccmodel.compare.loops import QUANTITIES, Quantity, measure
 from ccmodel.config import Accuracy, Measuring
-from ccmodel.model.failure import ModelError
+from ccmodel.failure import ModelError
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import PRESCRIBED, ModelInput, simulate
 from ccmodel.recording import Recording

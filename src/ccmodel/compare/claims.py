@@ -16,8 +16,8 @@ from ccmodel.compare import model_study
 from ccmodel.compare.loops import QUANTITIES, measure
 from ccmodel.compare.studies import label_of, labelled, origins_of, value_of
 from ccmodel.config import Claims, Measuring, ModelStudies
+from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
-from ccmodel.model.failure import ModelError
 from ccmodel.model.paper import SECTIONS as PAPER_SECTIONS
 from ccmodel.model.parameters import Parameters
 from ccmodel.recording import Recording

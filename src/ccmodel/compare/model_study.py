@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from ccmodel.compare.errors import last_cycle
 from ccmodel.config import ModelStudies
+from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.model import paper
 from ccmodel.model.exact import pair as exact
-from ccmodel.model.failure import ModelError
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad
 from ccmodel.model.parameters import Parameters

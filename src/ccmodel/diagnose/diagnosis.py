@@ -14,10 +14,10 @@ from ccmodel.diagnose.evidence import Weighed, weigh
 from ccmodel.diagnose.hypothesis import Hypothesis, singles
 from ccmodel.diagnose.judge import MOST_ALTERNATIVES, RIGHT, RIVAL, Judgement, judge, nested_errors
 from ccmodel.diagnose.trial import Trial, fit
+from ccmodel.failure import ModelError
 from ccmodel.identify.intervals import COVERAGE
 from ccmodel.identify.problem import MEASURED, Evidence, Free, Problem, each
 from ccmodel.identify.search import solve
-from ccmodel.model.failure import ModelError
 from ccmodel.model.parameters import Parameters, mechanism_key
 from ccmodel.recording import Recording, unit_of
 

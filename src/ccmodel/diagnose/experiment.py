@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ccmodel.diagnose.evidence import Weighed
 from ccmodel.diagnose.judge import Judgement
 from ccmodel.diagnose.trial import Trial
-from ccmodel.model.failure import ModelError
+from ccmodel.failure import ModelError
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 

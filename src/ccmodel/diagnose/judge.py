@@ -15,8 +15,8 @@ from ccmodel.diagnose.evidence import LOOKS, Weighed
 from ccmodel.diagnose.hypothesis import Hypothesis, plausible
 from ccmodel.diagnose.structure import Structure, structure
 from ccmodel.diagnose.trial import Score, Trial, fit, score
+from ccmodel.failure import ModelError
 from ccmodel.identify.problem import Free
-from ccmodel.model.failure import ModelError
 
 # A mechanism is worth a trial if it takes this share off the calibrated model's mean square, and a naming if it takes
 # more than this off what is left of held-out recordings.

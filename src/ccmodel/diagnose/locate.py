@@ -80,8 +80,7 @@ def excess_without(channel: str, weighed: Sequence[Weighed], calibrated: Trial) 
     rest = [e for w in weighed if (e := w.evidence.without(channel)).channels]
     fitted = rest[0].parameters.with_values(calibrated.values)
     lighter = each(rest, lambda i, e: weigh(e, fitted))
-    free = {name: replace(free, start=calibrated.values[name]) for name, free in calibrated.free.items()}
-    return float(fit(lighter, calibrated.hypothesis, free, calibrated.values).left.mean()) - 1.0
+    return float(fit(lighter, calibrated.hypothesis, calibrated.free, calibrated.values).left.mean()) - 1.0
 
 
 def _channels(weighed: Sequence[Weighed]) -> list[str]:

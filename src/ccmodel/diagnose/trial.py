@@ -11,8 +11,8 @@ from scipy.optimize import least_squares
 from ccmodel import mechanisms as registry
 from ccmodel.diagnose.evidence import LOOKS, Weighed
 from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.failure import ModelError
 from ccmodel.identify.problem import Free, each
-from ccmodel.model.failure import ModelError
 from ccmodel.model.parameters import mechanism_key
 from ccmodel.model.sensitivity import STEP, size_of
 
@@ -117,31 +117,29 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
     information = [j.T @ j / n for j, n in zip(J, counts, strict=True)]
     score = [j.T @ e / n for j, e, n in zip(J, r, counts, strict=True)]
     total = sum(information)
-    aside = [
+    without = [
         np.clip(found.x + _inverse(total - H, sizes) @ g, low, high) for H, g in zip(information, score, strict=True)
     ]
-    held_out = [named(x) for x in aside]
+    held_out = [named(x) for x in without]
     if len(acting) > 1:
-        scatter = _jackknife(np.array(aside) - found.x)
+        scatter = _jackknife(np.array(without) - found.x)
     else:
         scatter = _inverse(total, sizes) / (LOOKS * len(acting[0].evidence.channels))
-    left = each(acting, lambda i, w: errors(w, held_out[i]))
-    return Trial(hypothesis, calibrated, named(found.x), r, J, scatter, held_out, left)
+    aside = each(acting, lambda i, w: errors(w, held_out[i]))
+    return Trial(hypothesis, calibrated, named(found.x), r, J, scatter, held_out, aside)
 
 
-def _jackknife(aside: NDArray) -> NDArray:
+def _jackknife(moved: NDArray) -> NDArray:
     """Covariance of a fit from how far it moves as each recording is left out, shape (unknowns, unknowns)."""
-    return aside.T @ aside * (len(aside) - 1) / len(aside)
+    return moved.T @ moved * (len(moved) - 1) / len(moved)
 
 
 def _starts(names: Sequence[str], x0: NDArray, low: NDArray, high: NDArray) -> list[NDArray]:
     if "pretension_N" not in names:
         return [x0]
-    share = np.ones(x0.size)
-    starts = []
-    for share[names.index("pretension_N")] in PRETENSION_SHARES:
-        starts.append(np.clip(share * x0, low + 1e-9 * (high - low), high))
-    return starts
+    pretension = np.arange(x0.size) == names.index("pretension_N")
+    inside = low + 1e-9 * (high - low)
+    return [np.clip(np.where(pretension, share * x0, x0), inside, high) for share in PRETENSION_SHARES]
 
 
 def _best(solved: Callable, starts: Sequence[NDArray]):

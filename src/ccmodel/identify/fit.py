@@ -7,6 +7,7 @@ from math import inf, isfinite
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.failure import ModelError
 from ccmodel.identify.intervals import (
     Interval,
     Scatter,
@@ -21,7 +22,6 @@ from ccmodel.identify.intervals import (
 )
 from ccmodel.identify.problem import Problem
 from ccmodel.identify.search import Solution, solve
-from ccmodel.model.failure import ModelError
 
 # Optima of several starts are one if no unknown differs by more than this share of its size.
 SAME = 1e-3

@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.failure import ModelError
 from ccmodel.identify.noise import drive_errors, sensor_noise, size_over_time
-from ccmodel.model.failure import ModelError
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import PRESCRIBED, ModelInput, simulate
 from ccmodel.model.sensitivity import STEP, size_of

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
-from ccmodel.model.failure import ModelError
 
 # A profile may exceed the friction bound by what printing and reading numbers back costs, no more.
 BOUND_TOLERANCE = 1e-9

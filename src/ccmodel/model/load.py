@@ -6,7 +6,7 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.model.failure import ModelError
+from ccmodel.failure import ModelError
 
 
 @dataclass(frozen=True)

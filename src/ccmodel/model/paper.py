@@ -25,8 +25,8 @@ The load pulley couples the cables: its motion is what balances (T2 - T4) R_o ag
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.failure import ModelError
 from ccmodel.kernel import kernel
-from ccmodel.model.failure import ModelError
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad, TorqueLoad
 from ccmodel.model.response import PairResponse, Status

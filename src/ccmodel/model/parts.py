@@ -10,10 +10,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.failure import ModelError
 from ccmodel.mechanisms.pulley_eccentricity import winding
 from ccmodel.mechanisms.pulley_friction import bearing
 from ccmodel.model.exact.pair import CableResponse, ForceEnd, MotionEnd, simulate_cable
-from ccmodel.model.failure import ModelError
 from ccmodel.model.general.run import load_law, settings_of
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, initial_tension

@@ -5,7 +5,7 @@ from enum import Enum
 
 from numpy.typing import NDArray
 
-from ccmodel.model.failure import ModelError
+from ccmodel.failure import ModelError
 
 
 class Status(Enum):

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
+from ccmodel.failure import ModelError
 from ccmodel.model.exact import pair as exact
-from ccmodel.model.failure import ModelError
 from ccmodel.model.general import run as general
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad

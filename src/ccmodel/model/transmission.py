@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from math import inf
 
+from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
-from ccmodel.model.failure import ModelError
 
 # Beyond this mu phi the capstan factor leaves what double precision can carry.
 MAX_FRICTION_ANGLE = 300.0

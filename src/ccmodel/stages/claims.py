@@ -9,7 +9,7 @@ import pandas as pd
 from ccmodel import provenance
 from ccmodel.compare.claims import Claim, Row, claims_of, loop_placements
 from ccmodel.config import Claims, Measuring
-from ccmodel.model.failure import ModelError
+from ccmodel.failure import ModelError
 from ccmodel.model.parameters import Parameters
 from ccmodel.report.claims import model_figure, recordings_figure
 from ccmodel.report.figures import save_figure

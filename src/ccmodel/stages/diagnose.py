@@ -9,7 +9,7 @@ from ccmodel import provenance
 from ccmodel.config import Diagnosing
 from ccmodel.diagnose.diagnosis import Diagnosis
 from ccmodel.diagnose.diagnosis import diagnose as run
-from ccmodel.model.failure import ModelError
+from ccmodel.failure import ModelError
 from ccmodel.model.files import model_as_dict
 from ccmodel.model.parameters import Parameters
 from ccmodel.recording import read_recordings

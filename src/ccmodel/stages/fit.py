@@ -6,9 +6,9 @@ from pathlib import Path
 
 from ccmodel import provenance
 from ccmodel.config import Fit
+from ccmodel.failure import ModelError
 from ccmodel.identify.fit import FitResult, fit
 from ccmodel.identify.problem import Evidence, Free, Problem
-from ccmodel.model.failure import ModelError
 from ccmodel.model.parameters import Parameters
 from ccmodel.recording import read_recordings
 from ccmodel.stages.files import estimates_of, write_json

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from ccmodel.model.failure import ModelError
+from ccmodel.failure import ModelError
 from ccmodel.model.files import read_model
 from ccmodel.model.run import simulate_recording
 from ccmodel.recording import CHANNELS

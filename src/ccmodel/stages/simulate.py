@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ccmodel import provenance
-from ccmodel.model.failure import ModelError
+from ccmodel.failure import ModelError
 from ccmodel.model.run import simulate_recording
 from ccmodel.recording import read_recordings, write_recordings
 from ccmodel.stages.files import fitted, write_json

@@ -12,7 +12,7 @@ from ccmodel.compare.table_one.effects import Effect, all_effects, knows_time, s
 from ccmodel.compare.table_one.refit import NORMS, refit
 from ccmodel.compare.table_one.rigs import Condition, conditions, recorded, within_ranges
 from ccmodel.compare.table_one.settings import CHANNELS, NotStated, TableOne
-from ccmodel.model.failure import ModelError
+from ccmodel.failure import ModelError
 
 CONDITION = ("rig", "load_stiffness_Nm_per_rad", "amplitude_rad", "frequency_Hz", "fit_over")
 Case = tuple[Condition, tuple[Effect, ...]]

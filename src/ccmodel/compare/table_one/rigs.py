@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from ccmodel.compare.table_one.effects import DIFFERENCE, Effect
 from ccmodel.compare.table_one.settings import Cable, NotStated, Rig
+from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.model.exact import pair as exact
-from ccmodel.model.failure import ModelError
 from ccmodel.model.general import run as general
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.model.exact import run as kernels
 from ccmodel.model.exact.cable import (
@@ -37,7 +38,6 @@ from ccmodel.model.exact.cable import (
 )
 from ccmodel.model.exact.path import LUMP, NODE, PASSED, PER_M, X_PER_M, X_START, PathTables, tabulate
 from ccmodel.model.exact.still_point import MAX_STEPS, REACHED, step_apart
-from ccmodel.model.failure import ModelError
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad, series
 from ccmodel.model.response import PairResponse, Status

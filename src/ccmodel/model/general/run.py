@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
+from ccmodel.failure import ModelError
 from ccmodel.mechanisms.contract import Sensing, Settings, all_finite
 from ccmodel.mechanisms.load_dependent_friction import FLOOR_N, REFERENCE_N
 from ccmodel.mechanisms.pulley_eccentricity import winding
 from ccmodel.mechanisms.pulley_friction import bearing
 from ccmodel.mechanisms.strand_settling import stretch_at
-from ccmodel.model.failure import ModelError
 from ccmodel.model.general import march as rows
 from ccmodel.model.general.grid import Grid, make_grid
 from ccmodel.model.initial import InitialTension
