@@ -234,7 +234,9 @@ def cases() -> list[Case]:
             {"load": {"cubic_Nm_per_rad3": 0.1}},
             {"K3": 0.1},
         ),
-        _in_the_cable("load-inertia", "load", "J 5e-4 kg m^2", {"load": {"inertia_kg_m2": 5e-4}}, {"J": 5e-4}),
+        _in_the_cable(
+            "load-inertia", "load", "J 5e-4 kg m^2", {"load": {"inertia_kg_m2": 5e-4}}, {"J": 5e-4, "zeta": 0.0}
+        ),
         *stribeck_cases(),
     ]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from builders import recording
-from ccmodel.diagnose.evidence import weigh
+from ccmodel.diagnose.evidence import LOOKS, weigh
 from ccmodel.diagnose.locate import PARTS, parts_of
 from ccmodel.identify.problem import Evidence
 from ccmodel.model.parameters import Parameters
@@ -59,3 +59,20 @@ def test_parts_of_a_motion(weighed):
     top = np.argmin(np.abs(t - 0.55))
     assert part[top + 3] == PARTS.index("after a reversal")
     assert part[top + 22] == PARTS.index("under way")
+
+
+def test_what_differs_more_than_runs_do_is_counted_as_a_look_of_its_own(weighed):
+    """Lost among the samples: friction a tenth higher, or a zero off by three accuracies, are one number each."""
+    e = weighed.evidence
+    rows_a_look = e.measured.shape[1] / LOOKS
+    for values, row, size in (
+        ({"friction_coefficient": 0.15 * 1.1}, 0, 10.0),
+        ({"F_load_zero_N": 0.3}, 4, 3.0),
+        ({}, 0, 0.0),
+    ):
+        errors = e.errors(values).ravel()
+        counted = weighed.counted(errors)
+        assert counted[: errors.size] == pytest.approx(weighed.whitened(errors))
+        found = counted[errors.size :] / np.sqrt(rows_a_look)
+        assert found[row] == pytest.approx(size, rel=0.15, abs=0.1)
+        assert np.abs(np.delete(found, row)).max() < 0.15 * size + 0.1

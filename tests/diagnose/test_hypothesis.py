@@ -46,3 +46,10 @@ def test_a_number_far_out_of_its_range_is_not_plausible():
     assert plausible(friction, {key: 5e-3})
     assert not plausible(friction, {key: 5.0})
     assert plausible(friction, {key: np.float64(1e-6)})
+
+
+def test_a_mass_is_tried_at_many_sizes_under_one_damping():
+    probes = list(Hypothesis((("load-inertia", "load"),)).probes())
+    masses = np.array([p["load-inertia/load/J"] for p in probes])
+    assert (masses[1:] / masses[:-1]).max() < 1.25
+    assert len({p["load-inertia/load/zeta"] for p in probes}) == 1

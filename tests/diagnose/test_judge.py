@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.judge import _names_more, _probabilities, _verdict, nested_errors
+from ccmodel.diagnose.judge import Comparison, _fit_all, _names_more, _verdict, _weighed_anew, nested_errors
 from ccmodel.diagnose.structure import Structure
-from ccmodel.diagnose.trial import Trial
+from ccmodel.diagnose.trial import Score, Trial
+from made_evidence import batch, calibrated
 
 FRICTION, SCALE = ("pulley-friction", "drive-pulley"), ("torque-scale", "drive-sensor")
+PROBES = [(SCALE, "gain", 0.05), (FRICTION, "friction_torque", 2e-3)]
 BASE_VALUES = {"friction_coefficient": 0.15}
 VALUES = {"pulley-friction/drive-pulley/friction_torque": 4e-3, "torque-scale/drive-sensor/gain": 0.05}
 CHANNELS = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N")
@@ -29,7 +31,7 @@ def verdict(base, *trials, learnable=0.0):
     """Of trials that leave what they leave, and in that something to be learnt, the same in every recording."""
     trials = sorted(trials, key=lambda t: t.left.mean())
     unlearnt = {t.hypothesis: Structure(np.full(8, learnable)) for t in (base, *trials)}
-    return _verdict(base, trials, _probabilities(WEIGHED, base, trials), [], unlearnt)
+    return _verdict(Comparison(WEIGHED, base, trials, unlearnt), [])
 
 
 def test_nothing_missing():
@@ -86,3 +88,23 @@ def test_a_recording_is_judged_by_what_the_others_chose():
     chosen = nested_errors(verdict(base, friction, scale))
     assert chosen[0].hypothesis.acting == (SCALE,)
     assert chosen[1].hypothesis.acting == (FRICTION,)
+
+
+def test_a_pair_must_leave_less_than_a_single():
+    alone = [trial(9.0, FRICTION), trial(9.0, SCALE)]
+    assert verdict(trial(10.0), trial(1.4, FRICTION), alone[1]).verdict == "explained"
+    assert verdict(trial(10.0), trial(1.4, FRICTION, SCALE), *alone).verdict == "unexplained"
+    assert verdict(trial(10.0), trial(1.2, FRICTION, SCALE), *alone).verdict == "explained"
+
+
+def test_recordings_are_weighed_anew_about_what_explains_them_best():
+    recordings = batch(lambda said: {"tau_in_Nm": 0.1 * said["tau_in_Nm"]})
+    base = calibrated(recordings)
+    scores = [Score(Hypothesis((a,)), 0.0, {f"{a[0]}/{a[1]}/{p}": v}) for a, p, v in PROBES]
+    trials = _fit_all(recordings, base.free, base, scores, lambda text: None)
+    again = _weighed_anew(Comparison.of(recordings, base, trials), base.free, lambda text: None)
+    assert again.trials[0].hypothesis.acting == (SCALE,)
+    assert again.trials[0].values[f"{SCALE[0]}/{SCALE[1]}/gain"] == pytest.approx(0.1, abs=0.005)
+    assert {t.hypothesis for t in again.trials} == {t.hypothesis for t in trials}
+    assert again.base.left.mean() > again.trials[0].left.mean()
+    assert again.weighed[0].evidence.parameters.mechanisms[0].name == SCALE[0]

@@ -48,7 +48,10 @@ def base():
 
 
 def test_the_registry_has_the_whole_list():
-    assert {name: {p.name for p in mechanisms.get(name).parameters} for name in mechanisms.names()} == THE_LIST
+    must_be_said = {
+        name: {p.name for p in mechanisms.get(name).parameters if p.unsaid is None} for name in mechanisms.names()
+    }
+    assert must_be_said == THE_LIST
 
 
 @pytest.mark.parametrize("name", mechanisms.names())

@@ -164,6 +164,33 @@ def test_inertia_oscillates_at_its_own_frequency():
     assert 2 * np.diff(crossings).mean() == pytest.approx(samples, rel=5e-3)
 
 
+def test_a_ring_that_samples_hardly_show_is_followed_between_them():
+    """Ten samples a ring: with a step for each, the ring would be late by a third of itself after four."""
+    ring_s = 2 * np.pi * np.sqrt(1e-4 / (2 * K * R**2 + K_E))
+    load = MechanicalLoad(K_E, inertia_kg_m2=1e-4)
+
+    def pulled(samples):
+        rings = np.arange(5 * samples + 1) / samples
+        theta = 0.025 * (1 - np.cos(np.pi * np.clip(rings, 0, 1)))
+        return run(theta, mu=0.0, load=load, period_s=ring_s, samples=samples).theta_out_rad
+
+    fine = pulled(640)
+    assert rms(pulled(10), fine[::64]) < 0.02 * np.ptp(fine)
+
+
+def test_a_load_without_mass_is_stepped_once_a_sample():
+    r = run(sine())
+    assert r.substeps == sine().size
+
+
+def test_a_mass_that_was_left_out_comes_with_its_damping():
+    J, zeta, theta, dt = 2e-4, 0.2, sine(cycles=3), 1 / 500
+    r = run(theta, ("load-inertia", "load", {"J": J, "zeta": zeta}))
+    omega = np.gradient(r.theta_out_rad, dt)
+    expected = K_E * r.theta_out_rad + 2 * zeta * np.sqrt(J * K_E) * omega + J * np.gradient(omega, dt)
+    assert rms(r.tau_out_Nm[500:], expected[500:]) < 5e-3 * np.ptp(expected[500:])
+
+
 def test_a_load_that_turns_against_the_drive_keeps_its_torque():
     theta = sine(0.3, cycles=1)
     torque = 0.02 * np.sin(2 * np.pi * np.arange(theta.size) / 170)

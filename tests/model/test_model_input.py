@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from builders import recording
+from ccmodel.model.general import Active
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 
@@ -59,3 +60,28 @@ def test_the_rest_ends_when_the_drive_moves_not_when_its_count_does():
     given = ModelInput.of(counted)
     assert given.resting["tau_in_Nm"].size < first_count / 0.01
     assert np.ptp(given.resting["tau_in_Nm"]) < 0.1 * 0.6 * step
+
+
+FAULTS = [
+    ("load-cell-scale", {"gain": 0.05}),
+    ("load-cell-offset", {"offset": 1.0}),
+    ("load-cell-drift", {"rate": 0.2}),
+    ("load-cell-crosstalk", {"crosstalk": 0.1}),
+    ("torque-scale", {"gain": -0.08}),
+    ("time-skew", {"delay": 0.01}),
+]
+
+
+@pytest.mark.parametrize("place", ["drive-sensor", "load-sensor"])
+@pytest.mark.parametrize(("name", "values"), FAULTS)
+def test_tensions_at_rest_are_the_true_ones_whatever_is_wrong_with_a_sensor(name, values, place):
+    """What a model with a faulty sensor says of a rig is what the same model, told the rest's readings, says again."""
+    pull = recording(theta_in_rad=lambda t: 0.4 * np.sin(2 * np.pi * np.clip(t - 0.3, 0, None)))
+    rig = Parameters(
+        7750.0, 1.2, 0.156, 0.006, 0.006, load_stiffness_Nm_per_rad=0.05, pretension_N=7.0,
+        mechanisms=(Active(name, place, values),),
+    )  # fmt: skip
+    recorded = replace(simulate(ModelInput.of(pull), rig), origin="virtual-rig", rest_s=0.3)
+    again = simulate(ModelInput.of(recorded), replace(rig, pretension_N=None))
+    for channel in ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N"):
+        assert again[channel] == pytest.approx(recorded[channel], abs=1e-3 * np.ptp(recorded[channel])), channel

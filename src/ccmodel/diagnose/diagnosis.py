@@ -116,9 +116,9 @@ def diagnose(
     fitted = estimates.with_values(start)
     weighed = each(evidence, lambda i, e: weigh(e, fitted))
     judgement = judge(weighed, calibrated, start, singles(without), tell, [_suspect(s) for s in suspects])
-    not_judged += odd_one_out(judgement, weighed)
-    said = _said(recordings[0].batch, judgement, weighed, estimates, not_judged)
-    return Diagnosis(said, judgement, weighed, estimates)
+    not_judged += odd_one_out(judgement, judgement.weighed)
+    said = _said(recordings[0].batch, judgement, judgement.weighed, estimates, not_judged)
+    return Diagnosis(said, judgement, judgement.weighed, estimates)
 
 
 def odd_one_out(judgement: Judgement, weighed: Sequence[Weighed]) -> list[dict[str, str]]:

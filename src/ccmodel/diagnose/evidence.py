@@ -4,6 +4,10 @@ Friction that is a per cent higher, a sensor's zero, where in its count an encod
 drive's motion: each is a direction in which a recording may lie off what the right model says. Together with the
 sensors' noise they make the covariance of a recording's errors. Errors that were whitened by it are what hypotheses
 are judged by, and no fit needs unknowns for what differs from run to run.
+
+A zero that is off by more than its sensor's accuracy, friction that is ten per cent higher in every recording, is one
+number, lost among thousands of samples. How far off the errors put each is therefore counted besides them, as a look
+of its own.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.identify.problem import Evidence
-from ccmodel.model.parameters import Parameters
+from ccmodel.model.parameters import ZERO_OF, Parameters
 from ccmodel.model.sensitivity import STEP, size_of
 
 # Independent looks that a channel of a recording gives at a hypothesis: samples are far more, and alike.
@@ -32,6 +36,9 @@ class Weighed:
         Orthonormal directions of what differs from run to run, among the errors over the sensors' noise.
     shrink : ndarray, shape (k,)
         By how much whitening shrinks the errors along each.
+    likeliest : ndarray, shape (numbers, rows)
+        What makes of errors over the sensors' noise the likeliest differences of this run (in friction, in zeros), each
+        over its spread.
     floor : dict of str to float
         Root mean square of what a right model leaves, by channel, in its unit.
     """
@@ -39,12 +46,17 @@ class Weighed:
     evidence: Evidence
     directions: NDArray
     shrink: NDArray
+    likeliest: NDArray
     floor: Mapping[str, float]
 
     def whitened(self, errors: NDArray) -> NDArray:
-        """Errors over the sensors' noise, whitened; shape (rows,) or (rows, columns) as given."""
-        along = self.directions.T @ errors
-        return errors - self.directions @ (self.shrink[:, None] * along if along.ndim == 2 else self.shrink * along)
+        """Errors over the sensors' noise, whitened; shape (rows,)."""
+        return errors - self.directions @ (self.shrink * (self.directions.T @ errors))
+
+    def counted(self, errors: NDArray) -> NDArray:
+        """The same, and below it the likeliest differences, each weighed as a look; shape (rows + numbers,)."""
+        rows_a_look = self.evidence.measured.shape[1] / LOOKS
+        return np.concatenate([self.whitened(errors), np.sqrt(rows_a_look) * (self.likeliest @ errors)])
 
     def acting(self, parameters: Parameters) -> "Weighed":
         """The same recording beside another model."""
@@ -55,17 +67,16 @@ def weigh(evidence: Evidence, parameters: Parameters) -> Weighed:
     """Work out what may differ from run to run, about a model that is fitted already."""
     e = replace(evidence, parameters=parameters)
     said = e.modelled({})
-    differ = [
-        spread * (e.modelled({name: value + step}) - said) / step
-        for name, value, spread, step in _nuisances(e, parameters)
-    ]
+    nuisances = _nuisances(e, parameters)
+    differ = [spread * (e.modelled({name: value + step}) - said) / step for name, value, spread, step in nuisances]
     drawn = e.drive_errors({})
     friction = differ[0]
     floor = np.sqrt((e.sigma**2).mean(axis=1) + (friction**2).mean(axis=1))
     columns = [*(d / e.sigma for d in differ), *(d / np.sqrt(len(drawn)) for d in drawn)]
     N = np.stack([c.ravel() for c in columns], axis=1)
-    U, s, _ = np.linalg.svd(N, full_matrices=False)
-    return Weighed(e, U, 1 - 1 / np.hypot(1, s), dict(zip(e.channels, floor.tolist(), strict=True)))
+    U, s, Vt = np.linalg.svd(N, full_matrices=False)
+    likeliest = (Vt.T[: len(nuisances)] * (s / (1 + s**2))) @ U.T
+    return Weighed(e, U, 1 - 1 / np.hypot(1, s), likeliest, dict(zip(e.channels, floor.tolist(), strict=True)))
 
 
 def _nuisances(e: Evidence, parameters: Parameters) -> Sequence[tuple[str, float, float, float]]:
@@ -73,9 +84,7 @@ def _nuisances(e: Evidence, parameters: Parameters) -> Sequence[tuple[str, float
     recording = e.given.recording
     mu = parameters.friction_coefficient
     found = [("friction_coefficient", mu, FRICTION_SPREAD * mu)]
-    zeros = {"tau_in_zero_Nm": "tau_in_Nm", "tau_out_zero_Nm": "tau_out_Nm"}
-    zeros |= {"F_drive_zero_N": "F_drive_N", "F_load_zero_N": "F_load_N"}
-    for name, channel in zeros.items():
+    for channel, name in ZERO_OF.items():
         if channel in e.channels and channel in recording.accuracy:
             found.append((name, getattr(parameters, name), recording.accuracy[channel]))
     if "theta_out_rad" in e.channels and (step := recording.encoder_step_rad.get("theta_out_rad")):

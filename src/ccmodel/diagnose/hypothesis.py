@@ -72,11 +72,11 @@ class Hypothesis:
         """Values at which a single mechanism is tried out, all over its plausible range."""
         ((name, place),) = self.acting
         strength, *shapes = registry.get(name).parameters
-        grids = [[_within(strength, share) for share in STRENGTHS]]
+        grids = [[_within(strength, share) for share in strength.tried or STRENGTHS]]
         if name == "cable-asymmetry":
             yield from _asymmetries(name, place)
             return
-        grids += [[_within(p, share) for share in SHAPES] for p in shapes]
+        grids += [[_within(p, share) for share in p.tried or SHAPES] for p in shapes]
         for values in product(*grids):
             keys = (mechanism_key(name, place, p.name) for p in (strength, *shapes))
             yield dict(zip(keys, values, strict=True))

@@ -128,6 +128,6 @@ def _by_channel(e: Evidence, errors: NDArray, weighed: Sequence[Weighed]) -> NDA
     """Errors by channel of any recording, none where a channel is missing; shape (samples, channels)."""
     channels = sorted({c for w in weighed for c in w.evidence.channels})
     found = np.zeros((e.measured.shape[1], len(channels)))
-    for channel, values in zip(e.channels, errors.reshape(e.measured.shape), strict=True):
+    for channel, values in zip(e.channels, errors[: e.measured.size].reshape(e.measured.shape), strict=True):
         found[:, channels.index(channel)] = values
     return found

@@ -1,7 +1,7 @@
 """Trying a hypothesis: a quick score against the calibrated model, a full refit, and recordings held out in turn."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,9 +14,13 @@ from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.failure import ModelError
 from ccmodel.identify.problem import Free, each
 from ccmodel.model.parameters import mechanism_key
-from ccmodel.model.sensitivity import STEP, size_of
+from ccmodel.model.sensitivity import size_of
 
 TOLERANCE = 1e-4
+# Differences are taken over this share of a value: friction that falls with speed makes runs that are not smooth in it.
+DIFFERENCE = 3e-4
+# How much finer the solver's grid and steps are for what they cost a fit.
+FINER = 3
 MOST_EVALUATIONS = 25
 # Where no rest shows the pretension the errors have valleys of their own: both cables taut all along, or one of them
 # slack on its way. A fit then feels its way from either, at shares of the pretension, and goes on from the better.
@@ -33,14 +37,15 @@ class Trial:
     free : dict of str to Free
         What a calibration of the paper's model leaves free.
     values : dict of str to float
-    whitened : list of ndarray, each of shape (rows,)
+    whitened : list of ndarray, each of shape (rows + numbers,)
         By recording, what the fit leaves.
-    jacobian : list of ndarray, each of shape (rows, unknowns)
+    jacobian : list of ndarray, each of shape (rows + numbers, unknowns)
     covariance : ndarray, shape (unknowns, unknowns)
-        By how much the recordings disagree about the values; of a single one, what its noise says.
+        By how much the recordings disagree about the values, or of a single one what its noise says; and by how much
+        a finer solver would move them.
     held_out : list of dict
         By recording, the values that the other recordings ask for.
-    aside : list of ndarray, each of shape (rows,)
+    aside : list of ndarray, each of shape (rows + numbers,)
         By recording, what these leave of it, whitened.
     """
 
@@ -60,8 +65,8 @@ class Trial:
 
 
 def errors(one: Weighed, values: Mapping[str, float]) -> NDArray:
-    """Whitened errors of a recording, shape (rows,)."""
-    return one.whitened(one.evidence.errors(values).ravel())
+    """Whitened errors of a recording and its likeliest differences, shape (rows + numbers,)."""
+    return one.counted(one.evidence.errors(values).ravel())
 
 
 def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str, Free], start: dict) -> Trial:
@@ -111,7 +116,7 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
 
     starts = _starts(names, x0, low, high)
     found = solved(x0) if len(starts) == 1 else solved(_best(lambda x: solved(x, FEELING), starts).x)
-    ends = np.cumsum(counts)[:-1]
+    ends = np.cumsum([n + len(w.likeliest) for n, w in zip(counts, acting, strict=True)])[:-1]
     J = [part * np.sqrt(n) for part, n in zip(np.split(found.jac, ends), counts, strict=True)]
     r = [part * np.sqrt(n) for part, n in zip(np.split(found.fun, ends), counts, strict=True)]
     information = [j.T @ j / n for j, n in zip(J, counts, strict=True)]
@@ -126,7 +131,15 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
     else:
         scatter = _inverse(total, sizes) / (LOOKS * len(acting[0].evidence.channels))
     aside = each(acting, lambda i, w: errors(w, held_out[i]))
-    return Trial(hypothesis, calibrated, named(found.x), r, J, scatter, held_out, aside)
+    moved = _moved_by_finer(acting, named(found.x), r, J, counts, _inverse(total, sizes))
+    return Trial(hypothesis, calibrated, named(found.x), r, J, scatter + np.outer(moved, moved), held_out, aside)
+
+
+def _moved_by_finer(acting, values, r, J, counts, inverse: NDArray) -> NDArray:
+    """Where a finer solver would have the values, less where they are, to first order; shape (unknowns,)."""
+    finer = [w.acting(replace(w.evidence.parameters, refinement=FINER)) for w in acting]
+    changed = each(finer, lambda i, w: errors(w, values) - r[i])
+    return -inverse @ sum(j.T @ e / n for j, e, n in zip(J, changed, counts, strict=True))
 
 
 def _jackknife(moved: NDArray) -> NDArray:
@@ -165,7 +178,7 @@ def _jacobians(acting, x, names, sizes, high) -> list[NDArray]:
         base = errors(w, dict(zip(names, x.tolist(), strict=True)))
         columns = []
         for k in range(x.size):
-            step = 10 * STEP * sizes[k] * (-1 if x[k] + 10 * STEP * sizes[k] > high[k] else 1)
+            step = DIFFERENCE * sizes[k] * (-1 if x[k] + DIFFERENCE * sizes[k] > high[k] else 1)
             aside = x.copy()
             aside[k] += step
             columns.append((errors(w, dict(zip(names, aside.tolist(), strict=True))) - base) / step)

@@ -15,6 +15,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +53,10 @@ class Parameter:
         How a fit should step over the range.
     signed : bool
         Whether the range holds for the size of the number and either sign is possible.
+    tried : tuple of float
+        Shares of the range at which a mechanism is tried out before it is fitted, where the usual ones will not do.
+    unsaid : float or None
+        Its value in a model that does not say one; None where one must be said.
     """
 
     name: str
@@ -62,6 +67,8 @@ class Parameter:
     neutral: float = 0.0
     scale: str = "log"
     signed: bool = False
+    tried: tuple[float, ...] = ()
+    unsaid: float | None = None
 
 
 @dataclass
@@ -76,8 +83,9 @@ class Settings:
         Conduit: share of the length and extra bend (rad) of each kink.
     bristle_m : float
         Conduit: presliding length z0 of Dahl's bristle; 0 is Coulomb friction.
-    stribeck_rise, stribeck_speed : float
-        Conduit: share by which friction at rest exceeds that in fast sliding, and the speed (m/s) of its fall.
+    stribeck_rise, stribeck_speed, stribeck_fall : float
+        Conduit: share by which friction at rest exceeds that in fast sliding, the speed (m/s) of its fall, and the
+        power of speed that it falls with.
     viscous : float
         Conduit: drag per speed and length, N s/m per m.
     tension_exponent : float
@@ -100,14 +108,16 @@ class Settings:
         Pulleys: e and psi (rad) of R (1 + e sin(theta + psi)).
     half_gap : float
         Load pulley: half the dead zone between pulley and load, rad.
-    cubic_stiffness, inertia : float
-        Load: K_3 (N m/rad^3) and J (kg m^2), on top of what the load has by itself.
+    cubic_stiffness, inertia, ring_damping : float
+        Load: K_3 (N m/rad^3), J (kg m^2) and the damping of J on the load's spring as a share of the critical one, on
+        top of what the load has by itself.
     """
 
     kinks: list[tuple[float, float]] = field(default_factory=list)
     bristle_m: float = 0.0
     stribeck_rise: float = 0.0
     stribeck_speed: float = 1e-3
+    stribeck_fall: float = 2.0
     viscous: float = 0.0
     tension_exponent: float = 0.0
     drag_N: float = 0.0
@@ -127,6 +137,11 @@ class Settings:
     half_gap: float = 0.0
     cubic_stiffness: float = 0.0
     inertia: float = 0.0
+    ring_damping: float = 0.0
+
+    def damping(self, stiffness: float) -> float:
+        """N m s/rad of a load with a spring of so many N m/rad."""
+        return 2 * self.ring_damping * sqrt(self.inertia * stiffness)
 
 
 @dataclass(frozen=True)
@@ -190,6 +205,11 @@ class Mechanism:
     def neutral(self) -> dict[str, float]:
         """Parameter values at which it is not there."""
         return {p.name: p.neutral for p in self.parameters}
+
+    @property
+    def unsaid(self) -> dict[str, float]:
+        """Values of the parameters that a model may leave out."""
+        return {p.name: p.unsaid for p in self.parameters if p.unsaid is not None}
 
     @property
     def start(self) -> dict[str, float]:

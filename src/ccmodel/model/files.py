@@ -27,9 +27,10 @@ class _ModelFile(TypedModel):
 
 
 def model_as_dict(parameters: Parameters, provenance: dict) -> dict:
-    """Plain data for a model file; what belongs to single recordings is not in it."""
+    """Plain data for a model file; what belongs to single recordings, or to the solver, is not in it."""
     numbers = asdict(parameters)
     acting = numbers.pop("mechanisms")
+    del numbers["refinement"]
     return {"format": FORMAT, "parameters": numbers, "mechanisms": acting, "provenance": provenance}
 
 

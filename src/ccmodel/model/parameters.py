@@ -5,6 +5,14 @@ from dataclasses import dataclass, replace
 
 from ccmodel.model.general.run import Active
 
+# What a sensor reads where there is nothing, by its channel.
+ZERO_OF = {
+    "tau_in_Nm": "tau_in_zero_Nm",
+    "tau_out_Nm": "tau_out_zero_Nm",
+    "F_drive_N": "F_drive_zero_N",
+    "F_load_N": "F_load_zero_N",
+}
+
 
 @dataclass(frozen=True)
 class Parameters:
@@ -44,6 +52,8 @@ class Parameters:
         1 (`ccmodel.model.initial.InitialTension.between_ends`).
     mechanisms : tuple of Active
         What acts besides the paper's physics.
+    refinement : int
+        By how much the general solver's grid and steps are finer than usual, to see what they cost.
     """
 
     stiffness_N_per_m: float
@@ -66,6 +76,7 @@ class Parameters:
     profile_bow_A: float = 0.0
     profile_bow_B: float = 0.0
     mechanisms: tuple[Active, ...] = ()
+    refinement: int = 1
 
     @property
     def friction(self) -> float:

@@ -14,7 +14,7 @@ from ccmodel.model.exact import pair as exact
 from ccmodel.model.general import run as general
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
-from ccmodel.model.parameters import Parameters
+from ccmodel.model.parameters import ZERO_OF, Parameters
 from ccmodel.model.transmission import Transmission
 from ccmodel.recording import Recording, stride
 from ccmodel.rig.motion import SIDES, drive_motion
@@ -48,7 +48,8 @@ class ModelInput:
     tau_out : ndarray, shape (n,), or None
         Torque measured at the load pulley without the sensor's noise, N m; None where it was not recorded.
     resting : mapping of str to ndarray
-        What each channel read while the drive did not move, each of shape (resting samples,); empty without a rest.
+        What each channel read while the drive did not move, and time_s, each of shape (resting samples,); empty
+        without a rest.
     """
 
     recording: Recording
@@ -69,7 +70,8 @@ class ModelInput:
         every = stride(recording, step_s)
         series = (theta_in, deviations, place, theta_out, tau_out)
         thinned = (None if values is None else values[..., ::every] for values in series)
-        return cls(recording[::every], *thinned, {c: values[rest] for c, values in recording.channels.items()})
+        resting = {c: values[rest] for c, values in (recording.channels | {"time_s": recording.time_s}).items()}
+        return cls(recording[::every], *thinned, resting)
 
     @classmethod
     def prescribed(cls, recording: Recording, theta_in: NDArray) -> "ModelInput":
@@ -78,7 +80,7 @@ class ModelInput:
 
     @cached_property
     def resting_mean(self) -> dict[str, float]:
-        """What each channel read on average while the drive did not move; empty without a rest."""
+        """What each channel read on average while the drive did not move, and when; empty without a rest."""
         return {c: float(values.mean()) for c, values in self.resting.items() if values.size}
 
     @property
@@ -131,8 +133,7 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
     if parameters.drive_place:
         given = replace(given, theta_in=given.theta_in + parameters.drive_place * given.drive_place)
     read = _run(transmission, load, given, initial, parameters)
-    tau_in, tau_out = (read[f"tau_{end}_Nm"] + getattr(parameters, f"tau_{end}_zero_Nm") for end in ("in", "out"))
-    F_drive, F_load = (read[f"F_{end}_N"] + getattr(parameters, f"F_{end}_zero_N") for end in ("drive", "load"))
+    tau_in, tau_out, F_drive, F_load = (read[c] + getattr(parameters, zero) for c, zero in ZERO_OF.items())
     drive, load_side = tau_in / parameters.drive_radius_m, tau_out / parameters.load_radius_m
     channels = {
         "theta_in_rad": read["theta_in_rad"],
@@ -162,7 +163,10 @@ def _run(transmission, load, given: ModelInput, initial: InitialTension, paramet
     """
     if parameters.mechanisms or isinstance(load, TorqueLoad):
         time_s = given.recording.time_s
-        response = general.simulate(transmission, load, time_s, given.theta_in, initial, parameters.mechanisms)
+        finer = parameters.refinement
+        response = general.simulate(
+            transmission, load, time_s, given.theta_in, initial, parameters.mechanisms, finer * general.ELEMENTS, finer
+        )
         return dict(response.complete().read)
     response = exact.simulate_pair(transmission, load, given.theta_in, initial).complete()
     return {
@@ -184,13 +188,22 @@ def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension
     read = given.resting_mean
     if not all(f"T{i}_N" in read for i in (1, 2, 3, 4)):
         return InitialTension.uniform(path, scale * given.recording.pretension_N)
-    tau_in, tau_out = (read[f"tau_{end}_Nm"] - getattr(parameters, f"tau_{end}_zero_Nm") for end in ("in", "out"))
-    F_drive, F_load = (read[f"F_{end}_N"] - getattr(parameters, f"F_{end}_zero_N") for end in ("drive", "load"))
-    drive, load = tau_in / parameters.drive_radius_m, tau_out / parameters.load_radius_m
+    true = _true_at_rest(read, given, parameters)
+    F_drive, F_load = true["F_drive_N"], true["F_load_N"]
+    drive, load = true["tau_in_Nm"] / parameters.drive_radius_m, true["tau_out_Nm"] / parameters.load_radius_m
     T1, T3 = scale * (F_drive + drive) / 2, scale * (F_drive - drive) / 2
     T2, T4 = scale * (F_load + load) / 2, scale * (F_load - load) / 2
     bows = parameters.profile_bow_A, parameters.profile_bow_B
     return InitialTension.between_ends(path, parameters.friction, (T1, T2), (T3, T4), bows)
+
+
+def _true_at_rest(read: Mapping[str, float], given: ModelInput, parameters: Parameters) -> dict[str, float]:
+    """Torques and sums at rest, from what their sensors read there, their zeros and faults taken out."""
+    sensed = {c: read[c] - getattr(parameters, zero) for c, zero in ZERO_OF.items()}
+    still = {"theta_in_rad": 0.0, "theta_out_rad": 0.0}
+    radii = parameters.drive_radius_m, parameters.load_radius_m
+    seconds = read["time_s"] - float(given.recording.time_s[0])
+    return general.true_at(parameters.mechanisms, seconds, sensed | still, radii)
 
 
 def _load(given: ModelInput, parameters: Parameters, load_from: LoadFrom) -> SpringLoad | TorqueLoad | AngleLoad:

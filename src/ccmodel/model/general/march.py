@@ -47,11 +47,13 @@ EDGE = 1.0 - 1e-9
 NEWTON_LIMIT = 60
 # Friction that remembers its speed is taken from the slides expected of a step. Where those found make it another by
 # more than this share, the step is solved once more.
-GRIP_TOLERANCE = 1e-3
-LOOKS = 2
+GRIP_TOLERANCE = 1e-4
+LOOKS = 6
 PATIENCE = 12
 SMALLEST_SHARE = 1.0 / 128
 SMALLEST_SUBSTEP = 1.0 / 4096
+# Shares of a sample and its time add up to the whole within this.
+ROUNDING = 1e-9
 
 IMPEDANCE, PRESCRIBED_ANGLE = 0, 1
 
@@ -103,8 +105,8 @@ PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10, 18, 5, 11, 9
 # Numbers of a run.
 Physics = namedtuple(
     "Physics",
-    "has_settling has_relaxation tau conduit_compliance bristle presliding exponent rise vs radius eccentricity phase "
-    "stiffness_load cubic half_gap damping inertia load_friction kind general_friction",
+    "has_settling has_relaxation tau conduit_compliance bristle presliding exponent rise vs fall radius eccentricity "
+    "phase stiffness_load cubic half_gap damping inertia load_friction kind general_friction",
 )
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}  # not nnan: a NaN must be seen
@@ -502,7 +504,7 @@ def _renew(ph, node, slide, c, dt, into):
     """What the contacts of a cable remember after the slides in `NOW`, into row `into`."""
     rested, d, following = node[RESTED, c], slide[NOW, c], node[into, c]
     for i in range(node.shape[2]):
-        following[i] = renewed(rested[i], d[i + 1], dt, ph.vs)
+        following[i] = renewed(rested[i], d[i + 1], dt, ph.vs, ph.fall)
 
 
 @kernel(error_model="numpy", fastmath=FAST)
@@ -531,7 +533,7 @@ def _set_grip(ph, node, slide, course, dt):
 
 
 @kernel(error_model="numpy")
-def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, course, series, out, counts):
+def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, course, series, steps, out, counts):
     """Step through the samples.
 
     Parameters
@@ -547,6 +549,8 @@ def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, course, s
     course, series : ndarray, shape (m,) or (1,)
         Factor of mu, and what is prescribed at the load: a torque (N m) on top of the load's own, or the angle (rad).
         A single value holds throughout.
+    steps : int
+        Steps from one sample to the next; where one finds no solution it is halved.
     out : ndarray, shape (7, m)
         Filled with T1, T2, T3, T4 (N), load angle (rad), the load's torque and that of the cables on the drive
         pulley (N m).
@@ -572,13 +576,15 @@ def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, course, s
         wanted = series[min(j, series.size - 1)]
         rise = wanted - series[min(j - 1, series.size - 1)] if j > 0 else 0.0
         dt = time_s[j] - time_s[j - 1] if j > 0 else 0.0
-        done, part, bristle = 0.0, 1.0, ph.bristle
-        while done < 1.0:
+        whole = 1.0 / steps if j > 0 else 1.0
+        done, part, bristle = 0.0, whole, ph.bristle
+        while done < 1.0 - ROUNDING:
             part = min(part, 1.0 - done)
             step_pull, step_dt = part * pull, part * dt
             # The start: what the last steps did, scaled to the drive's step while it goes the same way.
             expected = 2 * last_pull - before_pull
-            if part == 1.0 and last_dt == dt and abs(expected - pull) <= 0.05 * abs(pull):
+            is_whole = abs(part - whole) <= ROUNDING and abs(last_dt - step_dt) <= ROUNDING * dt
+            if is_whole and abs(expected - step_pull) <= 0.05 * abs(step_pull):
                 for c in range(2):
                     for i in range(n + 2):
                         slide[NOW, c, i] = 2 * slide[LAST, c, i] - slide[BEFORE, c, i]
@@ -614,7 +620,7 @@ def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, course, s
                     if ph.presliding or bristle >= LONGEST_BRISTLE_M:
                         return j
                     bristle *= 10.0
-                    part = 1.0
+                    part = whole
                 continue
             _copy(slide, BEFORE, LAST)
             _copy(slide, LAST, NOW)
@@ -623,7 +629,7 @@ def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, course, s
             _commit(ph, piece, node, slide, mean, load, turn, step_dt)
             counts[1] += 1
             done += part
-            part *= 2.0
+            part = min(2.0 * part, whole)
         out[0, j], out[1, j] = max(piece[TENSION, 0, 0], 0.0), max(piece[TENSION, 0, n], 0.0)
         out[2, j], out[3, j] = max(piece[TENSION, 1, 0], 0.0), max(piece[TENSION, 1, n], 0.0)
         out[4, j] = load[ANGLE]

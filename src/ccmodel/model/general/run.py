@@ -1,7 +1,7 @@
 """Set up the march, run it, and say what the sensors would read."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,10 @@ from ccmodel.model.response import PairResponse, Status
 from ccmodel.model.transmission import Transmission
 
 ELEMENTS = 32
+# A load that rings turns by no more than this much of its phase in a step, as far as so many steps a sample do.
+RINGING_STEP_RAD, MOST_STEPS = 0.15, 16
+# Each round leaves as much of a sensor's fault as the fault is of the reading.
+FAULTS_ROUNDS = 8
 
 Load = SpringLoad | MechanicalLoad | TorqueLoad | AngleLoad
 
@@ -74,6 +78,7 @@ def simulate(
     initial: InitialTension,
     mechanisms: Mapping[str, Mapping] | Sequence[Active] = (),
     elements: int = ELEMENTS,
+    steps: int = 1,
 ) -> GeneralResponse:
     """Run the pair through a motion of the drive pulley.
 
@@ -91,6 +96,8 @@ def simulate(
         and values, which then are the mechanism's starting values.
     elements : int
         Cells of each cable.
+    steps : int
+        Steps from one sample to the next, at least.
 
     Returns
     -------
@@ -112,7 +119,7 @@ def simulate(
     series = np.zeros(1) if series is None else series
 
     grid = make_grid(transmission.path, elements, tuple(settings.kinks))
-    physics = _physics(transmission, load, settings)
+    physics = _physics(transmission, load, settings, elements)
     piece, node = _constants(transmission, settings, grid)
     course = np.ones(1) if settings.friction_course is None else settings.friction_course(time_s)
     mean, state = np.zeros((rows.MEAN_ROWS, 2)), np.zeros(rows.LOAD_ROWS)
@@ -122,7 +129,10 @@ def simulate(
     slide = np.zeros((rows.SLIDE_ROWS, 2, node.shape[2] + 2))
     drive = tuple(map(float, (transmission.drive_radius_m, *settings.drive_eccentricity)))
     out, counts = np.empty((7, time_s.size)), np.zeros(3, dtype=np.int64)
-    solved = rows.march(physics, piece, node, slide, mean, state, time_s, theta_in, drive, course, series, out, counts)
+    steps = max(steps, _steps(physics, transmission, time_s))
+    solved = rows.march(
+        physics, piece, node, slide, mean, state, time_s, theta_in, drive, course, series, steps, out, counts
+    )
 
     status = Status.OK if solved == time_s.size else Status.NO_CONVERGENCE
     time_s, theta_in, out = time_s[:solved], theta_in[:solved], out[:, :solved]
@@ -141,7 +151,7 @@ def simulate(
         "F_drive_N": T1 + T3,
         "F_load_N": T2 + T4,
     }
-    read = _read(active, time_s, channels, transmission)
+    read = _read(active, time_s, channels, (transmission.drive_radius_m, transmission.load_radius_m))
     return GeneralResponse(
         T1_N=T1,
         T2_N=T2,
@@ -190,8 +200,9 @@ def load_law(settings: Settings, stiffness: float, time_s: NDArray, theta: NDArr
     z = _deflection(stiffness, K3, start_Nm)
     angle = theta - theta[0] + _with_gap(z, settings.half_gap)
     beyond = np.sign(angle) * np.maximum(np.abs(angle) - settings.half_gap, 0.0)
-    acceleration = np.gradient(np.gradient(theta, time_s), time_s)
-    return stiffness * beyond + K3 * beyond**3 + settings.inertia * acceleration
+    speed = np.gradient(theta, time_s)
+    inertial = settings.damping(stiffness) * speed + settings.inertia * np.gradient(speed, time_s)
+    return stiffness * beyond + K3 * beyond**3 + inertial
 
 
 def _active(mechanisms) -> list[Active]:
@@ -208,19 +219,19 @@ def _active(mechanisms) -> list[Active]:
         if a.place not in known.places:
             raise ModelError(f"{a.name} acts at {' or '.join(known.places)}; got {a.place!r}")
         wanted = {p.name for p in known.parameters}
-        if set(a.values) != wanted:
+        if not known.unsaid.keys() | a.values.keys() >= wanted >= a.values.keys():
             raise ModelError(
                 f"{a.name} has the parameters {', '.join(sorted(wanted))}; got {', '.join(sorted(a.values)) or 'none'}"
             )
         if not all_finite(a.values):
             raise ModelError(f"{a.name} has a parameter that is not finite: {dict(a.values)}")
         for p in known.parameters:
-            if p.low > 0 and not p.signed and a.values[p.name] < 0:
+            if p.low > 0 and not p.signed and a.values.get(p.name, p.unsaid) < 0:
                 raise ModelError(
                     f"{a.name} has {p.name} = {a.values[p.name]:g} {p.unit}, which must not be negative; "
                     f"plausible is {p.low:g} to {p.high:g}"
                 )
-    return given
+    return [replace(a, values=registry.get(a.name).unsaid | dict(a.values)) for a in given]
 
 
 def _series(load: Load) -> NDArray | None:
@@ -275,7 +286,7 @@ def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tu
     return piece, node
 
 
-def _physics(transmission: Transmission, load: Load, settings: Settings) -> rows.Physics:
+def _physics(transmission: Transmission, load: Load, settings: Settings, elements: int) -> rows.Physics:
     is_mechanical = isinstance(load, MechanicalLoad)
     K_e = load.stiffness_Nm_per_rad if isinstance(load, SpringLoad | MechanicalLoad) else 0.0
     K_e = load.beside_Nm_per_rad if isinstance(load, TorqueLoad) else K_e
@@ -284,18 +295,21 @@ def _physics(transmission: Transmission, load: Load, settings: Settings) -> rows
         has_relaxation=settings.relaxing_share != 0,
         tau=float(settings.relaxing_time_s),
         conduit_compliance=float(settings.conduit_compliance),
-        bristle=float(settings.bristle_m) if settings.bristle_m > 0 else _coulomb_bristle(transmission, settings),
+        bristle=float(settings.bristle_m)
+        if settings.bristle_m > 0
+        else _coulomb_bristle(transmission, settings, elements),
         presliding=settings.bristle_m > 0,
         exponent=float(settings.tension_exponent),
         rise=float(settings.stribeck_rise),
         vs=float(settings.stribeck_speed),
+        fall=float(settings.stribeck_fall),
         radius=float(transmission.load_radius_m),
         eccentricity=float(settings.load_eccentricity[0]),
         phase=float(settings.load_eccentricity[1]),
         stiffness_load=float(K_e),
         cubic=float(settings.cubic_stiffness + (load.cubic_Nm_per_rad3 if is_mechanical else 0.0)),
         half_gap=float(settings.half_gap),
-        damping=float(load.damping_Nms_per_rad if is_mechanical else 0.0),
+        damping=float(settings.damping(K_e) + (load.damping_Nms_per_rad if is_mechanical else 0.0)),
         inertia=float(settings.inertia + (load.inertia_kg_m2 if is_mechanical else 0.0)),
         load_friction=float(settings.load_friction_Nm),
         kind=rows.PRESCRIBED_ANGLE if isinstance(load, AngleLoad) else rows.IMPEDANCE,
@@ -303,9 +317,23 @@ def _physics(transmission: Transmission, load: Load, settings: Settings) -> rows
     )
 
 
-def _coulomb_bristle(transmission: Transmission, settings: Settings) -> float:
+def _steps(physics: rows.Physics, transmission: Transmission, time_s: NDArray) -> int:
+    """Steps from one sample to the next that follow a load with mass as it rings on the cables; a power of two.
+
+    More of them where a fit takes a difference over the mass would be a jump, and powers of two have few.
+    """
+    if physics.inertia == 0 or physics.kind == rows.PRESCRIBED_ANGLE or time_s.size < 2:
+        return 1
+    cables = 2 * transmission.axial_rigidity_N / transmission.path.length_m * physics.radius**2
+    rings_rad_per_s = np.sqrt((cables + physics.stiffness_load) / physics.inertia)
+    wanted = rings_rad_per_s * float(np.median(np.diff(time_s))) / RINGING_STEP_RAD
+    return int(np.clip(2 ** np.ceil(np.log2(wanted)), 1, MOST_STEPS))
+
+
+def _coulomb_bristle(transmission: Transmission, settings: Settings, elements: int) -> float:
     over_cable = settings.conduit_compliance * transmission.axial_rigidity_N / transmission.path.length_m
-    return max(rows.COULOMB_BRISTLE_M, min(1.0, 10 * over_cable) * rows.SOFT_CONDUIT_BRISTLE_M)
+    soft = rows.SOFT_CONDUIT_BRISTLE_M * ELEMENTS / elements
+    return max(rows.COULOMB_BRISTLE_M, min(1.0, 10 * over_cable) * soft)
 
 
 def _initial_state(physics, piece, node, settings, profiles, course) -> NDArray:
@@ -366,10 +394,37 @@ def _with_gap(deflection: float, half_gap: float) -> float:
     return deflection + float(np.clip(deflection, -half_gap, half_gap))
 
 
-def _read(active: list[Active], time_s: NDArray, channels: dict[str, NDArray], transmission: Transmission):
+def true_at(active: Sequence[Active], seconds: float, read: Mapping[str, float], radii: tuple[float, float]) -> dict:
+    """What sensors would have read without their faults, so many seconds into a recording in which nothing moves.
+
+    Parameters
+    ----------
+    active : sequence of Active
+    seconds : float
+        Since the recording began.
+    read : mapping of str to float
+        What each channel of a run reads.
+    radii : (float, float)
+        Of the drive and the load pulley, m.
+
+    Returns
+    -------
+    dict of str to float
+        The same channels.
+    """
+    faults = [a for a in active if registry.get(a.name).reads is not None]
+    true = dict(read)
+    for _ in range(FAULTS_ROUNDS if faults else 0):
+        steady = {c: np.full(2, value) for c, value in true.items()}
+        faulty = _read(faults, np.array([0.0, seconds]), steady, radii)
+        true = {c: true[c] + read[c] - float(faulty[c][1]) for c in true}
+    return true
+
+
+def _read(active: Sequence[Active], time_s: NDArray, channels: dict[str, NDArray], radii: tuple[float, float]):
     for a in active:
         mechanism = registry.get(a.name)
         if mechanism.reads is not None:
-            sensing = Sensing(time_s, channels, transmission.drive_radius_m, transmission.load_radius_m)
+            sensing = Sensing(time_s, channels, *radii)
             channels = channels | mechanism.reads(sensing, a.place, a.values)
     return channels

@@ -1,0 +1,37 @@
+"""How sure a fit is of its values."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ccmodel.diagnose import trial
+from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.diagnose.trial import fit
+from made_evidence import batch, calibrated
+
+KEY = "conduit-compliance/conduit/compliance"
+
+
+def test_what_a_coarse_solver_costs_is_in_the_interval(monkeypatch):
+    """The recordings are the paper's model's, so that what is found of a compliance beyond noise is the solver's."""
+    recordings = batch()
+    base = calibrated(recordings)
+    hypothesis = Hypothesis((("conduit-compliance", "conduit"),))
+
+    def found():
+        t = fit(recordings, hypothesis, base.free, base.values | {KEY: 1e-5})
+        return t.values[KEY], t.covariance[list(t.values).index(KEY)]
+
+    value, with_solver = found()
+    monkeypatch.setattr(trial, "FINER", 1)
+    same, without = found()
+    assert same == value
+    k = list(base.values | {KEY: 0.0}).index(KEY)
+    assert with_solver[k] > without[k]
+    assert abs(value) < 3 * np.sqrt(with_solver[k])
+
+
+def test_the_papers_model_has_no_solver_to_refine():
+    for w in batch():
+        refined = w.acting(replace(w.evidence.parameters, refinement=3))
+        assert (w.evidence.modelled({}) == refined.evidence.modelled({})).all()
