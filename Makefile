@@ -52,7 +52,7 @@ table-one: $(VENV)/.ready  ## ask which left-out effect errs as the paper's Tabl
 	  --cores $(CORES)
 
 proof: $(VENV)/.ready  ## diagnose a handful of concealed cases and score them: results/proof/quick.md
-	$(BIN)/python -m proof quick --out results/proof/quick
+	$(BIN)/python -m proof quick --out results/proof/quick --cores $(CORES)
 	$(BIN)/python -m proof score results/proof/quick --out results/proof/quick.json --page results/proof/quick.md \
 	  --figures results/proof/figures --command "make proof" --of "A handful whose seeds never change." --strict
 

@@ -3,6 +3,8 @@
 import hashlib
 import json
 import time
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -23,6 +25,7 @@ Effect = Annotated[str | None, typer.Option(help="The effect of a single, remove
 Rivals = Annotated[
     bool, typer.Option("--rivals", help="Hold the rivals to the same recordings; needs the extra 'proof'.")
 ]
+Cores = Annotated[int, typer.Option(min=1, help="How many cases at a time.")]
 Out = Annotated[Path, typer.Option(help="Folder that gets a folder a case.")]
 
 
@@ -64,15 +67,16 @@ def run(
     kind: Kind = None,
     effect: Effect = None,
     rivals: Rivals = False,
+    cores: Cores = 1,
 ) -> None:
     """Record cases and have each diagnosed where nothing else is in reach; cases that have a result are kept."""
-    _judge_each(cases_of(seed, count, kind, effect), out, rivals)
+    _judge_each(cases_of(seed, count, kind, effect), out, rivals, cores)
 
 
 @app.command()
-def quick(out: Out) -> None:
+def quick(out: Out, cores: Cores = 1) -> None:
     """The handful of cases whose seeds never change."""
-    _judge_each([draw(q.seed, q.kind, q.effect) for q in read_plan().quick], out, False)
+    _judge_each([draw(q.seed, q.kind, q.effect) for q in read_plan().quick], out, False, cores)
 
 
 @app.command()
@@ -149,10 +153,11 @@ def part_of(digest: str, n: int) -> list[int]:
     return sorted(map(int, order[:n]))
 
 
-def _judge_each(cases: list[Case], out: Path, rivals: bool) -> None:
-    for case in cases:
-        if not (out / case.name / "result.json").exists():
-            _judge(case, out / case.name, rivals)
+def _judge_each(cases: list[Case], out: Path, rivals: bool, cores: int) -> None:
+    """Cases that have no result yet, some at a time."""
+    wanted = [case for case in cases if not (out / case.name / "result.json").exists()]
+    with ProcessPoolExecutor(cores) as pool:
+        list(pool.map(partial(_judge, rivals=rivals), wanted, [out / case.name for case in wanted]))
 
 
 def _judge(case: Case, out: Path, rivals: bool) -> None:

@@ -53,3 +53,5 @@ def test_a_mass_is_tried_at_many_sizes_under_one_damping():
     masses = np.array([p["load-inertia/load/J"] for p in probes])
     assert (masses[1:] / masses[:-1]).max() < 1.25
     assert len({p["load-inertia/load/zeta"] for p in probes}) == 1
+    assert scaled(Hypothesis((("load-inertia", "load"),)), probes[3], 0.2) == probes[3]
+    assert Hypothesis((("load-inertia", "load"),)).eased == ["load-inertia/load/zeta"]

@@ -1,14 +1,17 @@
 """How sure a fit is of its values."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from ccmodel.diagnose import trial
 from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.trial import fit
+from ccmodel.diagnose.trial import _eased, fit
 from made_evidence import batch, calibrated
 
+LOW = np.array([0.0, 1e-3])
 KEY = "conduit-compliance/conduit/compliance"
 
 
@@ -35,3 +38,11 @@ def test_the_papers_model_has_no_solver_to_refine():
     for w in batch():
         refined = w.acting(replace(w.evidence.parameters, refinement=3))
         assert (w.evidence.modelled({}) == refined.evidence.modelled({})).all()
+
+
+@pytest.mark.parametrize(("least", "end"), [(0.005, 0.00625), (0.08, 0.1), (0.0, 0.0015625)])
+def test_a_value_is_eased_down_as_long_as_that_leaves_less(least, end):
+    def solved(x):
+        return SimpleNamespace(x=x, cost=1 + abs(np.log((x[1] + 1e-9) / (least + 1e-9))))
+
+    assert _eased(solved, solved(np.array([3.0, 0.1])), 1, LOW).x == pytest.approx([3.0, end])

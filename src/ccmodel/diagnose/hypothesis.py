@@ -68,6 +68,16 @@ class Hypothesis:
                 found[key] = Free(float(np.clip(start[key], low, high)), low, high)
         return found
 
+    @property
+    def eased(self) -> list[str]:
+        """Unknowns whose fit begins high and is then repeated from lower and lower."""
+        return [
+            mechanism_key(name, place, parameter.name)
+            for name, place in self.acting
+            for parameter in registry.get(name).parameters
+            if parameter.eased
+        ]
+
     def probes(self) -> Iterator[dict[str, float]]:
         """Values at which a single mechanism is tried out, all over its plausible range."""
         ((name, place),) = self.acting

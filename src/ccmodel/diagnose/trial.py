@@ -21,6 +21,8 @@ TOLERANCE = 1e-4
 DIFFERENCE = 3e-4
 # How much finer the solver's grid and steps are for what they cost a fit.
 FINER = 3
+# By how much at a time a value is eased down (`Parameter.eased`).
+EASING = 4.0
 MOST_EVALUATIONS = 25
 # Where no rest shows the pretension the errors have valleys of their own: both cables taut all along, or one of them
 # slack on its way. A fit then feels its way from either, at shares of the pretension, and goes on from the better.
@@ -116,6 +118,8 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
 
     starts = _starts(names, x0, low, high)
     found = solved(x0) if len(starts) == 1 else solved(_best(lambda x: solved(x, FEELING), starts).x)
+    for k in map(names.index, hypothesis.eased):
+        found = _eased(solved, found, k, low)
     ends = np.cumsum([n + len(w.likeliest) for n, w in zip(counts, acting, strict=True)])[:-1]
     J = [part * np.sqrt(n) for part, n in zip(np.split(found.jac, ends), counts, strict=True)]
     r = [part * np.sqrt(n) for part, n in zip(np.split(found.fun, ends), counts, strict=True)]
@@ -153,6 +157,18 @@ def _starts(names: Sequence[str], x0: NDArray, low: NDArray, high: NDArray) -> l
     pretension = np.arange(x0.size) == names.index("pretension_N")
     inside = low + 1e-9 * (high - low)
     return [np.clip(np.where(pretension, share * x0, x0), inside, high) for share in PRETENSION_SHARES]
+
+
+def _eased(solved: Callable, found, k: int, low: NDArray):
+    """The solution as one of its values is eased down, as long as that leaves less."""
+    while found.x[k] > EASING * low[k]:
+        x = found.x.copy()
+        x[k] /= EASING
+        lower = solved(x)
+        if lower.cost > (1 - TOLERANCE) * found.cost:
+            break
+        found = lower
+    return found
 
 
 def _best(solved: Callable, starts: Sequence[NDArray]):
@@ -240,13 +256,15 @@ def _score(weighed, base: Trial, hypothesis: Hypothesis, counts, Q, left) -> Sco
 
 
 def scaled(hypothesis: Hypothesis, probe: Mapping[str, float], strength: float) -> dict[str, float] | None:
-    """A probe at another strength; None where its mechanism cannot have it."""
+    """A probe at another strength; None where its mechanism cannot have it, as it is where strengths differ in kind."""
     ((name, place),) = hypothesis.acting
     parameters = registry.get(name).parameters
     first = parameters[0]
     signed = first.signed or first.neutral == 1.0
     if strength <= 0 and not signed:
         return None
+    if first.tried:
+        return dict(probe)
     strength = float(np.clip(strength, -4.0, 4.0))
     strength = np.copysign(max(abs(strength), 0.1), strength)
     values = dict(probe)

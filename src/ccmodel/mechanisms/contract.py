@@ -55,6 +55,8 @@ class Parameter:
         Whether the range holds for the size of the number and either sign is possible.
     tried : tuple of float
         Shares of the range at which a mechanism is tried out before it is fitted, where the usual ones will not do.
+    eased : bool
+        Whether the least a mechanism leaves is found only from high values of this one, step by step down.
     unsaid : float or None
         Its value in a model that does not say one; None where one must be said.
     """
@@ -68,6 +70,7 @@ class Parameter:
     scale: str = "log"
     signed: bool = False
     tried: tuple[float, ...] = ()
+    eased: bool = False
     unsaid: float | None = None
 
 
