@@ -5,6 +5,7 @@ import pytest
 
 from builders import recording
 from ccmodel.model.general import Active
+from ccmodel.model.general import run as general
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 
@@ -66,15 +67,12 @@ FAULTS = [
     ("load-cell-scale", {"gain": 0.05}),
     ("load-cell-offset", {"offset": 1.0}),
     ("load-cell-drift", {"rate": 0.2}),
-    ("load-cell-crosstalk", {"crosstalk": 0.1}),
-    ("torque-scale", {"gain": -0.08}),
-    ("time-skew", {"delay": 0.01}),
 ]
 
 
 @pytest.mark.parametrize("place", ["drive-sensor", "load-sensor"])
 @pytest.mark.parametrize(("name", "values"), FAULTS)
-def test_tensions_at_rest_are_the_true_ones_whatever_is_wrong_with_a_sensor(name, values, place):
+def test_tensions_at_rest_are_the_true_ones_whatever_is_wrong_with_a_load_cell(name, values, place):
     """What a model with a faulty sensor says of a rig is what the same model, told the rest's readings, says again."""
     pull = recording(theta_in_rad=lambda t: 0.4 * np.sin(2 * np.pi * np.clip(t - 0.3, 0, None)))
     rig = Parameters(
@@ -85,3 +83,24 @@ def test_tensions_at_rest_are_the_true_ones_whatever_is_wrong_with_a_sensor(name
     again = simulate(ModelInput.of(recorded), replace(rig, pretension_N=None))
     for channel in ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N"):
         assert again[channel] == pytest.approx(recorded[channel], abs=1e-3 * np.ptp(recorded[channel])), channel
+
+
+@pytest.mark.parametrize(
+    "faults",
+    [
+        [("load-cell-crosstalk", "drive-sensor", {"crosstalk": 0.1})],
+        [("torque-scale", "load-sensor", {"gain": -0.3})],
+        [("time-skew", "load-sensor", {"delay": 0.01})],
+        [("torque-scale", "drive-sensor", {"gain": 0.1}), ("load-cell-crosstalk", "drive-sensor", {"crosstalk": 0.1})],
+        [("load-cell-drift", "load-sensor", {"rate": 0.2}), ("load-cell-scale", "load-sensor", {"gain": 0.1})],
+    ],
+)
+def test_what_sensors_would_have_read_without_their_faults(faults):
+    active = [Active(*fault) for fault in faults]
+    true = {"theta_in_rad": 0.0, "theta_out_rad": 0.0, "tau_in_Nm": 0.02, "tau_out_Nm": -0.01}
+    true |= {"F_drive_N": 14.0, "F_load_N": 12.0}
+    radii = 0.006, 0.005
+    steady = {c: np.full(2, value) for c, value in true.items()}
+    read = {c: float(v[1]) for c, v in general._read(active, np.array([0.0, 0.4]), steady, radii).items()}
+    assert (read != true) == (faults[0][0] != "time-skew")
+    assert general.true_at(active, 0.4, read, radii) == pytest.approx(true, rel=1e-4)

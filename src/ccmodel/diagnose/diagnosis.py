@@ -13,7 +13,7 @@ from ccmodel.diagnose import experiment, locate
 from ccmodel.diagnose.evidence import Weighed, weigh
 from ccmodel.diagnose.hypothesis import Hypothesis, singles
 from ccmodel.diagnose.judge import MOST_ALTERNATIVES, RIGHT, RIVAL, Judgement, judge, nested_errors
-from ccmodel.diagnose.trial import Trial, fit
+from ccmodel.diagnose.trial import Trial, fit, moved_by_finer
 from ccmodel.failure import ModelError
 from ccmodel.identify.intervals import COVERAGE
 from ccmodel.identify.problem import MEASURED, Evidence, Free, Problem, each
@@ -200,6 +200,7 @@ def _what_is_missing(evidence: Sequence[Evidence]) -> list[dict[str, str]]:
 def _said(batch, judgement: Judgement, weighed, estimates: Parameters, not_judged) -> dict:
     best, base = judgement.best, judgement.calibrated
     named = best.hypothesis.acting if judgement.verdict == "explained" else ()
+    by_solver = _by_solver(judgement, not_judged) if named else np.zeros(len(best.values))
     confidence = dict(zip([t.hypothesis for t in judgement.trials], judgement.probability, strict=True))
     alternatives = _alternatives(judgement, named, confidence)
     next_experiment = None
@@ -210,7 +211,7 @@ def _said(batch, judgement: Judgement, weighed, estimates: Parameters, not_judge
         "batch": batch,
         "verdict": judgement.verdict,
         "location": locate.location(judgement, weighed),
-        "mechanisms": [_mechanism(best, k, _named(name, confidence)) for k, (name, _) in enumerate(named)],
+        "mechanisms": [_mechanism(best, k, _named(name, confidence), by_solver) for k, (name, _) in enumerate(named)],
         "alternatives": alternatives,
         "nearest": _nearest(judgement),
         "fit": {
@@ -228,7 +229,8 @@ def _nearest(judgement: Judgement) -> dict | None:
     """Where nothing explains a batch: what came nearest, and what it left of the noise's mean square on held-out."""
     if judgement.verdict != "unexplained" or (trial := judgement.nearest) is None:
         return None
-    acting = [_mechanism(trial, k, 0.0) for k in range(len(trial.hypothesis.acting))]
+    nothing = np.zeros(len(trial.values))
+    acting = [_mechanism(trial, k, 0.0, nothing) for k in range(len(trial.hypothesis.acting))]
     return {
         "mechanisms": [{key: value for key, value in m.items() if key != "confidence"} for m in acting],
         "mean_square": float(trial.left.mean()),
@@ -254,7 +256,16 @@ def _confidence(acting: tuple[str, str], confidence: Mapping[Hypothesis, float])
     return min(MOST_CONFIDENT, sum(p for hypothesis, p in confidence.items() if acting in hypothesis.acting))
 
 
-def _mechanism(trial: Trial, k: int, confidence: float) -> dict:
+def _by_solver(judgement: Judgement, not_judged: list) -> NDArray:
+    """By how much a finer solver would move the named mechanisms' values, shape (unknowns,)."""
+    try:
+        return moved_by_finer(judgement.weighed, judgement.best)
+    except ModelError as error:
+        not_judged.append({"what": "what the solver's grid costs the values", "why": str(error)})
+        return np.zeros(len(judgement.best.values))
+
+
+def _mechanism(trial: Trial, k: int, confidence: float, by_solver: NDArray) -> dict:
     name, place = trial.hypothesis.acting[k]
     names = list(trial.values)
     count = len(trial.held_out)
@@ -263,7 +274,7 @@ def _mechanism(trial: Trial, k: int, confidence: float) -> dict:
     for p in registry.get(name).parameters:
         key = mechanism_key(name, place, p.name)
         value, i = trial.values[key], names.index(key)
-        sd = float(np.sqrt(max(trial.covariance[i, i], 0.0)))
+        sd = float(np.sqrt(max(trial.covariance[i, i], 0.0) + by_solver[i] ** 2))
         parameters.append(
             {
                 "name": p.name,

@@ -6,7 +6,7 @@ beyond noise is alike from sample to sample), so each channel of a recording cou
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,8 @@ PARTNERS = 3
 # top, and in that next to nothing to be learnt by more than chance, with what the simple form of a mechanism may miss.
 RIGHT = 1.5
 RIGHT_SHARE = 0.05
-# Of some thousand pairs one comes near by chance: a pair is right only if it leaves this, with nothing on top.
+# Of many hundred pairs one comes near by chance: a pair is right only if it leaves this, with no more on top than what
+# the simple forms of its members may miss.
 RIGHT_PAIR = 1.3
 LEARNABLE = 0.01
 # Trials that are asked what could still be learnt of what they leave.
@@ -56,7 +57,7 @@ class Judgement:
     best : Trial
         The hypothesis with the least left; the calibrated model where nothing is missing.
     trials : list of Trial
-        All that were fitted in full, the best first.
+        What was fitted in full and as the recordings were weighed in the end, the likeliest first.
     probability : list of float
         Of each of these.
     scores : list of Score
@@ -142,20 +143,26 @@ def judge(
         found = Comparison.of(found.weighed, found.base, [t for t in trials if _names_more(t, trials)])
         if found.wants_more and len(found.trials[0].hypothesis.acting) > 1:
             found = _weighed_anew(found, calibrated, tell)
+            found = replace(found, trials=[t for t in found.trials if _names_more(t, found.trials)])
     return _verdict(found, scores)
 
 
 def _weighed_anew(found: Comparison, calibrated: Mapping[str, Free], tell) -> Comparison:
-    """The leading trials again, beside what differs from run to run as the best of them feels it.
+    """Singles and the leading pairs again, beside what differs from run to run as the best of them feels it.
 
     What is not known of the drive's motion makes a load with mass ring, which the paper's model knows nothing of.
     """
     best = found.trials[0]
     tell(f"weighing the recordings about {best.hypothesis}")
     model = [best.hypothesis.of(w.evidence.parameters).with_values(best.values) for w in found.weighed]
-    weighed = each(found.weighed, lambda i, w: weigh(w.evidence, model[i]))
-    base = fit(weighed, Hypothesis(), calibrated, found.base.values)
-    again = [Score(t.hypothesis, 0.0, t.values) for t in found.trials[:CONTENDERS]]
+    try:
+        weighed = each(found.weighed, lambda i, w: weigh(w.evidence, model[i]))
+        base = fit(weighed, Hypothesis(), calibrated, found.base.values)
+    except ModelError as error:
+        tell(f"they stay weighed as they are ({error})")
+        return found
+    leading = [t for k, t in enumerate(found.trials) if k < CONTENDERS or len(t.hypothesis.acting) == 1]
+    again = [Score(t.hypothesis, 0.0, t.values) for t in leading]
     return Comparison.of(weighed, base, _fit_all(weighed, calibrated, base, again, tell))
 
 
@@ -234,7 +241,7 @@ def _verdict(found: Comparison, scores: list[Score]) -> Judgement:
     probability = _probabilities(found.weighed, base, trials)
 
     def judged(verdict: str, best: Trial) -> Judgement:
-        order = np.argsort(probability, kind="stable")[::-1]
+        order = np.argsort(-np.array(probability), kind="stable")
         likely = [trials[k] for k in order], [probability[k] for k in order]
         return Judgement(verdict, base, best, *likely, scores, learnable, found.weighed)
 

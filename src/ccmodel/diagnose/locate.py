@@ -78,7 +78,7 @@ def _place(judgement: Judgement, weighed: Sequence[Weighed]) -> str:
 def excess_without(channel: str, weighed: Sequence[Weighed], calibrated: Trial) -> float:
     """Mean square beyond noise of the other channels, if the paper's model is calibrated to these alone."""
     rest = [e for w in weighed if (e := w.evidence.without(channel)).channels]
-    fitted = rest[0].parameters.with_values(calibrated.values)
+    fitted = calibrated.hypothesis.of(rest[0].parameters).with_values(calibrated.values)
     lighter = each(rest, lambda i, e: weigh(e, fitted))
     return float(fit(lighter, calibrated.hypothesis, calibrated.free, calibrated.values).left.mean()) - 1.0
 

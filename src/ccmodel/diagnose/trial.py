@@ -43,8 +43,7 @@ class Trial:
         By recording, what the fit leaves.
     jacobian : list of ndarray, each of shape (rows + numbers, unknowns)
     covariance : ndarray, shape (unknowns, unknowns)
-        By how much the recordings disagree about the values, or of a single one what its noise says; and by how much
-        a finer solver would move them.
+        By how much the recordings disagree about the values; of a single one, what its noise says.
     held_out : list of dict
         By recording, the values that the other recordings ask for.
     aside : list of ndarray, each of shape (rows + numbers,)
@@ -135,15 +134,23 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
     else:
         scatter = _inverse(total, sizes) / (LOOKS * len(acting[0].evidence.channels))
     aside = each(acting, lambda i, w: errors(w, held_out[i]))
-    moved = _moved_by_finer(acting, named(found.x), r, J, counts, _inverse(total, sizes))
-    return Trial(hypothesis, calibrated, named(found.x), r, J, scatter + np.outer(moved, moved), held_out, aside)
+    return Trial(hypothesis, calibrated, named(found.x), r, J, scatter, held_out, aside)
 
 
-def _moved_by_finer(acting, values, r, J, counts, inverse: NDArray) -> NDArray:
-    """Where a finer solver would have the values, less where they are, to first order; shape (unknowns,)."""
-    finer = [w.acting(replace(w.evidence.parameters, refinement=FINER)) for w in acting]
-    changed = each(finer, lambda i, w: errors(w, values) - r[i])
-    return -inverse @ sum(j.T @ e / n for j, e, n in zip(J, changed, counts, strict=True))
+def moved_by_finer(weighed: Sequence[Weighed], trial: Trial) -> NDArray:
+    """Where a finer solver would have a trial's values, less where they are, to first order; shape (unknowns,).
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be run with the finer solver.
+    """
+    finer = [w.acting(replace(trial.hypothesis.of(w.evidence.parameters), refinement=FINER)) for w in weighed]
+    changed = each(finer, lambda i, w: errors(w, trial.values) - trial.whitened[i])
+    counts = [w.evidence.measured.size for w in weighed]
+    sizes = np.array([size_of(n, v) for n, v in trial.values.items()])
+    inverse = _inverse(sum(j.T @ j / n for j, n in zip(trial.jacobian, counts, strict=True)), sizes)
+    return -inverse @ sum(j.T @ e / n for j, e, n in zip(trial.jacobian, changed, counts, strict=True))
 
 
 def _jackknife(moved: NDArray) -> NDArray:
@@ -164,7 +171,10 @@ def _eased(solved: Callable, found, k: int, low: NDArray):
     while found.x[k] > EASING * low[k]:
         x = found.x.copy()
         x[k] /= EASING
-        lower = solved(x)
+        try:
+            lower = solved(x)
+        except ModelError:
+            break
         if lower.cost > (1 - TOLERANCE) * found.cost:
             break
         found = lower
@@ -213,7 +223,7 @@ class Score:
     gain : float
         Share of the mean square that goes, after everything that recalibration absorbs.
     values : dict of str to float
-        The probe that does best, its strength as the recordings ask for.
+        The probe that does best, `scaled` as the recordings ask for.
     """
 
     hypothesis: Hypothesis
@@ -256,7 +266,10 @@ def _score(weighed, base: Trial, hypothesis: Hypothesis, counts, Q, left) -> Sco
 
 
 def scaled(hypothesis: Hypothesis, probe: Mapping[str, float], strength: float) -> dict[str, float] | None:
-    """A probe at another strength; None where its mechanism cannot have it, as it is where strengths differ in kind."""
+    """A probe at another strength; None where its mechanism cannot have it.
+
+    Where a mechanism says which strengths are to be tried, they differ in kind, and the probe stays as it is.
+    """
     ((name, place),) = hypothesis.acting
     parameters = registry.get(name).parameters
     first = parameters[0]

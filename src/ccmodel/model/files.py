@@ -53,7 +53,7 @@ def read_model(path: Path) -> Parameters:
     for acting in stated.mechanisms:
         if acting.name not in registry.names():
             raise InputError(f"{path}: no mechanism is called {acting.name!r}; there are {', '.join(registry.names())}")
-    mechanisms = tuple(Active(m.name, m.place, m.values) for m in stated.mechanisms)
+    mechanisms = tuple(Active(m.name, m.place, registry.get(m.name).unsaid | dict(m.values)) for m in stated.mechanisms)
     try:
         return Parameters(**stated.parameters, mechanisms=mechanisms)
     except TypeError as error:

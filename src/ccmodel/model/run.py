@@ -198,12 +198,18 @@ def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension
 
 
 def _true_at_rest(read: Mapping[str, float], given: ModelInput, parameters: Parameters) -> dict[str, float]:
-    """Torques and sums at rest, from what their sensors read there, their zeros and faults taken out."""
+    """Torques and sums at rest, from what their sensors read there, their zeros and faults taken out.
+
+    A torque that stands for the load in a run stays as it was read, at rest as ever after.
+    """
     sensed = {c: read[c] - getattr(parameters, zero) for c, zero in ZERO_OF.items()}
     still = {"theta_in_rad": 0.0, "theta_out_rad": 0.0}
     radii = parameters.drive_radius_m, parameters.load_radius_m
     seconds = read["time_s"] - float(given.recording.time_s[0])
-    return general.true_at(parameters.mechanisms, seconds, sensed | still, radii)
+    true = general.true_at(parameters.mechanisms, seconds, sensed | still, radii)
+    if parameters.load_stiffness_Nm_per_rad is None:
+        true["tau_out_Nm"] = sensed["tau_out_Nm"]
+    return true
 
 
 def _load(given: ModelInput, parameters: Parameters, load_from: LoadFrom) -> SpringLoad | TorqueLoad | AngleLoad:

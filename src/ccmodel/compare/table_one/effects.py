@@ -95,7 +95,10 @@ def _of_mechanism(name: str, place: str, grid: Grid) -> list[Effect]:
         alone = [(p, v) for p in (strength, *shapes) for v in _strengths(p, grid)]
         neutral = registry.get(name).neutral
         return [Effect(name, place, {**neutral, p.name: v}, _is_plausible(p, v)) for p, v in alone]
-    lists = [_strengths(strength, grid), *([_within(p, share) for share in grid.shapes] for p in shapes)]
+    lists = [
+        _strengths(strength, grid),
+        *([_within(p, share) for share in grid.shapes] if p.unsaid is None else [p.unsaid] for p in shapes),
+    ]
     names = [p.name for p in (strength, *shapes)]
     return [
         Effect(name, place, dict(zip(names, values, strict=True)), _is_plausible(strength, values[0]))

@@ -46,7 +46,7 @@ LOOSE_TOLERANCE = 1e-5
 EDGE = 1.0 - 1e-9
 NEWTON_LIMIT = 60
 # Friction that remembers its speed is taken from the slides expected of a step. Where those found make it another by
-# more than this share, the step is solved once more.
+# more than this share, the step is solved again, so many times in all.
 GRIP_TOLERANCE = 1e-4
 LOOKS = 6
 PATIENCE = 12

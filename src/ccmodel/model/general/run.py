@@ -97,7 +97,7 @@ def simulate(
     elements : int
         Cells of each cable.
     steps : int
-        Steps from one sample to the next, at least.
+        Steps from one sample to the next; as many times what a load that rings needs.
 
     Returns
     -------
@@ -129,7 +129,7 @@ def simulate(
     slide = np.zeros((rows.SLIDE_ROWS, 2, node.shape[2] + 2))
     drive = tuple(map(float, (transmission.drive_radius_m, *settings.drive_eccentricity)))
     out, counts = np.empty((7, time_s.size)), np.zeros(3, dtype=np.int64)
-    steps = max(steps, _steps(physics, transmission, time_s))
+    steps *= _steps(physics, transmission, time_s)
     solved = rows.march(
         physics, piece, node, slide, mean, state, time_s, theta_in, drive, course, series, steps, out, counts
     )
