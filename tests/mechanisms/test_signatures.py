@@ -67,6 +67,22 @@ def test_stribeck_peaks_at_break_away_and_loses_less_at_speed():
     assert fast == pytest.approx(plain, rel=0.08)
 
 
+def test_running_in_goes_with_time_or_with_the_way_whatever_the_speed():
+    """In full slip after winding to and fro the capstan exponent is that of the time, or the way, that has gone."""
+    theta = np.concatenate([np.linspace(0, 2, 400), np.linspace(2, 0, 400), np.linspace(0, 2, 400)])
+    exponents = {}
+    for period_s in (1.0, 4.0):
+        for numbers in ({"tau": 2.0}, {"tau": 1e9, "per_m": 30.0}):
+            mechanism = ("running-in", "conduit", {"change": 0.3, **numbers})
+            r = run(theta, mechanism, load=AngleLoad(theta), period_s=period_s)
+            exponents[period_s, "per_m" in numbers] = np.log(r.T1_N[-1] / r.T2_N[-1]) / (np.pi * MU)
+    way_m, seconds = 6 * R, (theta.size - 1) / 500
+    for period_s in (1.0, 4.0):
+        by_time, by_way = exponents[period_s, False], exponents[period_s, True]
+        assert by_time == pytest.approx(1 + 0.3 * (1 - np.exp(-period_s * seconds / 2.0)), rel=1e-3)
+        assert by_way == pytest.approx(1 + 0.3 * (1 - np.exp(-30.0 * way_m)), rel=1e-3)
+
+
 @pytest.mark.parametrize("delta", [1.0, 2.0])
 def test_stribeck_friction_falls_with_speed_as_the_curve_says(delta):
     """In steady full slip ln(T1/T2) is the bend times mu (1 + a exp(-(v / vs)^delta))."""

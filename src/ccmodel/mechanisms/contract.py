@@ -96,7 +96,7 @@ class Settings:
     drag_N : float
         Conduit: friction of a whole cable that does not depend on tension.
     friction_course : callable or None
-        Conduit: factor of mu at given times (s, shape (samples,)), same shape.
+        Conduit: factor of mu at given times (s) and ways that the drive has wound (m), all of shape (samples,).
     friction_ratio_B, stiffness_ratio_B : float
         Cable: mu and EA of cable B over those of cable A.
     relaxing_share, relaxing_time_s : float
@@ -124,7 +124,7 @@ class Settings:
     viscous: float = 0.0
     tension_exponent: float = 0.0
     drag_N: float = 0.0
-    friction_course: Callable[[NDArray], NDArray] | None = None
+    friction_course: Callable[[NDArray, NDArray], NDArray] | None = None
     friction_ratio_B: float = 1.0
     stiffness_ratio_B: float = 1.0
     relaxing_share: float = 0.0

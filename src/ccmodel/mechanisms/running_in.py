@@ -1,6 +1,7 @@
 """Running-in: friction that changes as cable and liner wear into each other or warm up.
 
-Equation: mu (1 + change (1 - exp(-t / tau))), t from the start of the recording.
+Equation: mu (1 + change (1 - exp(-t / tau - per_m w))), t the time from the start of the recording and w the way that
+the drive has wound since: warming goes with the one, wear with the other.
 
 Signature: loops drift through a recording while the sensors' zeros stay.
 
@@ -18,8 +19,8 @@ def _enters(settings, place, values):
     if not values["tau"] > 0:
         raise ValueError(f"running in takes some time; got tau = {values['tau']} s")
 
-    def course(time_s):
-        return 1 + values["change"] * -np.expm1(-(time_s - time_s[0]) / values["tau"])
+    def course(time_s, way_m):
+        return 1 + values["change"] * -np.expm1(-(time_s - time_s[0]) / values["tau"] - values["per_m"] * way_m)
 
     settings.friction_course = course
 
@@ -29,7 +30,8 @@ MECHANISM = Mechanism(
     places=("conduit",),
     parameters=(
         Parameter("change", "1", 0.05, 0.3, 0.1, signed=True),
-        Parameter("tau", "s", 2.0, 100.0, 10.0, neutral=10.0),
+        Parameter("tau", "s", 2.0, 1000.0, 10.0, neutral=10.0, tried=(0.13, 0.31, 0.5)),
+        Parameter("per_m", "1/m", 1.0, 200.0, 1.0, tried=(0.0, 0.6), unsaid=0.0),
     ),
     summary="friction coefficient changes through a recording",
     mistaken_for="relaxation",

@@ -121,7 +121,10 @@ def simulate(
     grid = make_grid(transmission.path, elements, tuple(settings.kinks))
     physics = _physics(transmission, load, settings, elements)
     piece, node = _constants(transmission, settings, grid)
-    course = np.ones(1) if settings.friction_course is None else settings.friction_course(time_s)
+    course = np.ones(1)
+    if settings.friction_course is not None:
+        way_m = transmission.drive_radius_m * np.abs(np.diff(theta_in, prepend=theta_in[0])).cumsum()
+        course = settings.friction_course(time_s, way_m)
     mean, state = np.zeros((rows.MEAN_ROWS, 2)), np.zeros(rows.LOAD_ROWS)
     T = _initial_state(physics, piece, node, settings, initial.at(transmission.path, grid.boundary_m), course[0])
     mean[rows.MEAN] = (piece[rows.SHARE] * T).sum(axis=1)
