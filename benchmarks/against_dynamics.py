@@ -61,9 +61,6 @@ light cable had no unique motion: sliding slower than the fall is unstable withi
 set by the grid. The rows with a renewal length of a bristle show the rig doing so. It also chatters with the longer one
 where friction falls by much over a wide range of speeds. There the solver, which has no inertia, gives a course without
 chatter, and the difference holds the chatter itself.
-
-Short of chatter, a fall of 40 % leaves the rig one motion that the solver misses by more than the limit: the
-difference lies where sliding comes to a halt, and neither a finer grid nor smaller steps of the solver take it away.
 """
 
 
