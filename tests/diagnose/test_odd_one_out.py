@@ -28,15 +28,15 @@ def contradicting():
 
 
 def test_it_is_named(contradicting):
-    (found,) = odd_one_out(judged(contradicting), contradicting)
+    (found,) = odd_one_out(judged(contradicting))
     assert found["what"] == "r2"
     assert "check its bend" in found["why"]
 
 
 def test_where_all_are_off_none_is():
     recordings = batch(lambda said: {"tau_in_Nm": 2e-3 * np.sin(25 * said["theta_in_rad"])})
-    assert odd_one_out(judged(recordings), recordings) == []
+    assert odd_one_out(judged(recordings)) == []
 
 
 def test_three_recordings_do_not_say_which(contradicting):
-    assert odd_one_out(judged(contradicting[:3]), contradicting[:3]) == []
+    assert odd_one_out(judged(contradicting[:3])) == []

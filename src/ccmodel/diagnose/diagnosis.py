@@ -40,14 +40,12 @@ class Diagnosis:
     said : dict
         The content of diagnosis.json.
     judgement : Judgement
-    weighed : sequence of Weighed
     estimates : Parameters
         The batch's own, beforehand.
     """
 
     said: dict
     judgement: Judgement
-    weighed: Sequence[Weighed]
     estimates: Parameters
 
     def model(self, trial: Trial) -> Parameters:
@@ -116,14 +114,13 @@ def diagnose(
     fitted = estimates.with_values(start)
     weighed = each(evidence, lambda i, e: weigh(e, fitted))
     judgement = judge(weighed, calibrated, start, singles(without), tell, [_suspect(s) for s in suspects])
-    not_judged += odd_one_out(judgement, judgement.weighed)
-    said = _said(recordings[0].batch, judgement, judgement.weighed, estimates, not_judged)
-    return Diagnosis(said, judgement, judgement.weighed, estimates)
+    not_judged += odd_one_out(judgement)
+    return Diagnosis(_said(recordings[0].batch, judgement, estimates, not_judged), judgement, estimates)
 
 
-def odd_one_out(judgement: Judgement, weighed: Sequence[Weighed]) -> list[dict[str, str]]:
+def odd_one_out(judgement: Judgement) -> list[dict[str, str]]:
     """Of an unexplained batch, the recording without which the paper's model would do."""
-    base = judgement.calibrated
+    base, weighed = judgement.calibrated, judgement.weighed
     if judgement.verdict != "unexplained" or len(weighed) < FEWEST_TO_CONTRADICT:
         return []
     odd = int(np.argmax(base.left))
@@ -197,28 +194,28 @@ def _what_is_missing(evidence: Sequence[Evidence]) -> list[dict[str, str]]:
     return found
 
 
-def _said(batch, judgement: Judgement, weighed, estimates: Parameters, not_judged) -> dict:
-    best, base = judgement.best, judgement.calibrated
+def _said(batch, judgement: Judgement, estimates: Parameters, not_judged) -> dict:
+    best, base, weighed = judgement.best, judgement.calibrated, judgement.weighed
     named = best.hypothesis.acting if judgement.verdict == "explained" else ()
-    by_solver = _by_solver(judgement, not_judged) if named else np.zeros(len(best.values))
+    covariance = _with_solver(judgement, not_judged) if named else best.covariance
     confidence = dict(zip([t.hypothesis for t in judgement.trials], judgement.probability, strict=True))
     alternatives = _alternatives(judgement, named, confidence)
     next_experiment = None
     if judgement.verdict in ("undecided", "unexplained"):
-        next_experiment = experiment.proposed(judgement, weighed, estimates)
+        next_experiment = experiment.proposed(judgement, estimates)
     return {
         "format": FORMAT,
         "batch": batch,
         "verdict": judgement.verdict,
-        "location": locate.location(judgement, weighed),
-        "mechanisms": [_mechanism(best, k, _named(name, confidence), by_solver) for k, (name, _) in enumerate(named)],
+        "location": locate.location(judgement),
+        "mechanisms": [_mechanism(best, k, _named(name, confidence), covariance) for k, (name, _) in enumerate(named)],
         "alternatives": alternatives,
         "nearest": _nearest(judgement),
         "fit": {
             "held_out": [w.evidence.given.recording.id for w in weighed] if len(weighed) > 1 else [],
             "calibrated": base.values,
             "mean_square": {"calibrated": float(base.left.mean()), "extended": float(best.left.mean())},
-            "error": held_out_errors(judgement, weighed),
+            "error": held_out_errors(judgement),
         },
         "next_experiment": next_experiment,
         "not_judged": list(not_judged),
@@ -229,8 +226,7 @@ def _nearest(judgement: Judgement) -> dict | None:
     """Where nothing explains a batch: what came nearest, and what it left of the noise's mean square on held-out."""
     if judgement.verdict != "unexplained" or (trial := judgement.nearest) is None:
         return None
-    nothing = np.zeros(len(trial.values))
-    acting = [_mechanism(trial, k, 0.0, nothing) for k in range(len(trial.hypothesis.acting))]
+    acting = [_mechanism(trial, k, 0.0, trial.covariance) for k in range(len(trial.hypothesis.acting))]
     return {
         "mechanisms": [{key: value for key, value in m.items() if key != "confidence"} for m in acting],
         "mean_square": float(trial.left.mean()),
@@ -256,16 +252,18 @@ def _confidence(acting: tuple[str, str], confidence: Mapping[Hypothesis, float])
     return min(MOST_CONFIDENT, sum(p for hypothesis, p in confidence.items() if acting in hypothesis.acting))
 
 
-def _by_solver(judgement: Judgement, not_judged: list) -> NDArray:
-    """By how much a finer solver would move the named mechanisms' values, shape (unknowns,)."""
+def _with_solver(judgement: Judgement, not_judged: list) -> NDArray:
+    """Covariance of the best trial's values, with by how much a finer solver would move them."""
+    best = judgement.best
     try:
-        return moved_by_finer(judgement.weighed, judgement.best)
+        moved = moved_by_finer(judgement.weighed, best)
     except ModelError as error:
         not_judged.append({"what": "what the solver's grid costs the values", "why": str(error)})
-        return np.zeros(len(judgement.best.values))
+        return best.covariance
+    return best.covariance + np.outer(moved, moved)
 
 
-def _mechanism(trial: Trial, k: int, confidence: float, by_solver: NDArray) -> dict:
+def _mechanism(trial: Trial, k: int, confidence: float, covariance: NDArray) -> dict:
     name, place = trial.hypothesis.acting[k]
     names = list(trial.values)
     count = len(trial.held_out)
@@ -274,7 +272,7 @@ def _mechanism(trial: Trial, k: int, confidence: float, by_solver: NDArray) -> d
     for p in registry.get(name).parameters:
         key = mechanism_key(name, place, p.name)
         value, i = trial.values[key], names.index(key)
-        sd = float(np.sqrt(max(trial.covariance[i, i], 0.0) + by_solver[i] ** 2))
+        sd = float(np.sqrt(max(covariance[i, i], 0.0)))
         parameters.append(
             {
                 "name": p.name,
@@ -287,11 +285,11 @@ def _mechanism(trial: Trial, k: int, confidence: float, by_solver: NDArray) -> d
     return {"name": name, "place": place, "confidence": round(confidence, 4), "parameters": parameters}
 
 
-def held_out_errors(judgement: Judgement, weighed: Sequence[Weighed]) -> dict[str, dict]:
+def held_out_errors(judgement: Judgement) -> dict[str, dict]:
     """Root mean square on held-out recordings by channel, before and after, and what a right model leaves."""
     chosen = nested_errors(judgement)
     square: dict[str, list[tuple[float, float, float]]] = {}
-    for i, w in enumerate(weighed):
+    for i, w in enumerate(judgement.weighed):
         before = _raw(w, judgement.calibrated, i)
         after = before if chosen[i] is judgement.calibrated else _raw(w, chosen[i], i)
         for c, channel in enumerate(w.evidence.channels):

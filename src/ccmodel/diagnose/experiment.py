@@ -27,15 +27,15 @@ class Experiment:
     pretension_share: float
 
 
-def proposed(judgement: Judgement, weighed: Sequence[Weighed], estimates: Parameters) -> dict | None:
+def proposed(judgement: Judgement, estimates: Parameters) -> dict | None:
     """The experiment that separates the leading rivals best; None where there are no two that can be run."""
     rivals = [judgement.calibrated, *judgement.trials][: RIVALS + 1]
     rivals = judgement.trials[:RIVALS] if len(judgement.trials) > 1 else rivals
     if len(rivals) < 2:
         return None
-    template = max(weighed, key=lambda w: w.evidence.given.recording.pretension_N).evidence
+    template = max(judgement.weighed, key=lambda w: w.evidence.given.recording.pretension_N).evidence
     best, apart = None, 0.0
-    for experiment in candidates(weighed):
+    for experiment in candidates(judgement.weighed):
         distance = _apart(experiment, rivals, template, estimates)
         if distance > apart:
             best, apart = experiment, distance

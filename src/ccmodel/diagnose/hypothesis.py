@@ -52,31 +52,26 @@ class Hypothesis:
     @property
     def start(self) -> dict[str, float]:
         """The mechanisms' starting values, by the names of the unknowns."""
-        return {
-            mechanism_key(name, place, key): value
-            for name, place in self.acting
-            for key, value in registry.get(name).start.items()
-        }
+        return {key: parameter.start for key, parameter, _ in self._unknowns()}
 
     def free(self, start: Mapping[str, float]) -> dict[str, Free]:
         """The mechanisms' numbers as unknowns, from `start`."""
         found = {}
-        for name, place in self.acting:
-            for k, parameter in enumerate(registry.get(name).parameters):
-                key = mechanism_key(name, place, parameter.name)
-                low, high = _reach(parameter, strength=k == 0)
-                found[key] = Free(float(np.clip(start[key], low, high)), low, high)
+        for key, parameter, is_strength in self._unknowns():
+            low, high = _reach(parameter, is_strength)
+            found[key] = Free(float(np.clip(start[key], low, high)), low, high)
         return found
 
     @property
     def eased(self) -> list[str]:
         """Unknowns whose fit begins high and is then repeated from lower and lower."""
-        return [
-            mechanism_key(name, place, parameter.name)
-            for name, place in self.acting
-            for parameter in registry.get(name).parameters
-            if parameter.eased
-        ]
+        return [key for key, parameter, _ in self._unknowns() if parameter.eased]
+
+    def _unknowns(self) -> Iterator[tuple[str, Parameter, bool]]:
+        """Name of each of the mechanisms' numbers, what is known of it, and whether it is a mechanism's strength."""
+        for name, place in self.acting:
+            for k, parameter in enumerate(registry.get(name).parameters):
+                yield mechanism_key(name, place, parameter.name), parameter, k == 0
 
     def probes(self) -> Iterator[dict[str, float]]:
         """Values at which a single mechanism is tried out, all over its plausible range."""

@@ -45,12 +45,12 @@ TEXT = {
 }
 
 
-def location(judgement: Judgement, weighed: Sequence[Weighed]) -> dict:
+def location(judgement: Judgement) -> dict:
     """Place, channels and parts of the motion that carry the mismatch, and a sentence."""
     if judgement.verdict == "agrees":
         return {"place": None, "channels": [], "phases": [], "text": "model and recordings agree within the noise"}
-    place = judgement.best.hypothesis.acting[0][1] if judgement.best.hypothesis.acting else _place(judgement, weighed)
-    table = mismatch(weighed, judgement.calibrated)
+    place = judgement.best.hypothesis.acting[0][1] if judgement.best.hypothesis.acting else _place(judgement)
+    table = mismatch(judgement.weighed, judgement.calibrated)
     by_channel = {c: float(np.sqrt(np.nanmean(np.square(list(parts.values()))))) for c, parts in table.items()}
     worst = max(by_channel.values())
     channels = [c for c, value in sorted(by_channel.items(), key=lambda i: -i[1]) if value > NAMED_SHARE * worst]
@@ -61,12 +61,13 @@ def location(judgement: Judgement, weighed: Sequence[Weighed]) -> dict:
     return {"place": place, "channels": channels, "phases": parts, "text": text}
 
 
-def _place(judgement: Judgement, weighed: Sequence[Weighed]) -> str:
+def _place(judgement: Judgement) -> str:
     """Where the mismatch sits as far as it can be said without a mechanism that accounts for it.
 
     A sensor or pulley at fault spoils one channel, and the calibrated model is right in all others once that channel
     is not fitted. What spoils several lies between them, and where along the way the screening knows best.
     """
+    weighed = judgement.weighed
     left = {c: excess_without(c, weighed, judgement.calibrated) for c in _channels(weighed)}
     guilty = min(left, key=left.get)
     alone = left[guilty] < ALONE * float(judgement.calibrated.left.mean() - 1.0)

@@ -54,7 +54,7 @@ def write_diagnosis(file: Path, found: Diagnosis) -> None:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("ccmodel.report", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
-    origin = found.weighed[0].evidence.given.recording.origin
+    origin = found.judgement.weighed[0].evidence.given.recording.origin
     with plt.rc_context(STYLE):
         text = environment.get_template("diagnosis.html.j2").render(
             said=found.said,
@@ -65,7 +65,7 @@ def write_diagnosis(file: Path, found: Diagnosis) -> None:
             summaries={name: registry.get(name) for name in registry.names()},
             map=_encoded(_map(found)),
             loops=_encoded(_loops(found)),
-            recordings=[w.evidence.given.recording.id for w in found.weighed],
+            recordings=[w.evidence.given.recording.id for w in found.judgement.weighed],
         )
     file.write_text(text, encoding="utf-8")
 
@@ -104,7 +104,7 @@ def _why(trial: Trial, found: Diagnosis) -> str:
 def _map(found: Diagnosis) -> Figure:
     """Errors over the noise, channel by part of the motion, before and after."""
     j = found.judgement
-    before, after = mismatch(found.weighed, j.calibrated), mismatch(found.weighed, j.best)
+    before, after = mismatch(found.judgement.weighed, j.calibrated), mismatch(found.judgement.weighed, j.best)
     figure, axes = plt.subplots(1, 2, figsize=(8, 2.9), sharey=True)
     highest = max(np.nanmax([list(v.values()) for v in before.values()]), 3.0)
     for ax, table, title in zip(axes, (before, after), ("calibrated model", "with what was found"), strict=True):
@@ -130,7 +130,7 @@ def _loops(found: Diagnosis) -> Figure:
     label, scale = AXIS.get(channel, (f"{channel.rsplit('_', 1)[0]} (N)", 1))
     figure, axes = plt.subplots(1, len(order), figsize=(3.1 * len(order), 3.1), squeeze=False)
     for ax, i in zip(axes[0], order, strict=True):
-        w = found.weighed[i]
+        w = found.judgement.weighed[i]
         e = w.evidence
         c = e.channels.index(channel)
         theta = e.given.theta_in[e.judged]
@@ -154,7 +154,7 @@ def _loops(found: Diagnosis) -> Figure:
 def _worst_channel(found: Diagnosis) -> str:
     error = found.said["fit"]["error"]
     worst = max(error, key=lambda c: error[c]["before"] / error[c]["noise"])
-    channels = found.weighed[int(np.argmax(found.judgement.calibrated.left))].evidence.channels
+    channels = found.judgement.weighed[int(np.argmax(found.judgement.calibrated.left))].evidence.channels
     return next((c for c in channels if c.rsplit("_", 1)[0] == worst), channels[0])
 
 
