@@ -68,13 +68,14 @@ def diagnose(
     ] = 0.0,
     step: Annotated[float | None, typer.Option(min=1e-4, help="Compare a sample every so often, s.")] = None,
     cycles: Annotated[int | None, typer.Option(min=1, help="Compare so many cycles of a sine.")] = None,
+    beside: Annotated[Path | None, typer.Option(help="A model file: ask what is missing besides what it has.")] = None,
 ) -> None:
     """Say whether the calibrated model explains a batch, and if not: where it fails and what was left out."""
     from ccmodel.config import Diagnosing
     from ccmodel.stages.diagnose import diagnose as run
 
     judged = Diagnosing(allowance=allowance, step_s=step, cycles=cycles)
-    typer.echo(run(batch, out, without, lambda text: _err.print(text, style="dim", markup=False), judged))
+    typer.echo(run(batch, out, without, lambda text: _err.print(text, style="dim", markup=False), judged, beside))
 
 
 @app.command()

@@ -5,6 +5,7 @@ from ccmodel import mechanisms
 from ccmodel.diagnose.hypothesis import Hypothesis, plausible, singles
 from ccmodel.diagnose.trial import scaled
 from ccmodel.model.parameters import mechanism_parameter
+from made_evidence import PARAMETERS
 
 
 def test_every_mechanism_is_asked_at_each_of_its_places():
@@ -55,3 +56,16 @@ def test_a_mass_is_tried_at_many_sizes_under_one_damping():
     assert len({p["load-inertia/load/zeta"] for p in probes}) == 1
     assert scaled(Hypothesis((("load-inertia", "load"),)), probes[3], 0.2) == probes[3]
     assert Hypothesis((("load-inertia", "load"),)).eased == ["load-inertia/load/zeta"]
+
+
+def test_what_the_model_has_already_is_fitted_and_neither_named_nor_asked_for():
+    """What belongs to the model in question is part of every hypothesis beside it, and no finding."""
+    friction, gain = ("pulley-friction", "drive-pulley"), ("torque-scale", "load-sensor")
+    model = Hypothesis(beside=(friction,))
+    both = model.and_also(Hypothesis((gain,)))
+    assert both.names == {"torque-scale"}
+    assert [(m.name, m.place) for m in both.of(PARAMETERS).mechanisms] == [friction, gain]
+    assert set(both.free(both.start)) > set(model.free(model.start)) != set()
+    asked = {h.acting[0] for h in singles(model=model)}
+    assert friction not in asked
+    assert ("pulley-friction", "load-pulley") in asked

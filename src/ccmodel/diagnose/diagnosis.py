@@ -63,6 +63,7 @@ def diagnose(
     step_s: float = STEP_S,
     cycles: int | None = None,
     suspects: Sequence[Sequence[str]] = (),
+    beside: Parameters | None = None,
 ) -> Diagnosis:
     """Say whether the calibrated model explains recordings, and if not, where and why.
 
@@ -86,6 +87,10 @@ def diagnose(
         Cycles of a sine that are compared, once it has settled; further ones are more work and the same again.
     suspects : sequence of sequence of str
         One or two mechanisms, each as "name at place", that are fitted in full whatever the screening says of them.
+    beside : Parameters, optional
+        A model that such a rig was fitted with before, as a diagnosis writes it. What it has besides the paper's
+        physics then belongs to the model in question, all is fitted anew from its values, and asked is what else is
+        missing.
 
     Raises
     ------
@@ -109,11 +114,13 @@ def diagnose(
     calibrated = calibration(estimates, evidence)
     estimates = estimates.with_values({name: free.start for name, free in calibrated.items()})
     evidence = [replace(e, parameters=estimates) for e in evidence]
-    tell(f"calibrating the paper's model on {len(evidence)} recordings")
-    start = _first_fit(evidence, calibrated)
-    fitted = estimates.with_values(start)
+    model = Hypothesis(beside=tuple((m.name, m.place) for m in beside.mechanisms) if beside else ())
+    tell(f"calibrating {'the model given' if beside else 'the paper model'} on {len(evidence)} recordings")
+    start = _values_of(beside, calibrated, model) if beside else _first_fit(evidence, calibrated)
+    fitted = model.of(estimates).with_values(start)
     weighed = each(evidence, lambda i, e: weigh(e, fitted))
-    judgement = judge(weighed, calibrated, start, singles(without), tell, [_suspect(s) for s in suspects])
+    known = singles(without, model)
+    judgement = judge(weighed, calibrated, start, known, tell, [_suspect(s) for s in suspects], model)
     not_judged += odd_one_out(judgement)
     return Diagnosis(_said(recordings[0].batch, judgement, estimates, not_judged), judgement, estimates)
 
@@ -170,6 +177,12 @@ def calibration(estimates: Parameters, evidence: Sequence[Evidence]) -> dict[str
         free["tau_in_zero_Nm"] = Free(0.0, -reach, reach)
         free["tau_out_zero_Nm"] = Free(0.0, -reach, reach)
     return free
+
+
+def _values_of(beside: Parameters, calibrated: Mapping[str, Free], model: Hypothesis) -> dict[str, float]:
+    """A model's values of what a calibration leaves free, where it has them, and of the numbers of its mechanisms."""
+    known = {name: beside.value_of(name) for name in [*calibrated, *model.start]}
+    return {name: calibrated[name].start if value is None else value for name, value in known.items()}
 
 
 def _first_fit(evidence: Sequence[Evidence], calibrated: Mapping[str, Free]) -> dict[str, float]:

@@ -26,13 +26,20 @@ class Hypothesis:
     Attributes
     ----------
     acting : tuple of (str, str)
-        Mechanism and place of each; empty for the paper's model.
+        Mechanism and place of each; empty for the model that is in question.
+    beside : tuple of (str, str)
+        The same of what that model has besides the paper's physics; their numbers are fitted with the others.
     """
 
     acting: tuple[tuple[str, str], ...] = ()
+    beside: tuple[tuple[str, str], ...] = ()
 
     def __str__(self) -> str:
-        return " + ".join(f"{name} at {place}" for name, place in self.acting) or "the paper's model"
+        return " + ".join(f"{name} at {place}" for name, place in self.acting) or "the calibrated model"
+
+    def and_also(self, other: "Hypothesis") -> "Hypothesis":
+        """The same with what acts in another."""
+        return replace(self, acting=self.acting + other.acting)
 
     @property
     def names(self) -> frozenset[str]:
@@ -46,7 +53,7 @@ class Hypothesis:
 
     def of(self, parameters: Parameters) -> Parameters:
         """Parameters with the mechanisms in them, at their starting values."""
-        acting = tuple(Active(name, place, registry.get(name).start) for name, place in self.acting)
+        acting = tuple(Active(name, place, registry.get(name).start) for name, place in self.beside + self.acting)
         return replace(parameters, mechanisms=acting)
 
     @property
@@ -69,7 +76,7 @@ class Hypothesis:
 
     def _unknowns(self) -> Iterator[tuple[str, Parameter, bool]]:
         """Name of each of the mechanisms' numbers, what is known of it, and whether it is a mechanism's strength."""
-        for name, place in self.acting:
+        for name, place in self.beside + self.acting:
             for k, parameter in enumerate(registry.get(name).parameters):
                 yield mechanism_key(name, place, parameter.name), parameter, k == 0
 
@@ -87,10 +94,14 @@ class Hypothesis:
             yield dict(zip(keys, values, strict=True))
 
 
-def singles(without: Collection[str] = ()) -> list[Hypothesis]:
-    """Every mechanism at each of its places, but those that are not to be known."""
+PAPER = Hypothesis()
+
+
+def singles(without: Collection[str] = (), model: Hypothesis = PAPER) -> list[Hypothesis]:
+    """Every mechanism at each of its places, but those that are not to be known and those that a model has already."""
     names = [name for name in registry.names() if name not in without]
-    return [Hypothesis(((name, place),)) for name in names for place in registry.get(name).places]
+    every = ((name, place) for name in names for place in registry.get(name).places)
+    return [Hypothesis((acting,)) for acting in every if acting not in model.beside]
 
 
 def plausible(hypothesis: Hypothesis, values: Mapping[str, float], slack: float = 1.5) -> bool:

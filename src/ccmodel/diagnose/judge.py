@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.diagnose.evidence import LOOKS, Weighed, weigh
-from ccmodel.diagnose.hypothesis import Hypothesis, plausible
+from ccmodel.diagnose.hypothesis import PAPER, Hypothesis, plausible
 from ccmodel.diagnose.structure import Structure, structure
 from ccmodel.diagnose.trial import Score, Trial, fit, score
 from ccmodel.failure import ModelError
@@ -85,7 +85,7 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Hypotheses fitted to recordings that are weighed alike: the paper's model, and others with the best first."""
+    """Hypotheses fitted to recordings that are weighed alike: the calibrated model, and others with the best first."""
 
     weighed: Sequence[Weighed]
     base: Trial
@@ -111,6 +111,7 @@ def judge(
     known: Sequence[Hypothesis],
     tell: Callable[[str], None] = lambda text: None,
     suspects: Sequence[Hypothesis] = (),
+    model: Hypothesis = PAPER,
 ) -> Judgement:
     """Try all hypotheses and come to a verdict.
 
@@ -120,15 +121,17 @@ def judge(
     calibrated : mapping of str to Free
         What a calibration of the paper's model leaves free.
     start : mapping of str to float
-        Values of these from a first fit.
+        Values of these from a first fit, and of the numbers of what the model has besides the paper's physics.
     known : sequence of Hypothesis
         Single mechanisms that may be missing.
     tell : callable
         Is told how the work goes on, a line at a time.
     suspects : sequence of Hypothesis
         Singles or pairs that are fitted in full whatever the screening says of them.
+    model : Hypothesis
+        The model in question; the paper's unless something else is known already.
     """
-    base = fit(weighed, Hypothesis(), calibrated, start)
+    base = fit(weighed, model, calibrated, start)
     tell(f"the calibrated model leaves {_left(base):.2f} of the noise's mean square; asking every mechanism")
     scores = score(weighed, base, known)
     fewest = FEWEST_TRIALS if _left(base) > RIGHT else 0
@@ -157,7 +160,7 @@ def _weighed_anew(found: Comparison, calibrated: Mapping[str, Free], tell) -> Co
     model = [best.hypothesis.of(w.evidence.parameters).with_values(best.values) for w in found.weighed]
     try:
         weighed = each(found.weighed, lambda i, w: weigh(w.evidence, model[i]))
-        base = fit(weighed, Hypothesis(), calibrated, found.base.values)
+        base = fit(weighed, found.base.hypothesis, calibrated, found.base.values)
     except ModelError as error:
         tell(f"they stay weighed as they are ({error})")
         return found
@@ -187,7 +190,7 @@ def _fit_all(weighed, calibrated, base: Trial, chosen: Sequence[Score], tell) ->
     """Fit what extends a fitted hypothesis."""
     trials = []
     for s in chosen:
-        hypothesis = Hypothesis(base.hypothesis.acting + s.hypothesis.acting)
+        hypothesis = base.hypothesis.and_also(s.hypothesis)
         try:
             trial = fit(weighed, hypothesis, calibrated, base.values | s.values)
         except (ModelError, ValueError) as error:

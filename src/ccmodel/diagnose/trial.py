@@ -244,7 +244,7 @@ def score(weighed: Sequence[Weighed], base: Trial, hypotheses: Sequence[Hypothes
 
 def _score(weighed, base: Trial, hypothesis: Hypothesis, counts, Q, left) -> Score:
     best = Score(hypothesis, 0.0, {})
-    added = Hypothesis(base.hypothesis.acting + hypothesis.acting)
+    added = base.hypothesis.and_also(hypothesis)
     acting = [w.acting(added.of(w.evidence.parameters)) for w in weighed]
     for probe in hypothesis.probes():
         try:

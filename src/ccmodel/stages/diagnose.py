@@ -10,7 +10,7 @@ from ccmodel.config import Diagnosing
 from ccmodel.diagnose.diagnosis import Diagnosis
 from ccmodel.diagnose.diagnosis import diagnose as run
 from ccmodel.failure import ModelError
-from ccmodel.model.files import model_as_dict
+from ccmodel.model.files import model_as_dict, read_model
 from ccmodel.model.parameters import Parameters
 from ccmodel.recording import read_recordings
 from ccmodel.report.diagnosis import headline, write_diagnosis
@@ -25,13 +25,14 @@ def diagnose(
     without: Sequence[str] = (),
     tell: Callable[[str], None] = lambda text: None,
     judged: Diagnosing | None = None,
+    beside: Path | None = None,
 ) -> str:
-    """Diagnose a batch folder; the sentence that its page opens with.
+    """Diagnose a batch folder, beside what a model file has already; the sentence that its page opens with.
 
     Raises
     ------
     InputError
-        If the batch cannot be used, or there is no mechanism of a name in `without`.
+        If the batch or the model file cannot be used, or there is no mechanism of a name in `without`.
     """
     try:
         for name in without:
@@ -48,7 +49,8 @@ def diagnose(
     not_judged = [{"what": Path(f.file).name, "why": f.text} for f in refused]
     try:
         estimates = Parameters.estimated(ingested.batch.rig)
-        found = run(ingested.recordings, estimates, not_judged, without, tell, **_options(judged))
+        known = read_model(beside) if beside else None
+        found = run(ingested.recordings, estimates, not_judged, without, tell, **_options(judged), beside=known)
     except ModelError as error:
         raise InputError(f"{batch}: {error}") from None
     _write(found, inputs, out)
