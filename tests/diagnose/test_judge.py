@@ -1,12 +1,23 @@
 """The verdict from what trials leave, without any model run."""
 
+import itertools
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.judge import Comparison, _fit_all, _names_more, _verdict, _weighed_anew, nested_errors
+from ccmodel.diagnose.judge import (
+    ENOUGH,
+    SURE,
+    Comparison,
+    _fit_all,
+    _names_more,
+    _verdict,
+    _weighed_anew,
+    is_listed,
+    nested_errors,
+)
 from ccmodel.diagnose.structure import Structure
 from ccmodel.diagnose.trial import Score, Trial
 from made_evidence import batch, calibrated
@@ -57,6 +68,33 @@ def test_a_mechanism_that_could_be_at_either_of_two_places_is_named():
     found = verdict(trial(6.0), trial(1.0, SCALE), trial(1.0005, ("torque-scale", "load-sensor"), **values))
     assert found.verdict == "explained"
     assert max(found.probability) < 0.8
+
+
+def test_what_may_as_well_be_on_no_list_is_not_named_alone():
+    """A list's best always takes something off a small excess; a large one is seldom met by chance."""
+    weak = verdict(trial(1.4), trial(1.12, FRICTION))
+    assert weak.verdict == "undecided"
+    assert weak.probability[0] > SURE > weak.listed * weak.probability[0]
+    assert verdict(trial(14.0), trial(1.12, FRICTION)).verdict == "explained"
+
+
+def test_the_list_is_the_less_likely_the_more_is_left_and_the_more_was_tried():
+    base, lefts = trial(10.0), (0.95, 1.1, 1.4, 2.0, 5.0)
+    odds = [is_listed(trial(left, FRICTION), base) for left in lefts]
+    assert all(a > b for a, b in itertools.pairwise(odds))
+    assert odds[0] > 0.98
+    assert odds[-1] < 0.2
+    assert all(is_listed(trial(left, FRICTION, SCALE), base) < p for left, p in zip(lefts[:3], odds, strict=False))
+
+
+def test_a_single_that_leaves_a_little_too_much_is_asked_for_company():
+    def asks(left):
+        one = trial(left, FRICTION)
+        nothing = {one.hypothesis: Structure(np.zeros(8))}
+        return Comparison(WEIGHED, trial(10.0), [one], nothing).wants_more
+
+    assert asks(ENOUGH + 0.05)
+    assert not asks(ENOUGH - 0.05)
 
 
 def test_what_no_mechanism_brings_down_is_unexplained():

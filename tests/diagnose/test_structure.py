@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -52,3 +54,17 @@ def test_a_channel_that_one_recording_lacks_is_learnt_from_the_others(recordings
     object.__setattr__(lacking[0], "evidence", lacking[0].evidence.without("tau_out_Nm"))
     found = structure(lacking, trial(lacking, lambda k, e: np.sin(4 * e.given.theta_in[e.judged])))
     assert found.surely > 0.2
+
+
+def test_what_a_right_model_is_allowed_to_leave_may_follow_laws(recordings):
+    """An allowance of half the noise's mean square: a law of that size is no objection, a larger one is."""
+    allowed = [replace(w, evidence=_allowing(w.evidence, 0.5)) for w in recordings]
+    small = structure(allowed, trial(allowed, lambda k, e: 0.8 * np.sin(4 * e.given.theta_in[e.judged])))
+    large = structure(allowed, trial(allowed, lambda k, e: 2.0 * np.sin(4 * e.given.theta_in[e.judged])))
+    assert small.surely < 0 < large.surely
+
+
+def _allowing(e, share):
+    """The same evidence with an allowance that makes up a share of each variance."""
+    sigma = np.ptp(e.measured, axis=1, keepdims=True) / np.sqrt(share) * np.ones_like(e.measured)
+    return replace(e, sigma=sigma, allowance=1.0)

@@ -211,7 +211,8 @@ def _said(batch, judgement: Judgement, estimates: Parameters, not_judged) -> dic
     best, base, weighed = judgement.best, judgement.calibrated, judgement.weighed
     named = best.hypothesis.acting if judgement.verdict == "explained" else ()
     covariance = _with_solver(judgement, not_judged) if named else best.covariance
-    confidence = dict(zip([t.hypothesis for t in judgement.trials], judgement.probability, strict=True))
+    sure = [judgement.listed * p for p in judgement.probability]
+    confidence = dict(zip([t.hypothesis for t in judgement.trials], sure, strict=True))
     alternatives = _alternatives(judgement, named, confidence)
     next_experiment = None
     if judgement.verdict in ("undecided", "unexplained"):

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from ccmodel.diagnose.evidence import LOOKS, Weighed, weigh
 from ccmodel.diagnose.hypothesis import PAPER, Hypothesis, plausible
@@ -23,13 +24,15 @@ from ccmodel.identify.problem import Free, each
 WORTH_A_TRIAL = 0.01
 WORTH_A_NAME = 0.03
 # Trials after the screening, how many at least where something is missing (the screening is linear, and what rings or
-# sticks is not), and partners tried with each of the best two for a pair.
+# sticks is not); singles that may be one of a pair, and partners tried with each.
 TRIALS, FEWEST_TRIALS = 6, 3
-PARTNERS = 3
+FIRSTS, PARTNERS = 2, 3
 # What a right model leaves: the mean square of held-out recordings, with a share of the calibrated model's excess on
 # top, and in that next to nothing to be learnt by more than chance, with what the simple form of a mechanism may miss.
 RIGHT = 1.5
 RIGHT_SHARE = 0.05
+# A single mechanism that leaves more than this, with what its simple form may miss, may have company: pairs are tried.
+ENOUGH = 1.2
 # Of many hundred pairs one comes near by chance: a pair is right only if it leaves this, with no more on top than what
 # the simple forms of its members may miss.
 RIGHT_PAIR = 1.3
@@ -41,6 +44,14 @@ PAIR_SHARE = 0.5
 # Odds against naming something before anything is seen, and probability from which a name is given alone.
 PRIOR_AGREES = 0.5
 SURE = 0.8
+# That what is missing is on no list, before anything is seen; and what says afterwards that it was not. Right models
+# leave about LEVEL (mean and standard deviation over clean practice cases), and every other form adds a share of the
+# excess, FORM_SHARE or so. What is on no list is imitated by the best of the list more or less well, to any share of
+# the excess alike; by the best of all pairs that are fitted as well as the best of so many.
+OFF_LIST = 0.2
+LEVEL = (0.93, 0.09)
+FORM_SHARE = 0.04
+IMITATIONS = {1: 1, 2: FIRSTS * PARTNERS}
 RIVAL = 0.02
 MOST_ALTERNATIVES = 4
 
@@ -62,6 +73,8 @@ class Judgement:
         Of each of these.
     scores : list of Score
         The screening.
+    listed : float
+        Probability that what is missing is on the list at all, by what the likeliest trial leaves.
     learnable : mapping of Hypothesis to Structure
         What a flexible model could still learn of what the calibrated model and the leading trials leave.
     weighed : sequence of Weighed
@@ -73,6 +86,7 @@ class Judgement:
     best: Trial
     trials: list[Trial]
     probability: list[float]
+    listed: float
     scores: list[Score]
     learnable: Mapping[Hypothesis, Structure]
     weighed: Sequence[Weighed]
@@ -98,10 +112,22 @@ class Comparison:
         trials = sorted(trials, key=_left)
         return cls(weighed, base, trials, {t.hypothesis: structure(weighed, t) for t in [base, *trials[:CONTENDERS]]})
 
+    def is_right(self, trial: Trial) -> bool:
+        """Whether a trial leaves what a right model would."""
+        return is_right(trial, self.base, self.learnable)
+
+    @property
+    def has_right(self) -> bool:
+        """Whether the best trial leaves what a right model would."""
+        return bool(self.trials) and self.is_right(self.trials[0])
+
     @property
     def wants_more(self) -> bool:
-        """Whether something was found worth a trial, and even the best of it is not right."""
-        return bool(self.trials) and not is_right(self.trials[0], self.base, self.learnable)
+        """Whether something was found worth a trial, and even the best of it may have missed something."""
+        if not self.has_right:
+            return bool(self.trials)
+        best = self.trials[0]
+        return _left(best) > ENOUGH + best.hypothesis.missed * max(_left(self.base) - 1.0, 0.0)
 
 
 def judge(
@@ -138,35 +164,50 @@ def judge(
     leading = [s for k, s in enumerate(scores) if s.values and (s.gain > WORTH_A_TRIAL or k < fewest)][:TRIALS]
     asked = [Score(h, 0.0, h.start) for h in suspects if h not in [s.hypothesis for s in leading]]
     found = Comparison.of(weighed, base, _fit_all(weighed, calibrated, base, [*leading, *asked], tell))
-    if found.wants_more:
+    if found.trials and not found.has_right:
         found = _weighed_anew(found, calibrated, tell)
     if found.wants_more:
-        firsts = [t for t in found.trials if len(t.hypothesis.acting) == 1][:2]
-        trials = [*found.trials, *_pairs(found.weighed, calibrated, firsts, known, tell)]
-        found = Comparison.of(found.weighed, found.base, [t for t in trials if _names_more(t, trials)])
-        if found.wants_more and len(found.trials[0].hypothesis.acting) > 1:
-            found = _weighed_anew(found, calibrated, tell)
-            found = replace(found, trials=[t for t in found.trials if _names_more(t, found.trials)])
+        found = _with_pairs(found, calibrated, known, tell)
     return _verdict(found, scores)
+
+
+def _with_pairs(found: Comparison, calibrated: Mapping[str, Free], known: Sequence[Hypothesis], tell) -> Comparison:
+    """The same with pairs that are worth more than their members, of singles that would do where there are any."""
+    alone = [t for t in found.trials if len(t.hypothesis.acting) == 1]
+    firsts = [t for t in alone if found.is_right(t)] or alone
+    trials = [*found.trials, *_pairs(found.weighed, calibrated, firsts[:FIRSTS], known, tell)]
+    paired = Comparison.of(found.weighed, found.base, [t for t in trials if _names_more(t, trials)])
+    if not paired.has_right and len(paired.trials[0].hypothesis.acting) > 1:
+        paired = _weighed_anew(paired, calibrated, tell)
+        paired = replace(paired, trials=[t for t in paired.trials if _names_more(t, paired.trials)])
+    # A pair that comes near without being right takes nothing from a single that is.
+    return found if found.has_right and not paired.has_right else paired
 
 
 def _weighed_anew(found: Comparison, calibrated: Mapping[str, Free], tell) -> Comparison:
     """Singles and the leading pairs again, beside what differs from run to run as the best of them feels it.
 
-    What is not known of the drive's motion makes a load with mass ring, which the paper's model knows nothing of.
+    What is not known of the drive's motion makes a load with mass ring, which the paper's model knows nothing of. Where
+    no rest shows the pretension each is also fitted from where the best one ended: errors have valleys there.
     """
     best = found.trials[0]
     tell(f"weighing the recordings about {best.hypothesis}")
     model = [best.hypothesis.of(w.evidence.parameters).with_values(best.values) for w in found.weighed]
+
+    def starts(trial: Trial) -> list[dict[str, float]]:
+        elsewhere = [{name: best.values[name] for name in calibrated}] if "pretension_N" in calibrated else []
+        return [trial.values | values for values in ({}, *elsewhere) if trial is not best or not values]
+
     try:
         weighed = each(found.weighed, lambda i, w: weigh(w.evidence, model[i]))
-        base = fit(weighed, found.base.hypothesis, calibrated, found.base.values)
+        base = min((fit(weighed, found.base.hypothesis, calibrated, s) for s in starts(found.base)), key=_left)
     except ModelError as error:
         tell(f"they stay weighed as they are ({error})")
         return found
     leading = [t for k, t in enumerate(found.trials) if k < CONTENDERS or len(t.hypothesis.acting) == 1]
-    again = [Score(t.hypothesis, 0.0, t.values) for t in leading]
-    return Comparison.of(weighed, base, _fit_all(weighed, calibrated, base, again, tell))
+    again = _fit_all(weighed, calibrated, base, [Score(t.hypothesis, 0.0, s) for t in leading for s in starts(t)], tell)
+    best_of = {t.hypothesis: t for t in sorted(again, key=_left, reverse=True)}
+    return Comparison.of(weighed, base, list(best_of.values()))
 
 
 def is_right(trial: Trial, base: Trial, learnable: Mapping[Hypothesis, Structure]) -> bool:
@@ -239,26 +280,46 @@ def _probabilities(weighed, base: Trial, trials: Sequence[Trial]) -> list[float]
     return (weight / weight.sum())[1:].tolist()
 
 
+def is_listed(trial: Trial, base: Trial) -> float:
+    """Probability that what is missing is on the list, and not something else that the best of the list imitates.
+
+    By Bayes' rule from what the trial leaves, whose densities are those of a right model and of an imitation.
+    """
+    level, sd = LEVEL
+    excess, over = max(_left(base) - level, sd), _left(trial) - level
+    form = max(FORM_SHARE, trial.hypothesis.missed) * excess
+    wide = np.hypot(sd, form)
+    exact = norm.pdf(over, scale=sd)
+    # A share of half a normal distribution, and the level's scatter on top.
+    simplified = 2 * norm.pdf(over, scale=wide) * norm.cdf(over * form / (sd * wide))
+    n = IMITATIONS[min(len(trial.hypothesis.acting), 2)]
+    share = float(np.clip(over / excess, 0.0, 1.0))
+    imitation = norm.cdf(over / sd) * n * (1 - share) ** (n - 1) / excess
+    right = (1 - OFF_LIST) * (exact + simplified) / 2
+    return float(right / (right + OFF_LIST * imitation))
+
+
 def _verdict(found: Comparison, scores: list[Score]) -> Judgement:
     base, trials, learnable = found.base, found.trials, found.learnable
     probability = _probabilities(found.weighed, base, trials)
+    likeliest = trials[int(np.argmax(probability))] if trials else base
+    listed = is_listed(likeliest, base) if trials else 1.0
 
     def judged(verdict: str, best: Trial) -> Judgement:
         order = np.argsort(-np.array(probability), kind="stable")
         likely = [trials[k] for k in order], [probability[k] for k in order]
-        return Judgement(verdict, base, best, *likely, scores, learnable, found.weighed)
+        return Judgement(verdict, base, best, *likely, listed, scores, learnable, found.weighed)
 
     best = trials[0] if trials else base
     matters = trials and _left(base) - _left(best) > WORTH_A_NAME * max(1.0, _left(base))
     if not matters or 1.0 - sum(probability) > 0.5:
         return judged("agrees" if is_right(base, base, learnable) else "unexplained", base)
-    likeliest = trials[int(np.argmax(probability))]
     if not is_right(likeliest, base, learnable) or not plausible(likeliest.hypothesis, likeliest.values):
         return judged("unexplained", base)
     # A mechanism that could be at either of two places is named all the same.
     names = likeliest.hypothesis.names
     sure = sum(p for t, p in zip(trials, probability, strict=True) if t.hypothesis.names == names)
-    return judged("explained" if sure >= SURE else "undecided", likeliest)
+    return judged("explained" if listed * sure >= SURE else "undecided", likeliest)
 
 
 def nested_errors(judgement: Judgement) -> list[Trial]:

@@ -38,8 +38,8 @@ class Structure:
     Attributes
     ----------
     gain : ndarray, shape (recordings,)
-        By how much the mean square of a recording's whitened errors falls by what the others teach; negative where
-        that makes it worse. Of a single recording, by stretches of it.
+        By how much the mean square of a recording's whitened errors falls by what the others teach, beyond what a
+        right model is allowed to leave; negative where it falls by less or rises. Of a single recording, by stretches.
     """
 
     gain: NDArray
@@ -69,7 +69,8 @@ def structure(weighed: Sequence[Weighed], trial: Trial) -> Structure:
     size = np.trace(sum(gram)) / len(gram[0])
     gains = [_gains(features, errors, gram, cross, penalty * size) for penalty in PENALTIES]
     best = max(gains, key=np.mean)
-    return Structure(best if best.mean() > 0 else np.zeros_like(best))
+    allowed = np.mean([w.evidence.allowed for w in weighed])
+    return Structure((best if best.mean() > 0 else np.zeros_like(best)) - allowed)
 
 
 def _gains(features, errors, gram, cross, penalty: float) -> NDArray:

@@ -58,6 +58,8 @@ class Evidence:
         Values and their standard deviation, in the channels' units.
     placed : bool
         Whether where in its count the drive first rests is an unknown of the fit, and not part of the noise.
+    allowance : float
+        Share of each channel's peak to peak that `sigma` has besides the noise.
     """
 
     given: ModelInput
@@ -67,6 +69,7 @@ class Evidence:
     measured: NDArray
     sigma: NDArray
     placed: bool = False
+    allowance: float = 0.0
 
     @classmethod
     def of(
@@ -99,13 +102,18 @@ class Evidence:
         measured = np.stack([given.recording[c][judged] for c in used])
         sigma = np.stack([np.hypot(sensors[c], size_over_time(drive[c], time_s)[judged]) for c in used])
         sigma = np.hypot(sigma, allowance * np.ptp(measured, axis=1, keepdims=True))
-        return cls(given, parameters, used, judged, measured, sigma, placed)
+        return cls(given, parameters, used, judged, measured, sigma, placed, allowance)
 
     def without(self, channel: str) -> "Evidence":
         """The same without one of the channels."""
         kept = [k for k, c in enumerate(self.channels) if c != channel]
         channels = tuple(self.channels[k] for k in kept)
         return replace(self, channels=channels, measured=self.measured[kept], sigma=self.sigma[kept])
+
+    @property
+    def allowed(self) -> float:
+        """What the allowance may leave of the mean square of errors over `sigma`, in law as well as in chance."""
+        return float(np.mean((self.allowance * np.ptp(self.measured, axis=1, keepdims=True) / self.sigma) ** 2))
 
     @property
     def name(self) -> str:

@@ -78,7 +78,7 @@ def _rivals(found: Diagnosis) -> list[dict]:
         {
             "what": str(trial.hypothesis) if trial.hypothesis.acting else "the calibrated model",
             "left": float(trial.left.mean()),
-            "learnable": j.learnable[trial.hypothesis].mean if trial.hypothesis in j.learnable else None,
+            "learnable": max(j.learnable[trial.hypothesis].mean, 0.0) if trial.hypothesis in j.learnable else None,
             "p": p,
             "why": _why(trial, found),
         }
