@@ -11,7 +11,7 @@ from ccmodel.identify import intervals
 from ccmodel.identify.fit import fit
 from ccmodel.identify.intervals import REACH, bootstrap, covariance, profile
 from ccmodel.identify.problem import Block, Free, Problem
-from ccmodel.identify.search import solve
+from ccmodel.identify.search import information_and_slope, solve
 from drawn_batches import CONDITIONS, SPREAD, draw, problem_of
 
 EXTRA_BEND = Free(0.0, -1.0, 3.0)
@@ -124,6 +124,78 @@ def test_noise_that_is_alike_from_sample_to_sample_is_known_to_be(rho):
         found.append(intervals.noise_of(block)[0, 0] / intervals.WIDER**2 / n)
     # The mean that was taken out and the window take up to a sixth of it; 40 draws leave 4 % of chance.
     assert 0.75 < np.mean(found) / ((1 + rho) / (1 - rho)) < 1.1
+
+
+def test_errors_that_are_accounted_for_do_not_count_again():
+    """White noise beside a slow error of which likely draws are known: left is the white noise's say."""
+    random, n, found = np.random.default_rng(0), 400, []
+    time = np.linspace(0, 1, n)
+    J = np.stack([np.ones(n), np.sin(9 * time)], axis=1)[None]
+    information = J[0].T @ J[0]
+
+    def slow(draws):
+        weights = random.standard_normal((draws, 2, 1))
+        return 2 * (weights[:, :1] * np.sin(12 * time) + weights[:, 1:] * np.cos(12 * time))
+
+    for _ in range(40):
+        block = Block(np.arange(2), np.zeros((1, n)), J)
+        inverse = np.linalg.inv(information)
+        likely = intervals.left_by_fit(block, inverse, slow(40))
+        (left,) = intervals.left_by_fit(block, inverse, slow(1) + random.standard_normal((1, 1, n)))
+        block = replace(block, errors=left)
+        said = (np.diag(intervals.noise_of(block, each)) for each in ([], [likely]))
+        found.append([d / intervals.WIDER**2 / np.diag(information) for d in said])
+    twice, once = np.mean(found, axis=0)
+    assert (twice > 10).all()
+    # Draws of two weights differ in their size by as much as themselves; what is negative counts as nothing.
+    assert (once > 0.7).all() and (once < 0.5 * twice).all()
+
+
+def test_more_that_is_accounted_for_than_there_is_leaves_nothing():
+    random = np.random.default_rng(0)
+    block = Block(np.arange(3), random.standard_normal((2, 300)), random.standard_normal((2, 300, 3)))
+    found = intervals.noise_of(block, [10 * random.standard_normal((8, 2, 300))])
+    scale = np.abs(intervals.noise_of(block)).max()
+    assert np.linalg.eigvalsh(found).min() > -1e-12 * scale
+    assert np.abs(found).max() < 0.01 * scale
+
+
+def test_what_the_fit_leaves_of_an_error_is_what_a_new_fit_leaves_of_it(solved):
+    """Of a single recording, so that nothing is left by way of others."""
+    problem, _ = solved
+    problem = Problem(problem.evidence[:1], problem.shared, {"theta_out_zero_rad": problem.own["theta_out_zero_rad"]})
+    solution = solve(problem, problem.start)
+    (block,), (evidence,) = solution.blocks, problem.evidence
+    k = evidence.channels.index("theta_out_rad")
+    error = np.zeros_like(evidence.measured)
+    # The zero takes up the middle of it, nothing the rest.
+    error[k] = 0.05 * evidence.sigma[k] * (1 + np.sin(np.linspace(0, 40, error[k].size)))
+    moved = Problem([replace(evidence, measured=evidence.measured - error)], problem.shared, problem.own)
+    (added,) = (a - b for a, b in zip(moved.errors(solution.x), problem.errors(solution.x), strict=True))
+    information = block.information + np.diag(problem.expected**2)
+    (said,) = intervals.left_by_fit(block, np.linalg.inv(information), added[None])
+    found = moved.errors(solve(moved, solution.x).x)[0] - problem.errors(solution.x)[0]
+    assert np.linalg.norm(said) < 0.8 * np.linalg.norm(added)
+    assert np.linalg.norm(said - found) < 0.05 * np.linalg.norm(added - said)
+
+
+def test_what_rounding_does_to_a_fit_stands_in_its_covariance(solved):
+    """With residuals of nothing, against encoders of many phases; without a step, there is no rounding."""
+    problem, solution = solved
+    silent = replace(solution, blocks=[replace(b, errors=np.zeros_like(b.errors)) for b in solution.blocks])
+    read = [replace(e.given.recording, encoder_step_rad={}) for e in problem.evidence]
+    uncounted = [replace(e, given=replace(e.given, recording=r)) for e, r in zip(problem.evidence, read, strict=True)]
+    said = covariance(problem, silent) - covariance(Problem(uncounted, problem.shared, problem.own), silent)
+    random, scores = np.random.default_rng(0), np.zeros((400, problem.start.size))
+    for i, (e, block) in enumerate(zip(problem.evidence, solution.blocks, strict=True)):
+        k, step = e.channels.index("theta_out_rad"), e.given.recording.encoder_step_rad["theta_out_rad"]
+        place = e.modelled(problem.values_of(solution.x, i))[k] / step + random.uniform(size=(400, 1))
+        errors = (np.floor(place) + 0.5 - place) * step / e.sigma[k] * np.sqrt(problem.looks / e.measured.shape[1])
+        scores[:, block.columns] += errors @ block.derivatives[k]
+    information, _ = information_and_slope(problem, solution.x, solution.blocks)
+    moved = scores @ np.linalg.inv(information)
+    shared = slice(0, len(problem.shared))
+    np.testing.assert_allclose(np.diag(said)[shared], moved.var(axis=0)[shared], rtol=0.25)
 
 
 def test_nine_out_of_ten_intervals_hold_the_truth():

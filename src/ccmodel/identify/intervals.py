@@ -2,16 +2,18 @@
 
 An unknown that belongs to each recording (its friction, its zeros) is fitted with an expectation of how far it lies
 from the population's; that scatter from recording to recording governs the intervals, since thirty thousand samples
-of one run are not thirty thousand experiments. What the sensors' noise and the drive's unknown part add is worked out
-from the residuals as they are, correlated in time.
+of one run are not thirty thousand experiments. What the drive's unknown part and the rounding of counted angles add
+is worked out from likely errors of both, run through the model; what the sensors' noise and all else add, from the
+residuals as they are, correlated in time, less what those errors leave in them.
 """
 
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import fftconvolve
+from scipy.fft import next_fast_len
 from scipy.stats import chi2, norm, t
 
 from ccmodel.identify.problem import Block, Problem
@@ -96,19 +98,21 @@ class Scatter:
 def covariance(problem: Problem, solution: Solution) -> NDArray:
     """Covariance of all unknowns about the truth, shape (unknowns, unknowns); infinite where nothing is known.
 
-    Inverse information, corrected for residuals that are correlated in time, on either side of which stands the
-    noise that the residuals show and the drive's unknown part makes.
+    Inverse information, on either side of which stands the noise: what is expected to differ from recording to
+    recording, what the drive's unknown part and rounding make, and what else the residuals show, correlated in time.
     """
     information, _ = information_and_slope(problem, solution.x, solution.blocks)
-    noise = np.diag((problem.expected * scatter_scale(problem, solution)) ** 2)
-    drives = problem.drive_errors(solution.x)
-    # A variance from a few draws is itself uncertain: Student's reach over that of the normal distribution.
-    few = (t.ppf(0.5 + COVERAGE / 2, max(sum(map(len, drives)), 1)) / REACH) ** 2
-    for block, drive in zip(solution.blocks, drives, strict=True):
-        noise[np.ix_(block.columns, block.columns)] += noise_of(block) + few * _noise_of_drive(block, drive)
     alone, values, vectors = _directions(information)
     known = values > ROUNDING
     inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(alone, alone)
+    noise = np.diag((problem.expected * scatter_scale(problem, solution)) ** 2)
+    drives, rounded = problem.drive_errors(solution.x), problem.rounding_errors(solution.x)
+    # A variance from a few draws is itself uncertain: Student's reach over that of the normal distribution.
+    few = (t.ppf(0.5 + COVERAGE / 2, max(sum(map(len, drives)), 1)) / REACH) ** 2
+    for block, drive, rounding in zip(solution.blocks, drives, rounded, strict=True):
+        at = np.ix_(block.columns, block.columns)
+        left = [left_by_fit(block, inverse[at], errors) for errors in (drive, rounding)]
+        noise[at] += few * _noise_of_likely(block, drive) + _noise_of_likely(block, rounding) + noise_of(block, left)
     found = inverse @ noise @ inverse
     lost = (np.abs(vectors[:, ~known]) > INVOLVED).any(axis=1)
     found[lost, lost] = np.inf
@@ -138,34 +142,71 @@ def own_intervals(problem: Problem, solution: Solution, spread: NDArray) -> dict
     return found
 
 
-def noise_of(block: Block) -> NDArray:
-    """Covariance of a recording's score by the noise in it, as its residuals show it; shape (k, k)."""
-    return WIDER**2 * sum(_correlated(a, e) for a, e in zip(block.derivatives, block.errors, strict=True))
+def noise_of(block: Block, accounted: Sequence[NDArray] = ()) -> NDArray:
+    """Covariance of a recording's score by the noise in it, as its residuals show it; shape (k, k).
+
+    Parameters
+    ----------
+    block : Block
+    accounted : sequence of ndarray, each of shape (draws, channels, samples)
+        Likely errors of sources whose noise stands elsewhere, as the fit leaves them: none of it counts here.
+    """
+    noise = np.zeros((block.columns.size, block.columns.size))
+    for channel, (sensitivity, residual) in enumerate(zip(block.derivatives, block.errors, strict=True)):
+        noise += _correlated(sensitivity, residual, [errors[:, channel] for errors in accounted])
+    return WIDER**2 * noise
 
 
-def _noise_of_drive(block: Block, errors: NDArray) -> NDArray:
-    """The same by what is unknown of the drive's motion.
+def left_by_fit(block: Block, inverse: NDArray, errors: NDArray) -> NDArray:
+    """What the fit leaves of likely errors of a recording, shape (draws, channels, samples).
 
-    Unless it is an unknown of the fit, where in its count the drive rests is an error that lasts all recording long:
-    the fit takes it for something else, and what is left does not show it. What is left does show some of the other
-    errors of the drive, which therefore count twice: intervals that these govern are too wide rather than too narrow.
+    Errors e move the unknowns by -inv(H) J^T e, so that (I - J inv(H) J^T) e stands in the residuals. `inverse` is
+    inv(H) among the block's unknowns, H the information of all recordings. What errors of other recordings leave here,
+    by way of the shared unknowns, is not in it.
+    """
+    taken = np.einsum("csk,dcs->dk", block.derivatives, errors) @ inverse
+    return errors - np.einsum("csk,dk->dcs", block.derivatives, taken)
+
+
+def _noise_of_likely(block: Block, errors: NDArray) -> NDArray:
+    """Covariance of a recording's score by a source of which likely errors are known; shape (k, k).
+
+    The drive's motion and rounding err slowly, where an angle turns or rests all that while. Much of that the fit takes
+    for something else, and what is left does not show it: only the errors before the fit say what they do to it.
     """
     scores = np.einsum("csk,dcs->dk", block.derivatives, errors)
     return scores.T @ scores / max(len(errors), 1)
 
 
-def _correlated(sensitivity: NDArray, residual: NDArray) -> NDArray:
-    """Sum over pairs of samples of sensitivity x covariance of the residuals x sensitivity."""
+def _correlated(sensitivity: NDArray, residual: NDArray, accounted: Sequence[NDArray]) -> NDArray:
+    """Sum over pairs of samples of sensitivity x covariance of the residuals x sensitivity.
+
+    The residual is the sum of what the fit leaves of each source of noise. These know nothing of each other, so their
+    autocovariances add, and that of the sources `accounted` for comes off. The difference of two estimates may have
+    frequencies of negative power, which no noise has: there is nothing of it.
+    """
     n = residual.size
     lags = max(1, int(CORRELATED_SHARE * n))
-    own = fftconvolve(residual, residual[::-1])[n - 1 : n + lags] / n
+    own = _autocovariance(residual[None], lags) - sum(_autocovariance(errors, lags) for errors in accounted)
     taper = own * (1 - np.arange(lags + 1) / (lags + 1))
-    kernel = np.concatenate([taper[:0:-1], taper])
-    smeared = fftconvolve(sensitivity, kernel[:, None], mode="same", axes=0)
-    found = sensitivity.T @ smeared
-    # A covariance by its make, less what rounding and the window's ends do to it.
-    value, vector = np.linalg.eigh((found + found.T) / 2)
-    return (vector * np.maximum(value, 0.0)) @ vector.T
+    # Twice as long as the recording, so that its end does not follow on its beginning.
+    size = next_fast_len(2 * n, real=True)
+    around = np.zeros(size)
+    around[: lags + 1] = taper
+    around[-lags:] = taper[:0:-1]
+    power = np.maximum(np.fft.rfft(around).real, 0.0)
+    # All frequencies but the first (and the last, if they are even) stand for two.
+    power[1 : (size + 1) // 2] *= 2
+    waves = np.fft.rfft(sensitivity, size, axis=0)
+    return (waves.conj().T @ (power[:, None] * waves)).real / size
+
+
+def _autocovariance(errors: NDArray, lags: int) -> NDArray:
+    """Mean over draws of the product of samples 0 to `lags` apart, of errors of shape (draws, n); 0 of no draws."""
+    draws, n = errors.shape
+    size = next_fast_len(n + lags, real=True)
+    power = (np.abs(np.fft.rfft(errors, size)) ** 2).sum(axis=0)
+    return np.fft.irfft(power, size)[: lags + 1] / (n * max(draws, 1))
 
 
 def scatter(problem: Problem, solution: Solution) -> dict[str, Scatter]:

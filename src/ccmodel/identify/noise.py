@@ -15,6 +15,8 @@ FEWEST_AT_REST = 20
 BEST_SHARE = 0.1
 # Time over which the scatter of a few likely drive motions is averaged.
 ALIKE_S = 0.05
+# Where in its count a load may be that a motion starts from: evenly over the count, which nothing tells beforehand.
+PHASES = (np.arange(16) + 0.5) / 16 - 0.5
 
 
 def sensor_noise(given: ModelInput) -> dict[str, float]:
@@ -47,6 +49,15 @@ def drive_errors(given: ModelInput, parameters: Parameters, placed: bool = False
     deviations = given.placed_deviations if placed else given.drive_deviations
     aside = [simulate(replace(given, theta_in=given.theta_in + d), parameters) for d in deviations]
     return {c: np.array([a[c] - said[c] for a in aside]).reshape(-1, said.time_s.size) for c in said.channels}
+
+
+def rounding_errors(angle_rad: NDArray, step_rad: float) -> NDArray:
+    """What an encoder's counts may be wrong by over a motion, wherever in a count it starts; shape (phases, n), rad.
+
+    Where the motion turns or rests, a count's error lasts: it is not the white noise that its deviation suggests.
+    """
+    counts = angle_rad / step_rad + PHASES[:, None]
+    return (np.round(counts) - counts) * step_rad
 
 
 def size_over_time(errors: NDArray, time_s: NDArray) -> NDArray:

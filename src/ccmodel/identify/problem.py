@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.failure import ModelError
-from ccmodel.identify.noise import drive_errors, sensor_noise, size_over_time
+from ccmodel.identify.noise import PHASES, drive_errors, rounding_errors, sensor_noise, size_over_time
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import PRESCRIBED, ModelInput, simulate
 from ccmodel.model.sensitivity import STEP, size_of
@@ -134,6 +134,15 @@ class Evidence:
         found = drive_errors(self.given, self.parameters.with_values(values), self.placed)
         return np.stack([found[c][:, self.judged] for c in self.channels], axis=1) / self.sigma
 
+    def rounding_errors(self, values: Mapping[str, float]) -> NDArray:
+        """Likely errors over the noise of the angles that are counted, shape (phases, channels, judged samples)."""
+        said, steps = self.modelled(values), self.given.recording.encoder_step_rad
+        found = np.zeros((PHASES.size, *said.shape))
+        for k, channel in enumerate(self.channels):
+            if channel in steps:
+                found[:, k] = rounding_errors(said[k], steps[channel])
+        return found / self.sigma
+
 
 @dataclass(frozen=True)
 class Block:
@@ -247,6 +256,10 @@ class Problem:
     def drive_errors(self, x: NDArray) -> list[NDArray]:
         """By recording, likely errors for want of the drive's true motion; shape (draws, channels, samples)."""
         return self._each(lambda i: self.evidence[i].drive_errors(self.values_of(x, i)) * np.sqrt(self._weight(i)))
+
+    def rounding_errors(self, x: NDArray) -> list[NDArray]:
+        """By recording, likely errors of the angles that are counted; shape (phases, channels, samples)."""
+        return self._each(lambda i: self.evidence[i].rounding_errors(self.values_of(x, i)) * np.sqrt(self._weight(i)))
 
     def mean_square(self, x: NDArray) -> float:
         """Mean square of the errors over their noise, every sample alike."""
