@@ -34,6 +34,6 @@ def test_slow_and_fast_friction_are_told_apart_by_speed():
         ),
     ]
     base = trial(recordings)
-    found = proposed(Judgement("undecided", base, rivals[0], rivals, [0.5, 0.5], [], {}, recordings), PARAMETERS)
+    found = proposed(Judgement("undecided", base, rivals[0], rivals, [0.5, 0.5], 1.0, [], {}, recordings), PARAMETERS)
     assert found["separates"] == ["viscous-friction", "pulley-friction"]
     assert "Hz" in found["text"]

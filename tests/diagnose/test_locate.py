@@ -20,7 +20,7 @@ def wave(said, channel):
 def test_a_channel_that_is_off_alone_gives_its_place_away(channel, place):
     recordings = batch(lambda said: wave(said, channel))
     base = calibrated(recordings)
-    found = location(Judgement("unexplained", base, base, [], [], [], {}, recordings))
+    found = location(Judgement("unexplained", base, base, [], [], 1.0, [], {}, recordings))
     assert found["place"] == place
     assert found["channels"][0] == channel.rsplit("_", 1)[0]
 
@@ -28,4 +28,4 @@ def test_a_channel_that_is_off_alone_gives_its_place_away(channel, place):
 def test_a_ripple_of_both_torques_sits_in_between():
     recordings = batch(lambda said: wave(said, "tau_in_Nm") | wave(said, "tau_out_Nm") | wave(said, "theta_out_rad"))
     base = calibrated(recordings)
-    assert location(Judgement("unexplained", base, base, [], [], [], {}, recordings))["place"] == "conduit"
+    assert location(Judgement("unexplained", base, base, [], [], 1.0, [], {}, recordings))["place"] == "conduit"

@@ -14,7 +14,7 @@ from made_evidence import PARAMETERS, batch, calibrated
 
 def judged(recordings):
     base = calibrated(recordings)
-    return Judgement("unexplained", base, base, [], [], [], {}, recordings)
+    return Judgement("unexplained", base, base, [], [], 1.0, [], {}, recordings)
 
 
 @pytest.fixture(scope="module")
