@@ -16,16 +16,17 @@ from pathlib import Path
 from typing import Literal, Self
 
 import numpy as np
+import pandas as pd
 import yaml
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
 from proof import conceal
 from proof.build import folder_digest
-from proof.put_in import KINDS, write_batch
+from proof.put_in import KINDS, angle_rad, described, torque_Nm, write_batch
 from virtualrig.strict import Share, Strict
 
 PLAN = Path(__file__).with_name("real.yaml")
-MODEL, ALLOWED = "in-use.json", "allowed.json"
+MODEL, ALLOWED, STANDING = "in-use.json", "allowed.json", "as-it-stands.json"
 Range = tuple[PositiveFloat, PositiveFloat]
 Group = Literal["untouched", "put in", "taken out", "paper"]
 
@@ -233,6 +234,35 @@ def judge_real(
     (out / "result.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
     tell(f"{case.name}: {result['said']['verdict'] if done else 'no diagnosis'}, {result['took_s']:.0f} s of one core")
     return result
+
+
+def as_it_stands(
+    case: RealCase, plan: RealPlan, source: Path, in_use: Path, out: Path, sources: Path = conceal.SOURCES
+) -> None:
+    """What the model in use, nothing of it fitted anew, predicts of a case's recordings less what they show.
+
+    `out`/as-it-stands.json gets the root mean square by channel, the mean of each recording taken off: a sensor's zero
+    may be another from day to day.
+    """
+    squares: dict[str, list[float]] = {}
+    with tempfile.TemporaryDirectory(prefix="case-") as folder:
+        batch, predicted = Path(folder) / case.name, Path(folder) / "predicted"
+        write_batch(source, plan.watched, batch, case.kind, case.size)
+        ran = conceal.predict(batch, in_use / MODEL, predicted, sources)
+        stated = described(batch)
+        for recording in stated["recordings"] if ran.code == 0 and not ran.tampering else []:
+            log = pd.read_csv(batch / recording["file"])
+            said = pd.read_csv(predicted / f"{recording['id']}.csv")
+            judged = (log["time_s"] >= recording.get("settled_s", 0.0)).to_numpy()
+            measured = {
+                "theta_out_rad": angle_rad(log, stated["rig"], "load"),
+                "tau_in_Nm": torque_Nm(log, stated["rig"], "drive"),
+            }
+            for channel, values in measured.items():
+                off = np.interp(log["time_s"], said["time_s"], said[channel]) - values
+                squares.setdefault(channel, []).append(float(np.var(off[judged])))
+    errors = {channel: float(np.sqrt(np.mean(values))) for channel, values in squares.items()}
+    (out / STANDING).write_text(json.dumps(errors, indent=1), encoding="utf-8")
 
 
 def lacking(model: dict, left_out: str | None) -> dict:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from proof.page import commit, table
 from proof.real import ALLOWED, MODEL, RealPlan
-from proof.real_score import RealOutcome, found_size, is_right, made_of, moved, untouched_of
+from proof.real_score import RealOutcome, found_size, is_right, made_of, moved, raised, untouched_of
 
 # What people make of the tables stands below this line of the page and stays when the tables are made again.
 BY_HAND = "## What follows from it"
@@ -71,11 +71,12 @@ The other {len(plan.watched)} recordings ({_ids(plan.watched)}) are the watched 
 
 ## Put in
 
-"Changed" is the standard deviation of what was changed, as a share of the channel's peak to peak. "Left" is the mean
-square over what was allowed after everything was calibrated anew: what does not rise above the untouched
-{_left(untouched)} was absorbed. "Moved" are recalibrated numbers that are off the untouched recordings' by more than
-5 %. Right is: named or undecided with it, at its place; of what the list does not know, `unexplained` or `undecided`;
-of drag that the model in use has a number for, that the number takes it up.
+"Changed" is the standard deviation of what was changed, as a share of the channel's peak to peak. "As it
+stands" is the error of the model in use with nothing fitted anew, as a multiple of its error on the untouched
+recordings. "Left" is the mean square over what was allowed after everything was calibrated anew: what does not rise
+above the untouched {_left(untouched)} was absorbed. "Moved" are recalibrated numbers that are off the untouched
+recordings' by more than 5 %. Right is: named or undecided with it, at its place; of what the list does not know,
+`unexplained` or `undecided`; of drag that the model in use has a number for, that the number takes it up.
 
 {table(_PUT_IN_HEAD, [_put_in_row(o, plan, untouched) for o in groups["put in"]])}
 
@@ -95,7 +96,19 @@ The same untouched recordings, no model in use, the same share allowed.
 {by_hand}"""
 
 
-_PUT_IN_HEAD = ["put in", "size", "changed", "left", "said", "which is", "right", "place said", "size found", "moved"]
+_PUT_IN_HEAD = [
+    "put in",
+    "size",
+    "changed",
+    "as it stands",
+    "left",
+    "said",
+    "which is",
+    "right",
+    "place said",
+    "size found",
+    "moved",
+]
 _TAKEN_HEAD = ["taken out", "of", "off the list", "left", "said", "which is", "right", "place said", "size found"]
 _PAPER_HEAD = ["off the list", "left", "said", "place said", "left by it"]
 
@@ -108,6 +121,7 @@ def _put_in_row(o: RealOutcome, plan: RealPlan, untouched: RealOutcome | None) -
         o.case.kind.replace("-", " "),
         _sized(o.case.size, unit),
         changed,
+        ", ".join(f"{c.rpartition('_')[0]} {r:.1f}" for c, r in raised(o, untouched).items()),
         _left(o),
         _said(o),
         made_of(o),
@@ -140,7 +154,13 @@ def _paper_row(o: RealOutcome) -> list[str]:
 def _untouched(o: RealOutcome | None) -> str:
     if o is None:
         return "Not run."
-    return f"`{_said(o)}`: {made_of(o)}. Recalibrated, {_left(o)} of what was allowed is left."
+    standing = " and ".join(
+        f"{1e3 * e:.1f} m{c.rpartition('_')[2].replace('Nm', 'N m')} in {c.rpartition('_')[0]}"
+        for c, e in o.standing.items()
+    )
+    return f"""`{_said(o)}`: {made_of(o)}. Recalibrated, {_left(o)} of what was allowed is left. As it stands, nothing
+fitted anew, the model in use predicts these recordings to {standing} (root mean square, the mean of each recording
+aside)."""
 
 
 def _said(o: RealOutcome) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from proof.real import MODEL, RealCase, RealPlan, cases_of
+from proof.real import MODEL, STANDING, RealCase, RealPlan, cases_of
 from proof.score import same_place
 
 # A recalibrated number has moved if it is off what the untouched recordings have it by more than this share.
@@ -56,6 +56,7 @@ class RealOutcome:
     why: str = ""
     changed: dict[str, float] = field(default_factory=dict)
     took_s: float = 0.0
+    standing: dict[str, float] = field(default_factory=dict)
 
     @property
     def verdict(self) -> str:
@@ -110,20 +111,21 @@ def read_real_outcomes(plan: RealPlan, folder: Path) -> list[RealOutcome]:
     model = json.loads((folder / "model" / MODEL).read_text(encoding="utf-8"))
     found = []
     for case in cases_of(plan, model):
-        file = folder / "cases" / case.name / "result.json"
-        if file.exists():
-            found.append(outcome_of(case, truth_of(case, plan, model), json.loads(file.read_text(encoding="utf-8"))))
+        files = [folder / "cases" / case.name / name for name in ("result.json", STANDING)]
+        result, standing = (json.loads(f.read_text(encoding="utf-8")) if f.exists() else {} for f in files)
+        if result:
+            found.append(outcome_of(case, truth_of(case, plan, model), result, standing))
     return found
 
 
-def outcome_of(case: RealCase, truth: Truth, result: dict) -> RealOutcome:
-    """Put a result beside its answer."""
+def outcome_of(case: RealCase, truth: Truth, result: dict, standing: dict[str, float] | None = None) -> RealOutcome:
+    """Put a result, and what the model in use predicts as it stands, beside the answer."""
     said, why = result["said"], result["why"] or ""
     if result["tampering"]:
         said, why = None, "refused: it " + "; ".join(result["tampering"][:3])
     elif result["key"] != case.digest:
         said, why = None, "refused: the key made from the seed is not the one whose digest was left"
-    return RealOutcome(case, truth, said, why, result["changed"], result["took_s"])
+    return RealOutcome(case, truth, said, why, result["changed"], result["took_s"], standing or {})
 
 
 def made_of(o: RealOutcome) -> str:
@@ -185,6 +187,13 @@ def moved(o: RealOutcome, untouched: RealOutcome | None) -> dict[str, float]:
     before = untouched.said["calibrated"]
     shares = {n: v / before[n] - 1 for n, v in o.said["calibrated"].items() if before.get(n)}
     return {n: s for n, s in sorted(shares.items(), key=lambda i: -abs(i[1])) if abs(s) > MOVED}
+
+
+def raised(o: RealOutcome, untouched: RealOutcome | None) -> dict[str, float]:
+    """By channel, the error of the model in use as it stands over that on the untouched recordings."""
+    if untouched is None:
+        return {}
+    return {c: error / untouched.standing[c] for c, error in o.standing.items() if untouched.standing.get(c)}
 
 
 def untouched_of(outcomes: Sequence[RealOutcome]) -> RealOutcome | None:

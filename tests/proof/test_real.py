@@ -9,7 +9,7 @@ import yaml
 
 from proof import conceal, real
 from proof.put_in import KINDS
-from proof.real import cases_of, find_model, judge_real, read_real_plan
+from proof.real import as_it_stands, cases_of, find_model, judge_real, read_real_plan
 from proof.real_page import BY_HAND, real_page
 from proof.real_score import found_size, is_right, made_of, moved, outcome_of, read_real_outcomes, truth_of
 
@@ -34,6 +34,8 @@ def stand_in(monkeypatch):
     def run(words, folder, sources):
         out = folder / "out"
         out.mkdir()
+        if words[0] == "predict":
+            return _predicted(folder / words[1], out)
         allowance = float(words[words.index("--allowance") + 1])
         beside = json.loads((folder / words[words.index("--beside") + 1]).read_text()) if "--beside" in words else None
         said = {
@@ -52,6 +54,19 @@ def stand_in(monkeypatch):
         return conceal.Ran(0, "", ())
 
     monkeypatch.setattr(conceal, "run", run)
+
+
+def _predicted(batch, out):
+    """A load that follows the drive, and a torque that is off by an alternating 2 mN m."""
+    for file in batch.glob("*.csv.gz"):
+        log = pd.read_csv(file)
+        said = {
+            "time_s": log["time_s"],
+            "theta_out_rad": log["drive_encoder_counts"] * 2 * np.pi / 4000,
+            "tau_in_Nm": log["drive_encoder_counts"] * 4e-5 + 2e-3 * (-1.0) ** np.arange(len(log)),
+        }
+        pd.DataFrame(said).to_csv(out / file.name.replace(".csv.gz", ".csv"), index=False)
+    return conceal.Ran(0, "", ())
 
 
 @pytest.fixture
@@ -150,6 +165,20 @@ def test_each_group_is_asked_what_it_should(plan, batch, in_use, tmp_path):
     assert page.endswith(f"{BY_HAND}\n\nKept.\n")
     assert "drag with load" not in page
     assert page.count("| gain of load torque |") == 1
+
+
+def test_the_model_as_it_stands_is_held_to_what_was_recorded(plan, batch, in_use, tmp_path):
+    untouched, drag, gained = (c for c in cases_of(plan, MODEL) if c.group in ("untouched", "put in"))
+    drag, gained = (drag, gained) if drag.kind == "drag" else (gained, drag)
+    errors = {}
+    for case in (untouched, drag, gained):
+        as_it_stands(case, plan, batch, in_use, tmp_path)
+        errors[case.kind] = json.loads((tmp_path / real.STANDING).read_text())
+    assert errors[None]["tau_in_Nm"] == pytest.approx(2e-3)
+    assert errors[None]["theta_out_rad"] == pytest.approx(0.0, abs=1e-12)
+    # The load's torque is given to the model, not predicted; a drag of one size stands beside what was there.
+    assert errors["gain-of-load-torque"]["tau_in_Nm"] == pytest.approx(2e-3)
+    assert errors["drag"]["tau_in_Nm"] == pytest.approx(np.hypot(2e-3, drag.size), rel=0.1)
 
 
 def said(verdict="agrees", mechanisms=(), alternatives=(), place=None, calibrated=None):
