@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 CORES ?= 2
 
-.PHONY: help results real data test bench table-one coverage proof proof-full lint lock clean
+.PHONY: help results real data test bench table-one coverage proof proof-full proof-real lint lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -58,6 +58,11 @@ proof: $(VENV)/.ready  ## diagnose a handful of concealed cases and score them: 
 
 proof-full: $(VENV)/.ready  ## the full proof, or N cases of it drawn at random: docs/proof.md; goes on where it was stopped
 	$(BIN)/snakemake --snakefile proof/Snakefile --cores $(CORES) --keep-going $(if $(N)$(RIVALS),--config $(if $(N),cases=$(N)) $(if $(RIVALS),rivals=true))
+
+proof-real: $(VENV)/.ready  ## put something into the public da Vinci recordings and diagnose them: make proof-real DATA=path
+	@test -n "$(DATA)" || { echo "make proof-real needs DATA=path of the mis-tool-characterization data" >&2; exit 2; }
+	@$(BIN)/ccmodel import-mis-tool "$(DATA)" --out results/real/raw
+	$(BIN)/python -m proof real results/real/raw --out results/proof/real --page docs/real-concealment.md
 
 lint: $(VENV)/.ready
 	$(BIN)/ruff check .

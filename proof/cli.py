@@ -134,6 +134,35 @@ def score(
 
 
 @app.command()
+def real(
+    raw: Annotated[Path, typer.Argument(exists=True, file_okay=False, help="Imported batches of measured recordings.")],
+    out: Annotated[Path, typer.Option(help="Folder that gets the model in use and a folder a case.")],
+    page: Annotated[Path | None, typer.Option(help="Markdown page.")] = None,
+    numbers: Annotated[str | None, typer.Option(help="Only these cases, by comma, in this order; else all.")] = None,
+) -> None:
+    """Put something into measured recordings and have them diagnosed beside a model in use; goes on where it was."""
+    from proof.real import MODEL, STANDING, as_it_stands, cases_of, find_model, judge_real, read_real_plan
+    from proof.real_page import real_page
+    from proof.real_score import read_real_outcomes
+
+    plan = read_real_plan()
+    source = raw if raw.name == plan.batch else raw / plan.batch
+    if not (source / "batch.yaml").exists():
+        raise typer.BadParameter(f"there is no batch {plan.batch} in {raw}: import it with ccmodel import-mis-tool")
+    find_model(plan, source, out / "model", typer.echo, conceal.SOURCES)
+    cases = cases_of(plan, json.loads((out / "model" / MODEL).read_text(encoding="utf-8")))
+    for case in [cases[int(n)] for n in numbers.split(",")] if numbers else cases:
+        if not (out / "cases" / case.name / "result.json").exists():
+            judge_real(case, plan, source, out / "model", out / "cases" / case.name, tell=typer.echo)
+        if case.group in ("untouched", "put in") and not (out / "cases" / case.name / STANDING).exists():
+            as_it_stands(case, plan, source, out / "model", out / "cases" / case.name)
+    if page is not None:
+        earlier = page.read_text(encoding="utf-8") if page.exists() else ""
+        page.write_text(real_page(read_real_outcomes(plan, out), plan, out / "model", earlier), encoding="utf-8")
+        typer.echo(str(page))
+
+
+@app.command()
 def convergence(seed: Seed = 0) -> None:
     """Measure what the rig's numerics leave: against cells and bristles half as large and the rope's own mass."""
     from proof.convergence import measure

@@ -148,14 +148,42 @@ def run(arguments: Sequence[str], folder: Path, sources: Path = SOURCES) -> Ran:
     return Ran(code, said[-2000:], tuple(dict.fromkeys(tampering)))
 
 
-def diagnose(batch: Path, out: Path, without: Sequence[str] = (), sources: Path = SOURCES) -> Ran:
-    """Diagnose a copy of a batch in an otherwise empty folder; results are brought to `out`."""
+def core_s() -> float:
+    """Seconds that this process and those it waited for have spent on a core: however busy the machine is."""
+    return sum(os.times()[:4])
+
+
+def diagnose(
+    batch: Path,
+    out: Path,
+    without: Sequence[str] = (),
+    sources: Path = SOURCES,
+    options: Sequence[str] = (),
+    beside: Path | None = None,
+) -> Ran:
+    """Diagnose a copy of a batch in an otherwise empty folder; results are brought to `out`.
+
+    Parameters
+    ----------
+    batch, out : Path
+    without : sequence of str
+        Mechanisms that are taken off the list.
+    sources : Path
+        The diagnosis's package.
+    options : sequence of str
+        Further words of the command; they name no file.
+    beside : Path, optional
+        A model file that the folder gets besides the batch: asked is what is missing besides what it has.
+    """
     before = folder_digest(batch)
     with tempfile.TemporaryDirectory(prefix="batch-") as folder:
         world = Path(folder)
         shutil.copytree(batch, world / batch.name)
-        options = [word for name in without for word in ("--without", name)]
-        ran = run(["diagnose", batch.name, "--out", "out", *options], world, sources)
+        words = [*options, *(word for name in without for word in ("--without", name))]
+        if beside is not None:
+            shutil.copy(beside, world / "known.json")
+            words += ["--beside", "known.json"]
+        ran = run(["diagnose", batch.name, "--out", "out", *words], world, sources)
         altered = ("altered the batch",) if folder_digest(world / batch.name) != before else ()
         if (world / "out").exists():
             shutil.copytree(world / "out", out, dirs_exist_ok=True)

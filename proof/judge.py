@@ -2,7 +2,6 @@
 
 import gzip
 import json
-import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -46,7 +45,7 @@ def judge(
         What is in ``result.json``: the case's seed and the digest of its key, what the diagnosis said, and in each
         channel the errors on the kept-back recordings before and after it, beside their floor.
     """
-    started = _core_s()
+    started = conceal.core_s()
     out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="case-") as folder:
         batch, kept = Path(folder) / "batch" / case.name, Path(folder) / "kept" / case.name
@@ -73,16 +72,11 @@ def judge(
         "diagnosis": diagnosis,
         "errors": errors,
         "rivals": rivalled,
-        "took_s": round(_core_s() - started, 1),
+        "took_s": round(conceal.core_s() - started, 1),
     }
     (out / "result.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
     tell(f"{case.name}: {diagnosis['verdict'] if diagnosis else 'no diagnosis'}, {result['took_s']:.0f} s of one core")
     return result
-
-
-def _core_s() -> float:
-    """Seconds that this process and those it waited for have spent on a core: however busy the machine is."""
-    return sum(os.times()[:4])
 
 
 def _read(file: Path) -> dict | None:

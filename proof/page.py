@@ -46,11 +46,11 @@ one per cent of friction.
 
 ## Rates
 
-{_table(["", "", "rate", "95 % (Wilson)", "must be", ""], map(_rate_row, scored["rates"]))}
+{table(["", "", "rate", "95 % (Wilson)", "must be", ""], map(_rate_row, scored["rates"]))}
 
 ## Sizes
 
-{_table(["", "over", "value", "95 % (bootstrap)", "must be", ""], map(_statistic_row, scored["statistics"]))}
+{table(["", "over", "value", "95 % (bootstrap)", "must be", ""], map(_statistic_row, scored["statistics"]))}
 
 {_missed(scored)}
 {_rivals(scored["rivals"])}
@@ -60,11 +60,11 @@ one per cent of friction.
 
 ## Where each effect begins to be seen
 
-{_table(["effect", "cases", "noticed", "named first", "half are noticed at"], _detection_rows(scored["detection"]))}
+{table(["effect", "cases", "noticed", "named first", "half are noticed at"], _detection_rows(scored["detection"]))}
 
 ## Every miss
 
-{_table(_MISS_HEAD, map(_miss_row, scored["misses"])) if scored["misses"] else "None."}
+{table(_MISS_HEAD, map(_miss_row, scored["misses"])) if scored["misses"] else "None."}
 """
 
 
@@ -79,7 +79,8 @@ def commit() -> str:
     return say.stdout.strip().replace("-dirty", " with changes") or "unknown"
 
 
-def _table(head, rows) -> str:
+def table(head, rows) -> str:
+    """A Markdown table."""
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in lines)
 
@@ -144,7 +145,7 @@ def _rivals(rows) -> str:
 Each starts from the calibrated model. Errors on kept-back recordings over the floor in the worst channel, and the share
 of the gap to the floor closed in the channel that was off most: medians, with bootstrap intervals.
 
-{_table(head, lines)}
+{table(head, lines)}
 """
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from pydantic import ValidationError
 from rich.console import Console
 
 from ccmodel.typed import InputError
@@ -69,12 +70,20 @@ def diagnose(
     step: Annotated[float | None, typer.Option(min=1e-4, help="Compare a sample every so often, s.")] = None,
     cycles: Annotated[int | None, typer.Option(min=1, help="Compare so many cycles of a sine.")] = None,
     beside: Annotated[Path | None, typer.Option(help="A model file: ask what is missing besides what it has.")] = None,
+    suspect: Annotated[
+        list[str],
+        typer.Option(help="'NAME at PLACE', or two of them with a comma, to fit whatever the screening says."),
+    ] = [],  # noqa: B006
 ) -> None:
     """Say whether the calibrated model explains a batch, and if not: where it fails and what was left out."""
     from ccmodel.config import Diagnosing
     from ccmodel.stages.diagnose import diagnose as run
 
-    judged = Diagnosing(allowance=allowance, step_s=step, cycles=cycles)
+    suspects = [[one.strip() for one in stated.split(",")] for stated in suspect]
+    try:
+        judged = Diagnosing(allowance=allowance, step_s=step, cycles=cycles, suspects=suspects)
+    except ValidationError as error:
+        raise InputError(f"--suspect: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from None
     typer.echo(run(batch, out, without, lambda text: _err.print(text, style="dim", markup=False), judged, beside))
 
 

@@ -1,5 +1,7 @@
 """A diagnosis that looks for the answer is caught; one that does not is let be."""
 
+import json
+
 import pytest
 
 from proof import conceal
@@ -72,6 +74,21 @@ def test_honest_one_works_and_sees_nothing_of_us(batch, diagnosis, tmp_path):
     assert str(PROOF) not in seen
     assert str(ROOT / "src") not in seen
     assert str(batch.parent / "out") not in seen
+
+
+def test_a_model_in_use_and_words_reach_it(batch, diagnosis, tmp_path):
+    body = """
+import json, pathlib, sys
+pathlib.Path("out").mkdir()
+heard = sys.argv[1:] + [pathlib.Path("known.json").read_text()]
+pathlib.Path("out/heard.json").write_text(json.dumps(heard))
+"""
+    (tmp_path / "model.json").write_text("{}")
+    options = ["--allowance", "0.1"]
+    conceal.diagnose(batch, tmp_path / "out", ["backlash"], diagnosis(body), options, tmp_path / "model.json")
+    heard = json.loads((tmp_path / "out" / "heard.json").read_text())
+    words = ["diagnose", "case-1", "--out", "out", *options, "--without", "backlash", "--beside", "known.json", "{}"]
+    assert heard == words
 
 
 def test_the_copy_of_the_diagnosis_is_that_of_its_sources(diagnosis):
