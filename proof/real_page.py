@@ -78,20 +78,20 @@ above the untouched {_left(untouched)} was absorbed. "Moved" are recalibrated nu
 recordings' by more than 5 %. Right is: named or undecided with it, at its place; of what the list does not know,
 `unexplained` or `undecided`; of drag that the model in use has a number for, that the number takes it up.
 
-{table(_PUT_IN_HEAD, [_put_in_row(o, plan, untouched) for o in groups["put in"]])}
+{_rows(_PUT_IN_HEAD, [_put_in_row(o, plan, untouched) for o in groups["put in"]])}
 
 ## Taken out of the model in use
 
 The same untouched recordings beside the model without one of its mechanisms: on the list it should be named, off the
 list it should turn into `unexplained` at the same place.
 
-{table(_TAKEN_HEAD, [_taken_row(o, untouched) for o in groups["taken out"]])}
+{_rows(_TAKEN_HEAD, [_taken_row(o, untouched) for o in groups["taken out"]])}
 
 ## Beside the paper's model
 
 The same untouched recordings, no model in use, the same share allowed.
 
-{table(_PAPER_HEAD, [_paper_row(o) for o in groups["paper"]])}
+{_rows(_PAPER_HEAD, [_paper_row(o) for o in groups["paper"]])}
 
 {by_hand}"""
 
@@ -113,10 +113,14 @@ _TAKEN_HEAD = ["taken out", "of", "off the list", "left", "said", "which is", "r
 _PAPER_HEAD = ["off the list", "left", "said", "place said", "left by it"]
 
 
+def _rows(head: list[str], rows: list[list[str]]) -> str:
+    return table(head, rows) if rows else "Not run."
+
+
 def _put_in_row(o: RealOutcome, plan: RealPlan, untouched: RealOutcome | None) -> list[str]:
     unit = plan.put_in[o.case.kind].unit
     changed = ", ".join(f"{c} {100 * share:.1f} %" for c, share in o.changed.items())
-    shifts = ", ".join(f"{_short(n)} {100 * s:+.0f} %" for n, s in list(moved(o, untouched).items())[:4])
+    shifts = ", ".join(f"{_short(n)} {_share(s)}" for n, s in list(moved(o, untouched).items())[:4])
     return [
         o.case.kind.replace("-", " "),
         _sized(o.case.size, unit),
@@ -195,6 +199,11 @@ def _place(o: RealOutcome) -> str:
 
 def _sized(value: float | None, unit: str) -> str:
     return "" if value is None else f"{value:.3g} {unit}".removesuffix(" 1").strip()
+
+
+def _share(moved: float) -> str:
+    """A change as per cent, one that is more than fivefold as a multiple."""
+    return f"{100 * moved:+.0f} %" if moved < 4 else f"times {1 + moved:.0f}"
 
 
 def _short(name: str) -> str:
