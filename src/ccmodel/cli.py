@@ -70,6 +70,7 @@ def diagnose(
     step: Annotated[float | None, typer.Option(min=1e-4, help="Compare a sample every so often, s.")] = None,
     cycles: Annotated[int | None, typer.Option(min=1, help="Compare so many cycles of a sine.")] = None,
     beside: Annotated[Path | None, typer.Option(help="A model file: ask what is missing besides what it has.")] = None,
+    hold: Annotated[bool, typer.Option("--hold", help="Fit nothing of that model anew: ask what has changed.")] = False,
     suspect: Annotated[
         list[str],
         typer.Option(help="'NAME at PLACE', or two of them with a comma, to fit whatever the screening says."),
@@ -84,7 +85,7 @@ def diagnose(
         judged = Diagnosing(allowance=allowance, step_s=step, cycles=cycles, suspects=suspects)
     except ValidationError as error:
         raise InputError(f"--suspect: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from None
-    typer.echo(run(batch, out, without, lambda text: _err.print(text, style="dim", markup=False), judged, beside))
+    typer.echo(run(batch, out, without, lambda text: _err.print(text, style="dim", markup=False), judged, beside, hold))
 
 
 @app.command()

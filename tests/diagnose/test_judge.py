@@ -12,6 +12,7 @@ from ccmodel.diagnose.judge import (
     SURE,
     Comparison,
     _fit_all,
+    _looks,
     _names_more,
     _verdict,
     _weighed_anew,
@@ -27,7 +28,7 @@ PROBES = [(SCALE, "gain", 0.05), (FRICTION, "friction_torque", 2e-3)]
 BASE_VALUES = {"friction_coefficient": 0.15}
 VALUES = {"pulley-friction/drive-pulley/friction_torque": 4e-3, "torque-scale/drive-sensor/gain": 0.05}
 CHANNELS = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N")
-WEIGHED = [SimpleNamespace(evidence=SimpleNamespace(channels=CHANNELS))] * 8
+WEIGHED = [SimpleNamespace(evidence=SimpleNamespace(channels=CHANNELS, allowed=0.0))] * 8
 
 
 def trial(left, *acting, **values):
@@ -97,6 +98,11 @@ def test_a_single_that_leaves_a_little_too_much_is_asked_for_company():
     assert not asks(ENOUGH - 0.05)
 
 
+def test_what_a_right_model_may_leave_is_one_look_at_it_however_often_it_is_seen():
+    allowing = [SimpleNamespace(evidence=SimpleNamespace(channels=CHANNELS, allowed=1.0))] * 8
+    assert _looks(allowing) == pytest.approx(_looks(WEIGHED) / 8)
+
+
 def test_what_no_mechanism_brings_down_is_unexplained():
     assert verdict(trial(40.0), trial(30.0, FRICTION), trial(35.0, SCALE)).verdict == "unexplained"
     assert verdict(trial(5.0)).verdict == "unexplained"
@@ -145,4 +151,5 @@ def test_recordings_are_weighed_anew_about_what_explains_them_best():
     assert again.trials[0].values[f"{SCALE[0]}/{SCALE[1]}/gain"] == pytest.approx(0.1, abs=0.005)
     assert {t.hypothesis for t in again.trials} == {t.hypothesis for t in trials}
     assert again.base.left.mean() > again.trials[0].left.mean()
-    assert again.weighed[0].evidence.parameters.mechanisms[0].name == SCALE[0]
+    assert again.weighed[0].evidence.parameters == recordings[0].evidence.parameters
+    assert not np.allclose(again.weighed[0].shrink, recordings[0].shrink, rtol=1e-6)

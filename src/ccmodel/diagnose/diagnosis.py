@@ -24,6 +24,10 @@ from ccmodel.recording import Recording, unit_of
 FORMAT = 1
 # What no number of samples can promise: that the list of hypotheses holds the truth.
 MOST_CONFIDENT = 0.99
+# So near to the end of its range a number stands at it.
+AT_BOUND = 1e-3
+# What may have changed by itself since a model was fitted, where no rest shows it.
+ZEROS = ("tau_in_zero_Nm", "tau_out_zero_Nm")
 # Fewer recordings do not say which of them is the odd one.
 FEWEST_TO_CONTRADICT = 4
 # Enough samples for what such rigs do in a recording; more of them are more work and no more evidence.
@@ -64,6 +68,7 @@ def diagnose(
     cycles: int | None = None,
     suspects: Sequence[Sequence[str]] = (),
     beside: Parameters | None = None,
+    hold: bool = False,
 ) -> Diagnosis:
     """Say whether the calibrated model explains recordings, and if not, where and why.
 
@@ -91,6 +96,8 @@ def diagnose(
         A model that such a rig was fitted with before, as a diagnosis writes it. What it has besides the paper's
         physics then belongs to the model in question, all is fitted anew from its values, and asked is what else is
         missing.
+    hold : bool
+        Whether nothing of that model is fitted anew but sensors' zeros that no rest shows: asked is what has changed.
 
     Raises
     ------
@@ -113,16 +120,32 @@ def diagnose(
         not_judged.append({"what": f"errors below {100 * allowance:g} % of a channel's peak to peak", "why": why})
     calibrated = calibration(estimates, evidence)
     estimates = estimates.with_values({name: free.start for name, free in calibrated.items()})
+    model = Hypothesis(beside=tuple((m.name, m.place) for m in beside.mechanisms) if beside else (), is_held=hold)
+    known = _values_of(beside, calibrated, Hypothesis(beside=model.beside)) if beside else {}
+    if hold:
+        estimates = Hypothesis(beside=model.beside).of(estimates).with_values(known)
+        calibrated = {name: free for name, free in calibrated.items() if name in ZEROS}
+        why = "held as the model given has them, as the run was asked to"
+        not_judged.append({"what": "stiffness, friction and whatever else a calibration would fit", "why": why})
     evidence = [replace(e, parameters=estimates) for e in evidence]
-    model = Hypothesis(beside=tuple((m.name, m.place) for m in beside.mechanisms) if beside else ())
     tell(f"calibrating {'the model given' if beside else 'the paper model'} on {len(evidence)} recordings")
-    start = _values_of(beside, calibrated, model) if beside else _first_fit(evidence, calibrated)
+    start = known if beside else _first_fit(evidence, calibrated)
     fitted = model.of(estimates).with_values(start)
     weighed = each(evidence, lambda i, e: weigh(e, fitted))
-    known = singles(without, model)
-    judgement = judge(weighed, calibrated, start, known, tell, [_suspect(s) for s in suspects], model)
-    not_judged += odd_one_out(judgement)
+    listed = singles(without, model)
+    judgement = judge(weighed, calibrated, start, listed, tell, [_suspect(s) for s in suspects], model)
+    not_judged += odd_one_out(judgement) + _at_bounds(judgement.best)
     return Diagnosis(_said(recordings[0].batch, judgement, estimates, not_judged), judgement, estimates)
+
+
+def _at_bounds(trial: Trial) -> list[dict[str, str]]:
+    """What a calibration left at the end of its range."""
+    found = []
+    for name, free in trial.free.items():
+        value = trial.values[name]
+        if any(np.isclose(value, bound, rtol=AT_BOUND, atol=0.0) for bound in (free.low, free.high)):
+            found.append({"what": name, "why": f"stands at the end of its range, {value:.4g}: not a value to rely on"})
+    return found
 
 
 def odd_one_out(judgement: Judgement) -> list[dict[str, str]]:

@@ -29,10 +29,13 @@ class Hypothesis:
         Mechanism and place of each; empty for the model that is in question.
     beside : tuple of (str, str)
         The same of what that model has besides the paper's physics; their numbers are fitted with the others.
+    is_held : bool
+        Whether they are not, but stay as they are. One of them in `acting` means that its numbers have changed.
     """
 
     acting: tuple[tuple[str, str], ...] = ()
     beside: tuple[tuple[str, str], ...] = ()
+    is_held: bool = False
 
     def __str__(self) -> str:
         return " + ".join(f"{name} at {place}" for name, place in self.acting) or "the calibrated model"
@@ -52,8 +55,10 @@ class Hypothesis:
         return max((registry.get(name).missed for name, _ in self.acting), default=0.0)
 
     def of(self, parameters: Parameters) -> Parameters:
-        """Parameters with the mechanisms in them, at their starting values."""
-        acting = tuple(Active(name, place, registry.get(name).start) for name, place in self.beside + self.acting)
+        """Parameters with the mechanisms in them: at the values that they have there, or else at where they start."""
+        known = {(m.name, m.place): m.values for m in parameters.mechanisms}
+        every = dict.fromkeys(self.beside + self.acting)
+        acting = tuple(Active(*one, known.get(one) or registry.get(one[0]).start) for one in every)
         return replace(parameters, mechanisms=acting)
 
     @property
@@ -76,7 +81,7 @@ class Hypothesis:
 
     def _unknowns(self) -> Iterator[tuple[str, Parameter, bool]]:
         """Name of each of the mechanisms' numbers, what is known of it, and whether it is a mechanism's strength."""
-        for name, place in self.beside + self.acting:
+        for name, place in self.acting if self.is_held else self.beside + self.acting:
             for k, parameter in enumerate(registry.get(name).parameters):
                 yield mechanism_key(name, place, parameter.name), parameter, k == 0
 
@@ -98,10 +103,10 @@ PAPER = Hypothesis()
 
 
 def singles(without: Collection[str] = (), model: Hypothesis = PAPER) -> list[Hypothesis]:
-    """Every mechanism at each of its places, but those that are not to be known and those that a model has already."""
+    """Every mechanism at each of its places, but those that are not to be known and those that a model fits already."""
     names = [name for name in registry.names() if name not in without]
     every = ((name, place) for name in names for place in registry.get(name).places)
-    return [Hypothesis((acting,)) for acting in every if acting not in model.beside]
+    return [Hypothesis((acting,)) for acting in every if model.is_held or acting not in model.beside]
 
 
 def plausible(hypothesis: Hypothesis, values: Mapping[str, float], slack: float = 1.5) -> bool:

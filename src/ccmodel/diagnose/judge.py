@@ -199,7 +199,7 @@ def _weighed_anew(found: Comparison, calibrated: Mapping[str, Free], tell) -> Co
         return [trial.values | values for values in ({}, *elsewhere) if trial is not best or not values]
 
     try:
-        weighed = each(found.weighed, lambda i, w: weigh(w.evidence, model[i]))
+        weighed = each(found.weighed, lambda i, w: weigh(w.evidence, model[i]).acting(w.evidence.parameters))
         base = min((fit(weighed, found.base.hypothesis, calibrated, s) for s in starts(found.base)), key=_left)
     except ModelError as error:
         tell(f"they stay weighed as they are ({error})")
@@ -266,11 +266,18 @@ def _names_more(trial: Trial, trials: Sequence[Trial]) -> bool:
     return all(_left(trial) - 1 < PAIR_SHARE * (_left(t) - 1) for t in alone)
 
 
+def _looks(weighed: Sequence[Weighed]) -> float:
+    """Independent looks that recordings give; what a right model is allowed to leave is alike in all of them."""
+    each_gives = np.array([LOOKS * len(w.evidence.channels) for w in weighed])
+    allowed = np.array([w.evidence.allowed for w in weighed])
+    return float(np.sum(each_gives * (1 - allowed)) + np.mean(each_gives * allowed))
+
+
 def _probabilities(weighed, base: Trial, trials: Sequence[Trial]) -> list[float]:
     """Probability of each trial; what is missing from one is the calibrated model's."""
     if not trials:
         return []
-    looks = sum(LOOKS * len(w.evidence.channels) for w in weighed)
+    looks = _looks(weighed)
     left = np.array([_left(base), *map(_left, trials)])
     unknowns = np.array([0, *(len(t.values) - len(base.values) for t in trials)])
     scale = max(1.0, left.min())

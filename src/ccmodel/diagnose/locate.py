@@ -70,7 +70,7 @@ def _place(judgement: Judgement) -> str:
     weighed = judgement.weighed
     left = {c: excess_without(c, weighed, judgement.calibrated) for c in _channels(weighed)}
     guilty = min(left, key=left.get)
-    alone = left[guilty] < ALONE * float(judgement.calibrated.left.mean() - 1.0)
+    alone = left[guilty] < ALONE * max(float(judgement.calibrated.left.mean() - 1.0), 0.0)
     suspects = PLACES_OF[guilty] if alone else BETWEEN
     found = [s.hypothesis.acting[0][1] for s in judgement.scores if s.hypothesis.acting[0][1] in suspects and s.values]
     return found[0] if found else suspects[0]

@@ -1,29 +1,34 @@
 """Trying a hypothesis: a quick score against the calibrated model, a full refit, and recordings held out in turn."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from ccmodel import mechanisms as registry
 from ccmodel.diagnose.evidence import LOOKS, Weighed
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.failure import ModelError
 from ccmodel.identify.problem import Free, each
-from ccmodel.model.parameters import mechanism_key
+from ccmodel.model.parameters import Parameters, mechanism_key
 from ccmodel.model.sensitivity import size_of
 
 TOLERANCE = 1e-4
 # Differences are taken over this share of a value: friction that falls with speed makes runs that are not smooth in it.
 DIFFERENCE = 3e-4
+# One Newton step stands for a refit, and goes astray where errors bend. It is looked at where so many times as much is
+# left of a held-out recording as by the joint fit; and shares of it that are then tried.
+SUSPECT, SHORTER = 2.0, (1.0, 0.5, 0.25, 0.125)
 # How much finer the solver's grid and steps are for what they cost a fit.
 FINER = 3
 # By how much at a time a value is eased down (`Parameter.eased`).
 EASING = 4.0
 MOST_EVALUATIONS = 25
+# By which share a number that a model has already is changed to see what that does.
+CHANGE = 0.05
 # Where no rest shows the pretension the errors have valleys of their own: both cables taut all along, or one of them
 # slack on its way. A fit then feels its way from either, at shares of the pretension, and goes on from the better.
 PRETENSION_SHARES, FEELING = (1.0, 0.2), 8
@@ -110,6 +115,8 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
         return np.concatenate([J / np.sqrt(n) for J, n in zip(parts, counts, strict=True)])
 
     def solved(x, most=MOST_EVALUATIONS):
+        if not names:  # Nothing is free: the model stands as it is.
+            return OptimizeResult(x=x, fun=residuals(x), jac=jacobian(x), cost=0.0)
         return least_squares(
             residuals, x, jac=jacobian, bounds=(low, high), x_scale=sizes, ftol=TOLERANCE, xtol=TOLERANCE,
             gtol=TOLERANCE, max_nfev=most,
@@ -128,13 +135,40 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
     without = [
         np.clip(found.x + _inverse(total - H, sizes) @ g, low, high) for H, g in zip(information, score, strict=True)
     ]
-    held_out = [named(x) for x in without]
+    aside = each(acting, lambda i, w: errors(w, named(without[i])))
+    for i, (e, own) in enumerate(zip(aside, r, strict=True)):
+        if np.mean(e**2) > SUSPECT * np.mean(own**2):
+            others = [(w, left) for k, (w, left) in enumerate(zip(acting, r, strict=True)) if k != i]
+            without[i] = _shortened(others, found.x, without[i], named)
+            aside[i] = errors(acting[i], named(without[i]))
     if len(acting) > 1:
         scatter = _jackknife(np.array(without) - found.x)
     else:
         scatter = _inverse(total, sizes) / (LOOKS * len(acting[0].evidence.channels))
-    aside = each(acting, lambda i, w: errors(w, held_out[i]))
-    return Trial(hypothesis, calibrated, named(found.x), r, J, scatter, held_out, aside)
+    return Trial(hypothesis, calibrated, named(found.x), r, J, scatter, [named(x) for x in without], aside)
+
+
+def _shortened(others: Sequence[tuple[Weighed, NDArray]], x: NDArray, aside: NDArray, named: Callable) -> NDArray:
+    """The step from a joint optimum to that of some recordings alone, halved until it does not leave more of them.
+
+    Parameters
+    ----------
+    others : sequence of (Weighed, ndarray)
+        These recordings, and what the joint optimum leaves of each.
+    x, aside : ndarray, shape (unknowns,)
+        The joint optimum, and where one Newton step from it would have theirs.
+    named : callable
+        Makes values by name of either.
+    """
+    before = sum(np.mean(left**2) for _, left in others)
+    for share in SHORTER:
+        tried = x + share * (aside - x)
+        try:
+            if sum(each(others, lambda i, o, t=tried: np.mean(errors(o[0], named(t)) ** 2))) <= before:
+                return tried
+        except ModelError:
+            continue
+    return x
 
 
 def moved_by_finer(weighed: Sequence[Weighed], trial: Trial) -> NDArray:
@@ -208,7 +242,7 @@ def _jacobians(acting, x, names, sizes, high) -> list[NDArray]:
             aside = x.copy()
             aside[k] += step
             columns.append((errors(w, dict(zip(names, aside.tolist(), strict=True))) - base) / step)
-        return np.stack(columns, axis=1)
+        return np.stack(columns, axis=1) if columns else np.empty((base.size, 0))
 
     return each(acting, one)
 
@@ -246,7 +280,8 @@ def _score(weighed, base: Trial, hypothesis: Hypothesis, counts, Q, left) -> Sco
     best = Score(hypothesis, 0.0, {})
     added = base.hypothesis.and_also(hypothesis)
     acting = [w.acting(added.of(w.evidence.parameters)) for w in weighed]
-    for probe in hypothesis.probes():
+    has = base.hypothesis.of(weighed[0].evidence.parameters) if hypothesis.acting[0] in base.hypothesis.beside else None
+    for probe in changed(hypothesis, has) if has else hypothesis.probes():
         try:
             said = each(acting, lambda i, w, p=probe: errors(w, base.values | p) - base.whitened[i])
         except ModelError:
@@ -259,10 +294,24 @@ def _score(weighed, base: Trial, hypothesis: Hypothesis, counts, Q, left) -> Sco
             continue
         strength = -float(d @ left) / size
         gain = strength * abs(strength) * size / float(left @ left)
-        values = scaled(hypothesis, probe, strength)
+        values = scaled(hypothesis, probe, strength) if has is None else _further(has, probe, strength)
         if values is not None and abs(gain) > best.gain:
             best = Score(hypothesis, abs(gain), values)
     return best
+
+
+def changed(hypothesis: Hypothesis, model: Parameters) -> Iterator[dict[str, float]]:
+    """A model's own numbers of a mechanism, one of them changed at a time."""
+    own = {key: model.value_of(key) for key in hypothesis.start}
+    for key, value in own.items():
+        yield own | {key: (1 + CHANGE) * value}
+
+
+def _further(model: Parameters, probe: Mapping[str, float], strength: float) -> dict[str, float]:
+    """A change of a model's numbers at another strength, none of them turned round."""
+    own = {key: model.value_of(key) for key in probe}
+    share = float(np.clip(CHANGE * strength, -0.9, 10.0)) / CHANGE
+    return {key: own[key] + share * (value - own[key]) for key, value in probe.items()}
 
 
 def scaled(hypothesis: Hypothesis, probe: Mapping[str, float], strength: float) -> dict[str, float] | None:

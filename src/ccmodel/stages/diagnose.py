@@ -26,6 +26,7 @@ def diagnose(
     tell: Callable[[str], None] = lambda text: None,
     judged: Diagnosing | None = None,
     beside: Path | None = None,
+    hold: bool = False,
 ) -> str:
     """Diagnose a batch folder, beside what a model file has already; the sentence that its page opens with.
 
@@ -50,7 +51,11 @@ def diagnose(
     try:
         estimates = Parameters.estimated(ingested.batch.rig)
         known = read_model(beside) if beside else None
-        found = run(ingested.recordings, estimates, not_judged, without, tell, **_options(judged), beside=known)
+        if hold and known is None:
+            raise InputError("--hold: there is no model to hold; name one with --beside")
+        found = run(
+            ingested.recordings, estimates, not_judged, without, tell, **_options(judged), beside=known, hold=hold
+        )
     except ModelError as error:
         raise InputError(f"{batch}: {error}") from None
     _write(found, inputs, out)
