@@ -126,6 +126,7 @@ def test_what_has_changed_since_a_model_was_fitted_is_named(rubbed, tmp_path):
     (named,) = said["mechanisms"]
     assert (named["name"], named["place"]) == ("pulley-friction", "drive-pulley")
     assert named["parameters"][0]["value"] == pytest.approx(1.5 * RUBBING_NM, rel=0.1)
+    assert "has changed" in said["headline"]
 
 
 def _more(change, table, share):

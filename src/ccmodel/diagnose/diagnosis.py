@@ -244,6 +244,7 @@ def _said(batch, judgement: Judgement, estimates: Parameters, not_judged) -> dic
         "format": FORMAT,
         "batch": batch,
         "verdict": judgement.verdict,
+        "is_held": base.hypothesis.is_held,
         "location": locate.location(judgement),
         "mechanisms": [_mechanism(best, k, _named(name, confidence), covariance) for k, (name, _) in enumerate(named)],
         "alternatives": alternatives,

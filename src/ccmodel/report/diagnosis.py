@@ -35,18 +35,21 @@ def headline(said: dict) -> str:
     worst = max(error, key=lambda c: error[c]["before"] / error[c]["noise"])
     e = error[worst]
     fall = f"{e['before'] / e['noise']:.1f} to {e['after'] / e['noise']:.1f} times the noise in {SYMBOL[worst]}"
+    model, left_out, missing = "calibrated model", "was left out", "is missing"
+    if said["is_held"]:
+        model, left_out, missing = "model given", "has changed since the model given was fitted", "has changed"
     if said["verdict"] == "agrees":
-        return f"{batch}: the calibrated model agrees with the recordings; nothing is missing that they could show."
+        return f"{batch}: the {model} agrees with the recordings; nothing {missing} that they could show."
     if said["verdict"] == "explained":
         what = " and ".join(
             f"{registry.get(m['name']).summary} ({m['name']}, {m['place']})" for m in said["mechanisms"]
         )
-        return f"{batch}: what was left out is {what}; with it the held-out error falls from {fall}."
+        return f"{batch}: what {left_out} is {what}; with it the held-out error falls from {fall}."
     if said["verdict"] == "undecided":
         names = " or ".join(f"{a['name']} at {a['place']}" for a in said["alternatives"])
-        return f"{batch}: something is missing, and these recordings cannot tell {names} apart."
+        return f"{batch}: something {missing}, and these recordings cannot tell {names} apart."
     place = said["location"]["place"]
-    return f"{batch}: something is missing at the {place}, and no mechanism known here accounts for it."
+    return f"{batch}: something {missing} at the {place}, and no mechanism known here accounts for it."
 
 
 def write_diagnosis(file: Path, found: Diagnosis) -> None:
@@ -76,7 +79,7 @@ def _rivals(found: Diagnosis) -> list[dict]:
     rows = [(j.calibrated, None), *ranked[:RIVALS]]
     return [
         {
-            "what": str(trial.hypothesis) if trial.hypothesis.acting else "the calibrated model",
+            "what": str(trial.hypothesis),
             "left": float(trial.left.mean()),
             "learnable": max(j.learnable[trial.hypothesis].mean, 0.0) if trial.hypothesis in j.learnable else None,
             "p": p,
