@@ -84,16 +84,62 @@ def test_the_model_predicts_recordings(clean, tmp_path):
     assert np.sqrt(np.mean(error**2)) < 0.01 * np.ptp(said["tau_in_Nm"])
 
 
-def test_a_bearing_that_rubs_is_named(tmp_path):
-    batch = spoil(write_batch(tmp_path / "rubbing", pretensions=(7.0, 6.0, 5.0)), rubbing)
-    assert run("diagnose", batch, "--out", tmp_path / "out").exit_code == 0
-    said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+def test_a_bearing_that_rubs_is_named(rubbed):
+    said = json.loads((rubbed[1] / "diagnosis.json").read_text())
     assert said["verdict"] == "explained"
     (named,) = said["mechanisms"]
     assert (named["name"], named["place"]) == ("pulley-friction", "drive-pulley")
     assert named["parameters"][0]["value"] == pytest.approx(RUBBING_NM, rel=0.1)
     assert said["location"]["place"] == "drive-pulley"
     assert said["fit"]["error"]["tau_in"]["after"] < 0.3 * said["fit"]["error"]["tau_in"]["before"]
+
+
+@pytest.fixture(scope="module")
+def rubbed(tmp_path_factory):
+    """A batch whose bearing rubs, with its diagnosis."""
+    folder = tmp_path_factory.mktemp("rubbed")
+    batch = spoil(write_batch(folder / "rubbing", pretensions=(7.0, 6.0, 5.0)), rubbing)
+    assert run("diagnose", batch, "--out", folder / "out").exit_code == 0
+    return batch, folder / "out"
+
+
+def test_beside_a_model_that_has_it_nothing_else_is_missing(rubbed, tmp_path):
+    batch, known = rubbed
+    for hold in ([], ["--hold"]):
+        assert run("diagnose", batch, "--out", tmp_path, "--beside", known / "model.json", *hold).exit_code == 0
+        said = json.loads((tmp_path / "diagnosis.json").read_text())
+        assert said["verdict"] == "agrees"
+        assert {"pulley-friction"} == {m.name for m in read_model(tmp_path / "model.json").mechanisms}
+    assert any("held" in n["why"] for n in said["not_judged"])
+    held, given = read_model(tmp_path / "model.json"), read_model(known / "model.json")
+    assert held.stiffness_N_per_m == given.stiffness_N_per_m
+    assert held.mechanisms == given.mechanisms
+
+
+def test_what_has_changed_since_a_model_was_fitted_is_named(rubbed, tmp_path):
+    """The bearing is half as bad again: no new mechanism, and a new number of one that the model has."""
+    worn = spoil(write_batch(tmp_path / "worn", pretensions=(7.0, 6.0, 5.0)), lambda t: _more(rubbing, t, 1.5), seed=1)
+    found = run("diagnose", worn, "--out", tmp_path / "out", "--beside", rubbed[1] / "model.json", "--hold")
+    assert found.exit_code == 0
+    said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert said["verdict"] == "explained"
+    (named,) = said["mechanisms"]
+    assert (named["name"], named["place"]) == ("pulley-friction", "drive-pulley")
+    assert named["parameters"][0]["value"] == pytest.approx(1.5 * RUBBING_NM, rel=0.1)
+
+
+def _more(change, table, share):
+    """A log changed by so many times as much."""
+    before = table["drive_current_A"].copy()
+    changed = change(table)
+    changed["drive_current_A"] = before + share * (changed["drive_current_A"] - before)
+    return changed
+
+
+def test_nothing_can_be_held_without_a_model(clean, tmp_path):
+    found = run("diagnose", clean[0], "--out", tmp_path / "out", "--hold")
+    assert isinstance(found.exception, InputError)
+    assert "--beside" in str(found.exception)
 
 
 def test_a_single_recording_without_load_cells_gets_a_verdict_that_says_what_it_cannot(tmp_path):

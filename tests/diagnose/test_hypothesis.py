@@ -69,3 +69,16 @@ def test_what_the_model_has_already_is_fitted_and_neither_named_nor_asked_for():
     asked = {h.acting[0] for h in singles(model=model)}
     assert friction not in asked
     assert ("pulley-friction", "load-pulley") in asked
+
+
+def test_what_is_held_stays_as_it_is_unless_it_is_what_has_changed():
+    friction = ("pulley-friction", "drive-pulley")
+    key = "pulley-friction/drive-pulley/friction_torque"
+    model = Hypothesis(beside=(friction,), is_held=True)
+    known = model.of(PARAMETERS).with_values({key: 7e-3})
+    assert model.free({}) == {}
+    assert model.of(known).value_of(key) == 7e-3
+    changed = model.and_also(Hypothesis((friction,)))
+    assert changed in {model.and_also(h) for h in singles(model=model)}
+    assert list(changed.free({key: 7e-3})) == list(changed.start)
+    assert [(m.name, m.place) for m in changed.of(known).mechanisms] == [friction]

@@ -8,7 +8,7 @@ import pytest
 
 from ccmodel.diagnose import trial
 from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.trial import _eased, fit, moved_by_finer
+from ccmodel.diagnose.trial import _eased, _shortened, fit, moved_by_finer
 from made_evidence import batch, calibrated
 
 LOW = np.array([0.0, 1e-3])
@@ -42,3 +42,21 @@ def test_a_value_is_eased_down_as_long_as_that_leaves_less(least, end):
         return SimpleNamespace(x=x, cost=1 + abs(np.log((x[1] + 1e-9) / (least + 1e-9))))
 
     assert _eased(solved, solved(np.array([3.0, 0.1])), 1, LOW).x == pytest.approx([3.0, end])
+
+
+def test_a_step_that_goes_astray_is_shortened(monkeypatch):
+    """One unknown, of which the others' errors want 1: a step to 1 is taken, one to 4 halved, one to 40 not taken."""
+    monkeypatch.setattr(trial, "errors", lambda w, values: np.array([values["x"] - 1.0]))
+    others = [("a recording", np.array([-1.0]))] * 3
+
+    def step(to):
+        return _shortened(others, np.array([0.0]), np.array([to]), lambda x: {"x": x[0]})[0]
+
+    assert [step(1.0), step(4.0), step(40.0)] == [1.0, 2.0, 0.0]
+
+
+def test_with_nothing_free_a_model_stands_as_it_is():
+    recordings = batch()
+    found = fit(recordings, Hypothesis(), {}, {})
+    assert found.values == {}
+    assert found.left.mean() == pytest.approx(calibrated(recordings).left.mean(), rel=0.05)
