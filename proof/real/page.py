@@ -46,7 +46,7 @@ from a seed ([bounds and sources](../proof/real/plan.yaml)); the diagnosis ran i
 copy of the batch and the model in use, and nothing else. No answer was on disk, and names say nothing.
 
 **The model in use** was found from {len(plan.known)} recordings ({_ids(plan.known)}) as any owner would find it, with
-{100 * plan.allowance:g} % of peak to peak allowed: `{first["verdict"]}`, {_listed(model)}.
+{100 * plan.allowance:g} % of peak to peak allowed: `{first["verdict"]}`{_nearest_words(first)}: {_listed(model)}.
 It leaves {_nearest_left(first):.2f} of what was allowed, in the mean square, on recordings held out. It is not the
 whole truth. Allowed from then on was therefore the first of a ladder with which a diagnosis of these same recordings,
 the model held, says that nothing else is missing: {_ladder(allowed)}.
@@ -128,6 +128,10 @@ def _left(o: RealOutcome) -> str:
 def _nearest_left(said: dict) -> float:
     """What the best hypothesis left, right or not."""
     return said["nearest"]["mean_square"] if said["nearest"] else said["fit"]["mean_square"]["extended"]
+
+
+def _nearest_words(said: dict) -> str:
+    return ", and in use is what came nearest" if said["nearest"] else ""
 
 
 def _sized(value: float | None, unit: str) -> str:
