@@ -138,27 +138,25 @@ def real(
     raw: Annotated[Path, typer.Argument(exists=True, file_okay=False, help="Imported batches of measured recordings.")],
     out: Annotated[Path, typer.Option(help="Folder that gets the model in use and a folder a case.")],
     page: Annotated[Path | None, typer.Option(help="Markdown page.")] = None,
-    numbers: Annotated[str | None, typer.Option(help="Only these cases, by comma, in this order; else all.")] = None,
 ) -> None:
     """Put something into measured recordings and have them diagnosed beside a model in use; goes on where it was."""
-    from proof.real import MODEL, STANDING, as_it_stands, cases_of, find_model, judge_real, read_real_plan
-    from proof.real_page import real_page
-    from proof.real_score import read_real_outcomes
+    from proof.real.cases import cases_of as real_cases_of
+    from proof.real.page import real_page
+    from proof.real.plan import read_real_plan
+    from proof.real.run import MODEL, find_model, judge_real
+    from proof.real.score import read_real_outcomes
 
-    plan = read_real_plan()
+    plan, in_use = read_real_plan(), out / "model"
     source = raw if raw.name == plan.batch else raw / plan.batch
     if not (source / "batch.yaml").exists():
         raise typer.BadParameter(f"there is no batch {plan.batch} in {raw}: import it with ccmodel import-mis-tool")
-    find_model(plan, source, out / "model", typer.echo, conceal.SOURCES)
-    cases = cases_of(plan, json.loads((out / "model" / MODEL).read_text(encoding="utf-8")))
-    for case in [cases[int(n)] for n in numbers.split(",")] if numbers else cases:
+    find_model(plan, source, in_use, typer.echo)
+    for case in real_cases_of(plan, json.loads((in_use / MODEL).read_text(encoding="utf-8"))):
         if not (out / "cases" / case.name / "result.json").exists():
-            judge_real(case, plan, source, out / "model", out / "cases" / case.name, tell=typer.echo)
-        if case.group in ("untouched", "put in") and not (out / "cases" / case.name / STANDING).exists():
-            as_it_stands(case, plan, source, out / "model", out / "cases" / case.name)
+            judge_real(case, plan, source, in_use, out / "cases" / case.name, typer.echo)
     if page is not None:
         earlier = page.read_text(encoding="utf-8") if page.exists() else ""
-        page.write_text(real_page(read_real_outcomes(plan, out), plan, out / "model", earlier), encoding="utf-8")
+        page.write_text(real_page(read_real_outcomes(plan, out), plan, in_use, earlier), encoding="utf-8")
         typer.echo(str(page))
 
 

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from proof.put_in import DRAG_BUILDS_UP_RAD, KINDS, angle_rad, play, torque_Nm, write_batch
+from proof.real.put_in import DRAG_BUILDS_UP_RAD, KINDS, angle_rad, play, torque_Nm, write_batch
 
 COUNTS = {
     "drive": {
