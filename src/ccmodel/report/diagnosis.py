@@ -65,6 +65,7 @@ def write_diagnosis(file: Path, found: Diagnosis) -> None:
             origin=ORIGIN[origin],
             symbol=SYMBOL,
             rivals=_rivals(found),
+            listed=found.judgement.listed,
             summaries={name: registry.get(name) for name in registry.names()},
             map=_encoded(_map(found)),
             loops=_encoded(_loops(found)),
@@ -110,7 +111,8 @@ def _map(found: Diagnosis) -> Figure:
     before, after = mismatch(found.judgement.weighed, j.calibrated), mismatch(found.judgement.weighed, j.best)
     figure, axes = plt.subplots(1, 2, figsize=(8, 2.9), sharey=True)
     highest = max(np.nanmax([list(v.values()) for v in before.values()]), 3.0)
-    for ax, table, title in zip(axes, (before, after), ("calibrated model", "with what was found"), strict=True):
+    model = "model given" if found.said["is_held"] else "calibrated model"
+    for ax, table, title in zip(axes, (before, after), (model, "with what was found"), strict=True):
         values = np.array([[table[c][p] for p in PARTS] for c in table])
         ax.imshow(values, cmap="cividis", norm=matplotlib.colors.LogNorm(0.7, highest), aspect="auto")
         ax.set_xticks(range(len(PARTS)), PARTS)
@@ -139,10 +141,10 @@ def _loops(found: Diagnosis) -> Figure:
         theta = e.given.theta_in[e.judged]
         ax.plot(theta, scale * e.measured[c], color=FAINT, lw=2.2, label="recording")
         for trial, colour, line, name in (
-            (j.calibrated, COLOURS[0], "--", "calibrated"),
+            (j.calibrated, COLOURS[0], "--", "model given" if found.said["is_held"] else "calibrated"),
             (chosen[i], COLOURS[1], "-", "with what was found"),
         ):
-            if name != "calibrated" and trial is j.calibrated:
+            if name == "with what was found" and trial is j.calibrated:
                 continue
             said = replace(e, parameters=trial.hypothesis.of(e.parameters)).modelled(trial.held_out[i])[c]
             ax.plot(theta, scale * said, color=colour, lw=1.0, ls=line, label=name)
