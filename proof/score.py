@@ -124,13 +124,21 @@ class Outcome:
 def outcome(result: dict) -> Outcome:
     """Put the answer, made again from its seed, beside a result of `proof.judge.judge`."""
     case = draw(result["seed"], **result["asked"])
-    why, said = result["why"] or "", result["diagnosis"]
-    if result["tampering"]:
-        said, why = None, "refused: it " + "; ".join(result["tampering"][:3])
-    elif result["key"] != case.digest or result["case"] != case.name:
-        said, why = None, "refused: the key made from the seed is not the one whose digest was left"
+    why = refusal(result, case)
+    said = None if why else result["diagnosis"]
     errors = result["errors"] if said else {}
-    return Outcome(case.key, said, why, errors, result["took_s"], result["rivals"] if said else {})
+    return Outcome(
+        case.key, said, why or result["why"] or "", errors, result["took_s"], result["rivals"] if said else {}
+    )
+
+
+def refusal(result: dict, case) -> str:
+    """Why a result does not count as one of a case, made again from its seed; empty where it does."""
+    if result["tampering"]:
+        return "refused: it " + "; ".join(result["tampering"][:3])
+    if result["key"] != case.digest or result["case"] != case.name:
+        return "refused: the key made from the seed is not the one whose digest was left"
+    return ""
 
 
 def read_outcomes(folder: Path, names: Sequence[str] | None = None) -> list[Outcome]:

@@ -12,12 +12,10 @@ from pathlib import Path
 from proof.real.cases import RealCase, acting_of, cases_of, name_of, place_of
 from proof.real.plan import RealPlan
 from proof.real.run import MODEL
-from proof.score import same_place
+from proof.score import SURE, refusal, same_place
 
 # A size is found if it is off by no more than this share.
 FOUND = 0.25
-# A wrong name that is said with this probability is said confidently.
-CONFIDENT = 0.8
 
 
 @dataclass(frozen=True)
@@ -83,7 +81,7 @@ class RealOutcome:
     @property
     def wrong_names(self) -> list[str]:
         """What is named confidently, and wrongly."""
-        sure = [acting_of(claim) for claim in self.claims if claim["confidence"] >= CONFIDENT]
+        sure = [acting_of(claim) for claim in self.claims if claim["confidence"] >= SURE]
         return [acting for acting in sure if acting not in self.right_names]
 
 
@@ -111,12 +109,9 @@ def read_real_outcomes(plan: RealPlan, folder: Path) -> list[RealOutcome]:
 
 def outcome_of(case: RealCase, truth: Truth, result: dict) -> RealOutcome:
     """Put a result beside the answer."""
-    said, why = result["said"], result["why"] or ""
-    if result["tampering"]:
-        said, why = None, "refused: it " + "; ".join(result["tampering"][:3])
-    elif result["key"] != case.digest:
-        said, why = None, "refused: the key made from the seed is not the one whose digest was left"
-    return RealOutcome(case, truth, said, why, result["changed"], result["took_s"])
+    why = refusal(result, case)
+    said = None if why else result["said"]
+    return RealOutcome(case, truth, said, why or result["why"] or "", result["changed"], result["took_s"])
 
 
 def made_of(o: RealOutcome) -> str:

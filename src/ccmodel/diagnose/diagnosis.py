@@ -18,7 +18,7 @@ from ccmodel.failure import ModelError
 from ccmodel.identify.intervals import COVERAGE
 from ccmodel.identify.problem import MEASURED, Evidence, Free, Problem, each
 from ccmodel.identify.search import solve
-from ccmodel.model.parameters import Parameters, mechanism_key
+from ccmodel.model.parameters import ZERO_OF, Parameters, mechanism_key
 from ccmodel.recording import Recording, unit_of
 
 FORMAT = 1
@@ -26,8 +26,6 @@ FORMAT = 1
 MOST_CONFIDENT = 0.99
 # So near to the end of its range a number stands at it.
 AT_BOUND = 1e-3
-# What may have changed by itself since a model was fitted, where no rest shows it.
-ZEROS = ("tau_in_zero_Nm", "tau_out_zero_Nm")
 # Fewer recordings do not say which of them is the odd one.
 FEWEST_TO_CONTRADICT = 4
 # Enough samples for what such rigs do in a recording; more of them are more work and no more evidence.
@@ -120,15 +118,17 @@ def diagnose(
         not_judged.append({"what": f"errors below {100 * allowance:g} % of a channel's peak to peak", "why": why})
     calibrated = calibration(estimates, evidence)
     estimates = estimates.with_values({name: free.start for name, free in calibrated.items()})
-    model = Hypothesis(beside=tuple((m.name, m.place) for m in beside.mechanisms) if beside else (), is_held=hold)
-    known = _values_of(beside, calibrated, Hypothesis(beside=model.beside)) if beside else {}
+    model = Hypothesis(beside=tuple((m.name, m.place) for m in beside.mechanisms) if beside else ())
+    known = _values_of(beside, calibrated, model) if beside else {}
     if hold:
-        estimates = Hypothesis(beside=model.beside).of(estimates).with_values(known)
-        calibrated = {name: free for name, free in calibrated.items() if name in ZEROS}
+        model, estimates = replace(model, is_held=True), model.of(estimates).with_values(known)
+        # A zero may have changed by itself since the model was fitted.
+        calibrated = {name: free for name, free in calibrated.items() if name in ZERO_OF.values()}
         why = "held as the model given has them, as the run was asked to"
         not_judged.append({"what": "stiffness, friction and whatever else a calibration would fit", "why": why})
     evidence = [replace(e, parameters=estimates) for e in evidence]
-    tell(f"calibrating {'the model given' if beside else 'the paper model'} on {len(evidence)} recordings")
+    in_question = "the model given" if beside else "the paper's model"
+    tell(f"calibrating {in_question} on {len(evidence)} recordings")
     start = known if beside else _first_fit(evidence, calibrated)
     fitted = model.of(estimates).with_values(start)
     weighed = each(evidence, lambda i, e: weigh(e, fitted))

@@ -195,8 +195,9 @@ def _weighed_anew(found: Comparison, calibrated: Mapping[str, Free], tell) -> Co
     model = [best.hypothesis.of(w.evidence.parameters).with_values(best.values) for w in found.weighed]
 
     def starts(trial: Trial) -> list[dict[str, float]]:
-        elsewhere = [{name: best.values[name] for name in calibrated}] if "pretension_N" in calibrated else []
-        return [trial.values | values for values in ({}, *elsewhere) if trial is not best or not values]
+        if trial is best or "pretension_N" not in calibrated:
+            return [trial.values]
+        return [trial.values, trial.values | {name: best.values[name] for name in calibrated}]
 
     try:
         weighed = each(found.weighed, lambda i, w: weigh(w.evidence, model[i]).acting(w.evidence.parameters))

@@ -108,7 +108,7 @@ def _why(trial: Trial, found: Diagnosis) -> str:
 def _map(found: Diagnosis) -> Figure:
     """Errors over the noise, channel by part of the motion, before and after."""
     j = found.judgement
-    before, after = mismatch(found.judgement.weighed, j.calibrated), mismatch(found.judgement.weighed, j.best)
+    before, after = mismatch(j.weighed, j.calibrated), mismatch(j.weighed, j.best)
     figure, axes = plt.subplots(1, 2, figsize=(8, 2.9), sharey=True)
     highest = max(np.nanmax([list(v.values()) for v in before.values()]), 3.0)
     model = "model given" if found.said["is_held"] else "calibrated model"
@@ -135,7 +135,7 @@ def _loops(found: Diagnosis) -> Figure:
     label, scale = AXIS.get(channel, (f"{channel.rsplit('_', 1)[0]} (N)", 1))
     figure, axes = plt.subplots(1, len(order), figsize=(3.1 * len(order), 3.1), squeeze=False)
     for ax, i in zip(axes[0], order, strict=True):
-        w = found.judgement.weighed[i]
+        w = j.weighed[i]
         e = w.evidence
         c = e.channels.index(channel)
         theta = e.given.theta_in[e.judged]

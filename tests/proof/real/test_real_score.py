@@ -29,7 +29,15 @@ def judged(verdict="agrees", mechanisms=(), alternatives=(), place=None, **case)
         "nearest": None,
         "left": {"calibrated": 1.0, "extended": 1.0},
     }
-    result = {"said": said, "why": None, "tampering": [], "key": found.digest, "changed": {}, "took_s": 1.0}
+    result = {
+        "said": said,
+        "why": None,
+        "tampering": [],
+        "case": found.name,
+        "key": found.digest,
+        "changed": {},
+        "took_s": 1.0,
+    }
     return outcome_of(found, truth_of(found, plan, MODEL), result)
 
 
