@@ -3,7 +3,7 @@
 import hashlib
 import json
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -36,8 +36,8 @@ def build(case: Case, out: Path) -> dict:
     """
     batch, kept = out / "cases" / case.name, out / "kept-back" / case.name
     record(case, case.recordings, batch)
-    record(case, case.kept_back, kept)
-    (kept / "floor.json").write_text(json.dumps(floors_of(case), indent=1), encoding="utf-8")
+    trajectories = record(case, case.kept_back, kept)
+    (kept / "floor.json").write_text(json.dumps(floors_of(case, trajectories), indent=1), encoding="utf-8")
     return {"key": case.digest, "batch": folder_digest(batch), "kept-back": folder_digest(kept)}
 
 
@@ -93,8 +93,10 @@ class Displaced:
         return angle + self.by_rad * way, rate + self.by_rad * slope / DISPLACED_IN_S
 
 
-def floor_of(campaign: Campaign, plan: RecordingPlan, preparation: Preparation) -> dict[str, float]:
-    """Root mean square error that the true physics would leave in each channel of a recording.
+def floor_of(
+    campaign: Campaign, plan: RecordingPlan, preparation: Preparation, trajectory: Trajectory
+) -> dict[str, float]:
+    """Root mean square error that the true physics would leave in each channel of a recording that went like this.
 
     It does not know this run's friction to better than one per cent, where in its count the drive stood at rest, the
     sensors' noise and the zeros of the torques. Where in its count the load stood counts twice, as its zero is taken
@@ -105,7 +107,7 @@ def floor_of(campaign: Campaign, plan: RecordingPlan, preparation: Preparation) 
     count = (2 * np.pi / sensors.encoder.counts_per_rev) ** 2 / 12
     other = replace(preparation, friction_coefficient=preparation.friction_coefficient * FLOOR_FRICTION)
     moved = plan.model_copy(update={"excitation": Displaced(plan.excitation, np.sqrt(count))})
-    a = shown(campaign, simulate(campaign, plan, preparation))
+    a = shown(campaign, trajectory)
     b = shown(campaign, simulate(campaign, moved, other))
     torque = _variance(sensors.torque) + sensors.torque.accuracy_Nm**2 / 3
     force = _variance(sensors.load_cell) + sensors.load_cell.accuracy_N**2 / 6
@@ -125,24 +127,25 @@ def _variance(sensor: TorqueSensor | LoadCell) -> float:
     return noise**2 * (1 + (sensor.slow_noise.ratio if sensor.slow_noise else 0.0) ** 2)
 
 
-def record(case: Case, plans: Sequence[RecordingPlan], folder: Path) -> None:
-    """Write a batch of some of a case's recordings into a folder of its own."""
+def record(case: Case, plans: Sequence[RecordingPlan], folder: Path) -> dict[str, Trajectory]:
+    """Write a batch of some of a case's recordings into a folder of its own; what the rig did in each, by its id."""
     # What a build that was stopped left behind.
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    campaign = case.campaign
+    campaign, trajectories = case.campaign, {}
     for plan in plans:
         draw = recording_generator(case.seed, case.name, plan.id)
-        trajectory = simulate(campaign, plan, prepare(campaign, plan, draw))
+        trajectory = trajectories[plan.id] = simulate(campaign, plan, prepare(campaign, plan, draw))
         (folder / log_name(plan)).write_bytes(compress(log(trajectory, campaign.sensors, campaign.rig, draw)))
     described = description(campaign, case.name, NOTE, plans)
     (folder / "batch.yaml").write_text(as_yaml(described), encoding="utf-8")
+    return trajectories
 
 
-def floors_of(case: Case) -> dict[str, dict[str, float]]:
-    """Floors of the kept-back recordings by their ids (`floor_of`)."""
+def floors_of(case: Case, trajectories: Mapping[str, Trajectory]) -> dict[str, dict[str, float]]:
+    """Floors of the kept-back recordings by their ids (`floor_of`), from what the rig did in them."""
     prepared = {
         plan.id: prepare(case.campaign, plan, recording_generator(case.seed, case.name, plan.id))
         for plan in case.kept_back
     }
-    return {plan.id: floor_of(case.campaign, plan, prepared[plan.id]) for plan in case.kept_back}
+    return {p.id: floor_of(case.campaign, p, prepared[p.id], trajectories[p.id]) for p in case.kept_back}

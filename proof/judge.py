@@ -55,9 +55,9 @@ def judge(
         diagnosis = _read(out / "diagnosis.json") if ran.code == 0 and not ran.tampering else None
         tampering, errors, rivalled = list(ran.tampering), {}, {}
         if diagnosis is not None:
-            record(case, case.kept_back, kept)
+            floors = floors_of(case, record(case, case.kept_back, kept))
             predictions = {which: Path(folder) / which for which in MODELS}
-            errors = _errors(case, kept, out, predictions, sources, tampering)
+            errors = _errors(case, kept, floors, out, predictions, sources, tampering)
             if errors and with_rivals:
                 conceal.predict(batch, out / MODELS["before"], Path(folder) / "fitted", sources)
                 rivalled = rivals.errors(batch, Path(folder) / "fitted", kept, predictions["before"])
@@ -103,14 +103,20 @@ def _claim(said: dict) -> dict:
 
 
 def _errors(
-    case: Case, kept: Path, out: Path, predictions: dict[str, Path], sources: Path, tampering: list[str]
+    case: Case,
+    kept: Path,
+    floors: dict[str, dict[str, float]],
+    out: Path,
+    predictions: dict[str, Path],
+    sources: Path,
+    tampering: list[str],
 ) -> dict[str, dict[str, float]]:
     """By channel, the kept-back recordings' errors before and after the diagnosis and their floor, root mean square.
 
     Empty where a model of the diagnosis says nothing of one of the recordings. Predictions go to the folders of
     `predictions`; what one tried to reach is added to `tampering`.
     """
-    squares = {"floor": [[floor[c] ** 2 for c in CHANNELS] for floor in floors_of(case).values()]}
+    squares = {"floor": [[floor[c] ** 2 for c in CHANNELS] for floor in floors.values()]}
     with tempfile.TemporaryDirectory(prefix="blinded-") as folder:
         blinded = Path(folder) / kept.name
         blind(kept, blinded)

@@ -352,6 +352,7 @@ def _run(
     samples = theta_in.size
     nodes = inverse_mass.size
     elements = lengths.size
+    share_of_one = 1.0 / elements
     dt = sample_s / steps
     slow_steps = max(1, int(SLOW_S / dt))
     is_slow = p.tension_exponent != 0.0 or p.run_in_change != 0.0 or p.wear_rise != 0.0
@@ -360,6 +361,7 @@ def _run(
     v = np.zeros((2, nodes + 2))
     tension = start_tension.copy()
     elastic = start_tension.copy()
+    base = np.empty(nodes + 1)
     lost = np.zeros((relaxing.size, 2, nodes + 1))
     bristle = bristles[0].copy()
     strength = np.empty((2, nodes))
@@ -435,14 +437,15 @@ def _run(
                     _renew(p, rested[c], w, dt)
                 if elements == 1:
                     for i in range(nodes):
-                        z[i] = _bristle(z[i], w[i + 1] * dt / p.bristle_length)
+                        z[i] = _bristle(z[i], w[i + 1] * (dt / p.bristle_length))
                 else:
                     z[:] = 0.0
                     for k in range(elements):
                         zk = bristles[k, c]
+                        slid = dt / lengths[k]
                         for i in range(nodes):
-                            zk[i] = min(max(zk[i] + w[i + 1] * dt / lengths[k], -1.0), 1.0)
-                            z[i] += zk[i] / elements
+                            zk[i] = min(max(zk[i] + w[i + 1] * slid, -1.0), 1.0)
+                            z[i] += share_of_one * zk[i]
                 for i in range(1, nodes + 1):
                     x[i] += dt * w[i]
                 x[0] = side * drive
@@ -450,18 +453,17 @@ def _run(
                 x[nodes + 1] = side * load_way
                 w[nodes + 1] = side * load_radius * omega_out
                 _set_elastic(p, elastic[c], x, stretch[c], stiffness[c], settling[c], share, gives[c])
+                base[:] = elastic[c]
                 for k in range(relaxing.size):
                     q = lost[k, c]
                     rate = dt / relaxing_time[k]
                     for i in range(nodes + 1):
                         q[i] += rate * (elastic[c, i] - q[i])
+                        base[i] -= relaxing[k] * q[i]
                 for i in range(nodes + 1):
-                    base = elastic[c, i]
-                    for k in range(relaxing.size):
-                        base -= relaxing[k] * lost[k, c, i]
-                    pull = base + damper * (w[i] - w[i + 1])
+                    pull = base[i] + damper * (w[i] - w[i + 1])
                     # A slack segment neither pushes nor damps.
-                    T[i] = max(0.0, pull) if base > 0.0 else 0.0
+                    T[i] = max(0.0, pull) if base[i] > 0.0 else 0.0
                 if p.conduit_compliance > 0.0:
                     mean = 0.0
                     for i in range(nodes + 1):

@@ -156,7 +156,8 @@ def test_the_floor_is_what_noise_and_the_runs_own_friction_leave(poor, monkeypat
 
     monkeypatch.setattr(build, "simulate", simulated)
     campaign = poor.campaign.model_copy(update={"rig": poor.campaign.rig.model_copy(update={"effects": Effects()})})
-    floor = build.floor_of(campaign, plan, Preparation(1.0, 7.0, (0.2, 0.2)))
+    prepared = Preparation(1.0, 7.0, (0.2, 0.2))
+    floor = build.floor_of(campaign, plan, prepared, simulated(campaign, plan, prepared))
     noise, slow = campaign.sensors.torque.noise_Nm, campaign.sensors.torque.slow_noise.ratio
     expected = np.sqrt(0.01**2 + noise**2 * (1 + slow**2) + campaign.sensors.torque.accuracy_Nm**2 / 3)
     assert floor["tau_in_Nm"] == pytest.approx(expected, rel=1e-6)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,11 +107,15 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
     def named(x):
         return dict(zip(names, x.tolist(), strict=True))
 
+    @lru_cache(maxsize=1)  # An optimiser wants slopes where it has just been.
+    def by_recording(*values: float) -> list[NDArray]:
+        return each(acting, lambda i, w: errors(w, dict(zip(names, values, strict=True))))
+
     def residuals(x):
-        return np.concatenate(each(acting, lambda i, w: errors(w, named(x)) / np.sqrt(counts[i])))
+        return np.concatenate([e / np.sqrt(n) for e, n in zip(by_recording(*x.tolist()), counts, strict=True)])
 
     def jacobian(x):
-        parts = _jacobians(acting, x, names, sizes, high)
+        parts = _jacobians(acting, by_recording(*x.tolist()), x, names, sizes, high)
         return np.concatenate([J / np.sqrt(n) for J, n in zip(parts, counts, strict=True)])
 
     def solved(x, most=MOST_EVALUATIONS):
@@ -233,16 +237,15 @@ def _inverse(information: NDArray, sizes: NDArray) -> NDArray:
     return np.linalg.pinv(scaled, rcond=1e-10, hermitian=True) * np.outer(sizes, sizes)
 
 
-def _jacobians(acting, x, names, sizes, high) -> list[NDArray]:
+def _jacobians(acting, bases, x, names, sizes, high) -> list[NDArray]:
     def one(i: int, w: Weighed) -> NDArray:
-        base = errors(w, dict(zip(names, x.tolist(), strict=True)))
         columns = []
         for k in range(x.size):
             step = DIFFERENCE * sizes[k] * (-1 if x[k] + DIFFERENCE * sizes[k] > high[k] else 1)
             aside = x.copy()
             aside[k] += step
-            columns.append((errors(w, dict(zip(names, aside.tolist(), strict=True))) - base) / step)
-        return np.stack(columns, axis=1) if columns else np.empty((base.size, 0))
+            columns.append((errors(w, dict(zip(names, aside.tolist(), strict=True))) - bases[i]) / step)
+        return np.stack(columns, axis=1) if columns else np.empty((bases[i].size, 0))
 
     return each(acting, one)
 
