@@ -7,6 +7,7 @@ from builders import recording
 from ccmodel.diagnose.evidence import LOOKS, weigh
 from ccmodel.diagnose.locate import PARTS, parts_of
 from ccmodel.identify.problem import Evidence
+from ccmodel.model.general import Active
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 
@@ -50,6 +51,15 @@ def test_a_per_cent_of_friction_is_no_evidence_and_ten_are(weighed):
     }
     assert errors[0.01] < 1.5
     assert errors[0.1] > 50
+
+
+def test_where_in_its_gap_the_load_rests_is_no_evidence_where_no_torque_holds_it(weighed):
+    gap = Active("backlash", "load-pulley", {"half_gap": 0.02})
+    with_gap = replace(PARAMETERS, mechanisms=(gap,))
+    by_gap = weigh(weighed.evidence, with_gap)
+    moved = by_gap.acting(with_gap).evidence.errors({"load_place": 0.5}) - by_gap.acting(with_gap).evidence.errors({})
+    assert np.sum(weighed.whitened(moved.ravel()) ** 2) > 50
+    assert np.sum(by_gap.whitened(moved.ravel()) ** 2) < 3
 
 
 def test_parts_of_a_motion(weighed):

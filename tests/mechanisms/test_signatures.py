@@ -9,7 +9,7 @@ from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.mechanisms.pulley_friction import PRESLIDING_RAD
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import AngleLoad, MechanicalLoad
+from ccmodel.model.load import AngleLoad, MechanicalLoad, SpringLoad
 from general_runs import HALF_LOOP, K_E, MU, T0, TENSIONS, L, R, last_cycle, loop_area, rms, run, sine
 
 DRIVE_ONLY = (*TENSIONS, "theta_out_rad", "tau_out_Nm")
@@ -260,6 +260,26 @@ def test_backlash_flattens_the_loads_torque_around_zero():
     assert r.tau_out_Nm[inside] == pytest.approx(0.0, abs=1e-8)
     beyond = r.theta_out_rad > b
     assert r.tau_out_Nm[beyond] == pytest.approx(K_E * (r.theta_out_rad[beyond] - b), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "T2, known_to, place, side",
+    [
+        (7.4, 0.0, 0.0, 1.0),
+        (7.2, 0.0, 0.5, -1.0),
+        (7.3, 0.0, 0.5, 0.5),
+        (7.4, 1.2e-3, 0.0, 0.5),  # 0.1 N on 6 mm are half of what is known
+        (7.4, 1.2e-3, -1.0, 0.0),
+    ],
+)
+def test_a_load_with_a_gap_rests_against_the_side_it_is_held_to(T2, known_to, place, side):
+    b = 0.05
+    tensioned = InitialTension.between_ends(HALF_LOOP, MU, (T0, T2), (T0, T0))
+    load = SpringLoad(K_E, known_to, place)
+    r = run(sine(), ("backlash", "load-pulley", {"half_gap": b}), T=tensioned, load=load)
+    assert r.theta_out_rad[0] == pytest.approx(R * (T2 - T0) / K_E + side * b, abs=2e-5)
+    if abs(side) == 1:
+        assert r.tau_out_Nm[0] == pytest.approx(R * (T2 - T0), abs=1e-6)
 
 
 def test_stiffening_curves_torque_against_angle():

@@ -17,11 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.identify.problem import Evidence
+from ccmodel.model.general.run import settings_of
 from ccmodel.model.parameters import ZERO_OF, Parameters
 from ccmodel.model.sensitivity import STEP, size_of
 
 # Independent looks that a channel of a recording gives at a hypothesis: samples are far more, and alike.
 LOOKS = 20
+# Standard deviation of what may be anywhere from -1 to 1.
+ANYWHERE = 1 / np.sqrt(3)
 FRICTION_SPREAD = 0.01  # of itself, from run to run (docs/rig-log-format.md)
 
 
@@ -87,6 +90,8 @@ def _nuisances(e: Evidence, parameters: Parameters) -> Sequence[tuple[str, float
     for channel, name in ZERO_OF.items():
         if channel in e.channels and channel in recording.accuracy:
             found.append((name, getattr(parameters, name), recording.accuracy[channel]))
+    if settings_of(parameters.mechanisms).half_gap:
+        found.append(("load_place", parameters.load_place, ANYWHERE))
     if "theta_out_rad" in e.channels and (step := recording.encoder_step_rad.get("theta_out_rad")):
         found.append(("theta_out_zero_rad", parameters.theta_out_zero_rad, step / np.sqrt(12)))
     return [(name, value, spread, STEP * size_of(name, value) * 10) for name, value, spread in found]

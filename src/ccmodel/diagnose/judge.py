@@ -33,8 +33,8 @@ RIGHT = 1.5
 RIGHT_SHARE = 0.05
 # A single mechanism that leaves more than this, with what its simple form may miss, may have company: pairs are tried.
 ENOUGH = 1.2
-# Of many hundred pairs one comes near by chance: a pair is right only if it leaves this, with no more on top than what
-# the simple forms of its members may miss.
+# Of many hundred pairs one comes near by chance: a pair is right only if it leaves this, and of that share on top as
+# much less as more of them were fitted, or what the simple forms of its members may miss.
 RIGHT_PAIR = 1.3
 LEARNABLE = 0.01
 # Trials that are asked what could still be learnt of what they leave.
@@ -51,7 +51,6 @@ SURE = 0.8
 OFF_LIST = 0.2
 LEVEL = (0.93, 0.09)
 FORM_SHARE = 0.04
-IMITATIONS = {1: 1, 2: FIRSTS * PARTNERS}
 RIVAL = 0.02
 MOST_ALTERNATIVES = 4
 
@@ -217,11 +216,14 @@ def is_right(trial: Trial, base: Trial, learnable: Mapping[Hypothesis, Structure
     excess, missed = max(_left(base) - 1.0, 0.0), trial.hypothesis.missed
     if unlearnt is None or (trial is base and _left(base) > RIGHT):
         return False
-    if len(trial.hypothesis.acting) < 2:
-        is_small = _left(trial) <= RIGHT + max(RIGHT_SHARE, missed) * excess
-    else:
-        is_small = _left(trial) <= RIGHT_PAIR + missed * excess
-    return is_small and unlearnt.surely <= LEARNABLE + missed * excess
+    most = RIGHT_PAIR if len(trial.hypothesis.acting) > 1 else RIGHT
+    most += max(RIGHT_SHARE / _best_of(trial), missed) * excess
+    return _left(trial) <= most and unlearnt.surely <= LEARNABLE + missed * excess
+
+
+def _best_of(trial: Trial) -> int:
+    """As the best of how many independent imitations a trial may pass."""
+    return FIRSTS * PARTNERS if len(trial.hypothesis.acting) > 1 else 1
 
 
 def _left(trial: Trial) -> float:
@@ -300,7 +302,7 @@ def is_listed(trial: Trial, base: Trial) -> float:
     exact = norm.pdf(over, scale=sd)
     # A share of half a normal distribution, and the level's scatter on top.
     simplified = 2 * norm.pdf(over, scale=wide) * norm.cdf(over * form / (sd * wide))
-    n = IMITATIONS[min(len(trial.hypothesis.acting), 2)]
+    n = _best_of(trial)
     share = float(np.clip(over / excess, 0.0, 1.0))
     imitation = norm.cdf(over / sd) * n * (1 - share) ** (n - 1) / excess
     right = (1 - OFF_LIST) * (exact + simplified) / 2

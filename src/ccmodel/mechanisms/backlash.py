@@ -1,7 +1,8 @@
 """Backlash between the load pulley and the load.
 
 Equation: the load takes part only beyond a dead zone of +-b about its neutral position, so a spring load gives
-tau_out = K_e (theta -+ b) outside it and nothing inside.
+tau_out = K_e (theta -+ b) outside it and nothing inside. At rest it lies against the side that the cables' torque
+holds it to.
 
 Signature: the load's torque is flat around zero while the pulley turns.
 

@@ -15,9 +15,21 @@ class SpringLoad:
 
     A stiffness of zero is a load that turns freely. The paper's (21) counts the load's torque on the pulley, hence its
     opposite sign.
+
+    Attributes
+    ----------
+    stiffness_Nm_per_rad : float
+        K_e, >= 0.
+    rest_known_to_Nm : float
+        How well the torque is known with which a run begins; >= 0. Where there is a gap, a smaller one does not tell
+        which of its sides the load lies against.
+    rest_place : float
+        Where in the gap it rests then, -1 to 1.
     """
 
     stiffness_Nm_per_rad: float
+    rest_known_to_Nm: float = 0.0
+    rest_place: float = 0.0
 
     def __post_init__(self):
         if not (np.isfinite(self.stiffness_Nm_per_rad) and self.stiffness_Nm_per_rad >= 0):

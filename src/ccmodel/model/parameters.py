@@ -40,6 +40,8 @@ class Parameters:
         Angle of the load that its encoder shows as none: where in its count it rests.
     drive_place : float
         Where in its count the drive first rests, in standard deviations of what its motion says of that.
+    load_place : float
+        Where in its gap the load first rests, -1 to 1, as far as the torque there does not tell.
     F_drive_zero_N, F_load_zero_N : float
         What the load cells read without a tension.
     extra_bend_rad : float
@@ -68,6 +70,7 @@ class Parameters:
     tau_out_zero_Nm: float = 0.0
     theta_out_zero_rad: float = 0.0
     drive_place: float = 0.0
+    load_place: float = 0.0
     F_drive_zero_N: float = 0.0
     F_load_zero_N: float = 0.0
     extra_bend_rad: float = 0.0
@@ -144,6 +147,7 @@ OWN = (
     "profile_bow_A",
     "profile_bow_B",
     "drive_place",
+    "load_place",
     "theta_out_zero_rad",
     "tau_in_zero_Nm",
     "tau_out_zero_Nm",

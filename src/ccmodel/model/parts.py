@@ -16,7 +16,7 @@ from ccmodel.mechanisms.pulley_friction import bearing
 from ccmodel.model.exact.pair import CableResponse, ForceEnd, MotionEnd, simulate_cable
 from ccmodel.model.general.run import load_law, settings_of
 from ccmodel.model.parameters import Parameters
-from ccmodel.model.run import ModelInput, initial_tension
+from ccmodel.model.run import ModelInput, initial_tension, spring_load
 
 
 def drive_pulley(theta_in: NDArray, T1_N: NDArray, T3_N: NDArray, parameters: Parameters) -> NDArray:
@@ -97,4 +97,4 @@ def load(given: ModelInput, parameters: Parameters) -> NDArray:
     start = initial_tension(given, parameters)
     torque = (start.tension_A_N[-1] - start.tension_B_N[-1]) * parameters.load_radius_m
     settings = settings_of(parameters.mechanisms)
-    return load_law(settings, parameters.load_stiffness_Nm_per_rad, recording.time_s, given.theta_out, torque)
+    return load_law(settings, spring_load(given, parameters), recording.time_s, given.theta_out, torque)

@@ -23,6 +23,9 @@ from ccmodel.rig.motion import SIDES, drive_motion
 # hand, a spring or a brake does nothing above this frequency at the rates that rigs run at (0.1 to 1 Hz).
 LOAD_TORQUE_CUTOFF_HZ = 10.0
 
+# A torque at rest beyond so many times its sensor's accuracy is there.
+KNOWN_TO = 3.0
+
 # Before the first count comes, a drive has moved by up to a count, and the torque with it.
 STILL_RAD = 1e-5
 
@@ -219,13 +222,19 @@ def _load(given: ModelInput, parameters: Parameters, load_from: LoadFrom) -> Spr
             raise ModelError(f"{name}: no angle was measured at the load pulley")
         return AngleLoad(given.theta_out)
     if load_from == "law" and parameters.load_stiffness_Nm_per_rad is not None:
-        return SpringLoad(parameters.load_stiffness_Nm_per_rad)
+        return spring_load(given, parameters)
     if given.tau_out is None:
         raise ModelError(
             f"{name}: the batch states no load spring and no torque was measured at the load pulley; one of the two "
             "is needed to know the load"
         )
     return TorqueLoad(given.tau_out - parameters.tau_out_zero_Nm, parameters.spring_beside_load_Nm_per_rad)
+
+
+def spring_load(given: ModelInput, parameters: Parameters) -> SpringLoad:
+    """The load's spring, and what is known of how it rests at the start of a recording."""
+    known_to = KNOWN_TO * given.recording.accuracy.get("tau_out_Nm", 0.0)
+    return SpringLoad(parameters.load_stiffness_Nm_per_rad, known_to, parameters.load_place)
 
 
 def _motion(recording: Recording, channel: str) -> tuple[NDArray, NDArray, NDArray]:

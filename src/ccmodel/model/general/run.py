@@ -186,22 +186,22 @@ def settings_of(mechanisms: Mapping[str, Mapping] | Sequence[Active]) -> Setting
     return settings
 
 
-def load_law(settings: Settings, stiffness: float, time_s: NDArray, theta: NDArray, start_Nm: float) -> NDArray:
+def load_law(settings: Settings, load: SpringLoad, time_s: NDArray, theta: NDArray, start_Nm: float) -> NDArray:
     """Torque (N m, shape (n,)) of a spring load with what acts on it, along a course of its pulley.
 
     Parameters
     ----------
     settings : Settings
-    stiffness : float
-        K_e, N m/rad.
+    load : SpringLoad
     time_s, theta : ndarray, shape (n,)
         The pulley's course; only its changes matter.
     start_Nm : float
         Torque before it.
     """
-    K3 = settings.cubic_stiffness
-    z = _deflection(stiffness, K3, start_Nm)
-    angle = theta - theta[0] + _with_gap(z, settings.half_gap)
+    stiffness, K3 = load.stiffness_Nm_per_rad, settings.cubic_stiffness
+    start = _deflection(stiffness, K3, start_Nm)
+    start += settings.half_gap * _side(start_Nm, load.rest_known_to_Nm, load.rest_place)
+    angle = theta - theta[0] + start
     beyond = np.sign(angle) * np.maximum(np.abs(angle) - settings.half_gap, 0.0)
     speed = np.gradient(theta, time_s)
     inertial = settings.damping(stiffness) * speed + settings.inertia * np.gradient(speed, time_s)
@@ -368,11 +368,11 @@ def _load_angle(physics: rows.Physics, T: NDArray, load: Load, series: NDArray) 
     K, K3 = physics.stiffness_load, physics.cubic
     if isinstance(load, TorqueLoad) or (K == 0 and K3 == 0):
         return 0.0
+    rest = (load.rest_known_to_Nm, load.rest_place) if isinstance(load, SpringLoad) else (0.0, 0.0)
     theta = 0.0
     for _ in range(50):
-        R = physics.radius * winding(theta, physics.eccentricity, physics.phase)[1]
-        z = _deflection(K, K3, R * (T[0, -1] - T[1, -1]))
-        theta = _with_gap(z, physics.half_gap)
+        torque = physics.radius * winding(theta, physics.eccentricity, physics.phase)[1] * (T[0, -1] - T[1, -1])
+        theta = _deflection(K, K3, torque) + physics.half_gap * _side(torque, *rest)
         if physics.eccentricity == 0:
             break
     return float(theta)
@@ -388,13 +388,14 @@ def _deflection(K: float, K3: float, torque: float) -> float:
     return float(z)
 
 
-def _with_gap(deflection: float, half_gap: float) -> float:
-    """Angle of a load at rest whose spring is deflected, rad.
+def _side(torque: float, known_to: float, place: float) -> float:
+    """Where in its gap a load at rest stands that the cables turn with a torque, -1 to 1.
 
-    What a gap hides cannot be seen from the torque: a load that is all but free may stand anywhere in it. It is taken
-    to stand in the middle, and the further off, the more it is loaded, up to a deflection as large as the gap.
+    One that is held against its spring lies against a side. One that is all but free may stand anywhere: as far as the
+    torque is not known to be there, at the place that is given.
     """
-    return deflection + float(np.clip(deflection, -half_gap, half_gap))
+    side = float(np.clip(torque / known_to, -1.0, 1.0) if known_to else np.sign(torque))
+    return side + (1 - abs(side)) * place
 
 
 def true_at(active: Sequence[Active], seconds: float, read: Mapping[str, float], radii: tuple[float, float]) -> dict:
