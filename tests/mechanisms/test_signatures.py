@@ -268,8 +268,9 @@ def test_backlash_flattens_the_loads_torque_around_zero():
         (7.4, 0.0, 0.0, 1.0),
         (7.2, 0.0, 0.5, -1.0),
         (7.3, 0.0, 0.5, 0.5),
-        (7.4, 1.2e-3, 0.0, 0.5),  # 0.1 N on 6 mm are half of what is known
-        (7.4, 1.2e-3, -1.0, 0.0),
+        (7.4, 1.2e-3, 0.5, 0.5),  # 0.1 N on 6 mm are half of what is known
+        (7.4, 0.6e-3, 0.0, 0.5),
+        (7.4, 0.6e-3, -1.0, 0.0),
     ],
 )
 def test_a_load_with_a_gap_rests_against_the_side_it_is_held_to(T2, known_to, place, side):

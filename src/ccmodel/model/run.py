@@ -24,7 +24,7 @@ from ccmodel.rig.motion import SIDES, drive_motion
 LOAD_TORQUE_CUTOFF_HZ = 10.0
 
 # A torque at rest beyond so many times its sensor's accuracy is there.
-KNOWN_TO = 3.0
+KNOWN_TO = 2.0
 
 # Before the first count comes, a drive has moved by up to a count, and the torque with it.
 STILL_RAD = 1e-5

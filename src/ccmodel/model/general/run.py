@@ -391,11 +391,11 @@ def _deflection(K: float, K3: float, torque: float) -> float:
 def _side(torque: float, known_to: float, place: float) -> float:
     """Where in its gap a load at rest stands that the cables turn with a torque, -1 to 1.
 
-    One that is held against its spring lies against a side. One that is all but free may stand anywhere: as far as the
-    torque is not known to be there, at the place that is given.
+    One that is held against its spring lies against a side. One that is all but free may stand anywhere: where the
+    torque is not known to be there, at the place that is given. The one goes over into the other around `known_to`.
     """
-    side = float(np.clip(torque / known_to, -1.0, 1.0) if known_to else np.sign(torque))
-    return side + (1 - abs(side)) * place
+    held = float(np.clip(2 * abs(torque) / known_to - 1.5, 0.0, 1.0)) if known_to else float(torque != 0)
+    return held * float(np.sign(torque)) + (1 - held) * place
 
 
 def true_at(active: Sequence[Active], seconds: float, read: Mapping[str, float], radii: tuple[float, float]) -> dict:
