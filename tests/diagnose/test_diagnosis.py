@@ -8,10 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from threadpoolctl import threadpool_limits
 from typer.testing import CliRunner
 
 from builders import write_batch
 from ccmodel import cli
+from ccmodel.identify import problem
 from ccmodel.model.files import read_model
 from ccmodel.typed import InputError
 
@@ -68,8 +70,11 @@ def test_recordings_of_the_model_itself_agree_with_it(clean):
     assert "agrees" in (clean[1] / "report.html").read_text()
 
 
-def test_the_same_input_gives_the_same_json(clean, tmp_path):
-    assert run("diagnose", clean[0], "--out", tmp_path).exit_code == 0
+@pytest.mark.parametrize("cores", [1, 2])
+def test_the_same_input_gives_the_same_json(clean, tmp_path, monkeypatch, cores):
+    monkeypatch.setattr(problem, "CORES", cores)
+    with threadpool_limits(limits=cores, user_api="blas"):
+        assert run("diagnose", clean[0], "--out", tmp_path).exit_code == 0
     assert (tmp_path / "diagnosis.json").read_bytes() == (clean[1] / "diagnosis.json").read_bytes()
 
 

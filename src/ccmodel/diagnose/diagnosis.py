@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 from scipy.stats import t as student
+from threadpoolctl import threadpool_limits
 
 from ccmodel import mechanisms as registry
 from ccmodel.diagnose import experiment, locate
@@ -55,6 +56,8 @@ class Diagnosis:
         return trial.hypothesis.of(self.estimates).with_values(trial.values)
 
 
+# Recordings are worked on side by side; sums of several threads besides differ in their last digits with their number.
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def diagnose(
     recordings: Sequence[Recording],
     estimates: Parameters,
