@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from builders import recording
-from ccmodel.diagnose.evidence import LOOKS, weigh
+from ccmodel.diagnose.evidence import LOOKS, weigh, weighed_about
 from ccmodel.diagnose.locate import PARTS, parts_of
 from ccmodel.identify.problem import Evidence
 from ccmodel.model.general import Active
@@ -60,6 +60,16 @@ def test_where_in_its_gap_the_load_rests_is_no_evidence_where_no_torque_holds_it
     moved = by_gap.acting(with_gap).evidence.errors({"load_place": 0.5}) - by_gap.acting(with_gap).evidence.errors({})
     assert np.sum(weighed.whitened(moved.ravel()) ** 2) > 50
     assert np.sum(by_gap.whitened(moved.ravel()) ** 2) < 3
+
+
+@pytest.mark.parametrize("place", [-1.0, 0.0, 1.0])
+def test_a_load_is_found_where_in_its_gap_it_rested(weighed, place):
+    gap = Active("backlash", "load-pulley", {"half_gap": 0.02})
+    there = replace(PARAMETERS, mechanisms=(gap,), load_place=place)
+    e = weighed.evidence
+    recorded = replace(weighed, evidence=replace(e, measured=replace(e, parameters=there).modelled({})))
+    found = weighed_about(recorded, replace(there, load_place=0.0))
+    assert found.evidence.parameters == replace(PARAMETERS, load_place=place)
 
 
 def test_parts_of_a_motion(weighed):

@@ -23,8 +23,9 @@ from ccmodel.model.sensitivity import STEP, size_of
 
 # Independent looks that a channel of a recording gives at a hypothesis: samples are far more, and alike.
 LOOKS = 20
-# Standard deviation of what may be anywhere from -1 to 1.
+# Standard deviation of what may be anywhere from -1 to 1, and the places that are looked at where it matters.
 ANYWHERE = 1 / np.sqrt(3)
+PLACES = (0.0, -1.0, 1.0)
 FRICTION_SPREAD = 0.01  # of itself, from run to run (docs/rig-log-format.md)
 
 
@@ -80,6 +81,21 @@ def weigh(evidence: Evidence, parameters: Parameters) -> Weighed:
     U, s, Vt = np.linalg.svd(N, full_matrices=False)
     likeliest = (Vt.T[: len(nuisances)] * (s / (1 + s**2))) @ U.T
     return Weighed(e, U, 1 - 1 / np.hypot(1, s), likeliest, dict(zip(e.channels, floor.tolist(), strict=True)))
+
+
+def weighed_about(one: Weighed, model: Parameters) -> Weighed:
+    """A recording weighed anew about a model of it, its load where in a gap of that model it most likely rested.
+
+    With mass behind the gap either side makes another ringing of it, and no straight line leads from one to the other.
+    """
+
+    def left(place: float) -> float:
+        errors = one.acting(replace(model, load_place=place)).evidence.errors({})
+        return float(np.mean(one.whitened(errors.ravel()) ** 2))
+
+    place = min(PLACES, key=left) if settings_of(model.mechanisms).half_gap else one.evidence.parameters.load_place
+    about = weigh(one.evidence, replace(model, load_place=place))
+    return about.acting(replace(one.evidence.parameters, load_place=place))
 
 
 def _nuisances(e: Evidence, parameters: Parameters) -> Sequence[tuple[str, float, float, float]]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from ccmodel.diagnose.evidence import LOOKS, Weighed, weigh
+from ccmodel.diagnose.evidence import LOOKS, Weighed, weighed_about
 from ccmodel.diagnose.hypothesis import PAPER, Hypothesis, plausible
 from ccmodel.diagnose.structure import Structure, structure
 from ccmodel.diagnose.trial import Score, Trial, fit, score
@@ -199,7 +199,7 @@ def _weighed_anew(found: Comparison, calibrated: Mapping[str, Free], tell) -> Co
         return [trial.values, trial.values | {name: best.values[name] for name in calibrated}]
 
     try:
-        weighed = each(found.weighed, lambda i, w: weigh(w.evidence, model[i]).acting(w.evidence.parameters))
+        weighed = each(found.weighed, lambda i, w: weighed_about(w, model[i]))
         base = min((fit(weighed, found.base.hypothesis, calibrated, s) for s in starts(found.base)), key=_left)
     except ModelError as error:
         tell(f"they stay weighed as they are ({error})")
