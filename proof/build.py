@@ -36,8 +36,8 @@ def build(case: Case, out: Path) -> dict:
     """
     batch, kept = out / "cases" / case.name, out / "kept-back" / case.name
     record(case, case.recordings, batch)
-    trajectories = record(case, case.kept_back, kept)
-    (kept / "floor.json").write_text(json.dumps(floors_of(case, trajectories), indent=1), encoding="utf-8")
+    floors = floors_of(case, record(case, case.kept_back, kept))
+    (kept / "floor.json").write_text(json.dumps(floors, indent=1), encoding="utf-8")
     return {"key": case.digest, "batch": folder_digest(batch), "kept-back": folder_digest(kept)}
 
 
@@ -127,25 +127,23 @@ def _variance(sensor: TorqueSensor | LoadCell) -> float:
     return noise**2 * (1 + (sensor.slow_noise.ratio if sensor.slow_noise else 0.0) ** 2)
 
 
-def record(case: Case, plans: Sequence[RecordingPlan], folder: Path) -> dict[str, Trajectory]:
-    """Write a batch of some of a case's recordings into a folder of its own; what the rig did in each, by its id."""
+def record(case: Case, plans: Sequence[RecordingPlan], folder: Path) -> dict[str, tuple[Preparation, Trajectory]]:
+    """Write a batch of some of a case's recordings into a folder of its own; by id, how each began and went."""
     # What a build that was stopped left behind.
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    campaign, trajectories = case.campaign, {}
+    campaign, went = case.campaign, {}
     for plan in plans:
         draw = recording_generator(case.seed, case.name, plan.id)
-        trajectory = trajectories[plan.id] = simulate(campaign, plan, prepare(campaign, plan, draw))
+        preparation = prepare(campaign, plan, draw)
+        trajectory = simulate(campaign, plan, preparation)
+        went[plan.id] = preparation, trajectory
         (folder / log_name(plan)).write_bytes(compress(log(trajectory, campaign.sensors, campaign.rig, draw)))
     described = description(campaign, case.name, NOTE, plans)
     (folder / "batch.yaml").write_text(as_yaml(described), encoding="utf-8")
-    return trajectories
+    return went
 
 
-def floors_of(case: Case, trajectories: Mapping[str, Trajectory]) -> dict[str, dict[str, float]]:
-    """Floors of the kept-back recordings by their ids (`floor_of`), from what the rig did in them."""
-    prepared = {
-        plan.id: prepare(case.campaign, plan, recording_generator(case.seed, case.name, plan.id))
-        for plan in case.kept_back
-    }
-    return {p.id: floor_of(case.campaign, p, prepared[p.id], trajectories[p.id]) for p in case.kept_back}
+def floors_of(case: Case, went: Mapping[str, tuple[Preparation, Trajectory]]) -> dict[str, dict[str, float]]:
+    """Floors of the kept-back recordings by their ids (`floor_of`), from how each began and went."""
+    return {plan.id: floor_of(case.campaign, plan, *went[plan.id]) for plan in case.kept_back}

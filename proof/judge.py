@@ -57,7 +57,7 @@ def judge(
         if diagnosis is not None:
             floors = floors_of(case, record(case, case.kept_back, kept))
             predictions = {which: Path(folder) / which for which in MODELS}
-            errors = _errors(case, kept, floors, out, predictions, sources, tampering)
+            errors = _errors(floors, kept, out, predictions, sources, tampering)
             if errors and with_rivals:
                 conceal.predict(batch, out / MODELS["before"], Path(folder) / "fitted", sources)
                 rivalled = rivals.errors(batch, Path(folder) / "fitted", kept, predictions["before"])
@@ -103,9 +103,8 @@ def _claim(said: dict) -> dict:
 
 
 def _errors(
-    case: Case,
-    kept: Path,
     floors: dict[str, dict[str, float]],
+    kept: Path,
     out: Path,
     predictions: dict[str, Path],
     sources: Path,
@@ -124,7 +123,7 @@ def _errors(
             said = predictions[which]
             tampering += conceal.predict(blinded, out / model, said, sources).tampering
             try:
-                squares[which] = [error_squares(kept, plan.id, said / f"{plan.id}.csv") for plan in case.kept_back]
+                squares[which] = [error_squares(kept, id_, said / f"{id_}.csv") for id_ in floors]
             except (OSError, KeyError, ValueError):
                 return {}
     mean = {which: np.sqrt(np.mean(values, axis=0)) for which, values in squares.items()}

@@ -93,7 +93,7 @@ def weighed_about(one: Weighed, model: Parameters) -> Weighed:
         errors = one.acting(replace(model, load_place=place)).evidence.errors({})
         return float(np.mean(one.whitened(errors.ravel()) ** 2))
 
-    place = min(PLACES, key=left) if settings_of(model.mechanisms).half_gap else one.evidence.parameters.load_place
+    place = min(PLACES, key=left) if settings_of(model.mechanisms).half_gap else model.load_place
     about = weigh(one.evidence, replace(model, load_place=place))
     return about.acting(replace(one.evidence.parameters, load_place=place))
 

@@ -109,7 +109,7 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
 
     @lru_cache(maxsize=1)  # An optimiser wants slopes where it has just been.
     def by_recording(*values: float) -> list[NDArray]:
-        return each(acting, lambda i, w: errors(w, dict(zip(names, values, strict=True))))
+        return each(acting, lambda i, w: errors(w, named(np.array(values))))
 
     def residuals(x):
         return np.concatenate([e / np.sqrt(n) for e, n in zip(by_recording(*x.tolist()), counts, strict=True)])

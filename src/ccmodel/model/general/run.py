@@ -199,9 +199,7 @@ def load_law(settings: Settings, load: SpringLoad, time_s: NDArray, theta: NDArr
         Torque before it.
     """
     stiffness, K3 = load.stiffness_Nm_per_rad, settings.cubic_stiffness
-    start = _deflection(stiffness, K3, start_Nm)
-    start += settings.half_gap * _side(start_Nm, load.rest_known_to_Nm, load.rest_place)
-    angle = theta - theta[0] + start
+    angle = theta - theta[0] + _rest_angle(stiffness, K3, settings.half_gap, start_Nm, load)
     beyond = np.sign(angle) * np.maximum(np.abs(angle) - settings.half_gap, 0.0)
     speed = np.gradient(theta, time_s)
     inertial = settings.damping(stiffness) * speed + settings.inertia * np.gradient(speed, time_s)
@@ -368,11 +366,10 @@ def _load_angle(physics: rows.Physics, T: NDArray, load: Load, series: NDArray) 
     K, K3 = physics.stiffness_load, physics.cubic
     if isinstance(load, TorqueLoad) or (K == 0 and K3 == 0):
         return 0.0
-    rest = (load.rest_known_to_Nm, load.rest_place) if isinstance(load, SpringLoad) else (0.0, 0.0)
     theta = 0.0
     for _ in range(50):
         torque = physics.radius * winding(theta, physics.eccentricity, physics.phase)[1] * (T[0, -1] - T[1, -1])
-        theta = _deflection(K, K3, torque) + physics.half_gap * _side(torque, *rest)
+        theta = _rest_angle(K, K3, physics.half_gap, torque, load)
         if physics.eccentricity == 0:
             break
     return float(theta)
@@ -388,14 +385,17 @@ def _deflection(K: float, K3: float, torque: float) -> float:
     return float(z)
 
 
-def _side(torque: float, known_to: float, place: float) -> float:
-    """Where in its gap a load at rest stands that the cables turn with a torque, -1 to 1.
+def _rest_angle(K: float, K3: float, half_gap: float, torque: float, load: SpringLoad | MechanicalLoad) -> float:
+    """Angle (rad) of a load at rest that the cables turn with a torque.
 
-    One that is held against its spring lies against a side. One that is all but free may stand anywhere: where the
-    torque is not known to be there, at the place that is given. The one goes over into the other around `known_to`.
+    One that is held against its spring lies against a side of its gap. One that is all but free may stand anywhere:
+    where the torque is not known to be there, at the place that is given. The one goes over into the other around what
+    the torque is known to.
     """
+    known_to, place = (load.rest_known_to_Nm, load.rest_place) if isinstance(load, SpringLoad) else (0.0, 0.0)
     held = float(np.clip(2 * abs(torque) / known_to - 1.5, 0.0, 1.0)) if known_to else float(torque != 0)
-    return held * float(np.sign(torque)) + (1 - held) * place
+    side = held * float(np.sign(torque)) + (1 - held) * place
+    return _deflection(K, K3, torque) + half_gap * side
 
 
 def true_at(active: Sequence[Active], seconds: float, read: Mapping[str, float], radii: tuple[float, float]) -> dict:
