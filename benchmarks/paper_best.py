@@ -26,10 +26,11 @@ def simulate_pair(
     path = transmission.path
     x = np.linspace(0, path.length_m, sections + 1)
     h = np.diff(x) / (2 * transmission.axial_rigidity_N)
-    E, P = _capstan_lines(x, path.bend_at(x), transmission)
+    phi = path.bend_at(x)
+    E, P = _capstan_lines(x, phi, transmission)
     R_o = transmission.load_radius_m
     drive = transmission.drive_radius_m * (theta_in - theta_in[0])
-    out = _march(drive, load.stiffness_Nm_per_rad / R_o**2, np.array(initial.at(path, x)), h, E, P)
+    out = _march(drive, load.stiffness_Nm_per_rad / R_o**2, np.array(initial.at(x, phi)), h, E, P)
     out[4] /= R_o
     return out
 

@@ -20,7 +20,7 @@ def simulate_pair(
     x = np.linspace(0, path.length_m, sections + 1)
     h = np.diff(x) / (2 * transmission.axial_rigidity_N)
     lines = {S: _lines(x, path.bend_at(x), S, transmission) for S in (-1.0, 1.0)}
-    cables = [Cable(T, h, lines) for T in initial.at(path, x)]
+    cables = [Cable(T, h, lines) for T in initial.at(x, path.bend_at(x))]
     R_i, R_o, K_e = transmission.drive_radius_m, transmission.load_radius_m, load.stiffness_Nm_per_rad
     start = theta = (cables[0].T[-1] - cables[1].T[-1]) * R_o / K_e
     ends = [cable.u[-1] for cable in cables]

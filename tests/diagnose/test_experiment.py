@@ -13,7 +13,7 @@ VALUES = {"stiffness_N_per_m": 9000.0, "friction_coefficient": 0.15, "load_stiff
 
 def trial(recordings, *acting, **numbers):
     aside = [np.ones(w.evidence.measured.size) for w in recordings]
-    return Trial(Hypothesis(acting), {}, VALUES | numbers, [], [], np.eye(1), [], aside)
+    return Trial(Hypothesis(acting), {}, VALUES | numbers, [], [], np.eye(1), np.ones(1), [], aside)
 
 
 def test_it_is_within_what_the_rig_has_done():

@@ -34,9 +34,8 @@ WEIGHED = [SimpleNamespace(evidence=SimpleNamespace(channels=CHANNELS, allowed=0
 def trial(left, *acting, **values):
     own = {k: v for k, v in VALUES.items() if any(k.startswith(f"{n}/{p}/") for n, p in acting)} | values
     left = np.broadcast_to(np.asarray(left, float), 8)
-    return Trial(
-        Hypothesis(acting), {}, BASE_VALUES | own, [], [], np.eye(1), [BASE_VALUES] * 8, list(np.sqrt(left)[:, None])
-    )
+    aside = list(np.sqrt(left)[:, None])
+    return Trial(Hypothesis(acting), {}, BASE_VALUES | own, [], [], np.eye(1), np.ones(1), [BASE_VALUES] * 8, aside)
 
 
 def verdict(base, *trials, learnable=0.0):

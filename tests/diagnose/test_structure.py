@@ -22,7 +22,7 @@ def trial(recordings, errors):
         e = w.evidence
         shape = e.measured.shape
         aside.append((random.standard_normal(shape) + errors(k, e)).ravel())
-    return Trial(Hypothesis(), {}, {}, [], [], np.eye(1), [], aside)
+    return Trial(Hypothesis(), {}, {}, [], [], np.eye(1), np.ones(1), [], aside)
 
 
 def test_noise_teaches_nothing(recordings):

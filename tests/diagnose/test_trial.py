@@ -5,10 +5,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
 from ccmodel.diagnose import trial
 from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.trial import _eased, _shortened, fit, moved_by_finer
+from ccmodel.diagnose.trial import _eased, _scatter, _shortened, fit, moved_by_finer
 from made_evidence import batch, calibrated
 
 LOW = np.array([0.0, 1e-3])
@@ -34,6 +35,34 @@ def test_the_papers_model_has_no_solver_to_refine():
     for w in batch():
         refined = w.acting(replace(w.evidence.parameters, refinement=3))
         assert (w.evidence.modelled({}) == refined.evidence.modelled({})).all()
+
+
+def fits_of_lines(says, draws=4000, seed=7):
+    """Errors, standard deviations and degrees of freedom of lines through recordings that say so much of the slope."""
+    random = np.random.default_rng(seed)
+    J = [np.stack([np.ones(20), size * np.linspace(-1, 1, 20)], axis=1) for size in says]
+    information = [j.T @ j for j in J]
+    found = []
+    for _ in range(draws):
+        score = [j.T @ random.standard_normal(20) for j in J]
+        x = np.linalg.solve(sum(information), sum(score))
+        aside = [np.linalg.solve(sum(information) - H, sum(score) - g) for H, g in zip(information, score, strict=True)]
+        covariance, freedom = _scatter(np.array(aside) - x, information, np.ones(2))
+        found.append([x[1], np.sqrt(covariance[1, 1]), freedom[1]])
+    return np.array(found).T
+
+
+@pytest.mark.parametrize("says", [[1.0] * 8, [4.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0], [5.0, 5.0, 0.3, 0.3, 0.3]])
+def test_intervals_hold_the_truth_however_little_most_recordings_say(says):
+    off, sd, freedom = fits_of_lines(says)
+    assert np.mean(sd**2) == pytest.approx(np.var(off), rel=0.1)
+    held = np.mean(np.abs(off) < student.ppf(0.95, freedom) * sd)
+    assert 0.88 < held < 0.97  # where two of five say nearly all, rather too wide
+
+
+def test_recordings_that_say_alike_are_one_degree_of_freedom_each_but_one():
+    assert fits_of_lines([1.0] * 8, draws=1)[2] == pytest.approx(7.0)
+    assert fits_of_lines([5.0, 5.0, 0.3, 0.3, 0.3], draws=1)[2] < 2.0
 
 
 @pytest.mark.parametrize(("least", "end"), [(0.005, 0.00625), (0.08, 0.1), (0.0, 0.0015625)])

@@ -91,6 +91,15 @@ def test_initial_profiles_within_friction_hold():
     assert r.theta_out_rad[-1] == pytest.approx((6.0 - 7.5) * R / K_E, rel=1e-6)
 
 
+def test_what_friction_holds_at_rest_it_holds_at_a_kink_too():
+    kink = ("kink", "conduit", {"beta": 1.0, "s": 0.3})
+    limit = np.exp(MU * (np.pi + 1.0))
+    profile = InitialTension.between_ends(HALF_LOOP, MU, (2 * T0, 2 * T0 / limit), (T0, T0), kinks_rad=1.0)
+    r = run(np.linspace(0.0, 0.1, 20), kink, T=profile)
+    # All of cable A is about to slide, and the first pull is felt at its other end with no front to wait for.
+    assert pytest.approx(limit, rel=1e-6) == r.T1_N / r.T2_N
+
+
 def test_a_straight_path_is_two_springs():
     theta = sine(0.3)
     r = run(theta, path=ConduitPath([L], [0.0]))

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
 from scipy.stats import t as student
 from threadpoolctl import threadpool_limits
 
@@ -307,8 +306,7 @@ def _with_solver(judgement: Judgement, not_judged: list) -> NDArray:
 def _mechanism(trial: Trial, k: int, confidence: float, covariance: NDArray) -> dict:
     name, place = trial.hypothesis.acting[k]
     names = list(trial.values)
-    count = len(trial.held_out)
-    reach = student.ppf(0.5 + COVERAGE / 2, count - 1) if count > 1 else norm.ppf(0.5 + COVERAGE / 2)
+    reach = student.ppf(0.5 + COVERAGE / 2, trial.freedom)  # of infinite freedom: the normal distribution's
     parameters = []
     for p in registry.get(name).parameters:
         key = mechanism_key(name, place, p.name)
@@ -318,8 +316,8 @@ def _mechanism(trial: Trial, k: int, confidence: float, covariance: NDArray) -> 
             {
                 "name": p.name,
                 "value": value,
-                "low": value - reach * sd,
-                "high": value + reach * sd,
+                "low": value - reach[i] * sd,
+                "high": value + reach[i] * sd,
                 "unit": p.unit.replace(" ", "*"),
             }
         )

@@ -49,6 +49,8 @@ class Trial:
     jacobian : list of ndarray, each of shape (rows + numbers, unknowns)
     covariance : ndarray, shape (unknowns, unknowns)
         By how much the recordings disagree about the values; of a single one, what its noise says.
+    freedom : ndarray, shape (unknowns,)
+        Degrees of freedom of each one's variance: few where few recordings decide.
     held_out : list of dict
         By recording, the values that the other recordings ask for.
     aside : list of ndarray, each of shape (rows + numbers,)
@@ -61,6 +63,7 @@ class Trial:
     whitened: list[NDArray]
     jacobian: list[NDArray]
     covariance: NDArray
+    freedom: NDArray
     held_out: list[dict[str, float]]
     aside: list[NDArray]
 
@@ -146,10 +149,12 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
             without[i] = _shortened(others, found.x, without[i], named)
             aside[i] = errors(acting[i], named(without[i]))
     if len(acting) > 1:
-        scatter = _jackknife(np.array(without) - found.x)
+        scatter, freedom = _scatter(np.array(without) - found.x, information, sizes)
     else:
         scatter = _inverse(total, sizes) / (LOOKS * len(acting[0].evidence.channels))
-    return Trial(hypothesis, calibrated, named(found.x), r, J, scatter, [named(x) for x in without], aside)
+        freedom = np.full(len(names), np.inf)
+    held_out = [named(x) for x in without]
+    return Trial(hypothesis, calibrated, named(found.x), r, J, scatter, freedom, held_out, aside)
 
 
 def _shortened(others: Sequence[tuple[Weighed, NDArray]], x: NDArray, aside: NDArray, named: Callable) -> NDArray:
@@ -191,9 +196,39 @@ def moved_by_finer(weighed: Sequence[Weighed], trial: Trial) -> NDArray:
     return -inverse @ sum(j.T @ e / n for j, e, n in zip(trial.jacobian, changed, counts, strict=True))
 
 
-def _jackknife(moved: NDArray) -> NDArray:
-    """Covariance of a fit from how far it moves as each recording is left out, shape (unknowns, unknowns)."""
-    return moved.T @ moved * (len(moved) - 1) / len(moved)
+def _scatter(moved: NDArray, information: Sequence[NDArray], sizes: NDArray) -> tuple[NDArray, NDArray]:
+    """How sure a fit is, from how far it moves as each recording is left out.
+
+    The jackknife, for recordings of which some say more than others: left out, those move a fit further than they
+    ought to, and few of them are few degrees of freedom. Were errors as expected, the variances would be right in the
+    mean and scatter about as that chi-square does (Bell and McCaffrey, Survey Methodology 28, 2002, with each recording
+    left out in turn).
+
+    Parameters
+    ----------
+    moved : ndarray, shape (recordings, unknowns)
+    information : sequence of ndarray, each of shape (unknowns, unknowns)
+        By recording.
+    sizes : ndarray, shape (unknowns,)
+
+    Returns
+    -------
+    covariance : ndarray, shape (unknowns, unknowns)
+    freedom : ndarray, shape (unknowns,)
+        Degrees of freedom of each variance, 1 at least.
+    """
+    n, total = len(moved), sum(information)
+    inverse = _inverse(total, sizes)
+    aside = np.stack([_inverse(total - H, sizes) for H in information])
+    felt = np.einsum("iab,ibk->kia", np.stack(information), aside)
+    # By unknown, how what two recordings move it by is correlated.
+    expected = -felt @ inverse @ felt.transpose(0, 2, 1)
+    expected[:, range(n), range(n)] += np.einsum("iak,kia->ki", aside, felt)
+    mean, square = np.trace(expected, axis1=1, axis2=2), (expected**2).sum(axis=(1, 2))
+    known = square > 0
+    freedom = np.divide(mean**2, square, out=np.ones(len(sizes)), where=known).clip(1.0)
+    over = np.sqrt(np.divide(mean, np.diag(inverse), out=np.ones(len(sizes)), where=known))
+    return moved.T @ moved / np.outer(over, over), freedom
 
 
 def _starts(names: Sequence[str], x0: NDArray, low: NDArray, high: NDArray) -> list[NDArray]:

@@ -62,6 +62,7 @@ class InitialTension:
         A_N: tuple[float, float],
         B_N: tuple[float, float],
         bows: tuple[float, float] = (0.0, 0.0),
+        kinks_rad: float = 0.0,
     ) -> "InitialTension":
         """Profiles with the given tensions at the drive and the load end of each cable.
 
@@ -78,8 +79,10 @@ class InitialTension:
         bows : (float, float)
             How far ln T halfway through the bend lies off the straight line between the ends, of what friction can
             hold there, -1 to 1: the ends do not show it, and how the cable was tensioned decides.
+        kinks_rad : float
+            Bend that the path does not show.
         """
-        bound = friction_coefficient * path.bend_rad
+        bound = friction_coefficient * (path.bend_rad + kinks_rad)
         profiles = []
         for (drive, load), bow in zip((A_N, B_N), bows, strict=True):
             if min(drive, load) <= 0:
@@ -98,9 +101,12 @@ class InitialTension:
         tension = {"A": self.tension_A_N, "B": self.tension_B_N}[name]
         return InitialTension(self.x_m, tension, tension)
 
-    def at(self, path: ConduitPath, x: NDArray) -> tuple[NDArray, NDArray]:
-        """Tensions of A and B at arc lengths `x` (m), N; two arrays of the shape of `x`."""
-        phi, corner_phi = path.bend_at(x), path.bend_at(self.x_m)
+    def at(self, x: NDArray, phi: NDArray) -> tuple[NDArray, NDArray]:
+        """Tensions of A and B (N) at arc lengths `x` (m), the bend from the drive end to each of which is `phi` (rad).
+
+        Tension changes where the conduits bend, and with a kink by so much there. All arrays have the shape of `x`.
+        """
+        corner_phi = np.interp(self.x_m, x, phi)
         return tuple(_interpolate(phi, corner_phi, T) for T in (self.tension_A_N, self.tension_B_N))
 
     def log_slopes(self, path: ConduitPath, friction_coefficient: float) -> tuple[NDArray, NDArray, NDArray]:

@@ -71,9 +71,10 @@ def simulate_pair(
 
     path = transmission.path
     x = _nodes(path, sections)
-    T_A, T_B = initial.at(path, x)
+    phi = path.bend_at(x)
+    T_A, T_B = initial.at(x, phi)
     half_stretch = np.diff(x) / (2 * transmission.axial_rigidity_N)
-    E, P = _capstan_lines(x, path.bend_at(x), transmission)
+    E, P = _capstan_lines(x, phi, transmission)
     T, theta_out, failed = _march(
         theta_in,
         torque,

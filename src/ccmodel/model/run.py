@@ -197,7 +197,8 @@ def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension
     T1, T3 = scale * (F_drive + drive) / 2, scale * (F_drive - drive) / 2
     T2, T4 = scale * (F_load + load) / 2, scale * (F_load - load) / 2
     bows = parameters.profile_bow_A, parameters.profile_bow_B
-    return InitialTension.between_ends(path, parameters.friction, (T1, T2), (T3, T4), bows)
+    kinks_rad = sum(extra for _, extra in general.settings_of(parameters.mechanisms).kinks)
+    return InitialTension.between_ends(path, parameters.friction, (T1, T2), (T3, T4), bows, kinks_rad)
 
 
 def _true_at_rest(read: Mapping[str, float], given: ModelInput, parameters: Parameters) -> dict[str, float]:
