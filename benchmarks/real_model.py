@@ -22,13 +22,12 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
-from real_regressor import STEP_S, TARGETS, VARIED, folds
+from real_regressor import STEP_S, TARGETS, VARIED, folds, is_resolved, rms
 
 from ccmodel.config import load_config
 from ccmodel.diagnose.diagnosis import calibration, first_cycles
 from ccmodel.diagnose.evidence import weigh
 from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.travel import since_reversal
 from ccmodel.diagnose.trial import fit
 from ccmodel.identify.problem import Evidence, each
 from ccmodel.model.files import read_model
@@ -36,8 +35,6 @@ from ccmodel.model.parameters import Parameters
 from ccmodel.rig.ingest import ingest_batch
 
 CONFIG = Path(__file__).parents[1] / "config" / "real.yaml"
-# A count of the drive's encoder hides where in it the drive turns; so far from there it no longer matters.
-COUNTS = 2
 
 
 def held_out(fitted: Sequence[Evidence], evidence: Sequence[Evidence], model: Parameters, varied: str) -> list[NDArray]:
@@ -60,21 +57,6 @@ def held_out(fitted: Sequence[Evidence], evidence: Sequence[Evidence], model: Pa
     return errors
 
 
-def is_resolved(e: Evidence) -> NDArray:
-    """Samples at which the drive has gone some counts since it last turned round or has them to go, shape (judged,)."""
-    forth, back = (np.abs(t) for t in (since_reversal(e.given)[0], _until_reversal(e)))
-    return (np.minimum(forth, back) > COUNTS * e.given.recording.encoder_step_rad["theta_in_rad"])[e.judged]
-
-
-def _until_reversal(e: Evidence) -> NDArray:
-    recording = e.given.recording
-    turned = recording.with_channels({}, {}, "model")
-    backwards = replace(
-        e.given, recording=replace(turned, time_s=-recording.time_s[::-1]), theta_in=e.given.theta_in[::-1]
-    )
-    return since_reversal(backwards)[0][::-1]
-
-
 def rows(batch: Path, model_file: Path) -> tuple[list[dict], list[Evidence], dict]:
     """One row for each channel and each thing held out, as the yardstick has them; what they rest on."""
     ingested = ingest_batch(batch)
@@ -88,22 +70,18 @@ def rows(batch: Path, model_file: Path) -> tuple[list[dict], list[Evidence], dic
     found = []
     for channel, varied in product(TARGETS, VARIED):
         errors = [e[evidence[0].channels.index(channel)] for e in by_varied[varied]]
-        away = [e[is_resolved(v)] for e, v in zip(errors, evidence, strict=True)]
+        away = [e[is_resolved(v.given)[v.judged]] for e, v in zip(errors, evidence, strict=True)]
         found.append(
             {
                 "batch": batch.name,
                 "channel": channel,
                 "held_out": varied,
-                "rms": _rms(errors),
-                "rms_away_from_turns": _rms(away),
-                "by_recording": {v.given.recording.id: _rms([e]) for v, e in zip(evidence, errors, strict=True)},
+                "rms": rms(errors),
+                "rms_away_from_turns": rms(away),
+                "by_recording": {v.given.recording.id: rms([e]) for v, e in zip(evidence, errors, strict=True)},
             }
         )
     return found, evidence, by_varied
-
-
-def _rms(errors: Sequence[NDArray]) -> float:
-    return float(np.sqrt(np.mean([np.mean(e**2) for e in errors])))
 
 
 def draw(file: Path, evidence: Sequence[Evidence], errors: Sequence[NDArray]) -> None:
@@ -151,7 +129,10 @@ def main() -> None:
         unit = "mN m" if row["channel"].startswith("tau") else "mrad"
         text = f"{row['batch']}  {row['channel']}  other {row['held_out']}: {1e3 * row['rms']:.2f} {unit}"
         text += f" ({1e3 * row['rms_away_from_turns']:.2f} away from turns)"
-        print(text + (f", {row['rms'] / its['rms']:.2f} times the yardstick" if its else ""), flush=True)
+        if its:
+            everywhere, away = (row[k] / its[k] for k in ("rms", "rms_away_from_turns"))
+            text += f", {everywhere:.2f} times the yardstick ({away:.2f} away from turns)"
+        print(text, flush=True)
     if asked.figure:
         draw(asked.figure, evidence, errors["load_level"])
 

@@ -11,6 +11,7 @@ on the other recordings alone, by levels held out among these in the same way.
 import argparse
 import json
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -34,6 +35,8 @@ SETTINGS = [
 ]
 MOST_TREES = 300
 SEED = 0
+# A count of the drive's encoder hides where in it the drive turns; so far from there it no longer matters.
+COUNTS = 2
 
 
 def features(given: ModelInput) -> NDArray:
@@ -61,6 +64,19 @@ def is_judged(given: ModelInput) -> NDArray:
     return given.recording.time_s >= max(given.recording.settled_s, given.recording.rest_s)
 
 
+def is_resolved(given: ModelInput) -> NDArray:
+    """Samples at which the drive has gone some counts since it last turned round and has them to go, shape (n,)."""
+    forth, back = (np.abs(t) for t in (since_reversal(given)[0], _until_reversal(given)))
+    return np.minimum(forth, back) > COUNTS * given.recording.encoder_step_rad["theta_in_rad"]
+
+
+def _until_reversal(given: ModelInput) -> NDArray:
+    recording = given.recording
+    turned = recording.with_channels({}, {}, "model")
+    backwards = replace(given, recording=replace(turned, time_s=-recording.time_s[::-1]), theta_in=given.theta_in[::-1])
+    return since_reversal(backwards)[0][::-1]
+
+
 def folds(recordings: Sequence[Recording], varied: str) -> Iterator[tuple[float, NDArray]]:
     """Every value of what was varied, and which recordings have it."""
     values = np.array([r.excitation[varied] for r in recordings])
@@ -68,12 +84,12 @@ def folds(recordings: Sequence[Recording], varied: str) -> Iterator[tuple[float,
         yield float(value), values == value
 
 
-def held_out(inputs: Sequence[ModelInput], channel: str, varied: str) -> NDArray:
-    """Mean square by recording of what the regressor errs by, each predicted without all that share its value."""
+def held_out(inputs: Sequence[ModelInput], channel: str, varied: str) -> list[NDArray]:
+    """By recording what the regressor errs by, each predicted without all that share its value."""
     recordings = [g.recording for g in inputs]
     X = [features(g)[is_judged(g)] for g in inputs]
     y = [target(g, channel)[is_judged(g)] for g in inputs]
-    square = np.empty(len(inputs))
+    errors: list = [None] * len(inputs)
     for _, out in folds(recordings, varied):
         known = np.flatnonzero(~out)
         groups = [where[known] for _, where in folds(recordings, varied) if where[known].any()]
@@ -83,8 +99,8 @@ def held_out(inputs: Sequence[ModelInput], channel: str, varied: str) -> NDArray
         best = int(np.argmin([s.min() for s in searched]))
         model = _learnt(SETTINGS[best], X, y, known, 1 + int(searched[best].argmin()))
         for i in np.flatnonzero(out):
-            square[i] = np.mean((model.predict(X[i]) - y[i]) ** 2)
-    return square
+            errors[i] = model.predict(X[i]) - y[i]
+    return errors
 
 
 def _searched(settings: dict, X, y, known: NDArray, groups: Sequence[NDArray]) -> NDArray:
@@ -108,12 +124,25 @@ def yardstick(batch: Path) -> list[dict]:
     rows = []
     for channel, varied in product(TARGETS, VARIED):
         span = float(np.median([np.ptp(g.recording[channel][is_judged(g)]) for g in inputs]))
-        square = held_out(inputs, channel, varied)
-        by_recording = {g.recording.id: float(np.sqrt(s)) for g, s in zip(inputs, square, strict=True)}
-        rms = float(np.sqrt(square.mean()))
-        row = {"batch": batch.name, "channel": channel, "held_out": varied, "rms": rms, "peak_to_peak": span}
-        rows.append(row | {"by_recording": by_recording})
+        errors = held_out(inputs, channel, varied)
+        away = [e[is_resolved(g)[is_judged(g)]] for e, g in zip(errors, inputs, strict=True)]
+        rows.append(
+            {
+                "batch": batch.name,
+                "channel": channel,
+                "held_out": varied,
+                "peak_to_peak": span,
+                "rms": rms(errors),
+                "rms_away_from_turns": rms(away),
+                "by_recording": {g.recording.id: rms([e]) for g, e in zip(inputs, errors, strict=True)},
+            }
+        )
     return rows
+
+
+def rms(errors: Sequence[NDArray]) -> float:
+    """Root mean square of errors, every recording alike."""
+    return float(np.sqrt(np.mean([np.mean(e**2) for e in errors])))
 
 
 def main() -> None:
@@ -129,7 +158,7 @@ def main() -> None:
             share = 100 * row["rms"] / row["peak_to_peak"]
             print(
                 f"{row['batch']}  {row['channel']}  other {row['held_out']}: {1e3 * row['rms']:.2f} {unit},"
-                f" {share:.2f} % of peak to peak",
+                f" {share:.2f} % of peak to peak ({1e3 * row['rms_away_from_turns']:.2f} away from turns)",
                 flush=True,
             )
             rows.append(row)

@@ -65,8 +65,8 @@ def diagnose(
     out: Annotated[Path, typer.Option(help="Folder that gets diagnosis.json, the page and two models.")],
     without: Annotated[list[str], typer.Option(help="A mechanism that is not to be asked for; may be repeated.")] = [],  # noqa: B006
     allowance: Annotated[
-        float, typer.Option(min=0.0, max=0.49, help="Share of peak to peak that a right model may leave.")
-    ] = 0.0,
+        list[str], typer.Option(help="SHARE of peak to peak that a right model may leave; or CHANNEL=SHARE, repeated.")
+    ] = [],  # noqa: B006
     step: Annotated[float | None, typer.Option(min=1e-4, help="Compare a sample every so often, s.")] = None,
     cycles: Annotated[int | None, typer.Option(min=1, help="Compare so many cycles of a sine.")] = None,
     beside: Annotated[Path | None, typer.Option(help="A model file: ask what is missing besides what it has.")] = None,
@@ -82,10 +82,29 @@ def diagnose(
 
     suspects = [[one.strip() for one in stated.split(",")] for stated in suspect]
     try:
-        judged = Diagnosing(allowance=allowance, step_s=step, cycles=cycles, suspects=suspects)
+        judged = Diagnosing(allowance=_allowance(allowance), step_s=step, cycles=cycles, suspects=suspects)
     except ValidationError as error:
-        raise InputError(f"--suspect: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from None
+        # One of an allowance's two forms always has another type, which is no news.
+        said = next(e for e in error.errors() if e["type"] not in ("float_type", "dict_type"))
+        option = "--allowance" if said["loc"] else "--suspect"
+        raise InputError(f"{option}: {said['msg'].removeprefix('Value error, ')}") from None
     typer.echo(run(batch, out, without, lambda text: _err.print(text, style="dim", markup=False), judged, beside, hold))
+
+
+def _allowance(stated: list[str]) -> float | dict[str, float]:
+    """One share for all channels, or one a channel."""
+    from ccmodel.identify.problem import MEASURED
+
+    try:
+        shares = {channel: float(share) for channel, _, share in (one.rpartition("=") for one in stated)}
+    except ValueError:
+        raise InputError(f"--allowance: a share is a number, as 0.02; got {', '.join(stated)}") from None
+    if list(shares) == [""]:
+        return shares[""]
+    if unknown := shares.keys() - set(MEASURED):
+        got = ", ".join(name or "a share without a channel" for name in sorted(unknown))
+        raise InputError(f"--allowance: a channel is one of {', '.join(MEASURED)}; got {got}")
+    return shares
 
 
 @app.command()

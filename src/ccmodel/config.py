@@ -2,7 +2,7 @@
 
 from math import inf
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -20,6 +20,9 @@ PHASE_FIGURES = ("response", "torque-loop", "profiles")
 EACH = "each"
 ESTIMATED = "estimated"
 EXTENDED = "extended"
+
+Share = Annotated[float, Field(ge=0, lt=0.5)]
+Allowance = Share | dict[Literal[MEASURED], Share]
 
 
 class FreeParameter(TypedModel):
@@ -66,8 +69,9 @@ class Fit(TypedModel):
     channels: list[Literal[MEASURED]] = Field(
         list(MEASURED), min_length=1, description="what is compared; those recorded are used"
     )
-    allowance: float = Field(
-        0.0, ge=0, description="share of a channel's peak to peak that the model may leave, besides the noise"
+    allowance: Allowance = Field(
+        0.0,
+        description="share of a channel's peak to peak that the model may leave, besides the noise; or by channel",
     )
     starts: int = Field(1, ge=1, description="starts of the search, the configured one and others about it")
     step_s: float | None = Field(None, gt=0, description="take a sample every so often, s; absent: every sample")
@@ -179,8 +183,9 @@ class Accuracy(TypedModel):
 class Diagnosing(TypedModel):
     """How finely a diagnosis looks."""
 
-    allowance: float = Field(
-        0.0, ge=0, lt=0.5, description="share of a channel's peak to peak that a right model may leave besides noise"
+    allowance: Allowance = Field(
+        0.0,
+        description="share of a channel's peak to peak that a right model may leave besides noise; or by channel",
     )
     step_s: float | None = Field(None, gt=0, description="compare a sample every so often, s; absent: finely")
     cycles: int | None = Field(None, ge=1, description="cycles of a sine that are compared once settled; absent: all")

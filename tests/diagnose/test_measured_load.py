@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from builders import recording
+from ccmodel.cli import diagnose
 from ccmodel.config import Config, load_config
 from ccmodel.diagnose.diagnosis import calibration, first_cycles
 from ccmodel.diagnose.evidence import Weighed
@@ -18,6 +19,7 @@ from ccmodel.failure import ModelError
 from ccmodel.identify.problem import Evidence, Free
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
+from ccmodel.typed import InputError
 
 TRUE = Parameters(20000.0, 1.2, 0.15, 0.006, 0.006, spring_beside_load_Nm_per_rad=0.02, pretension_N=1.5)
 CHANNELS = ("theta_out_rad", "tau_in_Nm")
@@ -100,9 +102,39 @@ def test_a_suspect_that_is_not_known_is_refused(suspects, said):
         Config(diagnosing={"suspects": suspects})
 
 
+def test_an_allowance_may_differ_by_channel():
+    recorded = jaw(-0.01)
+    plain, allowing = (
+        Evidence.of(recorded, TRUE, CHANNELS, step_s=0.02, allowance=a) for a in (0.0, {"tau_in_Nm": 0.1})
+    )
+    angle, torque = (allowing.channels.index(c) for c in CHANNELS)
+    allowed = 0.1 * np.ptp(plain.measured[torque])
+    assert allowing.sigma[angle] == pytest.approx(plain.sigma[angle])
+    assert allowing.sigma[torque] == pytest.approx(np.hypot(plain.sigma[torque], allowed))
+    assert allowing.allowed == pytest.approx(np.mean((allowed / allowing.sigma[torque]) ** 2) / 2)
+    assert allowing.without("tau_in_Nm").allowed == 0
+    every = Evidence.of(recorded, TRUE, CHANNELS, step_s=0.02, allowance=0.1)
+    assert every.sigma[torque] == pytest.approx(allowing.sigma[torque])
+
+
+@pytest.mark.parametrize(
+    "stated, said",
+    [
+        (["0.9"], "less than 0.5"),
+        (["much"], "a share is a number"),
+        (["tau=0.1"], "a channel is one of .* got tau"),
+        (["0.1", "tau_in_Nm=0.1"], "a share without a channel"),
+        (["tau_in_Nm=0.9"], "less than 0.5"),
+    ],
+)
+def test_an_allowance_that_cannot_be_used_is_refused(tmp_path, stated, said):
+    with pytest.raises(InputError, match=f"--allowance: .*{said}"):
+        diagnose(tmp_path, tmp_path / "out", allowance=stated)
+
+
 def test_the_configuration_for_the_public_recordings_says_how_they_would_be_diagnosed():
     config = load_config(Path(__file__).parents[2] / "config" / "real.yaml")
-    assert 0 < config.diagnosing.allowance < 0.05
+    assert all(0 < share < 0.05 for share in config.diagnosing.allowance.values())
     assert config.diagnosing.suspects
 
 

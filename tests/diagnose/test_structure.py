@@ -67,4 +67,4 @@ def test_what_a_right_model_is_allowed_to_leave_may_follow_laws(recordings):
 def _allowing(e, share):
     """The same evidence with an allowance that makes up a share of each variance."""
     sigma = np.ptp(e.measured, axis=1, keepdims=True) / np.sqrt(share) * np.ones_like(e.measured)
-    return replace(e, sigma=sigma, allowance=1.0)
+    return replace(e, sigma=sigma, allowance=np.ones(len(e.channels)))

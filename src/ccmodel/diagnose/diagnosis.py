@@ -16,7 +16,7 @@ from ccmodel.diagnose.judge import MOST_ALTERNATIVES, RIGHT, RIVAL, Judgement, j
 from ccmodel.diagnose.trial import Trial, fit, moved_by_finer
 from ccmodel.failure import ModelError
 from ccmodel.identify.intervals import COVERAGE
-from ccmodel.identify.problem import MEASURED, Evidence, Free, Problem, each
+from ccmodel.identify.problem import MEASURED, Allowance, Evidence, Free, Problem, each
 from ccmodel.identify.search import solve
 from ccmodel.model.parameters import ZERO_OF, Parameters, mechanism_key
 from ccmodel.recording import Recording, unit_of
@@ -63,7 +63,7 @@ def diagnose(
     not_judged: Sequence[Mapping[str, str]] = (),
     without: Collection[str] = (),
     tell: Callable[[str], None] = lambda text: None,
-    allowance: float = 0.0,
+    allowance: Allowance = 0.0,
     step_s: float = STEP_S,
     cycles: int | None = None,
     suspects: Sequence[Sequence[str]] = (),
@@ -84,8 +84,9 @@ def diagnose(
         Mechanisms that are not asked for: what a diagnosis says when the truth is not on its list.
     tell : callable
         Is told how the work goes on.
-    allowance : float
-        Share of a channel's peak to peak that a right model may leave, besides the noise: what is finer is not judged.
+    allowance : float or mapping of str to float
+        Share of a channel's peak to peak that a right model may leave, besides the noise, one for all or by channel:
+        what is finer is not judged.
     step_s : float
         Time from one sample that is compared to the next, at least.
     cycles : int, optional
@@ -115,9 +116,8 @@ def diagnose(
     if not evidence:
         raise ModelError("none of the recordings can be compared with the model: " + not_judged[0]["why"])
     not_judged += _what_is_missing(evidence)
-    if allowance:
-        why = "as the run was asked to: part of what the noise is taken to be"
-        not_judged.append({"what": f"errors below {100 * allowance:g} % of a channel's peak to peak", "why": why})
+    why = "as the run was asked to: part of what the noise is taken to be"
+    not_judged += [{"what": what, "why": why} for what in _allowed(allowance)]
     calibrated = calibration(estimates, evidence)
     estimates = estimates.with_values({name: free.start for name, free in calibrated.items()})
     model = Hypothesis(beside=tuple((m.name, m.place) for m in beside.mechanisms) if beside else ())
@@ -138,6 +138,11 @@ def diagnose(
     judgement = judge(weighed, calibrated, start, listed, tell, [_suspect(s) for s in suspects], model)
     not_judged += odd_one_out(judgement) + _at_bounds(judgement.best)
     return Diagnosis(_said(recordings[0].batch, judgement, estimates, not_judged), judgement, estimates)
+
+
+def _allowed(allowance: Allowance) -> list[str]:
+    by_channel = allowance if isinstance(allowance, Mapping) else {"a channel": allowance}
+    return [f"errors below {100 * share:g} % of {name}'s peak to peak" for name, share in by_channel.items() if share]
 
 
 def _at_bounds(trial: Trial) -> list[dict[str, str]]:

@@ -22,6 +22,7 @@ from ccmodel.recording import Recording
 
 # What sensors measure; tensions are derived from these and do not count a second time.
 MEASURED = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N")
+Allowance = float | Mapping[str, float]
 CORES = 2
 
 
@@ -58,8 +59,8 @@ class Evidence:
         Values and their standard deviation, in the channels' units.
     placed : bool
         Whether where in its count the drive first rests is an unknown of the fit, and not part of the noise.
-    allowance : float
-        Share of each channel's peak to peak that `sigma` has besides the noise.
+    allowance : ndarray, shape (channels,)
+        Share of each one's peak to peak that `sigma` has besides the noise.
     """
 
     given: ModelInput
@@ -68,8 +69,8 @@ class Evidence:
     judged: NDArray
     measured: NDArray
     sigma: NDArray
+    allowance: NDArray
     placed: bool = False
-    allowance: float = 0.0
 
     @classmethod
     def of(
@@ -78,13 +79,13 @@ class Evidence:
         parameters: Parameters,
         channels: Sequence[str] = MEASURED,
         step_s: float | None = None,
-        allowance: float = 0.0,
+        allowance: Allowance = 0.0,
         placed: bool = False,
     ) -> "Evidence":
         """Evidence from a recording, a sample every `step_s` of it.
 
         Where the model is known not to be the whole truth, `allowance` adds that share of each channel's peak to peak
-        to the noise, so that no channel rules by being read finely.
+        to the noise, one for all or by channel, so that no channel rules by being read finely.
 
         Raises
         ------
@@ -101,19 +102,22 @@ class Evidence:
         sensors, drive = sensor_noise(given), drive_errors(given, parameters, placed)
         measured = np.stack([given.recording[c][judged] for c in used])
         sigma = np.stack([np.hypot(sensors[c], size_over_time(drive[c], time_s)[judged]) for c in used])
-        sigma = np.hypot(sigma, allowance * np.ptp(measured, axis=1, keepdims=True))
-        return cls(given, parameters, used, judged, measured, sigma, placed, allowance)
+        by_channel = allowance if isinstance(allowance, Mapping) else dict.fromkeys(used, allowance)
+        shares = np.array([by_channel.get(c, 0.0) for c in used])
+        sigma = np.hypot(sigma, (shares * np.ptp(measured, axis=1))[:, None])
+        return cls(given, parameters, used, judged, measured, sigma, shares, placed)
 
     def without(self, channel: str) -> "Evidence":
         """The same without one of the channels."""
         kept = [k for k, c in enumerate(self.channels) if c != channel]
         channels = tuple(self.channels[k] for k in kept)
-        return replace(self, channels=channels, measured=self.measured[kept], sigma=self.sigma[kept])
+        series = {name: getattr(self, name)[kept] for name in ("measured", "sigma", "allowance")}
+        return replace(self, channels=channels, **series)
 
     @property
     def allowed(self) -> float:
         """What the allowance may leave of the mean square of errors over `sigma`, in law as well as in chance."""
-        return float(np.mean((self.allowance * np.ptp(self.measured, axis=1, keepdims=True) / self.sigma) ** 2))
+        return float(np.mean(((self.allowance * np.ptp(self.measured, axis=1))[:, None] / self.sigma) ** 2))
 
     @property
     def name(self) -> str:
