@@ -1,5 +1,6 @@
 """What figures say of themselves; the pictures are looked at by people."""
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -9,6 +10,12 @@ from ccmodel.model.run import PRESCRIBED
 from ccmodel.report.figures import FIGURES
 
 LOOP = {"tau_in_Nm": lambda t: np.sin(2 * np.pi * t), "tau_out_Nm": lambda t: np.cos(2 * np.pi * t)}
+
+
+@pytest.fixture(autouse=True)
+def closed():
+    yield
+    plt.close("all")
 
 
 def pair(origin="virtual-rig", given="model", **kw):
