@@ -29,17 +29,22 @@ FAINT = "#9a9a9a"
 SYMBOL = {"theta_out": "θ_out", "tau_in": "τ_in", "tau_out": "τ_out", "F_drive": "F_drive", "F_load": "F_load"}
 
 
+def _in_question(said: dict) -> str:
+    """The model that the recordings are compared with first, in words."""
+    return "model given" if said["is_held"] else "calibrated model"
+
+
 def headline(said: dict) -> str:
     """The one sentence of a diagnosis."""
     batch, error = said["batch"], said["fit"]["error"]
     worst = max(error, key=lambda c: error[c]["before"] / error[c]["noise"])
     e = error[worst]
     fall = f"{e['before'] / e['noise']:.1f} to {e['after'] / e['noise']:.1f} times the noise in {SYMBOL[worst]}"
-    model, left_out, missing = "calibrated model", "was left out", "is missing"
+    left_out, missing = "was left out", "is missing"
     if said["is_held"]:
-        model, left_out, missing = "model given", "has changed since the model given was fitted", "has changed"
+        left_out, missing = f"has changed since the {_in_question(said)} was fitted", "has changed"
     if said["verdict"] == "agrees":
-        return f"{batch}: the {model} agrees with the recordings; nothing {missing} that they could show."
+        return f"{batch}: the {_in_question(said)} agrees with the recordings; nothing {missing} that they could show."
     if said["verdict"] == "explained":
         what = " and ".join(
             f"{registry.get(m['name']).summary} ({m['name']}, {m['place']})" for m in said["mechanisms"]
@@ -111,8 +116,7 @@ def _map(found: Diagnosis) -> Figure:
     before, after = mismatch(j.weighed, j.calibrated), mismatch(j.weighed, j.best)
     figure, axes = plt.subplots(1, 2, figsize=(8, 2.9), sharey=True)
     highest = max(np.nanmax([list(v.values()) for v in before.values()]), 3.0)
-    model = "model given" if found.said["is_held"] else "calibrated model"
-    for ax, table, title in zip(axes, (before, after), (model, "with what was found"), strict=True):
+    for ax, table, title in zip(axes, (before, after), (_in_question(found.said), "with what was found"), strict=True):
         values = np.array([[table[c][p] for p in PARTS] for c in table])
         ax.imshow(values, cmap="cividis", norm=matplotlib.colors.LogNorm(0.7, highest), aspect="auto")
         ax.set_xticks(range(len(PARTS)), PARTS)
@@ -141,7 +145,7 @@ def _loops(found: Diagnosis) -> Figure:
         theta = e.given.theta_in[e.judged]
         ax.plot(theta, scale * e.measured[c], color=FAINT, lw=2.2, label="recording")
         for trial, colour, line, name in (
-            (j.calibrated, COLOURS[0], "--", "model given" if found.said["is_held"] else "calibrated"),
+            (j.calibrated, COLOURS[0], "--", _in_question(found.said)),
             (chosen[i], COLOURS[1], "-", "with what was found"),
         ):
             if name == "with what was found" and trial is j.calibrated:
