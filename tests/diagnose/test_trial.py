@@ -65,6 +65,14 @@ def test_recordings_that_say_alike_are_one_degree_of_freedom_each_but_one():
     assert fits_of_lines([5.0, 5.0, 0.3, 0.3, 0.3], draws=1)[2] < 2.0
 
 
+def test_a_value_that_nothing_depends_on_is_left_as_it_moved():
+    blind = [np.diag([1.0, 0.0])] * 4
+    moved = np.array([[0.1, 0.0], [-0.1, 0.0], [0.2, 0.0], [-0.2, 0.0]])
+    covariance, freedom = _scatter(moved, blind, np.ones(2))
+    assert np.isfinite(covariance).all()
+    assert freedom == pytest.approx([3.0, 1.0])
+
+
 @pytest.mark.parametrize(("least", "end"), [(0.005, 0.00625), (0.08, 0.1), (0.0, 0.0015625)])
 def test_a_value_is_eased_down_as_long_as_that_leaves_less(least, end):
     def solved(x):

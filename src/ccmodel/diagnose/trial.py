@@ -225,7 +225,7 @@ def _scatter(moved: NDArray, information: Sequence[NDArray], sizes: NDArray) -> 
     expected = -felt @ inverse @ felt.transpose(0, 2, 1)
     expected[:, range(n), range(n)] += np.einsum("iak,kia->ki", aside, felt)
     mean, square = np.trace(expected, axis1=1, axis2=2), (expected**2).sum(axis=(1, 2))
-    known = square > 0
+    known = (square > 0) & (np.diag(inverse) > 0)
     freedom = np.divide(mean**2, square, out=np.ones(len(sizes)), where=known).clip(1.0)
     over = np.sqrt(np.divide(mean, np.diag(inverse), out=np.ones(len(sizes)), where=known))
     return moved.T @ moved / np.outer(over, over), freedom
