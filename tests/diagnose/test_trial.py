@@ -37,17 +37,24 @@ def test_the_papers_model_has_no_solver_to_refine():
         assert (w.evidence.modelled({}) == refined.evidence.modelled({})).all()
 
 
+def inverses(information):
+    """Of all recordings' information, and of that of all but each."""
+    total = sum(information)
+    return np.linalg.pinv(total), [np.linalg.pinv(total - H) for H in information]
+
+
 def fits_of_lines(says, draws=4000, seed=7):
     """Errors, standard deviations and degrees of freedom of lines through recordings that say so much of the slope."""
     random = np.random.default_rng(seed)
     J = [np.stack([np.ones(20), size * np.linspace(-1, 1, 20)], axis=1) for size in says]
     information = [j.T @ j for j in J]
+    inverse, inverses_aside = inverses(information)
     found = []
     for _ in range(draws):
         score = [j.T @ random.standard_normal(20) for j in J]
-        x = np.linalg.solve(sum(information), sum(score))
-        aside = [np.linalg.solve(sum(information) - H, sum(score) - g) for H, g in zip(information, score, strict=True)]
-        covariance, freedom = _scatter(np.array(aside) - x, information, np.ones(2))
+        x = inverse @ sum(score)
+        aside = [V @ (sum(score) - g) for V, g in zip(inverses_aside, score, strict=True)]
+        covariance, freedom = _scatter(np.array(aside) - x, information, inverse, inverses_aside)
         found.append([x[1], np.sqrt(covariance[1, 1]), freedom[1]])
     return np.array(found).T
 
@@ -68,7 +75,7 @@ def test_recordings_that_say_alike_are_one_degree_of_freedom_each_but_one():
 def test_a_value_that_nothing_depends_on_is_left_as_it_moved():
     blind = [np.diag([1.0, 0.0])] * 4
     moved = np.array([[0.1, 0.0], [-0.1, 0.0], [0.2, 0.0], [-0.2, 0.0]])
-    covariance, freedom = _scatter(moved, blind, np.ones(2))
+    covariance, freedom = _scatter(moved, blind, *inverses(blind))
     assert np.isfinite(covariance).all()
     assert freedom == pytest.approx([3.0, 1.0])
 

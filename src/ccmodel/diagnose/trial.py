@@ -139,9 +139,8 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
     information = [j.T @ j / n for j, n in zip(J, counts, strict=True)]
     score = [j.T @ e / n for j, e, n in zip(J, r, counts, strict=True)]
     total = sum(information)
-    without = [
-        np.clip(found.x + _inverse(total - H, sizes) @ g, low, high) for H, g in zip(information, score, strict=True)
-    ]
+    inverse, inverses_aside = _inverse(total, sizes), [_inverse(total - H, sizes) for H in information]
+    without = [np.clip(found.x + V @ g, low, high) for V, g in zip(inverses_aside, score, strict=True)]
     aside = each(acting, lambda i, w: errors(w, named(without[i])))
     for i, (e, own) in enumerate(zip(aside, r, strict=True)):
         if np.mean(e**2) > SUSPECT * np.mean(own**2):
@@ -149,9 +148,9 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
             without[i] = _shortened(others, found.x, without[i], named)
             aside[i] = errors(acting[i], named(without[i]))
     if len(acting) > 1:
-        scatter, freedom = _scatter(np.array(without) - found.x, information, sizes)
+        scatter, freedom = _scatter(np.array(without) - found.x, information, inverse, inverses_aside)
     else:
-        scatter = _inverse(total, sizes) / (LOOKS * len(acting[0].evidence.channels))
+        scatter = inverse / (LOOKS * len(acting[0].evidence.channels))
         freedom = np.full(len(names), np.inf)
     held_out = [named(x) for x in without]
     return Trial(hypothesis, calibrated, named(found.x), r, J, scatter, freedom, held_out, aside)
@@ -196,7 +195,9 @@ def moved_by_finer(weighed: Sequence[Weighed], trial: Trial) -> NDArray:
     return -inverse @ sum(j.T @ e / n for j, e, n in zip(trial.jacobian, changed, counts, strict=True))
 
 
-def _scatter(moved: NDArray, information: Sequence[NDArray], sizes: NDArray) -> tuple[NDArray, NDArray]:
+def _scatter(
+    moved: NDArray, information: Sequence[NDArray], inverse: NDArray, inverses_aside: Sequence[NDArray]
+) -> tuple[NDArray, NDArray]:
     """How sure a fit is, from how far it moves as each recording is left out.
 
     The jackknife, for recordings of which some say more than others: left out, those move a fit further than they
@@ -209,7 +210,10 @@ def _scatter(moved: NDArray, information: Sequence[NDArray], sizes: NDArray) -> 
     moved : ndarray, shape (recordings, unknowns)
     information : sequence of ndarray, each of shape (unknowns, unknowns)
         By recording.
-    sizes : ndarray, shape (unknowns,)
+    inverse : ndarray, shape (unknowns, unknowns)
+        Of that of all recordings.
+    inverses_aside : sequence of ndarray, each of shape (unknowns, unknowns)
+        Of that of all but each recording.
 
     Returns
     -------
@@ -217,17 +221,15 @@ def _scatter(moved: NDArray, information: Sequence[NDArray], sizes: NDArray) -> 
     freedom : ndarray, shape (unknowns,)
         Degrees of freedom of each variance, 1 at least.
     """
-    n, total = len(moved), sum(information)
-    inverse = _inverse(total, sizes)
-    aside = np.stack([_inverse(total - H, sizes) for H in information])
+    n, aside = len(moved), np.stack(inverses_aside)
     felt = np.einsum("iab,ibk->kia", np.stack(information), aside)
     # By unknown, how what two recordings move it by is correlated.
     expected = -felt @ inverse @ felt.transpose(0, 2, 1)
     expected[:, range(n), range(n)] += np.einsum("iak,kia->ki", aside, felt)
     mean, square = np.trace(expected, axis1=1, axis2=2), (expected**2).sum(axis=(1, 2))
     known = (square > 0) & (np.diag(inverse) > 0)
-    freedom = np.divide(mean**2, square, out=np.ones(len(sizes)), where=known).clip(1.0)
-    over = np.sqrt(np.divide(mean, np.diag(inverse), out=np.ones(len(sizes)), where=known))
+    freedom = np.divide(mean**2, square, out=np.ones_like(mean), where=known).clip(1.0)
+    over = np.sqrt(np.divide(mean, np.diag(inverse), out=np.ones_like(mean), where=known))
     return moved.T @ moved / np.outer(over, over), freedom
 
 
