@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
+from ccmodel.mechanisms.contract import Kink
 from ccmodel.model.general import simulate
 from ccmodel.model.general.grid import make_grid
 from ccmodel.model.initial import InitialTension
@@ -98,6 +99,24 @@ def test_what_friction_holds_at_rest_it_holds_at_a_kink_too():
     r = run(np.linspace(0.0, 0.1, 20), kink, T=profile)
     # All of cable A is about to slide, and the first pull is felt at its other end with no front to wait for.
     assert pytest.approx(limit, rel=1e-6) == r.T1_N / r.T2_N
+
+
+def test_a_kink_that_holds_nothing_at_rest_is_passed_last():
+    bend, limit = 1.0, np.exp(MU * np.pi)
+    profile = InitialTension.between_ends(HALF_LOOP, MU, (2 * T0, 2 * T0 / limit), (T0, T0))
+    r = run(np.linspace(0.0, 0.1, 200), ("kink", "conduit", {"beta": bend, "s": 0.3, "hold": 0.0}), T=profile)
+    ratio = r.T1_N / r.T2_N
+    assert ratio[0] == pytest.approx(limit, rel=1e-6)
+    assert (np.diff(ratio) >= -1e-9).all()
+    assert ratio[-1] == pytest.approx(limit * np.exp(MU * bend), rel=1e-6)
+    stalled = ratio < 0.999 * ratio[-1]  # until the front is past the kink nothing arrives
+    assert np.ptp(r.T2_N[stalled]) < 1e-3 * T0 < np.ptp(r.T2_N)
+
+
+@pytest.mark.parametrize("wrong", [{"hold": -0.1}, {"hold": 1.1}, {"s": 1.0}])
+def test_a_kink_outside_its_bounds_is_refused(wrong):
+    with pytest.raises(ModelError, match="a kink"):
+        run(np.zeros(3), ("kink", "conduit", {"beta": 1.0, "s": 0.3} | wrong))
 
 
 def test_a_straight_path_is_two_springs():
@@ -277,7 +296,7 @@ def test_bad_input_is_refused_by_name():
 
 
 def test_grid_respects_corners_and_kinks():
-    grid = make_grid(LOOPS, 32, kinks=((0.5, 0.7),))
+    grid = make_grid(LOOPS, 32, kinks=(Kink(0.5, 0.7, hold=0.5),))
     for corner in (0.3, 0.8, 0.6):
         assert np.abs(grid.boundary_m - corner).min() < 1e-12
     assert grid.boundary_rad[-1] == pytest.approx(LOOPS.bend_rad + 0.7)
@@ -285,6 +304,7 @@ def test_grid_respects_corners_and_kinks():
     assert grid.segment_m.sum() == pytest.approx(L)
     kink = np.flatnonzero(grid.cell_m == 0)
     assert grid.cell_rad[kink] == pytest.approx([0.7])
+    assert np.diff(grid.held_rad)[kink] == pytest.approx([0.35])
 
 
 def test_grid_has_about_the_cells_asked_for():

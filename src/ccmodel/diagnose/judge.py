@@ -163,7 +163,7 @@ def judge(
     leading = [s for k, s in enumerate(scores) if s.values and (s.gain > WORTH_A_TRIAL or k < fewest)][:TRIALS]
     asked = [Score(h, 0.0, h.start) for h in suspects if h not in [s.hypothesis for s in leading]]
     found = Comparison.of(weighed, base, _fit_all(weighed, calibrated, base, [*leading, *asked], tell))
-    if found.trials and not found.has_right:
+    if found.wants_more:
         found = _weighed_anew(found, calibrated, tell)
     if found.wants_more:
         found = _with_pairs(found, calibrated, known, tell)

@@ -16,6 +16,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +75,14 @@ class Parameter:
     unsaid: float | None = None
 
 
+class Kink(NamedTuple):
+    """A sharp bend: its share of the length, its angle (rad), and what share of its friction holds tension at rest."""
+
+    share: float
+    bend_rad: float
+    hold: float = 1.0
+
+
 @dataclass
 class Settings:
     """Everything that the general solver can be told beyond the paper's model; as made, it is the paper's model.
@@ -82,8 +91,8 @@ class Settings:
 
     Attributes
     ----------
-    kinks : list of (float, float)
-        Conduit: share of the length and extra bend (rad) of each kink.
+    kinks : list of Kink
+        Conduit.
     bristle_m : float
         Conduit: presliding length z0 of Dahl's bristle; 0 is Coulomb friction.
     stribeck_rise, stribeck_speed, stribeck_fall : float
@@ -116,7 +125,7 @@ class Settings:
         top of what the load has by itself.
     """
 
-    kinks: list[tuple[float, float]] = field(default_factory=list)
+    kinks: list[Kink] = field(default_factory=list)
     bristle_m: float = 0.0
     stribeck_rise: float = 0.0
     stribeck_speed: float = 1e-3

@@ -80,7 +80,7 @@ class InitialTension:
             How far ln T halfway through the bend lies off the straight line between the ends, of what friction can
             hold there, -1 to 1: the ends do not show it, and how the cable was tensioned decides.
         kinks_rad : float
-            Bend that the path does not show.
+            Bend that the path does not show, as far as it holds tension at rest.
         """
         bound = friction_coefficient * (path.bend_rad + kinks_rad)
         profiles = []
@@ -104,7 +104,8 @@ class InitialTension:
     def at(self, x: NDArray, phi: NDArray) -> tuple[NDArray, NDArray]:
         """Tensions of A and B (N) at arc lengths `x` (m), the bend from the drive end to each of which is `phi` (rad).
 
-        Tension changes where the conduits bend, and with a kink by so much there. All arrays have the shape of `x`.
+        Tension changes where the conduits bend, at a kink by as much of its bend as `phi` has. All arrays have the
+        shape of `x`.
         """
         corner_phi = np.interp(self.x_m, x, phi)
         return tuple(_interpolate(phi, corner_phi, T) for T in (self.tension_A_N, self.tension_B_N))

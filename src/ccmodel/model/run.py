@@ -197,7 +197,7 @@ def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension
     T1, T3 = scale * (F_drive + drive) / 2, scale * (F_drive - drive) / 2
     T2, T4 = scale * (F_load + load) / 2, scale * (F_load - load) / 2
     bows = parameters.profile_bow_A, parameters.profile_bow_B
-    kinks_rad = sum(extra for _, extra in general.settings_of(parameters.mechanisms).kinks)
+    kinks_rad = sum(kink.hold * kink.bend_rad for kink in general.settings_of(parameters.mechanisms).kinks)
     return InitialTension.between_ends(path, parameters.friction, (T1, T2), (T3, T4), bows, kinks_rad)
 
 

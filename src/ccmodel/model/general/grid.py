@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.geometry import ConduitPath
+from ccmodel.mechanisms.contract import Kink
 
 # How much of the cells the bend attracts; the rest is spread by length, for what acts per length.
 BEND_WEIGHT = 0.8
@@ -20,10 +21,13 @@ class Grid:
     ----------
     boundary_m, boundary_rad : ndarray, shape (n + 1,)
         Arc length and bend angle at the cells' boundaries; a kink is a cell without length.
+    held_rad : ndarray, shape (n + 1,)
+        The bend angle with so much of each kink as holds tension at rest.
     """
 
     boundary_m: NDArray
     boundary_rad: NDArray
+    held_rad: NDArray
 
     @cached_property
     def cell_m(self) -> NDArray:
@@ -44,7 +48,7 @@ class Grid:
 
 # A fit runs the same few paths thousands of times.
 @lru_cache(maxsize=256)
-def make_grid(path: ConduitPath, elements: int, kinks: tuple[tuple[float, float], ...] = ()) -> Grid:
+def make_grid(path: ConduitPath, elements: int, kinks: tuple[Kink, ...] = ()) -> Grid:
     """About `elements` cells, finer towards both ends, none across a corner of the path or a kink.
 
     A front that runs in from an end by X needs a pull of the order X^2, so the tension at that end rises as a square
@@ -56,14 +60,13 @@ def make_grid(path: ConduitPath, elements: int, kinks: tuple[tuple[float, float]
     path : ConduitPath
     elements : int
         Cells wanted; a path of many pieces gets at least one a piece.
-    kinks : tuple of (float, float)
-        Share of the length, in (0, 1), and extra bend (rad) of each.
+    kinks : tuple of Kink
     """
     length, bend = path.length_m, path.bend_rad
-    places = sorted((share * length, extra) for share, extra in kinks)
+    kinks = sorted(kinks)
     corners = np.concatenate([[0.0], np.cumsum(path.piece_length_m)])
     corners[-1] = length
-    corners = np.union1d(corners, [x for x, _ in places])
+    corners = np.union1d(corners, [kink.share * length for kink in kinks])
     weight = BEND_WEIGHT if bend > 0 else 0.0
 
     def coordinate(x):
@@ -79,9 +82,10 @@ def make_grid(path: ConduitPath, elements: int, kinks: tuple[tuple[float, float]
         keep &= np.abs(x - corner) > 0.4 * own
     x = np.union1d(x[keep], corners)
     phi = path.bend_at(x)
-    for place, extra in places:
-        i = int(np.searchsorted(x, place))
-        x = np.insert(x, i + 1, x[i])
-        phi = np.insert(phi, i + 1, phi[i])
-        phi[i + 1 :] += extra
-    return Grid(x, phi)
+    held = phi.copy()
+    for kink in kinks:
+        i = int(np.searchsorted(x, kink.share * length)) + 1
+        x, phi, held = (np.insert(values, i, values[i - 1]) for values in (x, phi, held))
+        phi[i:] += kink.bend_rad
+        held[i:] += kink.hold * kink.bend_rad
+    return Grid(x, phi, held)

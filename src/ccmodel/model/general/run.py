@@ -126,7 +126,7 @@ def simulate(
         way_m = transmission.drive_radius_m * np.abs(np.diff(theta_in, prepend=theta_in[0])).cumsum()
         course = settings.friction_course(time_s, way_m)
     mean, state = np.zeros((rows.MEAN_ROWS, 2)), np.zeros(rows.LOAD_ROWS)
-    T = _initial_state(physics, piece, node, settings, initial.at(grid.boundary_m, grid.boundary_rad), course[0])
+    T = _initial_state(physics, piece, node, settings, initial.at(grid.boundary_m, grid.held_rad), course[0])
     mean[rows.MEAN] = (piece[rows.SHARE] * T).sum(axis=1)
     state[rows.ANGLE] = _load_angle(physics, T, load, series)
     slide = np.zeros((rows.SLIDE_ROWS, 2, node.shape[2] + 2))
