@@ -47,6 +47,10 @@ def test_a_number_far_out_of_its_range_is_not_plausible():
     assert plausible(friction, {key: 5e-3})
     assert not plausible(friction, {key: 5.0})
     assert plausible(friction, {key: np.float64(1e-6)})
+    unlike, key = Hypothesis((("cable-asymmetry", "cable"),)), "cable-asymmetry/cable/ratio"
+    assert [plausible(unlike, {key: ratio}) for ratio in (0.1, 0.6, 1.0, 1.4, 4.2)] == [False, True, True, True, False]
+    drift, key = Hypothesis((("load-cell-drift", "load-sensor"),)), "load-cell-drift/load-sensor/rate"
+    assert [plausible(drift, {key: rate}) for rate in (-1.0, -0.1, 0.1, 1.0)] == [False, True, True, False]
 
 
 def test_a_mass_is_tried_at_many_sizes_under_one_damping():

@@ -1,6 +1,7 @@
 """The verdict from what trials leave, without any model run."""
 
 import itertools
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -78,6 +79,24 @@ def test_what_may_as_well_be_on_no_list_is_not_named_alone():
     assert verdict(trial(14.0), trial(1.12, FRICTION)).verdict == "explained"
 
 
+def test_what_is_more_likely_on_no_list_is_unexplained():
+    poor = verdict(trial(6.0), trial(1.74, FRICTION))
+    assert poor.probability[0] > SURE
+    assert poor.listed < 0.5
+    assert poor.verdict == "unexplained"
+
+
+def test_a_single_recording_gives_no_sure_name():
+    """Nothing can be held out of it, so whatever is fitted is only fitted."""
+    one = replace(trial(6.0), held_out=[BASE_VALUES], aside=[np.sqrt([6.0])])
+    friction = replace(trial(1.0, FRICTION), held_out=[BASE_VALUES], aside=[np.ones(1)])
+    unlearnt = {t.hypothesis: Structure(np.zeros(4)) for t in (one, friction)}
+    found = _verdict(Comparison(WEIGHED[:1], one, [friction], unlearnt), [])
+    assert found.verdict == "undecided"
+    assert found.listed * found.probability[0] < SURE
+    assert nested_errors(found) == [friction]
+
+
 def test_the_list_is_the_less_likely_the_more_is_left_and_the_more_was_tried():
     base, lefts = trial(10.0), (0.95, 1.1, 1.4, 2.0, 5.0)
     odds = [is_listed(trial(left, FRICTION), base) for left in lefts]
@@ -135,8 +154,8 @@ def test_a_recording_is_judged_by_what_the_others_chose():
 
 def test_a_pair_must_leave_less_than_a_single():
     alone = [trial(9.0, FRICTION), trial(9.0, SCALE)]
-    assert verdict(trial(10.0), trial(1.4, FRICTION), alone[1]).verdict == "explained"
-    assert verdict(trial(10.0), trial(1.4, FRICTION, SCALE), *alone).verdict == "unexplained"
+    assert verdict(trial(10.0), trial(1.5, FRICTION), alone[1]).verdict == "explained"
+    assert verdict(trial(10.0), trial(1.5, FRICTION, SCALE), *alone).verdict == "unexplained"
     assert verdict(trial(10.0), trial(1.2, FRICTION, SCALE), *alone).verdict == "explained"
 
 

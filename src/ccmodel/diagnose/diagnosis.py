@@ -312,6 +312,7 @@ def _mechanism(trial: Trial, k: int, confidence: float, covariance: NDArray) -> 
     name, place = trial.hypothesis.acting[k]
     names = list(trial.values)
     reach = student.ppf(0.5 + COVERAGE / 2, trial.freedom)  # of infinite freedom: the normal distribution's
+    free = trial.hypothesis.free(trial.values)
     parameters = []
     for p in registry.get(name).parameters:
         key = mechanism_key(name, place, p.name)
@@ -321,8 +322,8 @@ def _mechanism(trial: Trial, k: int, confidence: float, covariance: NDArray) -> 
             {
                 "name": p.name,
                 "value": value,
-                "low": value - reach[i] * sd,
-                "high": value + reach[i] * sd,
+                "low": max(value - reach[i] * sd, free[key].low),
+                "high": min(value + reach[i] * sd, free[key].high),
                 "unit": p.unit.replace(" ", "*"),
             }
         )
@@ -350,8 +351,3 @@ def held_out_errors(judgement: Judgement) -> dict[str, dict]:
 def _raw(w: Weighed, trial: Trial, i: int) -> NDArray:
     e = replace(w.evidence, parameters=trial.hypothesis.of(w.evidence.parameters))
     return e.errors(trial.held_out[i]) * e.sigma
-
-
-def said_of(hypothesis: Hypothesis) -> str:
-    """What a hypothesis means, in words."""
-    return " and ".join(registry.get(name).summary for name, _ in hypothesis.acting)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.diagnose.evidence import Weighed
-from ccmodel.diagnose.judge import Judgement
+from ccmodel.diagnose.judge import RIVAL, Judgement
 from ccmodel.diagnose.trial import Trial
 from ccmodel.failure import ModelError
 from ccmodel.model.parameters import Parameters
@@ -29,8 +29,9 @@ class Experiment:
 
 def proposed(judgement: Judgement, estimates: Parameters) -> dict | None:
     """The experiment that separates the leading rivals best; None where there are no two that can be run."""
-    rivals = [judgement.calibrated, *judgement.trials][: RIVALS + 1]
-    rivals = judgement.trials[:RIVALS] if len(judgement.trials) > 1 else rivals
+    likely = [t for t, p in zip(judgement.trials, judgement.probability, strict=True) if p > RIVAL]
+    rivals = likely if len(likely) > 1 else [judgement.calibrated, *judgement.trials]
+    rivals = rivals[:RIVALS]
     if len(rivals) < 2:
         return None
     template = max(judgement.weighed, key=lambda w: w.evidence.given.recording.pretension_N).evidence

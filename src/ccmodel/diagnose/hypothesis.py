@@ -113,8 +113,11 @@ def plausible(hypothesis: Hypothesis, values: Mapping[str, float], slack: float 
     """Whether no mechanism is stronger than its range has it by more than a factor; weaker ones are still there."""
     for name, place in hypothesis.acting:
         strength = registry.get(name).parameters[0]
-        has_range = strength.low > 0 and strength.neutral == 0 and strength.scale == "log"
-        if has_range and abs(values[mechanism_key(name, place, strength.name)]) > slack * strength.high:
+        value = values[mechanism_key(name, place, strength.name)]
+        if strength.neutral == 1.0:  # a ratio, which may as well be the other way round
+            if not strength.low / slack <= value <= slack * strength.high:
+                return False
+        elif abs(value) > slack * max(abs(strength.low), abs(strength.high)):
             return False
     return True
 

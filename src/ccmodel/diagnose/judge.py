@@ -52,6 +52,8 @@ OFF_LIST = 0.2
 LEVEL = (0.93, 0.09)
 FORM_SHARE = 0.04
 RIVAL = 0.02
+# A single recording leaves nothing to hold out: no name is sure, however well its mechanism fits.
+UNTESTED = 0.75
 MOST_ALTERNATIVES = 4
 
 
@@ -222,8 +224,8 @@ def is_right(trial: Trial, base: Trial, learnable: Mapping[Hypothesis, Structure
 
 
 def _best_of(trial: Trial) -> int:
-    """As the best of how many independent imitations a trial may pass."""
-    return FIRSTS * PARTNERS if len(trial.hypothesis.acting) > 1 else 1
+    """As the best of how many independent imitations a trial may pass: partners of one first, since firsts are alike."""
+    return PARTNERS if len(trial.hypothesis.acting) > 1 else 1
 
 
 def _left(trial: Trial) -> float:
@@ -314,6 +316,7 @@ def _verdict(found: Comparison, scores: list[Score]) -> Judgement:
     probability = _probabilities(found.weighed, base, trials)
     likeliest = trials[int(np.argmax(probability))] if trials else base
     listed = is_listed(likeliest, base) if trials else 1.0
+    listed *= UNTESTED if len(found.weighed) == 1 else 1.0
 
     def judged(verdict: str, best: Trial) -> Judgement:
         order = np.argsort(-np.array(probability), kind="stable")
@@ -326,6 +329,8 @@ def _verdict(found: Comparison, scores: list[Score]) -> Judgement:
         return judged("agrees" if is_right(base, base, learnable) else "unexplained", base)
     if not is_right(likeliest, base, learnable) or not plausible(likeliest.hypothesis, likeliest.values):
         return judged("unexplained", base)
+    if listed < 0.5:
+        return judged("unexplained", base)
     # A mechanism that could be at either of two places is named all the same.
     names = likeliest.hypothesis.names
     sure = sum(p for t, p in zip(trials, probability, strict=True) if t.hypothesis.names == names)
@@ -333,10 +338,10 @@ def _verdict(found: Comparison, scores: list[Score]) -> Judgement:
 
 
 def nested_errors(judgement: Judgement) -> list[Trial]:
-    """By recording, the trial that would have been chosen had the recording not been there."""
+    """By recording, the trial that would have been chosen had the recording not been there; of a single one, the best."""
     rivals = [judgement.calibrated, *judgement.trials]
-    if judgement.best is judgement.calibrated:
-        return [judgement.calibrated] * judgement.calibrated.left.size
+    if judgement.best is judgement.calibrated or judgement.calibrated.left.size == 1:
+        return [judgement.best] * judgement.calibrated.left.size
     left = np.stack([t.left for t in rivals])
     others = left.sum(axis=1, keepdims=True) - left
     pick: NDArray = np.argmin(others, axis=0)
