@@ -178,7 +178,8 @@ def diagnose(
     before = folder_digest(batch)
     with tempfile.TemporaryDirectory(prefix="batch-") as folder:
         world = Path(folder)
-        shutil.copytree(batch, world / batch.name)
+        # Without their time stamps: how long each took to make is no business of the diagnosis.
+        shutil.copytree(batch, world / batch.name, copy_function=shutil.copyfile)
         words = [*options, *(word for name in without for word in ("--without", name))]
         if beside is not None:
             shutil.copy(beside, world / "known.json")

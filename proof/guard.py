@@ -4,9 +4,10 @@ Not imported by the proof: it is the whole of what the concealed process starts 
 library. The JSON names the folders that may be read and written, those that are put on the import path, the file
 descriptor on which tampering is told, and the command's arguments.
 
-Python's audit hooks see every file that is opened, every folder that is listed, every import and every process that is
-started, and cannot be taken out again. What compiled code reads past Python they do not see: this keeps out whatever
-looks for answers, not a hostile extension.
+Python's audit hooks see every file that is opened, every folder that is listed, every import, every process that is
+started and every connection, and cannot be taken out again. What compiled code reads past Python they do not see, and
+code that first rewrote the functions that this file calls would blind them: this keeps out whatever looks for answers,
+and not what sets out to break it.
 """
 
 import json
@@ -17,6 +18,9 @@ from importlib import import_module
 HIDDEN = ("virtualrig", "proof")
 STARTS = ("subprocess.Popen", "os.system", "os.exec", "os.fork", "os.forkpty", "os.posix_spawn", "os.spawn")
 CHANGES = ("os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.link", "os.symlink", "os.truncate", "shutil.rmtree")
+# The others have one path; what a symbolic link points to is refused when it is opened.
+PATHS = {"os.rename": 2, "os.link": 2}
+CONNECTS = ("socket.connect", "socket.bind", "socket.sendto", "socket.getaddrinfo", "os.kill")
 WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
@@ -45,10 +49,14 @@ def guard(readable: list[str], writable: list[str], tell: int) -> None:
                 refuse(f"looked into {arguments[0]}")
         elif event == "import" and arguments[0].partition(".")[0] in HIDDEN:
             refuse(f"imported {arguments[0]}")
-        elif event in CHANGES and not inside(arguments[0], writable):
-            refuse(f"{event} of {arguments[0]}")
+        elif event in CHANGES:
+            for path in arguments[: PATHS.get(event, 1)]:
+                if not inside(path, writable):
+                    refuse(f"{event} of {path}")
         elif event in STARTS:
             refuse(f"started a process: {event}")
+        elif event in CONNECTS:
+            refuse(f"looked outside: {event}")
 
     sys.addaudithook(hook)
 

@@ -103,8 +103,8 @@ class Outcome:
 
     @property
     def is_visible(self) -> bool:
-        """Whether recalibration leaves three times what two repeats differ by."""
-        return self.size >= VISIBLE
+        """Whether recalibration leaves three times what two repeats differ by; counted so where it is not known."""
+        return not self.errors or self.size >= VISIBLE
 
     @property
     def closed(self) -> float | None:

@@ -1,6 +1,7 @@
 """A diagnosis that looks for the answer is caught; one that does not is let be."""
 
 import json
+import os
 
 import pytest
 
@@ -14,6 +15,7 @@ import os, pathlib, sys
 batch, out = pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[4])
 out.mkdir()
 (out / "diagnosis.json").write_text((batch / "batch.yaml").read_text())
+(out / "made").write_text(repr({f.stat().st_mtime > out.stat().st_mtime - 60 for f in batch.iterdir()}))
 (out / "environment").write_text(repr(dict(os.environ)) + repr(sys.path))
 """
 
@@ -25,6 +27,8 @@ CHEATS = {
     "climbs to other folders": ("import os; os.listdir('..')", "looked into .."),
     "asks another program": ("import subprocess; subprocess.run(['ls'])", "started a process"),
     "leaves a note": ("open('/var/tmp/note', 'w')", "wrote to /var/tmp/note"),
+    "carries a note out": ("import os; open('a', 'w').close(); os.rename('a', '/var/tmp/a')", "os.rename of /var"),
+    "calls someone": ("import socket; socket.create_connection(('127.0.0.1', 9))", "looked outside"),
     "swallows the refusal": (f"try: open({str(PROOF / 'proof.yaml')!r})\nexcept OSError: pass", "proof.yaml"),
     "alters the case": ("import sys; open(sys.argv[2] + '/batch.yaml', 'a').write('#')", "altered the batch"),
 }
@@ -35,6 +39,7 @@ def batch(tmp_path):
     folder = tmp_path / "case-1"
     folder.mkdir()
     (folder / "batch.yaml").write_text("format: 1\n")
+    os.utime(folder / "batch.yaml", (0, 0))
     return folder
 
 
@@ -70,6 +75,7 @@ def test_honest_one_works_and_sees_nothing_of_us(batch, diagnosis, tmp_path):
     ran = conceal.diagnose(batch, tmp_path / "out", sources=diagnosis(HONEST))
     assert (ran.code, ran.tampering) == (0, ())
     assert (tmp_path / "out" / "diagnosis.json").read_text() == "format: 1\n"
+    assert (tmp_path / "out" / "made").read_text() == "{True}"  # time stamps say nothing of how it was made
     seen = (tmp_path / "out" / "environment").read_text()
     assert str(PROOF) not in seen
     assert str(ROOT / "src") not in seen

@@ -224,7 +224,7 @@ def is_right(trial: Trial, base: Trial, learnable: Mapping[Hypothesis, Structure
 
 
 def _best_of(trial: Trial) -> int:
-    """As the best of how many independent imitations a trial may pass: partners of one first, since firsts are alike."""
+    """As the best of how many independent imitations a trial may pass: a first's partners, since firsts are alike."""
     return PARTNERS if len(trial.hypothesis.acting) > 1 else 1
 
 
@@ -338,7 +338,7 @@ def _verdict(found: Comparison, scores: list[Score]) -> Judgement:
 
 
 def nested_errors(judgement: Judgement) -> list[Trial]:
-    """By recording, the trial that would have been chosen had the recording not been there; of a single one, the best."""
+    """By recording, the trial that would have been chosen had it not been there; of a single one, the best."""
     rivals = [judgement.calibrated, *judgement.trials]
     if judgement.best is judgement.calibrated or judgement.calibrated.left.size == 1:
         return [judgement.best] * judgement.calibrated.left.size
