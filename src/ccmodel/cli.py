@@ -123,6 +123,21 @@ def predict(
         raise typer.Exit(1)
 
 
+@app.command()
+def simulate(
+    motion: Annotated[Path, typer.Argument(help="CSV with the columns time_s and theta_in_rad.")],
+    model: Annotated[Path, typer.Option(help="A model file, as a diagnosis or a fit writes it.")],
+    batch: Annotated[Path, typer.Option(help="Folder of a batch of the rig.")],
+    out: Annotated[Path, typer.Option(help="File that gets what the sensors would read, CSV.")],
+    recording: Annotated[str | None, typer.Option(help="Whose conduits and pretension; else the first one's.")] = None,
+    pretension: Annotated[float | None, typer.Option(min=0.0, help="Of both cables, N, in its stead.")] = None,
+) -> None:
+    """Say what the sensors would read if the drive of a rig moved so, by a fitted model."""
+    from ccmodel.stages.simulate import simulate as run
+
+    run(motion, model, batch, out, recording, pretension)
+
+
 @app.command("table-one")
 def table_one(
     settings: Annotated[Path, typer.Argument(help="config/table-one.yaml or one like it.")],

@@ -169,3 +169,49 @@ def test_what_is_no_batch_is_one_line(tmp_path):
     (tmp_path / "m.json").write_text("{}")
     found = run("predict", tmp_path / "empty", "--model", tmp_path / "m.json", "--out", tmp_path / "out")
     assert "m.json" in str(found.exception)
+
+
+@pytest.fixture
+def motion(tmp_path):
+    """Call with angles: a file of a motion of 0.01 s a sample."""
+
+    def made(theta_in, time_s=None):
+        time_s = 0.01 * np.arange(len(theta_in)) if time_s is None else time_s
+        pd.DataFrame({"time_s": time_s, "theta_in_rad": theta_in}).to_csv(tmp_path / "motion.csv", index=False)
+        return tmp_path / "motion.csv"
+
+    return made
+
+
+def test_the_model_says_what_a_motion_would_do_that_nobody_recorded(clean, motion, tmp_path):
+    batch, found = clean
+    log = pd.read_csv(batch / "t-7N.csv.gz")
+    theta = 0.6 * np.sin(2 * np.pi * np.maximum(log["time_s"] - 0.5, 0))
+    asked = [motion(theta, log["time_s"]), "--model", found / "model.json", "--batch", batch]
+    assert run("simulate", *asked, "--recording", "t-7N", "--out", tmp_path / "said.csv").exit_code == 0
+    said = pd.read_csv(tmp_path / "said.csv")
+    assert said["tau_in_Nm"].to_numpy() == pytest.approx(0.0234 * log["drive_current_A"].to_numpy(), abs=2e-3)
+    assert run("simulate", *asked, "--pretension", 14, "--out", tmp_path / "tense.csv").exit_code == 0
+    assert pd.read_csv(tmp_path / "tense.csv")["F_drive_N"][0] == pytest.approx(28.0, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("theta", "time", "options", "told"),
+    [
+        ([0.0, np.nan, 0.1], None, [], "line 3: both are numbers"),
+        ([0.0, 0.1, 0.2], [0.0, 0.1, 0.1], [], "line 4: .* time_s increases"),
+        ([], None, [], "no samples"),
+        ([0.0, 0.1], None, ["--recording", "none"], "no recording none that can be used; there is t-7N"),
+    ],
+)
+def test_a_motion_that_cannot_be_simulated_is_refused_in_a_line(clean, motion, tmp_path, theta, time, options, told):
+    asked = ["simulate", motion(theta, time), "--model", clean[1] / "model.json", "--batch", clean[0], *options]
+    with pytest.raises(InputError, match=told):
+        raise run(*asked, "--out", tmp_path / "said.csv").exception
+
+
+def test_a_motion_without_its_columns_is_refused(clean, tmp_path):
+    (tmp_path / "motion.csv").write_text("time,angle\n0,0\n")
+    asked = [tmp_path / "motion.csv", "--model", clean[1] / "model.json", "--batch", clean[0]]
+    with pytest.raises(InputError, match="columns time_s and theta_in_rad"):
+        raise run("simulate", *asked, "--out", tmp_path / "said.csv").exception

@@ -161,17 +161,30 @@ def test_a_profile_that_the_model_cannot_be_run_along_is_said(problem, monkeypat
     assert "no profile of stiffness_N_per_m: too soft" in said.warnings
 
 
-def test_a_stalled_search_is_refused_with_its_reason(problem, monkeypatch):
-    """A slope that points uphill: no step along it can help."""
+@pytest.fixture
+def uphill(monkeypatch):
+    """Slopes that point uphill: no step along one can help."""
     real = Problem.blocks
 
     def reversed_slope(self, x, *step):
         return [replace(b, derivatives=-b.derivatives) for b in real(self, x, *step)]
 
     monkeypatch.setattr(Problem, "blocks", reversed_slope)
+
+
+def test_a_stalled_search_is_refused_with_its_reason(problem, uphill, monkeypatch):
+    monkeypatch.setattr("ccmodel.identify.search.UNKNOWNS_DIRECT", 0)
     said = fit(problem)
     assert not said.succeeded
     assert said.message.startswith("stalled")
+
+
+def test_where_slopes_lead_nowhere_few_unknowns_are_searched_without(problem, drawn, uphill):
+    said = fit(Problem(problem.evidence, problem.shared))
+    assert said.succeeded
+    assert "direct search" in said.message
+    stiffness = said.values["stiffness_N_per_m"]
+    assert stiffness == pytest.approx(drawn.shared["stiffness_N_per_m"], rel=0.01)
 
 
 def test_tensions_do_not_enter_a_second_time(problem, drawn):

@@ -1,7 +1,7 @@
 """The experiment that would tell rivals apart: where their fitted predictions lie furthest apart."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,19 +75,9 @@ def _steps(amplitude: float, start: NDArray) -> NDArray:
 
 def _apart(experiment: Experiment, rivals: Sequence[Trial], template, estimates: Parameters) -> float:
     """Least distance between two rivals' predictions, in units of the noise (rms over channels)."""
-    n = experiment.theta_in.size
-    old = template.given.recording
-    recording = replace(
-        old,
-        time_s=np.arange(n) / RATE_HZ,
-        channels={"theta_in_rad": experiment.theta_in},
-        derived_from={"theta_in_rad": "proposed"},
-        pretension_N=old.pretension_N * experiment.pretension_share,
-        encoder_step_rad={},
-        rest_s=0.2,
-        settled_s=0.0,
-    )
-    given = ModelInput.prescribed(recording, experiment.theta_in)
+    like, time_s = template.given.recording, np.arange(experiment.theta_in.size) / RATE_HZ
+    pretension_N = like.pretension_N * experiment.pretension_share
+    given = ModelInput.prescribed(like, time_s, experiment.theta_in, pretension_N)
     noise = np.median(template.sigma, axis=1, keepdims=True)
     try:
         said = [simulate(given, t.hypothesis.of(estimates).with_values(t.values)) for t in rivals]

@@ -67,7 +67,7 @@ class Judgement:
     calibrated : Trial
         The paper's model.
     best : Trial
-        The hypothesis with the least left; the calibrated model where nothing is missing.
+        The likeliest hypothesis where it may explain the recordings; else the calibrated model.
     trials : list of Trial
         What was fitted in full and as the recordings were weighed in the end, the likeliest first.
     probability : list of float

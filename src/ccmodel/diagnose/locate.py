@@ -49,7 +49,7 @@ def location(judgement: Judgement) -> dict:
     """Place, channels and parts of the motion that carry the mismatch, and a sentence."""
     if judgement.verdict == "agrees":
         return {"place": None, "channels": [], "phases": [], "text": "model and recordings agree within the noise"}
-    place = judgement.best.hypothesis.acting[0][1] if judgement.best.hypothesis.acting else _place(judgement)
+    places = list(dict.fromkeys(place for _, place in judgement.best.hypothesis.acting)) or [_place(judgement)]
     table = mismatch(judgement.weighed, judgement.calibrated)
     by_channel = {c: float(np.sqrt(np.nanmean(np.square(list(parts.values()))))) for c, parts in table.items()}
     worst = max(by_channel.values())
@@ -57,8 +57,9 @@ def location(judgement: Judgement) -> dict:
     by_part = {p: float(np.sqrt(np.nanmean([table[c][p] ** 2 for c in channels]))) for p in PARTS}
     parts = [p for p in PARTS if by_part[p] > 0.7 * max(by_part.values())]
     verb = "is" if len(channels) == 1 else "are"
-    text = f"The mismatch sits {TEXT[place]}: {', '.join(channels)} {verb} off most, {' and '.join(parts)}."
-    return {"place": place, "channels": channels, "phases": parts, "text": text}
+    where = " and ".join(TEXT[place] for place in places)
+    text = f"The mismatch sits {where}: {', '.join(channels)} {verb} off most, {' and '.join(parts)}."
+    return {"place": places[0], "channels": channels, "phases": parts, "text": text}
 
 
 def _place(judgement: Judgement) -> str:

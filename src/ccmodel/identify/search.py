@@ -1,5 +1,7 @@
 """Searching for the least cost of a fit: scipy's trust region within bounds, on a cost of few rows.
 
+A cost too rough for that, as of measured loads, is searched without slopes in the end, where few values are unknown.
+
 Scipy asks for all errors and all derivatives and decomposes them whole, although of a fit's tens of thousands of rows
 only their products with one another count, and a recording's own unknowns touch no other recording. Here it is given
 a root of these products, with as many rows as there are unknowns and one more: the same cost, slope and curvature.
@@ -10,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import OptimizeResult, least_squares, lsq_linear
+from scipy.optimize import OptimizeResult, least_squares, lsq_linear, minimize
 
 from ccmodel.failure import ModelError
 from ccmodel.identify.problem import Block, Problem
@@ -21,19 +23,24 @@ from ccmodel.model.sensitivity import STEP
 TOLERANCE = 1e-10
 # The model has corners (`ccmodel.model.sensitivity`), and so has the cost: its least may lie on one, where a slope says
 # little. When not even so short a step helps, in sizes, what a step promises, in squares of a standard deviation,
-# decides whether the corner is the optimum: a tenth of one is a third of a deviation aside. Where it promises more,
-# differences are once taken more broadly.
+# decides whether the corner is the optimum: a tenth of one is a third of a deviation aside. Where it promises more, or
+# the search goes on and on, differences are once taken more broadly.
 SHORTEST = 1e-7
 BROAD = 1e-3
 EXCUSED = 0.1
 # Share by which the curvature along each unknown is taken for more than it is: what recordings do not tell apart stays
 # where it is, since its slope is that of rounding.
 DAMPING = 1e-9
+# Where slopes lead nowhere although they promise something, the cost is too rough for them (a load that rocks, cables
+# that go slack), and it is searched without: from points so far around, in sizes, down to a hundredth of that.
+AROUND, DOWN_TO = 1e-2, 1e-4
+MOST_DIRECT, UNKNOWNS_DIRECT = 1000, 8
 ON_BOUND = 1e-6  # The search stays inside its bounds; so near one, in sizes, it means the bound.
 MOST_EVALUATIONS = 100
 STUCK = 3  # scipy's status where no step longer than the shortest helps
 CONVERGED = "converged: the error no longer falls"
 ON_CORNER = "converged: the least error lies on a corner of it, within a third of a standard deviation"
+DIRECT = "converged: by direct search, the error being too rough for its slopes"
 STOPPED = "stopped at the largest number of evaluations without converging"
 STALLED = "stalled: no step lessens the error although its slope says that one should"
 
@@ -94,14 +101,26 @@ def solve(
         reduced = _Reduced(problem, start, movable, difference)
         found = least_squares(
             reduced.residuals, y, reduced.jacobian, reduced.bounds, ftol=tolerance, xtol=SHORTEST, gtol=None,
-            max_nfev=max(most_evaluations - evaluations, 1),
+            max_nfev=most_evaluations,
         )  # fmt: skip
         y, evaluations, message = found.x, evaluations + found.nfev, _message(found, reduced, tolerance)
-        if message != STALLED:
+        if message in (CONVERGED, ON_CORNER):
             break
+    if message == STALLED and movable.size <= UNKNOWNS_DIRECT:
+        found = _searched_directly(reduced, y)
+        y, evaluations, message = found.x, evaluations + found.nfev, DIRECT if found.success else STOPPED
     x, active = _on_bounds(problem, reduced.place(y))
-    converged = message in (CONVERGED, ON_CORNER)
-    return Solution(x, problem.cost(x), problem.blocks(x), active, converged, message, evaluations)
+    converged = message in (CONVERGED, ON_CORNER, DIRECT)
+    return Solution(x, problem.cost(x), problem.blocks(x, difference), active, converged, message, evaluations)
+
+
+def _searched_directly(reduced: "_Reduced", y: NDArray) -> OptimizeResult:
+    """From where slopes have led, by Nelder and Mead's simplex."""
+    low, high = reduced.bounds
+    step = np.where(y + AROUND <= high, AROUND, -AROUND)
+    simplex = np.clip(np.vstack([y, y + np.diag(step)]), low, high)
+    options = {"initial_simplex": simplex, "xatol": DOWN_TO, "fatol": np.inf, "maxfev": MOST_DIRECT}
+    return minimize(reduced.cost, y, method="Nelder-Mead", bounds=list(zip(low, high, strict=True)), options=options)
 
 
 def _message(found: OptimizeResult, reduced: "_Reduced", tolerance: float) -> str:
@@ -144,6 +163,13 @@ class _Reduced:
         x = np.array(self.start, float)
         x[self.movable] += y * self.sizes
         return x
+
+    def cost(self, y: NDArray) -> float:
+        """Infinite where the model cannot be run."""
+        try:
+            return self.problem.cost(self.place(y))
+        except (ModelError, ValueError):
+            return np.inf
 
     def residuals(self, y: NDArray) -> NDArray:
         """Infinite where the model cannot be run, so that the search turns back."""

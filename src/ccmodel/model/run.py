@@ -77,8 +77,28 @@ class ModelInput:
         return cls(recording[::every], *thinned, resting)
 
     @classmethod
-    def prescribed(cls, recording: Recording, theta_in: NDArray) -> "ModelInput":
-        """Input of a motion that nobody recorded: known exactly, begun without a rest."""
+    def prescribed(cls, like: Recording, time_s: NDArray, theta_in: NDArray, pretension_N: float) -> "ModelInput":
+        """Input of a motion that nobody recorded, known exactly, of a recording's rig: its cables evenly tensioned.
+
+        Parameters
+        ----------
+        like : Recording
+            Gives the conduits' path.
+        time_s, theta_in : ndarray, shape (n,)
+            s; rad.
+        pretension_N : float
+        """
+        recording = replace(
+            like,
+            time_s=time_s,
+            channels={"theta_in_rad": theta_in},
+            derived_from={"theta_in_rad": PRESCRIBED},
+            pretension_N=pretension_N,
+            encoder_step_rad={},
+            excitation={},
+            rest_s=0.0,
+            settled_s=0.0,
+        )
         return cls(recording, theta_in, np.zeros((0, theta_in.size)), np.zeros(theta_in.size), None, None, {})
 
     @cached_property

@@ -26,6 +26,7 @@ from ccmodel.report.figures import AXIS, COLOURS, STYLE
 LOOPS = 3
 RIVALS = 8
 FAINT = "#9a9a9a"
+WITH_FOUND = "with what was found"
 SYMBOL = {"theta_out": "θ_out", "tau_in": "τ_in", "tau_out": "τ_out", "F_drive": "F_drive", "F_load": "F_load"}
 
 
@@ -51,8 +52,10 @@ def headline(said: dict) -> str:
         )
         return f"{batch}: what {left_out} is {what}; with it the held-out error falls from {fall}."
     if said["verdict"] == "undecided":
-        names = " or ".join(f"{a['name']} at {a['place']}" for a in said["alternatives"])
-        return f"{batch}: something {missing}, and these recordings cannot tell {names} apart."
+        names = [f"{a['name']} at {a['place']}" for a in said["alternatives"]]
+        if len(names) == 1:
+            return f"{batch}: something {missing}; it may be {names[0]}, of which these recordings cannot make sure."
+        return f"{batch}: something {missing}, and these recordings cannot tell {' or '.join(names)} apart."
     place = said["location"]["place"]
     return f"{batch}: something {missing} at the {place}, and no mechanism known here accounts for it."
 
@@ -69,6 +72,8 @@ def write_diagnosis(file: Path, found: Diagnosis) -> None:
             headline=headline(found.said),
             origin=ORIGIN[origin],
             symbol=SYMBOL,
+            in_question=_in_question(found.said),
+            has_found=found.judgement.best is not found.judgement.calibrated,
             rivals=_rivals(found),
             listed=found.judgement.listed,
             summaries={name: registry.get(name) for name in registry.names()},
@@ -98,12 +103,15 @@ def _rivals(found: Diagnosis) -> list[dict]:
 def _why(trial: Trial, found: Diagnosis) -> str:
     """Why a hypothesis was not taken, or that it was."""
     j = found.judgement
+    if trial is j.calibrated:
+        return "agrees" if found.said["verdict"] == "agrees" else f"the {_in_question(found.said)}"
     if trial is j.best:
-        return "agrees" if not trial.hypothesis.acting and found.said["verdict"] == "agrees" else "the best"
+        return "the likeliest"
     if not plausible(trial.hypothesis, trial.values):
         return "only with more of it than there can be"
     if is_right(trial, j.calibrated, j.learnable):
-        return f"would do, but leaves {trial.left.mean() / j.best.left.mean():.3g} times as much"
+        ratio = trial.left.mean() / j.best.left.mean()
+        return f"would do, but leaves {ratio:.3g} times as much" if ratio > 1 else "would do, but has more unknowns"
     learnable = j.learnable.get(trial.hypothesis)
     if learnable is not None and learnable.surely > LEARNABLE:
         return "what it leaves follows laws that it does not know"
@@ -111,12 +119,14 @@ def _why(trial: Trial, found: Diagnosis) -> str:
 
 
 def _map(found: Diagnosis) -> Figure:
-    """Errors over the noise, channel by part of the motion, before and after."""
+    """Errors over the noise, channel by part of the motion, before and, where something was found, after."""
     j = found.judgement
-    before, after = mismatch(j.weighed, j.calibrated), mismatch(j.weighed, j.best)
-    figure, axes = plt.subplots(1, 2, figsize=(8, 2.9), sharey=True)
-    highest = max(np.nanmax([list(v.values()) for v in before.values()]), 3.0)
-    for ax, table, title in zip(axes, (before, after), (_in_question(found.said), "with what was found"), strict=True):
+    shown = {_in_question(found.said): mismatch(j.weighed, j.calibrated)}
+    highest = max(np.nanmax([list(v.values()) for table in shown.values() for v in table.values()]), 3.0)
+    if j.best is not j.calibrated:
+        shown[WITH_FOUND] = mismatch(j.weighed, j.best)
+    figure, axes = plt.subplots(1, len(shown), figsize=(4 * len(shown), 2.9), sharey=True, squeeze=False)
+    for ax, (title, table) in zip(axes[0], shown.items(), strict=True):
         values = np.array([[table[c][p] for p in PARTS] for c in table])
         ax.imshow(values, cmap="cividis", norm=matplotlib.colors.LogNorm(0.7, highest), aspect="auto")
         ax.set_xticks(range(len(PARTS)), PARTS)
@@ -146,9 +156,9 @@ def _loops(found: Diagnosis) -> Figure:
         ax.plot(theta, scale * e.measured[c], color=FAINT, lw=2.2, label="recording")
         for trial, colour, line, name in (
             (j.calibrated, COLOURS[0], "--", _in_question(found.said)),
-            (chosen[i], COLOURS[1], "-", "with what was found"),
+            (chosen[i], COLOURS[1], "-", WITH_FOUND),
         ):
-            if name == "with what was found" and trial is j.calibrated:
+            if name == WITH_FOUND and trial is j.calibrated:
                 continue
             said = replace(e, parameters=trial.hypothesis.of(e.parameters)).modelled(trial.held_out[i])[c]
             ax.plot(theta, scale * said, color=colour, lw=1.0, ls=line, label=name)
