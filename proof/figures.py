@@ -12,12 +12,15 @@ from matplotlib.ticker import NullFormatter
 BLUE, ORANGE, GREY, GREEN = "#0072B2", "#E69F00", "#999999", "#009E73"
 COLUMNS = 4
 KINDS = {"clean": ("o", GREY), "single": ("s", BLUE), "pair": ("^", GREEN), "unlisted": ("D", ORANGE)}
+KINDS |= {"poor": ("v", "#CC79A7")}
+NAMES = {"unlisted": "not on the list", "poor": "poor protocol"}
 
 
 def write_figures(scored: dict, folder: Path) -> list[str]:
     """Draw all figures that there are results for; their file names."""
     folder.mkdir(parents=True, exist_ok=True)
     drawn = {
+        "proof-noticing.png": (_noticing, scored["noticing"]),
         "proof-detection.png": (_detection, scored["detection"]),
         "proof-reliability.png": (_reliability, scored["reliability"]),
         "proof-kept-back.png": (_kept_back, scored["kept_back"]),
@@ -30,6 +33,28 @@ def write_figures(scored: dict, folder: Path) -> list[str]:
                 draw(data).savefig(folder / name, dpi=130)
             names.append(name)
     return names
+
+
+def _noticing(rows: list[dict]) -> Figure:
+    """How often single effects are noticed and named, by how far recalibration leaves them from the floor."""
+    figure = Figure(figsize=(4.5, 3.4), layout="constrained")
+    panel = figure.subplots()
+    for what, colour, marker, aside in (("noticed", BLUE, "o", 1.0), ("named first", ORANGE, "s", 1.05)):
+        rates = [row[what.split()[0]] for row in rows]
+        rate = np.array([r["rate"] for r in rates])
+        reach = np.clip([rate - [r["low"] for r in rates], [r["high"] for r in rates] - rate], 0, None)
+        x = [aside * row["size"] for row in rows]
+        panel.errorbar(x, rate, reach, fmt=marker, color=colour, ms=5, capsize=2, label=f"{what}, 95 % Wilson")
+    for row in rows:
+        panel.annotate(f"{row['noticed']['n']}", (row["size"], -0.09), fontsize=7, ha="center")
+    panel.set(xscale="log", ylim=(-0.15, 1.05), ylabel="share of single effects (their number below)")
+    panel.set_xlabel("error after recalibration alone, times the floor")
+    ends = panel.get_xlim()
+    panel.set_xticks([1, 2, 5, 10, 20, 50], ["1", "2", "5", "10", "20", "50"])
+    panel.set_xlim(ends)
+    panel.xaxis.set_minor_formatter(NullFormatter())
+    figure.legend(loc="outside upper center", ncols=2, frameon=False)
+    return figure
 
 
 def _detection(detection: dict) -> Figure:
@@ -85,19 +110,16 @@ def _kept_back(errors: list[dict]) -> Figure:
     figure = Figure(figsize=(4.5, 4.2), layout="constrained")
     panel = figure.subplots()
     for kind, (marker, colour) in KINDS.items():
-        some = [e for e in errors if (e["kind"] if e["kind"] in KINDS else _shown_as(e["kind"])) == kind]
-        panel.plot([e["before"] for e in some], [e["after"] for e in some], marker, color=colour, ms=3.5, label=kind)
+        some = [e for e in errors if {"removed": "unlisted"}.get(e["kind"], e["kind"]) == kind]
+        x, y = [e["before"] for e in some], [e["after"] for e in some]
+        panel.plot(x, y, marker, color=colour, ms=3.5, label=NAMES.get(kind, kind))
     ends = [0.5, max(max(e["before"], e["after"]) for e in errors) * 1.3]
     panel.plot(ends, ends, color=GREY, lw=0.8, ls="--")
     panel.axhline(1, color=GREY, lw=0.8)
     panel.set(xscale="log", yscale="log", xlim=ends, ylim=ends)
     panel.set(xlabel="after recalibration alone, times the floor", ylabel="after the diagnosis, times the floor")
-    figure.legend(loc="outside upper center", ncols=4, frameon=False)
+    figure.legend(loc="outside upper center", ncols=3, frameon=False)
     return figure
-
-
-def _shown_as(kind: str) -> str:
-    return {"removed": "unlisted", "poor": "single"}[kind]
 
 
 def _confusion(table: dict[str, dict[str, int]]) -> Figure:

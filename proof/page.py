@@ -5,11 +5,14 @@ import subprocess
 from datetime import date
 from pathlib import Path
 
+from proof.plan import PLAN
+
 TITLES = {
-    "proof-detection.png": "Every case of one effect at its size, by what was made of it, and the curve of noticing",
+    "proof-noticing.png": "How often single effects are noticed and named, by what recalibration alone leaves of them",
+    "proof-detection.png": "Every case of one effect at its size, by what was made of it; a curve where there are four",
     "proof-reliability.png": "Stated probabilities and how often they were right; numbers are claims",
     "proof-kept-back.png": "Errors on recordings that were kept back, in the channel that is off most",
-    "proof-confusion.png": "What single effects and clean cases were called",
+    "proof-confusion.png": "What clean cases and those of one effect were called, of all kinds and protocols",
 }
 
 
@@ -28,6 +31,7 @@ def page(scored: dict, figures: list[str], figure_folder: Path, page_file: Path,
     part : str
         Which cases these are, in a sentence.
     """
+    plan = os.path.relpath(PLAN, page_file.parent)
     beside = Path(os.path.relpath(figure_folder, page_file.parent))
     kinds = ", ".join(f"{n} {kind}" for kind, n in sorted(scored["kinds"].items()))
     pictures = "\n\n".join(f"{TITLES[name]}:\n\n![{TITLES[name]}]({beside / name})" for name in figures)
@@ -37,12 +41,14 @@ Made by `{command}` on {date.today().isoformat()}, commit {commit()}. {part}
 
 {scored["cases"]} cases: {kinds}. Each is a rig of its own, drawn from a seed: values, estimates that are off, an effect
 or two with their size and place, a protocol, noise, and what varies from run to run
-([what is drawn](../proof/proof.yaml)). The diagnosis ran on a copy of the batch in an otherwise empty folder, in a
-process that is refused everything else; no answer was on disk. What was kept back was recorded after it had ended.
+([what is drawn]({plan})). The diagnosis ran on a copy of the batch in an otherwise empty folder, in a process whose
+files, imports, programs and connections are refused outside it; no answer was on disk. What was kept back was recorded
+after it had ended.
 
 "Visible" are cases in which recalibration alone leaves, on kept-back recordings, three times what two repeats differ by
 (3 sqrt(2) times the floor) in some channel. The floor is what the true physics leaves: noise, zeros, encoder steps and
-one per cent of friction.
+one per cent of friction. "Open" is what more cases would decide: the interval holds what must be. Places that no
+recording tells apart count as one (cable and conduit; a pulley and its cable end; the load and its pulley).
 
 ## Rates
 
@@ -100,14 +106,18 @@ def _kept(r) -> str:
     """Whether a rate is what it must be: a coverage within its interval, any other at least."""
     if r["what"].startswith("90 %"):
         return "yes" if r["low"] <= r["target"] <= r["high"] else "**no**"
-    return "yes" if r["rate"] >= r["target"] else "**no**"
+    return _said(r["rate"] >= r["target"], r["low"] < r["target"] < r["high"])
+
+
+def _said(is_reached: bool, is_open: bool) -> str:
+    return ("yes" if is_reached else "**no**") + (", open" if is_open else "")
 
 
 def _statistic_row(s):
     if s["value"] is None:
         return [s["what"], "0", "", "", "", "no case"]
     must = "" if s["target"] is None else f"{s['target']:g}"
-    held = "" if s["target"] is None else "yes" if _reached(s) else "**no**"
+    held = "" if s["target"] is None else _said(_reached(s), s["low"] < s["target"] < s["high"])
     return [s["what"], s["n"], f"{s['value']:.3g}", f"{s['low']:.3g} to {s['high']:.3g}", must, held]
 
 
@@ -134,16 +144,22 @@ def _rivals(rows) -> str:
     """The section on rivals; nothing where none was held to these cases."""
     if not rows:
         return ""
-    head = ["", "says what and where", "clean", "visible", "share of the gap closed, visible"]
+    head = ["", "says what and where", "clean", "visible", "share of the gap closed, visible", "nearer, visible"]
     lines = [
-        [r["rival"], "yes" if r is rows[-1] else "no", *map(_value, (r["clean"], r["visible"], r["closed"]))]
+        [
+            r["rival"],
+            "yes" if r is rows[-1] else "no",
+            *map(_value, (r["clean"], r["visible"], r["closed"])),
+            "" if r is rows[-1] or not r["nearer"]["n"] else f"{r['nearer']['k']}/{r['nearer']['n']}",
+        ]
         for r in rows
     ]
     return f"""
 ## Rivals under the same data
 
 Each starts from the calibrated model. Errors on kept-back recordings over the floor in the worst channel, and the share
-of the gap to the floor closed in the channel that was off most: medians, with bootstrap intervals.
+of the gap to the floor closed in the channel that was off most: medians, with bootstrap intervals. "Nearer" counts the
+visible cases in which a rival leaves less in the worst channel than this diagnosis does.
 
 {table(head, lines)}
 """

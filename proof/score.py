@@ -9,6 +9,7 @@ import json
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,8 @@ RESAMPLES = 2000
 COVERAGE = 0.9
 # What two repeats of one condition differ by is the floor of one times the square root of two.
 VISIBLE = 3 * np.sqrt(2)
+# Edges of the errors after recalibration, in floors, by which single effects are put together.
+FLOORS = (0.0, 1.2, 1.6, 2.5, VISIBLE, np.inf)
 NEAR = {("cable", "conduit"), ("load-pulley", "load-end"), ("drive-pulley", "drive-end"), ("load", "load-pulley")}
 
 
@@ -307,7 +310,9 @@ def statistics(outcomes: Sequence[Outcome]) -> list[dict]:
         bootstrap("values: relative error, median", off, np.median),
         bootstrap("undecided: alternatives, mean", sizes, np.mean),
         bootstrap(
-            "seconds of one core a case, rig and predictions included, median", [o.took_s for o in outcomes], np.median
+            "seconds of one core a case, rig, predictions and rivals included, median",
+            [o.took_s for o in outcomes],
+            np.median,
         ),
     ]
 
@@ -330,6 +335,7 @@ def rivalry(outcomes: Iterable[Outcome]) -> list[dict]:
             row[what] = bootstrap(what, [max(_over_floor(o, name)) for o in some], np.median)
             if what == "visible":
                 row["closed"] = bootstrap("closed", [_closed_by(o, name) for o in some], np.median)
+                row["nearer"] = count("nearer than this diagnosis", some, lambda o, name=name: _is_nearer(o, name))
         rows.append(row)
     return rows
 
@@ -342,6 +348,10 @@ def _after(o: Outcome, rival: str) -> dict[str, float]:
 
 def _over_floor(o: Outcome, rival: str) -> list[float]:
     return [error / o.errors[c]["floor"] for c, error in _after(o, rival).items()]
+
+
+def _is_nearer(o: Outcome, rival: str) -> bool:
+    return max(_over_floor(o, rival)) < max(_over_floor(o, "this diagnosis"))
 
 
 def _closed_by(o: Outcome, rival: str) -> float:
@@ -374,7 +384,7 @@ def confusion(outcomes: Iterable[Outcome]) -> dict[str, dict[str, int]]:
     for o in outcomes:
         if len(o.key["truth"]) == 1:
             table[o.key["truth"][0]["name"]][o.first or o.verdict] += 1
-    return {name: dict(row) for name, row in sorted(table.items())}
+    return {name: dict(table[name]) for name in sorted(table, key=lambda name: (name != "none", name))}
 
 
 def detection(outcomes: Iterable[Outcome]) -> dict[str, dict]:
@@ -399,6 +409,20 @@ def detection(outcomes: Iterable[Outcome]) -> dict[str, dict]:
         | _half(p)
         for name, p in sorted(points.items())
     }
+
+
+def noticing(outcomes: Iterable[Outcome]) -> list[dict]:
+    """Single effects of all kinds together: how many were noticed and named, by how visible they are."""
+    singles = [o for o in outcomes if o.key["kind"] == "single" and o.errors]
+    found = []
+    for low, high in pairwise(FLOORS):
+        inside = [o for o in singles if low <= o.size < high]
+        if inside:
+            row = {"low": low, "high": high, "size": float(np.median([o.size for o in inside]))}
+            row["noticed"] = count("noticed", inside, lambda o: o.verdict not in ("agrees", "none"))
+            row["named"] = count("named first", inside, lambda o: o.first in o.names)
+            found.append(row)
+    return found
 
 
 def _half(points: list[dict]) -> dict:
@@ -464,6 +488,7 @@ def score(outcomes: Sequence[Outcome]) -> dict:
         "rivals": rivalry(outcomes),
         "reliability": reliability(outcomes),
         "detection": detection(outcomes),
+        "noticing": noticing(outcomes),
         "confusion": confusion(outcomes),
         "kept_back": [
             {"case": o.key["case"], "kind": o.key["kind"], "before": o.size, "after": o.left}

@@ -1,11 +1,13 @@
 """The score, on answers and diagnoses made up so that it can be said beforehand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from proof import score as scoring
 from proof.figures import write_figures
-from proof.page import page
+from proof.page import _kept, page
 from proof.score import Outcome
 
 
@@ -151,4 +153,26 @@ def test_every_miss_is_on_the_page(tmp_path):
     assert "imported virtualrig" in text
     assert "| clean: not accused | 1/3 |" in text
     assert all((tmp_path / "figures" / name).stat().st_size > 5000 for name in figures)
-    assert len(figures) == 4
+    assert len(figures) == 5
+
+
+def test_what_more_cases_would_decide_is_open():
+    few, many, none = (scoring.rate("", k, n, 0.9) for k, n in ((8, 8), (800, 800), (500, 800)))
+    assert [_kept(r) for r in (few, many, none)] == ["yes, open", "yes", "**no**"]
+
+
+def test_noticing_is_counted_by_how_visible_an_effect_is():
+    low, high = scoring.noticing([FOUND, MISNAMED, UNSEEN, OVERLOOKED, CLEAN])
+    assert (low["low"], low["noticed"]["k"], low["noticed"]["n"]) == (1.6, 0, 1)
+    assert (high["noticed"]["k"], high["named"]["k"], high["named"]["n"]) == (2, 1, 3)
+
+
+def test_a_rival_is_nearer_where_it_leaves_less():
+    beaten, better = (replace(FOUND, rivals={"x": {"tau_in_Nm": left}}) for left in (3.0, 1.5))
+    _, row, _ = scoring.rivalry([beaten, better])
+    assert (row["rival"], row["nearer"]["k"], row["nearer"]["n"]) == ("x", 1, 2)
+
+
+def test_a_crash_is_no_way_to_hide_a_visible_effect():
+    crashed = Outcome(answer("single", GAIN), None, "exit code 1")
+    assert rate_of("single, visible: noticed", FOUND, crashed) == (1, 2)
