@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from ccmodel.diagnose.evidence import weigh
 from ccmodel.diagnose.judge import Judgement
 from ccmodel.diagnose.locate import location
-from made_evidence import NOISE, batch, calibrated
+from made_evidence import NOISE, PARAMETERS, batch, calibrated
 
 
 def wave(said, channel):
@@ -29,3 +30,17 @@ def test_a_ripple_of_both_torques_sits_in_between():
     recordings = batch(lambda said: wave(said, "tau_in_Nm") | wave(said, "tau_out_Nm") | wave(said, "theta_out_rad"))
     base = calibrated(recordings)
     assert location(Judgement("unexplained", base, base, [], [], 1.0, [], {}, recordings))["place"] == "conduit"
+
+
+def test_the_only_channel_there_is_gives_a_place_all_the_same():
+    one = [only(w.evidence, "tau_in_Nm") for w in batch(lambda said: wave(said, "tau_in_Nm"))]
+    recordings = [weigh(e, PARAMETERS) for e in one]
+    base = calibrated(recordings)
+    found = location(Judgement("unexplained", base, base, [], [], 1.0, [], {}, recordings))
+    assert (found["place"], found["channels"]) == ("drive-pulley", ["tau_in"])
+
+
+def only(evidence, channel):
+    for other in set(evidence.channels) - {channel}:
+        evidence = evidence.without(other)
+    return evidence

@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from ccmodel import mechanisms as registry
 from ccmodel.diagnose import experiment, locate
-from ccmodel.diagnose.evidence import Weighed, weigh
+from ccmodel.diagnose.evidence import FRICTION_SPREAD, Weighed, weigh
 from ccmodel.diagnose.hypothesis import Hypothesis, singles
 from ccmodel.diagnose.judge import MOST_ALTERNATIVES, RIGHT, RIVAL, Judgement, judge, nested_errors
 from ccmodel.diagnose.trial import Trial, fit, moved_by_finer
@@ -216,7 +216,7 @@ def _values_of(beside: Parameters, calibrated: Mapping[str, Free], model: Hypoth
 
 
 def _first_fit(evidence: Sequence[Evidence], calibrated: Mapping[str, Free]) -> dict[str, float]:
-    problem = Problem(evidence, calibrated, {"friction_scale": Free(1.0, 0.2, 5.0, 0.01)})
+    problem = Problem(evidence, calibrated, {"friction_scale": Free(1.0, 0.2, 5.0, FRICTION_SPREAD)})
     found = solve(problem, problem.start, most_evaluations=20, tolerance=1e-4)
     return dict(zip(calibrated, found.x.tolist(), strict=False))
 

@@ -69,10 +69,14 @@ def _place(judgement: Judgement) -> str:
     is not fitted. What spoils several lies between them, and where along the way the screening knows best.
     """
     weighed = judgement.weighed
-    left = {c: excess_without(c, weighed, judgement.calibrated) for c in _channels(weighed)}
-    guilty = min(left, key=left.get)
-    alone = left[guilty] < ALONE * max(float(judgement.calibrated.left.mean() - 1.0), 0.0)
-    suspects = PLACES_OF[guilty] if alone else BETWEEN
+    channels = _channels(weighed)
+    if len(channels) == 1:
+        suspects = (*PLACES_OF[channels[0]], *BETWEEN)
+    else:
+        left = {c: excess_without(c, weighed, judgement.calibrated) for c in channels}
+        guilty = min(left, key=left.get)
+        alone = left[guilty] < ALONE * max(float(judgement.calibrated.left.mean() - 1.0), 0.0)
+        suspects = PLACES_OF[guilty] if alone else BETWEEN
     found = [s.hypothesis.acting[0][1] for s in judgement.scores if s.hypothesis.acting[0][1] in suspects and s.values]
     return found[0] if found else suspects[0]
 

@@ -19,7 +19,7 @@ def _enters(settings, place, values):
         settings.load_end_compliance = values["compliance"]
 
 
-# 5 to 100 % of a cable's own: 1 / 13.88 kN/m is 72 um/N.
+# 4 to 200 % of a cable's own: 1 / 13.88 kN/m is 72 um/N.
 MECHANISM = Mechanism(
     name="termination-compliance",
     places=("drive-end", "load-end"),

@@ -14,7 +14,8 @@ def _enters(settings, place, values):
     settings.viscous = values["c"]
 
 
-# A film that takes 1 to 40 % of Coulomb friction: 0.05 to 2 N over a metre of conduit at some 3 mm/s.
+# From a film that is all but nothing to one that takes half of what Coulomb friction does: 15 mN to 3 N over a metre of
+# conduit at some 3 mm/s.
 MECHANISM = Mechanism(
     name="viscous-friction",
     places=("conduit",),
