@@ -17,15 +17,15 @@ NOISE = {"tau_in_Nm": 1e-4, "tau_out_Nm": 1e-4, "F_drive_N": 0.05, "F_load_N": 0
 ACCURACY = {"tau_in_Nm": 1e-4, "tau_out_Nm": 1e-4, "F_drive_N": 0.1, "F_load_N": 0.1}
 
 
-def weighed(amplitude=0.6, frequency=1.0, pretension_N=7.0, seed=0, spoil=lambda said: {}):
-    """One recording; `spoil` says what is added to channels of what the model says."""
+def weighed(amplitude=0.6, frequency=1.0, pretension_N=7.0, seed=0, spoil=lambda said: {}, truth=PARAMETERS):
+    """One recording; `spoil` says what is added to channels of what the model with `truth` says."""
     random = np.random.default_rng(seed)
     drive = recording(
         id=f"r{seed}",
         pretension_N=pretension_N,
         theta_in_rad=lambda t: amplitude * np.sin(2 * np.pi * frequency * np.clip(t - 0.3, 0, None)),
     )
-    said = simulate(ModelInput.of(drive), PARAMETERS)
+    said = simulate(ModelInput.of(drive), truth)
     added = spoil(said)
     channels = {c: v + added.get(c, 0.0) for c, v in said.channels.items()}
     channels |= {c: channels[c] + sd * random.standard_normal(channels[c].size) for c, sd in NOISE.items()}
@@ -40,10 +40,10 @@ def weighed(amplitude=0.6, frequency=1.0, pretension_N=7.0, seed=0, spoil=lambda
     return weigh(Evidence.of(measured, PARAMETERS), PARAMETERS)
 
 
-def batch(spoil=lambda said: {}):
+def batch(spoil=lambda said: {}, truth=PARAMETERS):
     """Four recordings of different motions and pretensions."""
     conditions = ((0.6, 1.0, 7.0), (0.4, 0.7, 7.0), (0.6, 1.0, 5.0), (0.5, 1.3, 6.0))
-    return [weighed(*condition, seed=k, spoil=spoil) for k, condition in enumerate(conditions)]
+    return [weighed(*condition, seed=k, spoil=spoil, truth=truth) for k, condition in enumerate(conditions)]
 
 
 def calibrated(recordings):

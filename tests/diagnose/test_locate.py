@@ -1,11 +1,14 @@
 """The place of a mismatch that no mechanism accounts for."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ccmodel.diagnose.evidence import weigh
 from ccmodel.diagnose.judge import Judgement
 from ccmodel.diagnose.locate import location
+from ccmodel.model.general.run import Active
 from made_evidence import NOISE, PARAMETERS, batch, calibrated
 
 
@@ -16,7 +19,13 @@ def wave(said, channel):
 
 @pytest.mark.parametrize(
     "channel, place",
-    [("tau_in_Nm", "drive-pulley"), ("F_drive_N", "drive-sensor"), ("F_load_N", "load-sensor"), ("tau_out_Nm", "load")],
+    [
+        ("theta_out_rad", "load-sensor"),
+        ("tau_in_Nm", "drive-pulley"),
+        ("tau_out_Nm", "load-sensor"),
+        ("F_drive_N", "drive-sensor"),
+        ("F_load_N", "load-sensor"),
+    ],
 )
 def test_a_channel_that_is_off_alone_gives_its_place_away(channel, place):
     recordings = batch(lambda said: wave(said, channel))
@@ -24,6 +33,13 @@ def test_a_channel_that_is_off_alone_gives_its_place_away(channel, place):
     found = location(Judgement("unexplained", base, base, [], [], 1.0, [], {}, recordings))
     assert found["place"] == place
     assert found["channels"][0] == channel.rsplit("_", 1)[0]
+
+
+def test_a_load_of_another_law_leaves_cables_right_that_are_driven_by_its_torque():
+    stiff = Active("load-stiffening", "load", {"K3": 0.1})
+    recordings = batch(truth=replace(PARAMETERS, mechanisms=(stiff,)))
+    base = calibrated(recordings)
+    assert location(Judgement("unexplained", base, base, [], [], 1.0, [], {}, recordings))["place"] == "load"
 
 
 def test_a_ripple_of_both_torques_sits_in_between():

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ccmodel.failure import ModelError
 from ccmodel.identify.noise import PHASES, drive_errors, rounding_errors, sensor_noise, size_over_time
 from ccmodel.model.parameters import Parameters
-from ccmodel.model.run import PRESCRIBED, ModelInput, simulate
+from ccmodel.model.run import PRESCRIBED, LoadFrom, ModelInput, simulate
 from ccmodel.model.sensitivity import STEP, size_of
 from ccmodel.recording import Recording
 
@@ -61,6 +61,8 @@ class Evidence:
         Whether where in its count the drive first rests is an unknown of the fit, and not part of the noise.
     allowance : ndarray, shape (channels,)
         Share of each one's peak to peak that `sigma` has besides the noise.
+    load_from : {"law", "torque"}
+        Whether the load's law drives the cables' far end, or the torque that was measured there.
     """
 
     given: ModelInput
@@ -71,6 +73,7 @@ class Evidence:
     sigma: NDArray
     allowance: NDArray
     placed: bool = False
+    load_from: LoadFrom = "law"
 
     @classmethod
     def of(
@@ -114,6 +117,10 @@ class Evidence:
         series = {name: getattr(self, name)[kept] for name in ("measured", "sigma", "allowance")}
         return replace(self, channels=channels, **series)
 
+    def driven_by_torque(self) -> "Evidence":
+        """The same with the torque that was measured at the load in place of the load's law."""
+        return replace(self.without("tau_out_Nm"), load_from="torque")
+
     @property
     def allowed(self) -> float:
         """What the allowance may leave of the mean square of errors over `sigma`, in law as well as in chance."""
@@ -126,7 +133,7 @@ class Evidence:
 
     def modelled(self, values: Mapping[str, float]) -> NDArray:
         """What the model says with some parameters replaced, shape (channels, judged samples)."""
-        said = simulate(self.given, self.parameters.with_values(values))
+        said = simulate(self.given, self.parameters.with_values(values), self.load_from)
         return np.stack([said[c][self.judged] for c in self.channels])
 
     def errors(self, values: Mapping[str, float]) -> NDArray:
