@@ -51,7 +51,8 @@ def location(judgement: Judgement) -> dict:
     """Place, channels and parts of the motion that carry the mismatch, and a sentence."""
     if judgement.verdict == "agrees":
         return {"place": None, "channels": [], "phases": [], "text": "model and recordings agree within the noise"}
-    places = list(dict.fromkeys(place for _, place in judgement.best.hypothesis.acting)) or [_place(judgement)]
+    acting = judgement.best.hypothesis.acting
+    places = list(dict.fromkeys(place for _, place in acting)) or _places(judgement)
     table = mismatch(judgement.weighed, judgement.calibrated)
     by_channel = {c: float(np.sqrt(np.nanmean(np.square(list(parts.values()))))) for c, parts in table.items()}
     worst = max(by_channel.values())
@@ -59,13 +60,13 @@ def location(judgement: Judgement) -> dict:
     by_part = {p: float(np.sqrt(np.nanmean([table[c][p] ** 2 for c in channels]))) for p in PARTS}
     parts = [p for p in PARTS if by_part[p] > 0.7 * max(by_part.values())]
     verb = "is" if len(channels) == 1 else "are"
-    where = " and ".join(TEXT[place] for place in places)
+    where = (" and " if acting else " or ").join(TEXT[place] for place in places)
     text = f"The mismatch sits {where}: {', '.join(channels)} {verb} off most, {' and '.join(parts)}."
     return {"place": places[0], "channels": channels, "phases": parts, "text": text}
 
 
-def _place(judgement: Judgement) -> str:
-    """Where the mismatch sits as far as it can be said without a mechanism that accounts for it.
+def _places(judgement: Judgement) -> list[str]:
+    """Where the mismatch sits as far as it can be said without a mechanism that accounts for it, likeliest first.
 
     A sensor or pulley at fault spoils one channel, and the calibrated model is right in all others once that channel
     is not fitted. A load with another law leaves the cables right that are driven by its torque. What neither of these
@@ -79,8 +80,8 @@ def _place(judgement: Judgement) -> str:
         tried.append((excess(driven, calibrated), AT_THE_LOAD))
     left, places = min(tried, default=(0.0, PLACES_OF[channels[0]]))
     suspects = places if left <= ALONE * max(float(calibrated.left.mean() - 1.0), 0.0) else BETWEEN
-    found = [s.hypothesis.acting[0][1] for s in judgement.scores if s.hypothesis.acting[0][1] in suspects and s.values]
-    return found[0] if found else suspects[0]
+    found = [s.hypothesis.acting[0][1] for s in judgement.scores if s.values]
+    return list(dict.fromkeys([*(place for place in found if place in suspects), *suspects]))
 
 
 def without(channel: str, weighed: Sequence[Weighed]) -> list[Evidence]:
