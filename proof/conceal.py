@@ -8,7 +8,7 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -95,13 +95,13 @@ def stage(sources: Path = SOURCES) -> Path:
     return staged
 
 
-def run(arguments: Sequence[str], folder: Path, sources: Path = SOURCES) -> Ran:
-    """Run a ccmodel command with `folder` as its whole world.
+def run(commands: Sequence[Sequence[str]], folder: Path, sources: Path = SOURCES) -> Ran:
+    """Run ccmodel commands, one after the other in one process, with `folder` as its whole world.
 
     Parameters
     ----------
-    arguments : sequence of str
-        Of the command; paths in it are relative to `folder`.
+    commands : sequence of sequence of str
+        Arguments of each; paths in them are relative to `folder`.
     folder : Path
         Holds the batch and takes the results.
     sources : Path
@@ -117,7 +117,7 @@ def run(arguments: Sequence[str], folder: Path, sources: Path = SOURCES) -> Ran:
         "path": [str(staged), *libraries],
         "readable": [*standard, *libraries, *SYSTEM],
         "writable": [str(staged), str(folder)],
-        "argv": ["ccmodel", *arguments],
+        "commands": list(map(list, commands)),
         "tell": tells,
     }
     environment = {
@@ -184,22 +184,36 @@ def diagnose(
         if beside is not None:
             shutil.copy(beside, world / "known.json")
             words += ["--beside", "known.json"]
-        ran = run(["diagnose", batch.name, "--out", "out", *words], world, sources)
+        ran = run([["diagnose", batch.name, "--out", "out", *words]], world, sources)
         altered = ("altered the batch",) if folder_digest(world / batch.name) != before else ()
         if (world / "out").exists():
             shutil.copytree(world / "out", out, dirs_exist_ok=True)
     return Ran(ran.code, ran.said, ran.tampering + altered)
 
 
-def predict(blinded: Path, model: Path, out: Path, sources: Path = SOURCES) -> Ran:
-    """Predict a batch with a model file in an otherwise empty folder; predictions are brought to `out`."""
+def predict(blinded: Path, models: Mapping[Path, Path], sources: Path = SOURCES) -> Ran:
+    """Predict a batch with model files in an otherwise empty folder; predictions are brought to the folder of each.
+
+    Parameters
+    ----------
+    blinded : Path
+        The batch.
+    models : mapping of Path to Path
+        Model files, and the folders that get what they say.
+    sources : Path
+        The diagnosis's package.
+    """
     with tempfile.TemporaryDirectory(prefix="batch-") as folder:
         world = Path(folder)
-        shutil.copytree(blinded, world / blinded.name)
-        shutil.copy(model, world / "model.json")
-        ran = run(["predict", blinded.name, "--model", "model.json", "--out", "out"], world, sources)
-        if (world / "out").exists():
-            shutil.copytree(world / "out", out, dirs_exist_ok=True)
+        shutil.copytree(blinded, world / blinded.name, copy_function=shutil.copyfile)
+        commands = []
+        for k, model in enumerate(models):
+            shutil.copyfile(model, world / f"model-{k}.json")
+            commands.append(["predict", blinded.name, "--model", f"model-{k}.json", "--out", f"out-{k}"])
+        ran = run(commands, world, sources)
+        for k, out in enumerate(models.values()):
+            if (world / f"out-{k}").exists():
+                shutil.copytree(world / f"out-{k}", out, dirs_exist_ok=True)
     return ran
 
 

@@ -1,8 +1,8 @@
-"""Runs a command of the diagnosis with nothing in reach but the batch: ``python -I -S guard.py JSON``.
+"""Runs commands of the diagnosis with nothing in reach but the batch: ``python -I -S guard.py JSON``.
 
 Not imported by the proof: it is the whole of what the concealed process starts from, and imports only the standard
 library. The JSON names the folders that may be read and written, those that are put on the import path, the file
-descriptor on which tampering is told, and the command's arguments.
+descriptor on which tampering is told, and the commands' arguments.
 
 Python's audit hooks see every file that is opened, every folder that is listed, every import, every process that is
 started and every connection, and cannot be taken out again. What compiled code reads past Python they do not see, and
@@ -62,13 +62,19 @@ def guard(readable: list[str], writable: list[str], tell: int) -> None:
 
 
 def main(told: dict) -> None:
-    """Set up the import path, close the door and run the command."""
+    """Set up the import path, close the door and run the commands; exits with the highest of their codes."""
     sys.path[:] = told["standard"] + told["path"]
-    sys.argv = told["argv"]
     # The first time it is imported it looks all over the machine for fonts, and starts a program to ask for more.
     import_module("matplotlib.font_manager")
     guard(told["readable"], told["writable"], told["tell"])
-    import_module("ccmodel.cli").main()
+    run, codes = import_module("ccmodel.cli").main, [0]
+    for words in told["commands"]:
+        sys.argv = ["ccmodel", *words]
+        try:
+            run()
+        except SystemExit as ended:
+            codes.append(ended.code or 0)
+    sys.exit(max(codes))
 
 
 if __name__ == "__main__":

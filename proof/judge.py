@@ -59,7 +59,7 @@ def judge(
             predictions = {which: Path(folder) / which for which in MODELS}
             errors = _errors(floors, kept, out, predictions, sources, tampering)
             if errors and with_rivals:
-                conceal.predict(batch, out / MODELS["before"], Path(folder) / "fitted", sources)
+                conceal.predict(batch, {out / MODELS["before"]: Path(folder) / "fitted"}, sources)
                 rivalled = rivals.errors(batch, Path(folder) / "fitted", kept, predictions["before"])
     result = {
         "case": case.name,
@@ -119,9 +119,9 @@ def _errors(
     with tempfile.TemporaryDirectory(prefix="blinded-") as folder:
         blinded = Path(folder) / kept.name
         blind(kept, blinded)
-        for which, model in MODELS.items():
-            said = predictions[which]
-            tampering += conceal.predict(blinded, out / model, said, sources).tampering
+        asked = {out / model: predictions[which] for which, model in MODELS.items()}
+        tampering += conceal.predict(blinded, asked, sources).tampering
+        for which, said in predictions.items():
             try:
                 squares[which] = [error_squares(kept, id_, said / f"{id_}.csv") for id_ in floors]
             except (OSError, KeyError, ValueError):

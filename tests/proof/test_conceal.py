@@ -104,3 +104,19 @@ def test_the_copy_of_the_diagnosis_is_that_of_its_sources(diagnosis):
     (package / "cli.py").write_text("def main(): return 1\n")
     assert conceal.stage(package) != first
     assert not (first / "virtualrig").exists()
+
+
+def test_models_predict_one_after_the_other_and_one_that_fails_is_told(batch, diagnosis, tmp_path):
+    body = """
+import pathlib, sys
+model, out = pathlib.Path(sys.argv[4]), pathlib.Path(sys.argv[6])
+if model.read_text() == "bad": sys.exit(1)
+out.mkdir()
+(out / "said").write_text(model.read_text())
+"""
+    for name in ("bad", "good"):
+        (tmp_path / name).write_text(name)
+    models = {tmp_path / name: tmp_path / f"from-{name}" for name in ("bad", "good")}
+    assert conceal.predict(batch, models, diagnosis(body)).code == 1
+    assert (tmp_path / "from-good" / "said").read_text() == "good"
+    assert not (tmp_path / "from-bad").exists()
