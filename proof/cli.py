@@ -69,7 +69,7 @@ def run(
     rivals: Rivals = False,
     cores: Cores = 1,
 ) -> None:
-    """Record cases and have each diagnosed where nothing else is in reach; cases that have a result are kept."""
+    """Record cases and have each diagnosed where nothing else is in reach; results of the same sources are kept."""
     _judge_each(cases_of(seed, count, kind, effect), out, rivals, cores)
 
 
@@ -84,9 +84,13 @@ def full(
     out: Annotated[Path, typer.Option(help="Folder of this one case.")],
     index: Annotated[int, typer.Option(min=0, help="Number of the case in the full proof.")],
     rivals: Rivals = False,
+    digest: Annotated[str | None, typer.Option(help="Of the sources that the run began with.")] = None,
 ) -> None:
     """One case of the full proof, whose seed follows from the diagnosis's sources and its number."""
-    _judge(draw(seed_of(conceal.digest_of(), index)), out, rivals)
+    found = conceal.digest_of()
+    if digest not in (None, found):
+        raise typer.BadParameter("the diagnosis has changed since this run began: begin it again, or undo the change")
+    _judge(draw(seed_of(found, index)), out, rivals)
 
 
 @app.command()
@@ -181,10 +185,15 @@ def part_of(digest: str, n: int) -> list[int]:
 
 
 def _judge_each(cases: list[Case], out: Path, rivals: bool, cores: int) -> None:
-    """Cases that have no result yet, some at a time."""
-    wanted = [case for case in cases if not (out / case.name / "result.json").exists()]
+    """Cases that have no result of these sources yet, some at a time."""
+    digest = conceal.digest_of()
+    wanted = [case for case in cases if not _is_of(digest, out / case.name / "result.json")]
     with ProcessPoolExecutor(cores) as pool:
         list(pool.map(partial(_judge, rivals=rivals), wanted, [out / case.name for case in wanted]))
+
+
+def _is_of(digest: str, result: Path) -> bool:
+    return result.exists() and json.loads(result.read_text(encoding="utf-8")).get("sources") == digest
 
 
 def _judge(case: Case, out: Path, rivals: bool) -> None:

@@ -73,8 +73,16 @@ def main(told: dict) -> None:
         try:
             run()
         except SystemExit as ended:
-            codes.append(ended.code or 0)
+            codes.append(_code(ended))
     sys.exit(max(codes))
+
+
+def _code(ended: SystemExit) -> int:
+    """The exit code of what ended a command; as Python does, a text is said and counts as one."""
+    if isinstance(ended.code, str):
+        print(ended.code, file=sys.stderr)
+        return 1
+    return ended.code or 0
 
 
 if __name__ == "__main__":

@@ -42,8 +42,9 @@ def judge(
     Returns
     -------
     dict
-        What is in ``result.json``: the case's seed and the digest of its key, what the diagnosis said, and in each
-        channel the errors on the kept-back recordings before and after it, beside their floor.
+        What is in ``result.json``: the case's seed, the digests of its key and of the diagnosis's sources, what the
+        diagnosis said, and in each channel the errors on the kept-back recordings before and after it, beside their
+        floor.
     """
     started = conceal.core_s()
     out.mkdir(parents=True, exist_ok=True)
@@ -66,6 +67,7 @@ def judge(
         "seed": case.seed,
         "asked": case.asked,
         "key": case.digest,
+        "sources": conceal.digest_of(sources),
         "batch": digest,
         "tampering": tampering,
         "why": None if diagnosis is not None else f"exit code {ran.code}: {ran.said.strip()[-500:]}",

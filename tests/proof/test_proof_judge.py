@@ -5,10 +5,13 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
+from typer.testing import CliRunner
 
+from proof import conceal
 from proof import judge as judging
 from proof.build import record
 from proof.cases import draw
+from proof.cli import _is_of, app
 from proof.measured import REST_S
 from proof.score import outcome
 
@@ -20,7 +23,7 @@ import numpy as np, pandas as pd
 COUNT, AMPERE = 2 * np.pi / 2000, 0.0234
 
 def main():
-    what, batch, out = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path("out")
+    what, batch, out = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[sys.argv.index("--out") + 1])
     out.mkdir(exist_ok=True)
     if what == "diagnose":
         said = {"verdict": "agrees", "location": None, "mechanisms": [], "alternatives": []}
@@ -55,6 +58,18 @@ def stand_in(tmp_path_factory):
 @pytest.fixture(scope="module")
 def result(case, stand_in, tmp_path_factory):
     return judging.judge(case, tmp_path_factory.mktemp("judged"), stand_in, tell=lambda line: None)
+
+
+def test_results_of_other_sources_are_not_kept(result, stand_in, tmp_path):
+    (tmp_path / "result.json").write_text(json.dumps(result))
+    assert _is_of(conceal.digest_of(stand_in), tmp_path / "result.json")
+    assert not _is_of(conceal.digest_of(), tmp_path / "result.json")
+
+
+def test_a_run_whose_diagnosis_changed_on_the_way_is_refused(tmp_path):
+    ran = CliRunner().invoke(app, ["full", "--index", "1", "--out", str(tmp_path), "--digest", "0" * 16])
+    assert ran.exit_code == 2
+    assert "has changed since this run began" in " ".join(ran.output.split())
 
 
 def test_a_result_holds_what_was_said_and_no_answer(case, result):
