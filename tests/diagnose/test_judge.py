@@ -10,6 +10,7 @@ import pytest
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.diagnose.judge import (
     ENOUGH,
+    RIVAL,
     SURE,
     Comparison,
     _fit_all,
@@ -58,6 +59,15 @@ def test_one_mechanism_brings_it_down_to_noise_and_nothing_else_does():
     assert found.probability[0] > 0.99
 
 
+def test_what_helps_one_recording_and_harms_others_is_not_missing():
+    base = trial(1.1)
+    learnt = trial([0.1, *[1.15] * 7], FRICTION)
+    known = trial([0.1, *[1.1] * 7], FRICTION)
+    assert learnt.left.mean() < 0.95 * base.left.mean()
+    assert verdict(base, learnt).verdict == "agrees"
+    assert verdict(base, known).verdict != "agrees"
+
+
 def test_two_that_do_as_well_are_not_told_apart():
     found = verdict(trial(6.0), trial(1.0, FRICTION), trial(1.0005, SCALE))
     assert found.verdict == "undecided"
@@ -79,11 +89,11 @@ def test_what_may_as_well_be_on_no_list_is_not_named_alone():
     assert verdict(trial(14.0), trial(1.12, FRICTION)).verdict == "explained"
 
 
-def test_what_is_more_likely_on_no_list_is_unexplained():
-    poor = verdict(trial(6.0), trial(1.74, FRICTION))
-    assert poor.probability[0] > SURE
-    assert poor.listed < 0.5
-    assert poor.verdict == "unexplained"
+def test_what_is_all_but_surely_on_no_list_is_unexplained():
+    poor, hopeless = verdict(trial(6.0), trial(1.74, FRICTION)), verdict(trial(2.0), trial(1.54, FRICTION))
+    assert min(poor.probability[0], hopeless.probability[0]) > SURE
+    assert hopeless.listed < RIVAL < poor.listed < 0.5
+    assert (poor.verdict, hopeless.verdict) == ("undecided", "unexplained")
 
 
 def test_a_single_recording_gives_no_sure_name():

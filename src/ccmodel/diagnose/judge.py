@@ -20,9 +20,11 @@ from ccmodel.failure import ModelError
 from ccmodel.identify.problem import Free, each
 
 # A mechanism is worth a trial if it takes this share off the calibrated model's mean square, and a naming if it takes
-# more than this off what is left of held-out recordings.
+# more than this off what is left of held-out recordings, and off nearly all of them: one that makes some worse by this
+# share of what it makes others better has learnt a recording, and not the rig.
 WORTH_A_TRIAL = 0.01
-WORTH_A_NAME = 0.03
+WORTH_A_NAME = 0.05
+UNSTEADY = 0.25
 # Trials after the screening, how many at least where something is missing (the screening is linear, and what rings or
 # sticks is not); singles that may be one of a pair, and partners tried with each.
 TRIALS, FEWEST_TRIALS = 6, 3
@@ -323,18 +325,23 @@ def _verdict(found: Comparison, scores: list[Score]) -> Judgement:
         likely = [trials[k] for k in order], [probability[k] for k in order]
         return Judgement(verdict, base, best, *likely, listed, scores, learnable, found.weighed)
 
-    best = trials[0] if trials else base
-    matters = trials and _left(base) - _left(best) > WORTH_A_NAME * max(1.0, _left(base))
-    if not matters or 1.0 - sum(probability) > 0.5:
+    if not _matters(likeliest, base) or 1.0 - sum(probability) > 0.5:
         return judged("agrees" if is_right(base, base, learnable) else "unexplained", base)
     if not is_right(likeliest, base, learnable) or not plausible(likeliest.hypothesis, likeliest.values):
         return judged("unexplained", base)
-    if listed < 0.5:
+    if listed * max(probability) <= RIVAL:  # Nothing is left to be undecided about.
         return judged("unexplained", base)
     # A mechanism that could be at either of two places is named all the same.
     names = likeliest.hypothesis.names
     sure = sum(p for t, p in zip(trials, probability, strict=True) if t.hypothesis.names == names)
     return judged("explained" if listed * sure >= SURE else "undecided", likeliest)
+
+
+def _matters(trial: Trial, base: Trial) -> bool:
+    """Whether a hypothesis takes enough off what the calibrated model leaves, and not off some recordings alone."""
+    gain = base.left - trial.left
+    better, worse = gain.clip(0.0).mean(), -gain.clip(None, 0.0).mean()
+    return bool(better - worse > WORTH_A_NAME * max(1.0, _left(base)) and worse < UNSTEADY * better)
 
 
 def nested_errors(judgement: Judgement) -> list[Trial]:
