@@ -133,7 +133,7 @@ def simulate(
     pretension: Annotated[float | None, typer.Option(min=0.0, help="Of both cables, N, in its stead.")] = None,
 ) -> None:
     """Say what the sensors would read if the drive of a rig moved so, by a fitted model."""
-    from ccmodel.stages.simulate import simulate as run
+    from ccmodel.stages.simulate_motion import simulate_motion as run
 
     run(motion, model, batch, out, recording, pretension)
 

@@ -34,8 +34,8 @@ def stand_in(monkeypatch):
     The process that the real one runs in has tests of its own (test_conceal.py).
     """
 
-    def run(words, folder, sources):
-        out = folder / "out"
+    def run(commands, folder, sources):
+        (words,), out = commands, folder / "out"
         out.mkdir()
         allowance = float(words[words.index("--allowance") + 1])
         beside = json.loads((folder / words[words.index("--beside") + 1]).read_text()) if "--beside" in words else None
