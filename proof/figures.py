@@ -9,10 +9,15 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 # Okabe and Ito's colours, told apart by all kinds of eyes; shapes differ too.
-BLUE, ORANGE, GREY, GREEN = "#0072B2", "#E69F00", "#999999", "#009E73"
+BLUE, ORANGE, GREY, GREEN, PURPLE = "#0072B2", "#E69F00", "#999999", "#009E73", "#CC79A7"
 COLUMNS = 4
-KINDS = {"clean": ("o", GREY), "single": ("s", BLUE), "pair": ("^", GREEN), "unlisted": ("D", ORANGE)}
-KINDS |= {"poor": ("v", "#CC79A7")}
+KINDS = {
+    "clean": ("o", GREY),
+    "single": ("s", BLUE),
+    "pair": ("^", GREEN),
+    "unlisted": ("D", ORANGE),
+    "poor": ("v", PURPLE),
+}
 NAMES = {"unlisted": "not on the list", "poor": "poor protocol"}
 
 

@@ -118,6 +118,16 @@ class Outcome:
         return (e["before"] - e["after"]) / (e["before"] - e["floor"])
 
     @property
+    def is_noticed(self) -> bool:
+        """Whether the diagnosis says that something is missing."""
+        return self.verdict not in ("agrees", "none")
+
+    @property
+    def is_named_first(self) -> bool:
+        """Whether what it names first is hidden."""
+        return self.first in self.names
+
+    @property
     def confidently_wrong(self) -> bool:
         """Whether a name stated with confidence is of nothing that is hidden, or too many were named."""
         said = self.said["mechanisms"] if self.said else []
@@ -215,19 +225,16 @@ def rates(outcomes: Sequence[Outcome]) -> list[dict]:
     rich = [o for o in singles if o.key["protocol"] == "rich"]
     seen, rich_seen = [o for o in singles if o.is_visible], [o for o in rich if o.is_visible]
 
-    def named_first(o):
-        return o.first in o.names
-
     def open_or_right(o):
-        return named_first(o) or bool(o.names & set(o.open_set))
+        return o.is_named_first or bool(o.names & set(o.open_set))
 
     return [
         count("a verdict at all", outcomes, lambda o: o.said is not None, 1.0),
         count("clean: not accused", clean, lambda o: o.verdict == "agrees", 0.98),
-        count("single, visible: noticed", seen, lambda o: o.verdict not in ("agrees", "none"), 0.95),
+        count("single, visible: noticed", seen, lambda o: o.is_noticed, 0.95),
         count("single, visible: right place", seen, right_place, 0.95),
-        count("single, rich, visible: named first", rich_seen, named_first, 0.90),
-        count("single, rich, of any size: named first", rich, named_first),
+        count("single, rich, visible: named first", rich_seen, lambda o: o.is_named_first, 0.90),
+        count("single, rich, of any size: named first", rich, lambda o: o.is_named_first),
         count("single, of any size: named, or undecided with it", singles, open_or_right),
         count("not confidently wrong", outcomes, lambda o: not o.confidently_wrong, 0.98),
         count(
@@ -240,11 +247,11 @@ def rates(outcomes: Sequence[Outcome]) -> list[dict]:
         count(
             "outside the list, visible: noticed",
             [o for o in outside if o.is_visible],
-            lambda o: o.verdict not in ("agrees", "none"),
+            lambda o: o.is_noticed,
         ),
         count(
             "outside the list, noticed: right place",
-            [o for o in outside if o.verdict not in ("agrees", "none")],
+            [o for o in outside if o.is_noticed],
             right_place,
         ),
         count("pair: both named", pairs, lambda o: o.names <= {m["name"] for m in o.named}, 0.75),
@@ -400,8 +407,8 @@ def detection(outcomes: Iterable[Outcome]) -> dict[str, dict]:
                     "strength": truth["strength"],
                     "size": abs(truth["size"]),
                     "over_floor": None if np.isnan(o.size) else o.size,
-                    "noticed": o.verdict not in ("agrees", "none"),
-                    "named": o.first in o.names,
+                    "noticed": o.is_noticed,
+                    "named": o.is_named_first,
                 }
             )
     return {
@@ -419,8 +426,8 @@ def noticing(outcomes: Iterable[Outcome]) -> list[dict]:
         inside = [o for o in singles if low <= o.size < high]
         if inside:
             row = {"low": low, "high": high, "size": float(np.median([o.size for o in inside]))}
-            row["noticed"] = count("noticed", inside, lambda o: o.verdict not in ("agrees", "none"))
-            row["named"] = count("named first", inside, lambda o: o.first in o.names)
+            row["noticed"] = count("noticed", inside, lambda o: o.is_noticed)
+            row["named"] = count("named first", inside, lambda o: o.is_named_first)
             found.append(row)
     return found
 
@@ -473,9 +480,9 @@ def is_right(o: Outcome) -> bool:
         case "pair":
             return o.names <= {m["name"] for m in o.named}
         case "poor":
-            return o.first in o.names or bool(o.names & set(o.open_set)) or (o.verdict == "agrees" and not o.is_visible)
+            return o.is_named_first or bool(o.names & set(o.open_set)) or (o.verdict == "agrees" and not o.is_visible)
         case _:
-            return o.first in o.names or (o.verdict in ("agrees", "undecided") and not o.is_visible)
+            return o.is_named_first or (o.verdict in ("agrees", "undecided") and not o.is_visible)
 
 
 def score(outcomes: Sequence[Outcome]) -> dict:

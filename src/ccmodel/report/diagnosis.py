@@ -121,8 +121,9 @@ def _why(trial: Trial, found: Diagnosis) -> str:
 def _map(found: Diagnosis) -> Figure:
     """Errors over the noise, channel by part of the motion, before and, where something was found, after."""
     j = found.judgement
-    shown = {_in_question(found.said): mismatch(j.weighed, j.calibrated)}
-    highest = max(np.nanmax([list(v.values()) for table in shown.values() for v in table.values()]), 3.0)
+    before = mismatch(j.weighed, j.calibrated)
+    highest = max(np.nanmax([list(v.values()) for v in before.values()]), 3.0)
+    shown = {_in_question(found.said): before}
     if j.best is not j.calibrated:
         shown[WITH_FOUND] = mismatch(j.weighed, j.best)
     figure, axes = plt.subplots(1, len(shown), figsize=(4 * len(shown), 2.9), sharey=True, squeeze=False)

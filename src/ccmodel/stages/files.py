@@ -4,9 +4,11 @@ import json
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import pandas as pd
+
 from ccmodel.model.files import read_model
 from ccmodel.model.parameters import Parameters
-from ccmodel.recording import Recording, read_recordings
+from ccmodel.recording import CHANNELS, Recording, read_recordings
 from ccmodel.rig.batch import Batch
 
 
@@ -63,3 +65,9 @@ def read_pairs(recordings_file: Path, simulated_file: Path) -> list[tuple[Record
     """Every recording of a batch with what the model says of it, or None where the model could not be run."""
     simulated = {s.id: s for s in read_recordings(simulated_file)}
     return [(r, simulated.get(r.id)) for r in read_recordings(recordings_file)]
+
+
+def write_channels(file: Path, recording: Recording) -> None:
+    """Write all channels of a run over its times as CSV."""
+    table = pd.DataFrame({"time_s": recording.time_s} | {c: recording[c] for c in CHANNELS})
+    table.to_csv(file, index=False, float_format="%.9g")

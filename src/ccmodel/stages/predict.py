@@ -2,13 +2,11 @@
 
 from pathlib import Path
 
-import pandas as pd
-
 from ccmodel.failure import ModelError
 from ccmodel.model.files import read_model
 from ccmodel.model.run import simulate_recording
-from ccmodel.recording import CHANNELS
 from ccmodel.rig.ingest import ingest_batch
+from ccmodel.stages.files import write_channels
 
 
 def predict(batch: Path, model_file: Path, out: Path) -> list[str]:
@@ -27,6 +25,5 @@ def predict(batch: Path, model_file: Path, out: Path) -> list[str]:
         except (ModelError, ValueError) as error:
             said.append(f"{recording.batch}/{recording.id}: {error}")
             continue
-        table = pd.DataFrame({"time_s": modelled.time_s} | {c: modelled[c] for c in CHANNELS})
-        table.to_csv(out / f"{recording.id}.csv", index=False, float_format="%.9g")
+        write_channels(out / f"{recording.id}.csv", modelled)
     return said

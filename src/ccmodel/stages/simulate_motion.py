@@ -8,8 +8,9 @@ import pandas as pd
 from ccmodel.failure import ModelError
 from ccmodel.model.files import read_model
 from ccmodel.model.run import ModelInput, simulate
-from ccmodel.recording import CHANNELS, Recording
+from ccmodel.recording import Recording
 from ccmodel.rig.ingest import ingest_batch
+from ccmodel.stages.files import write_channels
 from ccmodel.typed import InputError
 
 COLUMNS = ["time_s", "theta_in_rad"]
@@ -49,9 +50,8 @@ def simulate_motion(
         said = simulate(given, parameters)
     except (ModelError, ValueError) as error:
         raise InputError(f"{motion_file}: {error}") from None
-    table = pd.DataFrame({"time_s": time_s} | {c: said[c] for c in CHANNELS})
     out.parent.mkdir(parents=True, exist_ok=True)
-    table.to_csv(out, index=False, float_format="%.9g")
+    write_channels(out, said)
 
 
 def _recording(batch: Path, name: str | None) -> Recording:
