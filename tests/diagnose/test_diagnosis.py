@@ -13,6 +13,9 @@ from typer.testing import CliRunner
 
 from builders import write_batch
 from ccmodel import cli
+from ccmodel.diagnose.diagnosis import _mechanism
+from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.diagnose.trial import Trial
 from ccmodel.identify import problem
 from ccmodel.model.files import read_model
 from ccmodel.typed import InputError
@@ -215,3 +218,19 @@ def test_a_motion_without_its_columns_is_refused(clean, tmp_path):
     asked = [tmp_path / "motion.csv", "--model", clean[1] / "model.json", "--batch", clean[0]]
     with pytest.raises(InputError, match="columns time_s and theta_in_rad"):
         raise run("simulate", *asked, "--out", tmp_path / "said.csv").exception
+
+
+def test_a_number_stands_where_a_finer_solver_would_have_it():
+    key, found = "constant-drag/conduit/f0", {}
+    for moved in (0.0, 0.03):
+        trial = Trial(
+            Hypothesis((("constant-drag", "conduit"),)), {}, {key: 0.5}, [], [], np.array([[0.04**2]]), np.inf, [], []
+        )
+        found[moved] = _mechanism(trial, 0, 0.9, np.array([moved]))["parameters"][0]
+    plain, corrected = found[0.0], found[0.03]
+    assert (plain["value"], corrected["value"]) == (0.5, pytest.approx(0.53))
+    reach = plain["high"] - plain["value"]
+    assert reach == pytest.approx(1.645 * 0.04, rel=1e-3)
+    # It knows of the move, and does not take it for certain.
+    assert corrected["high"] - corrected["value"] == pytest.approx(reach * 0.05 / 0.04, rel=1e-3)
+    assert corrected["low"] == pytest.approx(2 * corrected["value"] - corrected["high"])

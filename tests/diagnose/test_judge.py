@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from ccmodel.diagnose import judge
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.diagnose.judge import (
     ENOUGH,
@@ -31,6 +32,14 @@ BASE_VALUES = {"friction_coefficient": 0.15}
 VALUES = {"pulley-friction/drive-pulley/friction_torque": 4e-3, "torque-scale/drive-sensor/gain": 0.05}
 CHANNELS = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N")
 WEIGHED = [SimpleNamespace(evidence=SimpleNamespace(channels=CHANNELS, allowed=0.0))] * 8
+
+
+@pytest.fixture(autouse=True)
+def would_do(monkeypatch):
+    """What each part would leave beyond noise, were it at fault alone, and its places; none unless a test adds."""
+    found = []
+    monkeypatch.setattr(judge, "cleared", lambda weighed, calibrated: found)
+    return found
 
 
 def trial(left, *acting, **values):
@@ -167,6 +176,18 @@ def test_a_pair_must_leave_less_than_a_single():
     assert verdict(trial(10.0), trial(1.5, FRICTION), alone[1]).verdict == "explained"
     assert verdict(trial(10.0), trial(1.5, FRICTION, SCALE), *alone).verdict == "unexplained"
     assert verdict(trial(10.0), trial(1.2, FRICTION, SCALE), *alone).verdict == "explained"
+
+
+def test_a_pair_that_a_single_fault_elsewhere_may_imitate_is_not_named(would_do):
+    def of_pair():
+        return verdict(trial(10.0), trial(1.0, FRICTION, SCALE), trial(9.0, FRICTION), trial(9.0, SCALE)).verdict
+
+    would_do.append((ENOUGH, ("load-sensor",)))
+    assert of_pair() == "explained"  # without that sensor something is left: it is not at fault alone
+    would_do.append((0.1, ("load-sensor",)))
+    assert of_pair() == "unexplained"
+    would_do.append((0.1, ("drive-pulley", "drive-sensor")))
+    assert of_pair() == "explained"  # both of the pair are faults of that part themselves
 
 
 def test_recordings_are_weighed_anew_about_what_explains_them_best():

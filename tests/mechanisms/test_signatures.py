@@ -227,6 +227,20 @@ def test_drive_pulley_friction_is_a_square_wave_in_tau_in_alone(base):
     assert extra[steady] == pytest.approx(torque * np.sign(omega[steady]), abs=0.05 * torque)
 
 
+@pytest.mark.parametrize("place", ["drive-pulley", "load-pulley"])
+def test_a_bearings_friction_builds_up_over_its_presliding_angle(place):
+    """Dahl's law from an unloaded bearing: after an angle theta it is 1 - exp(-theta / presliding) of all."""
+    torque, presliding = 4e-3, 10e-3
+    values = {"friction_torque": torque, "presliding": presliding}
+    drive = np.linspace(0, 0.1, 200)
+    r = run(drive, ("pulley-friction", place, values))
+    if place == "drive-pulley":
+        theta, extra = drive, r.tau_in_Nm - (r.T1_N - r.T3_N) * R
+    else:
+        theta, extra = r.theta_out_rad, (r.T2_N - r.T4_N) * R - r.tau_out_Nm
+    assert extra == pytest.approx(torque * (1 - np.exp(-theta / presliding)), abs=1e-6)
+
+
 def test_load_pulley_friction_is_a_step_that_the_load_does_not_show():
     torque = 4e-3
     r = run(sine(), ("pulley-friction", "load-pulley", {"friction_torque": torque}))

@@ -240,7 +240,7 @@ def _what_is_missing(evidence: Sequence[Evidence]) -> list[dict[str, str]]:
 def _said(batch, judgement: Judgement, estimates: Parameters, not_judged) -> dict:
     best, base, weighed = judgement.best, judgement.calibrated, judgement.weighed
     named = best.hypothesis.acting if judgement.verdict == "explained" else ()
-    covariance = _with_solver(judgement, not_judged) if named else best.covariance
+    moved = _by_finer_solver(judgement, not_judged) if named else None
     sure = [judgement.listed * p for p in judgement.probability]
     confidence = dict(zip([t.hypothesis for t in judgement.trials], sure, strict=True))
     alternatives = _alternatives(judgement, named, confidence)
@@ -253,7 +253,7 @@ def _said(batch, judgement: Judgement, estimates: Parameters, not_judged) -> dic
         "verdict": judgement.verdict,
         "is_held": base.hypothesis.is_held,
         "location": locate.location(judgement),
-        "mechanisms": [_mechanism(best, k, _named(name, confidence), covariance) for k, (name, _) in enumerate(named)],
+        "mechanisms": [_mechanism(best, k, _named(name, confidence), moved) for k, (name, _) in enumerate(named)],
         "alternatives": alternatives,
         "nearest": _nearest(judgement),
         "fit": {
@@ -268,13 +268,17 @@ def _said(batch, judgement: Judgement, estimates: Parameters, not_judged) -> dic
 
 
 def _nearest(judgement: Judgement) -> dict | None:
-    """Where nothing explains a batch: what came nearest, and what it left of the noise's mean square on held-out."""
+    """Where nothing explains a batch: what came nearest, and what it left of the noise's mean square on held-out.
+
+    It may leave little enough, where a single fault of one part would do as well as the two that it takes.
+    """
     if judgement.verdict != "unexplained" or (trial := judgement.nearest) is None:
         return None
-    acting = [_mechanism(trial, k, 0.0, trial.covariance) for k in range(len(trial.hypothesis.acting))]
+    acting = [_mechanism(trial, k, 0.0) for k in range(len(trial.hypothesis.acting))]
     return {
         "mechanisms": [{key: value for key, value in m.items() if key != "confidence"} for m in acting],
         "mean_square": float(trial.left.mean()),
+        "one_fault_at": list(judgement.one_fault),
     }
 
 
@@ -297,33 +301,37 @@ def _confidence(acting: tuple[str, str], confidence: Mapping[Hypothesis, float])
     return min(MOST_CONFIDENT, sum(p for hypothesis, p in confidence.items() if acting in hypothesis.acting))
 
 
-def _with_solver(judgement: Judgement, not_judged: list) -> NDArray:
-    """Covariance of the best trial's values, with by how much a finer solver would move them."""
-    best = judgement.best
+def _by_finer_solver(judgement: Judgement, not_judged: list) -> NDArray | None:
+    """By how much a finer solver would move the best trial's values; None where it cannot be run."""
     try:
-        moved = moved_by_finer(judgement.weighed, best)
+        return moved_by_finer(judgement.weighed, judgement.best)
     except ModelError as error:
         not_judged.append({"what": "what the solver's grid costs the values", "why": str(error)})
-        return best.covariance
-    return best.covariance + np.outer(moved, moved)
+        return None
 
 
-def _mechanism(trial: Trial, k: int, confidence: float, covariance: NDArray) -> dict:
+def _mechanism(trial: Trial, k: int, confidence: float, moved: NDArray | None = None) -> dict:
+    """A mechanism's numbers where a finer solver would have them, in intervals that know of that move.
+
+    A model file keeps the numbers that were fitted: on the solver that it runs on these are the best.
+    """
     name, place = trial.hypothesis.acting[k]
     names = list(trial.values)
-    reach = student.ppf(0.5 + COVERAGE / 2, trial.freedom)  # of infinite freedom: the normal distribution's
+    moved = np.zeros(len(names)) if moved is None else moved
+    sds = np.hypot(np.sqrt(np.diag(trial.covariance).clip(0.0)), moved)
+    reach = student.ppf(0.5 + COVERAGE / 2, trial.freedom) * sds  # of infinite freedom: the normal distribution's
     free = trial.hypothesis.free(trial.values)
     parameters = []
     for p in registry.get(name).parameters:
         key = mechanism_key(name, place, p.name)
-        value, i = trial.values[key], names.index(key)
-        sd = float(np.sqrt(max(covariance[i, i], 0.0)))
+        i, low, high = names.index(key), free[key].low, free[key].high
+        value = float(np.clip(trial.values[key] + moved[i], low, high))
         parameters.append(
             {
                 "name": p.name,
                 "value": value,
-                "low": max(value - reach[i] * sd, free[key].low),
-                "high": min(value + reach[i] * sd, free[key].high),
+                "low": max(float(value - reach[i]), low),
+                "high": min(float(value + reach[i]), high),
                 "unit": p.unit.replace(" ", "*"),
             }
         )

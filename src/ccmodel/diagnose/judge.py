@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
+from ccmodel.diagnose.alone import cleared
 from ccmodel.diagnose.evidence import LOOKS, Weighed, weighed_about
 from ccmodel.diagnose.hypothesis import PAPER, Hypothesis, plausible
 from ccmodel.diagnose.structure import Structure, structure
@@ -82,6 +83,8 @@ class Judgement:
         What a flexible model could still learn of what the calibrated model and the leading trials leave.
     weighed : sequence of Weighed
         The recordings as they were weighed for all this.
+    one_fault : sequence of str
+        Places where a single fault of no known kind would do as well as the two mechanisms that come nearest.
     """
 
     verdict: str
@@ -93,6 +96,7 @@ class Judgement:
     scores: list[Score]
     learnable: Mapping[Hypothesis, Structure]
     weighed: Sequence[Weighed]
+    one_fault: Sequence[str] = ()
 
     @property
     def nearest(self) -> Trial | None:
@@ -329,12 +333,29 @@ def _verdict(found: Comparison, scores: list[Score]) -> Judgement:
         return judged("agrees" if is_right(base, base, learnable) else "unexplained", base)
     if not is_right(likeliest, base, learnable) or not plausible(likeliest.hypothesis, likeliest.values):
         return judged("unexplained", base)
+    if one_fault := _one_fault(found, likeliest.hypothesis):
+        return replace(judged("unexplained", base), one_fault=one_fault)
     if listed * max(probability) <= RIVAL:  # Nothing is left to be undecided about.
         return judged("unexplained", base)
     # A mechanism that could be at either of two places is named all the same.
     names = likeliest.hypothesis.names
     sure = sum(p for t, p in zip(trials, probability, strict=True) if t.hypothesis.names == names)
     return judged("explained" if listed * sure >= SURE else "undecided", likeliest)
+
+
+def _one_fault(found: Comparison, hypothesis: Hypothesis) -> list[str]:
+    """Places where a fault of one part alone, of whatever kind, accounts for what two mechanisms do together.
+
+    Two that by chance do what one fault would are the less likely story: an encoder's disc off its axis is imitated by
+    an eccentric pulley and a torque's gain. Both may be faults of that very part, and then there is nothing to it.
+    """
+    if len(hypothesis.acting) < 2:
+        return []
+    acting = {place for _, place in hypothesis.acting}
+    would_do = sorted((left, places) for left, places in cleared(found.weighed, found.base) if left <= ENOUGH - 1.0)
+    if any(acting <= set(places) for _, places in would_do):
+        return []
+    return list(dict.fromkeys(place for _, places in would_do for place in places))
 
 
 def _matters(trial: Trial, base: Trial) -> bool:

@@ -5,12 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ccmodel.diagnose.evidence import Weighed, weigh
+from ccmodel.diagnose.alone import PLACES_OF, channels_of, cleared
+from ccmodel.diagnose.evidence import Weighed
 from ccmodel.diagnose.judge import Judgement
 from ccmodel.diagnose.travel import is_moving, since_reversal
-from ccmodel.diagnose.trial import Trial, fit
-from ccmodel.failure import ModelError
-from ccmodel.identify.problem import Evidence, each
+from ccmodel.diagnose.trial import Trial
 from ccmodel.model.run import ModelInput
 
 # Parts of a motion by what the drive does.
@@ -19,19 +18,9 @@ PARTS = ("at rest", "after a reversal", "under way")
 AFTER_REVERSAL = 0.25
 # A channel is named if it carries this share of the error that the worst one does, in units of its noise.
 NAMED_SHARE = 0.35
-
-
-# A channel is guilty alone if without it no more than this share of the mismatch is left, and so is the load with the
-# torque that was measured there in place of its law. Of places that this does not tell apart the screening chooses.
+# One suspect alone accounts for a mismatch if without it no more than this share of it is left. Of places that this
+# does not tell apart the screening chooses.
 ALONE = 0.05
-PLACES_OF = {
-    "theta_out_rad": ("load-sensor",),
-    "tau_in_Nm": ("drive-pulley", "drive-sensor"),
-    "tau_out_Nm": ("load-sensor",),
-    "F_drive_N": ("drive-sensor",),
-    "F_load_N": ("load-sensor",),
-}
-AT_THE_LOAD = ("load", "load-pulley")
 BETWEEN = ("conduit",)
 
 TEXT = {
@@ -52,7 +41,7 @@ def location(judgement: Judgement) -> dict:
     if judgement.verdict == "agrees":
         return {"place": None, "channels": [], "phases": [], "text": "model and recordings agree within the noise"}
     acting = judgement.best.hypothesis.acting
-    places = list(dict.fromkeys(place for _, place in acting)) or _places(judgement)
+    places = list(dict.fromkeys(place for _, place in acting)) or judgement.one_fault or _places(judgement)
     table = mismatch(judgement.weighed, judgement.calibrated)
     by_channel = {c: float(np.sqrt(np.nanmean(np.square(list(parts.values()))))) for c, parts in table.items()}
     worst = max(by_channel.values())
@@ -68,39 +57,14 @@ def location(judgement: Judgement) -> dict:
 def _places(judgement: Judgement) -> list[str]:
     """Where the mismatch sits as far as it can be said without a mechanism that accounts for it, likeliest first.
 
-    A sensor or pulley at fault spoils one channel, and the calibrated model is right in all others once that channel
-    is not fitted. A load with another law leaves the cables right that are driven by its torque. What neither of these
-    mends lies in between, and there nearly everything that can be wrong is wrong along the conduits.
+    What no suspect alone accounts for (`ccmodel.diagnose.alone`) lies in between, and there nearly everything that can
+    be wrong is wrong along the conduits.
     """
     weighed, calibrated = judgement.weighed, judgement.calibrated
-    channels = _channels(weighed)
-    tried = [(excess(without(c, weighed), calibrated), PLACES_OF[c]) for c in channels if len(channels) > 1]
-    if all({"tau_out_Nm", "theta_out_rad"} < set(w.evidence.channels) for w in weighed):
-        driven = [w.evidence.driven_by_torque() for w in weighed]
-        tried.append((excess(driven, calibrated), AT_THE_LOAD))
-    left, places = min(tried, default=(0.0, PLACES_OF[channels[0]]))
+    left, places = min(cleared(weighed, calibrated), default=(0.0, PLACES_OF[channels_of(weighed)[0]]))
     suspects = places if left <= ALONE * max(float(calibrated.left.mean() - 1.0), 0.0) else BETWEEN
     found = [s.hypothesis.acting[0][1] for s in judgement.scores if s.values]
     return list(dict.fromkeys([*(place for place in found if place in suspects), *suspects]))
-
-
-def without(channel: str, weighed: Sequence[Weighed]) -> list[Evidence]:
-    """Recordings with a channel left out, those aside in which nothing else is judged."""
-    return [e for w in weighed if (e := w.evidence.without(channel)).channels]
-
-
-def excess(evidence: Sequence[Evidence], calibrated: Trial) -> float:
-    """Mean square beyond noise of what is left of recordings if the paper's model is calibrated to these."""
-    fitted = calibrated.hypothesis.of(evidence[0].parameters).with_values(calibrated.values)
-    try:
-        weighed = each(evidence, lambda i, e: weigh(e, fitted))
-        return float(fit(weighed, calibrated.hypothesis, calibrated.free, calibrated.values).left.mean()) - 1.0
-    except ModelError:
-        return np.inf
-
-
-def _channels(weighed: Sequence[Weighed]) -> list[str]:
-    return list(dict.fromkeys(c for w in weighed for c in w.evidence.channels))
 
 
 def mismatch(weighed: Sequence[Weighed], trial: Trial) -> dict[str, dict[str, float]]:

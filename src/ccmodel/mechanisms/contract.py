@@ -116,6 +116,8 @@ class Settings:
         Ends and conduit: m/N.
     drive_friction_Nm, load_friction_Nm : float
         Pulleys: friction torques.
+    drive_presliding_rad, load_presliding_rad : float
+        Pulleys: angles over which these build up.
     drive_eccentricity, load_eccentricity : (float, float)
         Pulleys: e and psi (rad) of R (1 + e sin(theta + psi)).
     half_gap : float
@@ -144,6 +146,8 @@ class Settings:
     conduit_compliance: float = 0.0
     drive_friction_Nm: float = 0.0
     load_friction_Nm: float = 0.0
+    drive_presliding_rad: float = 2e-3
+    load_presliding_rad: float = 2e-3
     drive_eccentricity: tuple[float, float] = (0.0, 0.0)
     load_eccentricity: tuple[float, float] = (0.0, 0.0)
     half_gap: float = 0.0

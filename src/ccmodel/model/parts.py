@@ -38,7 +38,8 @@ def drive_pulley(theta_in: NDArray, T1_N: NDArray, T3_N: NDArray, parameters: Pa
     """
     settings = settings_of(parameters.mechanisms)
     _, round_, _ = winding(theta_in, *settings.drive_eccentricity)
-    return (T1_N - T3_N) * parameters.drive_radius_m * round_ + settings.drive_friction_Nm * bearing(theta_in)
+    rubs = settings.drive_friction_Nm * bearing(theta_in, settings.drive_presliding_rad)
+    return (T1_N - T3_N) * parameters.drive_radius_m * round_ + rubs
 
 
 def cable(

@@ -110,6 +110,8 @@ def _why(trial: Trial, found: Diagnosis) -> str:
     if not plausible(trial.hypothesis, trial.values):
         return "only with more of it than there can be"
     if is_right(trial, j.calibrated, j.learnable):
+        if j.one_fault and len(trial.hypothesis.acting) > 1:
+            return f"would do, as would one fault at the {' or '.join(j.one_fault)}"
         ratio = trial.left.mean() / j.best.left.mean()
         return f"would do, but leaves {ratio:.3g} times as much" if ratio > 1 else "would do, but has more unknowns"
     learnable = j.learnable.get(trial.hypothesis)

@@ -25,7 +25,6 @@ from ccmodel.mechanisms.backlash import dead_zone
 from ccmodel.mechanisms.load_dependent_friction import power_of_tension
 from ccmodel.mechanisms.presliding import dahl
 from ccmodel.mechanisms.pulley_eccentricity import winding, wound
-from ccmodel.mechanisms.pulley_friction import PRESLIDING_RAD
 from ccmodel.mechanisms.relaxation import lag_weights
 from ccmodel.mechanisms.strand_settling import settling_tension
 from ccmodel.mechanisms.stribeck import renewed
@@ -106,7 +105,7 @@ PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10, 18, 5, 11, 9
 Physics = namedtuple(
     "Physics",
     "has_settling has_relaxation tau conduit_compliance bristle presliding exponent rise vs fall radius eccentricity "
-    "phase stiffness_load cubic half_gap damping inertia load_friction kind general_friction",
+    "phase stiffness_load cubic half_gap damping inertia load_friction load_presliding kind general_friction",
 )
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}  # not nnan: a NaN must be seen
@@ -248,8 +247,8 @@ def _load(ph, piece, load, turn, torque, dt):
         slope += (ph.damping + ph.inertia * a1 / dt) * a1 / dt
     bearing = load[BEARING]
     if ph.load_friction > 0.0:
-        bearing, by_turn = dahl(load[BEARING], turn, PRESLIDING_RAD)
-        slope += ph.load_friction * (by_turn if turn != 0.0 else 1.0 / PRESLIDING_RAD)
+        bearing, by_turn = dahl(load[BEARING], turn, ph.load_presliding)
+        slope += ph.load_friction * (by_turn if turn != 0.0 else 1.0 / ph.load_presliding)
     difference = max(piece[TENSION, 0, n], 0.0) - max(piece[TENSION, 1, n], 0.0)
     load[OMEGA_NEXT], load[BEARING_NEXT], load[TORQUE] = omega, bearing, tau
     return R * difference - tau - ph.load_friction * bearing, slope - ph.radius * round_slope * difference, R

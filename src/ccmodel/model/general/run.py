@@ -143,7 +143,7 @@ def simulate(
     if isinstance(load, TorqueLoad) and load.beside_Nm_per_rad:
         tau_out = series[:solved]  # what the sensor feels
     if settings.drive_friction_Nm != 0.0:
-        rubs = bearing(theta_in)
+        rubs = bearing(theta_in, settings.drive_presliding_rad)
         rubs *= settings.drive_friction_Nm
         tau_in += rubs
     channels = {
@@ -313,6 +313,7 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
         damping=float(settings.damping(K_e) + (load.damping_Nms_per_rad if is_mechanical else 0.0)),
         inertia=float(settings.inertia + (load.inertia_kg_m2 if is_mechanical else 0.0)),
         load_friction=float(settings.load_friction_Nm),
+        load_presliding=float(settings.load_presliding_rad),
         kind=rows.PRESCRIBED_ANGLE if isinstance(load, AngleLoad) else rows.IMPEDANCE,
         general_friction=bool(settings.tension_exponent != 0 or settings.drag_N != 0 or settings.viscous != 0),
     )
