@@ -27,11 +27,10 @@ def test_it_is_within_what_the_rig_has_done():
 def test_slow_and_fast_friction_are_told_apart_by_speed():
     """Viscous friction that looks like a bearing at the one speed recorded: at another speed they part."""
     recordings = batch()
+    bearing = {f"pulley-friction/drive-pulley/{name}": 2e-3 for name in ("friction_torque", "presliding")}
     rivals = [
         trial(recordings, ("viscous-friction", "conduit"), **{"viscous-friction/conduit/c": 30.0}),
-        trial(
-            recordings, ("pulley-friction", "drive-pulley"), **{"pulley-friction/drive-pulley/friction_torque": 2e-3}
-        ),
+        trial(recordings, ("pulley-friction", "drive-pulley"), **bearing),
     ]
     base = trial(recordings)
     found = proposed(Judgement("undecided", base, rivals[0], rivals, [0.5, 0.5], 1.0, [], {}, recordings), PARAMETERS)

@@ -27,7 +27,10 @@ from ccmodel.diagnose.trial import Score, Trial
 from made_evidence import batch, calibrated
 
 FRICTION, SCALE = ("pulley-friction", "drive-pulley"), ("torque-scale", "drive-sensor")
-PROBES = [(SCALE, "gain", 0.05), (FRICTION, "friction_torque", 2e-3)]
+PROBES = [
+    {"torque-scale/drive-sensor/gain": 0.05},
+    {f"pulley-friction/drive-pulley/{name}": 2e-3 for name in ("friction_torque", "presliding")},
+]
 BASE_VALUES = {"friction_coefficient": 0.15}
 VALUES = {"pulley-friction/drive-pulley/friction_torque": 4e-3, "torque-scale/drive-sensor/gain": 0.05}
 CHANNELS = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N")
@@ -193,7 +196,7 @@ def test_a_pair_that_a_single_fault_elsewhere_may_imitate_is_not_named(would_do)
 def test_recordings_are_weighed_anew_about_what_explains_them_best():
     recordings = batch(lambda said: {"tau_in_Nm": 0.1 * said["tau_in_Nm"]})
     base = calibrated(recordings)
-    scores = [Score(Hypothesis((a,)), 0.0, {f"{a[0]}/{a[1]}/{p}": v}) for a, p, v in PROBES]
+    scores = [Score(Hypothesis((a,)), 0.0, probe) for a, probe in zip((SCALE, FRICTION), PROBES, strict=True)]
     trials = _fit_all(recordings, base.free, base, scores, lambda text: None)
     again = _weighed_anew(Comparison.of(recordings, base, trials), base.free, lambda text: None)
     assert again.trials[0].hypothesis.acting == (SCALE,)
