@@ -1,27 +1,47 @@
 """The experiment that would tell rivals apart."""
 
 import numpy as np
+import pytest
 
-from ccmodel.diagnose.experiment import candidates, proposed
+from ccmodel.diagnose.experiment import RATE_HZ, _apart, _motions, _planned, candidates, proposed, recordings_wanted
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.diagnose.judge import Judgement
 from ccmodel.diagnose.trial import Trial
+from ccmodel.identify.problem import Free
 from made_evidence import PARAMETERS, batch
 
 VALUES = {"stiffness_N_per_m": 9000.0, "friction_coefficient": 0.15, "load_stiffness_Nm_per_rad": 0.05}
+FREE = {name: Free(value, value / 10, value * 10) for name, value in VALUES.items()}
+KNOWN_TO = 0.01  # of itself, each value
 
 
-def trial(recordings, *acting, **numbers):
+def trial(recordings, *acting, known_to=KNOWN_TO, **numbers):
+    values = VALUES | numbers
+    covariance = np.diag([(known_to * value) ** 2 for value in values.values()])
     aside = [np.ones(w.evidence.measured.size) for w in recordings]
-    return Trial(Hypothesis(acting), {}, VALUES | numbers, [], [], np.eye(1), np.ones(1), [], aside)
+    return Trial(Hypothesis(acting), FREE, values, [], [], covariance, np.ones(len(values)), [], aside)
+
+
+def judged(recordings, *rivals):
+    shares = [1 / len(rivals)] * len(rivals)
+    return Judgement("undecided", trial(recordings), rivals[0], list(rivals), shares, 1.0, [], {}, recordings)
 
 
 def test_it_is_within_what_the_rig_has_done():
     recordings = batch()
     largest = max(np.ptp(w.evidence.given.theta_in) / 2 for w in recordings)
+    bends = {w.evidence.given.recording.path.bend_rad for w in recordings}
     for candidate in candidates(recordings):
         assert np.abs(candidate.theta_in).max() <= largest * (1 + 1e-9)
         assert 0 < candidate.pretension_share <= 1
+        assert candidate.like.path.bend_rad in bends
+        assert candidate.like.pretension_N == max(w.evidence.given.recording.pretension_N for w in recordings)
+
+
+def test_no_motion_jumps():
+    for text, theta in _motions(0.6):
+        assert np.abs(np.diff(theta)).max() < 0.6 * 2 * np.pi * 1.2 / RATE_HZ * 1.01, text
+        assert theta[0] == 0.0
 
 
 def test_slow_and_fast_friction_are_told_apart_by_speed():
@@ -32,7 +52,31 @@ def test_slow_and_fast_friction_are_told_apart_by_speed():
         trial(recordings, ("viscous-friction", "conduit"), **{"viscous-friction/conduit/c": 30.0}),
         trial(recordings, ("pulley-friction", "drive-pulley"), **bearing),
     ]
-    base = trial(recordings)
-    found = proposed(Judgement("undecided", base, rivals[0], rivals, [0.5, 0.5], 1.0, [], {}, recordings), PARAMETERS)
+    found = proposed(judged(recordings, *rivals), PARAMETERS)
     assert found["separates"] == ["viscous-friction", "pulley-friction"]
     assert "Hz" in found["text"]
+
+
+def test_recordings_are_asked_for_until_one_rival_leads():
+    """The odds of a judgement: exp(looks x difference^2 / 2), a look twenty times a channel of a recording."""
+    assert recordings_wanted(1.0, 5) == 1
+    for apart in (0.05, 0.1):
+        n = recordings_wanted(apart, 5)
+        assert np.exp(0.5 * 20 * 5 * n * apart**2) >= 20 > np.exp(0.5 * 20 * 5 * (n - 1) * apart**2)
+
+
+@pytest.mark.parametrize("known_to, apart", [(0.5, False), (1e-5, True)])
+def test_a_difference_that_a_refit_takes_up_tells_nothing_apart(known_to, apart):
+    """Two rivals that are one, but for a stiffness that the recordings do not tell."""
+    recordings = batch()
+    drag = {"constant-drag/conduit/f0": 0.5}
+    rivals = [
+        trial(recordings, ("constant-drag", "conduit"), known_to=known_to, **drag | {"stiffness_N_per_m": k})
+        for k in (8500.0, 9500.0)
+    ]
+    template = recordings[0].evidence
+    experiment = candidates(recordings)[0]
+    planned = [_planned(experiment, rival, template, PARAMETERS) for rival in rivals]
+    as_fitted, refitted = _apart(planned), _apart(planned, rivals)
+    assert as_fitted > 0.5
+    assert (refitted > 0.5 * as_fitted) == apart

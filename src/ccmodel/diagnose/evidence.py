@@ -70,17 +70,34 @@ class Weighed:
 def weigh(evidence: Evidence, parameters: Parameters) -> Weighed:
     """Work out what may differ from run to run, about a model that is fitted already."""
     e = replace(evidence, parameters=parameters)
+    N, numbers = run_differences(e)
+    friction = N[:, 0].reshape(e.sigma.shape) * e.sigma
+    floor = np.sqrt((e.sigma**2).mean(axis=1) + (friction**2).mean(axis=1))
+    U, s, Vt = np.linalg.svd(N, full_matrices=False)
+    likeliest = (Vt.T[:numbers] * (s / (1 + s**2))) @ U.T
+    return Weighed(e, U, shrink_of(s), likeliest, dict(zip(e.channels, floor.tolist(), strict=True)))
+
+
+def run_differences(e: Evidence) -> tuple[NDArray, int]:
+    """What differs from run to run, a standard deviation of each in units of the noise, and how many are numbers.
+
+    Returns
+    -------
+    ndarray, shape (rows, k)
+        Numbers first, friction before all others; then what is not known of the drive's motion.
+    int
+    """
     said = e.modelled({})
-    nuisances = _nuisances(e, parameters)
+    nuisances = _nuisances(e, e.parameters)
     differ = [spread * (e.modelled({name: value + step}) - said) / step for name, value, spread, step in nuisances]
     drawn = e.drive_errors({})
-    friction = differ[0]
-    floor = np.sqrt((e.sigma**2).mean(axis=1) + (friction**2).mean(axis=1))
     columns = [*(d / e.sigma for d in differ), *(d / np.sqrt(len(drawn)) for d in drawn)]
-    N = np.stack([c.ravel() for c in columns], axis=1)
-    U, s, Vt = np.linalg.svd(N, full_matrices=False)
-    likeliest = (Vt.T[: len(nuisances)] * (s / (1 + s**2))) @ U.T
-    return Weighed(e, U, 1 - 1 / np.hypot(1, s), likeliest, dict(zip(e.channels, floor.tolist(), strict=True)))
+    return np.stack([c.ravel() for c in columns], axis=1), len(nuisances)
+
+
+def shrink_of(s: NDArray) -> NDArray:
+    """By how much whitening shrinks errors along directions that are so many standard deviations of the noise long."""
+    return 1 - 1 / np.hypot(1, s)
 
 
 def weighed_about(one: Weighed, model: Parameters) -> Weighed:

@@ -104,7 +104,7 @@ def _why(trial: Trial, found: Diagnosis) -> str:
     """Why a hypothesis was not taken, or that it was."""
     j = found.judgement
     if trial is j.calibrated:
-        return "agrees" if found.said["verdict"] == "agrees" else f"the {_in_question(found.said)}"
+        return "agrees" if found.said["verdict"] == "agrees" else "what is asked about"
     if trial is j.best:
         return "the likeliest"
     if not plausible(trial.hypothesis, trial.values):
