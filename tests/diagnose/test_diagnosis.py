@@ -16,8 +16,11 @@ from ccmodel import cli
 from ccmodel.diagnose.diagnosis import _mechanism
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.diagnose.trial import Trial
+from ccmodel.failure import ModelError
 from ccmodel.identify import problem
 from ccmodel.model.files import read_model
+from ccmodel.stages import diagnose as stage
+from ccmodel.stages.ingest import ingest
 from ccmodel.typed import InputError
 
 RUBBING_NM = 4e-3
@@ -234,3 +237,19 @@ def test_a_number_stands_where_a_finer_solver_would_have_it():
     # It knows of the move, and does not take it for certain.
     assert corrected["high"] - corrected["value"] == pytest.approx(reach * 0.05 / 0.04, rel=1e-3)
     assert corrected["low"] == pytest.approx(2 * corrected["value"] - corrected["high"])
+
+
+def test_the_pipeline_says_which_recordings_it_had_to_do_without(tmp_path, monkeypatch):
+    batch = write_batch(tmp_path / "cut", pretensions=(7.0, 5.0))
+    with gzip.open(batch / "t-5N.csv.gz", "wt") as f:
+        f.write("time_s,drive_encoder_counts\n0.004,0\n")
+    ingest(batch, tmp_path / "cut.nc", tmp_path / "cut.json")
+    told = []
+
+    def run(recordings, estimates, not_judged, **options):
+        told.extend(not_judged)
+        raise ModelError("what comes after is not asked here")
+
+    monkeypatch.setattr(stage, "run", run)
+    stage.diagnose_recordings(tmp_path / "cut.nc", tmp_path / "out")
+    assert [one["what"] for one in told] == ["t-5N.csv.gz"]

@@ -1,7 +1,8 @@
 """A batch -> diagnosis.json, a page for a person, and the two models that were compared."""
 
 import html
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 from ccmodel import mechanisms as registry
@@ -15,7 +16,7 @@ from ccmodel.model.parameters import Parameters
 from ccmodel.recording import read_recordings
 from ccmodel.report.diagnosis import headline, write_diagnosis
 from ccmodel.rig.ingest import ingest_batch
-from ccmodel.stages.files import estimates_of, write_json
+from ccmodel.stages.files import estimates_of, read_json, write_json
 from ccmodel.typed import InputError
 
 
@@ -44,10 +45,10 @@ def diagnose(
     inputs = provenance.of_inputs(sorted(p for p in batch.iterdir() if p.is_file()))
     # The same input gives the same files wherever it stands.
     inputs["sha256"] = {Path(name).name: digest for name, digest in inputs["sha256"].items()}
-    refused = [f for f in ingested.findings if f.severity == "refused"]
     if ingested.batch is None or not ingested.recordings:
-        raise InputError("\n".join(map(str, refused)) or f"{batch}: no recording that can be used")
-    not_judged = [{"what": Path(f.file).name, "why": f.text} for f in refused]
+        refused = [str(f) for f in ingested.findings if f.severity == "refused"]
+        raise InputError("\n".join(refused) or f"{batch}: no recording that can be used")
+    not_judged = _refused(map(asdict, ingested.findings))
     try:
         estimates = Parameters.estimated(ingested.batch.rig)
         known = read_model(beside) if beside else None
@@ -62,6 +63,11 @@ def diagnose(
     return headline(found.said)
 
 
+def _refused(findings: Iterable[Mapping]) -> list[dict[str, str]]:
+    """Of what was found wrong with a batch, what took a recording away."""
+    return [{"what": Path(f["file"]).name, "why": f["text"]} for f in findings if f["severity"] == "refused"]
+
+
 def _options(judged: Diagnosing | None) -> dict:
     return (judged or Diagnosing()).model_dump(exclude_none=True)
 
@@ -73,7 +79,8 @@ def diagnose_recordings(recordings_file: Path, out: Path, judged: Diagnosing | N
     try:
         if estimates is None or not recordings:
             raise ModelError("no recording that can be used")
-        found = run(recordings, estimates, **_options(judged))
+        not_judged = _refused(read_json(recordings_file.with_suffix(".json"))["findings"])
+        found = run(recordings, estimates, not_judged, **_options(judged))
     except ModelError as error:
         out.mkdir(parents=True, exist_ok=True)
         write_json(out / "diagnosis.json", {"batch": recordings_file.stem, "verdict": None, "why": str(error)})
