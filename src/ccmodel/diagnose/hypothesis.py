@@ -17,6 +17,7 @@ BEYOND = 3.0
 # Where in its range, on a logarithmic scale, the strength of a mechanism is tried out.
 STRENGTHS = (0.25, 0.6)
 SHAPES = (0.2, 0.5, 0.8)
+UNLIKE = 1.15  # A ratio that is tried out.
 
 
 @dataclass(frozen=True)
@@ -82,21 +83,22 @@ class Hypothesis:
     def _unknowns(self) -> Iterator[tuple[str, Parameter, bool]]:
         """Name of each of the mechanisms' numbers, what is known of it, and whether it is a mechanism's strength."""
         for name, place in self.acting if self.is_held else self.beside + self.acting:
-            for k, parameter in enumerate(registry.get(name).parameters):
-                yield mechanism_key(name, place, parameter.name), parameter, k == 0
+            mechanism = registry.get(name)
+            for parameter in mechanism.parameters:
+                yield mechanism_key(name, place, parameter.name), parameter, parameter in mechanism.strengths
 
     def probes(self) -> Iterator[dict[str, float]]:
         """Values at which a single mechanism is tried out, all over its plausible range."""
         ((name, place),) = self.acting
-        strength, *shapes = registry.get(name).parameters
-        grids = [[_within(strength, share) for share in strength.tried or STRENGTHS]]
-        if name == "cable-asymmetry":
-            yield from _asymmetries(name, place)
-            return
-        grids += [[_within(p, share) for share in p.tried or SHAPES] for p in shapes]
-        for values in product(*grids):
-            keys = (mechanism_key(name, place, p.name) for p in (strength, *shapes))
-            yield dict(zip(keys, values, strict=True))
+        mechanism = registry.get(name)
+        grids = [[_within(p, share) for share in p.tried or SHAPES] for p in mechanism.shapes]
+        for strength in mechanism.strengths:
+            others = {p.name: p.neutral for p in mechanism.strengths if p is not strength}
+            sizes = [UNLIKE] if strength.ratio else [_within(strength, share) for share in strength.tried or STRENGTHS]
+            for size, *values in product(sizes, *grids):
+                shapes = dict(zip((p.name for p in mechanism.shapes), values, strict=True))
+                said = others | {strength.name: size} | shapes
+                yield {mechanism_key(name, place, p.name): said[p.name] for p in mechanism.parameters}
 
 
 PAPER = Hypothesis()
@@ -112,19 +114,14 @@ def singles(without: Collection[str] = (), model: Hypothesis = PAPER) -> list[Hy
 def plausible(hypothesis: Hypothesis, values: Mapping[str, float], slack: float = 1.5) -> bool:
     """Whether no mechanism is stronger than its range has it by more than a factor; weaker ones are still there."""
     for name, place in hypothesis.acting:
-        strength = registry.get(name).parameters[0]
-        value = values[mechanism_key(name, place, strength.name)]
-        if strength.neutral == 1.0:  # a ratio, which may as well be the other way round
-            if not strength.low / slack <= value <= slack * strength.high:
+        for strength in registry.get(name).strengths:
+            value = values[mechanism_key(name, place, strength.name)]
+            if strength.ratio:  # which may as well be the other way round
+                if not strength.low / slack <= value <= slack * strength.high:
+                    return False
+            elif abs(value) > slack * max(abs(strength.low), abs(strength.high)):
                 return False
-        elif abs(value) > slack * max(abs(strength.low), abs(strength.high)):
-            return False
     return True
-
-
-def _asymmetries(name: str, place: str) -> Iterator[dict[str, float]]:
-    for ratio, K_ratio in ((1.15, 1.0), (1.0, 1.15)):
-        yield {mechanism_key(name, place, "ratio"): ratio, mechanism_key(name, place, "K_ratio"): K_ratio}
 
 
 def _within(parameter: Parameter, share: float) -> float:
@@ -141,7 +138,7 @@ def _reach(parameter: Parameter, strength: bool) -> tuple[float, float]:
         return (2 * low, 2 * high) if parameter.unit == "rad" else (low, high)
     if low < 0:
         return BEYOND * low, 0.5 * abs(low)
-    if parameter.neutral == 1.0:
+    if parameter.ratio:
         return low / BEYOND, high * BEYOND
     if parameter.signed:
         return -BEYOND * high, BEYOND * high

@@ -360,18 +360,15 @@ def scaled(hypothesis: Hypothesis, probe: Mapping[str, float], strength: float) 
     Where a mechanism says which strengths are to be tried, they differ in kind, and the probe stays as it is.
     """
     ((name, place),) = hypothesis.acting
-    parameters = registry.get(name).parameters
-    first = parameters[0]
-    signed = first.signed or first.neutral == 1.0
-    if strength <= 0 and not signed:
+    strengths = registry.get(name).strengths
+    if strength <= 0 and not any(p.signed or p.ratio for p in strengths):
         return None
-    if first.tried:
+    if any(p.tried for p in strengths):
         return dict(probe)
     strength = float(np.clip(strength, -4.0, 4.0))
     strength = np.copysign(max(abs(strength), 0.1), strength)
     values = dict(probe)
-    scaled_ones = parameters if name == "cable-asymmetry" else parameters[:1]
-    for p in scaled_ones:
+    for p in strengths:
         key = mechanism_key(name, place, p.name)
         values[key] = p.neutral + strength * (probe[key] - p.neutral)
     return values

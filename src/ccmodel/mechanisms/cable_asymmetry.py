@@ -21,8 +21,8 @@ MECHANISM = Mechanism(
     name="cable-asymmetry",
     places=("cable",),
     parameters=(
-        Parameter("ratio", "1", 0.6, 1.4, 1.1, neutral=1.0),
-        Parameter("K_ratio", "1", 0.6, 1.4, 1.0, neutral=1.0),
+        Parameter("ratio", "1", 0.6, 1.4, 1.1, neutral=1.0, ratio=True),
+        Parameter("K_ratio", "1", 0.6, 1.4, 1.0, neutral=1.0, ratio=True),
     ),
     summary="friction or stiffness differs between the cables",
     mistaken_for="load-cell-scale",

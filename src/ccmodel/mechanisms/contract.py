@@ -54,6 +54,8 @@ class Parameter:
         How a fit should step over the range.
     signed : bool
         Whether the range holds for the size of the number and either sign is possible.
+    ratio : bool
+        Whether it compares two parts that are neutrally alike: a strength of its own, whichever of them is the larger.
     tried : tuple of float
         Shares of the range at which a mechanism is tried out before it is fitted, where the usual ones will not do.
     eased : bool
@@ -70,6 +72,7 @@ class Parameter:
     neutral: float = 0.0
     scale: str = "log"
     signed: bool = False
+    ratio: bool = False
     tried: tuple[float, ...] = ()
     eased: bool = False
     unsaid: float | None = None
@@ -216,6 +219,16 @@ class Mechanism:
             raise ValueError(f"{self.name}: places are {', '.join(PLACES)}; got {', '.join(self.places) or 'none'}")
         if (self.enters is None) == (self.reads is None):
             raise ValueError(f"{self.name}: a mechanism either enters the solver or changes what sensors read")
+
+    @property
+    def strengths(self) -> tuple[Parameter, ...]:
+        """What says how much of it there is: its ratios, each by itself, or else its first parameter."""
+        return tuple(p for p in self.parameters if p.ratio) or self.parameters[:1]
+
+    @property
+    def shapes(self) -> tuple[Parameter, ...]:
+        """The other parameters."""
+        return tuple(p for p in self.parameters if p not in self.strengths)
 
     @property
     def neutral(self) -> dict[str, float]:

@@ -90,32 +90,26 @@ def _step(effect: Effect, grid: Grid) -> float:
 
 
 def _of_mechanism(name: str, place: str, grid: Grid) -> list[Effect]:
-    strength, *shapes = registry.get(name).parameters
-    if strength.neutral == 1:  # ratios: each by itself
-        alone = [(p, v) for p in (strength, *shapes) for v in _strengths(p, grid)]
-        neutral = registry.get(name).neutral
-        return [Effect(name, place, {**neutral, p.name: v}, _is_plausible(p, v)) for p, v in alone]
-    lists = [
-        _strengths(strength, grid),
-        *([_within(p, share) for share in grid.shapes] if p.unsaid is None else [p.unsaid] for p in shapes),
-    ]
-    names = [p.name for p in (strength, *shapes)]
+    mechanism = registry.get(name)
+    shapes = [[_within(p, s) for s in grid.shapes] if p.unsaid is None else [p.unsaid] for p in mechanism.shapes]
+    names = [p.name for p in mechanism.shapes]
     return [
-        Effect(name, place, dict(zip(names, values, strict=True)), _is_plausible(strength, values[0]))
-        for values in product(*lists)
+        Effect(
+            name, place, mechanism.neutral | {p.name: v} | dict(zip(names, of_shapes, strict=True)), _is_plausible(p, v)
+        )
+        for p in mechanism.strengths
+        for v in _strengths(p, grid)
+        for of_shapes in product(*shapes)
     ]
 
 
 def _strength_of(effect: Effect) -> Parameter:
-    first, *others = registry.get(effect.name).parameters
-    if first.neutral == 1:
-        return next(p for p in (first, *others) if effect.values[p.name] != 1)
-    return first
+    return next(p for p in registry.get(effect.name).strengths if effect.values[p.name] != p.neutral)
 
 
 def _strengths(parameter: Parameter, grid: Grid) -> list[float]:
     """Values of a strength, evenly in the logarithm of its distance from neutral, on every side that it has."""
-    if parameter.neutral == 1:
+    if parameter.ratio:
         sizes = np.geomspace(grid.smallest_difference, parameter.high - 1, grid.strengths)
         return [*(1 - sizes[::-1]).tolist(), *(1 + sizes).tolist()]
     low, high = sorted((abs(parameter.low), abs(parameter.high)))
@@ -132,7 +126,7 @@ def _within(parameter: Parameter, share: float) -> float:
 
 def _away(parameter: Parameter) -> float:
     """Where a strength is counted from."""
-    return 1.0 if parameter.neutral == 1 else 0.0
+    return 1.0 if parameter.ratio else 0.0
 
 
 def _is_plausible(parameter: Parameter, value: float) -> bool:
