@@ -148,6 +148,13 @@ def test_what_no_mechanism_brings_down_is_unexplained():
     assert verdict(trial(5.0)).verdict == "unexplained"
 
 
+@pytest.mark.parametrize("law_left, said", [(0.0, "agrees"), (0.05, "explained")])
+def test_a_mechanism_that_takes_little_counts_if_law_was_left(law_left, said):
+    base, scale = trial(0.93), trial(0.90, SCALE)
+    unlearnt = {base.hypothesis: Structure(np.full(8, law_left)), scale.hypothesis: Structure(np.zeros(8))}
+    assert _verdict(Comparison(WEIGHED, base, [scale], unlearnt), []).verdict == said
+
+
 def test_what_leaves_something_to_be_learnt_is_not_the_explanation():
     assert verdict(trial(1.3), learnable=0.2).verdict == "unexplained"
     assert verdict(trial(3.0), trial(1.2, FRICTION), learnable=0.3).verdict == "unexplained"

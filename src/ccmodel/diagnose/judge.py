@@ -329,8 +329,10 @@ def _verdict(found: Comparison, scores: list[Score]) -> Judgement:
         likely = [trials[k] for k in order], [probability[k] for k in order]
         return Judgement(verdict, base, best, *likely, listed, scores, learnable, found.weighed)
 
-    if not _matters(likeliest, base) or 1.0 - sum(probability) > 0.5:
-        return judged("agrees" if is_right(base, base, learnable) else "unexplained", base)
+    # Where law is left in what the calibrated model leaves, a mechanism that takes it away counts however little it is.
+    agrees = is_right(base, base, learnable)
+    if not _matters(likeliest, base, WORTH_A_NAME if agrees else 0.0) or 1.0 - sum(probability) > 0.5:
+        return judged("agrees" if agrees else "unexplained", base)
     if not is_right(likeliest, base, learnable) or not plausible(likeliest.hypothesis, likeliest.values):
         return judged("unexplained", base)
     if one_fault := _one_fault(found, likeliest.hypothesis):
@@ -358,11 +360,14 @@ def _one_fault(found: Comparison, hypothesis: Hypothesis) -> list[str]:
     return list(dict.fromkeys(place for _, places in would_do for place in places))
 
 
-def _matters(trial: Trial, base: Trial) -> bool:
-    """Whether a hypothesis takes enough off what the calibrated model leaves, and not off some recordings alone."""
+def _matters(trial: Trial, base: Trial, least: float) -> bool:
+    """Whether a hypothesis takes enough off what the calibrated model leaves, and not off some recordings alone.
+
+    `least` is the share of it that must go.
+    """
     gain = base.left - trial.left
     better, worse = gain.clip(0.0).mean(), -gain.clip(None, 0.0).mean()
-    return bool(better - worse > WORTH_A_NAME * max(1.0, _left(base)) and worse < UNSTEADY * better)
+    return bool(better - worse > least * max(1.0, _left(base)) and worse < UNSTEADY * better)
 
 
 def nested_errors(judgement: Judgement) -> list[Trial]:
