@@ -143,7 +143,7 @@ def real(
     out: Annotated[Path, typer.Option(help="Folder that gets the model in use and a folder a case.")],
     page: Annotated[Path | None, typer.Option(help="Markdown page.")] = None,
 ) -> None:
-    """Put something into measured recordings and have them diagnosed beside a model in use; goes on where it was."""
+    """Put something into measured recordings and have them diagnosed beside a model in use; done ones are kept."""
     from proof.real.cases import cases_of as real_cases_of
     from proof.real.page import real_page
     from proof.real.plan import read_real_plan
@@ -156,7 +156,7 @@ def real(
         raise typer.BadParameter(f"there is no batch {plan.batch} in {raw}: import it with ccmodel import-mis-tool")
     find_model(plan, source, in_use, typer.echo)
     for case in real_cases_of(plan, json.loads((in_use / MODEL).read_text(encoding="utf-8"))):
-        if not (out / "cases" / case.name / "result.json").exists():
+        if not _is_of({"sources": conceal.digest_of()}, out / "cases" / case.name / "result.json"):
             judge_real(case, plan, source, in_use, out / "cases" / case.name, typer.echo)
     if page is not None:
         earlier = page.read_text(encoding="utf-8") if page.exists() else ""
@@ -186,14 +186,14 @@ def part_of(digest: str, n: int) -> list[int]:
 
 def _judge_each(cases: list[Case], out: Path, rivals: bool, cores: int) -> None:
     """Cases that have no result of these sources yet, some at a time."""
-    digest = conceal.digest_of()
-    wanted = [case for case in cases if not _is_of(digest, out / case.name / "result.json")]
+    made_by = {"sources": conceal.digest_of(), "builder": conceal.builder_digest()}
+    wanted = [case for case in cases if not _is_of(made_by, out / case.name / "result.json")]
     with ProcessPoolExecutor(cores) as pool:
         list(pool.map(partial(_judge, rivals=rivals), wanted, [out / case.name for case in wanted]))
 
 
-def _is_of(digest: str, result: Path) -> bool:
-    return result.exists() and json.loads(result.read_text(encoding="utf-8")).get("sources") == digest
+def _is_of(made_by: dict[str, str], result: Path) -> bool:
+    return result.exists() and made_by.items() <= json.loads(result.read_text(encoding="utf-8")).items()
 
 
 def _judge(case: Case, out: Path, rivals: bool) -> None:

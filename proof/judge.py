@@ -68,6 +68,7 @@ def judge(
         "asked": case.asked,
         "key": case.digest,
         "sources": conceal.digest_of(sources),
+        "builder": conceal.builder_digest(),
         "batch": digest,
         "tampering": tampering,
         "why": None if diagnosis is not None else f"exit code {ran.code}: {ran.said.strip()[-500:]}",

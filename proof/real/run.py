@@ -98,6 +98,7 @@ def judge_real(
         "case": case.name,
         "number": case.number,
         "key": case.digest,
+        "sources": conceal.digest_of(sources),
         "batch": digest,
         "allowance": allowance,
         "tampering": list(ran.tampering),

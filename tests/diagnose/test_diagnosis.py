@@ -3,6 +3,7 @@
 import gzip
 import io
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -13,7 +14,7 @@ from typer.testing import CliRunner
 
 from builders import write_batch
 from ccmodel import cli
-from ccmodel.diagnose.diagnosis import _mechanism
+from ccmodel.diagnose.diagnosis import _alternatives, _mechanism
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.diagnose.trial import Trial
 from ccmodel.failure import ModelError
@@ -167,10 +168,58 @@ def test_a_single_recording_without_load_cells_gets_a_verdict_that_says_what_it_
     assert not any(m["confidence"] > 0.8 for m in said["mechanisms"])
 
 
-def test_what_is_no_batch_is_one_line(tmp_path):
-    (tmp_path / "empty").mkdir()
+def test_without_load_cells_each_recording_has_the_pretension_that_it_was_aimed_at(tmp_path):
+    """They were at three tensions, and one value for all would leave an excess that anything might be taken for."""
+    folder = write_batch(tmp_path / "blind", pretensions=(7.0, 5.0, 3.0))
+    spoil(folder, lambda table: table.drop(columns=["drive_load_cell_V", "load_load_cell_V"]))
+    assert run("diagnose", folder, "--out", tmp_path / "out").exit_code == 0
+    said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert said["verdict"] == "agrees"
+    assert said["fit"]["calibrated"]["pretension_scale"] == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_recording_whose_load_cell_failed_takes_nothing_from_the_others(tmp_path):
+    folder = spoil(write_batch(tmp_path / "one", pretensions=(7.0, 6.0, 5.0)))
+    file = folder / "t-5N.csv.gz"
+    table = pd.read_csv(file).assign(load_load_cell_V=0.25)  # A cell that reads nothing at all is no cell.
+    with gzip.open(file, "wt") as f:
+        table.to_csv(f, index=False)
+    assert run("diagnose", folder, "--out", tmp_path / "out").exit_code == 0
+    said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert said["verdict"] == "agrees"
+    assert "t-5N" in {n["what"] for n in said["not_judged"]}
+    assert "pretension_scale" not in said["fit"]["calibrated"]
+
+
+def test_an_estimate_beyond_what_a_fit_is_used_to_is_taken_all_the_same(tmp_path):
+    folder = spoil(write_batch(tmp_path / "stiff", pretensions=(7.0, 6.0)))
+    stated = yaml.safe_load((folder / "batch.yaml").read_text())
+    stated["rig"]["cable"] |= {"stiffness_N_per_m": 50.0, "friction_coefficient": 0.0}
+    (folder / "batch.yaml").write_text(yaml.safe_dump(stated))
+    assert run("diagnose", folder, "--out", tmp_path / "out").exit_code == 0
+
+
+def test_alternatives_are_others_than_what_is_named_each_once():
+    scale, drag = ("torque-scale", "drive-sensor"), ("constant-drag", "conduit")
+    there, elsewhere = ("pulley-friction", "drive-pulley"), ("pulley-friction", "load-pulley")
+    shares = {(scale,): 0.5, (drag,): 0.2, (there,): 0.1, (elsewhere,): 0.15}
+    confidence = {Hypothesis(acting): share for acting, share in shares.items()}
+    found = _alternatives(SimpleNamespace(verdict="undecided"), (), confidence)
+    assert [(a["name"], a["place"], a["confidence"]) for a in found] == [
+        (*scale, 0.5),
+        (*elsewhere, 0.25),
+        (*drag, 0.2),
+    ]
+    found = _alternatives(SimpleNamespace(verdict="explained"), (there,), confidence)
+    assert [a["name"] for a in found] == ["torque-scale", "constant-drag"]
+
+
+@pytest.mark.parametrize("is_there", [True, False])
+def test_what_is_no_batch_is_one_line(tmp_path, is_there):
+    if is_there:
+        (tmp_path / "empty").mkdir()
     found = run("diagnose", tmp_path / "empty", "--out", tmp_path / "out")
-    assert isinstance(found.exception, InputError)
+    assert isinstance(found.exception, InputError) or found.exit_code == 2
     assert len(str(found.exception).splitlines()) == 1
     (tmp_path / "m.json").write_text("{}")
     found = run("predict", tmp_path / "empty", "--model", tmp_path / "m.json", "--out", tmp_path / "out")

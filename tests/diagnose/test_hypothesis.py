@@ -71,7 +71,7 @@ def test_what_the_model_has_already_is_fitted_and_neither_named_nor_asked_for():
     friction, gain = ("pulley-friction", "drive-pulley"), ("torque-scale", "load-sensor")
     model = Hypothesis(beside=(friction,))
     both = model.and_also(Hypothesis((gain,)))
-    assert both.names == {"torque-scale"}
+    assert both.names == ("torque-scale",)
     assert [(m.name, m.place) for m in both.of(PARAMETERS).mechanisms] == [friction, gain]
     assert set(both.free(both.start)) > set(model.free(model.start)) != set()
     asked = {h.acting[0] for h in singles(model=model)}

@@ -165,6 +165,22 @@ def test_a_value_out_of_its_range_explains_nothing():
     assert verdict(trial(6.0), wild).verdict == "unexplained"
 
 
+def test_a_rival_that_cannot_be_takes_nothing_from_one_that_can():
+    wild = trial(0.95, SCALE, **{"torque-scale/drive-sensor/gain": 5.0})
+    found = verdict(trial(6.0), trial(1.0, FRICTION), wild)
+    assert found.verdict == "explained"
+    assert found.best.hypothesis.acting == (FRICTION,)
+    assert found.probability == pytest.approx([1.0, 0.0], abs=1e-6)
+    assert found.nearest.hypothesis.acting == (FRICTION,)
+
+
+def test_the_best_of_many_has_more_to_prove():
+    """Of one recording, where the price of having asked so many is a few per cent of what is left."""
+    one = [replace(t, held_out=[BASE_VALUES], aside=t.aside[:1]) for t in (trial(1.0), trial(0.9, FRICTION))]
+    few, many = (Comparison(WEIGHED[:1], one[0], one[1:], {}, asked).probability[0] for asked in (1, 32))
+    assert few / (1 - few) == pytest.approx(32 * many / (1 - many))
+
+
 def test_a_pair_must_halve_what_its_members_leave():
     alone = trial(1.9, FRICTION)
     assert not _names_more(trial(1.6, FRICTION, SCALE), [alone])

@@ -21,13 +21,15 @@ from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 from ccmodel.typed import InputError
 
-TRUE = Parameters(20000.0, 1.2, 0.15, 0.006, 0.006, spring_beside_load_Nm_per_rad=0.02, pretension_N=1.5)
+TRUE = Parameters(20000.0, 1.2, 0.15, 0.006, 0.006, spring_beside_load_Nm_per_rad=0.02, pretension_scale=0.2)
 CHANNELS = ("theta_out_rad", "tau_in_Nm")
 
 
-def jaw(load_Nm, id="r", **extra):
+def jaw(load_Nm, id="r", pretension_N=7.0, **extra):
     """A recording of `TRUE` against a torque that stays nearly the same, without noise."""
-    drive = recording(id=id, tau_out_Nm=lambda t: load_Nm + 0.002 * np.sin(2 * np.pi * t), settled_s=1.0)
+    drive = recording(
+        id=id, pretension_N=pretension_N, tau_out_Nm=lambda t: load_Nm + 0.002 * np.sin(2 * np.pi * t), settled_s=1.0
+    )
     said = simulate(ModelInput.of(drive), TRUE)
     measured = {c: said[c] for c in CHANNELS} | {c: drive[c] for c in ("theta_in_rad", "tau_out_Nm")}
     made = drive.with_channels(measured, dict.fromkeys(measured, "made by hand"), "rig")
@@ -42,15 +44,15 @@ def weighed(recorded, sigma=(1e-3, 1e-4)):
 
 
 def test_a_fit_finds_pretension_friction_and_spring_without_a_rest():
-    """From ten times the pretension, where no cable ever goes slack."""
-    batch = [weighed(jaw(load, str(k))) for k, load in enumerate((-0.005, -0.04))]
+    """From ten times the pretension, where no cable ever goes slack; two recordings were aimed at two pretensions."""
+    batch = [weighed(jaw(load, str(k), T)) for k, (load, T) in enumerate(((-0.005, 7.0), (-0.04, 9.0)))]
     free = {
-        "pretension_N": Free(15.0, 0.1, 100.0),
+        "pretension_scale": Free(2.0, 0.01, 100.0),
         "friction_coefficient": Free(0.15, 0.01, 1.0),
         "spring_beside_load_Nm_per_rad": Free(0.01, 0.0, 1.0),
     }
     found = fit(batch, Hypothesis(), free, {name: f.start for name, f in free.items()})
-    assert found.values["pretension_N"] == pytest.approx(1.5, rel=0.02)
+    assert found.values["pretension_scale"] == pytest.approx(0.2, rel=0.02)
     assert found.values["friction_coefficient"] == pytest.approx(0.15, rel=0.02)
     assert found.values["spring_beside_load_Nm_per_rad"] == pytest.approx(0.02, rel=0.05)
 
@@ -140,7 +142,7 @@ def test_the_configuration_for_the_public_recordings_says_how_they_would_be_diag
 
 def test_a_fit_feels_its_way_from_a_slack_cable_too_where_the_pretension_is_not_known():
     x0, low, high = np.array([2.0, 10.0]), np.array([0.0, 3.0]), np.array([5.0, 50.0])
-    taut, slack = _starts(["friction_coefficient", "pretension_N"], x0, low, high)
+    taut, slack = _starts(["friction_coefficient", "pretension_scale"], x0, low, high)
     assert taut == pytest.approx(x0)
     assert slack[0] == 2.0
     assert low[1] < slack[1] == pytest.approx(3.0)  # a fifth would lie below what is allowed

@@ -62,8 +62,10 @@ def result(case, stand_in, tmp_path_factory):
 
 def test_results_of_other_sources_are_not_kept(result, stand_in, tmp_path):
     (tmp_path / "result.json").write_text(json.dumps(result))
-    assert _is_of(conceal.digest_of(stand_in), tmp_path / "result.json")
-    assert not _is_of(conceal.digest_of(), tmp_path / "result.json")
+    made_by = {"sources": conceal.digest_of(stand_in), "builder": conceal.builder_digest()}
+    assert _is_of(made_by, tmp_path / "result.json")
+    for other in ({"sources": conceal.digest_of()}, {"builder": "another"}):
+        assert not _is_of(made_by | other, tmp_path / "result.json")
 
 
 def test_a_run_whose_diagnosis_changed_on_the_way_is_refused(tmp_path):

@@ -115,13 +115,18 @@ def diagnose(
             not_judged.append({"what": recording.id, "why": str(error)})
     if not evidence:
         raise ModelError("none of the recordings can be compared with the model: " + not_judged[0]["why"])
+    if any(map(_shows_pretension, evidence)):
+        why = "no rest with load cells shows its pretension, as the others' do"
+        not_judged += [{"what": e.given.recording.id, "why": why} for e in evidence if not _shows_pretension(e)]
+        evidence = [e for e in evidence if _shows_pretension(e)]
     not_judged += _what_is_missing(evidence)
     why = "as the run was asked to: part of what the noise is taken to be"
     not_judged += [{"what": what, "why": why} for what in _allowed(allowance)]
     calibrated = calibration(estimates, evidence)
     estimates = estimates.with_values({name: free.start for name, free in calibrated.items()})
     model = Hypothesis(beside=tuple((m.name, m.place) for m in beside.mechanisms) if beside else ())
-    known = _values_of(beside, calibrated, model) if beside else {}
+    aimed_at_N = float(np.mean([e.given.recording.pretension_N for e in evidence]))
+    known = _values_of(beside, calibrated, model, aimed_at_N) if beside else {}
     if hold:
         model, estimates = replace(model, is_held=True), model.of(estimates).with_values(known)
         # A zero may have changed by itself since the model was fitted.
@@ -162,7 +167,10 @@ def odd_one_out(judgement: Judgement) -> list[dict[str, str]]:
         return []
     odd = int(np.argmax(base.left))
     others = [w for i, w in enumerate(weighed) if i != odd]
-    left = float(fit(others, base.hypothesis, base.free, base.values).left.mean())
+    try:
+        left = float(fit(others, base.hypothesis, base.free, base.values).left.mean())
+    except (ModelError, ValueError):
+        return []
     if left > RIGHT:
         return []
     why = (
@@ -188,30 +196,50 @@ def first_cycles(recording: Recording, cycles: int | None) -> Recording:
 def calibration(estimates: Parameters, evidence: Sequence[Evidence]) -> dict[str, Free]:
     """What a calibration leaves free: stiffness, friction, the load's spring, and what no rest shows."""
     free = {
-        "stiffness_N_per_m": Free(estimates.stiffness_N_per_m, *STIFFNESS_N_PER_M),
-        "friction_coefficient": Free(estimates.friction_coefficient, *FRICTION),
+        "stiffness_N_per_m": _free(estimates.stiffness_N_per_m, *STIFFNESS_N_PER_M),
+        "friction_coefficient": _free(estimates.friction_coefficient, *FRICTION),
     }
     if estimates.load_stiffness_Nm_per_rad is not None:
-        free["load_stiffness_Nm_per_rad"] = Free(estimates.load_stiffness_Nm_per_rad, *LOAD)
+        free["load_stiffness_Nm_per_rad"] = _free(estimates.load_stiffness_Nm_per_rad, *LOAD)
     elif all("tau_in_Nm" in e.channels for e in evidence):
         # A batch that states no spring may have one all the same, which the torque measured at the load does not feel.
         size = float(np.median([np.ptp(e.given.recording["tau_in_Nm"]) / np.ptp(e.given.theta_in) for e in evidence]))
         free["spring_beside_load_Nm_per_rad"] = Free(0.1 * size, 0.0, 10 * size)
-    if any("T1_N" not in e.given.resting or "T2_N" not in e.given.resting for e in evidence):
-        aimed_at = float(np.mean([e.given.recording.pretension_N for e in evidence]))
-        free["pretension_N"] = Free(aimed_at, 0.01 * aimed_at, 100 * aimed_at)
+    if not all(map(_shows_pretension, evidence)):
+        free["pretension_scale"] = Free(1.0, 0.01, 100.0)  # of what each recording was aimed at
         free["load_radius_m"] = Free(
             estimates.load_radius_m, 0.3 * estimates.load_radius_m, 3 * estimates.load_radius_m
         )
-        reach = max(float(np.ptp(e.given.recording["tau_in_Nm"])) for e in evidence if "tau_in_Nm" in e.channels)
-        free["tau_in_zero_Nm"] = Free(0.0, -reach, reach)
-        free["tau_out_zero_Nm"] = Free(0.0, -reach, reach)
+        torques = [e.given.recording["tau_in_Nm"] for e in evidence if "tau_in_Nm" in e.channels]
+        if torques:
+            reach = max(float(np.ptp(torque)) for torque in torques)
+            free["tau_in_zero_Nm"] = Free(0.0, -reach, reach)
+            free["tau_out_zero_Nm"] = Free(0.0, -reach, reach)
     return free
 
 
-def _values_of(beside: Parameters, calibrated: Mapping[str, Free], model: Hypothesis) -> dict[str, float]:
-    """A model's values of what a calibration leaves free, where it has them, and of the numbers of its mechanisms."""
+def _free(estimate: float, low: float, high: float) -> Free:
+    """From an estimate as far as a fit may go anyway, and ten times as far as an estimate that lies beyond."""
+    if estimate > 0:
+        low, high = min(low, estimate / 10), max(high, 10 * estimate)
+    return Free(float(np.clip(estimate, low, high)), low, high)
+
+
+def _shows_pretension(e: Evidence) -> bool:
+    """Whether a rest at the start shows the tension at all four ends of the cables."""
+    return all(f"T{i}_N" in e.given.resting_mean for i in (1, 2, 3, 4))
+
+
+def _values_of(
+    beside: Parameters, calibrated: Mapping[str, Free], model: Hypothesis, aimed_at_N: float
+) -> dict[str, float]:
+    """A model's values of what a calibration leaves free, where it has them, and of the numbers of its mechanisms.
+
+    A model that has one pretension for all recordings has it as a share of what these were aimed at, on average.
+    """
     known = {name: beside.value_of(name) for name in [*calibrated, *model.start]}
+    if beside.pretension_N is not None and "pretension_scale" in known:
+        known["pretension_scale"] *= beside.pretension_N / aimed_at_N
     return {name: calibrated[name].start if value is None else value for name, value in known.items()}
 
 
@@ -225,10 +253,13 @@ def _what_is_missing(evidence: Sequence[Evidence]) -> list[dict[str, str]]:
     found = []
     recorded = {c for e in evidence for c in e.channels}
     for channel in MEASURED:
+        lacking = [e.given.recording.id for e in evidence if channel not in e.channels]
         if channel not in recorded:
             found.append({"what": channel, "why": "not recorded, or the load's course had to be taken from it"})
-    if any("T1_N" not in e.given.resting or "T2_N" not in e.given.resting for e in evidence):
-        why = "no rest with load cells shows them: fitted, one value for all recordings"
+        elif lacking:
+            found.append({"what": f"{channel} of {', '.join(lacking)}", "why": "not recorded there, or not usable"})
+    if not all(map(_shows_pretension, evidence)):
+        why = "no rest with load cells shows them: fitted, the pretension as one share of what each was aimed at"
         found.append({"what": "pretension, ratio of the pulleys, zeros of the torques", "why": why})
     if len(evidence) == 1:
         found.append({"what": "held-out error", "why": "a single recording: nothing can be held out"})
@@ -283,12 +314,16 @@ def _nearest(judgement: Judgement) -> dict | None:
 
 
 def _alternatives(judgement: Judgement, named, confidence) -> list[dict]:
+    """What else it could be: each mechanism that is not named already, at its likeliest place."""
     if judgement.verdict in ("agrees", "unexplained"):
         return []
-    others = {acting for hypothesis in confidence for acting in hypothesis.acting} - set(named)
-    ranked = sorted(((a, _confidence(a, confidence)) for a in sorted(others)), key=lambda item: -item[1])
-    ranked = ranked[:MOST_ALTERNATIVES]
-    return [{"name": n, "place": p, "confidence": round(c, 4)} for (n, p), c in ranked if c > RIVAL]
+    every = {acting for hypothesis in confidence for acting in hypothesis.acting}
+    places: dict[str, str] = {}
+    for name, place in sorted(every, key=lambda acting: (-_confidence(acting, confidence), acting)):
+        places.setdefault(name, place)
+    told = [(n, p, _named(n, confidence)) for n, p in places.items() if n not in dict(named)]
+    ranked = sorted(told, key=lambda one: -one[2])[:MOST_ALTERNATIVES]
+    return [{"name": n, "place": p, "confidence": round(c, 4)} for n, p, c in ranked if c > RIVAL]
 
 
 def _named(name: str, confidence: Mapping[Hypothesis, float]) -> float:
@@ -298,7 +333,7 @@ def _named(name: str, confidence: Mapping[Hypothesis, float]) -> float:
 
 def _confidence(acting: tuple[str, str], confidence: Mapping[Hypothesis, float]) -> float:
     """Probability that a mechanism acts at a place: of all hypotheses together that have it there."""
-    return min(MOST_CONFIDENT, sum(p for hypothesis, p in confidence.items() if acting in hypothesis.acting))
+    return sum(p for hypothesis, p in confidence.items() if acting in hypothesis.acting)
 
 
 def _by_finer_solver(judgement: Judgement, not_judged: list) -> NDArray | None:

@@ -25,8 +25,8 @@ from ccmodel.model.sensitivity import STEP, size_of
 LOOKS = 20
 # Standard deviation of what may be anywhere from -1 to 1, and the places that are looked at where it matters.
 ANYWHERE = 1 / np.sqrt(3)
-PLACES = (0.0, -1.0, 1.0)
-FRICTION_SPREAD = 0.01  # of itself, from run to run (docs/rig-log-format.md)
+WITHIN_GAP = (0.0, -1.0, 1.0)
+FRICTION_SPREAD = 0.01  # of itself, from run to run: what cables of the paper's kind are taken to repeat by
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def weighed_about(one: Weighed, model: Parameters) -> Weighed:
         errors = one.acting(replace(model, load_place=place)).evidence.errors({})
         return float(np.mean(one.whitened(errors.ravel()) ** 2))
 
-    place = min(PLACES, key=left) if settings_of(model.mechanisms).half_gap else model.load_place
+    place = min(WITHIN_GAP, key=left) if settings_of(model.mechanisms).half_gap else model.load_place
     about = weigh(one.evidence, replace(model, load_place=place))
     return about.acting(replace(one.evidence.parameters, load_place=place))
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ccmodel.diagnose.evidence import LOOKS, Weighed, run_differences, shrink_of
 from ccmodel.diagnose.judge import RIVAL, Judgement
+from ccmodel.diagnose.travel import speed
 from ccmodel.diagnose.trial import DIFFERENCE, Trial
 from ccmodel.failure import ModelError
 from ccmodel.identify.problem import Evidence, each
@@ -30,6 +31,9 @@ RIVALS = 4
 SIZES = ((1.0, 1.0), (1.0, 0.4), (0.4, 1.0))
 RATES_HZ = (0.1, 0.4, 1.2)
 HOLDS_S = (1.0, 3.0, 8.0)
+NESTED_HZ = 0.5
+MOVE_S = 0.5
+STEEPEST = 15 / 8  # Highest slope of a step's course over its mean one.
 # By which the better of two rivals should then lead.
 ODDS = 20.0
 # Experiments that lie furthest apart as fitted, which are then asked what a refit would leave of it.
@@ -83,9 +87,10 @@ def recordings_wanted(apart: float, channels: int) -> int:
 
 
 def candidates(weighed: Sequence[Weighed]) -> list[Experiment]:
-    """Motions within the amplitudes and rates that the batch shows the rig can do, at its least and largest bend."""
+    """Motions within the amplitudes and speeds that the batch shows the rig can do, at its least and largest bend."""
     given = [w.evidence.given for w in weighed]
     amplitude = max(np.ptp(g.theta_in) / 2 for g in given)
+    fastest = max(np.abs(speed(g)).max() for g in given)
     highest = max(g.recording.pretension_N for g in given)
     bends = {round(g.recording.path.bend_rad, 3): g.recording for g in given}
     found = []
@@ -95,23 +100,27 @@ def candidates(weighed: Sequence[Weighed]) -> list[Experiment]:
             at = f"pretension {pretension:.0%} of the highest recorded"
             at += f", bend {bend:.2g} rad" if len(bends) > 1 else ""
             found += [
-                Experiment(f"{text}, {at}", theta, pretension, like) for text, theta in _motions(size * amplitude)
+                Experiment(f"{text}, {at}", theta, pretension, like)
+                for text, theta in _motions(size * amplitude, fastest)
             ]
     return found
 
 
-def _motions(a: float) -> Iterator[tuple[str, NDArray]]:
-    """What is done, and the drive's angles, rad."""
+def _motions(a: float, fastest: float) -> Iterator[tuple[str, NDArray]]:
+    """What is done, and the drive's angles, rad: of an amplitude (rad), and no faster than a speed (rad/s)."""
     start = np.clip(np.arange(0, SECONDS, 1 / RATE_HZ) - 0.4, 0, None)
-    for rate in RATES_HZ:
-        yield f"a sine of {a:.2g} rad at {rate:g} Hz", a * np.sin(2 * np.pi * rate * start)
+    highest_Hz = fastest / (2 * np.pi * a)
+    for rate in dict.fromkeys(min(rate, highest_Hz) for rate in RATES_HZ):
+        yield f"a sine of {a:.2g} rad at {rate:.2g} Hz", a * np.sin(2 * np.pi * rate * start)
     for hold in HOLDS_S:
-        yield f"steps of {a:.2g} rad held for {hold:g} s", _steps(a, start, hold)
-    yield f"nested reversals from {a:.2g} rad down at 0.5 Hz", a * np.sin(np.pi * start) * (1 - start / start[-1])
+        yield f"steps of {a:.2g} rad held for {hold:g} s", _steps(a, start, hold, max(MOVE_S, STEEPEST * a / fastest))
+    rate = min(NESTED_HZ, highest_Hz)
+    nested = a * np.sin(2 * np.pi * rate * start) * (1 - start / start[-1])
+    yield f"nested reversals from {a:.2g} rad down at {rate:.2g} Hz", nested
 
 
-def _steps(amplitude: float, start: NDArray, hold_s: float, move_s: float = 0.5) -> NDArray:
-    """To one side, back, to the other, back, and so on, with a jerk that has no jumps."""
+def _steps(amplitude: float, start: NDArray, hold_s: float, move_s: float) -> NDArray:
+    """To one side, back, to the other, back, and so on, without a jump of the acceleration."""
     phase = start / (hold_s + move_s)
     k, s = np.floor(phase).astype(int), np.clip((phase % 1) * (hold_s + move_s) / move_s, 0, 1)
     levels = amplitude * np.array([0.0, 1.0, 0.0, -1.0])

@@ -46,9 +46,9 @@ class Hypothesis:
         return replace(self, acting=self.acting + other.acting)
 
     @property
-    def names(self) -> frozenset[str]:
-        """Names of its mechanisms, wherever they act."""
-        return frozenset(name for name, _ in self.acting)
+    def names(self) -> tuple[str, ...]:
+        """Names of its mechanisms in their order, wherever they act."""
+        return tuple(sorted(name for name, _ in self.acting))
 
     @property
     def missed(self) -> float:

@@ -100,24 +100,45 @@ class Judgement:
 
     @property
     def nearest(self) -> Trial | None:
-        """The trial that leaves the least, right or not; None where none was worth fitting."""
-        return min(self.trials, key=_left, default=None)
+        """The trial that leaves the least, right or not, of those that can be; None where none was worth fitting."""
+        return min(self.trials, key=lambda t: (not _is_plausible(t), _left(t)), default=None)
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Hypotheses fitted to recordings that are weighed alike: the calibrated model, and others with the best first."""
+    """Hypotheses fitted to recordings that are weighed alike: the calibrated model, and others with the best first.
+
+    Attributes
+    ----------
+    weighed : sequence of Weighed
+    base : Trial
+    trials : list of Trial
+    learnable : mapping of Hypothesis to Structure
+    asked : int
+        How many hypotheses these were chosen from.
+    """
 
     weighed: Sequence[Weighed]
     base: Trial
     trials: list[Trial]
     learnable: Mapping[Hypothesis, Structure]
+    asked: int = 0
 
     @classmethod
-    def of(cls, weighed: Sequence[Weighed], base: Trial, trials: Sequence[Trial]) -> "Comparison":
-        """Trials in their order, the leading ones asked what could still be learnt of what they leave."""
-        trials = sorted(trials, key=_left)
-        return cls(weighed, base, trials, {t.hypothesis: structure(weighed, t) for t in [base, *trials[:CONTENDERS]]})
+    def of(cls, weighed: Sequence[Weighed], base: Trial, trials: Sequence[Trial], asked: int = 0) -> "Comparison":
+        """Trials in their order, the leading and the likeliest asked what could still be learnt of what they leave.
+
+        One that wants more of a mechanism than there can be comes after all others, whatever it leaves.
+        """
+        trials = sorted(trials, key=lambda t: (not _is_plausible(t), _left(t)))
+        likeliest = np.argsort(_probabilities(weighed, base, trials, asked))[-1:]
+        contenders = {t.hypothesis: t for t in [base, *trials[:CONTENDERS], *(trials[k] for k in likeliest)]}
+        return cls(weighed, base, trials, {h: structure(weighed, t) for h, t in contenders.items()}, asked)
+
+    @property
+    def probability(self) -> list[float]:
+        """Of each trial; what is missing from one is the calibrated model's."""
+        return _probabilities(self.weighed, self.base, self.trials, self.asked)
 
     def is_right(self, trial: Trial) -> bool:
         """Whether a trial leaves what a right model would."""
@@ -170,7 +191,7 @@ def judge(
     fewest = FEWEST_TRIALS if _left(base) > RIGHT else 0
     leading = [s for k, s in enumerate(scores) if s.values and (s.gain > WORTH_A_TRIAL or k < fewest)][:TRIALS]
     asked = [Score(h, 0.0, h.start) for h in suspects if h not in [s.hypothesis for s in leading]]
-    found = Comparison.of(weighed, base, _fit_all(weighed, calibrated, base, [*leading, *asked], tell))
+    found = Comparison.of(weighed, base, _fit_all(weighed, calibrated, base, [*leading, *asked], tell), len(known))
     if found.wants_more:
         found = _weighed_anew(found, calibrated, tell)
     if found.wants_more:
@@ -183,7 +204,7 @@ def _with_pairs(found: Comparison, calibrated: Mapping[str, Free], known: Sequen
     alone = [t for t in found.trials if len(t.hypothesis.acting) == 1]
     firsts = [t for t in alone if found.is_right(t)] or alone
     trials = [*found.trials, *_pairs(found.weighed, calibrated, firsts[:FIRSTS], known, tell)]
-    paired = Comparison.of(found.weighed, found.base, [t for t in trials if _names_more(t, trials)])
+    paired = Comparison.of(found.weighed, found.base, [t for t in trials if _names_more(t, trials)], found.asked)
     if not paired.has_right and len(paired.trials[0].hypothesis.acting) > 1:
         paired = _weighed_anew(paired, calibrated, tell)
         paired = replace(paired, trials=[t for t in paired.trials if _names_more(t, paired.trials)])
@@ -202,7 +223,7 @@ def _weighed_anew(found: Comparison, calibrated: Mapping[str, Free], tell) -> Co
     model = [best.hypothesis.of(w.evidence.parameters).with_values(best.values) for w in found.weighed]
 
     def starts(trial: Trial) -> list[dict[str, float]]:
-        if trial is best or "pretension_N" not in calibrated:
+        if trial is best or "pretension_scale" not in calibrated:
             return [trial.values]
         return [trial.values, trial.values | {name: best.values[name] for name in calibrated}]
 
@@ -215,14 +236,14 @@ def _weighed_anew(found: Comparison, calibrated: Mapping[str, Free], tell) -> Co
     leading = [t for k, t in enumerate(found.trials) if k < CONTENDERS or len(t.hypothesis.acting) == 1]
     again = _fit_all(weighed, calibrated, base, [Score(t.hypothesis, 0.0, s) for t in leading for s in starts(t)], tell)
     best_of = {t.hypothesis: t for t in sorted(again, key=_left, reverse=True)}
-    return Comparison.of(weighed, base, list(best_of.values()))
+    return Comparison.of(weighed, base, list(best_of.values()), found.asked)
 
 
 def is_right(trial: Trial, base: Trial, learnable: Mapping[Hypothesis, Structure]) -> bool:
-    """Whether a hypothesis leaves what a right one would: little, and nothing that could still be learnt."""
+    """Whether a hypothesis is what a right one would be: it leaves little and no law in it, with values that can be."""
     unlearnt = learnable.get(trial.hypothesis)
     excess, missed = max(_left(base) - 1.0, 0.0), trial.hypothesis.missed
-    if unlearnt is None or (trial is base and _left(base) > RIGHT):
+    if unlearnt is None or not _is_plausible(trial) or (trial is base and _left(base) > RIGHT):
         return False
     most = RIGHT_PAIR if len(trial.hypothesis.acting) > 1 else RIGHT
     most += max(RIGHT_SHARE / _best_of(trial), missed) * excess
@@ -232,6 +253,10 @@ def is_right(trial: Trial, base: Trial, learnable: Mapping[Hypothesis, Structure
 def _best_of(trial: Trial) -> int:
     """As the best of how many independent imitations a trial may pass: a first's partners, since firsts are alike."""
     return PARTNERS if len(trial.hypothesis.acting) > 1 else 1
+
+
+def _is_plausible(trial: Trial) -> bool:
+    return plausible(trial.hypothesis, trial.values)
 
 
 def _left(trial: Trial) -> float:
@@ -274,7 +299,7 @@ def _names_more(trial: Trial, trials: Sequence[Trial]) -> bool:
         return True
     members = set(trial.hypothesis.acting)
     alone = [t for t in trials if set(t.hypothesis.acting) < members]
-    return all(_left(trial) - 1 < PAIR_SHARE * (_left(t) - 1) for t in alone)
+    return all(_left(trial) - 1 < PAIR_SHARE * (_left(t) - 1) and _left(trial) < _left(t) for t in alone)
 
 
 def _looks(weighed: Sequence[Weighed]) -> float:
@@ -284,8 +309,11 @@ def _looks(weighed: Sequence[Weighed]) -> float:
     return float(np.sum(each_gives * (1 - allowed)) + np.mean(each_gives * allowed))
 
 
-def _probabilities(weighed, base: Trial, trials: Sequence[Trial]) -> list[float]:
-    """Probability of each trial; what is missing from one is the calibrated model's."""
+def _probabilities(weighed, base: Trial, trials: Sequence[Trial], asked: int) -> list[float]:
+    """Probability of each trial; what is missing from one is the calibrated model's.
+
+    The best of many that were asked leaves little by chance, so that each begins with its share of all of these.
+    """
     if not trials:
         return []
     looks = _looks(weighed)
@@ -293,7 +321,8 @@ def _probabilities(weighed, base: Trial, trials: Sequence[Trial]) -> list[float]
     unknowns = np.array([0, *(len(t.values) - len(base.values) for t in trials)])
     scale = max(1.0, left.min())
     log = -0.5 * looks * left / scale - 0.5 * unknowns * np.log(looks)
-    log += np.log([PRIOR_AGREES, *[(1 - PRIOR_AGREES) / len(trials)] * len(trials)])
+    log += np.log([PRIOR_AGREES, *[(1 - PRIOR_AGREES) / max(asked, len(trials))] * len(trials)])
+    log[1:][[not _is_plausible(t) for t in trials]] = -np.inf
     weight = np.exp(log - log.max())
     return (weight / weight.sum())[1:].tolist()
 
@@ -319,7 +348,7 @@ def is_listed(trial: Trial, base: Trial) -> float:
 
 def _verdict(found: Comparison, scores: list[Score]) -> Judgement:
     base, trials, learnable = found.base, found.trials, found.learnable
-    probability = _probabilities(found.weighed, base, trials)
+    probability = found.probability
     likeliest = trials[int(np.argmax(probability))] if trials else base
     listed = is_listed(likeliest, base) if trials else 1.0
     listed *= UNTESTED if len(found.weighed) == 1 else 1.0
@@ -333,7 +362,7 @@ def _verdict(found: Comparison, scores: list[Score]) -> Judgement:
     agrees = is_right(base, base, learnable)
     if not _matters(likeliest, base, WORTH_A_NAME if agrees else 0.0) or 1.0 - sum(probability) > 0.5:
         return judged("agrees" if agrees else "unexplained", base)
-    if not is_right(likeliest, base, learnable) or not plausible(likeliest.hypothesis, likeliest.values):
+    if not is_right(likeliest, base, learnable):
         return judged("unexplained", base)
     if one_fault := _one_fault(found, likeliest.hypothesis):
         return replace(judged("unexplained", base), one_fault=one_fault)

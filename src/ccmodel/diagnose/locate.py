@@ -46,8 +46,9 @@ def location(judgement: Judgement) -> dict:
     by_channel = {c: float(np.sqrt(np.nanmean(np.square(list(parts.values()))))) for c, parts in table.items()}
     worst = max(by_channel.values())
     channels = [c for c, value in sorted(by_channel.items(), key=lambda i: -i[1]) if value > NAMED_SHARE * worst]
-    by_part = {p: float(np.sqrt(np.nanmean([table[c][p] ** 2 for c in channels]))) for p in PARTS}
-    parts = [p for p in PARTS if by_part[p] > 0.7 * max(by_part.values())]
+    squares = {p: np.array([table[c][p] ** 2 for c in channels]) for p in PARTS}
+    by_part = {p: float(np.sqrt(np.nanmean(s))) for p, s in squares.items() if np.isfinite(s).any()}
+    parts = [p for p in by_part if by_part[p] > 0.7 * max(by_part.values())]
     verb = "is" if len(channels) == 1 else "are"
     where = (" and " if acting else " or ").join(TEXT[place] for place in places)
     text = f"The mismatch sits {where}: {', '.join(channels)} {verb} off most, {' and '.join(parts)}."

@@ -78,6 +78,14 @@ def errors(one: Weighed, values: Mapping[str, float]) -> NDArray:
     return one.counted(one.evidence.errors(values).ravel())
 
 
+def _errors_if_any(one: Weighed, values: Mapping[str, float]) -> NDArray | None:
+    """The same; None where the model cannot be run with such values."""
+    try:
+        return errors(one, values)
+    except ModelError:
+        return None
+
+
 def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str, Free], start: dict) -> Trial:
     """Fit a hypothesis from given values and hold every recording out in turn.
 
@@ -141,12 +149,14 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
     total = sum(information)
     inverse, inverses_aside = _inverse(total, sizes), [_inverse(total - H, sizes) for H in information]
     without = [np.clip(found.x + V @ g, low, high) for V, g in zip(inverses_aside, score, strict=True)]
-    aside = each(acting, lambda i, w: errors(w, named(without[i])))
+    aside = each(acting, lambda i, w: _errors_if_any(w, named(without[i])))
     for i, (e, own) in enumerate(zip(aside, r, strict=True)):
-        if np.mean(e**2) > SUSPECT * np.mean(own**2):
+        if e is None or np.mean(e**2) > SUSPECT * np.mean(own**2):
             others = [(w, left) for k, (w, left) in enumerate(zip(acting, r, strict=True)) if k != i]
             without[i] = _shortened(others, found.x, without[i], named)
-            aside[i] = errors(acting[i], named(without[i]))
+            aside[i] = _errors_if_any(acting[i], named(without[i]))
+            if aside[i] is None:  # The joint optimum is all there is then.
+                without[i], aside[i] = found.x, own
     if len(acting) > 1:
         scatter, freedom = _scatter(np.array(without) - found.x, information, inverse, inverses_aside)
     else:
@@ -234,9 +244,9 @@ def _scatter(
 
 
 def _starts(names: Sequence[str], x0: NDArray, low: NDArray, high: NDArray) -> list[NDArray]:
-    if "pretension_N" not in names:
+    if "pretension_scale" not in names:
         return [x0]
-    pretension = np.arange(x0.size) == names.index("pretension_N")
+    pretension = np.arange(x0.size) == names.index("pretension_scale")
     inside = low + 1e-9 * (high - low)
     return [np.clip(np.where(pretension, share * x0, x0), inside, high) for share in PRETENSION_SHARES]
 

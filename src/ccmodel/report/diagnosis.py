@@ -117,7 +117,7 @@ def _why(trial: Trial, found: Diagnosis) -> str:
     learnable = j.learnable.get(trial.hypothesis)
     if learnable is not None and learnable.surely > LEARNABLE:
         return "what it leaves follows laws that it does not know"
-    return "leaves too much"
+    return "others leave less"
 
 
 def _map(found: Diagnosis) -> Figure:
@@ -147,8 +147,8 @@ def _loops(found: Diagnosis) -> Figure:
     """Torque loops of the recordings that were off most, before and after, held out."""
     j = found.judgement
     chosen = nested_errors(j)
-    order = np.argsort(j.calibrated.left)[::-1][:LOOPS]
     channel = _worst_channel(found)
+    order = [i for i in np.argsort(j.calibrated.left)[::-1] if channel in j.weighed[i].evidence.channels][:LOOPS]
     label, scale = AXIS.get(channel, (f"{channel.rsplit('_', 1)[0]} (N)", 1))
     figure, axes = plt.subplots(1, len(order), figsize=(3.1 * len(order), 3.1), squeeze=False)
     for ax, i in zip(axes[0], order, strict=True):

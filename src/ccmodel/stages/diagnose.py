@@ -42,13 +42,11 @@ def diagnose(
     except registry.UnknownMechanismError as error:
         raise InputError(f"--without: {error}") from None
     ingested = ingest_batch(batch)
-    inputs = provenance.of_inputs(sorted(p for p in batch.iterdir() if p.is_file()))
-    # The same input gives the same files wherever it stands.
-    inputs["sha256"] = {Path(name).name: digest for name, digest in inputs["sha256"].items()}
     if ingested.batch is None or not ingested.recordings:
         refused = [str(f) for f in ingested.findings if f.severity == "refused"]
         raise InputError("\n".join(refused) or f"{batch}: no recording that can be used")
     not_judged = _refused(map(asdict, ingested.findings))
+    inputs = provenance.of_inputs(provenance.files_in(batch), batch)
     try:
         estimates = Parameters.estimated(ingested.batch.rig)
         known = read_model(beside) if beside else None
@@ -57,7 +55,7 @@ def diagnose(
         found = run(
             ingested.recordings, estimates, not_judged, without, tell, **_options(judged), beside=known, hold=hold
         )
-    except ModelError as error:
+    except (ModelError, ValueError) as error:
         raise InputError(f"{batch}: {error}") from None
     _write(found, inputs, out)
     return headline(found.said)
@@ -96,6 +94,7 @@ def _write(found: Diagnosis, inputs: dict, out: Path) -> None:
     write_json(out / "diagnosis.json", found.said | {"headline": headline(found.said), "provenance": inputs})
     for name, trial in (("calibrated", found.judgement.calibrated), ("model", found.judgement.best)):
         write_json(out / f"{name}.json", model_as_dict(found.model(trial), inputs))
+    (out / "nearest.json").unlink(missing_ok=True)  # of an earlier run
     if found.said["nearest"]:
         write_json(out / "nearest.json", model_as_dict(found.model(found.judgement.nearest), inputs))
     write_diagnosis(out / "report.html", found)
