@@ -53,6 +53,8 @@ def test_a_number_far_out_of_its_range_is_not_plausible():
     for key, other in itertools.permutations(unlike.start):
         found = [plausible(unlike, {key: ratio, other: 1.0}) for ratio in (0.1, 0.6, 1.0, 1.4, 4.2)]
         assert found == [False, True, True, True, False]
+    rising, key = Hypothesis((("load-dependent-friction", "conduit"),)), "load-dependent-friction/conduit/n"
+    assert [plausible(rising, {key: n}) for n in (-1.0, -0.2, -0.01, 0.1)] == [False, True, True, False]
     drift, key = Hypothesis((("load-cell-drift", "load-sensor"),)), "load-cell-drift/load-sensor/rate"
     assert [plausible(drift, {key: rate}) for rate in (-1.0, -0.1, 0.1, 1.0)] == [False, True, True, False]
 

@@ -112,14 +112,21 @@ def singles(without: Collection[str] = (), model: Hypothesis = PAPER) -> list[Hy
 
 
 def plausible(hypothesis: Hypothesis, values: Mapping[str, float], slack: float = 1.5) -> bool:
-    """Whether no mechanism is stronger than its range has it by more than a factor; weaker ones are still there."""
+    """Whether no mechanism is stronger than its range has it by more than a factor, or the other way round.
+
+    Weaker ones are still there.
+    """
     for name, place in hypothesis.acting:
         for strength in registry.get(name).strengths:
             value = values[mechanism_key(name, place, strength.name)]
+            low, high = sorted((slack * strength.low, slack * strength.high))
             if strength.ratio:  # which may as well be the other way round
-                if not strength.low / slack <= value <= slack * strength.high:
-                    return False
-            elif abs(value) > slack * max(abs(strength.low), abs(strength.high)):
+                low = strength.low / slack
+            elif strength.signed:
+                low = -high
+            else:
+                low, high = min(low, 0.0), max(high, 0.0)
+            if not low <= value <= high:
                 return False
     return True
 
