@@ -175,7 +175,7 @@ def test_without_load_cells_each_recording_has_the_pretension_that_it_was_aimed_
     assert run("diagnose", folder, "--out", tmp_path / "out").exit_code == 0
     said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     assert said["verdict"] == "agrees"
-    assert said["fit"]["calibrated"]["pretension_scale"] == pytest.approx(1.0, abs=0.1)
+    assert said["fit"]["calibrated"]["pretension_share"] == pytest.approx(1.0, abs=0.1)
 
 
 def test_a_recording_whose_load_cell_failed_takes_nothing_from_the_others(tmp_path):
@@ -188,7 +188,7 @@ def test_a_recording_whose_load_cell_failed_takes_nothing_from_the_others(tmp_pa
     said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     assert said["verdict"] == "agrees"
     assert "t-5N" in {n["what"] for n in said["not_judged"]}
-    assert "pretension_scale" not in said["fit"]["calibrated"]
+    assert "pretension_share" not in said["fit"]["calibrated"]
 
 
 def test_an_estimate_beyond_what_a_fit_is_used_to_is_taken_all_the_same(tmp_path):

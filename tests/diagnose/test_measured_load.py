@@ -21,7 +21,7 @@ from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 from ccmodel.typed import InputError
 
-TRUE = Parameters(20000.0, 1.2, 0.15, 0.006, 0.006, spring_beside_load_Nm_per_rad=0.02, pretension_scale=0.2)
+TRUE = Parameters(20000.0, 1.2, 0.15, 0.006, 0.006, spring_beside_load_Nm_per_rad=0.02, pretension_share=0.2)
 CHANNELS = ("theta_out_rad", "tau_in_Nm")
 
 
@@ -47,12 +47,12 @@ def test_a_fit_finds_pretension_friction_and_spring_without_a_rest():
     """From ten times the pretension, where no cable ever goes slack; two recordings were aimed at two pretensions."""
     batch = [weighed(jaw(load, str(k), T)) for k, (load, T) in enumerate(((-0.005, 7.0), (-0.04, 9.0)))]
     free = {
-        "pretension_scale": Free(2.0, 0.01, 100.0),
+        "pretension_share": Free(2.0, 0.01, 100.0),
         "friction_coefficient": Free(0.15, 0.01, 1.0),
         "spring_beside_load_Nm_per_rad": Free(0.01, 0.0, 1.0),
     }
     found = fit(batch, Hypothesis(), free, {name: f.start for name, f in free.items()})
-    assert found.values["pretension_scale"] == pytest.approx(0.2, rel=0.02)
+    assert found.values["pretension_share"] == pytest.approx(0.2, rel=0.02)
     assert found.values["friction_coefficient"] == pytest.approx(0.15, rel=0.02)
     assert found.values["spring_beside_load_Nm_per_rad"] == pytest.approx(0.02, rel=0.05)
 
@@ -142,7 +142,7 @@ def test_the_configuration_for_the_public_recordings_says_how_they_would_be_diag
 
 def test_a_fit_feels_its_way_from_a_slack_cable_too_where_the_pretension_is_not_known():
     x0, low, high = np.array([2.0, 10.0]), np.array([0.0, 3.0]), np.array([5.0, 50.0])
-    taut, slack = _starts(["friction_coefficient", "pretension_scale"], x0, low, high)
+    taut, slack = _starts(["friction_coefficient", "pretension_share"], x0, low, high)
     assert taut == pytest.approx(x0)
     assert slack[0] == 2.0
     assert low[1] < slack[1] == pytest.approx(3.0)  # a fifth would lie below what is allowed

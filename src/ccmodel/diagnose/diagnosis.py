@@ -206,7 +206,7 @@ def calibration(estimates: Parameters, evidence: Sequence[Evidence]) -> dict[str
         size = float(np.median([np.ptp(e.given.recording["tau_in_Nm"]) / np.ptp(e.given.theta_in) for e in evidence]))
         free["spring_beside_load_Nm_per_rad"] = Free(0.1 * size, 0.0, 10 * size)
     if not all(map(_shows_pretension, evidence)):
-        free["pretension_scale"] = Free(1.0, 0.01, 100.0)  # of what each recording was aimed at
+        free["pretension_share"] = Free(1.0, 0.01, 100.0)  # of what each recording was aimed at
         free["load_radius_m"] = Free(
             estimates.load_radius_m, 0.3 * estimates.load_radius_m, 3 * estimates.load_radius_m
         )
@@ -238,8 +238,8 @@ def _values_of(
     A model that has one pretension for all recordings has it as a share of what these were aimed at, on average.
     """
     known = {name: beside.value_of(name) for name in [*calibrated, *model.start]}
-    if beside.pretension_N is not None and "pretension_scale" in known:
-        known["pretension_scale"] *= beside.pretension_N / aimed_at_N
+    if beside.pretension_N is not None and "pretension_share" in known:
+        known["pretension_share"] *= beside.pretension_N / aimed_at_N
     return {name: calibrated[name].start if value is None else value for name, value in known.items()}
 
 

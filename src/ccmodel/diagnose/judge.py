@@ -223,7 +223,7 @@ def _weighed_anew(found: Comparison, calibrated: Mapping[str, Free], tell) -> Co
     model = [best.hypothesis.of(w.evidence.parameters).with_values(best.values) for w in found.weighed]
 
     def starts(trial: Trial) -> list[dict[str, float]]:
-        if trial is best or "pretension_scale" not in calibrated:
+        if trial is best or "pretension_share" not in calibrated:
             return [trial.values]
         return [trial.values, trial.values | {name: best.values[name] for name in calibrated}]
 

@@ -244,9 +244,9 @@ def _scatter(
 
 
 def _starts(names: Sequence[str], x0: NDArray, low: NDArray, high: NDArray) -> list[NDArray]:
-    if "pretension_scale" not in names:
+    if "pretension_share" not in names:
         return [x0]
-    pretension = np.arange(x0.size) == names.index("pretension_scale")
+    pretension = np.arange(x0.size) == names.index("pretension_share")
     inside = low + 1e-9 * (high - low)
     return [np.clip(np.where(pretension, share * x0, x0), inside, high) for share in PRETENSION_SHARES]
 

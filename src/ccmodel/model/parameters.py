@@ -34,6 +34,8 @@ class Parameters:
         Where the load is a measured torque: a spring at the load pulley that the torque's sensor does not feel.
     pretension_N : float or None
         Initial tension, the same all along both cables; None takes from each recording what its rest shows.
+    pretension_share : float
+        Initial tension over what each recording was aimed at, where no rest shows it.
     tau_in_zero_Nm, tau_out_zero_Nm : float
         What the torque sensors read without a torque.
     theta_out_zero_rad : float
@@ -66,6 +68,7 @@ class Parameters:
     load_stiffness_Nm_per_rad: float | None = None
     spring_beside_load_Nm_per_rad: float = 0.0
     pretension_N: float | None = None
+    pretension_share: float = 1.0
     tau_in_zero_Nm: float = 0.0
     tau_out_zero_Nm: float = 0.0
     theta_out_zero_rad: float = 0.0

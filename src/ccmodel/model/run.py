@@ -210,7 +210,7 @@ def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension
         return InitialTension.uniform(path, scale * parameters.pretension_N)
     read = given.resting_mean
     if not all(f"T{i}_N" in read for i in (1, 2, 3, 4)):
-        return InitialTension.uniform(path, scale * given.recording.pretension_N)
+        return InitialTension.uniform(path, scale * parameters.pretension_share * given.recording.pretension_N)
     true = _true_at_rest(read, given, parameters)
     F_drive, F_load = true["F_drive_N"], true["F_load_N"]
     drive, load = true["tau_in_Nm"] / parameters.drive_radius_m, true["tau_out_Nm"] / parameters.load_radius_m
