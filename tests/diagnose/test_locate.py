@@ -7,7 +7,7 @@ import pytest
 
 from ccmodel.diagnose.evidence import weigh
 from ccmodel.diagnose.judge import Judgement
-from ccmodel.diagnose.locate import location
+from ccmodel.diagnose.locate import _sticking_out, location
 from ccmodel.model.general.run import Active
 from made_evidence import NOISE, PARAMETERS, batch, calibrated
 
@@ -60,3 +60,10 @@ def only(evidence, channel):
     for other in set(evidence.channels) - {channel}:
         evidence = evidence.without(other)
     return evidence
+
+
+def test_what_noise_leaves_anyway_makes_no_channel_stick_out():
+    """Beside an angle that is off by twice its noise, channels at 1.2 times theirs are as good as right."""
+    square = {"theta_out": 2.1**2, "tau_in": 1.15**2, "tau_out": 1.3**2, "F_drive": 0.9**2}
+    assert _sticking_out(square, 0.35) == ["theta_out", "tau_out"]
+    assert _sticking_out({"theta_out": 0.9, "tau_in": 0.8}, 0.35) == ["theta_out"]

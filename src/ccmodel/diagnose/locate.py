@@ -16,8 +16,9 @@ from ccmodel.model.run import ModelInput
 PARTS = ("at rest", "after a reversal", "under way")
 # A reversal's mark is looked for over this share of the drive's stroke after it.
 AFTER_REVERSAL = 0.25
-# A channel is named if it carries this share of the error that the worst one does, in units of its noise.
-NAMED_SHARE = 0.35
+# A channel is named if it carries this share of the error beyond noise that the worst one does, in units of its noise;
+# a part of the motion likewise.
+NAMED_SHARE, PARTS_SHARE = 0.35, 0.7
 # One suspect alone accounts for a mismatch if without it no more than this share of it is left. Of places that this
 # does not tell apart the screening chooses.
 ALONE = 0.05
@@ -43,16 +44,23 @@ def location(judgement: Judgement) -> dict:
     acting = judgement.best.hypothesis.acting
     places = list(dict.fromkeys(place for _, place in acting)) or judgement.one_fault or _places(judgement)
     table = mismatch(judgement.weighed, judgement.calibrated)
-    by_channel = {c: float(np.sqrt(np.nanmean(np.square(list(parts.values()))))) for c, parts in table.items()}
-    worst = max(by_channel.values())
-    channels = [c for c, value in sorted(by_channel.items(), key=lambda i: -i[1]) if value > NAMED_SHARE * worst]
+    square = {c: float(np.nanmean(np.square(list(parts.values())))) for c, parts in table.items()}
+    channels = _sticking_out(square, NAMED_SHARE)
     squares = {p: np.array([table[c][p] ** 2 for c in channels]) for p in PARTS}
-    by_part = {p: float(np.sqrt(np.nanmean(s))) for p, s in squares.items() if np.isfinite(s).any()}
-    parts = [p for p in by_part if by_part[p] > 0.7 * max(by_part.values())]
+    by_part = {p: float(np.nanmean(s)) for p, s in squares.items() if np.isfinite(s).any()}
+    parts = [p for p in PARTS if p in _sticking_out(by_part, PARTS_SHARE)]
     verb = "is" if len(channels) == 1 else "are"
     where = (" and " if acting else " or ").join(TEXT[place] for place in places)
     text = f"The mismatch sits {where}: {', '.join(channels)} {verb} off most, {' and '.join(parts)}."
     return {"place": places[0], "channels": channels, "phases": parts, "text": text}
+
+
+def _sticking_out(square: dict[str, float], share: float) -> list[str]:
+    """Of mean squares over what a right model leaves, the names of those furthest beyond it, the worst first."""
+    beyond = {name: max(value - 1.0, 0.0) for name, value in square.items()}
+    worst = max(beyond.values())
+    ranked = sorted(square, key=lambda name: -square[name])
+    return [name for name in ranked if beyond[name] > share**2 * worst] or ranked[:1]
 
 
 def _places(judgement: Judgement) -> list[str]:
