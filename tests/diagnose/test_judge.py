@@ -24,6 +24,7 @@ from ccmodel.diagnose.judge import (
 )
 from ccmodel.diagnose.structure import Structure
 from ccmodel.diagnose.trial import Score, Trial
+from ccmodel.identify.problem import Free
 from made_evidence import batch, calibrated
 
 FRICTION, SCALE = ("pulley-friction", "drive-pulley"), ("torque-scale", "drive-sensor")
@@ -117,6 +118,15 @@ def test_a_single_recording_gives_no_sure_name():
     assert found.verdict == "undecided"
     assert found.listed * found.probability[0] < SURE
     assert nested_errors(found) == [friction]
+
+
+def test_without_a_known_pretension_no_name_is_sure():
+    blind = replace(trial(6.0), free={"pretension_share": Free(1.0)})
+    friction = trial(1.0, FRICTION)
+    unlearnt = {t.hypothesis: Structure(np.zeros(8)) for t in (blind, friction)}
+    found = _verdict(Comparison(WEIGHED, blind, [friction], unlearnt), [])
+    assert found.verdict == "undecided"
+    assert found.best is friction
 
 
 def test_the_list_is_the_less_likely_the_more_is_left_and_the_more_was_tried():

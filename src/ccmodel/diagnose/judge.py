@@ -55,7 +55,8 @@ OFF_LIST = 0.2
 LEVEL = (0.93, 0.09)
 FORM_SHARE = 0.04
 RIVAL = 0.02
-# A single recording leaves nothing to hold out: no name is sure, however well its mechanism fits.
+# A single recording leaves nothing to hold out, and where no rest shows the pretension the errors have valleys of which
+# a fit sees some: no name is sure, however well its mechanism fits.
 UNTESTED = 0.75
 MOST_ALTERNATIVES = 4
 
@@ -351,7 +352,7 @@ def _verdict(found: Comparison, scores: list[Score]) -> Judgement:
     probability = found.probability
     likeliest = trials[int(np.argmax(probability))] if trials else base
     listed = is_listed(likeliest, base) if trials else 1.0
-    listed *= UNTESTED if len(found.weighed) == 1 else 1.0
+    listed *= UNTESTED if len(found.weighed) == 1 or "pretension_share" in base.free else 1.0
 
     def judged(verdict: str, best: Trial) -> Judgement:
         order = np.argsort(-np.array(probability), kind="stable")
