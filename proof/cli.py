@@ -155,8 +155,9 @@ def real(
     if not (source / "batch.yaml").exists():
         raise typer.BadParameter(f"there is no batch {plan.batch} in {raw}: import it with ccmodel import-mis-tool")
     find_model(plan, source, in_use, typer.echo)
+    made_by = {"sources": conceal.digest_of()}
     for case in real_cases_of(plan, json.loads((in_use / MODEL).read_text(encoding="utf-8"))):
-        if not _is_of({"sources": conceal.digest_of()}, out / "cases" / case.name / "result.json"):
+        if not _is_of(made_by, out / "cases" / case.name / "result.json"):
             judge_real(case, plan, source, in_use, out / "cases" / case.name, typer.echo)
     if page is not None:
         earlier = page.read_text(encoding="utf-8") if page.exists() else ""

@@ -115,10 +115,10 @@ def diagnose(
             not_judged.append({"what": recording.id, "why": str(error)})
     if not evidence:
         raise ModelError("none of the recordings can be compared with the model: " + not_judged[0]["why"])
-    if any(map(_shows_pretension, evidence)):
+    if any(e.given.shows_pretension for e in evidence):
         why = "no rest with load cells shows its pretension, as the others' do"
-        not_judged += [{"what": e.given.recording.id, "why": why} for e in evidence if not _shows_pretension(e)]
-        evidence = [e for e in evidence if _shows_pretension(e)]
+        not_judged += [{"what": e.given.recording.id, "why": why} for e in evidence if not e.given.shows_pretension]
+        evidence = [e for e in evidence if e.given.shows_pretension]
     not_judged += _what_is_missing(evidence)
     why = "as the run was asked to: part of what the noise is taken to be"
     not_judged += [{"what": what, "why": why} for what in _allowed(allowance)]
@@ -205,7 +205,7 @@ def calibration(estimates: Parameters, evidence: Sequence[Evidence]) -> dict[str
         # A batch that states no spring may have one all the same, which the torque measured at the load does not feel.
         size = float(np.median([np.ptp(e.given.recording["tau_in_Nm"]) / np.ptp(e.given.theta_in) for e in evidence]))
         free["spring_beside_load_Nm_per_rad"] = Free(0.1 * size, 0.0, 10 * size)
-    if not all(map(_shows_pretension, evidence)):
+    if not all(e.given.shows_pretension for e in evidence):
         free["pretension_share"] = Free(1.0, 0.01, 100.0)  # of what each recording was aimed at
         free["load_radius_m"] = Free(
             estimates.load_radius_m, 0.3 * estimates.load_radius_m, 3 * estimates.load_radius_m
@@ -223,11 +223,6 @@ def _free(estimate: float, low: float, high: float) -> Free:
     if estimate > 0:
         low, high = min(low, estimate / 10), max(high, 10 * estimate)
     return Free(float(np.clip(estimate, low, high)), low, high)
-
-
-def _shows_pretension(e: Evidence) -> bool:
-    """Whether a rest at the start shows the tension at all four ends of the cables."""
-    return all(f"T{i}_N" in e.given.resting_mean for i in (1, 2, 3, 4))
 
 
 def _values_of(
@@ -258,7 +253,7 @@ def _what_is_missing(evidence: Sequence[Evidence]) -> list[dict[str, str]]:
             found.append({"what": channel, "why": "not recorded, or the load's course had to be taken from it"})
         elif lacking:
             found.append({"what": f"{channel} of {', '.join(lacking)}", "why": "not recorded there, or not usable"})
-    if not all(map(_shows_pretension, evidence)):
+    if not all(e.given.shows_pretension for e in evidence):
         why = "no rest with load cells shows them: fitted, the pretension as one share of what each was aimed at"
         found.append({"what": "pretension, ratio of the pulleys, zeros of the torques", "why": why})
     if len(evidence) == 1:

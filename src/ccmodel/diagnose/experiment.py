@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ccmodel.diagnose.evidence import LOOKS, Weighed, run_differences, shrink_of
 from ccmodel.diagnose.judge import RIVAL, Judgement
 from ccmodel.diagnose.travel import speed
-from ccmodel.diagnose.trial import DIFFERENCE, Trial
+from ccmodel.diagnose.trial import Trial, slopes
 from ccmodel.failure import ModelError
 from ccmodel.identify.problem import Evidence, each
 from ccmodel.model.parameters import Parameters
@@ -150,7 +150,7 @@ def _apart(planned: Sequence[Evidence], refitted: Sequence[Trial] | None = None)
     """
     try:
         said = [e.errors({}).ravel() for e in planned]
-        taken = [_taken_up(e, t) for e, t in zip(planned, refitted, strict=True)] if refitted else None
+        taken = [_taken_up(*one) for one in zip(planned, said, refitted, strict=True)] if refitted else None
     except (ModelError, ValueError):
         return 0.0
     distances = []
@@ -163,14 +163,14 @@ def _apart(planned: Sequence[Evidence], refitted: Sequence[Trial] | None = None)
     return float(min(distances))
 
 
-def _taken_up(e: Evidence, trial: Trial) -> NDArray:
-    """What is not known of a rival's values and of a run, a standard deviation of each over the noise; (rows, k)."""
-    said, bounds = e.errors({}), trial.free | trial.hypothesis.free(trial.values)
-    slopes = []
-    for name, value in trial.values.items():
-        step = DIFFERENCE * size_of(name, value)
-        step = -step if value + step > bounds[name].high else step
-        slopes.append((e.errors({name: value + step}) - said).ravel() / step)
+def _taken_up(e: Evidence, said: NDArray, trial: Trial) -> NDArray:
+    """What is not known of a rival's values and of a run, a standard deviation of each over the noise; (rows, k).
+
+    `said` is what the rival says, over the noise.
+    """
+    names, x = list(trial.values), np.array(list(trial.values.values()))
+    free = trial.free | trial.hypothesis.free(trial.values)
+    sizes = [size_of(name, value) for name, value in trial.values.items()]
+    moves = slopes(lambda values: e.errors(values).ravel(), said, x, names, sizes, [free[name].high for name in names])
     variances, axes = np.linalg.eigh(trial.covariance)
-    unsure = np.stack(slopes, axis=1) @ (axes * np.sqrt(variances.clip(0.0)))
-    return np.hstack([unsure, run_differences(e)[0]])
+    return np.hstack([moves @ (axes * np.sqrt(variances.clip(0.0))), run_differences(e)[0]])

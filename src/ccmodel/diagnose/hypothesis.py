@@ -91,10 +91,10 @@ class Hypothesis:
         """Values at which a single mechanism is tried out, all over its plausible range."""
         ((name, place),) = self.acting
         mechanism = registry.get(name)
-        grids = [[_within(p, share) for share in p.tried or SHAPES] for p in mechanism.shapes]
+        grids = [[p.at(share) for share in p.tried or SHAPES] for p in mechanism.shapes]
         for strength in mechanism.strengths:
             others = {p.name: p.neutral for p in mechanism.strengths if p is not strength}
-            sizes = [UNLIKE] if strength.ratio else [_within(strength, share) for share in strength.tried or STRENGTHS]
+            sizes = [UNLIKE] if strength.ratio else [strength.at(share) for share in strength.tried or STRENGTHS]
             for size, *values in product(sizes, *grids):
                 shapes = dict(zip((p.name for p in mechanism.shapes), values, strict=True))
                 said = others | {strength.name: size} | shapes
@@ -129,13 +129,6 @@ def plausible(hypothesis: Hypothesis, values: Mapping[str, float], slack: float 
             if not low <= value <= high:
                 return False
     return True
-
-
-def _within(parameter: Parameter, share: float) -> float:
-    low, high = parameter.low, parameter.high
-    if parameter.scale == "log" and low > 0:
-        return float(low * (high / low) ** share)
-    return float(low + share * (high - low))
 
 
 def _reach(parameter: Parameter, strength: bool) -> tuple[float, float]:

@@ -48,7 +48,7 @@ def location(judgement: Judgement) -> dict:
     channels = _sticking_out(square, NAMED_SHARE)
     squares = {p: np.array([table[c][p] ** 2 for c in channels]) for p in PARTS}
     by_part = {p: float(np.nanmean(s)) for p, s in squares.items() if np.isfinite(s).any()}
-    parts = [p for p in PARTS if p in _sticking_out(by_part, PARTS_SHARE)]
+    parts = sorted(_sticking_out(by_part, PARTS_SHARE), key=PARTS.index)
     verb = "is" if len(channels) == 1 else "are"
     where = (" and " if acting else " or ").join(TEXT[place] for place in places)
     text = f"The mismatch sits {where}: {', '.join(channels)} {verb} off most, {' and '.join(parts)}."

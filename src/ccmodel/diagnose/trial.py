@@ -284,17 +284,19 @@ def _inverse(information: NDArray, sizes: NDArray) -> NDArray:
     return np.linalg.pinv(scaled, rcond=1e-10, hermitian=True) * np.outer(sizes, sizes)
 
 
-def _jacobians(acting, bases, x, names, sizes, high) -> list[NDArray]:
-    def one(i: int, w: Weighed) -> NDArray:
-        columns = []
-        for k in range(x.size):
-            step = DIFFERENCE * sizes[k] * (-1 if x[k] + DIFFERENCE * sizes[k] > high[k] else 1)
-            aside = x.copy()
-            aside[k] += step
-            columns.append((errors(w, dict(zip(names, aside.tolist(), strict=True))) - bases[i]) / step)
-        return np.stack(columns, axis=1) if columns else np.empty((bases[i].size, 0))
+def slopes(run: Callable[[dict[str, float]], NDArray], base: NDArray, x, names, sizes, high) -> NDArray:
+    """How what `run` makes of values by name, `base` at `x`, answers to each of them; shape (rows, unknowns)."""
+    columns = []
+    for k in range(x.size):
+        step = DIFFERENCE * sizes[k] * (-1 if x[k] + DIFFERENCE * sizes[k] > high[k] else 1)
+        aside = x.copy()
+        aside[k] += step
+        columns.append((run(dict(zip(names, aside.tolist(), strict=True))) - base) / step)
+    return np.stack(columns, axis=1) if columns else np.empty((base.size, 0))
 
-    return each(acting, one)
+
+def _jacobians(acting, bases, x, names, sizes, high) -> list[NDArray]:
+    return each(acting, lambda i, w: slopes(lambda values: errors(w, values), bases[i], x, names, sizes, high))
 
 
 @dataclass(frozen=True)

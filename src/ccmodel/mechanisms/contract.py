@@ -34,6 +34,9 @@ PLACES = (
 )
 
 
+PRESLIDING_RAD = 2e-3  # Over which a bearing's friction builds up where nothing says otherwise.
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One number of a mechanism.
@@ -76,6 +79,12 @@ class Parameter:
     tried: tuple[float, ...] = ()
     eased: bool = False
     unsaid: float | None = None
+
+    def at(self, share: float) -> float:
+        """A value within the range, in the measure in which a fit should step over it."""
+        if self.scale == "log":
+            return float(self.low * (self.high / self.low) ** share)
+        return float(self.low + share * (self.high - self.low))
 
 
 class Kink(NamedTuple):
@@ -149,8 +158,8 @@ class Settings:
     conduit_compliance: float = 0.0
     drive_friction_Nm: float = 0.0
     load_friction_Nm: float = 0.0
-    drive_presliding_rad: float = 2e-3
-    load_presliding_rad: float = 2e-3
+    drive_presliding_rad: float = PRESLIDING_RAD
+    load_presliding_rad: float = PRESLIDING_RAD
     drive_eccentricity: tuple[float, float] = (0.0, 0.0)
     load_eccentricity: tuple[float, float] = (0.0, 0.0)
     half_gap: float = 0.0

@@ -13,10 +13,8 @@ bearing's has the sign of the speed and one size.
 import numpy as np
 
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import Mechanism, Parameter, side
+from ccmodel.mechanisms.contract import PRESLIDING_RAD, Mechanism, Parameter, side
 from ccmodel.mechanisms.presliding import dahl
-
-PRESLIDING_RAD = 2e-3  # Where nothing says otherwise.
 
 
 @kernel
@@ -41,7 +39,14 @@ MECHANISM = Mechanism(
     parameters=(
         Parameter("friction_torque", "N m", 0.5e-3, 50e-3, 5e-3),
         Parameter(
-            "presliding", "rad", 0.5e-3, 20e-3, PRESLIDING_RAD, PRESLIDING_RAD, tried=(0.4,), unsaid=PRESLIDING_RAD
+            "presliding",
+            "rad",
+            0.5e-3,
+            20e-3,
+            PRESLIDING_RAD,
+            neutral=PRESLIDING_RAD,
+            tried=(0.4,),
+            unsaid=PRESLIDING_RAD,
         ),
     ),
     summary="a friction torque in a pulley's bearing",

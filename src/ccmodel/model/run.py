@@ -16,7 +16,7 @@ from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
 from ccmodel.model.parameters import ZERO_OF, Parameters
 from ccmodel.model.transmission import Transmission
-from ccmodel.recording import Recording, stride
+from ccmodel.recording import TENSIONS, Recording, stride
 from ccmodel.rig.motion import SIDES, drive_motion
 
 # A load torque that was measured is the load's course and the sensor's noise. The noise would rock the load end; a
@@ -105,6 +105,11 @@ class ModelInput:
     def resting_mean(self) -> dict[str, float]:
         """What each channel read on average while the drive did not move, and when; empty without a rest."""
         return {c: float(values.mean()) for c, values in self.resting.items() if values.size}
+
+    @property
+    def shows_pretension(self) -> bool:
+        """Whether a rest shows the tension at all four ends of the cables."""
+        return all(tension in self.resting_mean for tension in TENSIONS)
 
     @property
     def placed_deviations(self) -> NDArray:
@@ -208,10 +213,9 @@ def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension
     scale = parameters.pretension_scale
     if parameters.pretension_N is not None:
         return InitialTension.uniform(path, scale * parameters.pretension_N)
-    read = given.resting_mean
-    if not all(f"T{i}_N" in read for i in (1, 2, 3, 4)):
+    if not given.shows_pretension:
         return InitialTension.uniform(path, scale * parameters.pretension_share * given.recording.pretension_N)
-    true = _true_at_rest(read, given, parameters)
+    true = _true_at_rest(given.resting_mean, given, parameters)
     F_drive, F_load = true["F_drive_N"], true["F_load_N"]
     drive, load = true["tau_in_Nm"] / parameters.drive_radius_m, true["tau_out_Nm"] / parameters.load_radius_m
     T1, T3 = scale * (F_drive + drive) / 2, scale * (F_drive - drive) / 2

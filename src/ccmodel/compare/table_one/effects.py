@@ -70,7 +70,7 @@ def scaled(effect: Effect, factor: float) -> Effect:
     if effect.is_set_up:
         return replace(effect, values={DIFFERENCE: factor * effect.values[DIFFERENCE]})
     p = _strength_of(effect)
-    value = _away(p) + factor * (effect.values[p.name] - _away(p))
+    value = p.neutral + factor * (effect.values[p.name] - p.neutral)
     return replace(effect, values={**effect.values, p.name: value}, plausible=_is_plausible(p, value))
 
 
@@ -85,13 +85,13 @@ def _step(effect: Effect, grid: Grid) -> float:
     if effect.is_set_up:
         return 2.0
     p = _strength_of(effect)
-    sizes = np.sort([abs(v - _away(p)) for v in _strengths(p, grid)])
+    sizes = np.sort([abs(v - p.neutral) for v in _strengths(p, grid)])
     return float((sizes[-1] / sizes[0]) ** (1 / (grid.strengths - 1)))
 
 
 def _of_mechanism(name: str, place: str, grid: Grid) -> list[Effect]:
     mechanism = registry.get(name)
-    shapes = [[_within(p, s) for s in grid.shapes] if p.unsaid is None else [p.unsaid] for p in mechanism.shapes]
+    shapes = [[p.at(s) for s in grid.shapes] if p.unsaid is None else [p.unsaid] for p in mechanism.shapes]
     names = [p.name for p in mechanism.shapes]
     return [
         Effect(
@@ -117,16 +117,6 @@ def _strengths(parameter: Parameter, grid: Grid) -> list[float]:
     if parameter.signed:
         return [*(-sizes[::-1]).tolist(), *sizes.tolist()]
     return (np.sign(parameter.low) * sizes).tolist()
-
-
-def _within(parameter: Parameter, share: float) -> float:
-    low, high = parameter.low, parameter.high
-    return float(low * (high / low) ** share if parameter.scale == "log" else low + share * (high - low))
-
-
-def _away(parameter: Parameter) -> float:
-    """Where a strength is counted from."""
-    return 1.0 if parameter.ratio else 0.0
 
 
 def _is_plausible(parameter: Parameter, value: float) -> bool:
