@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -142,6 +142,7 @@ def draw(seed: int, kind: str | None = None, effect: str | None = None) -> Case:
     hidden = [_effect(*chosen, spring, random) for chosen in _chosen(kind, effect, plan, random)]
     truth = tuple(t for t, _ in hidden)
     campaign = _campaign(seed, plan, spring, Effects.model_validate(merged([e for _, e in hidden])), random)
+    truth = tuple(_with_the_rigs_own(t, campaign) for t in truth)
     pretension_N = random.uniform(*plan.rig.pretension_N)
     bend_rad = random.uniform(*(protocol.bend_rad or plan.rig.bend_rad))
     length_m = campaign.rig.cable.length_m
@@ -207,6 +208,20 @@ def _effect(name: str, spec: EffectPlan, strength: float, spring: float, random:
     entered, values = ENTRIES[name](size, also, place, spring)
     severity = min(int(strength * SEVERITIES) + 1, SEVERITIES)
     return Truth(name, place, float(strength), severity, size, spec.unit, values), entered
+
+
+def _with_the_rigs_own(truth: Truth, campaign: Campaign) -> Truth:
+    """A viscous film's value with what else resists in proportion to speed in this rig.
+
+    That is the drag on its cables, of the same law, and the damping of its load, as a drag on both cables would do it.
+    No recording tells these from the film.
+    """
+    if truth.name != "viscous-friction":
+        return truth
+    rig = campaign.rig
+    cables = campaign.numerics.drag_rate_per_s * rig.cable.density_kg_per_m
+    load = rig.load.damping_Nms_per_rad / (2 * rig.pulley_radius_m**2 * rig.cable.length_m)
+    return replace(truth, values={"c": truth.values["c"] + cables + load})
 
 
 def _campaign(seed: int, plan: Plan, spring: float, effects: Effects, random: Generator) -> Campaign:

@@ -29,6 +29,18 @@ def test_values_of_an_answer_have_names_of_the_list():
         assert set(truth.values) <= {p.name for p in mechanisms.get(name).parameters}
 
 
+def test_a_films_answer_counts_what_else_resists_as_it_does():
+    """On both cables, at one speed: drag on every length and damping of the load, as forces at the load's end."""
+    case = draw(3, "single", "viscous-friction")
+    (truth,), rig, speed = case.truth, case.campaign.rig, 0.01
+    mass_kg = 2 * rig.cable.density_kg_per_m * rig.cable.length_m
+    own_N = case.campaign.numerics.drag_rate_per_s * mass_kg * speed
+    own_N += rig.load.damping_Nms_per_rad * (speed / rig.pulley_radius_m) / rig.pulley_radius_m
+    film_N = 2 * rig.effects.viscous_Ns_per_m2 * rig.cable.length_m * speed
+    assert 2 * truth.values["c"] * rig.cable.length_m * speed == pytest.approx(film_N + own_N)
+    assert truth.size == rig.effects.viscous_Ns_per_m2
+
+
 @pytest.mark.parametrize("name", [*PLAN.effects, *PLAN.unlisted])
 def test_an_effect_enters_the_rig(name):
     kind = "unlisted" if name in PLAN.unlisted else "single"

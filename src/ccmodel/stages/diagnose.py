@@ -79,7 +79,7 @@ def diagnose_recordings(recordings_file: Path, out: Path, judged: Diagnosing | N
             raise ModelError("no recording that can be used")
         not_judged = _refused(read_json(recordings_file.with_suffix(".json"))["findings"])
         found = run(recordings, estimates, not_judged, **_options(judged))
-    except ModelError as error:
+    except (ModelError, ValueError) as error:
         out.mkdir(parents=True, exist_ok=True)
         write_json(out / "diagnosis.json", {"batch": recordings_file.stem, "verdict": None, "why": str(error)})
         for name in ("calibrated", "model"):
