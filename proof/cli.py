@@ -12,6 +12,7 @@ import numpy as np
 import typer
 
 from proof import conceal
+from proof.archive import pack, unpack
 from proof.build import build as build_case
 from proof.cases import Case, draw
 from proof.plan import read_plan
@@ -102,6 +103,17 @@ def part(n: Annotated[int | None, typer.Option(min=1, help="How many; else as pl
 
 
 @app.command()
+def resume(
+    out: Annotated[Path, typer.Option(help="Folder with a folder a case.")],
+    archive: Annotated[Path, typer.Option(help="What an earlier proof packed.")],
+) -> None:
+    """Bring back the results of an earlier proof of the same sources and the same cases."""
+    made_by = {"sources": conceal.digest_of(), "builder": conceal.builder_digest()}
+    if brought := unpack(archive, out, made_by):
+        typer.echo(f"{brought} results from {archive}", err=True)
+
+
+@app.command()
 def score(
     results: Annotated[Path, typer.Argument(exists=True, file_okay=False, help="Folder with a folder a case.")],
     out: Annotated[Path, typer.Option(help="JSON file with the score.")],
@@ -110,6 +122,7 @@ def score(
     command: Annotated[str, typer.Option(help="What made the results, for the page.")] = "python -m proof run",
     of: Annotated[str, typer.Option(help="Which cases these are, for the page.")] = "",
     numbers: Annotated[str | None, typer.Option(help="Only these folders, by comma; else all.")] = None,
+    archive: Annotated[Path | None, typer.Option(help="File that gets every result below RESULTS.")] = None,
     strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 where a case was missed.")] = False,
 ) -> None:
     """Score results against keys made again from their seeds."""
@@ -121,6 +134,8 @@ def score(
     outcomes = read_outcomes(results, numbers.split(",") if numbers else None)
     if not outcomes:
         raise typer.BadParameter(f"there is no result below {results}")
+    if archive is not None:
+        pack(results, archive)
     scored = score_of(outcomes)
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps(scored, indent=1), encoding="utf-8")
