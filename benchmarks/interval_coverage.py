@@ -74,7 +74,8 @@ zeros (anywhere within the paper's accuracy) and noise (0.1 mN m, 0.05 N), and b
 fit starts a fifth off and finds three values for the batch and eight for each recording. Seeds from {FIRST_SEED} on
 unless said otherwise above; nothing about the intervals was chosen by them.
 
-A 90 % interval should hold the truth in 90 % of the batches: within the limits in all but {UNLIKELY:.0%} of such tests.
+A 90 % interval should hold the truth in 90 % of the batches: by chance a count lies outside the limits once in
+{1 / UNLIKELY:.0f}.
 "mean" and "sd" are of the error over its stated standard deviation, which should be 0 and 1. Values of a recording's
 own are not independent within a batch, so that the limits are somewhat too narrow for them.
 

@@ -4,7 +4,7 @@ The model of a diagnosis is refitted without all recordings of one load level, t
 sensors would have read there. Refits start from the values of all recordings together: which valley of the errors is
 the right one is not asked again.
 
-    python benchmarks/real_model.py results/real/diagnoses/Tool_4_Maryland_L_2/model.json \
+    python benchmarks/real_model.py results/real/diagnoses/Tool_4_Maryland_L_2/nearest.json \
         results/real/raw/Tool_4_Maryland_L_2 --yardstick yardstick.json --figure held-out.png
 """
 
@@ -116,7 +116,7 @@ def _ends(items: list) -> tuple:
 def main() -> None:
     """Print what the model leaves, and its ratio to the yardstick's where that is given."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("model", type=Path, help="model.json of a diagnosis")
+    parser.add_argument("model", type=Path, help="a model file of a diagnosis")
     parser.add_argument("batch", type=Path, help="the imported batch that it is of")
     parser.add_argument("--yardstick", type=Path, help="what real_regressor.py wrote with --out")
     parser.add_argument("--figure", type=Path, help="draw held-out loops here")

@@ -137,7 +137,7 @@ def _missed(scored) -> str:
     ]
     if not rates + sizes:
         return "Nothing that there are cases for is missed."
-    return "Missed: " + "; ".join(rates + sizes) + ". The cases behind it are listed below."
+    return "Missed: " + "; ".join(rates + sizes) + ". Of the cases behind it the visible ones are listed below."
 
 
 def _rivals(rows) -> str:

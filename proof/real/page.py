@@ -68,7 +68,8 @@ of one core in the middle, {took[-1]:.0f} s at most.
 
 "Changed" is the standard deviation of what was changed, as a share of the channel's peak to peak. "Left" is the mean
 square that the model, held, leaves of these recordings, over what was allowed. Right is: named or undecided with it, at
-its place; of what no list knows, `unexplained` or `undecided`, and nothing named confidently.
+its place, or with its equal that no recording tells from it (a gain at one end is one at the other); of what no list
+knows, `unexplained` or `undecided` at whatever place, and nothing named confidently.
 
 {_rows(_PUT_IN_HEAD, [_put_in_row(o, plan) for o in outcomes if o.case.kind])}
 
