@@ -2,8 +2,9 @@
 
 Gradient boosting learns each measured channel from what the model is given too: the drive's angle and the torque at
 the load, now and a while ago, the drive's speed and direction, and how far it has gone since it last turned round. No
-physics is in it. All recordings of one load level, then of one rate, are held out in turn; the settings are searched
-on the other recordings alone, by levels held out among these in the same way.
+physics is in it. With --ahead it is told what comes, too, as a model is that runs on the whole motion. All recordings
+of one load level, then of one rate, are held out in turn; the settings are searched on the other recordings alone, by
+levels held out among these in the same way.
 
     python benchmarks/real_regressor.py results/real/raw/Tool_4_Maryland_L_2
 """
@@ -39,14 +40,16 @@ SEED = 0
 COUNTS = 2
 
 
-def features(given: ModelInput) -> NDArray:
-    """What is known of every sample, shape (n, features)."""
+def features(given: ModelInput, ahead: bool = False) -> NDArray:
+    """What is known of every sample, of what was before it or also of what comes, shape (n, features)."""
     theta, torque, time_s = given.theta_in, given.tau_out, given.recording.time_s
     omega = speed(given)
     travel, since_s = since_reversal(given)
-    lagged = [_earlier(values, time_s, lag) - values for values in (theta, torque) for lag in LAGS_S]
-    earlier_speeds = [_earlier(omega, time_s, lag) for lag in LAGS_S]
-    return np.column_stack([theta, omega, np.sign(omega), travel, since_s, torque, *lagged, *earlier_speeds])
+    lags = (*LAGS_S, *(-lag for lag in LAGS_S)) if ahead else LAGS_S
+    lagged = [_earlier(values, time_s, lag) - values for values in (theta, torque) for lag in lags]
+    other_speeds = [_earlier(omega, time_s, lag) for lag in lags]
+    to_come = _until_reversal(given) if ahead else ()
+    return np.column_stack([theta, omega, np.sign(omega), travel, since_s, torque, *lagged, *other_speeds, *to_come])
 
 
 def _earlier(values: NDArray, time_s: NDArray, lag: float) -> NDArray:
@@ -66,15 +69,16 @@ def is_judged(given: ModelInput) -> NDArray:
 
 def is_resolved(given: ModelInput) -> NDArray:
     """Samples at which the drive has gone some counts since it last turned round and has them to go, shape (n,)."""
-    forth, back = (np.abs(t) for t in (since_reversal(given)[0], _until_reversal(given)))
+    forth, back = (np.abs(t) for t in (since_reversal(given)[0], _until_reversal(given)[0]))
     return np.minimum(forth, back) > COUNTS * given.recording.encoder_step_rad["theta_in_rad"]
 
 
-def _until_reversal(given: ModelInput) -> NDArray:
+def _until_reversal(given: ModelInput) -> tuple[NDArray, NDArray]:
     recording = given.recording
     turned = recording.with_channels({}, {}, "model")
     backwards = replace(given, recording=replace(turned, time_s=-recording.time_s[::-1]), theta_in=given.theta_in[::-1])
-    return since_reversal(backwards)[0][::-1]
+    travel, time_s = since_reversal(backwards)
+    return travel[::-1], time_s[::-1]
 
 
 def folds(recordings: Sequence[Recording], varied: str) -> Iterator[tuple[float, NDArray]]:
@@ -84,10 +88,10 @@ def folds(recordings: Sequence[Recording], varied: str) -> Iterator[tuple[float,
         yield float(value), values == value
 
 
-def held_out(inputs: Sequence[ModelInput], channel: str, varied: str) -> list[NDArray]:
+def held_out(inputs: Sequence[ModelInput], channel: str, varied: str, ahead: bool = False) -> list[NDArray]:
     """By recording what the regressor errs by, each predicted without all that share its value."""
     recordings = [g.recording for g in inputs]
-    X = [features(g)[is_judged(g)] for g in inputs]
+    X = [features(g, ahead)[is_judged(g)] for g in inputs]
     y = [target(g, channel)[is_judged(g)] for g in inputs]
     errors: list = [None] * len(inputs)
     for _, out in folds(recordings, varied):
@@ -118,13 +122,13 @@ def _learnt(settings: dict, X, y, which: NDArray, trees: int) -> HistGradientBoo
     return model.fit(np.concatenate([X[i] for i in which]), np.concatenate([y[i] for i in which]))
 
 
-def yardstick(batch: Path) -> list[dict]:
+def yardstick(batch: Path, ahead: bool = False) -> list[dict]:
     """One row for each channel and each thing held out: rms error, and peak to peak of the typical recording."""
     inputs = [ModelInput.of(r, STEP_S) for r in ingest_batch(batch).recordings]
     rows = []
     for channel, varied in product(TARGETS, VARIED):
         span = float(np.median([np.ptp(g.recording[channel][is_judged(g)]) for g in inputs]))
-        errors = held_out(inputs, channel, varied)
+        errors = held_out(inputs, channel, varied, ahead)
         away = [e[is_resolved(g)[is_judged(g)]] for e, g in zip(errors, inputs, strict=True)]
         rows.append(
             {
@@ -150,10 +154,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("batches", nargs="+", type=Path, help="folders that `ccmodel import-mis-tool` wrote")
     parser.add_argument("--out", type=Path, help="write the rows here, JSON")
+    parser.add_argument("--ahead", action="store_true", help="tell it what comes, too")
     asked = parser.parse_args()
     rows = []
     for batch in asked.batches:
-        for row in yardstick(batch):
+        for row in yardstick(batch, asked.ahead):
             unit = "mN m" if row["channel"].startswith("tau") else "mrad"
             share = 100 * row["rms"] / row["peak_to_peak"]
             print(

@@ -62,10 +62,11 @@ def left_out(results: Folder) -> None:
 @app.command()
 def diagnose(
     batch: Folder,
-    out: Annotated[Path, typer.Option(help="Folder that gets diagnosis.json, the page and two models.")],
+    out: Annotated[Path, typer.Option(help="Folder that gets diagnosis.json, the page and the models.")],
     without: Annotated[list[str], typer.Option(help="A mechanism that is not to be asked for; may be repeated.")] = [],  # noqa: B006
     allowance: Annotated[
-        list[str], typer.Option(help="SHARE of peak to peak that a right model may leave; or CHANNEL=SHARE, repeated.")
+        list[str],
+        typer.Option(help="SHARE of peak to peak that a right model may leave; or as tau_in_Nm=0.02, repeated."),
     ] = [],  # noqa: B006
     step: Annotated[float | None, typer.Option(min=1e-4, help="Compare a sample every so often, s.")] = None,
     cycles: Annotated[int | None, typer.Option(min=1, help="Compare so many cycles of a sine.")] = None,
@@ -73,8 +74,9 @@ def diagnose(
     hold: Annotated[bool, typer.Option("--hold", help="Fit nothing of that model anew: ask what has changed.")] = False,
     suspect: Annotated[
         list[str],
-        typer.Option(help="'NAME at PLACE', or two of them with a comma, to fit whatever the screening says."),
+        typer.Option(help="As 'kink at conduit', or two with a comma, to fit whatever the screening says."),
     ] = [],  # noqa: B006
+    strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 unless it agrees: for a watch.")] = False,
 ) -> None:
     """Say whether the calibrated model explains a batch, and if not: where it fails and what was left out."""
     from ccmodel.config import Diagnosing
@@ -88,7 +90,10 @@ def diagnose(
         said = next(e for e in error.errors() if e["type"] not in ("float_type", "dict_type"))
         option = "--allowance" if said["loc"] else "--suspect"
         raise InputError(f"{option}: {said['msg'].removeprefix('Value error, ')}") from None
-    typer.echo(run(batch, out, without, lambda text: _err.print(text, style="dim", markup=False), judged, beside, hold))
+    said = run(batch, out, without, lambda text: _err.print(text, style="dim", markup=False), judged, beside, hold)
+    typer.echo(said["headline"])
+    if strict and said["verdict"] != "agrees":
+        raise typer.Exit(1)
 
 
 def _allowance(stated: list[str]) -> float | dict[str, float]:
@@ -113,10 +118,17 @@ def predict(
     model: Annotated[Path, typer.Option(help="A model file, as a diagnosis or a fit writes it.")],
     out: Annotated[Path, typer.Option(help="Folder that gets a CSV a recording.")],
 ) -> None:
-    """Say what the sensors of a batch's recordings would read, by a fitted model; exits 1 where it cannot be said."""
+    """Say what the sensors of a batch's recordings would read, by a fitted model, and how far off that is.
+
+    Exits with 1 where it cannot be said.
+    """
     from ccmodel.stages.predict import predict as run
 
-    said = run(batch, model, out)
+    said, errors = run(batch, model, out)
+    if len(errors):
+        typer.echo("root mean square error over the last cycle, % of peak to peak")
+        by_channel = errors.pivot(index="recording", columns="channel", values="nrmse_percent")
+        typer.echo(by_channel[list(dict.fromkeys(errors["channel"]))].to_string(float_format="%.2f"))
     for line in said:
         _say(line, "refused")
     if said:
@@ -130,7 +142,7 @@ def simulate(
     batch: Annotated[Path, typer.Option(help="Folder of a batch of the rig.")],
     out: Annotated[Path, typer.Option(help="File that gets what the sensors would read, CSV.")],
     recording: Annotated[str | None, typer.Option(help="Whose conduits and pretension; else the first one's.")] = None,
-    pretension: Annotated[float | None, typer.Option(min=0.0, help="Of both cables, N, in its stead.")] = None,
+    pretension: Annotated[float | None, typer.Option(min=0.0, help="Of both cables, N; else that recording's.")] = None,
 ) -> None:
     """Say what the sensors would read if the drive of a rig moved so, by a fitted model."""
     from ccmodel.stages.simulate_motion import simulate_motion as run

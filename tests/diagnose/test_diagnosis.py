@@ -86,7 +86,14 @@ def test_the_same_input_gives_the_same_json(clean, tmp_path, monkeypatch, cores)
 
 
 def test_the_model_predicts_recordings(clean, tmp_path):
-    assert run("predict", clean[0], "--model", clean[1] / "model.json", "--out", tmp_path).exit_code == 0
+    told = run("predict", clean[0], "--model", clean[1] / "model.json", "--out", tmp_path)
+    assert told.exit_code == 0
+    heading, channels, *rows = told.stdout.splitlines()
+    assert "%" in heading
+    assert "tau_in_Nm" in channels
+    assert {row.split()[0]: float(row.split()[2]) < 1.0 for row in rows if row.startswith("t-")} == dict.fromkeys(
+        [file.name.removesuffix(".csv.gz") for file in clean[0].glob("*.csv.gz")], True
+    )
     said, log = pd.read_csv(tmp_path / "t-7N.csv"), pd.read_csv(clean[0] / "t-7N.csv.gz")
     assert list(said.columns) == [
         "time_s", "theta_in_rad", "theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N",
@@ -94,6 +101,14 @@ def test_the_model_predicts_recordings(clean, tmp_path):
     ]  # fmt: skip
     error = said["tau_in_Nm"] - 0.0234 * log["drive_current_A"]
     assert np.sqrt(np.mean(error**2)) < 0.01 * np.ptp(said["tau_in_Nm"])
+
+
+@pytest.mark.parametrize(("verdict", "strict", "code"), [("agrees", 1, 0), ("explained", 1, 1), ("explained", 0, 0)])
+def test_a_watch_is_told_by_the_exit_code(tmp_path, monkeypatch, verdict, strict, code):
+    monkeypatch.setattr(stage, "diagnose", lambda *_: {"verdict": verdict, "headline": "it is as it is"})
+    found = run("diagnose", tmp_path, "--out", tmp_path / "out", *["--strict"] * strict)
+    assert found.exit_code == code
+    assert found.stdout == "it is as it is\n"
 
 
 def test_a_bearing_that_rubs_is_named(rubbed):

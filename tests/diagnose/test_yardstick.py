@@ -58,7 +58,7 @@ def test_what_is_near_a_turn_is_told_from_the_rest():
     assert not near[:-1][angle[:-1] < 0.96].any()  # the end of a recording may be a turn
 
 
-def test_a_sample_is_predicted_from_what_came_before():
+def test_a_sample_is_predicted_from_what_came_before_unless_it_is_asked_to_look_ahead():
     whole = condition(0.1, 0.7)
     later = whole.recording.time_s > 2.0
     stopped = np.where(later, whole.theta_in[~later][-1], whole.theta_in)
@@ -66,3 +66,6 @@ def test_a_sample_is_predicted_from_what_came_before():
     before = whole.recording.time_s < 1.9
     # Its speed and direction take the next sample too.
     assert yardstick.features(other)[before] == pytest.approx(yardstick.features(whole)[before])
+    soon = before & (whole.recording.time_s > 1.0)
+    ahead = yardstick.features(other, ahead=True)[soon], yardstick.features(whole, ahead=True)[soon]
+    assert (ahead[0] != ahead[1]).any(axis=1).all()

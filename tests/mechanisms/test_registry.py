@@ -39,6 +39,7 @@ THE_LIST = {
     "load-cell-drift": {"rate"},
     "load-cell-crosstalk": {"crosstalk"},
     "time-skew": {"delay"},
+    "drive-windup": {"compliance", "lost_motion"},
 }
 
 

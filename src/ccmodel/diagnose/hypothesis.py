@@ -105,8 +105,8 @@ PAPER = Hypothesis()
 
 
 def singles(without: Collection[str] = (), model: Hypothesis = PAPER) -> list[Hypothesis]:
-    """Every mechanism at each of its places, but those that are not to be known and those that a model fits already."""
-    names = [name for name in registry.names() if name not in without]
+    """Every mechanism at each of its places that is asked for unnamed, may be known, and that no model fits already."""
+    names = [name for name in registry.names() if name not in without and not registry.get(name).by_name_only]
     every = ((name, place) for name in names for place in registry.get(name).places)
     return [Hypothesis((acting,)) for acting in every if model.is_held or acting not in model.beside]
 

@@ -210,6 +210,8 @@ class Mechanism:
         What looks like it, and the experiment that tells.
     missed : float
         Share of what the effect does to recordings (in mean square) that this simple form of it may miss on a rig.
+    by_name_only : bool
+        Whether it is asked for only where somebody suspects it.
     """
 
     name: str
@@ -219,6 +221,7 @@ class Mechanism:
     mistaken_for: str
     separated_by: str
     missed: float = 0.001
+    by_name_only: bool = False
     enters: Callable[[Settings, str, Mapping[str, float]], None] | None = None
     reads: Callable[[Sensing, str, Mapping[str, float]], dict[str, NDArray]] | None = None
 

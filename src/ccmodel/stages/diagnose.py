@@ -28,8 +28,8 @@ def diagnose(
     judged: Diagnosing | None = None,
     beside: Path | None = None,
     hold: bool = False,
-) -> str:
-    """Diagnose a batch folder, beside what a model file has already; the sentence that its page opens with.
+) -> dict:
+    """Diagnose a batch folder, beside what a model file has already; what diagnosis.json says.
 
     Raises
     ------
@@ -57,8 +57,7 @@ def diagnose(
         )
     except (ModelError, ValueError) as error:
         raise InputError(f"{batch}: {error}") from None
-    _write(found, inputs, out)
-    return headline(found.said)
+    return _write(found, inputs, out)
 
 
 def _refused(findings: Iterable[Mapping]) -> list[dict[str, str]]:
@@ -89,12 +88,14 @@ def diagnose_recordings(recordings_file: Path, out: Path, judged: Diagnosing | N
     _write(found, inputs, out)
 
 
-def _write(found: Diagnosis, inputs: dict, out: Path) -> None:
+def _write(found: Diagnosis, inputs: dict, out: Path) -> dict:
     out.mkdir(parents=True, exist_ok=True)
-    write_json(out / "diagnosis.json", found.said | {"headline": headline(found.said), "provenance": inputs})
+    said = found.said | {"headline": headline(found.said), "provenance": inputs}
+    write_json(out / "diagnosis.json", said)
     for name, trial in (("calibrated", found.judgement.calibrated), ("model", found.judgement.best)):
         write_json(out / f"{name}.json", model_as_dict(found.model(trial), inputs))
     (out / "nearest.json").unlink(missing_ok=True)  # of an earlier run
     if found.said["nearest"]:
         write_json(out / "nearest.json", model_as_dict(found.model(found.judgement.nearest), inputs))
     write_diagnosis(out / "report.html", found)
+    return said
