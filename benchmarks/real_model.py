@@ -22,7 +22,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
-from real_regressor import STEP_S, TARGETS, VARIED, folds, is_resolved, rms
+from real_regressor import COUNTS, STEP_S, TARGETS, VARIED, folds, is_resolved, rms
 
 from ccmodel.config import load_config
 from ccmodel.diagnose.diagnosis import calibration, first_cycles
@@ -34,6 +34,7 @@ from ccmodel.model.files import read_model
 from ccmodel.model.parameters import Parameters
 from ccmodel.rig.ingest import ingest_batch
 
+AROUND = 0.12  # Of a cycle, to either side of a turn: what is drawn of it.
 CONFIG = Path(__file__).parents[1] / "config" / "real.yaml"
 
 
@@ -85,7 +86,7 @@ def rows(batch: Path, model_file: Path) -> tuple[list[dict], list[Evidence], dic
 
 
 def draw(file: Path, evidence: Sequence[Evidence], errors: Sequence[NDArray]) -> None:
-    """Drive torque over drive angle, recorded and predicted: slowest and fastest, at the least and the most load."""
+    """Drive torque over drive angle and, at a turn, over time: slowest and fastest, at the least and the most load."""
 
     def key(i):
         x = evidence[i].given.recording.excitation
@@ -94,19 +95,38 @@ def draw(file: Path, evidence: Sequence[Evidence], errors: Sequence[NDArray]) ->
     order = sorted(range(len(evidence)), key=key)
     loads = sorted({key(i)[0] for i in order})
     shown = [i for load in (loads[0], loads[-1]) for i in _ends([i for i in order if key(i)[0] == load])]
-    figure, axes = plt.subplots(1, 4, figsize=(13, 3.4), sharey=True)
-    for ax, i in zip(axes, shown, strict=True):
+    figure, (loops, turns) = plt.subplots(2, 4, figsize=(13, 6.4), sharey=True)
+    for loop, turn, i in zip(loops, turns, shown, strict=True):
         e = evidence[i]
         c = e.channels.index("tau_in_Nm")
         theta = e.given.theta_in[e.judged]
-        ax.plot(theta, 1e3 * e.measured[c], color="#9a9a9a", lw=2.2, label="recording (measured)")
-        ax.plot(theta, 1e3 * (e.measured[c] + errors[i][c]), lw=1.0, label="model, held out")
-        ax.set_title(f"load level {key(i)[0]:g}, {key(i)[1]:g} Hz", fontsize=9)
-        ax.set_xlabel("drive angle (rad)")
-    axes[0].set_ylabel("drive torque (mN m)")
-    axes[0].legend(fontsize=7)
+        said = {"recording (measured)": e.measured[c], "model, held out": e.measured[c] + errors[i][c]}
+        styles = ({"color": "#9a9a9a", "lw": 2.2}, {"lw": 1.0})
+        after_s, window, stands = _turn(e, 1 / key(i)[1])
+        for (label, torque), style in zip(said.items(), styles, strict=True):
+            loop.plot(theta, 1e3 * torque, label=label, **style)
+            turn.plot(after_s, 1e3 * torque[window], marker=".", **style)
+        turn.axvspan(*after_s[stands][[0, -1]], color="#e69f00", alpha=0.2, lw=0, label="the drive stands")
+        loop.set_title(f"load level {key(i)[0]:g}, {key(i)[1]:g} Hz", fontsize=9)
+        loop.set_xlabel("drive angle (rad)")
+        turn.set_xlabel("time about a turn (s)")
+    for ax in (loops[0], turns[0]):
+        ax.set_ylabel("drive torque (mN m)")
+        ax.legend(fontsize=7, loc="lower left")
     figure.tight_layout()
     figure.savefig(file, dpi=110)
+
+
+def _turn(e: Evidence, period_s: float) -> tuple[NDArray, NDArray, NDArray]:
+    """Time (s) about the furthest turn, the judged samples that it is, and at which of these the drive stands."""
+    theta, time_s = e.given.theta_in[e.judged], e.given.recording.time_s[e.judged]
+    well_in = (time_s > time_s[0] + period_s / 4) & (time_s < time_s[-1] - period_s / 4)
+    stands = theta > theta[well_in].max() - COUNTS * e.given.recording.encoder_step_rad["theta_in_rad"]
+    turned = np.flatnonzero(well_in & stands)
+    first = turned[: 1 + int(np.argmax(np.diff(turned, append=turned[-1] + theta.size) > 1))]
+    middle = time_s[first].mean()
+    window = np.flatnonzero(np.abs(time_s - middle) < AROUND * period_s)
+    return time_s[window] - middle, window, np.isin(window, first)
 
 
 def _ends(items: list) -> tuple:

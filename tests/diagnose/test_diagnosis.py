@@ -20,6 +20,7 @@ from ccmodel.diagnose.trial import Trial
 from ccmodel.failure import ModelError
 from ccmodel.identify import problem
 from ccmodel.model.files import read_model
+from ccmodel.report.diagnosis import headline
 from ccmodel.stages import diagnose as stage
 from ccmodel.stages.ingest import ingest
 from ccmodel.typed import InputError
@@ -227,6 +228,21 @@ def test_alternatives_are_others_than_what_is_named_each_once():
     ]
     found = _alternatives(SimpleNamespace(verdict="explained"), (there,), confidence)
     assert [a["name"] for a in found] == ["torque-scale", "constant-drag"]
+
+
+@pytest.mark.parametrize(
+    ("alternatives", "likeliest", "sentence"),
+    [
+        (["kink"], ["kink"], "it may be kink at conduit, of which"),
+        (["kink", "stribeck"], ["kink"], "cannot tell kink at conduit or stribeck at conduit apart"),
+        (["kink", "stribeck"], ["kink", "stribeck"], "it may be kink at conduit and stribeck at conduit together, of"),
+    ],
+)
+def test_two_that_act_together_are_not_said_to_be_two_that_cannot_be_told_apart(alternatives, likeliest, sentence):
+    claims = [[{"name": name, "place": "conduit"} for name in names] for names in (alternatives, likeliest)]
+    error = {"tau_in": {"before": 2.0, "after": 1.0, "noise": 1.0}}
+    said = {"batch": "b", "verdict": "undecided", "is_held": False, "fit": {"error": error}}
+    assert sentence in headline(said | {"alternatives": claims[0], "likeliest": claims[1]})
 
 
 @pytest.mark.parametrize("is_there", [True, False])

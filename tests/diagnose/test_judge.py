@@ -226,6 +226,15 @@ def test_a_pair_that_a_single_fault_elsewhere_may_imitate_is_not_named(would_do)
     assert of_pair() == "explained"  # both of the pair are faults of that part themselves
 
 
+def test_a_pair_is_not_ruled_out_by_a_fault_that_the_list_has_a_name_for(would_do):
+    """One of the pair would do by itself, where that fault sits: this is not on no list, but the second is not sure."""
+    would_do.append((0.1, ("drive-sensor",)))
+    both, other = trial(1.0, FRICTION, SCALE), trial(9.0, FRICTION)
+    assert verdict(trial(10.0), both, other, trial(9.0, SCALE)).verdict == "unexplained"
+    found = verdict(trial(10.0), both, other, trial(1.9, SCALE))
+    assert (found.verdict, found.probability[0] > SURE) == ("undecided", True)
+
+
 def test_recordings_are_weighed_anew_about_what_explains_them_best():
     recordings = batch(lambda said: {"tau_in_Nm": 0.1 * said["tau_in_Nm"]})
     base = calibrated(recordings)

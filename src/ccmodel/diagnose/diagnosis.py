@@ -281,6 +281,7 @@ def _said(batch, judgement: Judgement, estimates: Parameters, not_judged) -> dic
         "location": locate.location(judgement),
         "mechanisms": [_mechanism(best, k, _named(name, confidence), moved) for k, (name, _) in enumerate(named)],
         "alternatives": alternatives,
+        "likeliest": [{"name": n, "place": p} for n, p in best.hypothesis.acting if judgement.verdict == "undecided"],
         "nearest": _nearest(judgement),
         "fit": {
             "held_out": [w.evidence.given.recording.id for w in weighed] if len(weighed) > 1 else [],

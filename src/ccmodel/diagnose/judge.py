@@ -365,14 +365,21 @@ def _verdict(found: Comparison, scores: list[Score]) -> Judgement:
         return judged("agrees" if agrees else "unexplained", base)
     if not is_right(likeliest, base, learnable):
         return judged("unexplained", base)
-    if one_fault := _one_fault(found, likeliest.hypothesis):
+    one_fault = _one_fault(found, likeliest.hypothesis)
+    # What is on no list may be that fault, unless the list has one there that would do.
+    if one_fault and not any(_is_at(t, one_fault) and is_right(t, base, learnable) for t in trials):
         return replace(judged("unexplained", base), one_fault=one_fault)
     if listed * max(probability) <= RIVAL:  # Nothing is left to be undecided about.
         return judged("unexplained", base)
     # A mechanism that could be at either of two places is named all the same.
     names = likeliest.hypothesis.names
     sure = sum(p for t, p in zip(trials, probability, strict=True) if t.hypothesis.names == names)
-    return judged("explained" if listed * sure >= SURE else "undecided", likeliest)
+    return judged("explained" if listed * sure >= SURE and not one_fault else "undecided", likeliest)
+
+
+def _is_at(trial: Trial, places: Sequence[str]) -> bool:
+    """Whether a trial has but one mechanism, at one of these places."""
+    return len(trial.hypothesis.acting) == 1 and trial.hypothesis.acting[0][1] in places
 
 
 def _one_fault(found: Comparison, hypothesis: Hypothesis) -> list[str]:

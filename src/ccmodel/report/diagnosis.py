@@ -2,6 +2,7 @@
 
 import base64
 import io
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -52,12 +53,18 @@ def headline(said: dict) -> str:
         )
         return f"{batch}: what {left_out} is {what}; with it the held-out error falls from {fall}."
     if said["verdict"] == "undecided":
-        names = [f"{a['name']} at {a['place']}" for a in said["alternatives"]]
+        names, together = _placed(said["alternatives"]), _placed(said["likeliest"])
+        if len(together) > 1:
+            names = [f"{' and '.join(together)} together", *(name for name in names if name not in together)]
         if len(names) == 1:
             return f"{batch}: something {missing}; it may be {names[0]}, of which these recordings cannot make sure."
         return f"{batch}: something {missing}, and these recordings cannot tell {' or '.join(names)} apart."
     place = said["location"]["place"]
     return f"{batch}: something {missing} at the {place}, and no mechanism known here accounts for it."
+
+
+def _placed(claims: Sequence[dict]) -> list[str]:
+    return [f"{claim['name']} at {claim['place']}" for claim in claims]
 
 
 def write_diagnosis(file: Path, found: Diagnosis) -> None:
