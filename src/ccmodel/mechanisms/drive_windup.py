@@ -22,10 +22,10 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 # About its turning point a pulley that stands creeps and its encoder dithers.
 STANDS_WITHIN_RAD = 2e-3
-# Where the motor is known from what the pulley does, on either side, in lengths of the stand from its middle.
-KNOWN_AT = 0.5 + 0.1 * np.arange(4)
-# The cubic of least squares through eight such points: its coefficients are these times the eight.
-CUBIC = np.linalg.pinv(np.vander(np.concatenate([-KNOWN_AT[::-1], KNOWN_AT]), 4))
+# Where the motor is known from what the pulley does, in lengths of the stand from its middle.
+KNOWN_AT = np.array([-0.8, -0.7, -0.6, -0.5, 0.5, 0.6, 0.7, 0.8])
+# The cubic of least squares through these: its coefficients are this times what is known there.
+CUBIC = np.linalg.pinv(np.vander(KNOWN_AT, 4))
 
 
 @kernel
@@ -71,16 +71,11 @@ def _at_turn(time_s, theta, tau, compliance, lost_motion, within, way, extreme, 
     while last < theta.size - 1 and abs(theta[last] - theta[extreme]) <= within:
         last += 1
     middle, length = (time_s[first] + time_s[last]) / 2, time_s[last] - time_s[first]
-    from_, to = middle - KNOWN_AT[-1] * length, middle + KNOWN_AT[-1] * length
-    if way * (tau[first] - tau[last]) <= 0.0 or from_ < time_s[0] or to > time_s[-1]:
+    known_s = middle + KNOWN_AT * length
+    if way * (tau[first] - tau[last]) <= 0.0 or known_s[0] < time_s[0] or known_s[-1] > time_s[-1]:
         return  # Nothing that would have to wind back, or the motor's course is not known on both sides.
-    motor = np.empty(2 * KNOWN_AT.size)
-    for k in range(motor.size):
-        at = KNOWN_AT[k - KNOWN_AT.size] if k >= KNOWN_AT.size else -KNOWN_AT[KNOWN_AT.size - 1 - k]
-        play = -way * np.sign(at) * lost_motion / 2
-        at = middle + at * length
-        motor[k] = np.interp(at, time_s, theta) + compliance * np.interp(at, time_s, tau) + play
-    a3, a2, a1, a0 = CUBIC @ motor
+    pulley, torque = np.interp(known_s, time_s, theta), np.interp(known_s, time_s, tau)
+    a3, a2, a1, a0 = CUBIC @ (pulley + compliance * torque - way * np.sign(KNOWN_AT) * lost_motion / 2)
     # The motor may not pull the pulley on: once its spring has given way, it has.
     most, least = way * tau[first], way * tau[last]
     for i in range(first + 1, last):
