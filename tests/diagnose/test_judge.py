@@ -129,6 +129,19 @@ def test_without_a_known_pretension_no_name_is_sure():
     assert found.best is friction
 
 
+def test_an_allowance_takes_from_what_is_sure_as_much_as_it_is_of_what_may_be_left():
+    def sure(allowed):
+        weighed = [SimpleNamespace(evidence=SimpleNamespace(channels=CHANNELS, allowed=allowed))] * 8
+        base, friction = trial(6.0), trial(1.0, FRICTION)
+        unlearnt = {t.hypothesis: Structure(np.zeros(8)) for t in (base, friction)}
+        return _verdict(Comparison(weighed, base, [friction], unlearnt), [])
+
+    shares = [sure(allowed).listed for allowed in (0.0, 0.01, 0.5, 1.0)]
+    assert all(more > less for more, less in itertools.pairwise(shares))
+    assert sure(0.01).verdict == "explained"
+    assert (sure(1.0).verdict, shares[-1] / shares[0]) == ("undecided", pytest.approx(0.75))
+
+
 def test_the_list_is_the_less_likely_the_more_is_left_and_the_more_was_tried():
     base, lefts = trial(10.0), (0.95, 1.1, 1.4, 2.0, 5.0)
     odds = [is_listed(trial(left, FRICTION), base) for left in lefts]

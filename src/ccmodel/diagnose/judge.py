@@ -55,8 +55,9 @@ OFF_LIST = 0.2
 LEVEL = (0.93, 0.09)
 FORM_SHARE = 0.04
 RIVAL = 0.02
-# A single recording leaves nothing to hold out, and where no rest shows the pretension the errors have valleys of which
-# a fit sees some: no name is sure, however well its mechanism fits.
+# A single recording leaves nothing to hold out; where no rest shows the pretension the errors have valleys of which a
+# fit sees some; and where something is allowed, nobody knows what a right model would leave of that. No name is sure
+# then, however well its mechanism fits.
 UNTESTED = 0.75
 MOST_ALTERNATIVES = 4
 
@@ -352,7 +353,8 @@ def _verdict(found: Comparison, scores: list[Score]) -> Judgement:
     probability = found.probability
     likeliest = trials[int(np.argmax(probability))] if trials else base
     listed = is_listed(likeliest, base) if trials else 1.0
-    listed *= UNTESTED if len(found.weighed) == 1 or "pretension_share" in base.free else 1.0
+    blind = len(found.weighed) == 1 or "pretension_share" in base.free
+    listed *= UNTESTED ** (1.0 if blind else np.mean([w.evidence.allowed for w in found.weighed]))
 
     def judged(verdict: str, best: Trial) -> Judgement:
         order = np.argsort(-np.array(probability), kind="stable")
