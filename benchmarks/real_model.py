@@ -100,10 +100,11 @@ def draw(file: Path, evidence: Sequence[Evidence], errors: Sequence[NDArray]) ->
         e = evidence[i]
         c = e.channels.index("tau_in_Nm")
         theta = e.given.theta_in[e.judged]
-        said = {"recording (measured)": e.measured[c], "model, held out": e.measured[c] + errors[i][c]}
-        styles = ({"color": "#9a9a9a", "lw": 2.2}, {"lw": 1.0})
         after_s, window, stands = _turn(e, 1 / key(i)[1])
-        for (label, torque), style in zip(said.items(), styles, strict=True):
+        for label, torque, style in (
+            ("recording (measured)", e.measured[c], {"color": "#9a9a9a", "lw": 2.2}),
+            ("model, held out", e.measured[c] + errors[i][c], {"lw": 1.0}),
+        ):
             loop.plot(theta, 1e3 * torque, label=label, **style)
             turn.plot(after_s, 1e3 * torque[window], marker=".", **style)
         turn.axvspan(*after_s[stands][[0, -1]], color="#e69f00", alpha=0.2, lw=0, label="the drive stands")

@@ -77,8 +77,8 @@ def _until_reversal(given: ModelInput) -> tuple[NDArray, NDArray]:
     recording = given.recording
     turned = recording.with_channels({}, {}, "model")
     backwards = replace(given, recording=replace(turned, time_s=-recording.time_s[::-1]), theta_in=given.theta_in[::-1])
-    travel, time_s = since_reversal(backwards)
-    return travel[::-1], time_s[::-1]
+    travel, left_s = since_reversal(backwards)
+    return travel[::-1], left_s[::-1]
 
 
 def folds(recordings: Sequence[Recording], varied: str) -> Iterator[tuple[float, NDArray]]:

@@ -14,11 +14,13 @@ def pack(cases: Path, file: Path) -> int:
 
     The same results give the same bytes.
     """
-    results = {f.parent.name: json.loads(f.read_text(encoding="utf-8")) for f in sorted(cases.glob("*/result.json"))}
-    lines = [json.dumps({"number": number} | result, sort_keys=True) for number, result in results.items()]
+    lines = []
+    for result in sorted(cases.glob("*/result.json")):
+        numbered = {"number": result.parent.name} | json.loads(result.read_text(encoding="utf-8"))
+        lines.append(json.dumps(numbered, sort_keys=True) + "\n")
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_bytes(gzip.compress("".join(f"{line}\n" for line in lines).encode(), mtime=0))
-    return len(results)
+    file.write_bytes(gzip.compress("".join(lines).encode(), mtime=0))
+    return len(lines)
 
 
 def unpack(file: Path, cases: Path, made_by: dict[str, str]) -> int:

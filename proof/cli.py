@@ -108,8 +108,7 @@ def resume(
     archive: Annotated[Path, typer.Option(help="What an earlier proof packed.")],
 ) -> None:
     """Bring back the results of an earlier proof of the same sources and the same cases."""
-    made_by = {"sources": conceal.digest_of(), "builder": conceal.builder_digest()}
-    if brought := unpack(archive, out, made_by):
+    if brought := unpack(archive, out, conceal.made_by()):
         typer.echo(f"{brought} results from {archive}", err=True)
 
 
@@ -202,7 +201,7 @@ def part_of(digest: str, n: int) -> list[int]:
 
 def _judge_each(cases: list[Case], out: Path, rivals: bool, cores: int) -> None:
     """Cases that have no result of these sources yet, some at a time."""
-    made_by = {"sources": conceal.digest_of(), "builder": conceal.builder_digest()}
+    made_by = conceal.made_by()
     wanted = [case for case in cases if not _is_of(made_by, out / case.name / "result.json")]
     with ProcessPoolExecutor(cores) as pool:
         list(pool.map(partial(_judge, rivals=rivals), wanted, [out / case.name for case in wanted]))

@@ -79,6 +79,11 @@ def builder_digest() -> str:
     return hashlib.sha256(b"\0".join(parts)).hexdigest()[:8]
 
 
+def made_by(sources: Path = SOURCES) -> dict[str, str]:
+    """What tells a result of this diagnosis and of these cases from any other, under the names that it has there."""
+    return {"sources": digest_of(sources), "builder": builder_digest()}
+
+
 def stage(sources: Path = SOURCES) -> Path:
     """A copy of the diagnosis's package alone, in a folder that goes by its digest, so that it compiles once."""
     staged = Path(tempfile.gettempdir()) / f"ccmodel-alone-{os.getuid()}" / digest_of(sources)

@@ -128,7 +128,7 @@ def predict(
     if len(errors):
         typer.echo("root mean square error over the last cycle, % of peak to peak")
         by_channel = errors.pivot(index="recording", columns="channel", values="nrmse_percent")
-        typer.echo(by_channel[list(dict.fromkeys(errors["channel"]))].to_string(float_format="%.2f"))
+        typer.echo(by_channel[errors["channel"].unique()].to_string(float_format="%.2f"))
     for line in said:
         _say(line, "refused")
     if said:
