@@ -17,8 +17,8 @@ from scipy.stats import binom
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from ccmodel.identify.fit import fit  # noqa: E402
-from ccmodel.identify.intervals import COVERAGE, REACH  # noqa: E402
+from ccmodel.inference.fit import fit  # noqa: E402
+from ccmodel.inference.intervals import COVERAGE, REACH  # noqa: E402
 from drawn_batches import CONDITIONS, draw, problem_of  # noqa: E402
 
 FIRST_SEED = 20_000
@@ -36,7 +36,7 @@ def one_batch(seed: int) -> dict[str, list[float]] | str:
     found = defaultdict(list)
     for name, true in drawn.shared.items():
         found[name].append((said.values[name] - true) / said.intervals[name].sd)
-    for e, own in zip(problem.evidence, drawn.own, strict=True):
+    for e, own in zip(problem.observations, drawn.own, strict=True):
         for name, true in own.items():
             interval = said.own_intervals[e.name][name]
             found[f"own {name}"].append(((interval.low + interval.high) / 2 - true) / interval.sd)

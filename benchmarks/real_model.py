@@ -25,11 +25,11 @@ from numpy.typing import NDArray
 from real_regressor import COUNTS, STEP_S, TARGETS, VARIED, folds, is_resolved, rms
 
 from ccmodel.config import load_config
+from ccmodel.diagnose.candidate import fit
 from ccmodel.diagnose.diagnosis import calibration, first_cycles
-from ccmodel.diagnose.evidence import weigh
 from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.trial import fit
-from ccmodel.identify.problem import Evidence, each
+from ccmodel.diagnose.whitening import weigh
+from ccmodel.inference.problem import Observations, each
 from ccmodel.model.files import read_model
 from ccmodel.model.parameters import Parameters
 from ccmodel.rig.ingest import ingest_batch
@@ -38,40 +38,42 @@ AROUND = 0.12  # Of a cycle, to either side of a turn: what is drawn of it.
 CONFIG = Path(__file__).parents[1] / "config" / "real.yaml"
 
 
-def held_out(fitted: Sequence[Evidence], evidence: Sequence[Evidence], model: Parameters, varied: str) -> list[NDArray]:
+def held_out(
+    fitted: Sequence[Observations], observations: Sequence[Observations], model: Parameters, varied: str
+) -> list[NDArray]:
     """By recording, what the model errs by with values from those that do not share its load level or its rate.
 
     It is fitted to as much of them as a diagnosis takes, and judged on all of the others.
     """
     hypothesis = Hypothesis(tuple((m.name, m.place) for m in model.mechanisms))
-    free = calibration(evidence[0].parameters, evidence)
+    free = calibration(observations[0].parameters, observations)
     start = {name: model.value_of(name) for name in free}
     start |= {f"{m.name}/{m.place}/{k}": v for m in model.mechanisms for k, v in m.values.items()}
     weighed = each(fitted, lambda i, e: weigh(e, replace(model, mechanisms=())))
-    errors: list = [None] * len(evidence)
-    for _, out in folds([e.given.recording for e in evidence], varied):
+    errors: list = [None] * len(observations)
+    for _, out in folds([e.given.recording for e in observations], varied):
         known = [w for w, aside in zip(weighed, out, strict=True) if not aside]
         values = fit(known, hypothesis, free, start).values
         for i in np.flatnonzero(out):
-            e = replace(evidence[i], parameters=hypothesis.of(evidence[i].parameters))
+            e = replace(observations[i], parameters=hypothesis.of(observations[i].parameters))
             errors[i] = e.modelled(values) - e.measured
     return errors
 
 
-def rows(batch: Path, model_file: Path) -> tuple[list[dict], list[Evidence], dict]:
+def rows(batch: Path, model_file: Path) -> tuple[list[dict], list[Observations], dict]:
     """One row for each channel and each thing held out, as the yardstick has them; what they rest on."""
     ingested = ingest_batch(batch)
     stated = load_config(CONFIG).diagnosing
     model = read_model(model_file)
     estimates = Parameters.estimated(ingested.batch.rig)
-    evidence = [Evidence.of(r, estimates, step_s=STEP_S) for r in ingested.recordings]
+    observations = [Observations.of(r, estimates, step_s=STEP_S) for r in ingested.recordings]
     short = [first_cycles(r, stated.cycles) for r in ingested.recordings]
-    fitted = [Evidence.of(r, estimates, step_s=STEP_S, allowance=stated.allowance) for r in short]
-    by_varied = {varied: held_out(fitted, evidence, model, varied) for varied in VARIED}
+    fitted = [Observations.of(r, estimates, step_s=STEP_S, tolerance=stated.tolerance) for r in short]
+    by_varied = {varied: held_out(fitted, observations, model, varied) for varied in VARIED}
     found = []
     for channel, varied in product(TARGETS, VARIED):
-        errors = [e[evidence[0].channels.index(channel)] for e in by_varied[varied]]
-        away = [e[is_resolved(v.given)[v.judged]] for e, v in zip(errors, evidence, strict=True)]
+        errors = [e[observations[0].channels.index(channel)] for e in by_varied[varied]]
+        away = [e[is_resolved(v.given)[v.judged]] for e, v in zip(errors, observations, strict=True)]
         found.append(
             {
                 "batch": batch.name,
@@ -79,25 +81,25 @@ def rows(batch: Path, model_file: Path) -> tuple[list[dict], list[Evidence], dic
                 "held_out": varied,
                 "rms": rms(errors),
                 "rms_away_from_turns": rms(away),
-                "by_recording": {v.given.recording.id: rms([e]) for v, e in zip(evidence, errors, strict=True)},
+                "by_recording": {v.given.recording.id: rms([e]) for v, e in zip(observations, errors, strict=True)},
             }
         )
-    return found, evidence, by_varied
+    return found, observations, by_varied
 
 
-def draw(file: Path, evidence: Sequence[Evidence], errors: Sequence[NDArray]) -> None:
+def draw(file: Path, observations: Sequence[Observations], errors: Sequence[NDArray]) -> None:
     """Drive torque over drive angle and, at a turn, over time: slowest and fastest, at the least and the most load."""
 
     def key(i):
-        x = evidence[i].given.recording.excitation
+        x = observations[i].given.recording.excitation
         return x["load_level"], x["frequency_Hz"]
 
-    order = sorted(range(len(evidence)), key=key)
+    order = sorted(range(len(observations)), key=key)
     loads = sorted({key(i)[0] for i in order})
     shown = [i for load in (loads[0], loads[-1]) for i in _ends([i for i in order if key(i)[0] == load])]
     figure, (loops, turns) = plt.subplots(2, 4, figsize=(13, 6.4), sharey=True)
     for loop, turn, i in zip(loops, turns, shown, strict=True):
-        e = evidence[i]
+        e = observations[i]
         c = e.channels.index("tau_in_Nm")
         theta = e.given.theta_in[e.judged]
         after_s, window, stands = _turn(e, 1 / key(i)[1])
@@ -118,7 +120,7 @@ def draw(file: Path, evidence: Sequence[Evidence], errors: Sequence[NDArray]) ->
     figure.savefig(file, dpi=110)
 
 
-def _turn(e: Evidence, period_s: float) -> tuple[NDArray, NDArray, NDArray]:
+def _turn(e: Observations, period_s: float) -> tuple[NDArray, NDArray, NDArray]:
     """Time (s) about the furthest turn, the judged samples that it is, and at which of these the drive stands."""
     theta, time_s = e.given.theta_in[e.judged], e.given.recording.time_s[e.judged]
     well_in = (time_s > time_s[0] + period_s / 4) & (time_s < time_s[-1] - period_s / 4)
@@ -143,7 +145,7 @@ def main() -> None:
     parser.add_argument("--figure", type=Path, help="draw held-out loops here")
     asked = parser.parse_args()
     yardstick = json.loads(asked.yardstick.read_text()) if asked.yardstick else []
-    found, evidence, errors = rows(asked.batch, asked.model)
+    found, observations, errors = rows(asked.batch, asked.model)
     for row in found:
         same = ("batch", "channel", "held_out")
         its = next((y for y in yardstick if all(y[k] == row[k] for k in same)), None)
@@ -155,7 +157,7 @@ def main() -> None:
             text += f", {everywhere:.2f} times the yardstick ({away:.2f} away from turns)"
         print(text, flush=True)
     if asked.figure:
-        draw(asked.figure, evidence, errors["load_level"])
+        draw(asked.figure, observations, errors["load_level"])
 
 
 if __name__ == "__main__":

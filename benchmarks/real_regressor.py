@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.ensemble import HistGradientBoostingRegressor
 
-from ccmodel.diagnose.travel import since_reversal, speed
+from ccmodel.diagnose.drive import since_reversal, speed
 from ccmodel.model.run import ModelInput
 from ccmodel.recording import Recording
 from ccmodel.rig.ingest import ingest_batch

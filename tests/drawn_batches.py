@@ -11,7 +11,7 @@ import pandas as pd
 
 from builders import RIG
 from ccmodel.geometry import ConduitPath
-from ccmodel.identify.problem import Evidence, Free, Problem
+from ccmodel.inference.problem import Free, Observations, Problem
 from ccmodel.model.exact.pair import simulate_pair
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad
@@ -32,7 +32,7 @@ CONDITIONS = ((np.pi, 7.0), (2 * np.pi, 7.0), (np.pi, 4.0), (2 * np.pi, 4.0))
 SPREAD = {
     "friction_scale": FRICTION,
     "pretension_scale": PRETENSION,
-    "drive_place": 1.0,
+    "drive_encoder_offset": 1.0,
     "theta_out_zero_rad": STEP_RAD / np.sqrt(12),
     "tau_in_zero_Nm": ZERO_TORQUE_NM / np.sqrt(3),
     "tau_out_zero_Nm": ZERO_TORQUE_NM / np.sqrt(3),
@@ -50,15 +50,17 @@ class Drawn:
     own: list[dict[str, float]]
 
 
-def draw(seed: int, conditions=CONDITIONS, duration_s=3.4, rate_Hz=200.0, friction=FRICTION, bow=0.0) -> Drawn:
-    """A batch with values of its own; with `bow`, cable A's initial tension bends by so much of what friction holds."""
+def draw(seed: int, conditions=CONDITIONS, duration_s=3.4, rate_Hz=200.0, friction=FRICTION, curvature=0.0) -> Drawn:
+    """A batch with values of its own; with `curvature`, that curvature of the initial tension of cable A."""
     random = np.random.default_rng(seed)
     shared = {
         "stiffness_N_per_m": random.uniform(6000, 10000),
         "friction_coefficient": random.uniform(0.12, 0.18),
         "load_stiffness_Nm_per_rad": random.uniform(0.04, 0.06),
     }
-    made = [_recorded(random, shared, i, *c, duration_s, rate_Hz, friction, bow) for i, c in enumerate(conditions)]
+    made = [
+        _recorded(random, shared, i, *c, duration_s, rate_Hz, friction, curvature) for i, c in enumerate(conditions)
+    ]
     return Drawn([r for r, _ in made], shared, [own for _, own in made])
 
 
@@ -67,12 +69,14 @@ def problem_of(drawn: Drawn, own=SPREAD, **more: Free) -> Problem:
     start = {n: v * (1.2 if n.startswith("stiff") else 0.8) for n, v in drawn.shared.items()}
     free = {n: Free(v, 0.2 * v, 5 * v) for n, v in start.items()} | more
     parameters = Parameters(reference_length_m=1.2, drive_radius_m=0.006, load_radius_m=0.006, **start)
-    evidence = [Evidence.of(r, parameters, placed="drive_place" in own) for r in drawn.recordings]
+    observations = [
+        Observations.of(r, parameters, offset_is_free="drive_encoder_offset" in own) for r in drawn.recordings
+    ]
     at = {"friction_scale": 1.0, "pretension_scale": 1.0}
-    return Problem(evidence, free, {name: Free(at.get(name, 0.0), spread=own[name]) for name in own})
+    return Problem(observations, free, {name: Free(at.get(name, 0.0), spread=own[name]) for name in own})
 
 
-def _recorded(random, shared, i, bend_rad, pretension_N, duration_s, rate_Hz, friction, bow):
+def _recorded(random, shared, i, bend_rad, pretension_N, duration_s, rate_Hz, friction, curvature):
     t = np.arange(1, round(duration_s * rate_Hz) + 1) / rate_Hz
     moving = np.maximum(t - REST_S, 0)
     amplitude, frequency = random.uniform(0.7, 1.0), random.uniform(0.5, 0.8)
@@ -84,7 +88,7 @@ def _recorded(random, shared, i, bend_rad, pretension_N, duration_s, rate_Hz, fr
     A, B = ([tension, tension * np.exp(-s * mu * bend_rad)] for s in random.uniform(*PROFILE, 2))
     transmission = Transmission(path, shared["stiffness_N_per_m"] * 1.2, mu, 0.006, 0.006)
     load = SpringLoad(shared["load_stiffness_Nm_per_rad"])
-    initial = InitialTension.between_ends(path, mu, tuple(A), tuple(B), (bow, 0.0))
+    initial = InitialTension.between_ends(path, mu, tuple(A), tuple(B), (curvature, 0.0))
     r = simulate_pair(transmission, load, theta, initial)
     zero = {
         "tau_in_zero_Nm": random.uniform(-1, 1) * ZERO_TORQUE_NM,

@@ -132,3 +132,11 @@ def test_a_fit_that_makes_no_sense_is_refused(change, text):
     Config.model_validate({"fits": {"f": FIT}}, strict=False)
     with pytest.raises(ValueError, match=text):
         Config.model_validate({"fits": {"f": FIT | change}}, strict=False)
+
+
+def test_former_names_of_keys_are_read_and_said(tmp_path):
+    file = tmp_path / "config.yaml"
+    text = (ROOT / "config" / "real.yaml").read_text()
+    file.write_text(text.replace("tolerance:", "allowance:").replace("forced_candidates:", "suspects:"))
+    with pytest.warns(FutureWarning, match="'suspects' is now called 'forced_candidates'"):
+        assert load_config(file) == load_config(ROOT / "config" / "real.yaml")

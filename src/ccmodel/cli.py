@@ -3,15 +3,40 @@
 import json
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import typer
 from pydantic import ValidationError
 from rich.console import Console
+from typer.core import TyperGroup
 
 from ccmodel.typed import InputError
 
-app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+
+class _FormerOptions(TyperGroup):
+    """Takes options under the names that they had before, and says what they are called now."""
+
+    renamed: ClassVar = {
+        "--allowance": "--tolerance",
+        "--suspect": "--candidate",
+        "--beside": "--baseline",
+        "--hold": "--freeze",
+    }
+
+    def parse_args(self, ctx, args):
+        """Click's own, with every option under its current name."""
+        current = []
+        for word in args:
+            option, equals, value = word.partition("=")
+            if option in self.renamed:
+                _err.print(f"{option} is now called {self.renamed[option]}", style="yellow", markup=False)
+            current.append(self.renamed.get(option, option) + equals + value)
+        return super().parse_args(ctx, current)
+
+
+app = typer.Typer(
+    cls=_FormerOptions, help=__doc__, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False
+)
 _err = Console(stderr=True, soft_wrap=True, highlight=False)
 
 Folder = Annotated[Path, typer.Argument()]
@@ -64,15 +89,19 @@ def diagnose(
     batch: Folder,
     out: Annotated[Path, typer.Option(help="Folder that gets diagnosis.json, the page and the models.")],
     without: Annotated[list[str], typer.Option(help="A mechanism that is not to be asked for; may be repeated.")] = [],  # noqa: B006
-    allowance: Annotated[
+    tolerance: Annotated[
         list[str],
         typer.Option(help="SHARE of peak to peak that a right model may leave; or as tau_in_Nm=0.02, repeated."),
     ] = [],  # noqa: B006
     step: Annotated[float | None, typer.Option(min=1e-4, help="Compare a sample every so often, s.")] = None,
     cycles: Annotated[int | None, typer.Option(min=1, help="Compare so many cycles of a sine.")] = None,
-    beside: Annotated[Path | None, typer.Option(help="A model file: ask what is missing besides what it has.")] = None,
-    hold: Annotated[bool, typer.Option("--hold", help="Fit nothing of that model anew: ask what has changed.")] = False,
-    suspect: Annotated[
+    baseline: Annotated[
+        Path | None, typer.Option(help="A model file: ask what is missing besides what it has.")
+    ] = None,
+    freeze: Annotated[
+        bool, typer.Option("--freeze", help="Fit nothing of that model anew: ask what has changed.")
+    ] = False,
+    candidate: Annotated[
         list[str],
         typer.Option(help="As 'kink at conduit', or two with a comma, to fit whatever the screening says."),
     ] = [],  # noqa: B006
@@ -82,33 +111,35 @@ def diagnose(
     from ccmodel.config import Diagnosing
     from ccmodel.stages.diagnose import diagnose as run
 
-    suspects = [[one.strip() for one in stated.split(",")] for stated in suspect]
+    forced_candidates = [[one.strip() for one in stated.split(",")] for stated in candidate]
     try:
-        judged = Diagnosing(allowance=_allowance(allowance), step_s=step, cycles=cycles, suspects=suspects)
+        judged = Diagnosing(
+            tolerance=_tolerance(tolerance), step_s=step, cycles=cycles, forced_candidates=forced_candidates
+        )
     except ValidationError as error:
-        # One of an allowance's two forms always has another type, which is no news.
+        # One of a tolerance's two forms always has another type, which is no news.
         said = next(e for e in error.errors() if e["type"] not in ("float_type", "dict_type"))
-        option = "--allowance" if said["loc"] else "--suspect"
+        option = "--tolerance" if said["loc"] else "--candidate"
         raise InputError(f"{option}: {said['msg'].removeprefix('Value error, ')}") from None
-    said = run(batch, out, without, lambda text: _err.print(text, style="dim", markup=False), judged, beside, hold)
+    said = run(batch, out, without, lambda text: _err.print(text, style="dim", markup=False), judged, baseline, freeze)
     typer.echo(said["headline"])
     if strict and said["verdict"] != "agrees":
         raise typer.Exit(1)
 
 
-def _allowance(stated: list[str]) -> float | dict[str, float]:
+def _tolerance(stated: list[str]) -> float | dict[str, float]:
     """One share for all channels, or one a channel."""
-    from ccmodel.identify.problem import MEASURED
+    from ccmodel.inference.problem import MEASURED
 
     try:
         shares = {channel: float(share) for channel, _, share in (one.rpartition("=") for one in stated)}
     except ValueError:
-        raise InputError(f"--allowance: a share is a number, as 0.02; got {', '.join(stated)}") from None
+        raise InputError(f"--tolerance: a share is a number, as 0.02; got {', '.join(stated)}") from None
     if list(shares) == [""]:
         return shares[""]
     if unknown := shares.keys() - set(MEASURED):
         got = ", ".join(name or "a share without a channel" for name in sorted(unknown))
-        raise InputError(f"--allowance: a channel is one of {', '.join(MEASURED)}; got {got}")
+        raise InputError(f"--tolerance: a channel is one of {', '.join(MEASURED)}; got {got}")
     return shares
 
 

@@ -2,13 +2,13 @@
 
 from math import inf
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
 from ccmodel import mechanisms
-from ccmodel.identify.problem import MEASURED
-from ccmodel.model.parameters import FREE, OWN
+from ccmodel.inference.problem import MEASURED
+from ccmodel.model.parameters import FORMER_NAMES, FREE, OWN
 from ccmodel.rig.batch import valid_name
 from ccmodel.typed import InputError, Positive, TypedModel, load_yaml_model
 
@@ -22,7 +22,7 @@ ESTIMATED = "estimated"
 EXTENDED = "extended"
 
 Share = Annotated[float, Field(ge=0, lt=0.5)]
-Allowance = Share | dict[Literal[MEASURED], Share]
+Tolerance = Share | dict[Literal[MEASURED], Share]
 
 
 class FreeParameter(TypedModel):
@@ -69,7 +69,7 @@ class Fit(TypedModel):
     channels: list[Literal[MEASURED]] = Field(
         list(MEASURED), min_length=1, description="what is compared; those recorded are used"
     )
-    allowance: Allowance = Field(
+    tolerance: Tolerance = Field(
         0.0,
         description="share of a channel's peak to peak that the model may leave, besides the noise; or by channel",
     )
@@ -183,30 +183,32 @@ class Accuracy(TypedModel):
 class Diagnosing(TypedModel):
     """How finely a diagnosis looks."""
 
-    allowance: Allowance = Field(
+    tolerance: Tolerance = Field(
         0.0,
         description="share of a channel's peak to peak that a right model may leave besides noise; or by channel",
     )
     step_s: float | None = Field(None, gt=0, description="compare a sample every so often, s; absent: finely")
     cycles: int | None = Field(None, ge=1, description="cycles of a sine that are compared once settled; absent: all")
-    suspects: list[list[str]] = Field(
+    forced_candidates: list[list[str]] = Field(
         default_factory=list,
         description="one or two mechanisms each, 'name at place', to fit in full whatever the screening says",
     )
 
     @model_validator(mode="after")
     def _suspects_known(self):
-        for one in (s for suspect in self.suspects for s in suspect):
+        for one in (s for suspect in self.forced_candidates for s in suspect):
             name, _, place = one.partition(" at ")
             if name not in mechanisms.names() or place not in mechanisms.get(name).places:
-                raise ValueError(f"suspects: there is no mechanism '{one}'; one is stated as 'name at place'")
-        if any(len(suspect) not in (1, 2) for suspect in self.suspects):
-            raise ValueError("suspects: each is a list of one mechanism or of two")
+                raise ValueError(f"forced_candidates: there is no mechanism '{one}'; one is stated as 'name at place'")
+        if any(len(suspect) not in (1, 2) for suspect in self.forced_candidates):
+            raise ValueError("forced_candidates: each is a list of one mechanism or of two")
         return self
 
 
 class Config(TypedModel):
     """A pipeline run."""
+
+    renamed: ClassVar = {"allowance": "tolerance", "suspects": "forced_candidates", **FORMER_NAMES}
 
     raw: str = Field("data/raw", description="folder with a folder a batch")
     results: str = Field("results", description="folder for all that the run makes")

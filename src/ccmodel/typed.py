@@ -8,11 +8,12 @@ what to do.
 import difflib
 import json
 import re
-from collections.abc import Iterable, Sequence
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, ClassVar, TypeVar, Union, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -26,6 +27,8 @@ class TypedModel(BaseModel):
     """Base of every typed file: frozen, no key beyond those named, no silent conversions, no NaN or infinity."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    # Former names of keys, at any depth, which files written earlier may still have.
+    renamed: ClassVar[Mapping[str, str]] = {}
 
 
 @dataclass(frozen=True)
@@ -86,7 +89,7 @@ def load_yaml_model(path: Path, model: type[M]) -> M:
     InputError
         If the file is missing, no YAML, gives a key twice or does not fit the model: every problem in a line.
     """
-    node, data = _read_yaml(Path(path))
+    node, data = _read_yaml(Path(path), getattr(model, "renamed", {}))
     try:
         # JSON mode: lists may become tuples and text paths or choices, while numbers stay strict.
         return model.model_validate_json(data)
@@ -142,8 +145,8 @@ _Loader.add_implicit_resolver(
 )
 
 
-def _read_yaml(path: Path) -> tuple[yaml.Node, str]:
-    """The file's nodes, for finding lines, and its content as JSON."""
+def _read_yaml(path: Path, renamed: Mapping[str, str]) -> tuple[yaml.Node, str]:
+    """The file's nodes, for finding lines, and its content as JSON, every key under its current name."""
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
@@ -154,7 +157,7 @@ def _read_yaml(path: Path) -> tuple[yaml.Node, str]:
         loader = _Loader(text)
         node = loader.get_single_node()
         data = loader.construct_document(node) if node is not None else None
-        as_json = json.dumps(data, default=str)
+        as_json = json.dumps(_under_current_names(data, renamed, path), default=str)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         what = error.problem or "it cannot be understood"
@@ -171,6 +174,16 @@ def _read_yaml(path: Path) -> tuple[yaml.Node, str]:
         found = "nothing" if data is None else f"a {type(data).__name__}"
         raise _input_error([Problem(str(path), None, f"must hold keys and values, found {found}")])
     return node, as_json
+
+
+def _under_current_names(data: Any, renamed: Mapping[str, str], path: Path) -> Any:
+    if isinstance(data, list):
+        return [_under_current_names(entry, renamed, path) for entry in data]
+    if not isinstance(data, dict):
+        return data
+    for former in renamed.keys() & data.keys():
+        warnings.warn(f"{path}: '{former}' is now called '{renamed[former]}'", FutureWarning, stacklevel=2)
+    return {renamed.get(key, key): _under_current_names(value, renamed, path) for key, value in data.items()}
 
 
 def _input_error(problems: list[Problem]) -> InputError:

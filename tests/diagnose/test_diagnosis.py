@@ -14,11 +14,11 @@ from typer.testing import CliRunner
 
 from builders import write_batch
 from ccmodel import cli
+from ccmodel.diagnose.candidate import CandidateFit
 from ccmodel.diagnose.diagnosis import _alternatives, _mechanism
 from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.trial import Trial
 from ccmodel.failure import ModelError
-from ccmodel.identify import problem
+from ccmodel.inference import problem
 from ccmodel.model.files import read_model
 from ccmodel.report.diagnosis import headline
 from ccmodel.stages import diagnose as stage
@@ -133,8 +133,8 @@ def rubbed(tmp_path_factory):
 
 def test_beside_a_model_that_has_it_nothing_else_is_missing(rubbed, tmp_path):
     batch, known = rubbed
-    for hold in ([], ["--hold"]):
-        assert run("diagnose", batch, "--out", tmp_path, "--beside", known / "model.json", *hold).exit_code == 0
+    for hold in ([], ["--freeze"]):
+        assert run("diagnose", batch, "--out", tmp_path, "--baseline", known / "model.json", *hold).exit_code == 0
         said = json.loads((tmp_path / "diagnosis.json").read_text())
         assert said["verdict"] == "agrees"
         assert {"pulley-friction"} == {m.name for m in read_model(tmp_path / "model.json").mechanisms}
@@ -147,7 +147,7 @@ def test_beside_a_model_that_has_it_nothing_else_is_missing(rubbed, tmp_path):
 def test_what_has_changed_since_a_model_was_fitted_is_named(rubbed, tmp_path):
     """The bearing is half as bad again: no new mechanism, and a new number of one that the model has."""
     worn = spoil(write_batch(tmp_path / "worn", pretensions=(7.0, 6.0, 5.0)), lambda t: _more(rubbing, t, 1.5), seed=1)
-    found = run("diagnose", worn, "--out", tmp_path / "out", "--beside", rubbed[1] / "model.json", "--hold")
+    found = run("diagnose", worn, "--out", tmp_path / "out", "--baseline", rubbed[1] / "model.json", "--freeze")
     assert found.exit_code == 0
     said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     assert said["verdict"] == "explained"
@@ -166,9 +166,9 @@ def _more(change, table, share):
 
 
 def test_nothing_can_be_held_without_a_model(clean, tmp_path):
-    found = run("diagnose", clean[0], "--out", tmp_path / "out", "--hold")
+    found = run("diagnose", clean[0], "--out", tmp_path / "out", "--freeze")
     assert isinstance(found.exception, InputError)
-    assert "--beside" in str(found.exception)
+    assert "--baseline" in str(found.exception)
 
 
 def test_a_single_recording_without_load_cells_gets_a_verdict_that_says_what_it_cannot(tmp_path):
@@ -306,7 +306,7 @@ def test_a_motion_without_its_columns_is_refused(clean, tmp_path):
 def test_a_number_stands_where_a_finer_solver_would_have_it():
     key, found = "constant-drag/conduit/f0", {}
     for moved in (0.0, 0.03):
-        trial = Trial(
+        trial = CandidateFit(
             Hypothesis((("constant-drag", "conduit"),)), {}, {key: 0.5}, [], [], np.array([[0.04**2]]), np.inf, [], []
         )
         found[moved] = _mechanism(trial, 0, 0.9, np.array([moved]))["parameters"][0]

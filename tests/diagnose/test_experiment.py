@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from ccmodel.diagnose.candidate import CandidateFit
+from ccmodel.diagnose.comparison import Judgement
 from ccmodel.diagnose.experiment import RATE_HZ, _apart, _motions, _planned, candidates, proposed, recordings_wanted
 from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.judge import Judgement
-from ccmodel.diagnose.trial import Trial
-from ccmodel.identify.problem import Free
-from made_evidence import PARAMETERS, batch
+from ccmodel.inference.problem import Free
+from made_observations import PARAMETERS, batch
 
 VALUES = {"stiffness_N_per_m": 9000.0, "friction_coefficient": 0.15, "load_stiffness_Nm_per_rad": 0.05}
 FREE = {name: Free(value, value / 10, value * 10) for name, value in VALUES.items()}
@@ -18,8 +18,8 @@ KNOWN_TO = 0.01  # of itself, each value
 def trial(recordings, *acting, known_to=KNOWN_TO, **numbers):
     values = VALUES | numbers
     covariance = np.diag([(known_to * value) ** 2 for value in values.values()])
-    aside = [np.ones(w.evidence.measured.size) for w in recordings]
-    return Trial(Hypothesis(acting), FREE, values, [], [], covariance, np.ones(len(values)), [], aside)
+    aside = [np.ones(w.observations.measured.size) for w in recordings]
+    return CandidateFit(Hypothesis(acting), FREE, values, [], [], covariance, np.ones(len(values)), [], aside)
 
 
 def judged(recordings, *rivals):
@@ -29,13 +29,13 @@ def judged(recordings, *rivals):
 
 def test_it_is_within_what_the_rig_has_done():
     recordings = batch()
-    largest = max(np.ptp(w.evidence.given.theta_in) / 2 for w in recordings)
-    bends = {w.evidence.given.recording.path.bend_rad for w in recordings}
+    largest = max(np.ptp(w.observations.given.theta_in) / 2 for w in recordings)
+    bends = {w.observations.given.recording.path.bend_rad for w in recordings}
     for candidate in candidates(recordings):
         assert np.abs(candidate.theta_in).max() <= largest * (1 + 1e-9)
         assert 0 < candidate.pretension_share <= 1
         assert candidate.like.path.bend_rad in bends
-        assert candidate.like.pretension_N == max(w.evidence.given.recording.pretension_N for w in recordings)
+        assert candidate.like.pretension_N == max(w.observations.given.recording.pretension_N for w in recordings)
 
 
 @pytest.mark.parametrize("fastest", [0.5, 3.0])
@@ -75,7 +75,7 @@ def test_a_difference_that_a_refit_takes_up_tells_nothing_apart(known_to, apart)
         trial(recordings, ("constant-drag", "conduit"), known_to=known_to, **drag | {"stiffness_N_per_m": k})
         for k in (8500.0, 9500.0)
     ]
-    template = recordings[0].evidence
+    template = recordings[0].observations
     experiment = candidates(recordings)[0]
     planned = [_planned(experiment, rival, template, PARAMETERS) for rival in rivals]
     as_fitted, refitted = _apart(planned), _apart(planned, rivals)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from ccmodel import mechanisms
+from ccmodel.diagnose.candidate import scaled
 from ccmodel.diagnose.hypothesis import Hypothesis, plausible, singles
-from ccmodel.diagnose.trial import scaled
 from ccmodel.model.parameters import mechanism_parameter
-from made_evidence import PARAMETERS
+from made_observations import PARAMETERS
 
 
 def test_every_mechanism_is_asked_at_each_of_its_places_but_what_is_asked_for_by_name():
@@ -67,13 +67,13 @@ def test_a_mass_is_tried_at_many_sizes_under_one_damping():
     assert (masses[1:] / masses[:-1]).max() < 1.25
     assert len({p["load-inertia/load/zeta"] for p in probes}) == 1
     assert scaled(Hypothesis((("load-inertia", "load"),)), probes[3], 0.2) == probes[3]
-    assert Hypothesis((("load-inertia", "load"),)).eased == ["load-inertia/load/zeta"]
+    assert Hypothesis((("load-inertia", "load"),)).continuation == ["load-inertia/load/zeta"]
 
 
 def test_what_the_model_has_already_is_fitted_and_neither_named_nor_asked_for():
     """What belongs to the model in question is part of every hypothesis beside it, and no finding."""
     friction, gain = ("pulley-friction", "drive-pulley"), ("torque-scale", "load-sensor")
-    model = Hypothesis(beside=(friction,))
+    model = Hypothesis(baseline=(friction,))
     both = model.and_also(Hypothesis((gain,)))
     assert both.names == ("torque-scale",)
     assert [(m.name, m.place) for m in both.of(PARAMETERS).mechanisms] == [friction, gain]
@@ -86,7 +86,7 @@ def test_what_the_model_has_already_is_fitted_and_neither_named_nor_asked_for():
 def test_what_is_held_stays_as_it_is_unless_it_is_what_has_changed():
     friction = ("pulley-friction", "drive-pulley")
     key = "pulley-friction/drive-pulley/friction_torque"
-    model = Hypothesis(beside=(friction,), is_held=True)
+    model = Hypothesis(baseline=(friction,), is_frozen=True)
     known = model.of(PARAMETERS).with_values({key: 7e-3})
     assert model.free({}) == {}
     assert model.of(known).value_of(key) == 7e-3

@@ -10,13 +10,13 @@ import pytest
 from builders import recording
 from ccmodel.cli import diagnose
 from ccmodel.config import Config, load_config
+from ccmodel.diagnose.candidate import _best, _starts, fit
+from ccmodel.diagnose.comparison import judge
 from ccmodel.diagnose.diagnosis import calibration, first_cycles
-from ccmodel.diagnose.evidence import Weighed
 from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.judge import judge
-from ccmodel.diagnose.trial import _best, _starts, fit
+from ccmodel.diagnose.whitening import Whitened
 from ccmodel.failure import ModelError
-from ccmodel.identify.problem import Evidence, Free
+from ccmodel.inference.problem import Free, Observations
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 from ccmodel.typed import InputError
@@ -37,10 +37,10 @@ def jaw(load_Nm, id="r", pretension_N=7.0, **extra):
 
 
 def weighed(recorded, sigma=(1e-3, 1e-4)):
-    e = Evidence.of(recorded, replace(TRUE, spring_beside_load_Nm_per_rad=0.0), CHANNELS, step_s=0.02)
+    e = Observations.of(recorded, replace(TRUE, spring_beside_load_Nm_per_rad=0.0), CHANNELS, step_s=0.02)
     e = replace(e, sigma=np.repeat(np.array(sigma)[:, None], e.measured.shape[1], axis=1))
     rows = e.measured.size
-    return Weighed(e, np.zeros((rows, 1)), np.zeros(1), np.zeros((0, rows)), dict(zip(e.channels, sigma, strict=True)))
+    return Whitened(e, np.zeros((rows, 1)), np.zeros(1), np.zeros((0, rows)), dict(zip(e.channels, sigma, strict=True)))
 
 
 def test_a_fit_finds_pretension_friction_and_spring_without_a_rest():
@@ -58,7 +58,7 @@ def test_a_fit_finds_pretension_friction_and_spring_without_a_rest():
 
 
 def test_the_spring_beside_the_load_is_asked_for_only_where_the_load_was_measured():
-    e = weighed(jaw(-0.01)).evidence
+    e = weighed(jaw(-0.01)).observations
     assert "spring_beside_load_Nm_per_rad" in calibration(e.parameters, [e])
     assert "spring_beside_load_Nm_per_rad" not in calibration(replace(e.parameters, load_stiffness_Nm_per_rad=0.1), [e])
 
@@ -85,37 +85,37 @@ def test_a_suspect_is_fitted_in_full_though_the_screening_passes_it_over():
     free = {"friction_coefficient": Free(0.15, 0.01, 1.0), "spring_beside_load_Nm_per_rad": Free(0.02, 0.0, 1.0)}
     start = {name: f.start for name, f in free.items()}
     suspect = Hypothesis((("pulley-friction", "drive-pulley"),))
-    found = judge(batch, free, start, known=[], suspects=[suspect])
+    found = judge(batch, free, start, known=[], forced_candidates=[suspect])
     assert [t.hypothesis for t in found.trials] == [suspect]
     assert found.nearest is found.trials[0]
     assert judge(batch, free, start, known=[]).nearest is None
 
 
 @pytest.mark.parametrize(
-    "suspects, said",
+    "forced_candidates, said",
     [
         ([["friction"]], "there is no mechanism 'friction'"),
         ([["presliding at load"]], "there is no mechanism 'presliding at load'"),
         ([[]], "one mechanism or of two"),
     ],
 )
-def test_a_suspect_that_is_not_known_is_refused(suspects, said):
+def test_a_suspect_that_is_not_known_is_refused(forced_candidates, said):
     with pytest.raises(ValueError, match=said):
-        Config(diagnosing={"suspects": suspects})
+        Config(diagnosing={"forced_candidates": forced_candidates})
 
 
 def test_an_allowance_may_differ_by_channel():
     recorded = jaw(-0.01)
     plain, allowing = (
-        Evidence.of(recorded, TRUE, CHANNELS, step_s=0.02, allowance=a) for a in (0.0, {"tau_in_Nm": 0.1})
+        Observations.of(recorded, TRUE, CHANNELS, step_s=0.02, tolerance=a) for a in (0.0, {"tau_in_Nm": 0.1})
     )
     angle, torque = (allowing.channels.index(c) for c in CHANNELS)
     allowed = 0.1 * np.ptp(plain.measured[torque])
     assert allowing.sigma[angle] == pytest.approx(plain.sigma[angle])
     assert allowing.sigma[torque] == pytest.approx(np.hypot(plain.sigma[torque], allowed))
-    assert allowing.allowed == pytest.approx(np.mean((allowed / allowing.sigma[torque]) ** 2) / 2)
-    assert allowing.without("tau_in_Nm").allowed == 0
-    every = Evidence.of(recorded, TRUE, CHANNELS, step_s=0.02, allowance=0.1)
+    assert allowing.tolerance_share == pytest.approx(np.mean((allowed / allowing.sigma[torque]) ** 2) / 2)
+    assert allowing.without("tau_in_Nm").tolerance_share == 0
+    every = Observations.of(recorded, TRUE, CHANNELS, step_s=0.02, tolerance=0.1)
     assert every.sigma[torque] == pytest.approx(allowing.sigma[torque])
 
 
@@ -130,14 +130,14 @@ def test_an_allowance_may_differ_by_channel():
     ],
 )
 def test_an_allowance_that_cannot_be_used_is_refused(tmp_path, stated, said):
-    with pytest.raises(InputError, match=f"--allowance: .*{said}"):
-        diagnose(tmp_path, tmp_path / "out", allowance=stated)
+    with pytest.raises(InputError, match=f"--tolerance: .*{said}"):
+        diagnose(tmp_path, tmp_path / "out", tolerance=stated)
 
 
 def test_the_configuration_for_the_public_recordings_says_how_they_would_be_diagnosed():
     config = load_config(Path(__file__).parents[2] / "config" / "real.yaml")
-    assert all(0 < share < 0.05 for share in config.diagnosing.allowance.values())
-    assert config.diagnosing.suspects
+    assert all(0 < share < 0.05 for share in config.diagnosing.tolerance.values())
+    assert config.diagnosing.forced_candidates
 
 
 def test_a_fit_feels_its_way_from_a_slack_cable_too_where_the_pretension_is_not_known():

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ccmodel.diagnose.comparison import Judgement
 from ccmodel.diagnose.diagnosis import odd_one_out
-from ccmodel.diagnose.evidence import weigh
-from ccmodel.diagnose.judge import Judgement
+from ccmodel.diagnose.whitening import weigh
 from ccmodel.geometry import ConduitPath
-from made_evidence import PARAMETERS, batch, calibrated
+from made_observations import PARAMETERS, batch, calibrated
 
 
 def judged(recordings):
@@ -21,7 +21,7 @@ def judged(recordings):
 def contradicting():
     """Four recordings, of which the batch says that the third was bent twice as much as it was."""
     recordings = batch()
-    e = recordings[2].evidence
+    e = recordings[2].observations
     stated = replace(e.given.recording, path=ConduitPath([1.2], [2 * np.pi]))
     recordings[2] = weigh(replace(e, given=replace(e.given, recording=stated)), PARAMETERS)
     return recordings

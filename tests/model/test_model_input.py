@@ -32,14 +32,14 @@ def test_where_the_drive_rests_shifts_all_that_follows():
     )
     given = ModelInput.of(counted)
     parameters = Parameters(7750.0, 1.2, 0.156, 0.006, 0.006, load_stiffness_Nm_per_rad=0.05, pretension_N=7.0)
-    shift = simulate(given, replace(parameters, drive_place=2.0))["theta_in_rad"] - given.theta_in
-    assert shift == pytest.approx(2 * given.drive_place)
+    shift = simulate(given, replace(parameters, drive_encoder_offset=2.0))["theta_in_rad"] - given.theta_in
+    assert shift == pytest.approx(2 * given.drive_encoder_offset)
     assert shift[t < 0.4] == pytest.approx(0, abs=1e-3 * step)
-    later = given.drive_place[t > 1]
+    later = given.drive_encoder_offset[t > 1]
     assert later == pytest.approx(later[0], rel=0.02)
     assert 0 < abs(later[0]) < step / np.sqrt(12) * 1.01
     # Once that is known, less is unknown.
-    assert (given.placed_deviations**2).mean() < (given.drive_deviations**2).mean()
+    assert (given.deviations_given_offset**2).mean() < (given.drive_deviations**2).mean()
 
 
 def test_a_drive_that_was_not_counted_is_taken_as_it_is():

@@ -170,14 +170,14 @@ def test_a_load_that_turns_against_the_drive_keeps_its_torque():
             assert np.abs(np.log(near[taut] / far[taut])).max() <= 0.156 * np.pi + 1e-9
 
 
-@pytest.mark.parametrize("bow", [-1.0, 0.4, 1.0])
-def test_a_profile_that_bends_keeps_its_ends_and_what_friction_holds(bow):
+@pytest.mark.parametrize("curvature", [-1.0, 0.4, 1.0])
+def test_a_profile_that_bends_keeps_its_ends_and_what_friction_holds(curvature):
     path = ConduitPath([0.4, 0.6, 0.2], [0.0, 2.0, 1.0])
-    tension = InitialTension.between_ends(path, 0.1, (8.0, 7.0), (7.0, 7.0), (bow, 0.0))
+    tension = InitialTension.between_ends(path, 0.1, (8.0, 7.0), (7.0, 7.0), (curvature, 0.0))
     assert tension.tension_A_N[[0, -1]] == pytest.approx([8.0, 7.0])
     assert path.bend_at(tension.x_m)[1] == pytest.approx(1.5)
     off = np.log(tension.tension_A_N[1]) - np.log([8.0, 7.0]).mean()
-    assert off == pytest.approx(bow * 0.5 * (0.3 - np.log(8 / 7)))
+    assert off == pytest.approx(curvature * 0.5 * (0.3 - np.log(8 / 7)))
     tension.log_slopes(path, 0.1)  # Refuses more than friction holds.
     assert tension.tension_B_N == pytest.approx(7.0)
 

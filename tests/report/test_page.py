@@ -7,8 +7,8 @@ import pytest
 
 from ccmodel.compare.errors import COLUMNS
 from ccmodel.config import Config
-from ccmodel.identify.fit import FitResult
-from ccmodel.identify.intervals import Interval, Scatter, Undetermined
+from ccmodel.inference.fit import FitResult
+from ccmodel.inference.intervals import Interval, Scatter, Undetermined
 from ccmodel.report.page import about, interval, write_page
 
 APART = "friction_coefficient and extra_bend_rad are not determined apart; known is mu + 0.05 x e = 0.16"

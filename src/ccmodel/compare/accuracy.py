@@ -253,7 +253,7 @@ def _aside(case: Case) -> dict[str, float]:
 
 
 def _every_other(given: ModelInput) -> ModelInput:
-    thin = {n: v[..., ::2] for n in ("theta_in", "drive_deviations", "drive_place", "theta_out", "tau_out")
+    thin = {n: v[..., ::2] for n in ("theta_in", "drive_deviations", "drive_encoder_offset", "theta_out", "tau_out")
             if (v := getattr(given, n)) is not None}  # fmt: skip
     return replace(given, recording=given.recording[::2], **thin)
 

@@ -9,15 +9,15 @@ from scipy.stats import t as student
 from threadpoolctl import threadpool_limits
 
 from ccmodel import mechanisms as registry
-from ccmodel.diagnose import experiment, locate
-from ccmodel.diagnose.evidence import FRICTION_SPREAD, Weighed, weigh
+from ccmodel.diagnose import experiment, location
+from ccmodel.diagnose.candidate import CandidateFit, fit, moved_by_finer
+from ccmodel.diagnose.comparison import MOST_ALTERNATIVES, RIGHT, RIVAL, Judgement, judge, nested_errors
 from ccmodel.diagnose.hypothesis import Hypothesis, singles
-from ccmodel.diagnose.judge import MOST_ALTERNATIVES, RIGHT, RIVAL, Judgement, judge, nested_errors
-from ccmodel.diagnose.trial import Trial, fit, moved_by_finer
+from ccmodel.diagnose.whitening import FRICTION_SPREAD, Whitened, weigh
 from ccmodel.failure import ModelError
-from ccmodel.identify.intervals import COVERAGE
-from ccmodel.identify.problem import MEASURED, Allowance, Evidence, Free, Problem, each
-from ccmodel.identify.search import solve
+from ccmodel.inference.intervals import COVERAGE
+from ccmodel.inference.problem import MEASURED, Free, Observations, Problem, Tolerance, each
+from ccmodel.inference.search import solve
 from ccmodel.model.parameters import ZERO_OF, Parameters, mechanism_key
 from ccmodel.recording import Recording, unit_of
 
@@ -28,7 +28,7 @@ MOST_CONFIDENT = 0.99
 AT_BOUND = 1e-3
 # Fewer recordings do not say which of them is the odd one.
 FEWEST_TO_CONTRADICT = 4
-# Enough samples for what such rigs do in a recording; more of them are more work and no more evidence.
+# Enough samples for what such rigs do in a recording; more of them are more work and no more observations.
 STEP_S, MOST_SAMPLES = 0.008, 2000
 STIFFNESS_N_PER_M, FRICTION, LOAD = (1e2, 1e7), (0.005, 1.5), (1e-4, 10.0)
 
@@ -50,7 +50,7 @@ class Diagnosis:
     judgement: Judgement
     estimates: Parameters
 
-    def model(self, trial: Trial) -> Parameters:
+    def model(self, trial: CandidateFit) -> Parameters:
         """A trial's model, for any recording."""
         return trial.hypothesis.of(self.estimates).with_values(trial.values)
 
@@ -63,12 +63,12 @@ def diagnose(
     not_judged: Sequence[Mapping[str, str]] = (),
     without: Collection[str] = (),
     tell: Callable[[str], None] = lambda text: None,
-    allowance: Allowance = 0.0,
+    tolerance: Tolerance = 0.0,
     step_s: float = STEP_S,
     cycles: int | None = None,
-    suspects: Sequence[Sequence[str]] = (),
-    beside: Parameters | None = None,
-    hold: bool = False,
+    forced_candidates: Sequence[Sequence[str]] = (),
+    baseline: Parameters | None = None,
+    freeze: bool = False,
 ) -> Diagnosis:
     """Say whether the calibrated model explains recordings, and if not, where and why.
 
@@ -84,20 +84,20 @@ def diagnose(
         Mechanisms that are not asked for: what a diagnosis says when the truth is not on its list.
     tell : callable
         Is told how the work goes on.
-    allowance : float or mapping of str to float
+    tolerance : float or mapping of str to float
         Share of a channel's peak to peak that a right model may leave, besides the noise, one for all or by channel:
         what is finer is not judged.
     step_s : float
         Time from one sample that is compared to the next, at least.
     cycles : int, optional
         Cycles of a sine that are compared, once it has settled; further ones are more work and the same again.
-    suspects : sequence of sequence of str
+    forced_candidates : sequence of sequence of str
         One or two mechanisms, each as "name at place", that are fitted in full whatever the screening says of them.
-    beside : Parameters, optional
+    baseline : Parameters, optional
         A model that such a rig was fitted with before, as a diagnosis writes it. What it has besides the paper's
         physics then belongs to the model in question, all is fitted anew from its values, and asked is what else is
         missing.
-    hold : bool
+    freeze : bool
         Whether nothing of that model is fitted anew but sensors' zeros that no rest shows: asked is what has changed.
 
     Raises
@@ -106,51 +106,55 @@ def diagnose(
         If the model cannot be run on any of the recordings.
     """
     not_judged = [dict(n) for n in not_judged]
-    evidence = []
+    observations = []
     for recording in recordings:
         try:
             step = max(step_s, float(np.ptp(recording.time_s)) / MOST_SAMPLES)
-            evidence.append(Evidence.of(first_cycles(recording, cycles), estimates, step_s=step, allowance=allowance))
+            observations.append(
+                Observations.of(first_cycles(recording, cycles), estimates, step_s=step, tolerance=tolerance)
+            )
         except (ModelError, ValueError) as error:
             not_judged.append({"what": recording.id, "why": str(error)})
-    if not evidence:
+    if not observations:
         raise ModelError("none of the recordings can be compared with the model: " + not_judged[0]["why"])
-    if any(e.given.shows_pretension for e in evidence):
+    if any(e.given.initial_tension_observed for e in observations):
         why = "no rest with load cells shows its pretension, as the others' do"
-        not_judged += [{"what": e.given.recording.id, "why": why} for e in evidence if not e.given.shows_pretension]
-        evidence = [e for e in evidence if e.given.shows_pretension]
-    not_judged += _what_is_missing(evidence)
+        not_judged += [
+            {"what": e.given.recording.id, "why": why} for e in observations if not e.given.initial_tension_observed
+        ]
+        observations = [e for e in observations if e.given.initial_tension_observed]
+    not_judged += _what_is_missing(observations)
     why = "as the run was asked to: part of what the noise is taken to be"
-    not_judged += [{"what": what, "why": why} for what in _allowed(allowance)]
-    calibrated = calibration(estimates, evidence)
+    not_judged += [{"what": what, "why": why} for what in _allowed(tolerance)]
+    calibrated = calibration(estimates, observations)
     estimates = estimates.with_values({name: free.start for name, free in calibrated.items()})
-    model = Hypothesis(beside=tuple((m.name, m.place) for m in beside.mechanisms) if beside else ())
-    aimed_at_N = float(np.mean([e.given.recording.pretension_N for e in evidence]))
-    known = _values_of(beside, calibrated, model, aimed_at_N) if beside else {}
-    if hold:
-        model, estimates = replace(model, is_held=True), model.of(estimates).with_values(known)
+    model = Hypothesis(baseline=tuple((m.name, m.place) for m in baseline.mechanisms) if baseline else ())
+    aimed_at_N = float(np.mean([e.given.recording.pretension_N for e in observations]))
+    known = _values_of(baseline, calibrated, model, aimed_at_N) if baseline else {}
+    if freeze:
+        model, estimates = replace(model, is_frozen=True), model.of(estimates).with_values(known)
         # A zero may have changed by itself since the model was fitted.
         calibrated = {name: free for name, free in calibrated.items() if name in ZERO_OF.values()}
         why = "held as the model given has them, as the run was asked to"
         not_judged.append({"what": "stiffness, friction and whatever else a calibration would fit", "why": why})
-    evidence = [replace(e, parameters=estimates) for e in evidence]
-    in_question = "the model given" if beside else "the paper's model"
-    tell(f"calibrating {in_question} on {len(evidence)} recordings")
-    start = known if beside else _first_fit(evidence, calibrated)
+    observations = [replace(e, parameters=estimates) for e in observations]
+    in_question = "the model given" if baseline else "the paper's model"
+    tell(f"calibrating {in_question} on {len(observations)} recordings")
+    start = known if baseline else _first_fit(observations, calibrated)
     fitted = model.of(estimates).with_values(start)
-    weighed = each(evidence, lambda i, e: weigh(e, fitted))
+    weighed = each(observations, lambda i, e: weigh(e, fitted))
     listed = singles(without, model)
-    judgement = judge(weighed, calibrated, start, listed, tell, [_suspect(s) for s in suspects], model)
+    judgement = judge(weighed, calibrated, start, listed, tell, [_suspect(s) for s in forced_candidates], model)
     not_judged += odd_one_out(judgement) + _at_bounds(judgement.best)
     return Diagnosis(_said(recordings[0].batch, judgement, estimates, not_judged), judgement, estimates)
 
 
-def _allowed(allowance: Allowance) -> list[str]:
-    by_channel = allowance if isinstance(allowance, Mapping) else {"a channel": allowance}
+def _allowed(tolerance: Tolerance) -> list[str]:
+    by_channel = tolerance if isinstance(tolerance, Mapping) else {"a channel": tolerance}
     return [f"errors below {100 * share:g} % of {name}'s peak to peak" for name, share in by_channel.items() if share]
 
 
-def _at_bounds(trial: Trial) -> list[dict[str, str]]:
+def _at_bounds(trial: CandidateFit) -> list[dict[str, str]]:
     """What a calibration left at the end of its range."""
     found = []
     for name, free in trial.free.items():
@@ -177,7 +181,7 @@ def odd_one_out(judgement: Judgement) -> list[dict[str, str]]:
         f"without it the calibrated model leaves {left:.2f} of the noise's mean square in the others, and with them"
         f" {float(base.left[odd]):.3g} in this one: check its bend, pretension and wiring against the batch file"
     )
-    return [{"what": weighed[odd].evidence.given.recording.id, "why": why}]
+    return [{"what": weighed[odd].observations.given.recording.id, "why": why}]
 
 
 def _suspect(stated: Sequence[str]) -> Hypothesis:
@@ -193,7 +197,7 @@ def first_cycles(recording: Recording, cycles: int | None) -> Recording:
     return recording[: int(wanted.sum())]
 
 
-def calibration(estimates: Parameters, evidence: Sequence[Evidence]) -> dict[str, Free]:
+def calibration(estimates: Parameters, observations: Sequence[Observations]) -> dict[str, Free]:
     """What a calibration leaves free: stiffness, friction, the load's spring, and what no rest shows."""
     free = {
         "stiffness_N_per_m": _free(estimates.stiffness_N_per_m, *STIFFNESS_N_PER_M),
@@ -201,16 +205,18 @@ def calibration(estimates: Parameters, evidence: Sequence[Evidence]) -> dict[str
     }
     if estimates.load_stiffness_Nm_per_rad is not None:
         free["load_stiffness_Nm_per_rad"] = _free(estimates.load_stiffness_Nm_per_rad, *LOAD)
-    elif all("tau_in_Nm" in e.channels for e in evidence):
+    elif all("tau_in_Nm" in e.channels for e in observations):
         # A batch that states no spring may have one all the same, which the torque measured at the load does not feel.
-        size = float(np.median([np.ptp(e.given.recording["tau_in_Nm"]) / np.ptp(e.given.theta_in) for e in evidence]))
+        size = float(
+            np.median([np.ptp(e.given.recording["tau_in_Nm"]) / np.ptp(e.given.theta_in) for e in observations])
+        )
         free["spring_beside_load_Nm_per_rad"] = Free(0.1 * size, 0.0, 10 * size)
-    if not all(e.given.shows_pretension for e in evidence):
+    if not all(e.given.initial_tension_observed for e in observations):
         free["pretension_share"] = Free(1.0, 0.01, 100.0)  # of what each recording was aimed at
         free["load_radius_m"] = Free(
             estimates.load_radius_m, 0.3 * estimates.load_radius_m, 3 * estimates.load_radius_m
         )
-        torques = [e.given.recording["tau_in_Nm"] for e in evidence if "tau_in_Nm" in e.channels]
+        torques = [e.given.recording["tau_in_Nm"] for e in observations if "tau_in_Nm" in e.channels]
         if torques:
             reach = max(float(np.ptp(torque)) for torque in torques)
             free["tau_in_zero_Nm"] = Free(0.0, -reach, reach)
@@ -226,39 +232,39 @@ def _free(estimate: float, low: float, high: float) -> Free:
 
 
 def _values_of(
-    beside: Parameters, calibrated: Mapping[str, Free], model: Hypothesis, aimed_at_N: float
+    baseline: Parameters, calibrated: Mapping[str, Free], model: Hypothesis, aimed_at_N: float
 ) -> dict[str, float]:
     """A model's values of what a calibration leaves free, where it has them, and of the numbers of its mechanisms.
 
     A model that has one pretension for all recordings has it as a share of what these were aimed at, on average.
     """
-    known = {name: beside.value_of(name) for name in [*calibrated, *model.start]}
-    if beside.pretension_N is not None and "pretension_share" in known:
-        known["pretension_share"] *= beside.pretension_N / aimed_at_N
+    known = {name: baseline.value_of(name) for name in [*calibrated, *model.start]}
+    if baseline.pretension_N is not None and "pretension_share" in known:
+        known["pretension_share"] *= baseline.pretension_N / aimed_at_N
     return {name: calibrated[name].start if value is None else value for name, value in known.items()}
 
 
-def _first_fit(evidence: Sequence[Evidence], calibrated: Mapping[str, Free]) -> dict[str, float]:
-    problem = Problem(evidence, calibrated, {"friction_scale": Free(1.0, 0.2, 5.0, FRICTION_SPREAD)})
+def _first_fit(observations: Sequence[Observations], calibrated: Mapping[str, Free]) -> dict[str, float]:
+    problem = Problem(observations, calibrated, {"friction_scale": Free(1.0, 0.2, 5.0, FRICTION_SPREAD)})
     found = solve(problem, problem.start, most_evaluations=20, tolerance=1e-4)
     return dict(zip(calibrated, found.x.tolist(), strict=False))
 
 
-def _what_is_missing(evidence: Sequence[Evidence]) -> list[dict[str, str]]:
+def _what_is_missing(observations: Sequence[Observations]) -> list[dict[str, str]]:
     found = []
-    recorded = {c for e in evidence for c in e.channels}
+    recorded = {c for e in observations for c in e.channels}
     for channel in MEASURED:
-        lacking = [e.given.recording.id for e in evidence if channel not in e.channels]
+        lacking = [e.given.recording.id for e in observations if channel not in e.channels]
         if channel not in recorded:
             found.append({"what": channel, "why": "not recorded, or the load's course had to be taken from it"})
         elif lacking:
             found.append({"what": f"{channel} of {', '.join(lacking)}", "why": "not recorded there, or not usable"})
-    if not all(e.given.shows_pretension for e in evidence):
+    if not all(e.given.initial_tension_observed for e in observations):
         why = "no rest with load cells shows them: fitted, the pretension as one share of what each was aimed at"
         found.append({"what": "pretension, ratio of the pulleys, zeros of the torques", "why": why})
-    if len(evidence) == 1:
+    if len(observations) == 1:
         found.append({"what": "held-out error", "why": "a single recording: nothing can be held out"})
-    if len({round(e.given.recording.path.bend_rad, 3) for e in evidence}) == 1:
+    if len({round(e.given.recording.path.bend_rad, 3) for e in observations}) == 1:
         found.append({"what": "friction apart from bend", "why": "one bend angle: only the product of the two shows"})
     return found
 
@@ -277,14 +283,14 @@ def _said(batch, judgement: Judgement, estimates: Parameters, not_judged) -> dic
         "format": FORMAT,
         "batch": batch,
         "verdict": judgement.verdict,
-        "is_held": base.hypothesis.is_held,
-        "location": locate.location(judgement),
+        "is_held": base.hypothesis.is_frozen,
+        "location": location.location(judgement),
         "mechanisms": [_mechanism(best, k, _named(name, confidence), moved) for k, (name, _) in enumerate(named)],
         "alternatives": alternatives,
         "likeliest": [{"name": n, "place": p} for n, p in best.hypothesis.acting if judgement.verdict == "undecided"],
         "nearest": _nearest(judgement),
         "fit": {
-            "held_out": [w.evidence.given.recording.id for w in weighed] if len(weighed) > 1 else [],
+            "held_out": [w.observations.given.recording.id for w in weighed] if len(weighed) > 1 else [],
             "calibrated": base.values,
             "mean_square": {"calibrated": float(base.left.mean()), "extended": float(best.left.mean())},
             "error": held_out_errors(judgement),
@@ -341,7 +347,7 @@ def _by_finer_solver(judgement: Judgement, not_judged: list) -> NDArray | None:
         return None
 
 
-def _mechanism(trial: Trial, k: int, confidence: float, moved: NDArray | None = None) -> dict:
+def _mechanism(trial: CandidateFit, k: int, confidence: float, moved: NDArray | None = None) -> dict:
     """A mechanism's numbers where a finer solver would have them, in intervals that know of that move.
 
     A model file keeps the numbers that were fitted: on the solver that it runs on these are the best.
@@ -376,7 +382,7 @@ def held_out_errors(judgement: Judgement) -> dict[str, dict]:
     for i, w in enumerate(judgement.weighed):
         before = _raw(w, judgement.calibrated, i)
         after = before if chosen[i] is judgement.calibrated else _raw(w, chosen[i], i)
-        for c, channel in enumerate(w.evidence.channels):
+        for c, channel in enumerate(w.observations.channels):
             row = (np.mean(before[c] ** 2), np.mean(after[c] ** 2), w.floor[channel] ** 2)
             square.setdefault(channel, []).append(row)
     found = {}
@@ -387,6 +393,6 @@ def held_out_errors(judgement: Judgement) -> dict[str, dict]:
     return found
 
 
-def _raw(w: Weighed, trial: Trial, i: int) -> NDArray:
-    e = replace(w.evidence, parameters=trial.hypothesis.of(w.evidence.parameters))
+def _raw(w: Whitened, trial: CandidateFit, i: int) -> NDArray:
+    e = replace(w.observations, parameters=trial.hypothesis.of(w.observations.parameters))
     return e.errors(trial.held_out[i]) * e.sigma

@@ -13,12 +13,12 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.diagnose.evidence import LOOKS, Weighed, run_differences, shrink_of
-from ccmodel.diagnose.judge import RIVAL, Judgement
-from ccmodel.diagnose.travel import speed
-from ccmodel.diagnose.trial import Trial, slopes
+from ccmodel.diagnose.candidate import CandidateFit, slopes
+from ccmodel.diagnose.comparison import RIVAL, Judgement
+from ccmodel.diagnose.drive import speed
+from ccmodel.diagnose.whitening import LOOKS, Whitened, run_differences, shrink_of
 from ccmodel.failure import ModelError
-from ccmodel.identify.problem import Evidence, each
+from ccmodel.inference.problem import Observations, each
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput
 from ccmodel.model.sensitivity import size_of
@@ -62,7 +62,7 @@ def proposed(judgement: Judgement, estimates: Parameters) -> dict | None:
     rivals = rivals[:RIVALS]
     if len(rivals) < 2:
         return None
-    template = max(judgement.weighed, key=lambda w: w.evidence.given.recording.pretension_N).evidence
+    template = max(judgement.weighed, key=lambda w: w.observations.given.recording.pretension_N).observations
     every = candidates(judgement.weighed)
     planned = [[_planned(e, t, template, estimates) for t in rivals] for e in every]
     roughly = np.array(each(planned, lambda i, of_rivals: _apart(of_rivals)))
@@ -86,9 +86,9 @@ def recordings_wanted(apart: float, channels: int) -> int:
     return int(np.ceil(2 * np.log(ODDS) / (LOOKS * channels * apart**2)))
 
 
-def candidates(weighed: Sequence[Weighed]) -> list[Experiment]:
+def candidates(weighed: Sequence[Whitened]) -> list[Experiment]:
     """Motions within the amplitudes and speeds that the batch shows the rig can do, at its least and largest bend."""
-    given = [w.evidence.given for w in weighed]
+    given = [w.observations.given for w in weighed]
     amplitude = max(np.ptp(g.theta_in) / 2 for g in given)
     fastest = max(np.abs(speed(g)).max() for g in given)
     highest = max(g.recording.pretension_N for g in given)
@@ -128,22 +128,24 @@ def _steps(amplitude: float, start: NDArray, hold_s: float, move_s: float) -> ND
     return levels[k % 4] + (levels[(k + 1) % 4] - levels[k % 4]) * smooth
 
 
-def _planned(experiment: Experiment, rival: Trial, template: Evidence, estimates: Parameters) -> Evidence:
+def _planned(
+    experiment: Experiment, rival: CandidateFit, template: Observations, estimates: Parameters
+) -> Observations:
     """An experiment as a rival would have it, in units of the noise that the rig's recordings have."""
     shape = len(template.channels), experiment.theta_in.size
     model = rival.hypothesis.of(estimates).with_values(rival.values)
-    return Evidence(
+    return Observations(
         given=experiment.given(),
         parameters=replace(model, pretension_scale=model.pretension_scale * experiment.pretension_share),
         channels=template.channels,
         judged=np.ones(shape[1], bool),
         measured=np.zeros(shape),
         sigma=np.broadcast_to(np.median(template.sigma, axis=1, keepdims=True), shape),
-        allowance=np.zeros(shape[0]),
+        tolerance=np.zeros(shape[0]),
     )
 
 
-def _apart(planned: Sequence[Evidence], refitted: Sequence[Trial] | None = None) -> float:
+def _apart(planned: Sequence[Observations], refitted: Sequence[CandidateFit] | None = None) -> float:
     """Least distance between two rivals' predictions, in units of the noise (rms over channels); 0 where one fails.
 
     With the rivals `refitted` only what a refit of either would leave of it counts.
@@ -163,7 +165,7 @@ def _apart(planned: Sequence[Evidence], refitted: Sequence[Trial] | None = None)
     return float(min(distances))
 
 
-def _taken_up(e: Evidence, said: NDArray, trial: Trial) -> NDArray:
+def _taken_up(e: Observations, said: NDArray, trial: CandidateFit) -> NDArray:
     """What is not known of a rival's values and of a run, a standard deviation of each over the noise; (rows, k).
 
     `said` is what the rival says, over the noise.

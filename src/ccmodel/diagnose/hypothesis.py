@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 
 from ccmodel import mechanisms as registry
-from ccmodel.identify.problem import Free
+from ccmodel.inference.problem import Free
 from ccmodel.mechanisms import Parameter
 from ccmodel.model.general.run import Active
 from ccmodel.model.parameters import Parameters, mechanism_key
@@ -28,15 +28,15 @@ class Hypothesis:
     ----------
     acting : tuple of (str, str)
         Mechanism and place of each; empty for the model that is in question.
-    beside : tuple of (str, str)
+    baseline : tuple of (str, str)
         The same of what that model has besides the paper's physics; their numbers are fitted with the others.
-    is_held : bool
+    is_frozen : bool
         Whether they are not, but stay as they are. One of them in `acting` means that its numbers have changed.
     """
 
     acting: tuple[tuple[str, str], ...] = ()
-    beside: tuple[tuple[str, str], ...] = ()
-    is_held: bool = False
+    baseline: tuple[tuple[str, str], ...] = ()
+    is_frozen: bool = False
 
     def __str__(self) -> str:
         return " + ".join(f"{name} at {place}" for name, place in self.acting) or "the calibrated model"
@@ -51,14 +51,14 @@ class Hypothesis:
         return tuple(sorted(name for name, _ in self.acting))
 
     @property
-    def missed(self) -> float:
+    def model_form_error(self) -> float:
         """Share of what it does to recordings that the simple forms of its mechanisms may miss."""
-        return max((registry.get(name).missed for name, _ in self.acting), default=0.0)
+        return max((registry.get(name).model_form_error for name, _ in self.acting), default=0.0)
 
     def of(self, parameters: Parameters) -> Parameters:
         """Parameters with the mechanisms in them: at the values that they have there, or else at where they start."""
         known = {(m.name, m.place): m.values for m in parameters.mechanisms}
-        every = dict.fromkeys(self.beside + self.acting)
+        every = dict.fromkeys(self.baseline + self.acting)
         acting = tuple(Active(*one, known.get(one) or registry.get(one[0]).start) for one in every)
         return replace(parameters, mechanisms=acting)
 
@@ -76,13 +76,13 @@ class Hypothesis:
         return found
 
     @property
-    def eased(self) -> list[str]:
+    def continuation(self) -> list[str]:
         """Unknowns whose fit begins high and is then repeated from lower and lower."""
-        return [key for key, parameter, _ in self._unknowns() if parameter.eased]
+        return [key for key, parameter, _ in self._unknowns() if parameter.continuation]
 
     def _unknowns(self) -> Iterator[tuple[str, Parameter, bool]]:
         """Name of each of the mechanisms' numbers, what is known of it, and whether it is a mechanism's strength."""
-        for name, place in self.acting if self.is_held else self.beside + self.acting:
+        for name, place in self.acting if self.is_frozen else self.baseline + self.acting:
             mechanism = registry.get(name)
             for parameter in mechanism.parameters:
                 yield mechanism_key(name, place, parameter.name), parameter, parameter in mechanism.strengths
@@ -91,10 +91,12 @@ class Hypothesis:
         """Values at which a single mechanism is tried out, all over its plausible range."""
         ((name, place),) = self.acting
         mechanism = registry.get(name)
-        grids = [[p.at(share) for share in p.tried or SHAPES] for p in mechanism.shapes]
+        grids = [[p.at(share) for share in p.screening_grid or SHAPES] for p in mechanism.shapes]
         for strength in mechanism.strengths:
             others = {p.name: p.neutral for p in mechanism.strengths if p is not strength}
-            sizes = [UNLIKE] if strength.ratio else [strength.at(share) for share in strength.tried or STRENGTHS]
+            sizes = (
+                [UNLIKE] if strength.ratio else [strength.at(share) for share in strength.screening_grid or STRENGTHS]
+            )
             for size, *values in product(sizes, *grids):
                 shapes = dict(zip((p.name for p in mechanism.shapes), values, strict=True))
                 said = others | {strength.name: size} | shapes
@@ -108,7 +110,7 @@ def singles(without: Collection[str] = (), model: Hypothesis = PAPER) -> list[Hy
     """Every mechanism at each of its places that is asked for unnamed, may be known, and that no model fits already."""
     names = [name for name in registry.names() if name not in without and not registry.get(name).by_name_only]
     every = ((name, place) for name in names for place in registry.get(name).places)
-    return [Hypothesis((acting,)) for acting in every if model.is_held or acting not in model.beside]
+    return [Hypothesis((acting,)) for acting in every if model.is_frozen or acting not in model.baseline]
 
 
 def plausible(hypothesis: Hypothesis, values: Mapping[str, float], slack: float = 1.5) -> bool:

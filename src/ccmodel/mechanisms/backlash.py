@@ -23,7 +23,7 @@ def dead_zone(theta, half_gap):
     return 0.0, 0.0
 
 
-def _enters(settings, place, values):
+def _modifies_physics(settings, place, values):
     settings.half_gap = values["half_gap"]
 
 
@@ -34,5 +34,5 @@ MECHANISM = Mechanism(
     summary="a dead zone between load pulley and load",
     mistaken_for="strand-settling",
     separated_by="torque near zero at two pretensions",
-    enters=_enters,
+    modifies_physics=_modifies_physics,
 )

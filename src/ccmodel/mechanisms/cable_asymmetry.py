@@ -10,7 +10,7 @@ Mistaken for the gain of a load cell. Exchange the cables: the residual goes wit
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
-def _enters(settings, place, values):
+def _modifies_physics(settings, place, values):
     if not values["K_ratio"] > 0:
         raise ValueError(f"both cables have some stiffness, so K_ratio is above zero; got {values['K_ratio']}")
     settings.friction_ratio_B = values["ratio"]
@@ -27,5 +27,5 @@ MECHANISM = Mechanism(
     summary="friction or stiffness differs between the cables",
     mistaken_for="load-cell-scale",
     separated_by="exchange of the cables",
-    enters=_enters,
+    modifies_physics=_modifies_physics,
 )

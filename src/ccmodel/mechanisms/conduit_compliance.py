@@ -12,7 +12,7 @@ softness acts as far as the front has come, a termination's at its end, a condui
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
-def _enters(settings, place, values):
+def _modifies_physics(settings, place, values):
     settings.conduit_compliance = values["compliance"]
 
 
@@ -23,5 +23,5 @@ MECHANISM = Mechanism(
     summary="a conduit shortens under its cable's mean tension",
     mistaken_for="K, termination-compliance",
     separated_by="partial motion against full slip",
-    enters=_enters,
+    modifies_physics=_modifies_physics,
 )

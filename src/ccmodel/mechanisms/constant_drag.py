@@ -11,7 +11,7 @@ its intercept at zero tension.
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
-def _enters(settings, place, values):
+def _modifies_physics(settings, place, values):
     settings.drag_N = values["f0"]
 
 
@@ -22,5 +22,5 @@ MECHANISM = Mechanism(
     summary="friction that does not depend on tension",
     mistaken_for="load-dependent-friction, pulley-friction",
     separated_by="the loss's intercept at low pretension",
-    enters=_enters,
+    modifies_physics=_modifies_physics,
 )

@@ -4,8 +4,8 @@
    package finds it by itself.
 2. Its docstring says the equation, what it looks like in a recording, what it is mistaken for and which experiment
    tells the two apart.
-3. It enters through one of two doors. ``enters`` writes its values into `Settings` before a run. ``reads`` changes
-   what the sensors show after a run. Neither may touch what its values do not name.
+3. It acts in one of two ways. ``modifies_physics`` writes its values into `Settings` before a run.
+   ``modifies_observation`` changes what the sensors show after a run. Neither touches what its values do not name.
 4. A mechanism that is not in a model leaves the numbers bit for bit as they are. One whose parameters are at their
    neutral values gives the paper's model, or tends to it as a parameter with an open neutral value (a bristle
    length of zero, a speed of zero) gets there.
@@ -59,11 +59,11 @@ class Parameter:
         Whether the range holds for the size of the number and either sign is possible.
     ratio : bool
         Whether it compares two parts that are neutrally alike: a strength of its own, whichever of them is the larger.
-    tried : tuple of float
+    screening_grid : tuple of float
         Shares of the range at which a mechanism is tried out before it is fitted, where the usual ones will not do.
-    eased : bool
+    continuation : bool
         Whether the least a mechanism leaves is found only from high values of this one, step by step down.
-    unsaid : float or None
+    default : float or None
         Its value in a model that does not say one; None where one must be said.
     """
 
@@ -76,9 +76,9 @@ class Parameter:
     scale: str = "log"
     signed: bool = False
     ratio: bool = False
-    tried: tuple[float, ...] = ()
-    eased: bool = False
-    unsaid: float | None = None
+    screening_grid: tuple[float, ...] = ()
+    continuation: bool = False
+    default: float | None = None
 
     def at(self, share: float) -> float:
         """A value within the range, in the measure in which a fit should step over it."""
@@ -200,15 +200,15 @@ class Mechanism:
     places : tuple of str
         Where it can act, of `PLACES`.
     parameters : tuple of Parameter
-    enters : callable or None
-        ``enters(settings, place, values)`` writes into `Settings`.
-    reads : callable or None
-        ``reads(sensing, place, values)`` returns the channels that change.
+    modifies_physics : callable or None
+        ``modifies_physics(settings, place, values)`` writes into `Settings`.
+    modifies_observation : callable or None
+        ``modifies_observation(sensing, place, values)`` returns the channels that change.
     summary : str
         One line for tables and pages.
     mistaken_for, separated_by : str
         What looks like it, and the experiment that tells.
-    missed : float
+    model_form_error : float
         Share of what the effect does to recordings (in mean square) that this simple form of it may miss on a rig.
     by_name_only : bool
         Whether it is asked for only where somebody suspects it.
@@ -220,16 +220,16 @@ class Mechanism:
     summary: str
     mistaken_for: str
     separated_by: str
-    missed: float = 0.001
+    model_form_error: float = 0.001
     by_name_only: bool = False
-    enters: Callable[[Settings, str, Mapping[str, float]], None] | None = None
-    reads: Callable[[Sensing, str, Mapping[str, float]], dict[str, NDArray]] | None = None
+    modifies_physics: Callable[[Settings, str, Mapping[str, float]], None] | None = None
+    modifies_observation: Callable[[Sensing, str, Mapping[str, float]], dict[str, NDArray]] | None = None
 
     def __post_init__(self):
         unknown = set(self.places) - set(PLACES)
         if unknown or not self.places:
             raise ValueError(f"{self.name}: places are {', '.join(PLACES)}; got {', '.join(self.places) or 'none'}")
-        if (self.enters is None) == (self.reads is None):
+        if (self.modifies_physics is None) == (self.modifies_observation is None):
             raise ValueError(f"{self.name}: a mechanism either enters the solver or changes what sensors read")
 
     @property
@@ -248,9 +248,9 @@ class Mechanism:
         return {p.name: p.neutral for p in self.parameters}
 
     @property
-    def unsaid(self) -> dict[str, float]:
+    def default(self) -> dict[str, float]:
         """Values of the parameters that a model may leave out."""
-        return {p.name: p.unsaid for p in self.parameters if p.unsaid is not None}
+        return {p.name: p.default for p in self.parameters if p.default is not None}
 
     @property
     def start(self) -> dict[str, float]:

@@ -85,7 +85,7 @@ def _at_turn(time_s, theta, tau, compliance, lost_motion, within, way, extreme, 
         found[i] = way * max(least, most)
 
 
-def _reads(sensing, place, values):
+def _modifies_observation(sensing, place, values):
     given = sensing.time_s, sensing.channels["theta_in_rad"], sensing.channels["tau_in_Nm"]
     return {"tau_in_Nm": wound(*map(np.ascontiguousarray, given), values["compliance"], values["lost_motion"])}
 
@@ -101,5 +101,5 @@ MECHANISM = Mechanism(
     mistaken_for="pulley-friction",
     separated_by="the motor's own encoder",
     by_name_only=True,
-    reads=_reads,
+    modifies_observation=_modifies_observation,
 )

@@ -13,7 +13,7 @@ Mistaken for a larger mu, and for a compliant termination. The time at which the
 from ccmodel.mechanisms.contract import Kink, Mechanism, Parameter
 
 
-def _enters(settings, place, values):
+def _modifies_physics(settings, place, values):
     if not 0 < values["s"] < 1:
         raise ValueError(f"a kink's s is a share of the length between 0 and 1; got {values['s']}")
     if values["beta"] < 0:
@@ -29,10 +29,10 @@ MECHANISM = Mechanism(
     parameters=(
         Parameter("beta", "rad", 0.2, 1.5, 0.6),
         Parameter("s", "1", 0.05, 0.95, 0.5, neutral=0.5, scale="linear"),
-        Parameter("hold", "1", 0.0, 1.0, 0.5, neutral=1.0, scale="linear", tried=(0.5,), unsaid=1.0),
+        Parameter("hold", "1", 0.0, 1.0, 0.5, neutral=1.0, scale="linear", screening_grid=(0.5,), default=1.0),
     ),
     summary="extra bend at one place of the conduits",
     mistaken_for="mu, termination-compliance",
     separated_by="the front's timing",
-    enters=_enters,
+    modifies_physics=_modifies_physics,
 )

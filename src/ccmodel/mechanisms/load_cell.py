@@ -49,7 +49,7 @@ MECHANISMS = (
         summary="a load cell reads too high or too low by a share",
         mistaken_for="load-cell-offset, cable-asymmetry",
         separated_by="two pretensions",
-        reads=_scale,
+        modifies_observation=_scale,
     ),
     Mechanism(
         name="load-cell-offset",
@@ -58,7 +58,7 @@ MECHANISMS = (
         summary="a load cell's zero is off",
         mistaken_for="load-cell-scale",
         separated_by="two pretensions, the rest at the start",
-        reads=_offset,
+        modifies_observation=_offset,
     ),
     Mechanism(
         name="load-cell-drift",
@@ -67,7 +67,7 @@ MECHANISMS = (
         summary="a load cell's zero moves with time",
         mistaken_for="relaxation, load-cell-offset",
         separated_by="rest at start and end; the other side's cell",
-        reads=_drift,
+        modifies_observation=_drift,
     ),
     Mechanism(
         name="load-cell-crosstalk",
@@ -76,6 +76,6 @@ MECHANISMS = (
         summary="part of the torque shows in the load cell",
         mistaken_for="load-cell-scale",
         separated_by="strokes to both sides",
-        reads=_crosstalk,
+        modifies_observation=_crosstalk,
     ),
 )

@@ -27,7 +27,7 @@ def power_of_tension(tension, n):
     return factor, n * factor * tension / square
 
 
-def _enters(settings, place, values):
+def _modifies_physics(settings, place, values):
     settings.tension_exponent = values["n"]
 
 
@@ -38,5 +38,5 @@ MECHANISM = Mechanism(
     summary="friction coefficient falls with tension",
     mistaken_for="constant-drag",
     separated_by="three pretensions",
-    enters=_enters,
+    modifies_physics=_modifies_physics,
 )

@@ -11,7 +11,7 @@ Mistaken for a clock that is late. A sweep of frequencies tells: a delay's error
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
-def _enters(settings, place, values):
+def _modifies_physics(settings, place, values):
     settings.inertia, settings.ring_damping = values["J"], values["zeta"]
 
 
@@ -23,11 +23,11 @@ MECHANISM = Mechanism(
     name="load-inertia",
     places=("load",),
     parameters=(
-        Parameter("J", "kg m^2", 1e-5, 1e-3, 1e-4, tried=TRIED),
-        Parameter("zeta", "1", 1e-3, 0.3, 0.1, tried=(0.85,), eased=True, unsaid=0.0),
+        Parameter("J", "kg m^2", 1e-5, 1e-3, 1e-4, screening_grid=TRIED),
+        Parameter("zeta", "1", 1e-3, 0.3, 0.1, screening_grid=(0.85,), continuation=True, default=0.0),
     ),
     summary="the load's moment of inertia",
     mistaken_for="time-skew",
     separated_by="a sweep of frequencies",
-    enters=_enters,
+    modifies_physics=_modifies_physics,
 )

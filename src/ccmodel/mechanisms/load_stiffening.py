@@ -10,7 +10,7 @@ Mistaken for backlash. The torque near zero tells: flat with backlash, straight 
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
-def _enters(settings, place, values):
+def _modifies_physics(settings, place, values):
     settings.cubic_stiffness = values["K3"]
 
 
@@ -21,5 +21,5 @@ MECHANISM = Mechanism(
     summary="the load's spring stiffens with its angle",
     mistaken_for="backlash",
     separated_by="torque near zero angle",
-    enters=_enters,
+    modifies_physics=_modifies_physics,
 )

@@ -23,7 +23,7 @@ def dahl(xi, slide, z0):
     return direction + (xi - direction) * left, (1.0 - direction * xi) * left / z0
 
 
-def _enters(settings, place, values):
+def _modifies_physics(settings, place, values):
     settings.bristle_m = values["z0"]
 
 
@@ -36,6 +36,6 @@ MECHANISM = Mechanism(
     separated_by="nested reversals of small amplitude",
     # One bristle stands for asperities whose lengths differ many times; elastic-slip elements with lengths from 1 to 12
     # show what that costs.
-    missed=0.08,
-    enters=_enters,
+    model_form_error=0.08,
+    modifies_physics=_modifies_physics,
 )

@@ -26,7 +26,7 @@ def wound(theta, turn, e, psi):
     return turn + 2.0 * e * np.sin(theta + psi + 0.5 * turn) * np.sin(0.5 * turn)
 
 
-def _enters(settings, place, values):
+def _modifies_physics(settings, place, values):
     if not abs(values["e"]) < 1:
         raise ValueError(f"a pulley turns about a point within it, so e is below 1; got {values['e']}")
     if side(place) == "drive":
@@ -41,10 +41,10 @@ MECHANISM = Mechanism(
     parameters=(
         Parameter("e", "1", 0.01, 0.08, 0.03),
         # Two probes half a turn apart would not do: one that is off by a right angle shows nothing of the strength.
-        Parameter("psi", "rad", -np.pi, np.pi, 0.0, scale="linear", tried=(0.125, 0.375, 0.625, 0.875)),
+        Parameter("psi", "rad", -np.pi, np.pi, 0.0, scale="linear", screening_grid=(0.125, 0.375, 0.625, 0.875)),
     ),
     summary="a pulley's radius changes with its angle",
     mistaken_for="load-stiffening",
     separated_by="strokes that start at other angles",
-    enters=_enters,
+    modifies_physics=_modifies_physics,
 )

@@ -26,7 +26,7 @@ def bearing(theta, presliding_rad):
     return share
 
 
-def _enters(settings, place, values):
+def _modifies_physics(settings, place, values):
     if side(place) == "drive":
         settings.drive_friction_Nm, settings.drive_presliding_rad = values["friction_torque"], values["presliding"]
     else:
@@ -45,12 +45,12 @@ MECHANISM = Mechanism(
             20e-3,
             PRESLIDING_RAD,
             neutral=PRESLIDING_RAD,
-            tried=(0.4,),
-            unsaid=PRESLIDING_RAD,
+            screening_grid=(0.4,),
+            default=PRESLIDING_RAD,
         ),
     ),
     summary="a friction torque in a pulley's bearing",
     mistaken_for="torque-scale, constant-drag",
     separated_by="parity of the error against speed and load",
-    enters=_enters,
+    modifies_physics=_modifies_physics,
 )

@@ -28,7 +28,7 @@ def lag_weights(step_over_tau):
     return keep, mean - keep, 1.0 - mean
 
 
-def _enters(settings, place, values):
+def _modifies_physics(settings, place, values):
     if not values["r"] < 1:
         raise ValueError(f"a cable relaxes by a share r of its tension below 1; got {values['r']}")
     if not values["tau"] > 0:
@@ -44,5 +44,5 @@ MECHANISM = Mechanism(
     summary="tension decays at rest and over cycles",
     mistaken_for="load-cell-drift",
     separated_by="both ends and both cables together, at rest",
-    enters=_enters,
+    modifies_physics=_modifies_physics,
 )

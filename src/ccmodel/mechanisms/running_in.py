@@ -13,7 +13,7 @@ import numpy as np
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
-def _enters(settings, place, values):
+def _modifies_physics(settings, place, values):
     if not values["change"] > -1:
         raise ValueError(f"running in leaves some friction, so its change is above -1; got {values['change']}")
     if not values["tau"] > 0:
@@ -30,11 +30,11 @@ MECHANISM = Mechanism(
     places=("conduit",),
     parameters=(
         Parameter("change", "1", 0.05, 0.3, 0.1, signed=True),
-        Parameter("tau", "s", 2.0, 1000.0, 10.0, neutral=10.0, tried=(0.13, 0.31, 0.5)),
-        Parameter("per_m", "1/m", 1.0, 200.0, 1.0, tried=(0.0, 0.6), unsaid=0.0),
+        Parameter("tau", "s", 2.0, 1000.0, 10.0, neutral=10.0, screening_grid=(0.13, 0.31, 0.5)),
+        Parameter("per_m", "1/m", 1.0, 200.0, 1.0, screening_grid=(0.0, 0.6), default=0.0),
     ),
     summary="friction coefficient changes through a recording",
     mistaken_for="relaxation",
     separated_by="holds, and a return to the start condition",
-    enters=_enters,
+    modifies_physics=_modifies_physics,
 )

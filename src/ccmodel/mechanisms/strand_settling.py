@@ -33,7 +33,7 @@ def stretch_at(tension, lost, stiffness):
     return stretch
 
 
-def _enters(settings, place, values):
+def _modifies_physics(settings, place, values):
     settings.settling_N = values["T_scale"]
 
 
@@ -44,5 +44,5 @@ MECHANISM = Mechanism(
     summary="cable stiffness falls at low tension",
     mistaken_for="backlash, slack",
     separated_by="a sweep at low pretension",
-    enters=_enters,
+    modifies_physics=_modifies_physics,
 )

@@ -34,7 +34,7 @@ def renewed(rested, slide, dt, vs, delta):
     return rested * left + (1.0 - left) * quick_exp(-ratio)
 
 
-def _enters(settings, place, values):
+def _modifies_physics(settings, place, values):
     if not values["vs"] > 0:
         raise ValueError(f"the speed at which friction has fallen, vs, is above zero; got {values['vs']} m/s")
     settings.stribeck_rise = values["a"]
@@ -47,10 +47,10 @@ MECHANISM = Mechanism(
     parameters=(
         Parameter("a", "1", 0.05, 0.6, 0.2),
         Parameter("vs", "m/s", 1e-4, 1e-2, 2e-3, neutral=1e-3),
-        Parameter("delta", "1", 0.5, 2.5, 1.5, neutral=2.0, tried=(0.7,), unsaid=2.0),
+        Parameter("delta", "1", 0.5, 2.5, 1.5, neutral=2.0, screening_grid=(0.7,), default=2.0),
     ),
     summary="friction is higher at rest than in motion",
     mistaken_for="presliding, viscous-friction",
     separated_by="a sweep of speeds",
-    enters=_enters,
+    modifies_physics=_modifies_physics,
 )

@@ -12,7 +12,7 @@ front has run in, the cable behind it not yet.
 from ccmodel.mechanisms.contract import Mechanism, Parameter, side
 
 
-def _enters(settings, place, values):
+def _modifies_physics(settings, place, values):
     if side(place) == "drive":
         settings.drive_end_compliance = values["compliance"]
     else:
@@ -27,5 +27,5 @@ MECHANISM = Mechanism(
     summary="a compliance in series at a cable's end",
     mistaken_for="K",
     separated_by="two conduit lengths, partial motion",
-    enters=_enters,
+    modifies_physics=_modifies_physics,
 )

@@ -17,7 +17,7 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter, side
 _LOAD_CHANNELS = ("theta_out_rad", "tau_out_Nm", "F_load_N")
 
 
-def _reads(sensing, place, values):
+def _modifies_observation(sensing, place, values):
     late = values["delay"] if side(place) == "load" else -values["delay"]
     t = sensing.time_s
     return {name: np.interp(t - late, t, sensing.channels[name]) for name in _LOAD_CHANNELS}
@@ -30,5 +30,5 @@ MECHANISM = Mechanism(
     summary="one side's clock is late",
     mistaken_for="viscous-friction, load-inertia",
     separated_by="a chirp",
-    reads=_reads,
+    modifies_observation=_modifies_observation,
 )

@@ -10,7 +10,7 @@ Mistaken for friction in a pulley. The sign of the speed tells: a gain's error d
 from ccmodel.mechanisms.contract import Mechanism, Parameter, sensor_torque
 
 
-def _reads(sensing, place, values):
+def _modifies_observation(sensing, place, values):
     channel = sensor_torque(place)
     return {channel: sensing.channels[channel] * (1 + values["gain"])}
 
@@ -22,5 +22,5 @@ MECHANISM = Mechanism(
     summary="a torque reads too high or too low by a share",
     mistaken_for="pulley-friction",
     separated_by="sign of speed",
-    reads=_reads,
+    modifies_observation=_modifies_observation,
 )

@@ -10,7 +10,7 @@ Mistaken for Stribeck friction (whose loops narrow with speed) and for a clock t
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
-def _enters(settings, place, values):
+def _modifies_physics(settings, place, values):
     settings.viscous = values["c"]
 
 
@@ -23,5 +23,5 @@ MECHANISM = Mechanism(
     summary="drag in proportion to sliding speed",
     mistaken_for="stribeck, time-skew",
     separated_by="three speeds",
-    enters=_enters,
+    modifies_physics=_modifies_physics,
 )

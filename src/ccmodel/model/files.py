@@ -7,7 +7,7 @@ from pydantic import Field, ValidationError
 
 from ccmodel import mechanisms as registry
 from ccmodel.model.general.run import Active
-from ccmodel.model.parameters import Parameters
+from ccmodel.model.parameters import FORMER_NAMES, Parameters
 from ccmodel.typed import InputError, TypedModel
 
 FORMAT = 1
@@ -31,6 +31,8 @@ def model_as_dict(parameters: Parameters, provenance: dict) -> dict:
     numbers = asdict(parameters)
     acting = numbers.pop("mechanisms")
     del numbers["refinement"]
+    in_file = {name: former for former, name in FORMER_NAMES.items()}
+    numbers = {in_file.get(name, name): value for name, value in numbers.items()}
     return {"format": FORMAT, "parameters": numbers, "mechanisms": acting, "provenance": provenance}
 
 
@@ -53,8 +55,11 @@ def read_model(path: Path) -> Parameters:
     for acting in stated.mechanisms:
         if acting.name not in registry.names():
             raise InputError(f"{path}: no mechanism is called {acting.name!r}; there are {', '.join(registry.names())}")
-    mechanisms = tuple(Active(m.name, m.place, registry.get(m.name).unsaid | dict(m.values)) for m in stated.mechanisms)
+    mechanisms = tuple(
+        Active(m.name, m.place, registry.get(m.name).default | dict(m.values)) for m in stated.mechanisms
+    )
     try:
-        return Parameters(**stated.parameters, mechanisms=mechanisms)
+        parameters = {FORMER_NAMES.get(name, name): value for name, value in stated.parameters.items()}
+        return Parameters(**parameters, mechanisms=mechanisms)
     except TypeError as error:
         raise InputError(f"{path}: {error}") from None

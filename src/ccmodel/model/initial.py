@@ -61,7 +61,7 @@ class InitialTension:
         friction_coefficient: float,
         A_N: tuple[float, float],
         B_N: tuple[float, float],
-        bows: tuple[float, float] = (0.0, 0.0),
+        curvatures: tuple[float, float] = (0.0, 0.0),
         kinks_rad: float = 0.0,
     ) -> "InitialTension":
         """Profiles with the given tensions at the drive and the load end of each cable.
@@ -76,7 +76,7 @@ class InitialTension:
         friction_coefficient : float
         A_N, B_N : (float, float)
             Tension at the drive end and at the load end, N. A cable with an end at zero or below is slack.
-        bows : (float, float)
+        curvatures : (float, float)
             How far ln T halfway through the bend lies off the straight line between the ends, of what friction can
             hold there, -1 to 1: the ends do not show it, and how the cable was tensioned decides.
         kinks_rad : float
@@ -84,15 +84,15 @@ class InitialTension:
         """
         bound = friction_coefficient * (path.bend_rad + kinks_rad)
         profiles = []
-        for (drive, load), bow in zip((A_N, B_N), bows, strict=True):
+        for (drive, load), curvature in zip((A_N, B_N), curvatures, strict=True):
             if min(drive, load) <= 0:
                 profiles.append(np.zeros(3))
                 continue
             mean, half = 0.5 * np.log(drive * load), 0.5 * np.clip(np.log(load / drive), -bound, bound)
-            off = np.clip(bow, -1, 1) * (0.5 * bound - abs(half))
+            off = np.clip(curvature, -1, 1) * (0.5 * bound - abs(half))
             profiles.append(np.exp([mean - half, mean + off, mean + half]))
         corners = np.array([0.0, path.halfway_m, path.length_m])
-        if not any(bows):  # A corner that is none would only cost time.
+        if not any(curvatures):  # A corner that is none would only cost time.
             return cls(corners[::2], *(T[::2] for T in profiles))
         return cls(corners, *profiles)
 

@@ -23,13 +23,13 @@ class SpringLoad:
     rest_known_to_Nm : float
         How well the torque is known with which a run begins; >= 0. Where there is a gap, a smaller one does not tell
         which of its sides the load lies against.
-    rest_place : float
+    rest_gap_position : float
         Where in the gap it rests then, -1 to 1.
     """
 
     stiffness_Nm_per_rad: float
     rest_known_to_Nm: float = 0.0
-    rest_place: float = 0.0
+    rest_gap_position: float = 0.0
 
     def __post_init__(self):
         if not (np.isfinite(self.stiffness_Nm_per_rad) and self.stiffness_Nm_per_rad >= 0):

@@ -40,9 +40,9 @@ class Parameters:
         What the torque sensors read without a torque.
     theta_out_zero_rad : float
         Angle of the load that its encoder shows as none: where in its count it rests.
-    drive_place : float
+    drive_encoder_offset : float
         Where in its count the drive first rests, in standard deviations of what its motion says of that.
-    load_place : float
+    load_gap_position : float
         Where in its gap the load first rests, -1 to 1, as far as the torque there does not tell.
     F_drive_zero_N, F_load_zero_N : float
         What the load cells read without a tension.
@@ -51,7 +51,7 @@ class Parameters:
     friction_scale, pretension_scale : float
         Friction and initial tension of one recording over what they are in the population, and over what its rest
         shows.
-    profile_bow_A, profile_bow_B : float
+    tension_curvature_A, tension_curvature_B : float
         How each cable's initial tension bends between the ends that its rest shows, of what friction can hold, -1 to
         1 (`ccmodel.model.initial.InitialTension.between_ends`).
     mechanisms : tuple of Active
@@ -72,15 +72,15 @@ class Parameters:
     tau_in_zero_Nm: float = 0.0
     tau_out_zero_Nm: float = 0.0
     theta_out_zero_rad: float = 0.0
-    drive_place: float = 0.0
-    load_place: float = 0.0
+    drive_encoder_offset: float = 0.0
+    load_gap_position: float = 0.0
     F_drive_zero_N: float = 0.0
     F_load_zero_N: float = 0.0
     extra_bend_rad: float = 0.0
     friction_scale: float = 1.0
     pretension_scale: float = 1.0
-    profile_bow_A: float = 0.0
-    profile_bow_B: float = 0.0
+    tension_curvature_A: float = 0.0
+    tension_curvature_B: float = 0.0
     mechanisms: tuple[Active, ...] = ()
     refinement: int = 1
 
@@ -143,14 +143,22 @@ def mechanism_parameter(key: str) -> tuple[str, str, str] | None:
     return tuple(parts) if len(parts) == 3 else None
 
 
+# Names that model files keep, and configuration files may still have, for what is called otherwise here.
+FORMER_NAMES = {
+    "drive_place": "drive_encoder_offset",
+    "load_place": "load_gap_position",
+    "profile_bow_A": "tension_curvature_A",
+    "profile_bow_B": "tension_curvature_B",
+}
+
 # What each recording has of its own, and what all share; lengths and the drive radius only scale what is among these.
 OWN = (
     "friction_scale",
     "pretension_scale",
-    "profile_bow_A",
-    "profile_bow_B",
-    "drive_place",
-    "load_place",
+    "tension_curvature_A",
+    "tension_curvature_B",
+    "drive_encoder_offset",
+    "load_gap_position",
     "theta_out_zero_rad",
     "tau_in_zero_Nm",
     "tau_out_zero_Nm",

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
+from ccmodel.encoder.motion import SIDES, drive_motion
 from ccmodel.failure import ModelError
 from ccmodel.model.exact import pair as exact
 from ccmodel.model.general import run as general
@@ -17,7 +18,6 @@ from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
 from ccmodel.model.parameters import ZERO_OF, Parameters
 from ccmodel.model.transmission import Transmission
 from ccmodel.recording import TENSIONS, Recording, stride
-from ccmodel.rig.motion import SIDES, drive_motion
 
 # A load torque that was measured is the load's course and the sensor's noise. The noise would rock the load end; a
 # hand, a spring or a brake does nothing above this frequency at the rates that rigs run at (0.1 to 1 Hz).
@@ -44,7 +44,7 @@ class ModelInput:
         The drive's motion behind its encoder's counts, rad; 0 at the rest at the start where there is one.
     drive_deviations : ndarray, shape (draws, n)
         Likely deviations of that motion from the true one, rad; no draws where the drive's angle was not counted.
-    drive_place : ndarray, shape (n,)
+    drive_encoder_offset : ndarray, shape (n,)
         One standard deviation of where in its count the drive first rests, as it shows in its motion, rad.
     theta_out : ndarray, shape (n,), or None
         The load's motion behind its encoder's counts, rad; None where it was not recorded.
@@ -58,7 +58,7 @@ class ModelInput:
     recording: Recording
     theta_in: NDArray
     drive_deviations: NDArray
-    drive_place: NDArray
+    drive_encoder_offset: NDArray
     theta_out: NDArray | None
     tau_out: NDArray | None
     resting: Mapping[str, NDArray]
@@ -107,14 +107,14 @@ class ModelInput:
         return {c: float(values.mean()) for c, values in self.resting.items() if values.size}
 
     @property
-    def shows_pretension(self) -> bool:
+    def initial_tension_observed(self) -> bool:
         """Whether a rest shows the tension at all four ends of the cables."""
         return all(tension in self.resting_mean for tension in TENSIONS)
 
     @property
-    def placed_deviations(self) -> NDArray:
+    def deviations_given_offset(self) -> NDArray:
         """`drive_deviations` where it is known where in its count the drive first rests."""
-        return self.drive_deviations - SIDES[: len(self.drive_deviations), None] * self.drive_place
+        return self.drive_deviations - SIDES[: len(self.drive_deviations), None] * self.drive_encoder_offset
 
 
 def simulate_recording(recording: Recording, parameters: Parameters) -> Recording:
@@ -158,8 +158,8 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
     )
     load = _load(given, parameters, load_from)
     initial = initial_tension(given, parameters)
-    if parameters.drive_place:
-        given = replace(given, theta_in=given.theta_in + parameters.drive_place * given.drive_place)
+    if parameters.drive_encoder_offset:
+        given = replace(given, theta_in=given.theta_in + parameters.drive_encoder_offset * given.drive_encoder_offset)
     read = _run(transmission, load, given, initial, parameters)
     tau_in, tau_out, F_drive, F_load = (read[c] + getattr(parameters, zero) for c, zero in ZERO_OF.items())
     drive, load_side = tau_in / parameters.drive_radius_m, tau_out / parameters.load_radius_m
@@ -213,16 +213,16 @@ def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension
     scale = parameters.pretension_scale
     if parameters.pretension_N is not None:
         return InitialTension.uniform(path, scale * parameters.pretension_N)
-    if not given.shows_pretension:
+    if not given.initial_tension_observed:
         return InitialTension.uniform(path, scale * parameters.pretension_share * given.recording.pretension_N)
     true = _true_at_rest(given.resting_mean, given, parameters)
     F_drive, F_load = true["F_drive_N"], true["F_load_N"]
     drive, load = true["tau_in_Nm"] / parameters.drive_radius_m, true["tau_out_Nm"] / parameters.load_radius_m
     T1, T3 = scale * (F_drive + drive) / 2, scale * (F_drive - drive) / 2
     T2, T4 = scale * (F_load + load) / 2, scale * (F_load - load) / 2
-    bows = parameters.profile_bow_A, parameters.profile_bow_B
+    curvatures = parameters.tension_curvature_A, parameters.tension_curvature_B
     kinks_rad = sum(kink.hold * kink.bend_rad for kink in general.settings_of(parameters.mechanisms).kinks)
-    return InitialTension.between_ends(path, parameters.friction, (T1, T2), (T3, T4), bows, kinks_rad)
+    return InitialTension.between_ends(path, parameters.friction, (T1, T2), (T3, T4), curvatures, kinks_rad)
 
 
 def _true_at_rest(read: Mapping[str, float], given: ModelInput, parameters: Parameters) -> dict[str, float]:
@@ -259,7 +259,7 @@ def _load(given: ModelInput, parameters: Parameters, load_from: LoadFrom) -> Spr
 def spring_load(given: ModelInput, parameters: Parameters) -> SpringLoad:
     """The load's spring, and what is known of how it rests at the start of a recording."""
     known_to = KNOWN_TO * given.recording.accuracy.get("tau_out_Nm", 0.0)
-    return SpringLoad(parameters.load_stiffness_Nm_per_rad, known_to, parameters.load_place)
+    return SpringLoad(parameters.load_stiffness_Nm_per_rad, known_to, parameters.load_gap_position)
 
 
 def _motion(recording: Recording, channel: str) -> tuple[NDArray, NDArray, NDArray]:

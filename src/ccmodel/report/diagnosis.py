@@ -16,11 +16,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ccmodel import mechanisms as registry
+from ccmodel.diagnose.candidate import CandidateFit
+from ccmodel.diagnose.comparison import LEARNABLE, is_right, nested_errors
 from ccmodel.diagnose.diagnosis import Diagnosis
 from ccmodel.diagnose.hypothesis import plausible
-from ccmodel.diagnose.judge import LEARNABLE, is_right, nested_errors
-from ccmodel.diagnose.locate import PARTS, mismatch
-from ccmodel.diagnose.trial import Trial
+from ccmodel.diagnose.location import PARTS, mismatch
 from ccmodel.recording import ORIGIN
 from ccmodel.report.figures import AXIS, COLOURS, STYLE
 
@@ -72,7 +72,7 @@ def write_diagnosis(file: Path, found: Diagnosis) -> None:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("ccmodel.report", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
-    origin = found.judgement.weighed[0].evidence.given.recording.origin
+    origin = found.judgement.weighed[0].observations.given.recording.origin
     with plt.rc_context(STYLE):
         text = environment.get_template("diagnosis.html.j2").render(
             said=found.said,
@@ -86,7 +86,7 @@ def write_diagnosis(file: Path, found: Diagnosis) -> None:
             summaries={name: registry.get(name) for name in registry.names()},
             map=_encoded(_map(found)),
             loops=_encoded(_loops(found)),
-            recordings=[w.evidence.given.recording.id for w in found.judgement.weighed],
+            recordings=[w.observations.given.recording.id for w in found.judgement.weighed],
         )
     file.write_text(text, encoding="utf-8")
 
@@ -107,7 +107,7 @@ def _rivals(found: Diagnosis) -> list[dict]:
     ]
 
 
-def _why(trial: Trial, found: Diagnosis) -> str:
+def _why(trial: CandidateFit, found: Diagnosis) -> str:
     """Why a hypothesis was not taken, or that it was."""
     j = found.judgement
     if trial is j.calibrated:
@@ -155,12 +155,12 @@ def _loops(found: Diagnosis) -> Figure:
     j = found.judgement
     chosen = nested_errors(j)
     channel = _worst_channel(found)
-    order = [i for i in np.argsort(j.calibrated.left)[::-1] if channel in j.weighed[i].evidence.channels][:LOOPS]
+    order = [i for i in np.argsort(j.calibrated.left)[::-1] if channel in j.weighed[i].observations.channels][:LOOPS]
     label, scale = AXIS.get(channel, (f"{channel.rsplit('_', 1)[0]} (N)", 1))
     figure, axes = plt.subplots(1, len(order), figsize=(3.1 * len(order), 3.1), squeeze=False)
     for ax, i in zip(axes[0], order, strict=True):
         w = j.weighed[i]
-        e = w.evidence
+        e = w.observations
         c = e.channels.index(channel)
         theta = e.given.theta_in[e.judged]
         ax.plot(theta, scale * e.measured[c], color=FAINT, lw=2.2, label="recording")
@@ -183,7 +183,7 @@ def _loops(found: Diagnosis) -> Figure:
 def _worst_channel(found: Diagnosis) -> str:
     error = found.said["fit"]["error"]
     worst = max(error, key=lambda c: error[c]["before"] / error[c]["noise"])
-    channels = found.judgement.weighed[int(np.argmax(found.judgement.calibrated.left))].evidence.channels
+    channels = found.judgement.weighed[int(np.argmax(found.judgement.calibrated.left))].observations.channels
     return next((c for c in channels if c.rsplit("_", 1)[0] == worst), channels[0])
 
 

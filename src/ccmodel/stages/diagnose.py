@@ -26,8 +26,8 @@ def diagnose(
     without: Sequence[str] = (),
     tell: Callable[[str], None] = lambda text: None,
     judged: Diagnosing | None = None,
-    beside: Path | None = None,
-    hold: bool = False,
+    baseline: Path | None = None,
+    freeze: bool = False,
 ) -> dict:
     """Diagnose a batch folder, beside what a model file has already; what diagnosis.json says.
 
@@ -49,11 +49,11 @@ def diagnose(
     inputs = provenance.of_inputs(provenance.files_in(batch), batch)
     try:
         estimates = Parameters.estimated(ingested.batch.rig)
-        known = read_model(beside) if beside else None
-        if hold and known is None:
-            raise InputError("--hold: there is no model to hold; name one with --beside")
+        known = read_model(baseline) if baseline else None
+        if freeze and known is None:
+            raise InputError("--freeze: there is no model to hold; name one with --baseline")
         found = run(
-            ingested.recordings, estimates, not_judged, without, tell, **_options(judged), beside=known, hold=hold
+            ingested.recordings, estimates, not_judged, without, tell, **_options(judged), baseline=known, freeze=freeze
         )
     except (ModelError, ValueError) as error:
         raise InputError(f"{batch}: {error}") from None

@@ -7,8 +7,8 @@ from pathlib import Path
 from ccmodel import provenance
 from ccmodel.config import Fit
 from ccmodel.failure import ModelError
-from ccmodel.identify.fit import FitResult, fit
-from ccmodel.identify.problem import Evidence, Free, Problem
+from ccmodel.inference.fit import FitResult, fit
+from ccmodel.inference.problem import Free, Observations, Problem
 from ccmodel.model.parameters import Parameters
 from ccmodel.recording import read_recordings
 from ccmodel.stages.files import estimates_of, write_json
@@ -31,16 +31,18 @@ def _fit(stated: Fit, recordings_files: Sequence[Path]) -> FitResult:
         return FitResult(False, "no usable recording to fit")
     try:
         shared = {name: _start(name, free, pairs[0][1]) for name, free in stated.free.items()}
-        placed = "drive_place" in stated.per_recording
+        offset_is_free = "drive_encoder_offset" in stated.per_recording
         at_start = {name: free.start for name, free in shared.items()}
-        evidence = [
-            Evidence.of(r, p.with_values(at_start), stated.channels, stated.step_s, stated.allowance, placed)
+        observations = [
+            Observations.of(
+                r, p.with_values(at_start), stated.channels, stated.step_s, stated.tolerance, offset_is_free
+            )
             for r, p in pairs
         ]
     except (ModelError, ValueError) as error:
         return FitResult(False, str(error), recordings=[f"{r.batch}/{r.id}" for r, _ in pairs])
     own = {name: _start(name, each, pairs[0][1], each.spread) for name, each in stated.per_recording.items()}
-    return fit(Problem(evidence, shared, own), stated.starts, stated.profile)
+    return fit(Problem(observations, shared, own), stated.starts, stated.profile)
 
 
 def _start(name: str, free, estimates: Parameters, spread: float | None = None) -> Free:

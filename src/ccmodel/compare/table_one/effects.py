@@ -91,7 +91,7 @@ def _step(effect: Effect, grid: Grid) -> float:
 
 def _of_mechanism(name: str, place: str, grid: Grid) -> list[Effect]:
     mechanism = registry.get(name)
-    shapes = [[p.at(s) for s in grid.shapes] if p.unsaid is None else [p.unsaid] for p in mechanism.shapes]
+    shapes = [[p.at(s) for s in grid.shapes] if p.default is None else [p.default] for p in mechanism.shapes]
     names = [p.name for p in mechanism.shapes]
     return [
         Effect(

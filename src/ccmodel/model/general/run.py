@@ -178,9 +178,9 @@ def settings_of(mechanisms: Mapping[str, Mapping] | Sequence[Active]) -> Setting
     settings = Settings()
     for a in _active(mechanisms):
         mechanism = registry.get(a.name)
-        if mechanism.enters is not None:
+        if mechanism.modifies_physics is not None:
             try:
-                mechanism.enters(settings, a.place, a.values)
+                mechanism.modifies_physics(settings, a.place, a.values)
             except ValueError as e:
                 raise ModelError(str(e)) from None
     return settings
@@ -220,19 +220,19 @@ def _active(mechanisms) -> list[Active]:
         if a.place not in known.places:
             raise ModelError(f"{a.name} acts at {' or '.join(known.places)}; got {a.place!r}")
         wanted = {p.name for p in known.parameters}
-        if not known.unsaid.keys() | a.values.keys() >= wanted >= a.values.keys():
+        if not known.default.keys() | a.values.keys() >= wanted >= a.values.keys():
             raise ModelError(
                 f"{a.name} has the parameters {', '.join(sorted(wanted))}; got {', '.join(sorted(a.values)) or 'none'}"
             )
         if not all_finite(a.values):
             raise ModelError(f"{a.name} has a parameter that is not finite: {dict(a.values)}")
         for p in known.parameters:
-            if p.low > 0 and not p.signed and a.values.get(p.name, p.unsaid) < 0:
+            if p.low > 0 and not p.signed and a.values.get(p.name, p.default) < 0:
                 raise ModelError(
                     f"{a.name} has {p.name} = {a.values[p.name]:g} {p.unit}, which must not be negative; "
                     f"plausible is {p.low:g} to {p.high:g}"
                 )
-    return [replace(a, values=registry.get(a.name).unsaid | dict(a.values)) for a in given]
+    return [replace(a, values=registry.get(a.name).default | dict(a.values)) for a in given]
 
 
 def _series(load: Load) -> NDArray | None:
@@ -393,7 +393,7 @@ def _rest_angle(K: float, K3: float, half_gap: float, torque: float, load: Sprin
     where the torque is not known to be there, at the place that is given. The one goes over into the other around what
     the torque is known to.
     """
-    known_to, place = (load.rest_known_to_Nm, load.rest_place) if isinstance(load, SpringLoad) else (0.0, 0.0)
+    known_to, place = (load.rest_known_to_Nm, load.rest_gap_position) if isinstance(load, SpringLoad) else (0.0, 0.0)
     held = float(np.clip(2 * abs(torque) / known_to - 1.5, 0.0, 1.0)) if known_to else float(torque != 0)
     side = held * float(np.sign(torque)) + (1 - held) * place
     return _deflection(K, K3, torque) + half_gap * side
@@ -417,7 +417,7 @@ def true_at(active: Sequence[Active], seconds: float, read: Mapping[str, float],
     dict of str to float
         The same channels.
     """
-    faults = [a for a in active if registry.get(a.name).reads is not None]
+    faults = [a for a in active if registry.get(a.name).modifies_observation is not None]
     true = dict(read)
     for _ in range(FAULTS_ROUNDS if faults else 0):
         steady = {c: np.full(2, value) for c, value in true.items()}
@@ -429,7 +429,7 @@ def true_at(active: Sequence[Active], seconds: float, read: Mapping[str, float],
 def _read(active: Sequence[Active], time_s: NDArray, channels: dict[str, NDArray], radii: tuple[float, float]):
     for a in active:
         mechanism = registry.get(a.name)
-        if mechanism.reads is not None:
+        if mechanism.modifies_observation is not None:
             sensing = Sensing(time_s, channels, *radii)
-            channels = channels | mechanism.reads(sensing, a.place, a.values)
+            channels = channels | mechanism.modifies_observation(sensing, a.place, a.values)
     return channels

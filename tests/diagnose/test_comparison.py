@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ccmodel.diagnose import judge
-from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.judge import (
+from ccmodel.diagnose import comparison
+from ccmodel.diagnose.candidate import CandidateFit, Score
+from ccmodel.diagnose.comparison import (
     ENOUGH,
     RIVAL,
     SURE,
@@ -22,10 +22,10 @@ from ccmodel.diagnose.judge import (
     is_listed,
     nested_errors,
 )
-from ccmodel.diagnose.structure import Structure
-from ccmodel.diagnose.trial import Score, Trial
-from ccmodel.identify.problem import Free
-from made_evidence import batch, calibrated
+from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.diagnose.lack_of_fit import LackOfFit
+from ccmodel.inference.problem import Free
+from made_observations import batch, calibrated
 
 FRICTION, SCALE = ("pulley-friction", "drive-pulley"), ("torque-scale", "drive-sensor")
 PROBES = [
@@ -35,14 +35,14 @@ PROBES = [
 BASE_VALUES = {"friction_coefficient": 0.15}
 VALUES = {"pulley-friction/drive-pulley/friction_torque": 4e-3, "torque-scale/drive-sensor/gain": 0.05}
 CHANNELS = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N")
-WEIGHED = [SimpleNamespace(evidence=SimpleNamespace(channels=CHANNELS, allowed=0.0))] * 8
+WEIGHED = [SimpleNamespace(observations=SimpleNamespace(channels=CHANNELS, tolerance_share=0.0))] * 8
 
 
 @pytest.fixture(autouse=True)
 def would_do(monkeypatch):
     """What each part would leave beyond noise, were it at fault alone, and its places; none unless a test adds."""
     found = []
-    monkeypatch.setattr(judge, "cleared", lambda weighed, calibrated: found)
+    monkeypatch.setattr(comparison, "cleared", lambda weighed, calibrated: found)
     return found
 
 
@@ -50,13 +50,15 @@ def trial(left, *acting, **values):
     own = {k: v for k, v in VALUES.items() if any(k.startswith(f"{n}/{p}/") for n, p in acting)} | values
     left = np.broadcast_to(np.asarray(left, float), 8)
     aside = list(np.sqrt(left)[:, None])
-    return Trial(Hypothesis(acting), {}, BASE_VALUES | own, [], [], np.eye(1), np.ones(1), [BASE_VALUES] * 8, aside)
+    return CandidateFit(
+        Hypothesis(acting), {}, BASE_VALUES | own, [], [], np.eye(1), np.ones(1), [BASE_VALUES] * 8, aside
+    )
 
 
 def verdict(base, *trials, learnable=0.0):
     """Of trials that leave what they leave, and in that something to be learnt, the same in every recording."""
     trials = sorted(trials, key=lambda t: t.left.mean())
-    unlearnt = {t.hypothesis: Structure(np.full(8, learnable)) for t in (base, *trials)}
+    unlearnt = {t.hypothesis: LackOfFit(np.full(8, learnable)) for t in (base, *trials)}
     return _verdict(Comparison(WEIGHED, base, trials, unlearnt), [])
 
 
@@ -113,7 +115,7 @@ def test_a_single_recording_gives_no_sure_name():
     """Nothing can be held out of it, so whatever is fitted is only fitted."""
     one = replace(trial(6.0), held_out=[BASE_VALUES], aside=[np.sqrt([6.0])])
     friction = replace(trial(1.0, FRICTION), held_out=[BASE_VALUES], aside=[np.ones(1)])
-    unlearnt = {t.hypothesis: Structure(np.zeros(4)) for t in (one, friction)}
+    unlearnt = {t.hypothesis: LackOfFit(np.zeros(4)) for t in (one, friction)}
     found = _verdict(Comparison(WEIGHED[:1], one, [friction], unlearnt), [])
     assert found.verdict == "undecided"
     assert found.listed * found.probability[0] < SURE
@@ -123,7 +125,7 @@ def test_a_single_recording_gives_no_sure_name():
 def test_without_a_known_pretension_no_name_is_sure():
     blind = replace(trial(6.0), free={"pretension_share": Free(1.0)})
     friction = trial(1.0, FRICTION)
-    unlearnt = {t.hypothesis: Structure(np.zeros(8)) for t in (blind, friction)}
+    unlearnt = {t.hypothesis: LackOfFit(np.zeros(8)) for t in (blind, friction)}
     found = _verdict(Comparison(WEIGHED, blind, [friction], unlearnt), [])
     assert found.verdict == "undecided"
     assert found.best is friction
@@ -131,9 +133,9 @@ def test_without_a_known_pretension_no_name_is_sure():
 
 def test_an_allowance_takes_from_what_is_sure_as_much_as_it_is_of_what_may_be_left():
     def sure(allowed):
-        weighed = [SimpleNamespace(evidence=SimpleNamespace(channels=CHANNELS, allowed=allowed))] * 8
+        weighed = [SimpleNamespace(observations=SimpleNamespace(channels=CHANNELS, tolerance_share=allowed))] * 8
         base, friction = trial(6.0), trial(1.0, FRICTION)
-        unlearnt = {t.hypothesis: Structure(np.zeros(8)) for t in (base, friction)}
+        unlearnt = {t.hypothesis: LackOfFit(np.zeros(8)) for t in (base, friction)}
         return _verdict(Comparison(weighed, base, [friction], unlearnt), [])
 
     shares = [sure(allowed).listed for allowed in (0.0, 0.01, 0.5, 1.0)]
@@ -154,7 +156,7 @@ def test_the_list_is_the_less_likely_the_more_is_left_and_the_more_was_tried():
 def test_a_single_that_leaves_a_little_too_much_is_asked_for_company():
     def asks(left):
         one = trial(left, FRICTION)
-        nothing = {one.hypothesis: Structure(np.zeros(8))}
+        nothing = {one.hypothesis: LackOfFit(np.zeros(8))}
         return Comparison(WEIGHED, trial(10.0), [one], nothing).wants_more
 
     assert asks(ENOUGH + 0.05)
@@ -162,7 +164,7 @@ def test_a_single_that_leaves_a_little_too_much_is_asked_for_company():
 
 
 def test_what_a_right_model_may_leave_is_one_look_at_it_however_often_it_is_seen():
-    allowing = [SimpleNamespace(evidence=SimpleNamespace(channels=CHANNELS, allowed=1.0))] * 8
+    allowing = [SimpleNamespace(observations=SimpleNamespace(channels=CHANNELS, tolerance_share=1.0))] * 8
     assert _looks(allowing) == pytest.approx(_looks(WEIGHED) / 8)
 
 
@@ -174,7 +176,7 @@ def test_what_no_mechanism_brings_down_is_unexplained():
 @pytest.mark.parametrize("law_left, said", [(0.0, "agrees"), (0.05, "explained")])
 def test_a_mechanism_that_takes_little_counts_if_law_was_left(law_left, said):
     base, scale = trial(0.93), trial(0.90, SCALE)
-    unlearnt = {base.hypothesis: Structure(np.full(8, law_left)), scale.hypothesis: Structure(np.zeros(8))}
+    unlearnt = {base.hypothesis: LackOfFit(np.full(8, law_left)), scale.hypothesis: LackOfFit(np.zeros(8))}
     assert _verdict(Comparison(WEIGHED, base, [scale], unlearnt), []).verdict == said
 
 
@@ -258,5 +260,5 @@ def test_recordings_are_weighed_anew_about_what_explains_them_best():
     assert again.trials[0].values[f"{SCALE[0]}/{SCALE[1]}/gain"] == pytest.approx(0.1, abs=0.005)
     assert {t.hypothesis for t in again.trials} == {t.hypothesis for t in trials}
     assert again.base.left.mean() > again.trials[0].left.mean()
-    assert again.weighed[0].evidence.parameters == recordings[0].evidence.parameters
+    assert again.weighed[0].observations.parameters == recordings[0].observations.parameters
     assert not np.allclose(again.weighed[0].shrink, recordings[0].shrink, rtol=1e-6)

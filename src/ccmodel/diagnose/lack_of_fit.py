@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from ccmodel.diagnose.evidence import Weighed
-from ccmodel.diagnose.travel import since_reversal, speed
-from ccmodel.diagnose.trial import Trial
-from ccmodel.identify.problem import Evidence, each
+from ccmodel.diagnose.candidate import CandidateFit
+from ccmodel.diagnose.drive import since_reversal, speed
+from ccmodel.diagnose.whitening import Whitened
+from ccmodel.inference.problem import Observations, each
 from ccmodel.model.run import simulate
 from ccmodel.recording import TENSIONS
 
@@ -32,7 +32,7 @@ SEED = 0
 
 
 @dataclass(frozen=True)
-class Structure:
+class LackOfFit:
     """What could be learnt of a trial's errors.
 
     Attributes
@@ -56,10 +56,10 @@ class Structure:
         return self.mean - float(student.ppf(0.975, n - 1) * self.gain.std(ddof=1) / np.sqrt(n))
 
 
-def structure(weighed: Sequence[Weighed], trial: Trial) -> Structure:
+def structure(weighed: Sequence[Whitened], trial: CandidateFit) -> LackOfFit:
     """Learn a trial's held-out errors from what the rig was doing, each recording's from the others'."""
     about = each(weighed, lambda i, w: _circumstances(w, trial))
-    errors = each(weighed, lambda i, w: _by_channel(w.evidence, trial.aside[i], weighed))
+    errors = each(weighed, lambda i, w: _by_channel(w.observations, trial.aside[i], weighed))
     if len(weighed) == 1:
         about, errors = (np.array_split(part[0], STRETCHES) for part in (about, errors))
     features = _featured(about)
@@ -69,8 +69,8 @@ def structure(weighed: Sequence[Weighed], trial: Trial) -> Structure:
     size = np.trace(sum(gram)) / len(gram[0])
     gains = [_gains(features, errors, gram, cross, penalty * size) for penalty in PENALTIES]
     best = max(gains, key=np.mean)
-    allowed = np.mean([w.evidence.allowed for w in weighed])
-    return Structure((best if best.mean() > 0 else np.zeros_like(best)) - allowed)
+    allowed = np.mean([w.observations.tolerance_share for w in weighed])
+    return LackOfFit((best if best.mean() > 0 else np.zeros_like(best)) - allowed)
 
 
 def _gains(features, errors, gram, cross, penalty: float) -> NDArray:
@@ -100,9 +100,9 @@ def _featured(about: Sequence[NDArray]) -> list[NDArray]:
     return found
 
 
-def _circumstances(w: Weighed, trial: Trial) -> NDArray:
+def _circumstances(w: Whitened, trial: CandidateFit) -> NDArray:
     """What errors may depend on, sample by sample, as far as the model knows it; shape (samples, quantities)."""
-    e = w.evidence
+    e = w.observations
     given, time_s = e.given, e.given.recording.time_s
     said = simulate(given, trial.hypothesis.of(e.parameters).with_values(trial.values))
     omega = speed(given)
@@ -125,9 +125,9 @@ def _circumstances(w: Weighed, trial: Trial) -> NDArray:
     return np.column_stack(quantities)[e.judged]
 
 
-def _by_channel(e: Evidence, errors: NDArray, weighed: Sequence[Weighed]) -> NDArray:
+def _by_channel(e: Observations, errors: NDArray, weighed: Sequence[Whitened]) -> NDArray:
     """Errors by channel of any recording, none where a channel is missing; shape (samples, channels)."""
-    channels = sorted({c for w in weighed for c in w.evidence.channels})
+    channels = sorted({c for w in weighed for c in w.observations.channels})
     found = np.zeros((e.measured.shape[1], len(channels)))
     for channel, values in zip(e.channels, errors[: e.measured.size].reshape(e.measured.shape), strict=True):
         found[:, channels.index(channel)] = values

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
 from ccmodel import mechanisms as registry
-from ccmodel.diagnose.evidence import LOOKS, Weighed
 from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.diagnose.whitening import LOOKS, Whitened
 from ccmodel.failure import ModelError
-from ccmodel.identify.problem import Free, each
+from ccmodel.inference.problem import Free, each
 from ccmodel.model.parameters import Parameters, mechanism_key
 from ccmodel.model.sensitivity import size_of
 
@@ -24,7 +24,7 @@ DIFFERENCE = 3e-4
 SUSPECT, SHORTER = 2.0, (1.0, 0.5, 0.25, 0.125)
 # How much finer the solver's grid and steps are for what they cost a fit.
 FINER = 3
-# By how much at a time a value is eased down (`Parameter.eased`).
+# By how much at a time a value is eased down (`Parameter.continuation`).
 EASING = 4.0
 MOST_EVALUATIONS = 25
 # By which share a number that a model has already is changed to see what that does.
@@ -35,7 +35,7 @@ PRETENSION_SHARES, FEELING = (1.0, 0.2), 8
 
 
 @dataclass(frozen=True)
-class Trial:
+class CandidateFit:
     """A hypothesis fitted to all recordings.
 
     Attributes
@@ -73,12 +73,12 @@ class Trial:
         return np.array([np.mean(e**2) for e in self.aside])
 
 
-def errors(one: Weighed, values: Mapping[str, float]) -> NDArray:
+def errors(one: Whitened, values: Mapping[str, float]) -> NDArray:
     """Whitened errors of a recording and its likeliest differences, shape (rows + numbers,)."""
-    return one.counted(one.evidence.errors(values).ravel())
+    return one.counted(one.observations.errors(values).ravel())
 
 
-def _errors_if_any(one: Weighed, values: Mapping[str, float]) -> NDArray | None:
+def _errors_if_any(one: Whitened, values: Mapping[str, float]) -> NDArray | None:
     """The same; None where the model cannot be run with such values."""
     try:
         return errors(one, values)
@@ -86,12 +86,12 @@ def _errors_if_any(one: Weighed, values: Mapping[str, float]) -> NDArray | None:
         return None
 
 
-def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str, Free], start: dict) -> Trial:
+def fit(weighed: Sequence[Whitened], hypothesis: Hypothesis, calibrated: dict[str, Free], start: dict) -> CandidateFit:
     """Fit a hypothesis from given values and hold every recording out in turn.
 
     Parameters
     ----------
-    weighed : sequence of Weighed
+    weighed : sequence of Whitened
     hypothesis : Hypothesis
     calibrated : dict of str to Free
         What a calibration of the paper's model leaves free.
@@ -100,7 +100,7 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
 
     Returns
     -------
-    Trial
+    CandidateFit
 
     Raises
     ------
@@ -109,11 +109,11 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
     """
     free = {n: Free(start[n], f.low, f.high) for n, f in calibrated.items()} | hypothesis.free(start)
     names = list(free)
-    acting = [w.acting(hypothesis.of(w.evidence.parameters)) for w in weighed]
+    acting = [w.acting(hypothesis.of(w.observations.parameters)) for w in weighed]
     low, high = (np.array([getattr(f, end) for f in free.values()]) for end in ("low", "high"))
     x0 = np.clip([f.start for f in free.values()], low + 1e-9 * (high - low), high - 1e-9 * (high - low))
     sizes = np.array([size_of(n, f.start) for n, f in free.items()])
-    counts = [w.evidence.measured.size for w in acting]
+    counts = [w.observations.measured.size for w in acting]
 
     def named(x):
         return dict(zip(names, x.tolist(), strict=True))
@@ -139,7 +139,7 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
 
     starts = _starts(names, x0, low, high)
     found = solved(x0) if len(starts) == 1 else solved(_best(lambda x: solved(x, FEELING), starts).x)
-    for k in map(names.index, hypothesis.eased):
+    for k in map(names.index, hypothesis.continuation):
         found = _eased(solved, found, k, low)
     ends = np.cumsum([n + len(w.likeliest) for n, w in zip(counts, acting, strict=True)])[:-1]
     J = [part * np.sqrt(n) for part, n in zip(np.split(found.jac, ends), counts, strict=True)]
@@ -160,18 +160,18 @@ def fit(weighed: Sequence[Weighed], hypothesis: Hypothesis, calibrated: dict[str
     if len(acting) > 1:
         scatter, freedom = _scatter(np.array(without) - found.x, information, inverse, inverses_aside)
     else:
-        scatter = inverse / (LOOKS * len(acting[0].evidence.channels))
+        scatter = inverse / (LOOKS * len(acting[0].observations.channels))
         freedom = np.full(len(names), np.inf)
     held_out = [named(x) for x in without]
-    return Trial(hypothesis, calibrated, named(found.x), r, J, scatter, freedom, held_out, aside)
+    return CandidateFit(hypothesis, calibrated, named(found.x), r, J, scatter, freedom, held_out, aside)
 
 
-def _shortened(others: Sequence[tuple[Weighed, NDArray]], x: NDArray, aside: NDArray, named: Callable) -> NDArray:
+def _shortened(others: Sequence[tuple[Whitened, NDArray]], x: NDArray, aside: NDArray, named: Callable) -> NDArray:
     """The step from a joint optimum to that of some recordings alone, halved until it does not leave more of them.
 
     Parameters
     ----------
-    others : sequence of (Weighed, ndarray)
+    others : sequence of (Whitened, ndarray)
         These recordings, and what the joint optimum leaves of each.
     x, aside : ndarray, shape (unknowns,)
         The joint optimum, and where one Newton step from it would have theirs.
@@ -189,7 +189,7 @@ def _shortened(others: Sequence[tuple[Weighed, NDArray]], x: NDArray, aside: NDA
     return x
 
 
-def moved_by_finer(weighed: Sequence[Weighed], trial: Trial) -> NDArray:
+def moved_by_finer(weighed: Sequence[Whitened], trial: CandidateFit) -> NDArray:
     """Where a finer solver would have a trial's values, less where they are, to first order; shape (unknowns,).
 
     Raises
@@ -197,9 +197,9 @@ def moved_by_finer(weighed: Sequence[Weighed], trial: Trial) -> NDArray:
     ModelError
         If the model cannot be run with the finer solver.
     """
-    finer = [w.acting(replace(trial.hypothesis.of(w.evidence.parameters), refinement=FINER)) for w in weighed]
+    finer = [w.acting(replace(trial.hypothesis.of(w.observations.parameters), refinement=FINER)) for w in weighed]
     changed = each(finer, lambda i, w: errors(w, trial.values) - trial.whitened[i])
-    counts = [w.evidence.measured.size for w in weighed]
+    counts = [w.observations.measured.size for w in weighed]
     sizes = np.array([size_of(n, v) for n, v in trial.values.items()])
     inverse = _inverse(sum(j.T @ j / n for j, n in zip(trial.jacobian, counts, strict=True)), sizes)
     return -inverse @ sum(j.T @ e / n for j, e, n in zip(trial.jacobian, changed, counts, strict=True))
@@ -317,9 +317,9 @@ class Score:
     values: dict[str, float]
 
 
-def score(weighed: Sequence[Weighed], base: Trial, hypotheses: Sequence[Hypothesis]) -> list[Score]:
+def score(weighed: Sequence[Whitened], base: CandidateFit, hypotheses: Sequence[Hypothesis]) -> list[Score]:
     """Score hypotheses against a fitted one that they extend, the best first."""
-    counts = [w.evidence.measured.size for w in weighed]
+    counts = [w.observations.measured.size for w in weighed]
     A = np.concatenate([J / np.sqrt(n) for J, n in zip(base.jacobian, counts, strict=True)])
     r = np.concatenate([e / np.sqrt(n) for e, n in zip(base.whitened, counts, strict=True)])
     Q, _ = np.linalg.qr(A)
@@ -328,11 +328,15 @@ def score(weighed: Sequence[Weighed], base: Trial, hypotheses: Sequence[Hypothes
     return sorted(scored, key=lambda s: -s.gain)
 
 
-def _score(weighed, base: Trial, hypothesis: Hypothesis, counts, Q, left) -> Score:
+def _score(weighed, base: CandidateFit, hypothesis: Hypothesis, counts, Q, left) -> Score:
     best = Score(hypothesis, 0.0, {})
     added = base.hypothesis.and_also(hypothesis)
-    acting = [w.acting(added.of(w.evidence.parameters)) for w in weighed]
-    has = base.hypothesis.of(weighed[0].evidence.parameters) if hypothesis.acting[0] in base.hypothesis.beside else None
+    acting = [w.acting(added.of(w.observations.parameters)) for w in weighed]
+    has = (
+        base.hypothesis.of(weighed[0].observations.parameters)
+        if hypothesis.acting[0] in base.hypothesis.baseline
+        else None
+    )
     for probe in changed(hypothesis, has) if has else hypothesis.probes():
         try:
             said = each(acting, lambda i, w, p=probe: errors(w, base.values | p) - base.whitened[i])
@@ -375,7 +379,7 @@ def scaled(hypothesis: Hypothesis, probe: Mapping[str, float], strength: float) 
     strengths = registry.get(name).strengths
     if strength <= 0 and not any(p.signed or p.ratio for p in strengths):
         return None
-    if any(p.tried for p in strengths):
+    if any(p.screening_grid for p in strengths):
         return dict(probe)
     strength = float(np.clip(strength, -4.0, 4.0))
     strength = np.copysign(max(abs(strength), 0.1), strength)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.failure import ModelError
-from ccmodel.identify.intervals import (
+from ccmodel.inference.intervals import (
     Interval,
     Scatter,
     Undetermined,
@@ -20,8 +20,8 @@ from ccmodel.identify.intervals import (
     scatter,
     undetermined,
 )
-from ccmodel.identify.problem import Problem
-from ccmodel.identify.search import Solution, solve
+from ccmodel.inference.problem import Problem
+from ccmodel.inference.search import Solution, solve
 
 # Optima of several starts are one if no unknown differs by more than this share of its size.
 SAME = 1e-3
@@ -111,7 +111,7 @@ def fit(problem: Problem, starts: int = 1, profiled: Sequence[str] = ()) -> FitR
     FitResult
         A failed fit is a result that says so, not an exception.
     """
-    names = [e.name for e in problem.evidence]
+    names = [e.name for e in problem.observations]
     if not names:
         return FitResult(False, "no usable recording to fit")
     low, high = problem.bounds
@@ -157,7 +157,7 @@ def _result(problem: Problem, found: Solution, warnings: list[str], profiled: Se
     known = intervals(problem, found, variance) | nowhere
     profiles, lost_on_the_way = _profiles(problem, found, [n for n in profiled if isfinite(known[n].sd)], variance)
     scattered = scatter(problem, found)
-    resampled = bootstrap(problem, found) if len(problem.evidence) >= ENOUGH_RECORDINGS else {}
+    resampled = bootstrap(problem, found) if len(problem.observations) >= ENOUGH_RECORDINGS else {}
     return FitResult(
         succeeded=True,
         message=found.message,
@@ -173,13 +173,13 @@ def _result(problem: Problem, found: Solution, warnings: list[str], profiled: Se
         warnings=[*warnings, *lost_on_the_way, *_unlikely(scattered), *_disagreeing(known, resampled)],
         cost=problem.mean_square(found.x),
         evaluations=found.evaluations,
-        recordings=[e.name for e in problem.evidence],
+        recordings=[e.name for e in problem.observations],
     )
 
 
 def _own(problem: Problem, x: NDArray) -> dict[str, dict[str, float]]:
-    values = (problem.values_of(x, i) for i in range(len(problem.evidence)))
-    return {e.name: {n: v[n] for n in problem.own} for e, v in zip(problem.evidence, values, strict=True)}
+    values = (problem.values_of(x, i) for i in range(len(problem.observations)))
+    return {e.name: {n: v[n] for n in problem.own} for e, v in zip(problem.observations, values, strict=True)}
 
 
 def _profiles(

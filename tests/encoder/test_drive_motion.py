@@ -3,7 +3,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from ccmodel.rig.motion import drive_motion
+from ccmodel.encoder.motion import drive_motion
 
 COARSE, FINE = np.pi / 1000, 2 * np.pi / 8192
 REST = 0.4

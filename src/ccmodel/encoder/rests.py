@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.rig.bounded import fitted
+from ccmodel.encoder.bounded import fitted
 
 # A motion s^p from rest stays in the first count at most 1 / (2^(1/p) - 1) times as long as in the next: 2.4 times at
 # constant acceleration, 5.3 where acceleration begins smoothly. Longer must have been a rest; a turn comes to 4.8.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ccmodel.identify.noise import PHASES, rounding_errors
+from ccmodel.inference.noise import PHASES, rounding_errors
 
 STEP = 0.003
 

@@ -40,13 +40,13 @@ def sensor_noise(given: ModelInput) -> dict[str, float]:
     return found
 
 
-def drive_errors(given: ModelInput, parameters: Parameters, placed: bool = False) -> dict[str, NDArray]:
+def drive_errors(given: ModelInput, parameters: Parameters, offset_is_free: bool = False) -> dict[str, NDArray]:
     """What is unknown of the drive's motion, as it shows in each channel: a few likely errors, shape (draws, n).
 
     Where in its count the drive first rests is part of it unless it is `placed`: an unknown of the fit.
     """
     said = simulate(given, parameters)
-    deviations = given.placed_deviations if placed else given.drive_deviations
+    deviations = given.deviations_given_offset if offset_is_free else given.drive_deviations
     aside = [simulate(replace(given, theta_in=given.theta_in + d), parameters) for d in deviations]
     return {c: np.array([a[c] - said[c] for a in aside]).reshape(-1, said.time_s.size) for c in said.channels}
 

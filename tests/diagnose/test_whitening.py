@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from builders import recording
-from ccmodel.diagnose.evidence import LOOKS, weigh, weighed_about
-from ccmodel.diagnose.locate import PARTS, parts_of
-from ccmodel.identify.problem import Evidence
+from ccmodel.diagnose.location import PARTS, parts_of
+from ccmodel.diagnose.whitening import LOOKS, weigh, weighed_about
+from ccmodel.inference.problem import Observations
 from ccmodel.model.general import Active
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
@@ -25,7 +25,7 @@ def weighed():
         accuracy={"tau_in_Nm": 1e-4, "tau_out_Nm": 1e-4, "F_drive_N": 0.1, "F_load_N": 0.1, "theta_out_rad": 1e-3},
         rest_s=0.3,
     )
-    return weigh(Evidence.of(measured, PARAMETERS), PARAMETERS)
+    return weigh(Observations.of(measured, PARAMETERS), PARAMETERS)
 
 
 def test_what_differs_from_run_to_run_is_shrunk_to_one_deviation(weighed):
@@ -44,7 +44,7 @@ def test_what_no_run_to_run_difference_makes_is_left_as_it_is(weighed):
 
 
 def test_a_per_cent_of_friction_is_no_evidence_and_ten_are(weighed):
-    e = weighed.evidence
+    e = weighed.observations
     errors = {
         share: np.sum(weighed.whitened(e.errors({"friction_coefficient": 0.15 * (1 + share)}).ravel()) ** 2)
         for share in (0.01, 0.1)
@@ -56,8 +56,10 @@ def test_a_per_cent_of_friction_is_no_evidence_and_ten_are(weighed):
 def test_where_in_its_gap_the_load_rests_is_no_evidence_where_no_torque_holds_it(weighed):
     gap = Active("backlash", "load-pulley", {"half_gap": 0.02})
     with_gap = replace(PARAMETERS, mechanisms=(gap,))
-    by_gap = weigh(weighed.evidence, with_gap)
-    moved = by_gap.acting(with_gap).evidence.errors({"load_place": 0.5}) - by_gap.acting(with_gap).evidence.errors({})
+    by_gap = weigh(weighed.observations, with_gap)
+    moved = by_gap.acting(with_gap).observations.errors({"load_gap_position": 0.5}) - by_gap.acting(
+        with_gap
+    ).observations.errors({})
     assert np.sum(weighed.whitened(moved.ravel()) ** 2) > 50
     assert np.sum(by_gap.whitened(moved.ravel()) ** 2) < 3
 
@@ -65,15 +67,15 @@ def test_where_in_its_gap_the_load_rests_is_no_evidence_where_no_torque_holds_it
 @pytest.mark.parametrize("place", [-1.0, 0.0, 1.0])
 def test_a_load_is_found_where_in_its_gap_it_rested(weighed, place):
     gap = Active("backlash", "load-pulley", {"half_gap": 0.02})
-    there = replace(PARAMETERS, mechanisms=(gap,), load_place=place)
-    e = weighed.evidence
-    recorded = replace(weighed, evidence=replace(e, measured=replace(e, parameters=there).modelled({})))
-    found = weighed_about(recorded, replace(there, load_place=0.0))
-    assert found.evidence.parameters == replace(PARAMETERS, load_place=place)
+    there = replace(PARAMETERS, mechanisms=(gap,), load_gap_position=place)
+    e = weighed.observations
+    recorded = replace(weighed, observations=replace(e, measured=replace(e, parameters=there).modelled({})))
+    found = weighed_about(recorded, replace(there, load_gap_position=0.0))
+    assert found.observations.parameters == replace(PARAMETERS, load_gap_position=place)
 
 
 def test_parts_of_a_motion(weighed):
-    given = weighed.evidence.given
+    given = weighed.observations.given
     part, t = parts_of(given), given.recording.time_s
     assert (part[t < 0.28] == PARTS.index("at rest")).all()
     top = np.argmin(np.abs(t - 0.55))
@@ -83,7 +85,7 @@ def test_parts_of_a_motion(weighed):
 
 def test_what_differs_more_than_runs_do_is_counted_as_a_look_of_its_own(weighed):
     """Lost among the samples: friction a tenth higher, or a zero off by three accuracies, are one number each."""
-    e = weighed.evidence
+    e = weighed.observations
     rows_a_look = e.measured.shape[1] / LOOKS
     for values, row, size in (
         ({"friction_coefficient": 0.15 * 1.1}, 0, 10.0),

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ccmodel.diagnose.evidence import weigh
-from ccmodel.diagnose.judge import Judgement
-from ccmodel.diagnose.locate import _sticking_out, location
+from ccmodel.diagnose.comparison import Judgement
+from ccmodel.diagnose.location import _sticking_out, location
+from ccmodel.diagnose.whitening import weigh
 from ccmodel.model.general.run import Active
-from made_evidence import NOISE, PARAMETERS, batch, calibrated
+from made_observations import NOISE, PARAMETERS, batch, calibrated
 
 
 def wave(said, channel):
@@ -49,17 +49,17 @@ def test_a_ripple_of_both_torques_sits_in_between():
 
 
 def test_the_only_channel_there_is_gives_a_place_all_the_same():
-    one = [only(w.evidence, "tau_in_Nm") for w in batch(lambda said: wave(said, "tau_in_Nm"))]
+    one = [only(w.observations, "tau_in_Nm") for w in batch(lambda said: wave(said, "tau_in_Nm"))]
     recordings = [weigh(e, PARAMETERS) for e in one]
     base = calibrated(recordings)
     found = location(Judgement("unexplained", base, base, [], [], 1.0, [], {}, recordings))
     assert (found["place"], found["channels"]) == ("drive-pulley", ["tau_in"])
 
 
-def only(evidence, channel):
-    for other in set(evidence.channels) - {channel}:
-        evidence = evidence.without(other)
-    return evidence
+def only(observations, channel):
+    for other in set(observations.channels) - {channel}:
+        observations = observations.without(other)
+    return observations
 
 
 def test_what_noise_leaves_anyway_makes_no_channel_stick_out():

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 from scipy.stats import chi2, norm, t
 
-from ccmodel.identify.problem import Block, Problem
-from ccmodel.identify.search import Solution, information_and_slope, solve
+from ccmodel.inference.problem import Block, Problem
+from ccmodel.inference.search import Solution, information_and_slope, solve
 from ccmodel.repeats import condition_of, pooled_scatter
 
 COVERAGE = 0.90
@@ -129,7 +129,7 @@ def own_intervals(problem: Problem, solution: Solution, spread: NDArray) -> dict
     """The same of each recording's own unknowns, and of its friction where it has one; from the covariance of all."""
     found = {}
     shared = list(problem.shared)
-    for i, e in enumerate(problem.evidence):
+    for i, e in enumerate(problem.observations):
         at = np.arange(len(problem.names))[problem.own_columns(i)]
         own = dict(zip(problem.own, at, strict=True))
         found[e.name] = {name: Interval.about(solution.x[k], np.sqrt(spread[k, k])) for name, k in own.items()}
@@ -211,14 +211,14 @@ def _autocovariance(errors: NDArray, lags: int) -> NDArray:
 
 def scatter(problem: Problem, solution: Solution) -> dict[str, Scatter]:
     """How the recordings' own values scatter, for those of which something is expected; by parameter."""
-    n, found = len(problem.evidence), {}
+    n, found = len(problem.observations), {}
     for place, (name, free) in enumerate(problem.own.items()):
         if free.spread is None:
             continue
         at = len(problem.shared) + place + len(problem.own) * np.arange(n)
         square = float((problem.unexpected(solution.x)[at] ** 2).sum())
         alike = defaultdict(list)
-        for e, value in zip(problem.evidence, solution.x[at].tolist(), strict=True):
+        for e, value in zip(problem.observations, solution.x[at].tolist(), strict=True):
             alike[condition_of(e.given.recording)].append(value)
         of_repeats, freedom = pooled_scatter(list(alike.values()), relative=False)
         about = float(np.sqrt(square / n)), float(chi2.sf(square, n))

@@ -1,14 +1,14 @@
-"""Recordings of the paper's model with noise, weighed: a diagnosis's evidence without logs."""
+"""Recordings of the paper's model with noise, weighed: a diagnosis's observations without logs."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from builders import recording
-from ccmodel.diagnose.evidence import weigh
+from ccmodel.diagnose.candidate import fit
 from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.trial import fit
-from ccmodel.identify.problem import Evidence, Free
+from ccmodel.diagnose.whitening import weigh
+from ccmodel.inference.problem import Free, Observations
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 
@@ -37,7 +37,7 @@ def weighed(amplitude=0.6, frequency=1.0, pretension_N=7.0, seed=0, spoil=lambda
         accuracy=ACCURACY,
         rest_s=0.3,
     )
-    return weigh(Evidence.of(measured, PARAMETERS), PARAMETERS)
+    return weigh(Observations.of(measured, PARAMETERS), PARAMETERS)
 
 
 def batch(spoil=lambda said: {}, truth=PARAMETERS):

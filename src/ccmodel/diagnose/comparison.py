@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from ccmodel.diagnose.alone import cleared
-from ccmodel.diagnose.evidence import LOOKS, Weighed, weighed_about
+from ccmodel.diagnose.candidate import CandidateFit, Score, fit, score
 from ccmodel.diagnose.hypothesis import PAPER, Hypothesis, plausible
-from ccmodel.diagnose.structure import Structure, structure
-from ccmodel.diagnose.trial import Score, Trial, fit, score
+from ccmodel.diagnose.isolation import cleared
+from ccmodel.diagnose.lack_of_fit import LackOfFit, structure
+from ccmodel.diagnose.whitening import LOOKS, Whitened, weighed_about
 from ccmodel.failure import ModelError
-from ccmodel.identify.problem import Free, each
+from ccmodel.inference.problem import Free, each
 
 # A mechanism is worth a trial if it takes this share off the calibrated model's mean square, and a naming if it takes
 # more than this off what is left of held-out recordings, and off nearly all of them: one that makes some worse by this
@@ -69,11 +69,11 @@ class Judgement:
     Attributes
     ----------
     verdict : {"agrees", "explained", "undecided", "unexplained"}
-    calibrated : Trial
+    calibrated : CandidateFit
         The paper's model.
-    best : Trial
+    best : CandidateFit
         The likeliest hypothesis where it may explain the recordings; else the calibrated model.
-    trials : list of Trial
+    trials : list of CandidateFit
         What was fitted in full and as the recordings were weighed in the end, the likeliest first.
     probability : list of float
         Of each of these.
@@ -81,27 +81,27 @@ class Judgement:
         The screening.
     listed : float
         Probability that what is missing is on the list at all, by what the likeliest trial leaves.
-    learnable : mapping of Hypothesis to Structure
+    learnable : mapping of Hypothesis to LackOfFit
         What a flexible model could still learn of what the calibrated model and the leading trials leave.
-    weighed : sequence of Weighed
+    weighed : sequence of Whitened
         The recordings as they were weighed for all this.
     one_fault : sequence of str
         Places where a single fault of no known kind would do as well as the two mechanisms that come nearest.
     """
 
     verdict: str
-    calibrated: Trial
-    best: Trial
-    trials: list[Trial]
+    calibrated: CandidateFit
+    best: CandidateFit
+    trials: list[CandidateFit]
     probability: list[float]
     listed: float
     scores: list[Score]
-    learnable: Mapping[Hypothesis, Structure]
-    weighed: Sequence[Weighed]
+    learnable: Mapping[Hypothesis, LackOfFit]
+    weighed: Sequence[Whitened]
     one_fault: Sequence[str] = ()
 
     @property
-    def nearest(self) -> Trial | None:
+    def nearest(self) -> CandidateFit | None:
         """The trial that leaves the least, right or not, of those that can be; None where none was worth fitting."""
         return min(self.trials, key=lambda t: (not _is_plausible(t), _left(t)), default=None)
 
@@ -112,22 +112,24 @@ class Comparison:
 
     Attributes
     ----------
-    weighed : sequence of Weighed
-    base : Trial
-    trials : list of Trial
-    learnable : mapping of Hypothesis to Structure
+    weighed : sequence of Whitened
+    base : CandidateFit
+    trials : list of CandidateFit
+    learnable : mapping of Hypothesis to LackOfFit
     asked : int
         How many hypotheses these were chosen from.
     """
 
-    weighed: Sequence[Weighed]
-    base: Trial
-    trials: list[Trial]
-    learnable: Mapping[Hypothesis, Structure]
+    weighed: Sequence[Whitened]
+    base: CandidateFit
+    trials: list[CandidateFit]
+    learnable: Mapping[Hypothesis, LackOfFit]
     asked: int = 0
 
     @classmethod
-    def of(cls, weighed: Sequence[Weighed], base: Trial, trials: Sequence[Trial], asked: int = 0) -> "Comparison":
+    def of(
+        cls, weighed: Sequence[Whitened], base: CandidateFit, trials: Sequence[CandidateFit], asked: int = 0
+    ) -> "Comparison":
         """Trials in their order, the leading and the likeliest asked what could still be learnt of what they leave.
 
         One that wants more of a mechanism than there can be comes after all others, whatever it leaves.
@@ -142,7 +144,7 @@ class Comparison:
         """Of each trial; what is missing from one is the calibrated model's."""
         return _probabilities(self.weighed, self.base, self.trials, self.asked)
 
-    def is_right(self, trial: Trial) -> bool:
+    def is_right(self, trial: CandidateFit) -> bool:
         """Whether a trial leaves what a right model would."""
         return is_right(trial, self.base, self.learnable)
 
@@ -157,23 +159,23 @@ class Comparison:
         if not self.has_right:
             return bool(self.trials)
         best = self.trials[0]
-        return _left(best) > ENOUGH + best.hypothesis.missed * max(_left(self.base) - 1.0, 0.0)
+        return _left(best) > ENOUGH + best.hypothesis.model_form_error * max(_left(self.base) - 1.0, 0.0)
 
 
 def judge(
-    weighed: Sequence[Weighed],
+    weighed: Sequence[Whitened],
     calibrated: Mapping[str, Free],
     start: Mapping[str, float],
     known: Sequence[Hypothesis],
     tell: Callable[[str], None] = lambda text: None,
-    suspects: Sequence[Hypothesis] = (),
+    forced_candidates: Sequence[Hypothesis] = (),
     model: Hypothesis = PAPER,
 ) -> Judgement:
     """Try all hypotheses and come to a verdict.
 
     Parameters
     ----------
-    weighed : sequence of Weighed
+    weighed : sequence of Whitened
     calibrated : mapping of str to Free
         What a calibration of the paper's model leaves free.
     start : mapping of str to float
@@ -182,7 +184,7 @@ def judge(
         Single mechanisms that may be missing.
     tell : callable
         Is told how the work goes on, a line at a time.
-    suspects : sequence of Hypothesis
+    forced_candidates : sequence of Hypothesis
         Singles or pairs that are fitted in full whatever the screening says of them.
     model : Hypothesis
         The model in question; the paper's unless something else is known already.
@@ -192,7 +194,7 @@ def judge(
     scores = score(weighed, base, known)
     fewest = FEWEST_TRIALS if _left(base) > RIGHT else 0
     leading = [s for k, s in enumerate(scores) if s.values and (s.gain > WORTH_A_TRIAL or k < fewest)][:TRIALS]
-    asked = [Score(h, 0.0, h.start) for h in suspects if h not in [s.hypothesis for s in leading]]
+    asked = [Score(h, 0.0, h.start) for h in forced_candidates if h not in [s.hypothesis for s in leading]]
     found = Comparison.of(weighed, base, _fit_all(weighed, calibrated, base, [*leading, *asked], tell), len(known))
     if found.wants_more:
         found = _weighed_anew(found, calibrated, tell)
@@ -222,9 +224,9 @@ def _weighed_anew(found: Comparison, calibrated: Mapping[str, Free], tell) -> Co
     """
     best = found.trials[0]
     tell(f"weighing the recordings about {best.hypothesis}")
-    model = [best.hypothesis.of(w.evidence.parameters).with_values(best.values) for w in found.weighed]
+    model = [best.hypothesis.of(w.observations.parameters).with_values(best.values) for w in found.weighed]
 
-    def starts(trial: Trial) -> list[dict[str, float]]:
+    def starts(trial: CandidateFit) -> list[dict[str, float]]:
         if trial is best or "pretension_share" not in calibrated:
             return [trial.values]
         return [trial.values, trial.values | {name: best.values[name] for name in calibrated}]
@@ -241,10 +243,10 @@ def _weighed_anew(found: Comparison, calibrated: Mapping[str, Free], tell) -> Co
     return Comparison.of(weighed, base, list(best_of.values()), found.asked)
 
 
-def is_right(trial: Trial, base: Trial, learnable: Mapping[Hypothesis, Structure]) -> bool:
+def is_right(trial: CandidateFit, base: CandidateFit, learnable: Mapping[Hypothesis, LackOfFit]) -> bool:
     """Whether a hypothesis is what a right one would be: it leaves little and no law in it, with values that can be."""
     unlearnt = learnable.get(trial.hypothesis)
-    excess, missed = max(_left(base) - 1.0, 0.0), trial.hypothesis.missed
+    excess, missed = max(_left(base) - 1.0, 0.0), trial.hypothesis.model_form_error
     if unlearnt is None or not _is_plausible(trial) or (trial is base and _left(base) > RIGHT):
         return False
     most = RIGHT_PAIR if len(trial.hypothesis.acting) > 1 else RIGHT
@@ -252,20 +254,20 @@ def is_right(trial: Trial, base: Trial, learnable: Mapping[Hypothesis, Structure
     return _left(trial) <= most and unlearnt.surely <= LEARNABLE + missed * excess
 
 
-def _best_of(trial: Trial) -> int:
+def _best_of(trial: CandidateFit) -> int:
     """As the best of how many independent imitations a trial may pass: a first's partners, since firsts are alike."""
     return PARTNERS if len(trial.hypothesis.acting) > 1 else 1
 
 
-def _is_plausible(trial: Trial) -> bool:
+def _is_plausible(trial: CandidateFit) -> bool:
     return plausible(trial.hypothesis, trial.values)
 
 
-def _left(trial: Trial) -> float:
+def _left(trial: CandidateFit) -> float:
     return float(trial.left.mean())
 
 
-def _fit_all(weighed, calibrated, base: Trial, chosen: Sequence[Score], tell) -> list[Trial]:
+def _fit_all(weighed, calibrated, base: CandidateFit, chosen: Sequence[Score], tell) -> list[CandidateFit]:
     """Fit what extends a fitted hypothesis."""
     trials = []
     for s in chosen:
@@ -280,7 +282,7 @@ def _fit_all(weighed, calibrated, base: Trial, chosen: Sequence[Score], tell) ->
     return trials
 
 
-def _pairs(weighed, calibrated, firsts: Sequence[Trial], known, tell) -> list[Trial]:
+def _pairs(weighed, calibrated, firsts: Sequence[CandidateFit], known, tell) -> list[CandidateFit]:
     tell("one mechanism is not enough; trying pairs")
     found, seen = [], set()
     for first in firsts:
@@ -295,7 +297,7 @@ def _pairs(weighed, calibrated, firsts: Sequence[Trial], known, tell) -> list[Tr
     return found
 
 
-def _names_more(trial: Trial, trials: Sequence[Trial]) -> bool:
+def _names_more(trial: CandidateFit, trials: Sequence[CandidateFit]) -> bool:
     """Whether a pair is worth more than each of its members alone; a single always is."""
     if len(trial.hypothesis.acting) < 2:
         return True
@@ -304,14 +306,14 @@ def _names_more(trial: Trial, trials: Sequence[Trial]) -> bool:
     return all(_left(trial) - 1 < PAIR_SHARE * (_left(t) - 1) and _left(trial) < _left(t) for t in alone)
 
 
-def _looks(weighed: Sequence[Weighed]) -> float:
+def _looks(weighed: Sequence[Whitened]) -> float:
     """Independent looks that recordings give; what a right model is allowed to leave is alike in all of them."""
-    each_gives = np.array([LOOKS * len(w.evidence.channels) for w in weighed])
-    allowed = np.array([w.evidence.allowed for w in weighed])
+    each_gives = np.array([LOOKS * len(w.observations.channels) for w in weighed])
+    allowed = np.array([w.observations.tolerance_share for w in weighed])
     return float(np.sum(each_gives * (1 - allowed)) + np.mean(each_gives * allowed))
 
 
-def _probabilities(weighed, base: Trial, trials: Sequence[Trial], asked: int) -> list[float]:
+def _probabilities(weighed, base: CandidateFit, trials: Sequence[CandidateFit], asked: int) -> list[float]:
     """Probability of each trial; what is missing from one is the calibrated model's.
 
     The best of many that were asked leaves little by chance, so that each begins with its share of all of these.
@@ -329,14 +331,14 @@ def _probabilities(weighed, base: Trial, trials: Sequence[Trial], asked: int) ->
     return (weight / weight.sum())[1:].tolist()
 
 
-def is_listed(trial: Trial, base: Trial) -> float:
+def is_listed(trial: CandidateFit, base: CandidateFit) -> float:
     """Probability that what is missing is on the list, and not something else that the best of the list imitates.
 
     By Bayes' rule from what the trial leaves, whose densities are those of a right model and of an imitation.
     """
     level, sd = LEVEL
     excess, over = max(_left(base) - level, sd), _left(trial) - level
-    form = max(FORM_SHARE, trial.hypothesis.missed) * excess
+    form = max(FORM_SHARE, trial.hypothesis.model_form_error) * excess
     wide = np.hypot(sd, form)
     exact = norm.pdf(over, scale=sd)
     # A share of half a normal distribution, and the level's scatter on top.
@@ -354,9 +356,9 @@ def _verdict(found: Comparison, scores: list[Score]) -> Judgement:
     likeliest = trials[int(np.argmax(probability))] if trials else base
     listed = is_listed(likeliest, base) if trials else 1.0
     blind = len(found.weighed) == 1 or "pretension_share" in base.free
-    listed *= UNTESTED ** (1.0 if blind else np.mean([w.evidence.allowed for w in found.weighed]))
+    listed *= UNTESTED ** (1.0 if blind else np.mean([w.observations.tolerance_share for w in found.weighed]))
 
-    def judged(verdict: str, best: Trial) -> Judgement:
+    def judged(verdict: str, best: CandidateFit) -> Judgement:
         order = np.argsort(-np.array(probability), kind="stable")
         likely = [trials[k] for k in order], [probability[k] for k in order]
         return Judgement(verdict, base, best, *likely, listed, scores, learnable, found.weighed)
@@ -379,7 +381,7 @@ def _verdict(found: Comparison, scores: list[Score]) -> Judgement:
     return judged("explained" if listed * sure >= SURE and not one_fault else "undecided", likeliest)
 
 
-def _is_at(trial: Trial, places: Sequence[str]) -> bool:
+def _is_at(trial: CandidateFit, places: Sequence[str]) -> bool:
     """Whether a trial has but one mechanism, at one of these places."""
     return len(trial.hypothesis.acting) == 1 and trial.hypothesis.acting[0][1] in places
 
@@ -399,7 +401,7 @@ def _one_fault(found: Comparison, hypothesis: Hypothesis) -> list[str]:
     return list(dict.fromkeys(place for _, places in would_do for place in places))
 
 
-def _matters(trial: Trial, base: Trial, least: float) -> bool:
+def _matters(trial: CandidateFit, base: CandidateFit, least: float) -> bool:
     """Whether a hypothesis takes enough off what the calibrated model leaves, and not off some recordings alone.
 
     `least` is the share of it that must go.
@@ -409,7 +411,7 @@ def _matters(trial: Trial, base: Trial, least: float) -> bool:
     return bool(better - worse > least * max(1.0, _left(base)) and worse < UNSTEADY * better)
 
 
-def nested_errors(judgement: Judgement) -> list[Trial]:
+def nested_errors(judgement: Judgement) -> list[CandidateFit]:
     """By recording, the trial that would have been chosen had it not been there; of a single one, the best."""
     rivals = [judgement.calibrated, *judgement.trials]
     if judgement.best is judgement.calibrated or judgement.calibrated.left.size == 1:

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from ccmodel.rig import bounded
-from ccmodel.rig.rests import Rest, find_rests
+from ccmodel.encoder import bounded
+from ccmodel.encoder.rests import Rest, find_rests
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def drive_motion(time_s: NDArray, theta_counts_rad: NDArray, step_rad: float, re
     small (motions without corners) or its third has heavy tails (triangles, jumps of acceleration), whichever predicts
     each count better from all the others. How small follows the recording, a tenth of a second at a time. Where the
     drive rests the angle is constant; where in its count it rests is told by the first counts on either side
-    (`ccmodel.rig.rests`), no better than that.
+    (`ccmodel.encoder.rests`), no better than that.
 
     Parameters
     ----------
@@ -138,8 +138,8 @@ def drive_motion(time_s: NDArray, theta_counts_rad: NDArray, step_rad: float, re
     same reason. It is the law of the start that counts do not tell: where it is known to be constant acceleration, 30
     counts of a ramp tell its rest to 0.05; to expect starts as simple as that whenever counts allow them makes ramps
     right to 0.13, and steps, sines and triangles wrong by 0.2 to 0.3. What does tell it is what the cables do: a fit of
-    torques and sums finds the first rest's place (`Parameters.drive_place`) to an eighth of its stated deviation on
-    the sines of `data/raw/loops`, which is 0.02 to 0.03 counts.
+    torques and sums finds the first rest's place (`Parameters.drive_encoder_offset`) to an eighth of its stated
+    deviation on the sines of `data/raw/loops`, which is 0.02 to 0.03 counts.
     """
     time = np.asarray(time_s, dtype=float)
     counted = np.asarray(theta_counts_rad, dtype=float)

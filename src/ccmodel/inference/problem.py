@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.failure import ModelError
-from ccmodel.identify.noise import PHASES, drive_errors, rounding_errors, sensor_noise, size_over_time
+from ccmodel.inference.noise import PHASES, drive_errors, rounding_errors, sensor_noise, size_over_time
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import PRESCRIBED, LoadFrom, ModelInput, simulate
 from ccmodel.model.sensitivity import STEP, size_of
@@ -22,7 +22,7 @@ from ccmodel.recording import Recording
 
 # What sensors measure; tensions are derived from these and do not count a second time.
 MEASURED = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N")
-Allowance = float | Mapping[str, float]
+Tolerance = float | Mapping[str, float]
 CORES = 2
 
 
@@ -45,7 +45,7 @@ class Free:
 
 
 @dataclass(frozen=True)
-class Evidence:
+class Observations:
     """A recording made ready: the model's input, the samples that are compared and the noise of each.
 
     Attributes
@@ -59,7 +59,7 @@ class Evidence:
         Values and their standard deviation, in the channels' units.
     placed : bool
         Whether where in its count the drive first rests is an unknown of the fit, and not part of the noise.
-    allowance : ndarray, shape (channels,)
+    tolerance : ndarray, shape (channels,)
         Share of each one's peak to peak that `sigma` has besides the noise.
     load_from : {"law", "torque"}
         Whether the load's law drives the cables' far end, or the torque that was measured there.
@@ -71,8 +71,8 @@ class Evidence:
     judged: NDArray
     measured: NDArray
     sigma: NDArray
-    allowance: NDArray
-    placed: bool = False
+    tolerance: NDArray
+    offset_is_free: bool = False
     load_from: LoadFrom = "law"
 
     @classmethod
@@ -82,12 +82,12 @@ class Evidence:
         parameters: Parameters,
         channels: Sequence[str] = MEASURED,
         step_s: float | None = None,
-        allowance: Allowance = 0.0,
-        placed: bool = False,
-    ) -> "Evidence":
-        """Evidence from a recording, a sample every `step_s` of it.
+        tolerance: Tolerance = 0.0,
+        offset_is_free: bool = False,
+    ) -> "Observations":
+        """Observations from a recording, a sample every `step_s` of it.
 
-        Where the model is known not to be the whole truth, `allowance` adds that share of each channel's peak to peak
+        Where the model is known not to be the whole truth, `tolerance` adds that share of each channel's peak to peak
         to the noise, one for all or by channel, so that no channel rules by being read finely.
 
         Raises
@@ -102,29 +102,29 @@ class Evidence:
             raise ModelError(f"{recording.batch}/{recording.id}: none of {', '.join(channels)} was recorded")
         time_s = given.recording.time_s
         judged = time_s >= max(recording.rest_s, recording.settled_s)
-        sensors, drive = sensor_noise(given), drive_errors(given, parameters, placed)
+        sensors, drive = sensor_noise(given), drive_errors(given, parameters, offset_is_free)
         measured = np.stack([given.recording[c][judged] for c in used])
         sigma = np.stack([np.hypot(sensors[c], size_over_time(drive[c], time_s)[judged]) for c in used])
-        by_channel = allowance if isinstance(allowance, Mapping) else dict.fromkeys(used, allowance)
+        by_channel = tolerance if isinstance(tolerance, Mapping) else dict.fromkeys(used, tolerance)
         shares = np.array([by_channel.get(c, 0.0) for c in used])
         sigma = np.hypot(sigma, (shares * np.ptp(measured, axis=1))[:, None])
-        return cls(given, parameters, used, judged, measured, sigma, shares, placed)
+        return cls(given, parameters, used, judged, measured, sigma, shares, offset_is_free)
 
-    def without(self, channel: str) -> "Evidence":
+    def without(self, channel: str) -> "Observations":
         """The same without one of the channels."""
         kept = [k for k, c in enumerate(self.channels) if c != channel]
         channels = tuple(self.channels[k] for k in kept)
-        series = {name: getattr(self, name)[kept] for name in ("measured", "sigma", "allowance")}
+        series = {name: getattr(self, name)[kept] for name in ("measured", "sigma", "tolerance")}
         return replace(self, channels=channels, **series)
 
-    def driven_by_torque(self) -> "Evidence":
+    def driven_by_torque(self) -> "Observations":
         """The same with the torque that was measured at the load in place of the load's law."""
         return replace(self.without("tau_out_Nm"), load_from="torque")
 
     @property
-    def allowed(self) -> float:
-        """What the allowance may leave of the mean square of errors over `sigma`, in law as well as in chance."""
-        return float(np.mean(((self.allowance * np.ptp(self.measured, axis=1))[:, None] / self.sigma) ** 2))
+    def tolerance_share(self) -> float:
+        """What the tolerance may leave of the mean square of errors over `sigma`, in law as well as in chance."""
+        return float(np.mean(((self.tolerance * np.ptp(self.measured, axis=1))[:, None] / self.sigma) ** 2))
 
     @property
     def name(self) -> str:
@@ -142,7 +142,7 @@ class Evidence:
 
     def drive_errors(self, values: Mapping[str, float]) -> NDArray:
         """Likely errors over the noise that the drive's unknown part makes, shape (draws, channels, judged samples)."""
-        found = drive_errors(self.given, self.parameters.with_values(values), self.placed)
+        found = drive_errors(self.given, self.parameters.with_values(values), self.offset_is_free)
         return np.stack([found[c][:, self.judged] for c in self.channels], axis=1) / self.sigma
 
     def rounding_errors(self, values: Mapping[str, float]) -> NDArray:
@@ -189,7 +189,7 @@ class Problem:
 
     Attributes
     ----------
-    evidence : sequence of Evidence
+    observations : sequence of Observations
     shared, own : mapping of str to Free
         Unknowns with one value for all, and with one value for each recording.
     looks : float
@@ -197,7 +197,7 @@ class Problem:
         what a model leaves beyond the sensors' noise is alike from sample to sample.
     """
 
-    evidence: Sequence[Evidence]
+    observations: Sequence[Observations]
     shared: Mapping[str, Free]
     own: Mapping[str, Free] = field(default_factory=dict)
     looks: float = 100.0
@@ -205,17 +205,17 @@ class Problem:
     @cached_property
     def names(self) -> list[str]:
         """Unknowns in the order of a vector of them: shared, then each recording's own."""
-        return [*self.shared, *(f"{name}@{e.name}" for e in self.evidence for name in self.own)]
+        return [*self.shared, *(f"{name}@{e.name}" for e in self.observations for name in self.own)]
 
     @cached_property
     def free(self) -> list[Free]:
         """What is said of each of `names`."""
-        return [*self.shared.values(), *(f for _ in self.evidence for f in self.own.values())]
+        return [*self.shared.values(), *(f for _ in self.observations for f in self.own.values())]
 
     @cached_property
     def sizes(self) -> NDArray:
         """What each unknown's steps are measured by, shape (unknowns,)."""
-        plain = [*self.shared, *(name for _ in self.evidence for name in self.own)]
+        plain = [*self.shared, *(name for _ in self.observations for name in self.own)]
         return np.array([f.spread or size_of(n, f.start) for n, f in zip(plain, self.free, strict=True)])
 
     @cached_property
@@ -266,21 +266,23 @@ class Problem:
 
     def drive_errors(self, x: NDArray) -> list[NDArray]:
         """By recording, likely errors for want of the drive's true motion; shape (draws, channels, samples)."""
-        return self._each(lambda i: self.evidence[i].drive_errors(self.values_of(x, i)) * np.sqrt(self._weight(i)))
+        return self._each(lambda i: self.observations[i].drive_errors(self.values_of(x, i)) * np.sqrt(self._weight(i)))
 
     def rounding_errors(self, x: NDArray) -> list[NDArray]:
         """By recording, likely errors of the angles that are counted; shape (phases, channels, samples)."""
-        return self._each(lambda i: self.evidence[i].rounding_errors(self.values_of(x, i)) * np.sqrt(self._weight(i)))
+        return self._each(
+            lambda i: self.observations[i].rounding_errors(self.values_of(x, i)) * np.sqrt(self._weight(i))
+        )
 
     def mean_square(self, x: NDArray) -> float:
         """Mean square of the errors over their noise, every sample alike."""
         total = sum(float((e**2).sum()) / self._weight(i) for i, e in enumerate(self.errors(x)))
-        return total / sum(e.measured.size for e in self.evidence)
+        return total / sum(e.measured.size for e in self.observations)
 
     @cached_property
     def independent_looks(self) -> float:
         """Number of independent errors that the cost is worth: what it comes to if the model is right."""
-        return sum(e.measured.size * self._weight(i) for i, e in enumerate(self.evidence))
+        return sum(e.measured.size * self._weight(i) for i, e in enumerate(self.observations))
 
     def _block(self, x: NDArray, i: int, relative: float) -> Block:
         columns = np.r_[0 : len(self.shared), self.own_columns(i)].astype(int)
@@ -295,13 +297,13 @@ class Problem:
         return Block(columns, base, derivatives)
 
     def _weighed(self, x: NDArray, i: int) -> NDArray:
-        return self.evidence[i].errors(self.values_of(x, i)) * np.sqrt(self._weight(i))
+        return self.observations[i].errors(self.values_of(x, i)) * np.sqrt(self._weight(i))
 
     def _weight(self, i: int) -> float:
-        return min(1.0, self.looks / self.evidence[i].measured.shape[1])
+        return min(1.0, self.looks / self.observations[i].measured.shape[1])
 
     def _each(self, work: Callable) -> list:
-        return each(self.evidence, lambda i, evidence: work(i))
+        return each(self.observations, lambda i, observations: work(i))
 
 
 def each(recordings: Sequence, work: Callable) -> list:

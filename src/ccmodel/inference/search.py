@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares, lsq_linear, minimize
 
 from ccmodel.failure import ModelError
-from ccmodel.identify.problem import Block, Problem
+from ccmodel.inference.problem import Block, Problem
 from ccmodel.model.sensitivity import STEP
 
 # A search has converged when a step lessens the cost by less than this share of it: its place is then known to a

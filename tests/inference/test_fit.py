@@ -8,9 +8,9 @@ import pytest
 from scipy.optimize import least_squares
 
 from ccmodel.failure import ModelError
-from ccmodel.identify.fit import fit
-from ccmodel.identify.problem import Evidence, Free, Problem
-from ccmodel.identify.search import solve
+from ccmodel.inference.fit import fit
+from ccmodel.inference.problem import Free, Observations, Problem
+from ccmodel.inference.search import solve
 from ccmodel.recording import TENSIONS
 from drawn_batches import CONDITIONS, SPREAD, draw, problem_of
 
@@ -66,25 +66,25 @@ def test_every_recording_has_values_of_its_own_within_what_their_intervals_say(d
 
 def test_an_initial_tension_that_bends_between_the_ends_is_found():
     """The rest shows the ends alone; taken for straight, a profile like this would be taken for something else."""
-    drawn = draw(4, conditions=CONDITIONS[:2], duration_s=2.4, bow=0.5)
-    said = fit(problem_of(drawn, SPREAD | {"profile_bow_A": 0.3, "profile_bow_B": 0.3}))
+    drawn = draw(4, conditions=CONDITIONS[:2], duration_s=2.4, curvature=0.5)
+    said = fit(problem_of(drawn, SPREAD | {"tension_curvature_A": 0.3, "tension_curvature_B": 0.3}))
     straight = fit(problem_of(drawn))
     assert straight.cost > 1.5 * said.cost
     for own in said.own_intervals.values():
-        for name, true in (("profile_bow_A", 0.5), ("profile_bow_B", 0.0)):
+        for name, true in (("tension_curvature_A", 0.5), ("tension_curvature_B", 0.0)):
             assert (own[name].low + own[name].high) / 2 == pytest.approx(true, abs=0.1)
 
 
 def test_where_the_drive_rests_is_told_by_more_than_its_motion(found):
     """All that its counts say of the first rest is one standard deviation; torques and tensions say more."""
     for own in found.own_intervals.values():
-        assert own["drive_place"].sd < 0.9
-        assert abs(own["drive_place"].low + own["drive_place"].high) / 2 < 4
+        assert own["drive_encoder_offset"].sd < 0.9
+        assert abs(own["drive_encoder_offset"].low + own["drive_encoder_offset"].high) / 2 < 4
 
 
 def test_all_rows_give_the_same(problem):
     """Scipy's trust region on every row of the same cost, where ours gives it a root of their products."""
-    problem = Problem(problem.evidence[:2], problem.shared, problem.own)
+    problem = Problem(problem.observations[:2], problem.shared, problem.own)
     ours = solve(problem, problem.start)
     assert ours.message.startswith("converged")
     theirs = least_squares(
@@ -110,44 +110,44 @@ def test_a_start_that_ends_elsewhere_is_said(problem, monkeypatch):
         found = real(problem, x)
         return found if len(calls) == 1 else replace(found, x=found.x * 1.1, cost=found.cost * 2)
 
-    monkeypatch.setattr("ccmodel.identify.fit.solve", astray)
+    monkeypatch.setattr("ccmodel.inference.fit.solve", astray)
     assert "1 of 2 starts ended elsewhere, at a higher or equal error" in fit(problem, starts=2).warnings
 
 
 def test_a_bound_that_was_hit_is_named(problem):
     low = problem.start[0]
     free = problem.shared | {"stiffness_N_per_m": Free(low, low, 2 * low)}  # truth lies a sixth lower
-    said = fit(Problem(problem.evidence, free, problem.own))
+    said = fit(Problem(problem.observations, free, problem.own))
     assert said.at_bound == ["stiffness_N_per_m"]
     assert said.values["stiffness_N_per_m"] == low
 
 
 def test_a_start_outside_its_bounds_is_refused_by_name(problem):
     free = problem.shared | {"stiffness_N_per_m": Free(1.0, 10.0, 1e5)}
-    said = fit(Problem(problem.evidence, free))
+    said = fit(Problem(problem.observations, free))
     assert not said.succeeded
     assert "stiffness_N_per_m starts at 1, outside" in said.message
 
 
 def test_a_fit_that_is_not_finite_is_refused_with_its_reason(problem):
-    evidence = problem.evidence[0]
-    measured = evidence.measured.copy()
+    observations = problem.observations[0]
+    measured = observations.measured.copy()
     measured[0, 10] = np.nan
-    said = fit(Problem([replace(evidence, measured=measured)], problem.shared, problem.own))
+    said = fit(Problem([replace(observations, measured=measured)], problem.shared, problem.own))
     assert not said.succeeded
     assert "not finite" in said.message
     assert not said.values
 
 
 def test_a_model_that_cannot_be_run_on_the_way_makes_the_search_turn_back(problem, drawn, monkeypatch):
-    real = Evidence.errors
+    real = Observations.errors
 
     def picky(self, values):
         if values["stiffness_N_per_m"] < 0.95 * drawn.shared["stiffness_N_per_m"]:
             raise ModelError("too soft")
         return real(self, values)
 
-    monkeypatch.setattr(Evidence, "errors", picky)
+    monkeypatch.setattr(Observations, "errors", picky)
     assert fit(problem).values["stiffness_N_per_m"] == pytest.approx(drawn.shared["stiffness_N_per_m"], rel=0.005)
 
 
@@ -155,7 +155,7 @@ def test_a_profile_that_the_model_cannot_be_run_along_is_said(problem, monkeypat
     def unable(*_):
         raise ModelError("too soft")
 
-    monkeypatch.setattr("ccmodel.identify.fit.profile", unable)
+    monkeypatch.setattr("ccmodel.inference.fit.profile", unable)
     said = fit(problem, profiled=["stiffness_N_per_m"])
     assert said.succeeded
     assert "no profile of stiffness_N_per_m: too soft" in said.warnings
@@ -173,14 +173,14 @@ def uphill(monkeypatch):
 
 
 def test_a_stalled_search_is_refused_with_its_reason(problem, uphill, monkeypatch):
-    monkeypatch.setattr("ccmodel.identify.search.UNKNOWNS_DIRECT", 0)
+    monkeypatch.setattr("ccmodel.inference.search.UNKNOWNS_DIRECT", 0)
     said = fit(problem)
     assert not said.succeeded
     assert said.message.startswith("stalled")
 
 
 def test_where_slopes_lead_nowhere_few_unknowns_are_searched_without(problem, drawn, uphill):
-    said = fit(Problem(problem.evidence, problem.shared))
+    said = fit(Problem(problem.observations, problem.shared))
     assert said.succeeded
     assert "direct search" in said.message
     stiffness = said.values["stiffness_N_per_m"]
@@ -191,16 +191,16 @@ def test_tensions_do_not_enter_a_second_time(problem, drawn):
     """With other tensions in the recording the errors are what they were: they are derived from torques and sums."""
     recording = drawn.recordings[0]
     channels = {c: v + (100.0 if c in TENSIONS else 0.0) for c, v in recording.channels.items()}
-    given = problem.evidence[0].given
-    tampered = Evidence.of(replace(recording, channels=channels), problem.evidence[0].parameters)
+    given = problem.observations[0].given
+    tampered = Observations.of(replace(recording, channels=channels), problem.observations[0].parameters)
     assert not set(tampered.channels) & set(TENSIONS)
-    assert tampered.measured == pytest.approx(problem.evidence[0].measured)
+    assert tampered.measured == pytest.approx(problem.observations[0].measured)
     assert given.recording.id == recording.id
 
 
 def test_weights_are_the_noise_that_the_rest_shows(drawn, problem):
     """Torque noise of 0.1 mN m is found from 80 samples at rest, to within a quarter of it."""
-    e = problem.evidence[0]
+    e = problem.observations[0]
     quiet = e.sigma[e.channels.index("tau_out_Nm")]
     assert quiet.min() == pytest.approx(1e-4, rel=0.25)
     assert e.sigma[e.channels.index("F_load_N")].min() == pytest.approx(0.05, rel=0.25)

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from ccmodel.identify import intervals
-from ccmodel.identify.fit import fit
-from ccmodel.identify.intervals import REACH, bootstrap, covariance, profile
-from ccmodel.identify.problem import Block, Free, Problem
-from ccmodel.identify.search import information_and_slope, solve
+from ccmodel.inference import intervals
+from ccmodel.inference.fit import fit
+from ccmodel.inference.intervals import REACH, bootstrap, covariance, profile
+from ccmodel.inference.problem import Block, Free, Problem
+from ccmodel.inference.search import information_and_slope, solve
 from drawn_batches import CONDITIONS, SPREAD, draw, problem_of
 
 EXTRA_BEND = Free(0.0, -1.0, 3.0)
@@ -73,13 +73,15 @@ def test_of_two_paths_both_are_known():
 def test_an_unknown_on_which_nothing_depends_is_named_alone(solved):
     """The load cells' zeros without the load cells' channels, tensions from elsewhere."""
     problem, _ = solved
-    evidence = [replace(e, parameters=replace(e.parameters, pretension_N=7.0)) for e in problem.evidence]
-    at = [e.channels.index("theta_out_rad") for e in evidence]
-    evidence = [
+    observations = [replace(e, parameters=replace(e.parameters, pretension_N=7.0)) for e in problem.observations]
+    at = [e.channels.index("theta_out_rad") for e in observations]
+    observations = [
         replace(e, channels=("theta_out_rad",), measured=e.measured[[k]], sigma=e.sigma[[k]])
-        for e, k in zip(evidence, at, strict=True)
+        for e, k in zip(observations, at, strict=True)
     ]
-    said = fit(Problem(evidence, {n: problem.shared[n] for n in ("stiffness_N_per_m",)} | {"F_load_zero_N": Free(0.0)}))
+    said = fit(
+        Problem(observations, {n: problem.shared[n] for n in ("stiffness_N_per_m",)} | {"F_load_zero_N": Free(0.0)})
+    )
     (group,) = said.undetermined
     assert group.text == "F_load_zero_N is not determined by these recordings"
     assert said.as_dict()["intervals"]["F_load_zero_N"]["low"] is None
@@ -100,7 +102,7 @@ def test_a_profile_stops_at_a_bound(solved):
     k = problem.names.index("friction_coefficient")
     near = float(solution.x[k] + 0.5 * np.sqrt(variance[k]))
     free = problem.shared | {"friction_coefficient": replace(problem.shared["friction_coefficient"], high=near)}
-    bounded = Problem(problem.evidence, free, problem.own)
+    bounded = Problem(problem.observations, free, problem.own)
     assert profile(bounded, solution, "friction_coefficient", variance).high == near
 
 
@@ -163,14 +165,16 @@ def test_more_that_is_accounted_for_than_there_is_leaves_nothing():
 def test_what_the_fit_leaves_of_an_error_is_what_a_new_fit_leaves_of_it(solved):
     """Of a single recording, so that nothing is left by way of others."""
     problem, _ = solved
-    problem = Problem(problem.evidence[:1], problem.shared, {"theta_out_zero_rad": problem.own["theta_out_zero_rad"]})
+    problem = Problem(
+        problem.observations[:1], problem.shared, {"theta_out_zero_rad": problem.own["theta_out_zero_rad"]}
+    )
     solution = solve(problem, problem.start)
-    (block,), (evidence,) = solution.blocks, problem.evidence
-    k = evidence.channels.index("theta_out_rad")
-    error = np.zeros_like(evidence.measured)
+    (block,), (observations,) = solution.blocks, problem.observations
+    k = observations.channels.index("theta_out_rad")
+    error = np.zeros_like(observations.measured)
     # The zero takes up the middle of it, nothing the rest.
-    error[k] = 0.05 * evidence.sigma[k] * (1 + np.sin(np.linspace(0, 40, error[k].size)))
-    moved = Problem([replace(evidence, measured=evidence.measured - error)], problem.shared, problem.own)
+    error[k] = 0.05 * observations.sigma[k] * (1 + np.sin(np.linspace(0, 40, error[k].size)))
+    moved = Problem([replace(observations, measured=observations.measured - error)], problem.shared, problem.own)
     (added,) = (a - b for a, b in zip(moved.errors(solution.x), problem.errors(solution.x), strict=True))
     information = block.information + np.diag(problem.expected**2)
     (said,) = intervals.left_by_fit(block, np.linalg.inv(information), added[None])
@@ -183,11 +187,13 @@ def test_what_rounding_does_to_a_fit_stands_in_its_covariance(solved):
     """With residuals of nothing, against encoders of many phases; without a step, there is no rounding."""
     problem, solution = solved
     silent = replace(solution, blocks=[replace(b, errors=np.zeros_like(b.errors)) for b in solution.blocks])
-    read = [replace(e.given.recording, encoder_step_rad={}) for e in problem.evidence]
-    uncounted = [replace(e, given=replace(e.given, recording=r)) for e, r in zip(problem.evidence, read, strict=True)]
+    read = [replace(e.given.recording, encoder_step_rad={}) for e in problem.observations]
+    uncounted = [
+        replace(e, given=replace(e.given, recording=r)) for e, r in zip(problem.observations, read, strict=True)
+    ]
     said = covariance(problem, silent) - covariance(Problem(uncounted, problem.shared, problem.own), silent)
     random, scores = np.random.default_rng(0), np.zeros((400, problem.start.size))
-    for i, (e, block) in enumerate(zip(problem.evidence, solution.blocks, strict=True)):
+    for i, (e, block) in enumerate(zip(problem.observations, solution.blocks, strict=True)):
         k, step = e.channels.index("theta_out_rad"), e.given.recording.encoder_step_rad["theta_out_rad"]
         place = e.modelled(problem.values_of(solution.x, i))[k] / step + random.uniform(size=(400, 1))
         errors = (np.floor(place) + 0.5 - place) * step / e.sigma[k] * np.sqrt(problem.looks / e.measured.shape[1])
@@ -207,7 +213,7 @@ def test_nine_out_of_ten_intervals_hold_the_truth():
         said = fit(problem)
         assert said.succeeded, said.message
         pairs = [(said.intervals[n], true) for n, true in drawn.shared.items()]
-        for e, own in zip(problem.evidence, drawn.own, strict=True):
+        for e, own in zip(problem.observations, drawn.own, strict=True):
             pairs += [(said.own_intervals[e.name][n], true) for n, true in own.items()]
         held += [i.low <= true <= i.high for i, true in pairs]
     # Not all of them are independent, so the limits are those of half as many, 1 in 1,000 either side.

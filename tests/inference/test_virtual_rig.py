@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ccmodel.identify.fit import fit
-from ccmodel.identify.problem import Evidence, Free, Problem
+from ccmodel.inference.fit import fit
+from ccmodel.inference.problem import Free, Observations, Problem
 from ccmodel.model.parameters import Parameters
 from ccmodel.rig.ingest import ingest_batch
 from drawn_batches import SPREAD
@@ -19,7 +19,7 @@ def said():
     """One, two and three half loops, each twice."""
     batch = ingest_batch(LOOPS)
     estimates = Parameters.estimated(batch.batch.rig)
-    evidence = [Evidence.of(r, estimates, step_s=0.004, placed=True) for r in batch.recordings]
+    observations = [Observations.of(r, estimates, step_s=0.004, offset_is_free=True) for r in batch.recordings]
     free = {
         "stiffness_N_per_m": Free(estimates.stiffness_N_per_m, 1e3, 1e5),
         "friction_coefficient": Free(estimates.friction_coefficient, 0.01, 0.6),
@@ -27,7 +27,7 @@ def said():
     }
     scales = ("friction_scale", "pretension_scale")
     own = {name: Free(1.0 if name in scales else 0.0, spread=spread) for name, spread in SPREAD.items()}
-    return fit(Problem(evidence, free, own))
+    return fit(Problem(observations, free, own))
 
 
 def test_stiffness_friction_and_load_are_what_the_rig_was_made_with(said):

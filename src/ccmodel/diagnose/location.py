@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ccmodel.diagnose.alone import PLACES_OF, channels_of, cleared
-from ccmodel.diagnose.evidence import Weighed
-from ccmodel.diagnose.judge import Judgement
-from ccmodel.diagnose.travel import is_moving, since_reversal
-from ccmodel.diagnose.trial import Trial
+from ccmodel.diagnose.candidate import CandidateFit
+from ccmodel.diagnose.comparison import Judgement
+from ccmodel.diagnose.drive import is_moving, since_reversal
+from ccmodel.diagnose.isolation import PLACES_OF, channels_of, cleared
+from ccmodel.diagnose.whitening import Whitened
 from ccmodel.model.run import ModelInput
 
 # Parts of a motion by what the drive does.
@@ -66,8 +66,8 @@ def _sticking_out(square: dict[str, float], share: float) -> list[str]:
 def _places(judgement: Judgement) -> list[str]:
     """Where the mismatch sits as far as it can be said without a mechanism that accounts for it, likeliest first.
 
-    What no suspect alone accounts for (`ccmodel.diagnose.alone`) lies in between, and there nearly everything that can
-    be wrong is wrong along the conduits.
+    What no suspect alone accounts for (`ccmodel.diagnose.isolation`) lies in between, and there nearly everything
+    that can be wrong is wrong along the conduits.
     """
     weighed, calibrated = judgement.weighed, judgement.calibrated
     left, places = min(cleared(weighed, calibrated), default=(0.0, PLACES_OF[channels_of(weighed)[0]]))
@@ -76,11 +76,11 @@ def _places(judgement: Judgement) -> list[str]:
     return list(dict.fromkeys([*(place for place in found if place in suspects), *suspects]))
 
 
-def mismatch(weighed: Sequence[Weighed], trial: Trial) -> dict[str, dict[str, float]]:
+def mismatch(weighed: Sequence[Whitened], trial: CandidateFit) -> dict[str, dict[str, float]]:
     """Root mean square of the held-out errors over what a right model leaves, by channel and part of the motion."""
     sums: dict[str, dict[str, list]] = {}
     for i, w in enumerate(weighed):
-        e = replace(w.evidence, parameters=trial.hypothesis.of(w.evidence.parameters))
+        e = replace(w.observations, parameters=trial.hypothesis.of(w.observations.parameters))
         floor = np.array([w.floor[c] for c in e.channels])[:, None]
         errors = e.errors(trial.held_out[i]) * e.sigma / floor
         part = parts_of(e.given)[e.judged]

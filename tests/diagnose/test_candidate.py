@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from ccmodel.diagnose import trial
+from ccmodel.diagnose import candidate
+from ccmodel.diagnose.candidate import _eased, _scatter, _shortened, fit, moved_by_finer
 from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.trial import _eased, _scatter, _shortened, fit, moved_by_finer
-from made_evidence import batch, calibrated
+from made_observations import batch, calibrated
 
 LOW = np.array([0.0, 1e-3])
 KEY = "conduit-compliance/conduit/compliance"
@@ -24,17 +24,17 @@ def test_what_a_coarse_solver_costs_is_what_it_takes_to_undo_it(monkeypatch):
     found = fit(recordings, hypothesis, base.free, base.values | {KEY: 1e-5})
     k = list(found.values).index(KEY)
     moved = moved_by_finer(recordings, found)
-    finer = [w.acting(replace(w.evidence.parameters, refinement=trial.FINER)) for w in recordings]
+    finer = [w.acting(replace(w.observations.parameters, refinement=candidate.FINER)) for w in recordings]
     there = fit(finer, hypothesis, base.free, found.values)
     assert found.values[KEY] + moved[k] == pytest.approx(there.values[KEY], abs=0.3 * abs(moved[k]))
-    monkeypatch.setattr(trial, "FINER", 1)
+    monkeypatch.setattr(candidate, "FINER", 1)
     assert moved_by_finer(recordings, found) == pytest.approx(np.zeros(moved.size), abs=1e-12)
 
 
 def test_the_papers_model_has_no_solver_to_refine():
     for w in batch():
-        refined = w.acting(replace(w.evidence.parameters, refinement=3))
-        assert (w.evidence.modelled({}) == refined.evidence.modelled({})).all()
+        refined = w.acting(replace(w.observations.parameters, refinement=3))
+        assert (w.observations.modelled({}) == refined.observations.modelled({})).all()
 
 
 def inverses(information):
@@ -90,7 +90,7 @@ def test_a_value_is_eased_down_as_long_as_that_leaves_less(least, end):
 
 def test_a_step_that_goes_astray_is_shortened(monkeypatch):
     """One unknown, of which the others' errors want 1: a step to 1 is taken, one to 4 halved, one to 40 not taken."""
-    monkeypatch.setattr(trial, "errors", lambda w, values: np.array([values["x"] - 1.0]))
+    monkeypatch.setattr(candidate, "errors", lambda w, values: np.array([values["x"] - 1.0]))
     others = [("a recording", np.array([-1.0]))] * 3
 
     def step(to):

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.identify.problem import Evidence
+from ccmodel.inference.problem import Observations
 from ccmodel.model.general.run import settings_of
 from ccmodel.model.parameters import ZERO_OF, Parameters
 from ccmodel.model.sensitivity import STEP, size_of
@@ -30,12 +30,12 @@ FRICTION_SPREAD = 0.01  # of itself, from run to run: what cables of the paper's
 
 
 @dataclass(frozen=True)
-class Weighed:
+class Whitened:
     """A recording with the covariance of its errors.
 
     Attributes
     ----------
-    evidence : Evidence
+    observations : Observations
     directions : ndarray, shape (rows, k)
         Orthonormal directions of what differs from run to run, among the errors over the sensors' noise.
     shrink : ndarray, shape (k,)
@@ -47,7 +47,7 @@ class Weighed:
         Root mean square of what a right model leaves, by channel, in its unit.
     """
 
-    evidence: Evidence
+    observations: Observations
     directions: NDArray
     shrink: NDArray
     likeliest: NDArray
@@ -59,26 +59,26 @@ class Weighed:
 
     def counted(self, errors: NDArray) -> NDArray:
         """The same, and below it the likeliest differences, each weighed as a look; shape (rows + numbers,)."""
-        rows_a_look = self.evidence.measured.shape[1] / LOOKS
+        rows_a_look = self.observations.measured.shape[1] / LOOKS
         return np.concatenate([self.whitened(errors), np.sqrt(rows_a_look) * (self.likeliest @ errors)])
 
-    def acting(self, parameters: Parameters) -> "Weighed":
+    def acting(self, parameters: Parameters) -> "Whitened":
         """The same recording beside another model."""
-        return replace(self, evidence=replace(self.evidence, parameters=parameters))
+        return replace(self, observations=replace(self.observations, parameters=parameters))
 
 
-def weigh(evidence: Evidence, parameters: Parameters) -> Weighed:
+def weigh(observations: Observations, parameters: Parameters) -> Whitened:
     """Work out what may differ from run to run, about a model that is fitted already."""
-    e = replace(evidence, parameters=parameters)
+    e = replace(observations, parameters=parameters)
     N, numbers = run_differences(e)
     friction = N[:, 0].reshape(e.sigma.shape) * e.sigma
     floor = np.sqrt((e.sigma**2).mean(axis=1) + (friction**2).mean(axis=1))
     U, s, Vt = np.linalg.svd(N, full_matrices=False)
     likeliest = (Vt.T[:numbers] * (s / (1 + s**2))) @ U.T
-    return Weighed(e, U, shrink_of(s), likeliest, dict(zip(e.channels, floor.tolist(), strict=True)))
+    return Whitened(e, U, shrink_of(s), likeliest, dict(zip(e.channels, floor.tolist(), strict=True)))
 
 
-def run_differences(e: Evidence) -> tuple[NDArray, int]:
+def run_differences(e: Observations) -> tuple[NDArray, int]:
     """What differs from run to run, a standard deviation of each in units of the noise, and how many are numbers.
 
     Returns
@@ -100,22 +100,22 @@ def shrink_of(s: NDArray) -> NDArray:
     return 1 - 1 / np.hypot(1, s)
 
 
-def weighed_about(one: Weighed, model: Parameters) -> Weighed:
+def weighed_about(one: Whitened, model: Parameters) -> Whitened:
     """A recording weighed anew about a model of it, its load where in a gap of that model it most likely rested.
 
     With mass behind the gap either side makes another ringing of it, and no straight line leads from one to the other.
     """
 
     def left(place: float) -> float:
-        errors = one.acting(replace(model, load_place=place)).evidence.errors({})
+        errors = one.acting(replace(model, load_gap_position=place)).observations.errors({})
         return float(np.mean(one.whitened(errors.ravel()) ** 2))
 
-    place = min(WITHIN_GAP, key=left) if settings_of(model.mechanisms).half_gap else model.load_place
-    about = weigh(one.evidence, replace(model, load_place=place))
-    return about.acting(replace(one.evidence.parameters, load_place=place))
+    place = min(WITHIN_GAP, key=left) if settings_of(model.mechanisms).half_gap else model.load_gap_position
+    about = weigh(one.observations, replace(model, load_gap_position=place))
+    return about.acting(replace(one.observations.parameters, load_gap_position=place))
 
 
-def _nuisances(e: Evidence, parameters: Parameters) -> Sequence[tuple[str, float, float, float]]:
+def _nuisances(e: Observations, parameters: Parameters) -> Sequence[tuple[str, float, float, float]]:
     """Name, value, spread from run to run and step of each number that differs; friction first."""
     recording = e.given.recording
     mu = parameters.friction_coefficient
@@ -124,7 +124,7 @@ def _nuisances(e: Evidence, parameters: Parameters) -> Sequence[tuple[str, float
         if channel in e.channels and channel in recording.accuracy:
             found.append((name, getattr(parameters, name), recording.accuracy[channel]))
     if settings_of(parameters.mechanisms).half_gap:
-        found.append(("load_place", parameters.load_place, ANYWHERE))
+        found.append(("load_gap_position", parameters.load_gap_position, ANYWHERE))
     if "theta_out_rad" in e.channels and (step := recording.encoder_step_rad.get("theta_out_rad")):
         found.append(("theta_out_zero_rad", parameters.theta_out_zero_rad, step / np.sqrt(12)))
     return [(name, value, spread, STEP * size_of(name, value) * 10) for name, value, spread in found]
