@@ -195,6 +195,30 @@ def table_one(
 
 
 @app.command()
+def mechanisms(
+    name: Annotated[str | None, typer.Argument(help="Print the whole entry of this one.")] = None,
+    markdown: Annotated[bool, typer.Option("--markdown", help="Print docs/mechanisms.md.")] = False,
+) -> None:
+    """List the mechanisms: names, places, parameters with range and unit."""
+    from rich.table import Table
+
+    from ccmodel.mechanisms import UnknownMechanismError, catalogue
+
+    if markdown:
+        typer.echo(catalogue.page())
+    elif name is None:
+        table = Table("name", "places", "parameters", "what it is", box=None)
+        for row in catalogue.rows():
+            table.add_row(*row)
+        Console(soft_wrap=False, highlight=False).print(table, markup=False)
+    else:
+        try:
+            typer.echo(catalogue.entry(name))
+        except UnknownMechanismError as error:
+            raise InputError(str(error)) from None
+
+
+@app.command()
 def schema() -> None:
     """Print the JSON schema of the configuration."""
     from ccmodel.config import Config
