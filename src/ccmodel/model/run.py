@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
-from ccmodel.encoder.motion import SIDES, drive_motion
+from ccmodel.encoder.reconstruction import reconstruct_motion
+from ccmodel.encoder.smoothing import OFFSET_SCORES
 from ccmodel.failure import ModelError
 from ccmodel.model.exact import pair as exact
 from ccmodel.model.general import run as general
@@ -114,7 +115,7 @@ class ModelInput:
     @property
     def deviations_given_offset(self) -> NDArray:
         """`drive_deviations` where it is known where in its count the drive first rests."""
-        return self.drive_deviations - SIDES[: len(self.drive_deviations), None] * self.drive_encoder_offset
+        return self.drive_deviations - OFFSET_SCORES[: len(self.drive_deviations), None] * self.drive_encoder_offset
 
 
 def simulate_recording(recording: Recording, parameters: Parameters) -> Recording:
@@ -267,8 +268,8 @@ def _motion(recording: Recording, channel: str) -> tuple[NDArray, NDArray, NDArr
     if channel not in recording.encoder_step_rad:
         return recording[channel], np.zeros((0, recording.time_s.size)), np.zeros(recording.time_s.size)
     step_rad = recording.encoder_step_rad[channel]
-    found = drive_motion(recording.time_s, recording[channel], step_rad, recording.rest_s)
-    return found.theta_rad, found.deviations_rad, found.place_rad
+    found = reconstruct_motion(recording.time_s, recording[channel], step_rad, recording.rest_s)
+    return found.theta_rad, found.deviations_rad, found.encoder_offset_rad
 
 
 def _rest(recording: Recording, theta_in: NDArray) -> slice:
