@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from ccmodel.channels import TENSIONS
 from ccmodel.failure import ModelError
 from ccmodel.inference.fit import fit
 from ccmodel.inference.problem import Free, Observations, Problem
 from ccmodel.inference.search import solve
-from ccmodel.recording import TENSIONS
 from drawn_batches import CONDITIONS, SPREAD, draw, problem_of
 
 

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from ccmodel.channels import TENSIONS
 from ccmodel.diagnose.candidate import CandidateFit
 from ccmodel.diagnose.drive import since_reversal, speed
 from ccmodel.diagnose.whitening import Whitened
 from ccmodel.inference.problem import Observations, each
 from ccmodel.model.run import simulate
-from ccmodel.recording import TENSIONS
 
 # Random features, how many of the quantities each looks at on average, and over which lengths (in standard deviations).
 FEATURES = 200

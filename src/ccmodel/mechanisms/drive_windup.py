@@ -17,6 +17,7 @@ therefore asked for by name only.
 
 import numpy as np
 
+from ccmodel.channels import TAU_IN, THETA_IN
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
@@ -86,8 +87,8 @@ def _at_turn(time_s, theta, tau, compliance, lost_motion, within, way, extreme, 
 
 
 def _modifies_observation(sensing, place, values):
-    given = sensing.time_s, sensing.channels["theta_in_rad"], sensing.channels["tau_in_Nm"]
-    return {"tau_in_Nm": wound(*map(np.ascontiguousarray, given), values["compliance"], values["lost_motion"])}
+    given = sensing.time_s, sensing.channels[THETA_IN], sensing.channels[TAU_IN]
+    return {TAU_IN: wound(*map(np.ascontiguousarray, given), values["compliance"], values["lost_motion"])}
 
 
 MECHANISM = Mechanism(
