@@ -129,7 +129,7 @@ def diagnose(
 
 def _tolerance(stated: list[str]) -> float | dict[str, float]:
     """One share for all channels, or one a channel."""
-    from ccmodel.inference.observations import MEASURED
+    from ccmodel.channels import MEASURED
 
     try:
         shares = {channel: float(share) for channel, _, share in (one.rpartition("=") for one in stated)}

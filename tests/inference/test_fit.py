@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from ccmodel.channels import TENSIONS
 from ccmodel.failure import ModelError
 from ccmodel.inference.fit import fit
 from ccmodel.inference.least_squares import solve
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.problem import Free, Problem
-from ccmodel.recording import TENSIONS
 from drawn_batches import CONDITIONS, SPREAD, draw, problem_of
 
 

@@ -5,22 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ccmodel.channels import TAU_IN, TAU_OUT, ZERO_OF
+from ccmodel.diagnose import settings
 from ccmodel.diagnose.hypothesis import PAPER, Hypothesis
-from ccmodel.diagnose.settings import (
-    FIRST_FIT_EVALUATIONS,
-    FIRST_FIT_TOLERANCE,
-    FRICTION,
-    FRICTION_SPREAD,
-    LOAD_NM_PER_RAD,
-    PARALLEL_SPRING,
-    PRETENSION_SHARE,
-    RADIUS_RATIO,
-    STIFFNESS_N_PER_M,
-)
 from ccmodel.inference.least_squares import Search, solve
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.problem import Free, Problem
-from ccmodel.model.parameters import ZERO_OF, Parameters
+from ccmodel.model.parameters import Parameters
 
 
 @dataclass(frozen=True)
@@ -73,24 +64,24 @@ def model_in_question(
 def calibration(estimates: Parameters, observations: Sequence[Observations]) -> dict[str, Free]:
     """Unknowns of a calibration: stiffness, friction, the load's spring, and whatever a rest does not show."""
     free = {
-        "stiffness_N_per_m": _free(estimates.stiffness_N_per_m, *STIFFNESS_N_PER_M),
-        "friction_coefficient": _free(estimates.friction_coefficient, *FRICTION),
+        "stiffness_N_per_m": _free(estimates.stiffness_N_per_m, *settings.STIFFNESS_N_PER_M),
+        "friction_coefficient": _free(estimates.friction_coefficient, *settings.FRICTION),
     }
-    has_torque = [o for o in observations if "tau_in_Nm" in o.channels]
+    has_torque = [o for o in observations if TAU_IN in o.channels]
     if estimates.load_stiffness_Nm_per_rad is not None:
-        free["load_stiffness_Nm_per_rad"] = _free(estimates.load_stiffness_Nm_per_rad, *LOAD_NM_PER_RAD)
+        free["load_stiffness_Nm_per_rad"] = _free(estimates.load_stiffness_Nm_per_rad, *settings.LOAD_NM_PER_RAD)
     elif len(has_torque) == len(observations):
         # A spring parallel to the load, which the torque sensor at the load does not measure.
-        ratios = [np.ptp(o.given.recording["tau_in_Nm"]) / np.ptp(o.given.theta_in) for o in observations]
-        start, most = (factor * float(np.median(ratios)) for factor in PARALLEL_SPRING)
+        ratios = [np.ptp(o.given.recording[TAU_IN]) / np.ptp(o.given.theta_in) for o in observations]
+        start, most = (factor * float(np.median(ratios)) for factor in settings.PARALLEL_SPRING)
         free["spring_beside_load_Nm_per_rad"] = Free(start, 0.0, most)
     if not all(o.given.initial_tension_observed for o in observations):
-        free["pretension_share"] = Free(1.0, *PRETENSION_SHARE)
+        free["pretension_share"] = Free(1.0, *settings.PRETENSION_SHARE)
         radius = estimates.load_radius_m
-        free["load_radius_m"] = Free(radius, *(ratio * radius for ratio in RADIUS_RATIO))
+        free["load_radius_m"] = Free(radius, *(ratio * radius for ratio in settings.RADIUS_RATIO))
         if has_torque:
-            reach = max(float(np.ptp(o.given.recording["tau_in_Nm"])) for o in has_torque)
-            free |= {name: Free(0.0, -reach, reach) for name in ("tau_in_zero_Nm", "tau_out_zero_Nm")}
+            reach = max(float(np.ptp(o.given.recording[TAU_IN])) for o in has_torque)
+            free |= {name: Free(0.0, -reach, reach) for name in (ZERO_OF[TAU_IN], ZERO_OF[TAU_OUT])}
     return free
 
 
@@ -115,6 +106,6 @@ def _values_of(
 
 
 def _first_fit(observations: Sequence[Observations], free: Mapping[str, Free]) -> dict[str, float]:
-    problem = Problem(observations, free, {"friction_scale": Free(1.0, 0.2, 5.0, FRICTION_SPREAD)})
-    how = Search(most_evaluations=FIRST_FIT_EVALUATIONS, tolerance=FIRST_FIT_TOLERANCE)
+    problem = Problem(observations, free, {"friction_scale": Free(1.0, 0.2, 5.0, settings.FRICTION_SPREAD)})
+    how = Search(most_evaluations=settings.FIRST_FIT_EVALUATIONS, tolerance=settings.FIRST_FIT_TOLERANCE)
     return dict(zip(free, solve(problem, problem.start, how).x.tolist(), strict=False))

@@ -7,16 +7,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.diagnose import settings
 from ccmodel.diagnose.hypothesis import Hypothesis, plausible
-from ccmodel.diagnose.settings import (
-    CONTINUATION_FACTOR,
-    FIT_DIFFERENCE,
-    FIT_EVALUATIONS,
-    FIT_TOLERANCE,
-    PRETENSION_STARTS,
-    REFINEMENT,
-    START_EVALUATIONS,
-)
 from ccmodel.diagnose.whitening import Whitened
 from ccmodel.failure import ModelError
 from ccmodel.inference.cross_validation import inverse_of, leave_one_out
@@ -27,7 +19,9 @@ from ccmodel.inference.pool import each
 from ccmodel.inference.problem import Free, Problem
 from ccmodel.model.parameters import Parameters
 
-SEARCH = Search(FIT_TOLERANCE, FIT_TOLERANCE, FIT_DIFFERENCE, FIT_EVALUATIONS, retreats=False)
+SEARCH = Search(
+    settings.FIT_TOLERANCE, settings.FIT_TOLERANCE, settings.FIT_DIFFERENCE, settings.FIT_EVALUATIONS, retreats=False
+)
 
 
 @dataclass(frozen=True)
@@ -146,7 +140,7 @@ def _starts(problem: Problem) -> list[NDArray]:
     if "pretension_share" not in problem.names:
         return [problem.start]
     is_pretension = np.array(problem.names) == "pretension_share"
-    return [np.where(is_pretension, share * problem.start, problem.start) for share in PRETENSION_STARTS]
+    return [np.where(is_pretension, share * problem.start, problem.start) for share in settings.PRETENSION_STARTS]
 
 
 def _best(problem: Problem, starts: Sequence[NDArray]) -> Solution:
@@ -154,7 +148,7 @@ def _best(problem: Problem, starts: Sequence[NDArray]) -> Solution:
     found, failure = [], None
     for x in starts:
         try:
-            found.append(minimise(problem, x, replace(SEARCH, most_evaluations=START_EVALUATIONS)))
+            found.append(minimise(problem, x, replace(SEARCH, most_evaluations=settings.START_EVALUATIONS)))
         except ModelError as error:
             failure = error
     if not found:
@@ -164,14 +158,14 @@ def _best(problem: Problem, starts: Sequence[NDArray]) -> Solution:
 
 def continued(search, solution: Solution, k: int, low: NDArray) -> Solution:
     """Continuation in one unknown: from its value downwards by steps, as long as that lowers the cost."""
-    while solution.x[k] > CONTINUATION_FACTOR * low[k]:
+    while solution.x[k] > settings.CONTINUATION_FACTOR * low[k]:
         x = solution.x.copy()
-        x[k] /= CONTINUATION_FACTOR
+        x[k] /= settings.CONTINUATION_FACTOR
         try:
             lower = search(x)
         except ModelError:
             break
-        if lower.cost > (1 - FIT_TOLERANCE) * solution.cost:
+        if lower.cost > (1 - settings.FIT_TOLERANCE) * solution.cost:
             break
         solution = lower
     return solution
@@ -186,7 +180,7 @@ def discretisation_shift(whitened: Sequence[Whitened], candidate: CandidateFit) 
         If the model cannot be run on the finer solver.
     """
     finer = [
-        w.with_parameters(replace(candidate.hypothesis.of(w.observations.parameters), refinement=REFINEMENT))
+        w.with_parameters(replace(candidate.hypothesis.of(w.observations.parameters), refinement=settings.REFINEMENT))
         for w in whitened
     ]
     changes = each(finer, lambda i, w: w.errors(candidate.values) - candidate.residuals[i])

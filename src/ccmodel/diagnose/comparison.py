@@ -14,24 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
+from ccmodel.diagnose import settings
 from ccmodel.diagnose.candidate import CandidateFit
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.diagnose.lack_of_fit import LackOfFit, lack_of_fit
-from ccmodel.diagnose.settings import (
-    ADEQUATE,
-    ADEQUATE_LACK_OF_FIT,
-    ADEQUATE_PAIR,
-    ADEQUATE_SHARE,
-    CONTENDERS,
-    CORRECT_LEVEL,
-    CORRECT_SPREAD,
-    FORM_SHARE,
-    PARTNERS,
-    PRIOR_AGREES,
-    PRIOR_MISSPECIFIED,
-    SUFFICIENT,
-    UNTESTED,
-)
 from ccmodel.diagnose.whitening import Whitened
 from ccmodel.inference.effective_samples import in_comparison
 
@@ -66,7 +52,7 @@ class Comparison:
         """Candidates in their order, with the lack of fit of the leading and the most probable."""
         ordered = sorted(candidates, key=lambda c: (not c.is_plausible, c.mean_square))
         likely = np.argsort(posterior(whitened, base, ordered, screened))[-1:]
-        contenders = {c.hypothesis: c for c in [base, *ordered[:CONTENDERS], *(ordered[k] for k in likely)]}
+        contenders = {c.hypothesis: c for c in [base, *ordered[: settings.CONTENDERS], *(ordered[k] for k in likely)]}
         lacks = {hypothesis: lack_of_fit(whitened, c) for hypothesis, c in contenders.items()}
         return cls(whitened, base, ordered, lacks, screened)
 
@@ -91,11 +77,11 @@ class Comparison:
         form = candidate.hypothesis.model_form_error
         if lack is None or not candidate.is_plausible:
             return False
-        if candidate is self.base and candidate.mean_square > ADEQUATE:
+        if candidate is self.base and candidate.mean_square > settings.ADEQUATE:
             return False
-        most = ADEQUATE_PAIR if candidate.hypothesis.is_pair else ADEQUATE
-        most += max(ADEQUATE_SHARE / _imitations(candidate), form) * self.excess
-        return candidate.mean_square <= most and lack.lower_bound <= ADEQUATE_LACK_OF_FIT + form * self.excess
+        most = settings.ADEQUATE_PAIR if candidate.hypothesis.is_pair else settings.ADEQUATE
+        most += max(settings.ADEQUATE_SHARE / _imitations(candidate), form) * self.excess
+        return candidate.mean_square <= most and lack.lower_bound <= settings.ADEQUATE_LACK_OF_FIT + form * self.excess
 
     @property
     def has_adequate(self) -> bool:
@@ -108,7 +94,7 @@ class Comparison:
         if not self.has_adequate:
             return not self.candidates
         best = self.candidates[0]
-        return best.mean_square <= SUFFICIENT + best.hypothesis.model_form_error * self.excess
+        return best.mean_square <= settings.SUFFICIENT + best.hypothesis.model_form_error * self.excess
 
     @property
     def well_specified(self) -> float:
@@ -122,7 +108,7 @@ class Comparison:
         """Confidence discount: below one where adequacy is not tested against held-out noise."""
         untested = len(self.whitened) == 1 or "pretension_share" in self.base.free
         share = 1.0 if untested else np.mean([w.observations.tolerance_share for w in self.whitened])
-        return float(UNTESTED**share)
+        return float(settings.UNTESTED**share)
 
 
 def posterior(
@@ -140,8 +126,8 @@ def posterior(
     mean_squares = np.array([base.mean_square, *(c.mean_square for c in candidates)])
     unknowns = np.array([0, *(len(c.values) - len(base.values) for c in candidates)])
     bic = samples * mean_squares / max(1.0, mean_squares.min()) + unknowns * np.log(samples)
-    each = (1 - PRIOR_AGREES) / max(screened, len(candidates))
-    log = -bic / 2 + np.log([PRIOR_AGREES, *[each] * len(candidates)])
+    each = (1 - settings.PRIOR_AGREES) / max(screened, len(candidates))
+    log = -bic / 2 + np.log([settings.PRIOR_AGREES, *[each] * len(candidates)])
     log[1:][[not c.is_plausible for c in candidates]] = -np.inf
     weight = np.exp(log - log.max())
     return (weight / weight.sum())[1:].tolist()
@@ -154,20 +140,20 @@ def well_specified(candidate: CandidateFit, base: CandidateFit) -> float:
     model-form error in every second case. An imitation comes to any share of the calibrated model's excess with the
     same density, and the best of several imitations to the lowest of as many shares.
     """
-    excess = max(base.mean_square - CORRECT_LEVEL, CORRECT_SPREAD)
-    over = candidate.mean_square - CORRECT_LEVEL
-    form = max(FORM_SHARE, candidate.hypothesis.model_form_error) * excess
-    width = np.hypot(CORRECT_SPREAD, form)
-    exact = norm.pdf(over, scale=CORRECT_SPREAD)
+    excess = max(base.mean_square - settings.CORRECT_LEVEL, settings.CORRECT_SPREAD)
+    over = candidate.mean_square - settings.CORRECT_LEVEL
+    form = max(settings.FORM_SHARE, candidate.hypothesis.model_form_error) * excess
+    width = np.hypot(settings.CORRECT_SPREAD, form)
+    exact = norm.pdf(over, scale=settings.CORRECT_SPREAD)
     # A half-normal form error convolved with the normal scatter of correct models.
-    simplified = 2 * norm.pdf(over, scale=width) * norm.cdf(over * form / (CORRECT_SPREAD * width))
+    simplified = 2 * norm.pdf(over, scale=width) * norm.cdf(over * form / (settings.CORRECT_SPREAD * width))
     n = _imitations(candidate)
     share = float(np.clip(over / excess, 0.0, 1.0))
-    imitation = norm.cdf(over / CORRECT_SPREAD) * n * (1 - share) ** (n - 1) / excess
-    correct = (1 - PRIOR_MISSPECIFIED) * (exact + simplified) / 2
-    return float(correct / (correct + PRIOR_MISSPECIFIED * imitation))
+    imitation = norm.cdf(over / settings.CORRECT_SPREAD) * n * (1 - share) ** (n - 1) / excess
+    correct = (1 - settings.PRIOR_MISSPECIFIED) * (exact + simplified) / 2
+    return float(correct / (correct + settings.PRIOR_MISSPECIFIED * imitation))
 
 
 def _imitations(candidate: CandidateFit) -> int:
     """Number of independent imitations of which a candidate may be the best: a pair's partners, otherwise one."""
-    return PARTNERS if candidate.hypothesis.is_pair else 1
+    return settings.PARTNERS if candidate.hypothesis.is_pair else 1

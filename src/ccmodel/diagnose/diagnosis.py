@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 from threadpoolctl import threadpool_limits
 
+from ccmodel.diagnose import settings
 from ccmodel.diagnose.calibration import model_in_question
 from ccmodel.diagnose.candidate import CandidateFit, fit
 from ccmodel.diagnose.hypothesis import single_mechanisms, stated_hypothesis
 from ccmodel.diagnose.observations import observations_of
 from ccmodel.diagnose.result import report
 from ccmodel.diagnose.selection import Progress, Selection, silent
-from ccmodel.diagnose.settings import STEP_S
 from ccmodel.diagnose.verdict import Judgement, judge
 from ccmodel.diagnose.whitening import whiten
 from ccmodel.inference.observations import Tolerance
@@ -39,7 +39,7 @@ class Options:
     """
 
     tolerance: Tolerance = 0.0
-    step_s: float = STEP_S
+    step_s: float = settings.STEP_S
     cycles: int | None = None
     forced_candidates: Sequence[Sequence[str]] = ()
     without: Collection[str] = ()

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.diagnose.settings import REST_SPEED
+from ccmodel.diagnose import settings
 from ccmodel.model.run import ModelInput
 
 
@@ -15,7 +15,7 @@ def speed(given: ModelInput) -> NDArray:
 def is_moving(given: ModelInput) -> NDArray:
     """Whether the drive moves, shape (n,)."""
     omega = np.abs(speed(given))
-    return omega > REST_SPEED * omega.max()
+    return omega > settings.REST_SPEED * omega.max()
 
 
 def since_reversal(given: ModelInput) -> tuple[NDArray, NDArray]:

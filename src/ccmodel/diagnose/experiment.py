@@ -13,22 +13,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.diagnose import settings
 from ccmodel.diagnose.candidate import CandidateFit
 from ccmodel.diagnose.drive import speed
-from ccmodel.diagnose.settings import (
-    EXPERIMENT_RATE_HZ,
-    EXPERIMENT_S,
-    EXPERIMENT_SIZES,
-    FIT_DIFFERENCE,
-    HOLDS_S,
-    NESTED_HZ,
-    REFITTED,
-    RIVAL,
-    SEPARATED,
-    SINES_HZ,
-    STEP_DURATION_S,
-    WANTED_ODDS,
-)
 from ccmodel.diagnose.verdict import Judgement
 from ccmodel.diagnose.whitening import Whitened, nuisances, shrinkage_of
 from ccmodel.failure import ModelError
@@ -54,24 +41,24 @@ class Experiment:
 
     def given(self) -> ModelInput:
         """Input of a model run."""
-        time_s = np.arange(self.theta_in.size) / EXPERIMENT_RATE_HZ
+        time_s = np.arange(self.theta_in.size) / settings.EXPERIMENT_RATE_HZ
         return ModelInput.prescribed(self.like, time_s, self.theta_in, self.like.pretension_N)
 
 
 def proposed(judgement: Judgement, estimates: Parameters) -> dict | None:
     """The experiment that best separates the leading candidates; None without two that can be run."""
     pairs = zip(judgement.candidates, judgement.probability, strict=True)
-    rivals = [c for c, p in pairs if p > RIVAL]
+    rivals = [c for c, p in pairs if p > settings.RIVAL]
     if len(rivals) < 2:
         rivals = [judgement.calibrated, *judgement.candidates]
-    rivals = rivals[:SEPARATED]
+    rivals = rivals[: settings.SEPARATED]
     if len(rivals) < 2:
         return None
     template = max(judgement.whitened, key=lambda w: w.observations.given.recording.pretension_N).observations
     every = experiments(judgement.whitened)
     planned = [[_planned(e, c, template, estimates) for c in rivals] for e in every]
     as_fitted = np.array(each(planned, lambda i, of_rivals: _separation(of_rivals)))
-    leading = [int(k) for k in np.argsort(-as_fitted, kind="stable")[:REFITTED] if as_fitted[k] > 0]
+    leading = [int(k) for k in np.argsort(-as_fitted, kind="stable")[: settings.REFITTED] if as_fitted[k] > 0]
     refitted = each(leading, lambda i, k: _separation(planned[k], rivals))
     if max(refitted, default=0.0) <= 0:
         return None
@@ -86,7 +73,7 @@ def proposed(judgement: Judgement, estimates: Parameters) -> dict | None:
 
 def recordings_wanted(separation: float, channels: int) -> int:
     """Number of recordings that give odds of `WANTED_ODDS`, of a separation in units of the noise."""
-    return int(np.ceil(2 * np.log(WANTED_ODDS) / (IN_DIAGNOSIS * channels * separation**2)))
+    return int(np.ceil(2 * np.log(settings.WANTED_ODDS) / (IN_DIAGNOSIS * channels * separation**2)))
 
 
 def experiments(whitened: Sequence[Whitened]) -> list[Experiment]:
@@ -99,7 +86,7 @@ def experiments(whitened: Sequence[Whitened]) -> list[Experiment]:
     found = []
     for bend in dict.fromkeys((max(bends), min(bends))):
         like = replace(bends[bend], pretension_N=highest_N)
-        for size, pretension in EXPERIMENT_SIZES:
+        for size, pretension in settings.EXPERIMENT_SIZES:
             at = f"pretension {pretension:.0%} of the highest recorded"
             at += f", bend {bend:.2g} rad" if len(bends) > 1 else ""
             found += [
@@ -111,14 +98,14 @@ def experiments(whitened: Sequence[Whitened]) -> list[Experiment]:
 
 def _motions(a: float, fastest: float) -> Iterator[tuple[str, NDArray]]:
     """Text and drive angles (rad) of motions with an amplitude (rad), no faster than a speed (rad/s)."""
-    start = np.clip(np.arange(0, EXPERIMENT_S, 1 / EXPERIMENT_RATE_HZ) - 0.4, 0, None)
+    start = np.clip(np.arange(0, settings.EXPERIMENT_S, 1 / settings.EXPERIMENT_RATE_HZ) - 0.4, 0, None)
     highest_Hz = fastest / (2 * np.pi * a)
-    for rate in dict.fromkeys(min(rate, highest_Hz) for rate in SINES_HZ):
+    for rate in dict.fromkeys(min(rate, highest_Hz) for rate in settings.SINES_HZ):
         yield f"a sine of {a:.2g} rad at {rate:.2g} Hz", a * np.sin(2 * np.pi * rate * start)
-    for hold in HOLDS_S:
-        move_s = max(STEP_DURATION_S, STEEPEST * a / fastest)
+    for hold in settings.HOLDS_S:
+        move_s = max(settings.STEP_DURATION_S, STEEPEST * a / fastest)
         yield f"steps of {a:.2g} rad held for {hold:g} s", _steps(a, start, hold, move_s)
-    rate = min(NESTED_HZ, highest_Hz)
+    rate = min(settings.NESTED_HZ, highest_Hz)
     nested = a * np.sin(2 * np.pi * rate * start) * (1 - start / start[-1])
     yield f"nested reversals from {a:.2g} rad down at {rate:.2g} Hz", nested
 
@@ -174,7 +161,7 @@ def _absorbed(o: Observations, predicted: NDArray, candidate: CandidateFit) -> N
     names, x = list(candidate.values), np.array(list(candidate.values.values()))
     free = candidate.free | candidate.hypothesis.free(candidate.values)
     sizes = np.array([size_of(name, value) for name, value in candidate.values.items()])
-    steps = inward(FIT_DIFFERENCE * sizes, x, np.array([free[name].high for name in names]))
+    steps = inward(settings.FIT_DIFFERENCE * sizes, x, np.array([free[name].high for name in names]))
     effects = jacobian(lambda at: o.errors(dict(zip(names, at, strict=True))).ravel(), x, steps, predicted)
     variances, axes = np.linalg.eigh(candidate.covariance)
     return np.hstack([effects @ (axes * np.sqrt(variances.clip(0.0))), nuisances(o)[0]])

@@ -7,13 +7,7 @@ from itertools import product
 import numpy as np
 
 from ccmodel import mechanisms as registry
-from ccmodel.diagnose.settings import (
-    BEYOND_RANGE,
-    RANGE_SLACK,
-    SCREENED_RATIO,
-    SCREENED_SHAPES,
-    SCREENED_STRENGTHS,
-)
+from ccmodel.diagnose import settings
 from ccmodel.inference.problem import Free
 from ccmodel.mechanisms import Parameter
 from ccmodel.model.general.run import Active
@@ -102,11 +96,11 @@ class Hypothesis:
         """Values at which a single mechanism is screened, spread over its plausible range."""
         ((name, place),) = self.acting
         mechanism = registry.get(name)
-        grids = [[p.at(share) for share in p.screening_grid or SCREENED_SHAPES] for p in mechanism.shapes]
+        grids = [[p.at(share) for share in p.screening_grid or settings.SCREENED_SHAPES] for p in mechanism.shapes]
         for strength in mechanism.strengths:
             others = {p.name: p.neutral for p in mechanism.strengths if p is not strength}
-            shares = strength.screening_grid or SCREENED_STRENGTHS
-            sizes = [SCREENED_RATIO] if strength.ratio else [strength.at(share) for share in shares]
+            shares = strength.screening_grid or settings.SCREENED_STRENGTHS
+            sizes = [settings.SCREENED_RATIO] if strength.ratio else [strength.at(share) for share in shares]
             for size, *values in product(sizes, *grids):
                 shapes = dict(zip((p.name for p in mechanism.shapes), values, strict=True))
                 every = others | {strength.name: size} | shapes
@@ -138,9 +132,9 @@ def plausible(hypothesis: Hypothesis, values: Mapping[str, float]) -> bool:
 
 
 def _is_plausible(strength: Parameter, value: float) -> bool:
-    low, high = sorted((RANGE_SLACK * strength.low, RANGE_SLACK * strength.high))
+    low, high = sorted((settings.RANGE_SLACK * strength.low, settings.RANGE_SLACK * strength.high))
     if strength.ratio:
-        low = strength.low / RANGE_SLACK
+        low = strength.low / settings.RANGE_SLACK
     elif strength.signed:
         low = -high
     else:
@@ -155,9 +149,9 @@ def _bounds(parameter: Parameter, is_strength: bool) -> tuple[float, float]:
         # An angle may exceed a revolution; a position may not leave the conduit.
         return (2 * low, 2 * high) if parameter.unit == "rad" else (low, high)
     if low < 0:
-        return BEYOND_RANGE * low, 0.5 * abs(low)
+        return settings.BEYOND_RANGE * low, 0.5 * abs(low)
     if parameter.ratio:
-        return low / BEYOND_RANGE, high * BEYOND_RANGE
+        return low / settings.BEYOND_RANGE, high * settings.BEYOND_RANGE
     if parameter.signed:
-        return -BEYOND_RANGE * high, BEYOND_RANGE * high
-    return (0.0 if is_strength else low / BEYOND_RANGE), BEYOND_RANGE * high
+        return -settings.BEYOND_RANGE * high, settings.BEYOND_RANGE * high
+    return (0.0 if is_strength else low / settings.BEYOND_RANGE), settings.BEYOND_RANGE * high

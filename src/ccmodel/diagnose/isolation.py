@@ -9,20 +9,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ccmodel.channels import PLACES_OF, TAU_OUT, THETA_OUT
 from ccmodel.diagnose.candidate import CandidateFit, fit
 from ccmodel.diagnose.whitening import Whitened, whiten
 from ccmodel.failure import ModelError
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.pool import each
 
-# Places where a fault may be that affects one channel only.
-PLACES_OF = {
-    "theta_out_rad": ("load-sensor",),
-    "tau_in_Nm": ("drive-pulley", "drive-sensor"),
-    "tau_out_Nm": ("load-sensor",),
-    "F_drive_N": ("drive-sensor",),
-    "F_load_N": ("load-sensor",),
-}
 AT_THE_LOAD = ("load", "load-pulley")
 
 
@@ -30,7 +23,7 @@ def isolate(whitened: Sequence[Whitened], calibrated: CandidateFit) -> list[tupl
     """For each part that may be at fault, the excess mean square without it and the places of that part."""
     channels = channels_of(whitened)
     found = [(excess(without(c, whitened), calibrated), PLACES_OF[c]) for c in channels if len(channels) > 1]
-    if all({"tau_out_Nm", "theta_out_rad"} < set(w.observations.channels) for w in whitened):
+    if all({TAU_OUT, THETA_OUT} < set(w.observations.channels) for w in whitened):
         driven = [w.observations.driven_by_torque() for w in whitened]
         found.append((excess(driven, calibrated), AT_THE_LOAD))
     return found

@@ -13,21 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from ccmodel.channels import TAU_IN, TENSIONS, THETA_OUT
+from ccmodel.diagnose import settings
 from ccmodel.diagnose.candidate import CandidateFit
 from ccmodel.diagnose.drive import since_reversal, speed
-from ccmodel.diagnose.settings import (
-    FEATURES,
-    FEATURES_SEED,
-    INPUTS_PER_FEATURE,
-    LACK_OF_FIT_COVERAGE,
-    LENGTH_SCALES,
-    PENALTIES,
-    STRETCHES,
-)
 from ccmodel.diagnose.whitening import Whitened
 from ccmodel.inference.pool import each
 from ccmodel.model.run import simulate
-from ccmodel.recording import TENSIONS
 
 
 @dataclass(frozen=True)
@@ -52,7 +44,7 @@ class LackOfFit:
     def lower_bound(self) -> float:
         """Lower end of the 95 % interval of the mean."""
         n = self.reduction.size
-        quantile = float(student.ppf(0.5 + LACK_OF_FIT_COVERAGE / 2, n - 1))
+        quantile = float(student.ppf(0.5 + settings.LACK_OF_FIT_COVERAGE / 2, n - 1))
         return self.mean - quantile * float(self.reduction.std(ddof=1)) / np.sqrt(n)
 
 
@@ -61,13 +53,13 @@ def lack_of_fit(whitened: Sequence[Whitened], candidate: CandidateFit) -> LackOf
     inputs = each(whitened, lambda i, w: _inputs(w, candidate))
     residuals = each(whitened, lambda i, w: _by_channel(w, candidate.loo_residuals[i], whitened))
     if len(whitened) == 1:
-        inputs, residuals = (np.array_split(part[0], STRETCHES) for part in (inputs, residuals))
+        inputs, residuals = (np.array_split(part[0], settings.STRETCHES) for part in (inputs, residuals))
     features = _features(inputs)
     share = [1 / len(e) for e in residuals]
     gram = [s * F.T @ F for s, F in zip(share, features, strict=True)]
     cross = [s * F.T @ e for s, F, e in zip(share, features, residuals, strict=True)]
     size = np.trace(sum(gram)) / len(gram[0])
-    reductions = [_reductions(features, residuals, gram, cross, penalty * size) for penalty in PENALTIES]
+    reductions = [_reductions(features, residuals, gram, cross, penalty * size) for penalty in settings.PENALTIES]
     best = max(reductions, key=np.mean)
     tolerated = np.mean([w.observations.tolerance_share for w in whitened])
     return LackOfFit((best if best.mean() > 0 else np.zeros_like(best)) - tolerated)
@@ -85,14 +77,14 @@ def _reductions(features, residuals, gram, cross, penalty: float) -> NDArray:
 
 def _features(inputs: Sequence[NDArray]) -> list[NDArray]:
     """Constant, linear and random Fourier features by recording; shape (samples, features)."""
-    random = np.random.default_rng(FEATURES_SEED)
+    random = np.random.default_rng(settings.FEATURES_SEED)
     every = np.concatenate(inputs)
     mean, scale = every.mean(axis=0), every.std(axis=0)
     scale[scale == 0] = 1.0
-    shape = (every.shape[1], FEATURES)
-    used = random.random(shape) < INPUTS_PER_FEATURE / every.shape[1]
-    directions = used * random.standard_normal(shape) / random.choice(LENGTH_SCALES, FEATURES)
-    shift = random.uniform(0, 2 * np.pi, FEATURES)
+    shape = (every.shape[1], settings.FEATURES)
+    used = random.random(shape) < settings.INPUTS_PER_FEATURE / every.shape[1]
+    directions = used * random.standard_normal(shape) / random.choice(settings.LENGTH_SCALES, settings.FEATURES)
+    shift = random.uniform(0, 2 * np.pi, settings.FEATURES)
     found = []
     for quantities in inputs:
         x = (quantities - mean) / scale
@@ -115,8 +107,8 @@ def _inputs(w: Whitened, candidate: CandidateFit) -> NDArray:
         np.tanh(travel / (0.2 * np.abs(travel).max() or 1.0)),
         time_s,
         np.minimum(since_s, 3.0),
-        simulated["theta_out_rad"],
-        simulated["tau_in_Nm"],
+        simulated[THETA_OUT],
+        simulated[TAU_IN],
         *tensions,
         np.full_like(time_s, given.recording.path.bend_rad),
         np.full_like(time_s, np.mean(tensions)),

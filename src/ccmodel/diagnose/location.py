@@ -4,10 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ccmodel.channels import PLACES_OF, short_name
+from ccmodel.diagnose import settings
 from ccmodel.diagnose.candidate import CandidateFit
 from ccmodel.diagnose.drive import is_moving, since_reversal
-from ccmodel.diagnose.isolation import PLACES_OF, channels_of, isolate
-from ccmodel.diagnose.settings import AFTER_REVERSAL, ISOLATED_SHARE, NAMED_CHANNEL, NAMED_PHASE
+from ccmodel.diagnose.isolation import channels_of, isolate
 from ccmodel.diagnose.verdict import Judgement
 from ccmodel.diagnose.whitening import Whitened
 from ccmodel.model.run import ModelInput
@@ -38,10 +39,10 @@ def location(judgement: Judgement) -> dict:
     places = hypothesis.places or judgement.single_fault_places or _places(judgement)
     table = mismatch(judgement.whitened, judgement.calibrated)
     square = {c: float(np.nanmean(np.square(list(phases.values())))) for c, phases in table.items()}
-    channels = _prominent(square, NAMED_CHANNEL)
+    channels = _prominent(square, settings.NAMED_CHANNEL)
     squares = {p: np.array([table[c][p] ** 2 for c in channels]) for p in PHASES}
     by_phase = {p: float(np.nanmean(s)) for p, s in squares.items() if np.isfinite(s).any()}
-    phases = sorted(_prominent(by_phase, NAMED_PHASE), key=PHASES.index)
+    phases = sorted(_prominent(by_phase, settings.NAMED_PHASE), key=PHASES.index)
     verb = "is" if len(channels) == 1 else "are"
     where = (" and " if hypothesis.acting else " or ").join(TEXT[place] for place in places)
     text = f"The mismatch sits {where}: {', '.join(channels)} {verb} off most, {' and '.join(phases)}."
@@ -64,7 +65,7 @@ def _places(judgement: Judgement) -> list[str]:
     """
     whitened, calibrated = judgement.whitened, judgement.calibrated
     least, places = min(isolate(whitened, calibrated), default=(0.0, PLACES_OF[channels_of(whitened)[0]]))
-    possible = places if least <= ISOLATED_SHARE * judgement.comparison.excess else BETWEEN
+    possible = places if least <= settings.ISOLATED_SHARE * judgement.comparison.excess else BETWEEN
     scored = [s.hypothesis.acting[0][1] for s in judgement.scores if s.values]
     return list(dict.fromkeys([*(place for place in scored if place in possible), *possible]))
 
@@ -78,7 +79,7 @@ def mismatch(whitened: Sequence[Whitened], candidate: CandidateFit) -> dict[str,
         errors = o.errors({}) * o.sigma / floor
         phase = phases_of(o.given)[o.judged]
         for c, channel in enumerate(o.channels):
-            by_phase = collected.setdefault(channel.rsplit("_", 1)[0], {p: [] for p in PHASES})
+            by_phase = collected.setdefault(short_name(channel), {p: [] for p in PHASES})
             for k, p in enumerate(PHASES):
                 by_phase[p].append(errors[c][phase == k])
     return {
@@ -90,7 +91,7 @@ def mismatch(whitened: Sequence[Whitened], candidate: CandidateFit) -> dict[str,
 def phases_of(given: ModelInput) -> np.ndarray:
     """Index into `PHASES` of every sample, shape (n,)."""
     moving = is_moving(given)
-    just_reversed = np.abs(since_reversal(given)[0]) < AFTER_REVERSAL * np.ptp(given.theta_in)
+    just_reversed = np.abs(since_reversal(given)[0]) < settings.AFTER_REVERSAL * np.ptp(given.theta_in)
     return np.where(moving, np.where(just_reversed, 1, 2), 0)
 
 

@@ -4,9 +4,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ccmodel.diagnose.settings import MOST_SAMPLES, STEP_S
+from ccmodel.channels import MEASURED
+from ccmodel.diagnose import settings
 from ccmodel.failure import ModelError
-from ccmodel.inference.observations import MEASURED, Observations, Tolerance
+from ccmodel.inference.observations import Observations, Tolerance
 from ccmodel.model.parameters import Parameters
 from ccmodel.recording import Recording
 
@@ -17,7 +18,7 @@ def observations_of(
     recordings: Sequence[Recording],
     estimates: Parameters,
     tolerance: Tolerance = 0.0,
-    step_s: float = STEP_S,
+    step_s: float = settings.STEP_S,
     cycles: int | None = None,
 ) -> tuple[list[Observations], NotJudged]:
     """Observations of every usable recording, and what could not be judged.
@@ -32,7 +33,7 @@ def observations_of(
     """
     usable, not_judged = [], []
     for recording in recordings:
-        step = max(step_s, float(np.ptp(recording.time_s)) / MOST_SAMPLES)
+        step = max(step_s, float(np.ptp(recording.time_s)) / settings.MOST_SAMPLES)
         try:
             shown = first_cycles(recording, cycles)
             usable.append(Observations.of(shown, estimates, step_s=step, tolerance=tolerance))

@@ -7,23 +7,15 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from ccmodel import mechanisms as registry
-from ccmodel.diagnose import experiment, location
+from ccmodel.channels import short_name, unit_of
+from ccmodel.diagnose import experiment, location, settings
 from ccmodel.diagnose.candidate import CandidateFit, discretisation_shift, fit
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.diagnose.observations import NotJudged
-from ccmodel.diagnose.settings import (
-    ADEQUATE,
-    AT_BOUND,
-    FEWEST_TO_CONTRADICT,
-    MOST_ALTERNATIVES,
-    MOST_CONFIDENT,
-    RIVAL,
-)
 from ccmodel.diagnose.verdict import Judgement, nested_choice
 from ccmodel.failure import ModelError
 from ccmodel.inference.intervals import COVERAGE
 from ccmodel.model.parameters import Parameters, mechanism_key
-from ccmodel.recording import unit_of
 
 FORMAT = 1
 
@@ -80,13 +72,13 @@ def _alternatives(judgement: Judgement, named: Mapping[str, str]) -> list[dict]:
     for name, place in sorted(every, key=lambda acting: (-_place_probability(acting, confidence), acting)):
         places.setdefault(name, place)
     others = [(n, p, _name_probability(n, confidence)) for n, p in places.items() if n not in named]
-    ranked = sorted(others, key=lambda one: -one[2])[:MOST_ALTERNATIVES]
-    return [{"name": n, "place": p, "confidence": round(c, 4)} for n, p, c in ranked if c > RIVAL]
+    ranked = sorted(others, key=lambda one: -one[2])[: settings.MOST_ALTERNATIVES]
+    return [{"name": n, "place": p, "confidence": round(c, 4)} for n, p, c in ranked if c > settings.RIVAL]
 
 
 def _name_probability(name: str, confidence: Mapping[Hypothesis, float]) -> float:
     """Probability that a mechanism acts at any of its places, below certainty."""
-    return min(MOST_CONFIDENT, sum(p for hypothesis, p in confidence.items() if name in hypothesis.names))
+    return min(settings.MOST_CONFIDENT, sum(p for hypothesis, p in confidence.items() if name in hypothesis.names))
 
 
 def _place_probability(acting: tuple[str, str], confidence: Mapping[Hypothesis, float]) -> float:
@@ -137,7 +129,7 @@ def held_out_errors(judgement: Judgement) -> dict[str, dict]:
     found = {}
     for channel, rows in squares.items():
         before, after, noise = np.sqrt(np.mean(rows, axis=0)).tolist()
-        name = channel.rsplit("_", 1)[0]
+        name = short_name(channel)
         found[name] = {"before": before, "after": after, "noise": noise, "unit": unit_of(channel).replace(" ", "*")}
     return found
 
@@ -145,7 +137,7 @@ def held_out_errors(judgement: Judgement) -> dict[str, dict]:
 def contradicting_recording(judgement: Judgement) -> NotJudged:
     """Of an unexplained batch, the recording without which the calibrated model is adequate; a list of one or none."""
     base, whitened = judgement.calibrated, judgement.whitened
-    if judgement.verdict != "unexplained" or len(whitened) < FEWEST_TO_CONTRADICT:
+    if judgement.verdict != "unexplained" or len(whitened) < settings.FEWEST_TO_CONTRADICT:
         return []
     worst = int(np.argmax(base.by_recording))
     others = [w for i, w in enumerate(whitened) if i != worst]
@@ -153,7 +145,7 @@ def contradicting_recording(judgement: Judgement) -> NotJudged:
         without = fit(others, base.hypothesis, base.free, base.values).mean_square
     except (ModelError, ValueError):
         return []
-    if without > ADEQUATE:
+    if without > settings.ADEQUATE:
         return []
     why = (
         f"the calibrated model has a mean square of {without:.2f} (1: noise) in the others without it, and of"
@@ -168,6 +160,6 @@ def _at_bounds(candidate: CandidateFit) -> NotJudged:
     found = []
     for name, free in candidate.free.items():
         value = candidate.values[name]
-        if any(np.isclose(value, bound, rtol=AT_BOUND, atol=0.0) for bound in (free.low, free.high)):
+        if any(np.isclose(value, bound, rtol=settings.AT_BOUND, atol=0.0) for bound in (free.low, free.high)):
             found.append({"what": name, "why": f"stands at the end of its range, {value:.4g}: not a value to rely on"})
     return found

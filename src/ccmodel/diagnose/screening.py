@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
+from ccmodel.diagnose import settings
 from ccmodel.diagnose.candidate import CandidateFit
 from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.settings import EXTRAPOLATION, SCREENED_CHANGE
 from ccmodel.diagnose.whitening import Whitened
 from ccmodel.failure import ModelError
 from ccmodel.inference.pool import each
@@ -116,12 +116,12 @@ def _stacked(whitened: Sequence[Whitened], by_recording: Sequence[NDArray]) -> N
 def changes(own: Mapping[str, float]) -> Iterator[dict[str, float]]:
     """Values of a baseline's mechanism, one of them changed at a time."""
     for key, value in own.items():
-        yield own | {key: (1 + SCREENED_CHANGE) * value}
+        yield own | {key: (1 + settings.SCREENED_CHANGE) * value}
 
 
 def changed(own: Mapping[str, float], values: Mapping[str, float], strength: float) -> dict[str, float]:
     """A change of a baseline's values extrapolated to another strength, without a change of sign."""
-    share = float(np.clip(SCREENED_CHANGE * strength, -0.9, 10.0)) / SCREENED_CHANGE
+    share = float(np.clip(settings.SCREENED_CHANGE * strength, -0.9, 10.0)) / settings.SCREENED_CHANGE
     return {key: own[key] + share * (value - own[key]) for key, value in values.items()}
 
 
@@ -136,7 +136,7 @@ def scaled(hypothesis: Hypothesis, values: Mapping[str, float], strength: float)
         return None
     if any(p.screening_grid for p in strengths):
         return dict(values)
-    least, most = EXTRAPOLATION
+    least, most = settings.EXTRAPOLATION
     strength = float(np.copysign(np.clip(abs(strength), least, most), strength))
     found = dict(values)
     for p in strengths:

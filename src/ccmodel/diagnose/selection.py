@@ -3,20 +3,11 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from ccmodel.diagnose import settings
 from ccmodel.diagnose.candidate import CandidateFit, fit
 from ccmodel.diagnose.comparison import Comparison
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.diagnose.screening import Score, screen
-from ccmodel.diagnose.settings import (
-    ADEQUATE,
-    CONTENDERS,
-    FEWEST_FITTED,
-    FIRSTS,
-    MOST_FITTED,
-    PAIR_SHARE,
-    PARTNERS,
-    WORTH_FITTING,
-)
 from ccmodel.diagnose.whitening import Whitened, relinearised
 from ccmodel.failure import ModelError
 from ccmodel.inference.pool import each
@@ -55,8 +46,9 @@ class Selection:
         text = f"calibrated model: leave-one-out mean square {base.mean_square:.2f} (1: noise); screening"
         self.progress(f"{text} {len(self.mechanisms)} mechanisms")
         scores = screen(whitened, base, self.mechanisms)
-        fewest = FEWEST_FITTED if base.mean_square > ADEQUATE else 0
-        leading = [s for k, s in enumerate(scores) if s.values and (s.gain > WORTH_FITTING or k < fewest)][:MOST_FITTED]
+        fewest = settings.FEWEST_FITTED if base.mean_square > settings.ADEQUATE else 0
+        worth = [s for k, s in enumerate(scores) if s.values and (s.gain > settings.WORTH_FITTING or k < fewest)]
+        leading = worth[: settings.MOST_FITTED]
         chosen = [s.hypothesis for s in leading]
         forced = [Score(h, 0.0, h.start) for h in self.forced if h not in chosen]
         singles = self.fit_all(whitened, base, [*leading, *forced])
@@ -85,7 +77,7 @@ class Selection:
         """The same with pairs that improve on their members, from adequate singles where there are any."""
         singles = [c for c in found.candidates if not c.hypothesis.is_pair]
         firsts = [c for c in singles if found.is_adequate(c)] or singles
-        every = [*found.candidates, *self._pairs(found.whitened, firsts[:FIRSTS])]
+        every = [*found.candidates, *self._pairs(found.whitened, firsts[: settings.FIRSTS])]
         improving = [c for c in every if improves_on_members(c, every)]
         paired = Comparison.of(found.whitened, found.base, improving, found.screened)
         if not paired.has_adequate and paired.candidates[0].hypothesis.is_pair:
@@ -103,7 +95,7 @@ class Selection:
             chosen = []
             for s in screen(whitened, first, partners):
                 pair = frozenset(first.hypothesis.acting + s.hypothesis.acting)
-                if s.gain > WORTH_FITTING and pair not in seen and len(chosen) < PARTNERS:
+                if s.gain > settings.WORTH_FITTING and pair not in seen and len(chosen) < settings.PARTNERS:
                     seen.add(pair)
                     chosen.append(s)
             found += self.fit_all(whitened, first, chosen)
@@ -134,7 +126,7 @@ class Selection:
         except ModelError as error:
             self.progress(f"the covariance stays as it is ({error})")
             return found
-        leading = [c for k, c in enumerate(found.candidates) if k < CONTENDERS or not c.hypothesis.is_pair]
+        leading = [c for k, c in enumerate(found.candidates) if k < settings.CONTENDERS or not c.hypothesis.is_pair]
         again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in leading for s in starts(c)])
         best_of = {c.hypothesis: c for c in sorted(again, key=lambda c: c.mean_square, reverse=True)}
         return Comparison.of(whitened, base, list(best_of.values()), found.screened)
@@ -147,4 +139,4 @@ def improves_on_members(candidate: CandidateFit, candidates: Sequence[CandidateF
     members = set(candidate.hypothesis.acting)
     alone = [c.mean_square for c in candidates if set(c.hypothesis.acting) < members]
     pair = candidate.mean_square
-    return all(pair - 1 < PAIR_SHARE * (single - 1) and pair < single for single in alone)
+    return all(pair - 1 < settings.PAIR_SHARE * (single - 1) and pair < single for single in alone)

@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ccmodel.diagnose import settings
 from ccmodel.diagnose.candidate import CandidateFit
 from ccmodel.diagnose.comparison import Comparison
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.diagnose.isolation import isolate
 from ccmodel.diagnose.lack_of_fit import LackOfFit
 from ccmodel.diagnose.screening import Score
-from ccmodel.diagnose.settings import RIVAL, SUFFICIENT, SURE, UNSTEADY, WORTH_NAMING
 from ccmodel.diagnose.whitening import Whitened
 
 
@@ -79,7 +79,7 @@ def judge(found: Comparison, scores: list[Score]) -> Judgement:
     - ``agrees``: the calibrated model is adequate, and no candidate improves on it enough to be named.
     - ``unexplained``: neither it nor the most probable candidate is adequate; or the candidate is a pair where a single
       fault of unknown kind would do; or it is most likely an imitation.
-    - ``explained``: the most probable candidate is adequate and its names have at least the probability `SURE`.
+    - ``explained``: the most probable candidate is adequate and its names are sure enough.
     - ``undecided``: otherwise.
     """
     likely, probability = found.most_probable, found.posterior
@@ -90,7 +90,7 @@ def judge(found: Comparison, scores: list[Score]) -> Judgement:
     )  # fmt: skip
     # A mechanism that removes the lack of fit of an inadequate model counts, however small its gain.
     agrees = found.is_adequate(found.base)
-    least = WORTH_NAMING if agrees else 0.0
+    least = settings.WORTH_NAMING if agrees else 0.0
     if not improves(likely, found.base, least) or 1.0 - sum(probability) > 0.5:
         return replace(unexplained, verdict="agrees") if agrees else unexplained
     if not found.is_adequate(likely):
@@ -98,12 +98,12 @@ def judge(found: Comparison, scores: list[Score]) -> Judgement:
     elsewhere = single_fault_places(found, likely.hypothesis)
     if elsewhere and not any(_is_at(c, elsewhere) and found.is_adequate(c) for c in found.candidates):
         return replace(unexplained, single_fault_places=elsewhere)
-    if found.well_specified * max(probability) <= RIVAL:
+    if found.well_specified * max(probability) <= settings.RIVAL:
         return unexplained
     # Candidates with the same mechanism at different places add up to the probability of its name.
     names = likely.hypothesis.names
     named = sum(p for c, p in zip(found.candidates, probability, strict=True) if c.hypothesis.names == names)
-    is_sure = found.well_specified * named >= SURE and not elsewhere
+    is_sure = found.well_specified * named >= settings.SURE and not elsewhere
     return replace(unexplained, verdict="explained" if is_sure else "undecided", best=likely)
 
 
@@ -111,7 +111,7 @@ def improves(candidate: CandidateFit, base: CandidateFit, least: float) -> bool:
     """Whether a candidate lowers the mean square by more than a share `least`, and not at some recordings' expense."""
     gain = base.by_recording - candidate.by_recording
     better, worse = gain.clip(0.0).mean(), -gain.clip(None, 0.0).mean()
-    return bool(better - worse > least * max(1.0, base.mean_square) and worse < UNSTEADY * better)
+    return bool(better - worse > least * max(1.0, base.mean_square) and worse < settings.UNSTEADY * better)
 
 
 def _is_at(candidate: CandidateFit, places: Sequence[str]) -> bool:
@@ -128,7 +128,9 @@ def single_fault_places(found: Comparison, hypothesis: Hypothesis) -> list[str]:
     if not hypothesis.is_pair:
         return []
     acting = set(hypothesis.places)
-    isolated = sorted((left, at) for left, at in isolate(found.whitened, found.base) if left <= SUFFICIENT - 1.0)
+    isolated = sorted(
+        (left, at) for left, at in isolate(found.whitened, found.base) if left <= settings.SUFFICIENT - 1.0
+    )
     if any(acting <= set(at) for _, at in isolated):
         return []
     return list(dict.fromkeys(place for _, at in isolated for place in at))

@@ -15,12 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.diagnose.settings import FRICTION_SPREAD, GAP_POSITIONS, GAP_SPREAD
+from ccmodel.channels import THETA_OUT, ZERO_OF
+from ccmodel.diagnose import settings
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS
 from ccmodel.inference.jacobian import STEP, jacobian, size_of
 from ccmodel.inference.observations import Observations
 from ccmodel.model.general.run import settings_of
-from ccmodel.model.parameters import ZERO_OF, Parameters
+from ccmodel.model.parameters import Parameters
 
 # Step of the differences by a nuisance, relative to its size.
 NUISANCE_STEP = 10 * STEP
@@ -132,7 +133,7 @@ def relinearised(one: Whitened, model: Parameters) -> Whitened:
         return float(np.mean(one.whiten(at.errors({}).ravel()) ** 2))
 
     has_gap = settings_of(model.mechanisms).half_gap
-    position = min(GAP_POSITIONS, key=mean_square) if has_gap else model.load_gap_position
+    position = min(settings.GAP_POSITIONS, key=mean_square) if has_gap else model.load_gap_position
     about = whiten(one.observations, replace(model, load_gap_position=position))
     return about.with_parameters(replace(one.observations.parameters, load_gap_position=position))
 
@@ -141,12 +142,12 @@ def _scalar_nuisances(o: Observations) -> Sequence[tuple[str, float, float]]:
     """Name, value and prior standard deviation of each; friction first."""
     recording, parameters = o.given.recording, o.parameters
     mu = parameters.friction_coefficient
-    found = [("friction_coefficient", mu, FRICTION_SPREAD * mu)]
+    found = [("friction_coefficient", mu, settings.FRICTION_SPREAD * mu)]
     for channel, name in ZERO_OF.items():
         if channel in o.channels and channel in recording.accuracy:
             found.append((name, getattr(parameters, name), recording.accuracy[channel]))
     if settings_of(parameters.mechanisms).half_gap:
-        found.append(("load_gap_position", parameters.load_gap_position, GAP_SPREAD))
-    if "theta_out_rad" in o.channels and (step := recording.encoder_step_rad.get("theta_out_rad")):
+        found.append(("load_gap_position", parameters.load_gap_position, settings.GAP_SPREAD))
+    if THETA_OUT in o.channels and (step := recording.encoder_step_rad.get(THETA_OUT)):
         found.append(("theta_out_zero_rad", parameters.theta_out_zero_rad, step / np.sqrt(12)))
     return found

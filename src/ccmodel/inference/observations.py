@@ -6,14 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.channels import MEASURED, TAU_OUT
 from ccmodel.failure import ModelError
 from ccmodel.inference.noise import PHASES, drive_errors, rounding_errors, sensor_noise, size_over_time
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import PRESCRIBED, LoadFrom, ModelInput, simulate
 from ccmodel.recording import Recording
 
-# What sensors measure. Tensions are derived from these and do not count a second time.
-MEASURED = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N")
 # Standard deviation of the model discrepancy, as a share of a channel's peak to peak: one for all, or by channel.
 Tolerance = float | Mapping[str, float]
 
@@ -92,7 +91,7 @@ class Observations:
 
     def driven_by_torque(self) -> "Observations":
         """The same with the measured load torque in place of the load's law."""
-        return replace(self.without("tau_out_Nm"), load_from="torque")
+        return replace(self.without(TAU_OUT), load_from="torque")
 
     def with_parameters(self, parameters: Parameters) -> "Observations":
         """The same for a model with other parameters."""

@@ -19,6 +19,8 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from ccmodel.channels import SUM_AT, TORQUE_AT
+
 PLACES = (
     "drive-pulley",
     "drive-end",
@@ -236,9 +238,9 @@ def side(place: str) -> str:
 
 def sensor_torque(place: str) -> str:
     """Name of the torque channel on the side of a sensor place."""
-    return {"drive": "tau_in_Nm", "load": "tau_out_Nm"}[side(place)]
+    return TORQUE_AT[side(place)]
 
 
 def sensor_sum(place: str) -> str:
     """Name of the load cell's channel on the side of a sensor place."""
-    return {"drive": "F_drive_N", "load": "F_load_N"}[side(place)]
+    return SUM_AT[side(place)]

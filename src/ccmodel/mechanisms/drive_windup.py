@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ccmodel.channels import TAU_IN, THETA_IN
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
@@ -71,10 +72,9 @@ def _fill_reversal(time_s, theta, tau, compliance, lost_motion, standstill, dire
 
 
 def _modifies_observation(sensing, place, values):
-    given = sensing.time_s, sensing.channels["theta_in_rad"], sensing.channels["tau_in_Nm"]
-    return {
-        "tau_in_Nm": torque_of_train(*map(np.ascontiguousarray, given), values["compliance"], values["lost_motion"])
-    }
+    given = sensing.time_s, sensing.channels[THETA_IN], sensing.channels[TAU_IN]
+    torque = torque_of_train(*map(np.ascontiguousarray, given), values["compliance"], values["lost_motion"])
+    return {TAU_IN: torque}
 
 
 MECHANISM = Mechanism(

@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from ccmodel.channels import F_LOAD, TAU_OUT, THETA_OUT
 from ccmodel.mechanisms.contract import Mechanism, Parameter, side
 
-_LOAD_CHANNELS = ("theta_out_rad", "tau_out_Nm", "F_load_N")
+_LOAD_CHANNELS = (THETA_OUT, TAU_OUT, F_LOAD)
 
 
 def _modifies_observation(sensing, place, values):

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
+from ccmodel.channels import F_DRIVE, F_LOAD, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
 from ccmodel.failure import ModelError
 from ccmodel.mechanisms.contract import Sensing, Settings
 from ccmodel.mechanisms.load_dependent_friction import FLOOR_N, REFERENCE_N
@@ -148,12 +149,12 @@ def simulate(
         rubs *= settings.drive_friction_Nm
         tau_in += rubs
     channels = {
-        "theta_in_rad": theta_in,
-        "theta_out_rad": theta_out,
-        "tau_in_Nm": tau_in,
-        "tau_out_Nm": tau_out,
-        "F_drive_N": T1 + T3,
-        "F_load_N": T2 + T4,
+        THETA_IN: theta_in,
+        THETA_OUT: theta_out,
+        TAU_IN: tau_in,
+        TAU_OUT: tau_out,
+        F_DRIVE: T1 + T3,
+        F_LOAD: T2 + T4,
     }
     read = _read(active, time_s, channels, (transmission.drive_radius_m, transmission.load_radius_m))
     return GeneralResponse(
