@@ -1,8 +1,8 @@
-"""Something put into the raw logs of a measured batch: what the sensors would have logged had it been there.
+"""Faults seeded into the raw logs of a measured batch: what the sensors would have logged with the fault present.
 
-Each kind is one function that takes a log, the rig's constants as its ``batch.yaml`` states them and a size, and gives
-the changed log. They work in the logs' own units: counts stay whole numbers where they were, currents stay currents.
-None of them shares code with the mechanisms that a diagnosis asks for.
+Each fault is a function of a log, the rig's constants from ``batch.yaml`` and a size, and returns the changed log. It
+works in the units of the log: counts stay whole numbers and currents stay currents. No fault shares code with the
+mechanisms of the diagnosis.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -13,40 +13,40 @@ import pandas as pd
 import yaml
 from numpy.typing import NDArray
 
-# The way over which a drag builds up after the drive has turned, rad: a few counts of its encoder.
-DRAG_BUILDS_UP_RAD = 4e-3
+# Drive travel over which a drag reverses after a reversal of the motion, rad: a few counts of the encoder.
+DRAG_REVERSAL_RAD = 4e-3
 
 Rig = Mapping[str, Mapping]
-Change = Callable[[pd.DataFrame, Rig, float], pd.DataFrame]
+Fault = Callable[[pd.DataFrame, Rig, float], pd.DataFrame]
 
 
 def torque_column(log: pd.DataFrame, end: str) -> str:
-    """The column that an end's torque is read from: its sensor's, else the motor's current."""
+    """The column that holds an end's torque: its torque sensor's if there is one, otherwise the motor current."""
     counts = f"{end}_torque_counts"
     return counts if counts in log else f"{end}_current_A"
 
 
 def unit_Nm(column: str, side: Mapping) -> float:
-    """N m a unit of a torque column, with its sign."""
+    """Torque of one unit of a torque column, N m, with the sensor's sign."""
     size = side["torque_sensor"]["Nm_per_count"] if column.endswith("counts") else side["torque_constant_Nm_per_A"]
     return size * side.get("torque_sign", 1)
 
 
 def torque_Nm(log: pd.DataFrame, rig: Rig, end: str) -> NDArray:
-    """An end's torque as its sensor has it, shape (n,)."""
+    """Measured torque of an end, N m, shape (n,)."""
     column = torque_column(log, end)
     return unit_Nm(column, rig[end]) * (log[column].to_numpy() - _zero(column, rig[end]))
 
 
 def angle_rad(log: pd.DataFrame, rig: Rig, end: str) -> NDArray:
-    """An end's angle from its encoder's own zero, shape (n,)."""
+    """Measured angle of an end from its encoder's zero, rad, shape (n,)."""
     side = rig[end]
     step = 2 * np.pi / side["encoder_counts_per_rev"]
     return side.get("encoder_sign", 1) * step * log[f"{end}_encoder_counts"].to_numpy()
 
 
-def gain(end: str) -> Change:
-    """A torque sensor that reads (1 + size) times the torque, its electrical zero kept."""
+def gain(end: str) -> Fault:
+    """A torque sensor that reads (1 + size) times the torque, with an unchanged electrical zero."""
 
     def change(log, rig, size):
         column = torque_column(log, end)
@@ -56,8 +56,8 @@ def gain(end: str) -> Change:
     return change
 
 
-def late(*columns: str) -> Change:
-    """Columns that show at time t what was at t - size (s); before the log begins, what it begins with."""
+def delay(*columns: str) -> Fault:
+    """Columns delayed by size (s); the first `size` seconds repeat the first sample."""
 
     def change(log, rig, size):
         time_s = log["time_s"].to_numpy()
@@ -68,8 +68,8 @@ def late(*columns: str) -> Change:
     return change
 
 
-def drift(end: str) -> Change:
-    """The zero of a torque sensor that moves by size (N m/s) from the start of every recording on."""
+def drift(end: str) -> Fault:
+    """A torque sensor's zero that drifts by size (N m/s) from the start of each recording."""
 
     def change(log, rig, size):
         return _add_torque(log, rig, end, size * (log["time_s"] - log["time_s"].iloc[0]).to_numpy())
@@ -78,29 +78,29 @@ def drift(end: str) -> Change:
 
 
 def lost_motion(log: pd.DataFrame, rig: Rig, size: float) -> pd.DataFrame:
-    """A play of +-size (rad) between the load and what its encoder sees."""
+    """A play of +-size (rad) between the load and its encoder."""
     step = 2 * np.pi / rig["load"]["encoder_counts_per_rev"]
     counts = log["load_encoder_counts"].to_numpy()
     return _with(log, "load_encoder_counts", play(counts, size / step))
 
 
 def drag(log: pd.DataFrame, rig: Rig, size: float) -> pd.DataFrame:
-    """A drag of size (N m) against the drive's motion, in the drive's torque."""
+    """A friction torque of size (N m) against the drive's motion, added to the drive's torque."""
     return _add_torque(log, rig, "drive", size * _direction(log, rig))
 
 
 def drag_with_load(log: pd.DataFrame, rig: Rig, size: float) -> pd.DataFrame:
-    """A drag against the drive's motion of a share of the load's torque, in the drive's torque."""
+    """A friction torque against the drive's motion of size times the load's torque, added to the drive's torque."""
     share = size * np.abs(torque_Nm(log, rig, "load"))
     return _add_torque(log, rig, "drive", share * _direction(log, rig))
 
 
-KINDS: dict[str, Change] = {
+FAULTS: dict[str, Fault] = {
     "gain-of-drive-torque": gain("drive"),
     "gain-of-load-torque": gain("load"),
-    "late-drive-side": late("drive_encoder_counts", "drive_torque_counts", "drive_current_A"),
-    "late-load-side": late("load_encoder_counts", "load_torque_counts", "load_current_A"),
-    "late-drive-torque": late("drive_torque_counts", "drive_current_A"),
+    "late-drive-side": delay("drive_encoder_counts", "drive_torque_counts", "drive_current_A"),
+    "late-load-side": delay("load_encoder_counts", "load_torque_counts", "load_current_A"),
+    "late-drive-torque": delay("drive_torque_counts", "drive_current_A"),
     "drift-of-drive-torque": drift("drive"),
     "lost-motion-of-jaw": lost_motion,
     "drag": drag,
@@ -108,20 +108,23 @@ KINDS: dict[str, Change] = {
 }
 
 
-def play(course: NDArray, half: float) -> NDArray:
-    """What follows a course through a play of +-half, at first in the middle of it; shape (n,)."""
-    followed = np.empty(len(course))
-    at = course[0]
-    for i, value in enumerate(course):
-        at = min(max(at, value - half), value + half)
-        followed[i] = at
-    return followed
+def play(values: NDArray, half_width: float) -> NDArray:
+    """Output of a play (backlash) operator of +-half_width, initially centred; shape (n,)."""
+    output = np.empty(len(values))
+    position = values[0]
+    for i, value in enumerate(values):
+        position = min(max(position, value - half_width), value + half_width)
+        output[i] = position
+    return output
 
 
 def _direction(log: pd.DataFrame, rig: Rig) -> NDArray:
-    """-1 to 1 with the drive's motion: what is left of its way once a play has taken its part. 0 until it moves."""
+    """Direction of the drive's motion, -1 to 1, shape (n,).
+
+    It is 0 until the drive moves, and reverses linearly over `DRAG_REVERSAL_RAD` (a stop operator).
+    """
     theta = angle_rad(log, rig, "drive")
-    return (theta - play(theta, DRAG_BUILDS_UP_RAD / 2)) / (DRAG_BUILDS_UP_RAD / 2)
+    return (theta - play(theta, DRAG_REVERSAL_RAD / 2)) / (DRAG_REVERSAL_RAD / 2)
 
 
 def _zero(column: str, side: Mapping) -> float:
@@ -134,42 +137,47 @@ def _add_torque(log: pd.DataFrame, rig: Rig, end: str, torque: NDArray) -> pd.Da
 
 
 def _with(log: pd.DataFrame, column: str, values: NDArray) -> pd.DataFrame:
-    """A log with other values in a column, whole numbers where it had them."""
+    """A log with new values in a column, rounded if the column holds whole numbers."""
     if pd.api.types.is_integer_dtype(log[column]):
         values = np.rint(values).astype(int)
     return log.assign(**{column: values})
 
 
-def described(batch: Path) -> dict:
-    """What a batch's ``batch.yaml`` states."""
+def description(batch: Path) -> dict:
+    """Content of a batch's ``batch.yaml``."""
     return yaml.safe_load((batch / "batch.yaml").read_text(encoding="utf-8"))
 
 
 def write_batch(
-    source: Path, recordings: Sequence[str], out: Path, kind: str | None = None, size: float = 0.0
+    source: Path, recordings: Sequence[str], out: Path, fault: str | None = None, size: float = 0.0
 ) -> dict[str, float]:
-    """Write some of a batch's recordings as a batch of `out`'s name, with one thing put into all of them.
+    """Write some of a batch's recordings as a batch named after `out`, with one fault seeded into all of them.
 
     Parameters
     ----------
     source : Path
-        The measured batch, which stays as it is.
+        The measured batch, which is not changed.
     recordings : sequence of str
-        Ids of those that are written.
+        Ids of the recordings to write.
     out : Path
         Folder that is made.
-    kind : str, optional
-        Of `KINDS`; without it the logs are copied byte for byte.
+    fault : str, optional
+        A key of `FAULTS`; without it the logs are copied byte for byte.
     size : float
-        In the kind's unit.
+        In the fault's unit.
 
     Returns
     -------
     dict of str to float
-        By channel, the standard deviation of what was changed over the channel's peak to peak, root mean square over
-        all recordings from their stated start-up on; channels that stay are left out.
+        By changed channel, the standard deviation of the change over the channel's peak to peak: the root mean square
+        over all recordings, each after its stated start-up.
+
+    Raises
+    ------
+    ValueError
+        If the batch lacks one of the recordings.
     """
-    stated = described(source)
+    stated = description(source)
     kept = {r["id"]: r for r in stated["recordings"] if r["id"] in recordings}
     if missing := [name for name in recordings if name not in kept]:
         raise ValueError(f"{source}: there is no recording {', '.join(missing)}")
@@ -179,14 +187,14 @@ def write_batch(
         before = source / recording["file"]
         after = out / recording["file"]
         after.parent.mkdir(parents=True, exist_ok=True)
-        if kind is None:
+        if fault is None:
             after.write_bytes(before.read_bytes())
             continue
         log = pd.read_csv(before)
-        changed = KINDS[kind](log, stated["rig"], size)
+        changed = FAULTS[fault](log, stated["rig"], size)
         changed.to_csv(after, index=False, float_format="%.9g")
-        judged = (log["time_s"] >= recording.get("settled_s", 0.0)).to_numpy()
-        for channel, share in _shares(log[judged], changed[judged], stated["rig"]).items():
+        settled = (log["time_s"] >= recording.get("settled_s", 0.0)).to_numpy()
+        for channel, share in _shares(log[settled], changed[settled], stated["rig"]).items():
             shares.setdefault(channel, []).append(share)
     text = yaml.safe_dump(stated | {"batch": out.name, "recordings": list(kept.values())}, sort_keys=False)
     (out / "batch.yaml").write_text(text, encoding="utf-8")
@@ -194,13 +202,14 @@ def write_batch(
 
 
 def _shares(log: pd.DataFrame, changed: pd.DataFrame, rig: Rig) -> dict[str, float]:
-    read = {
-        f"{what}_{'in' if end == 'drive' else 'out'}": (of, end)
+    """By channel, the standard deviation of a change over the channel's peak to peak."""
+    channels = {
+        f"{quantity}_{'in' if end == 'drive' else 'out'}": (measure, end)
         for end in ("drive", "load")
-        for what, of in (("theta", angle_rad), ("tau", torque_Nm))
+        for quantity, measure in (("theta", angle_rad), ("tau", torque_Nm))
     }
     found = {}
-    for channel, (of, end) in read.items():
-        was, became = of(log, rig, end), of(changed, rig, end)
-        found[channel] = float(np.std(became - was) / np.ptp(was))
+    for channel, (measure, end) in channels.items():
+        before, after = measure(log, rig, end), measure(changed, rig, end)
+        found[channel] = float(np.std(after - before) / np.ptp(before))
     return found
