@@ -67,6 +67,11 @@ class Completed:
     tampering: tuple[str, ...]
 
     @property
+    def is_usable(self) -> bool:
+        """Whether the command succeeded without tampering."""
+        return self.code == 0 and not self.tampering
+
+    @property
     def failure(self) -> str:
         """Exit code and the end of standard error, for a result."""
         return f"exit code {self.code}: {self.stderr.strip()[-500:]}"

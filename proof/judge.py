@@ -19,13 +19,11 @@ DRIVE_COLUMNS = ("time_s", "drive_encoder_counts")
 # Model files of a diagnosis: with recalibrated parameters alone, and with the identified mechanisms.
 MODELS = {"before": "calibrated.json", "after": "model.json"}
 
+Report = Callable[[str], None]
+
 
 def judge(
-    case: Case,
-    out: Path,
-    sources: Path = conceal.SOURCES,
-    report: Callable[[str], None] = print,
-    with_regressors: bool = False,
+    case: Case, out: Path, sources: Path = conceal.SOURCES, report: Report = print, with_regressors: bool = False
 ) -> dict:
     """Record a case, have it diagnosed in isolation, then compare its models' predictions with held-out recordings.
 
@@ -44,8 +42,8 @@ def judge(
     Returns
     -------
     dict
-        The content of ``result.json``: the case's seed, digests of its answer and of the sources, the diagnosis, and
-        by channel the root mean square errors on held-out recordings before and after it, with the noise floor.
+        Content of ``result.json``: seed, digests of answer and sources, the diagnosis, and by channel the root mean
+        square errors on held-out recordings before and after it, with the noise floor.
     """
     started = conceal.core_s()
     out.mkdir(parents=True, exist_ok=True)
@@ -54,11 +52,8 @@ def judge(
         record(case, case.recordings, batch)
         digest = folder_digest(batch)
         completed = conceal.diagnose(batch, out, case.without, sources)
-        usable = completed.code == 0 and not completed.tampering
-        diagnosis = _read_diagnosis(out / "diagnosis.json") if usable else None
-        held_out = _HeldOut()
-        if diagnosis is not None:
-            held_out = _compare_with_held_out(case, batch, out, sources, with_regressors)
+        diagnosis = _read_diagnosis(out / "diagnosis.json") if completed.is_usable else None
+        held_out = _compare_with_held_out(case, batch, out, sources, with_regressors) if diagnosis else _HeldOut()
     result = {
         "case": case.name,
         "seed": case.seed,
@@ -73,10 +68,15 @@ def judge(
         "rivals": held_out.regressors,
         "took_s": round(conceal.core_s() - started, 1),
     }
-    (out / "result.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
-    verdict = diagnosis["verdict"] if diagnosis else "no diagnosis"
-    report(f"{case.name}: {verdict}, {result['took_s']:.0f} s of one core")
+    write_result(result, out, report)
     return result
+
+
+def write_result(result: dict, out: Path, report: Report) -> None:
+    """Write ``result.json``, and report its verdict and processor time."""
+    (out / "result.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
+    verdict = result["diagnosis"]["verdict"] if result["diagnosis"] else "no diagnosis"
+    report(f"{result['case']}: {verdict}, {result['took_s']:.0f} s of one core")
 
 
 def _read_diagnosis(file: Path) -> dict | None:

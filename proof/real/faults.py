@@ -178,12 +178,10 @@ def write_batch(
         If the batch lacks one of the recordings.
     """
     stated = description(source)
-    kept = {r["id"]: r for r in stated["recordings"] if r["id"] in recordings}
-    if missing := [name for name in recordings if name not in kept]:
-        raise ValueError(f"{source}: there is no recording {', '.join(missing)}")
+    chosen = _chosen(stated, recordings, source)
     out.mkdir(parents=True)
     shares: dict[str, list[float]] = {}
-    for recording in kept.values():
+    for recording in chosen:
         before = source / recording["file"]
         after = out / recording["file"]
         after.parent.mkdir(parents=True, exist_ok=True)
@@ -196,9 +194,16 @@ def write_batch(
         settled = (log["time_s"] >= recording.get("settled_s", 0.0)).to_numpy()
         for channel, share in _shares(log[settled], changed[settled], stated["rig"]).items():
             shares.setdefault(channel, []).append(share)
-    text = yaml.safe_dump(stated | {"batch": out.name, "recordings": list(kept.values())}, sort_keys=False)
+    text = yaml.safe_dump(stated | {"batch": out.name, "recordings": chosen}, sort_keys=False)
     (out / "batch.yaml").write_text(text, encoding="utf-8")
     return {channel: float(np.sqrt(np.mean(np.square(s)))) for channel, s in shares.items() if max(s) > 0}
+
+
+def _chosen(stated: dict, recordings: Sequence[str], source: Path) -> list[dict]:
+    """Entries of the named recordings, in the order of the batch."""
+    if missing := set(recordings).difference(r["id"] for r in stated["recordings"]):
+        raise ValueError(f"{source}: there is no recording {', '.join(sorted(missing))}")
+    return [r for r in stated["recordings"] if r["id"] in recordings]
 
 
 def _shares(log: pd.DataFrame, changed: pd.DataFrame, rig: Rig) -> dict[str, float]:

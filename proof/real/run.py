@@ -8,6 +8,7 @@ from pathlib import Path
 
 from proof import conceal
 from proof.build import folder_digest
+from proof.judge import write_result
 from proof.real.cases import RealCase, without_mechanism
 from proof.real.faults import write_batch
 from proof.real.plan import RealPlan
@@ -53,7 +54,7 @@ def _diagnosed(batch: Path, out: Path, options: list[str], baseline: Path | None
     """A diagnosis of unchanged recordings; an existing one is kept."""
     if not (out / "diagnosis.json").exists():
         completed = conceal.diagnose(batch, out, (), sources, options, baseline)
-        if completed.code != 0 or completed.tampering:
+        if not completed.is_usable:
             raise ValueError(f"{batch.name}: {completed.failure} {completed.tampering}")
     return json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
 
@@ -100,7 +101,6 @@ def judge_real(
         started = conceal.core_s()
         options = _frozen(plan, tolerance)
         completed = conceal.diagnose(batch, out, case.without, options=options, baseline=known)
-    is_usable = completed.code == 0 and not completed.tampering
     result = {
         "case": case.name,
         "number": case.number,
@@ -109,14 +109,12 @@ def judge_real(
         "batch": digest,
         "tolerance": tolerance,
         "tampering": list(completed.tampering),
-        "failure": None if is_usable else completed.failure,
-        "diagnosis": _read_diagnosis(out) if is_usable else None,
+        "failure": None if completed.is_usable else completed.failure,
+        "diagnosis": _read_diagnosis(out) if completed.is_usable else None,
         "changed": changed,
         "took_s": round(conceal.core_s() - started, 1),
     }
-    (out / "result.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
-    verdict = result["diagnosis"]["verdict"] if is_usable else "no diagnosis"
-    report(f"{case.name}: {verdict}, {result['took_s']:.0f} s of one core")
+    write_result(result, out, report)
     return result
 
 
