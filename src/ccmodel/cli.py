@@ -59,7 +59,7 @@ def check(batch: Folder) -> None:
 @app.command("import-mis-tool")
 def import_mis_tool(
     source: Folder,
-    out: Annotated[Path, typer.Option(help="Folder for the batch folders, one for each tool and wrist angle.")],
+    out: Annotated[Path, typer.Option(help="Folder for the batches, one for each tool and angle.")],
 ) -> None:
     """Convert the public da Vinci instrument recordings in SOURCE to batches."""
     from ccmodel.rig import mis_tool
@@ -102,11 +102,9 @@ def diagnose(
         list[str],
         typer.Option(help="As 'kink at conduit', or two with a comma: fit it in full whatever the screening says."),
     ] = [],  # noqa: B006
-    strict: Annotated[
-        bool, typer.Option("--strict", help="Exit with 1 unless the verdict is agrees: for monitoring.")
-    ] = False,
+    strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 unless the model agrees.")] = False,
 ) -> None:
-    """Decide whether the calibrated model explains a batch; if not, locate the mismatch and name the physics left out."""
+    """Decide whether the calibrated model explains a batch; if not, locate and name the physics left out."""
     from ccmodel.studies.diagnosis.run import diagnose as run
     from ccmodel.studies.diagnosis.settings import Diagnosing
 
@@ -170,12 +168,8 @@ def simulate(
     model: Annotated[Path, typer.Option(help="A model file, as a diagnosis or a fit writes it.")],
     batch: Annotated[Path, typer.Option(help="Folder of a batch of the rig.")],
     out: Annotated[Path, typer.Option(help="File for the sensor readings, CSV.")],
-    recording: Annotated[
-        str | None, typer.Option(help="Recording with the conduits and the pretension; else the first.")
-    ] = None,
-    pretension: Annotated[
-        float | None, typer.Option(min=0.0, help="Pretension of both cables, N; else that of the recording.")
-    ] = None,
+    recording: Annotated[str | None, typer.Option(help="Recording with the conduits; else the first.")] = None,
+    pretension: Annotated[float | None, typer.Option(min=0.0, help="Pretension, N; else that recording's.")] = None,
 ) -> None:
     """Simulate the sensor readings of a rig for a motion of its drive, by a fitted model."""
     from ccmodel.steps.predict import simulate_motion as run

@@ -20,9 +20,9 @@ from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.failure import ModelError
 from ccmodel.inference import problem
 from ccmodel.model.files import read_model
-from ccmodel.report.diagnosis import headline
-from ccmodel.stages import diagnose as stage
-from ccmodel.stages.ingest import ingest
+from ccmodel.steps.ingest import ingest
+from ccmodel.studies.diagnosis import run as stage
+from ccmodel.studies.diagnosis.page import headline
 from ccmodel.typed import InputError
 
 RUBBING_NM = 4e-3

@@ -74,6 +74,7 @@ def figures(name, ending):
 def tables(name):
     """The CSV files of a study and the JSON file that its part of the page shows."""
     csv = [
-        f"{RESULTS}/tables/{stem.format(name=name)}.csv" for stem in STUDIES[name].tables
+        f"{RESULTS}/tables/{stem.format(name=name)}.csv"
+        for stem in STUDIES[name].tables
     ]
     return csv + ([f"{RESULTS}/tables/{name}.json"] if csv else [])

@@ -230,7 +230,7 @@ QUANTITIES = {
         "share of the cycle in phase IVa (slack, drive going on)", "%", 100.0, slack_before_reversal_share, TENSIONS
     ),
     "IVb_share": Quantity(
-        "share of the cycle in phase IVb (slack through a turn)", "%", 100.0, slack_through_reversal_share, TENSIONS
+        "share of the cycle in phase IVb (slack through a reversal)", "%", 100.0, slack_through_reversal_share, TENSIONS
     ),
     "work_lost": Quantity("work lost in a cycle", "mJ", 1e3, work_lost, (TAU_IN, THETA_IN)),
 }

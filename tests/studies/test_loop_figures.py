@@ -1,14 +1,17 @@
 """What figures say of themselves; the pictures are looked at by people."""
 
+from typing import get_args
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
 from builders import recording
-from ccmodel.config import Study
 from ccmodel.model.run import PRESCRIBED
-from ccmodel.report.figures import FIGURES
+from ccmodel.studies.loops.figure import draw as draw_study
+from ccmodel.studies.loops.settings import Figure, Study
 
+FIGURES = get_args(Figure)
 LOOP = {"tau_in_Nm": lambda t: np.sin(2 * np.pi * t), "tau_out_Nm": lambda t: np.cos(2 * np.pi * t)}
 
 
@@ -32,7 +35,7 @@ def texts(figure):
 
 
 def draw(pairs, figure="torque-loops", **kw):
-    return FIGURES[figure](pairs, Study(batches=["b"], figure=figure, variable="pretension", title="a study", **kw))
+    return draw_study(pairs, Study(batches=["b"], figure=figure, variable="pretension", title="a study", **kw))
 
 
 @pytest.mark.parametrize("figure", FIGURES)

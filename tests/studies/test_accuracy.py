@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ccmodel.compare import model_study
-from ccmodel.compare.accuracy import BY_RECORDING, Case, bias_and_scatter, comparison_table, summary
-from ccmodel.config import Accuracy, Measuring
 from ccmodel.model.run import simulate_recording
+from ccmodel.studies.accuracy.comparison import BY_RECORDING, Case, bias_and_scatter, comparison_table, summary
+from ccmodel.studies.accuracy.settings import Accuracy
+from ccmodel.studies.claims import model_runs
+from ccmodel.studies.loops.settings import Measuring
 from model_runs import CABLE, STUDY
 
 ASKED, HOW = Accuracy(), Measuring()
@@ -59,7 +60,7 @@ def cases(stiffness_off=0.0, accuracy=0.0005):
     found = []
     for i, pretension in enumerate((6.0, 7.0, 8.0)):
         study = STUDY.model_copy(update={"pretension_N": pretension})
-        recorded = model_study.run(CABLE, model_study.even(study), 0.05, study)
+        recorded = model_runs.run(CABLE, model_runs.even(study), 0.05, study)
         recorded = replace(
             recorded, batch="b", id=f"r{i}-a", origin="virtual-rig", accuracy=dict.fromkeys(recorded.channels, accuracy)
         )

@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ccmodel.compare import model_study
-from ccmodel.compare.claims import NO, OPEN, YES, claims_of, loop_placements
-from ccmodel.config import Claims, Measuring
 from ccmodel.repeats import condition_of, estimates, pooled_scatter
-from ccmodel.report.claims import model_figure, recordings_figure
 from ccmodel.report.figures import save_figure
+from ccmodel.studies.claims import model_runs
+from ccmodel.studies.claims.claim import NO, OPEN, YES
+from ccmodel.studies.claims.figure import model_figure, recordings_figure
+from ccmodel.studies.claims.settings import Claims
+from ccmodel.studies.claims.study import claims_of
+from ccmodel.studies.loops.settings import Measuring
 from model_runs import CABLE, STUDY
 
 CLAIMS = Claims(bend="bend", pretension="pretension", radius="radius", small_percent=5.0, model=STUDY)
@@ -22,20 +24,20 @@ def pairs_over(paths_and_pretensions, scatter=0.003):
     pairs = []
     for i, (path, pretension) in enumerate(paths_and_pretensions):
         study = STUDY.model_copy(update={"pretension_N": pretension, "amplitude_rad": 0.6})
-        said = model_study.run(CABLE, path, 0.05, study)
+        said = model_runs.run(CABLE, path, 0.05, study)
         for letter, sign in (("a", 1), ("b", -1)):
-            run = model_study.run(replace(CABLE, friction_scale=1 + sign * scatter), path, 0.05, study)
+            run = model_runs.run(replace(CABLE, friction_scale=1 + sign * scatter), path, 0.05, study)
             pairs.append((replace(run, batch="b", id=f"r{i}-{letter}", origin="virtual-rig"), said))
     return pairs
 
 
 @pytest.fixture(scope="module")
 def found():
-    even = model_study.even
+    even = model_runs.even
     pairs = {
         "bend": pairs_over([(even(STUDY, n * np.pi), 2.5) for n in (1, 2, 3)]),
         "pretension": pairs_over([(even(STUDY), T) for T in (0.3, 2.0, 7.0)]),
-        "radius": pairs_over([(model_study.placements(s)["in the middle"], 7.3) for s in
+        "radius": pairs_over([(model_runs.placements(s)["in the middle"], 7.3) for s in
                               (STUDY.model_copy(update={"loop_radius_m": r}) for r in (0.0457, 0.0762))]),
     }  # fmt: skip
     return {claim.name: claim for claim in claims_of(pairs, CABLE, CLAIMS, HOW)}
@@ -62,7 +64,7 @@ def test_the_deadband_knows_nothing_of_the_load_while_both_cables_are_taut(found
 
 def test_a_trend_the_other_way_is_not_borne_out():
     """The longer loop first: what is called rising falls."""
-    pairs = pairs_over([(model_study.even(STUDY, n * np.pi), 2.5) for n in (2, 1)])
+    pairs = pairs_over([(model_runs.even(STUDY, n * np.pi), 2.5) for n in (2, 1)])
     swapped = [(replace(r, path=s.path), s) for (r, _), (s, _) in zip(pairs, pairs[::-1], strict=True)]
     claims = claims_of({"bend": swapped, "pretension": [], "radius": []}, None, CLAIMS, HOW)
     assert claims[0].borne_out == NO
@@ -83,13 +85,13 @@ def test_without_recordings_the_figures_can_still_be_drawn(tmp_path):
 
 def test_the_figures_call_the_virtual_rig_what_it_is(found, tmp_path):
     save_figure(recordings_figure(list(found.values())), tmp_path / "a.svg")
-    save_figure(model_figure(list(found.values()), loop_placements(CABLE, STUDY)), tmp_path / "b.svg")
+    save_figure(model_figure(list(found.values()), model_runs.loop_placements(CABLE, STUDY)), tmp_path / "b.svg")
     assert "virtual rig, simulated" in (tmp_path / "a.svg").read_text()
     assert "loop at the drive end" in (tmp_path / "b.svg").read_text()
 
 
 def test_without_repeats_there_is_no_interval_and_it_is_said():
-    pairs = pairs_over([(model_study.even(STUDY, n * np.pi), 2.5) for n in (1, 2)])[::2]
+    pairs = pairs_over([(model_runs.even(STUDY, n * np.pi), 2.5) for n in (1, 2)])[::2]
     claim = claims_of({"bend": pairs, "pretension": [], "radius": []}, None, CLAIMS, HOW)[0]
     assert claim.borne_out == OPEN
     assert all(row.low is None and row.gap == "no repeats: no interval" for row in claim.rows)
@@ -102,8 +104,8 @@ def test_the_papers_sections_converge_to_the_exact_solver(found):
 
 
 def test_sections_needed_hold_from_there_on():
-    assert model_study.sections_needed({4: 0.5, 8: 2.0, 16: 0.9, 32: 0.1}, 1.0) == 16
-    assert model_study.sections_needed({4: 3.0, 8: 2.0}, 1.0) is None
+    assert model_runs.sections_needed({4: 0.5, 8: 2.0, 16: 0.9, 32: 0.1}, 1.0) == 16
+    assert model_runs.sections_needed({4: 3.0, 8: 2.0}, 1.0) is None
 
 
 def test_scatter_is_pooled_over_conditions():
@@ -117,6 +119,6 @@ def test_scatter_is_pooled_over_conditions():
 
 
 def test_repeats_are_told_by_their_last_letter(found):
-    recorded = pairs_over([(model_study.even(STUDY), 7.0)])[0][0]
+    recorded = pairs_over([(model_runs.even(STUDY), 7.0)])[0][0]
     assert condition_of(recorded) == "b/r0"
     assert condition_of(replace(recorded, id="t-7N")) == "b/t-7N"

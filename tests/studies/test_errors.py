@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from builders import recording
-from ccmodel.compare.errors import COLUMNS, error_table, last_cycle
-from ccmodel.compare.studies import label_of, labelled, origins_of, value_of
+from ccmodel.errors import COLUMNS, error_table, last_cycle
 from ccmodel.model.run import PRESCRIBED
+from ccmodel.studies.variables import label_of, labelled, origins_of, value_of
 
 
 def test_error_is_rms_in_units_and_over_peak_to_peak():

@@ -10,14 +10,15 @@ from scipy.optimize import least_squares
 from typer.testing import CliRunner
 
 from ccmodel import mechanisms as registry
+from ccmodel.channels import TABLE_ONE
 from ccmodel.cli import app
-from ccmodel.compare.table_one import rank
-from ccmodel.compare.table_one.effects import KNOWS_TIME, Effect, all_effects, finer, scaled
-from ccmodel.compare.table_one.refit import refit
-from ccmodel.compare.table_one.rigs import Condition, motion, plain, recorded, within_ranges
-from ccmodel.compare.table_one.settings import CHANNELS, TableOne
-from ccmodel.compare.table_one.study import run_study
 from ccmodel.diagnose.hypothesis import singles
+from ccmodel.studies.table_one import rank
+from ccmodel.studies.table_one.effects import DEPENDS_ON_TIME, Effect, all_effects, finer, scaled
+from ccmodel.studies.table_one.refit import refit
+from ccmodel.studies.table_one.rigs import Condition, motion, plain, recorded, within_ranges
+from ccmodel.studies.table_one.settings import TableOne
+from ccmodel.studies.table_one.study import run_study
 from ccmodel.typed import InputError, load_yaml_model
 
 ROOT = Path(__file__).parents[2]
@@ -118,7 +119,7 @@ def test_only_effects_that_know_the_time_see_the_rate():
         effect = group[-1]
         here, there = recorded(STUDY.rig, HERE, [effect]), recorded(STUDY.rig, slow, [effect])
         alike = np.abs(here - there).max(axis=1) < 1e-4 * np.ptp(here, axis=1)
-        assert alike.all() == (effect.name not in KNOWS_TIME), effect
+        assert alike.all() == (effect.name not in DEPENDS_ON_TIME), effect
 
 
 def test_the_drive_moves_a_whole_sine_in_the_judged_cycle():
@@ -221,4 +222,4 @@ def test_a_tiny_run_writes_tables_and_figure(tiny_file, tmp_path):
     ranked = pd.read_csv(tmp_path / "out/ranking.csv")
     assert set(ranked["by"]) <= {"errors", "errors and fit", "fit", "errors at the paper's fit"}
     assert set(ranked["norm"]) == {"peak-to-peak", "maximum", "rms"}
-    assert {f"error_{c}" for c in CHANNELS} < set(ranked.columns)
+    assert {f"error_{c}" for c in TABLE_ONE} < set(ranked.columns)
