@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ccmodel.model.run import simulate_recording
-from ccmodel.studies.accuracy.comparison import BY_RECORDING, Case, bias_and_scatter, comparison_table, summary
 from ccmodel.studies.accuracy.settings import Accuracy
+from ccmodel.studies.accuracy.study import BY_RECORDING, Case, bias_and_scatter, comparison_table, summary
 from ccmodel.studies.claims import model_runs
 from ccmodel.studies.loops.settings import Measuring
 from model_runs import CABLE, STUDY

@@ -8,8 +8,8 @@ import pytest
 
 from builders import recording
 from ccmodel.model.run import PRESCRIBED
-from ccmodel.studies.loops.figure import draw as draw_study
 from ccmodel.studies.loops.settings import Figure, Study
+from ccmodel.studies.loops.study import draw as draw_study
 
 FIGURES = get_args(Figure)
 LOOP = {"tau_in_Nm": lambda t: np.sin(2 * np.pi * t), "tau_out_Nm": lambda t: np.cos(2 * np.pi * t)}

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from ccmodel.config import load_config
-from ccmodel.studies.phases.figure import DRAW
-from ccmodel.studies.phases.study import study_of
+from ccmodel.studies.phases.study import DRAW, study_of
 
 EXAMPLE = load_config(Path(__file__).parents[2] / "config/config.yaml").phases
 STUDY = study_of(EXAMPLE)

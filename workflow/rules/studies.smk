@@ -11,9 +11,9 @@ for name, study in STUDIES.items():
             simulated=[simulated_of(p, batch) for _, p, batch in needs],
             fits=sorted(set(fits) - {""}),
         output:
-            tables(name),
-            figures(name, "svg"),
-            report(
+            tables=tables(name),
+            svg=figures(name, "svg"),
+            png=report(
                 figures(name, "png"),
                 caption="../report/study.rst",
                 category="Studies",
@@ -31,12 +31,10 @@ for name, study in STUDIES.items():
             runtime=60,
         params:
             kind=study.kind,
-            name=name,
             settings=study.model_dump_json(),
             measuring=CONFIG.measuring.model_dump_json(),
             labels=[label for label, _, _ in needs],
             fits=fits,
-            results=RESULTS,
             sources=source_digest(f"ccmodel.studies.{study.kind}.study"),
         message:
             f"Making study {name}"

@@ -1,16 +1,15 @@
 """Recordings, simulations and fits of a study -> its tables (CSV, JSON) and figures (PNG and SVG)."""
 
-from pathlib import Path
-
 from ccmodel.jobs import logged
 from ccmodel.studies.run import run_study, runs_of
 
 with logged(snakemake.log[0], snakemake.threads):
+    given, made, params = snakemake.input, snakemake.output, snakemake.params
     run_study(
-        snakemake.params.kind,
-        snakemake.params.name,
-        snakemake.params.settings,
-        snakemake.params.measuring,
-        runs_of(snakemake.params.labels, snakemake.input.recordings, snakemake.input.simulated, snakemake.params.fits),
-        Path(snakemake.params.results),
+        params.kind,
+        params.settings,
+        params.measuring,
+        runs_of(params.labels, given.recordings, given.simulated, params.fits),
+        made.tables,
+        list(zip(made.png, made.svg, strict=True)),
     )

@@ -76,28 +76,32 @@ class Outcome:
     summary: dict = field(default_factory=dict)
 
 
-def run_study(kind: str, name: str, settings: str, measuring: str, runs: Sequence[Run], results: Path) -> None:
+def run_study(
+    kind: str, settings: str, measuring: str, runs: Sequence[Run], tables: Sequence[Path],
+    figures: Sequence[Sequence[Path]],
+) -> None:  # fmt: skip
     """Judge a study and write its tables and figures.
 
     Parameters
     ----------
-    kind, name : str
-        Folder in `ccmodel.studies`; name in the configuration.
+    kind : str
+        Folder of the study in `ccmodel.studies`.
     settings, measuring : str
         The study's settings and how loops are measured, as JSON.
     runs : sequence of Run
-    results : Path
-        Folder of all results.
+    tables : sequence of Path
+        The CSV files in the order of the settings, then the JSON file; empty for a study without tables.
+    figures : sequence of sequence of Path
+        The files of each figure in the order of the settings, PNG and SVG.
     """
     study = import_module(f"ccmodel.studies.{kind}.study")
-    asked = study.SETTINGS.model_validate_json(settings)
-    outcome = study.judge(asked, runs, Measuring.model_validate_json(measuring))
-    for stem, table in zip(asked.tables, outcome.tables, strict=True):
-        write_table(results / f"tables/{stem.format(name=name)}.csv", table)
-    if asked.tables:
+    outcome = study.judge(study.SETTINGS.model_validate_json(settings), runs, Measuring.model_validate_json(measuring))
+    for file, table in zip(tables[:-1], outcome.tables, strict=True):
+        write_table(file, table)
+    if tables:
         inputs = provenance.of_inputs(sorted({file for run in runs for file in run.files}))
-        write_json(results / f"tables/{name}.json", outcome.summary | {"provenance": inputs})
-    for stem, figure in zip(asked.figures, outcome.figures, strict=True):
-        for ending in ("png", "svg"):
-            save_figure(figure, results / f"figures/{stem.format(name=name)}.{ending}")
+        write_json(tables[-1], outcome.summary | {"provenance": inputs})
+    for files, figure in zip(figures, outcome.figures, strict=True):
+        for file in files:
+            save_figure(figure, Path(file))
         plt.close(figure)

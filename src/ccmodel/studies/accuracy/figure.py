@@ -22,9 +22,9 @@ def scatter_figure(table: pd.DataFrame, lines: Sequence[dict]) -> Figure:
     Parameters
     ----------
     table : DataFrame
-        With the columns of `ccmodel.studies.accuracy.comparison.BY_RECORDING`.
+        With the columns of `ccmodel.studies.accuracy.study.BY_RECORDING`.
     lines : sequence of dict
-        Its `ccmodel.studies.accuracy.comparison.summary`.
+        Its `ccmodel.studies.accuracy.study.summary`.
     """
     return _panels(table, lines, _scatter_panel, "Modelled over recorded values")
 

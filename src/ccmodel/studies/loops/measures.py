@@ -13,17 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from ccmodel.channels import (
-    CABLES,
-    F_DRIVE,
-    F_LOAD,
-    TABLE,
-    TAU_IN,
-    TAU_OUT,
-    TENSIONS,
-    THETA_IN,
-    THETA_OUT,
-)
+from ccmodel.channels import CABLES, F_DRIVE, F_LOAD, TABLE, TAU_IN, TAU_OUT, TENSIONS, THETA_IN, THETA_OUT
 from ccmodel.errors import last_cycle
 from ccmodel.recording import Recording
 from ccmodel.studies.loops.settings import Measuring
