@@ -422,7 +422,7 @@ def test_load_encoder_that_the_description_does_not_know(bench):
     del bench.described["rig"]["load"]["encoder_counts_per_rev"]
     ingested = ingest_batch(bench.write().folder)
     assert {f.text for f in ingested.findings} == {
-        "not used: batch.yaml has no rig.load.encoder_counts_per_rev to make sense of it"
+        "not used: batch.yaml lacks rig.load.encoder_counts_per_rev, which converts it"
     }
     assert "theta_out_rad" not in ingested.recordings[0]
 
@@ -529,7 +529,7 @@ def test_sensor_that_the_description_does_not_know(bench):
     del bench.described["rig"]["drive"]["load_cell"]
     ingested = ingest_batch(bench.write().folder)
     assert {str(f).split(": ", 1)[1] for f in ingested.findings} == {
-        "not used: batch.yaml has no rig.drive.load_cell to make sense of it"
+        "not used: batch.yaml lacks rig.drive.load_cell, which converts it"
     }
     assert "F_drive_N" not in ingested.recordings[0]
 
