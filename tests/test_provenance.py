@@ -18,7 +18,7 @@ def test_a_step_consists_of_what_it_imports():
         "recording.py",
         "batch.py",
     } <= simulate
-    assert not {"figures.py", "errors.py", "mis_tool.py", "page.html.j2"} & simulate
+    assert not {"figures.py", "errors.py", "signs.py", "page.html.j2"} & simulate
 
 
 def test_templates_belong_to_the_step_that_fills_them():

@@ -7,9 +7,10 @@ import pytest
 import yaml
 
 from ccmodel.rig.ingest import ingest_batch
-from ccmodel.rig.mis_tool import NM_PER_COUNT, import_mis_tool
+from ccmodel.rig.mis_tool import import_mis_tool
 from ccmodel.typed import InputError
 
+NM_PER_COUNT = 3.9811e-5  # stated by the data set
 REAL = Path(__file__).parents[3] / "shared/real/mis-tool-characterization/data"
 HEADER = "%Data taken by somebody\n%Freq_Hz=0.99\n%Back-end Time [ms], Back-end CUI Encoder [counts]\n"
 
