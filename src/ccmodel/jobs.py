@@ -1,4 +1,4 @@
-"""What every pipeline job does with its log."""
+"""The log file of a pipeline job."""
 
 import logging
 import sys
@@ -9,7 +9,7 @@ from contextlib import contextmanager, redirect_stderr
 
 @contextmanager
 def logged(file: str) -> Iterator[None]:
-    """Send warnings, log lines and the trace of a failure to a job's log file; end the job when it fails."""
+    """Write warnings, log lines and the traceback of a failure to the log file; exit with 1 on failure."""
     with open(file, "w") as log, redirect_stderr(log):
         logging.basicConfig(stream=log, level=logging.INFO, force=True)
         try:

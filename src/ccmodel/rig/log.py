@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy.ndimage import find_objects, label
 
 from ccmodel.rig import readers
 from ccmodel.rig.batch import COLUMNS, REQUIRED_COLUMNS
@@ -88,7 +89,7 @@ def _drop_bad(table: pd.DataFrame, limits: Limits, warnings: list[Defect]) -> pd
         row = int(table.index[is_bad][0])
         if is_bad.all():
             raise LogError(None, column, "has no numbers: leave the column out if the rig has no such sensor")
-        run = longest_run(is_bad)[1]
+        run = length(longest_run(is_bad))
         if run > limits.bad_cells_in_a_row or is_bad.mean() > limits.bad_cells_fraction:
             raise LogError(row, column, f"{is_bad.sum()} cells have no number, {run} of them in a row")
         many = f"{is_bad.sum()} cells have no number: their rows are" if is_bad.sum() > 1 else "no number: row"
@@ -150,16 +151,16 @@ def _gap_text(count: int, longest: float, usual: float, uneven: bool) -> str:
     return f"{what} of {longest:.4g} s where a step is {usual:.4g} s"
 
 
-def runs(flags: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Starts and lengths of all runs of true values."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
-    return edges[::2], edges[1::2] - edges[::2]
+def runs(flags: np.ndarray) -> list[slice]:
+    """All runs of true values."""
+    return [run for (run,) in find_objects(label(flags)[0])]
 
 
-def longest_run(flags: np.ndarray) -> tuple[int, int]:
-    """Start and length of the longest run of true values; (0, 0) if there is none."""
-    starts, lengths = runs(flags)
-    if starts.size == 0:
-        return 0, 0
-    longest = np.argmax(lengths)
-    return int(starts[longest]), int(lengths[longest])
+def longest_run(flags: np.ndarray) -> slice:
+    """The longest run of true values, the first of several; empty if there is none."""
+    return max(runs(flags), key=length, default=slice(0, 0))
+
+
+def length(run: slice) -> int:
+    """Number of samples of a run."""
+    return run.stop - run.start

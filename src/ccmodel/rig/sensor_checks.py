@@ -10,7 +10,7 @@ import pandas as pd
 from ccmodel.rig.batch import Rig
 from ccmodel.rig.findings import Defect, LogError
 from ccmodel.rig.limits import LIMITS, Limits
-from ccmodel.rig.log import longest_run, runs
+from ccmodel.rig.log import length, longest_run, runs
 
 DRIVE, LOAD = "drive_encoder_counts", "load_encoder_counts"
 
@@ -61,13 +61,13 @@ def _check_drive(table: pd.DataFrame, rig: Rig, limits: Limits) -> None:
     if jump := _jump(table, DRIVE, rig.drive.encoder_counts_per_rev, limits):
         raise LogError(*jump)
     # The load cannot move by itself: if it moves, the drive moves too.
-    start, length = longest_run(np.diff(counts.to_numpy(), prepend=np.nan) == 0)
-    if LOAD in table:
+    still = longest_run(np.diff(counts.to_numpy(), prepend=np.nan) == 0)
+    if LOAD in table and length(still):
         creep = max(limits.other_end_counts, limits.other_end_fraction * np.ptp(table[LOAD]))
-        if np.ptp(table[LOAD].iloc[start : start + length]) > creep:
-            last = int(table.index[start + length - 1])
+        if np.ptp(table[LOAD].iloc[still]) > creep:
+            first, last = table.index[still][[0, -1]]
             text = f"stands still up to row {last} while the load moves: encoder stuck"
-            raise LogError(int(table.index[start]), DRIVE, text)
+            raise LogError(int(first), DRIVE, text)
 
 
 def _dead(table: pd.DataFrame, column: str, rig: Rig, limits: Limits) -> Defect | None:
@@ -126,11 +126,13 @@ def _frozen(table: pd.DataFrame, column: str, limits: Limits) -> list[Defect]:
 def _standstills(table: pd.DataFrame, column: str, limits: Limits) -> list[slice]:
     """Parts of a log in which a column keeps one value for long."""
     time = table["time_s"].to_numpy()
-    starts, lengths = runs(np.diff(table[column].to_numpy(), prepend=np.nan) == 0)
     # The sample before a run of repeats has the same value.
-    first, last = starts - 1, starts + lengths - 1
-    long = (lengths > limits.frozen_samples) & (time[last] - time[first] > limits.frozen_s)
-    return [slice(start, stop + 1) for start, stop in zip(first[long], last[long], strict=True)]
+    parts = [slice(run.start - 1, run.stop) for run in runs(np.diff(table[column].to_numpy(), prepend=np.nan) == 0)]
+    return [
+        part
+        for part in parts
+        if length(part) > limits.frozen_samples + 1 and time[part.stop - 1] - time[part.start] > limits.frozen_s
+    ]
 
 
 def _saturated(values: pd.Series, sensor_range: tuple[float, float] | None, limits: Limits) -> list[Defect]:
@@ -148,8 +150,8 @@ def _saturated(values: pd.Series, sensor_range: tuple[float, float] | None, limi
         what = "flat at its extreme value"
     found = []
     for end in ends:
-        start, length = longest_run(end)
-        if length >= limits.flat_samples:
-            text = f"{what} in {end.sum()} samples, {length} in a row from here: saturated"
-            found.append(Defect(int(values.index[start]), values.name, text))
+        run = longest_run(end)
+        if length(run) >= limits.flat_samples:
+            text = f"{what} in {end.sum()} samples, {length(run)} in a row from here: saturated"
+            found.append(Defect(int(values.index[run.start]), values.name, text))
     return found
