@@ -21,7 +21,6 @@ GUARD = Path(__file__).with_name("guard.py")
 BUILDER = (
     "proof.yaml",
     "plan.py",
-    "effects.py",
     "cases.py",
     "build.py",
     "judge.py",
