@@ -40,35 +40,6 @@ class SpringLoad:
 
 
 @dataclass(frozen=True)
-class MechanicalLoad:
-    """A spring that stiffens, with inertia and damping: tau_out = K_e theta + K_3 theta^3 + B omega + J alpha.
-
-    Attributes
-    ----------
-    stiffness_Nm_per_rad : float
-        K_e, >= 0; theta_out is counted from the neutral position (from the start if there is no spring at all).
-    cubic_Nm_per_rad3 : float
-        K_3; softening (negative) is allowed as long as the torque still rises with the angle.
-    damping_Nms_per_rad : float
-        B >= 0.
-    inertia_kg_m2 : float
-        J >= 0.
-    """
-
-    stiffness_Nm_per_rad: float = 0.0
-    cubic_Nm_per_rad3: float = 0.0
-    damping_Nms_per_rad: float = 0.0
-    inertia_kg_m2: float = 0.0
-
-    def __post_init__(self):
-        for name in ("stiffness_Nm_per_rad", "damping_Nms_per_rad", "inertia_kg_m2"):
-            if not 0 <= getattr(self, name) < inf:
-                raise ModelError(f"a load's {name} must be finite and not negative; got {getattr(self, name)}")
-        if not np.isfinite(self.cubic_Nm_per_rad3):
-            raise ModelError(f"a load's cubic_Nm_per_rad3 must be finite; got {self.cubic_Nm_per_rad3}")
-
-
-@dataclass(frozen=True)
 class TorqueLoad:
     """A torque known at every sample, as measured at the load pulley; linear in between.
 
@@ -78,7 +49,7 @@ class TorqueLoad:
         tau_out, the torque of the cables on the load.
     beside_Nm_per_rad : float
         A spring that holds the load pulley too and that the torque's sensor does not feel, slack where a run starts;
-        >= 0. Only the general solver knows it.
+        >= 0.
     """
 
     torque_Nm: NDArray
@@ -88,11 +59,6 @@ class TorqueLoad:
         if not 0 <= self.beside_Nm_per_rad < inf:
             raise ModelError(f"a spring beside a load is finite and not negative; got {self.beside_Nm_per_rad}")
         object.__setattr__(self, "torque_Nm", series(self.torque_Nm, "torque_Nm"))
-
-    def check_alone(self) -> None:
-        """For solvers that know no spring beside the torque."""
-        if self.beside_Nm_per_rad:
-            raise ModelError("a spring beside a measured torque takes the general solver")
 
 
 @dataclass(frozen=True)

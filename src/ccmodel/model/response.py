@@ -12,13 +12,8 @@ class Status(Enum):
     """How a simulation ended; the text says what to do about it."""
 
     OK = "every sample was reached"
-    STUCK = (
-        "the path between two samples did not come to an end within its number of events: sample the drive and the"
-        " load more finely around the first sample that is missing"
-    )
     UNBALANCED = (
-        "the cables cannot hold the load that was given: a cable can only pull; check the sign of the given torque or"
-        " force and its zero"
+        "the cables do not balance the load: check the stiffness of the load's spring against that of the cables"
     )
     NO_CONVERGENCE = (
         "the cables and the load find no balance there, not in the smallest substep either: look at the load torque"

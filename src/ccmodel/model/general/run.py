@@ -16,7 +16,7 @@ from ccmodel.mechanisms.strand_settling import stretch_at
 from ccmodel.model.general import march as rows
 from ccmodel.model.general.grid import Grid, make_grid
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import AngleLoad, MechanicalLoad, SpringLoad, TorqueLoad
+from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
 from ccmodel.model.response import PairResponse, Status
 from ccmodel.model.transmission import Transmission
 
@@ -26,7 +26,7 @@ RINGING_STEP_RAD, MOST_STEPS = 0.15, 16
 # Each round leaves as much of a sensor's fault as the fault is of the reading.
 FAULTS_ROUNDS = 8
 
-Load = SpringLoad | MechanicalLoad | TorqueLoad | AngleLoad
+Load = SpringLoad | TorqueLoad | AngleLoad
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def simulate(
     Parameters
     ----------
     transmission : Transmission
-    load : SpringLoad, MechanicalLoad, TorqueLoad or AngleLoad
+    load : SpringLoad, TorqueLoad or AngleLoad
     time_s : ndarray, shape (n,)
         Sample times, s, increasing.
     theta_in : ndarray, shape (n,)
@@ -186,26 +186,6 @@ def settings_of(mechanisms: Mapping[str, Mapping] | Sequence[Active]) -> Setting
     return settings
 
 
-def load_law(settings: Settings, load: SpringLoad, time_s: NDArray, theta: NDArray, start_Nm: float) -> NDArray:
-    """Torque (N m, shape (n,)) of a spring load with what acts on it, along a course of its pulley.
-
-    Parameters
-    ----------
-    settings : Settings
-    load : SpringLoad
-    time_s, theta : ndarray, shape (n,)
-        The pulley's course; only its changes matter.
-    start_Nm : float
-        Torque before it.
-    """
-    stiffness, K3 = load.stiffness_Nm_per_rad, settings.cubic_stiffness
-    angle = theta - theta[0] + _rest_angle(stiffness, K3, settings.half_gap, start_Nm, load)
-    beyond = np.sign(angle) * np.maximum(np.abs(angle) - settings.half_gap, 0.0)
-    speed = np.gradient(theta, time_s)
-    inertial = settings.damping(stiffness) * speed + settings.inertia * np.gradient(speed, time_s)
-    return stiffness * beyond + K3 * beyond**3 + inertial
-
-
 def _active(mechanisms) -> list[Active]:
     given = []
     if isinstance(mechanisms, Mapping):
@@ -288,8 +268,7 @@ def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tu
 
 
 def _physics(transmission: Transmission, load: Load, settings: Settings, elements: int) -> rows.Physics:
-    is_mechanical = isinstance(load, MechanicalLoad)
-    K_e = load.stiffness_Nm_per_rad if isinstance(load, SpringLoad | MechanicalLoad) else 0.0
+    K_e = load.stiffness_Nm_per_rad if isinstance(load, SpringLoad) else 0.0
     K_e = load.beside_Nm_per_rad if isinstance(load, TorqueLoad) else K_e
     return rows.Physics(
         has_settling=settings.settling_N > 0,
@@ -308,10 +287,10 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
         eccentricity=float(settings.load_eccentricity[0]),
         phase=float(settings.load_eccentricity[1]),
         stiffness_load=float(K_e),
-        cubic=float(settings.cubic_stiffness + (load.cubic_Nm_per_rad3 if is_mechanical else 0.0)),
+        cubic=float(settings.cubic_stiffness),
         half_gap=float(settings.half_gap),
-        damping=float(settings.damping(K_e) + (load.damping_Nms_per_rad if is_mechanical else 0.0)),
-        inertia=float(settings.inertia + (load.inertia_kg_m2 if is_mechanical else 0.0)),
+        damping=float(settings.damping(K_e)),
+        inertia=float(settings.inertia),
         load_friction=float(settings.load_friction_Nm),
         load_presliding=float(settings.load_presliding_rad),
         kind=rows.PRESCRIBED_ANGLE if isinstance(load, AngleLoad) else rows.IMPEDANCE,
@@ -386,14 +365,14 @@ def _deflection(K: float, K3: float, torque: float) -> float:
     return float(z)
 
 
-def _rest_angle(K: float, K3: float, half_gap: float, torque: float, load: SpringLoad | MechanicalLoad) -> float:
+def _rest_angle(K: float, K3: float, half_gap: float, torque: float, load: SpringLoad) -> float:
     """Angle (rad) of a load at rest that the cables turn with a torque.
 
     One that is held against its spring lies against a side of its gap. One that is all but free may stand anywhere:
     where the torque is not known to be there, at the place that is given. The one goes over into the other around what
     the torque is known to.
     """
-    known_to, place = (load.rest_known_to_Nm, load.rest_gap_position) if isinstance(load, SpringLoad) else (0.0, 0.0)
+    known_to, place = load.rest_known_to_Nm, load.rest_gap_position
     held = float(np.clip(2 * abs(torque) / known_to - 1.5, 0.0, 1.0)) if known_to else float(torque != 0)
     side = held * float(np.sign(torque)) + (1 - held) * place
     return _deflection(K, K3, torque) + half_gap * side
