@@ -13,6 +13,7 @@ from ccmodel.encoder.motion import SIDES, drive_motion
 from ccmodel.failure import ModelError
 from ccmodel.model.exact import pair as exact
 from ccmodel.model.general import run as general
+from ccmodel.model.general.sensors import true_at
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad, TorqueLoad
 from ccmodel.model.parameters import ZERO_OF, Parameters
@@ -228,7 +229,7 @@ def _true_at_rest(read: Mapping[str, float], given: ModelInput, parameters: Para
     still = {"theta_in_rad": 0.0, "theta_out_rad": 0.0}
     radii = parameters.drive_radius_m, parameters.load_radius_m
     seconds = read["time_s"] - float(given.recording.time_s[0])
-    true = general.true_at(parameters.mechanisms, seconds, sensed | still, radii)
+    true = true_at(parameters.mechanisms, seconds, sensed | still, radii)
     if parameters.load_stiffness_Nm_per_rad is None:
         true["tau_out_Nm"] = sensed["tau_out_Nm"]
     return true
