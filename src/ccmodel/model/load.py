@@ -1,4 +1,4 @@
-"""Loads that the transmission can work against."""
+"""Loads that the transmission works against."""
 
 from dataclasses import dataclass
 from math import inf
@@ -21,10 +21,10 @@ class SpringLoad:
     stiffness_Nm_per_rad : float
         K_e, >= 0.
     rest_known_to_Nm : float
-        How well the torque is known with which a run begins; >= 0. Where there is a gap, a smaller one does not tell
-        which of its sides the load lies against.
+        Uncertainty of the torque at the start of a run; >= 0. A smaller torque does not show which side of a gap the
+        load touches.
     rest_gap_position : float
-        Where in the gap it rests then, -1 to 1.
+        Position in the gap at rest in that case, -1 to 1.
     """
 
     stiffness_Nm_per_rad: float
@@ -48,8 +48,7 @@ class TorqueLoad:
     torque_Nm : ndarray, shape (n,)
         tau_out, the torque of the cables on the load.
     beside_Nm_per_rad : float
-        A spring that holds the load pulley too and that the torque's sensor does not feel, slack where a run starts;
-        >= 0.
+        A spring at the load pulley that the torque sensor does not feel, without torque at the start of a run; >= 0.
     """
 
     torque_Nm: NDArray
@@ -78,7 +77,7 @@ class AngleLoad:
 
 
 def series(values, name: str) -> NDArray:
-    """`values` as one finite number a sample, at least one; `ModelError` where they are not."""
+    """`values` as a contiguous array of one finite number a sample; `ModelError` where they are not."""
     values = np.ascontiguousarray(values, dtype=float)
     if values.ndim != 1 or values.size == 0:
         raise ModelError(f"{name} is one row of samples, at least one; got an array of shape {values.shape}")
