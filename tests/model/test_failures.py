@@ -10,8 +10,7 @@ from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.model import exact, general
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import AngleLoad, MechanicalLoad, SpringLoad, TorqueLoad
-from ccmodel.model.response import Status
+from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
 from ccmodel.model.run import ModelInput, simulate
 from ccmodel.model.transmission import Transmission
 from model_runs import PULLED
@@ -30,6 +29,10 @@ def by_exact(drive=DRIVE, load=SPRING, one=PAIR, initial=INITIAL):
 def by_general(drive=DRIVE, load=SPRING, one=PAIR, initial=INITIAL, **mechanisms):
     acting = {name.replace("_", "-"): entry for name, entry in mechanisms.items()}
     return general.simulate(one, load, np.arange(len(drive)) * 0.01, drive, initial, acting)
+
+
+def one_cable(far=300.0, rigidity=9300.0, mu=0.15):
+    return exact.simulate_cable(PATH, rigidity, mu, far, DRIVE, INITIAL)
 
 
 def as_model(**changes):
@@ -62,10 +65,8 @@ def effect(place="conduit", **values):
         (lambda: replace(PAIR, friction_coefficient=-0.1), "lower bound of 0"),
         (lambda: replace(PAIR, friction_coefficient=np.inf), "friction_coefficient must be finite"),
         (lambda: SpringLoad(-1.0), "finite and not negative"),
-        (lambda: MechanicalLoad(inertia_kg_m2=np.inf), "inertia_kg_m2 must be finite"),
         (lambda: TorqueLoad([0.0, np.nan]), "torque_Nm is not finite at sample 1: leave"),
         (lambda: TorqueLoad([0.0], -1.0), "a spring beside a load is finite and not negative; got -1"),
-        (lambda: by_exact(load=TorqueLoad(np.zeros(50), 0.1)), "takes the general solver"),
         (lambda: AngleLoad([]), "at least one"),
         (lambda: InitialTension.uniform(PATH, -1.0), "positive along the whole cable"),
         (lambda: InitialTension.uniform(PATH, np.nan), "finite"),
@@ -73,8 +74,11 @@ def effect(place="conduit", **values):
         (lambda: by_general(drive=np.zeros(0)), "at least one"),
         (lambda: by_exact(drive=with_gap(DRIVE)), "theta_in_rad is not finite at sample 3: leave"),
         (lambda: by_general(drive=with_gap(DRIVE, gap=np.inf)), "theta_in is not finite at sample 3"),
-        (lambda: by_exact(load=TorqueLoad(np.zeros(3))), "3 samples, the drive has 50"),
         (lambda: by_general(load=TorqueLoad(np.zeros(1))), "1 samples, the drive angle 50"),
+        (lambda: one_cable(far=-1.0), "stiffness is not negative; got -1"),
+        (lambda: one_cable(far=np.nan), "stiffness is not negative; got nan"),
+        (lambda: one_cable(rigidity=0.0), "axial_rigidity_N must be positive"),
+        (lambda: one_cable(mu=-0.1), "lower bound of 0"),
         (lambda: by_exact(one=replace(PAIR, friction_coefficient=200.0)), "check the unit of the bend angles"),
         (lambda: by_general(one=replace(PAIR, friction_coefficient=200.0)), "check the unit of the bend angles"),
         (lambda: by_general(relaxation=effect("cable", r=1.2, tau=5.0)), "share r of its tension below 1"),
@@ -96,10 +100,6 @@ def test_what_cannot_be_run_is_refused_by_name(attempt, says):
         attempt()
 
 
-def test_a_tension_that_would_have_to_push_is_said():
-    """The other endings of a run, stuck and without convergence, are tested beside their solvers."""
-    pushed = exact.ForceEnd(np.array([7.3, -1.0]))
-    response = exact.simulate_cable(PATH, 9300.0, 0.15, pushed, np.zeros(2), INITIAL)
-    assert response.status is Status.UNBALANCED
-    assert "a cable can only pull" in response.status.value
-    assert (response.T_near_N >= 0).all() and (response.T_far_N >= 0).all()
+def test_a_measured_torque_is_not_for_the_exact_solver():
+    with pytest.raises(TypeError, match="takes a SpringLoad; got TorqueLoad"):
+        by_exact(load=TorqueLoad(np.zeros(50)))

@@ -15,8 +15,9 @@ from ccmodel.encoder.smoothing import OFFSET_SCORES
 from ccmodel.failure import ModelError
 from ccmodel.model.exact import pair as exact
 from ccmodel.model.general import run as general
+from ccmodel.model.general.sensors import true_at
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
+from ccmodel.model.load import SpringLoad, TorqueLoad
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.transmission import Transmission
 from ccmodel.recording import Recording, stride
@@ -31,7 +32,7 @@ KNOWN_TO = 2.0
 # Before the first count comes, a drive has moved by up to a count, and the torque with it.
 STILL_RAD = 1e-5
 
-LoadFrom = Literal["law", "torque", "angle"]
+LoadFrom = Literal["law", "torque"]
 PRESCRIBED = "prescribed"  # `derived_from` of a channel that the model was given, not asked
 
 
@@ -135,8 +136,8 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
         Gives the drive's motion, the conduit's path, the tensions at rest and, where it is asked for or `parameters`
         has no load stiffness, what was measured at the load pulley.
     parameters : Parameters
-    load_from : {"law", "torque", "angle"}
-        What stands at the load: its law, or the torque or the angle that was measured there in its stead.
+    load_from : {"law", "torque"}
+        What stands at the load: its law, or the torque that was measured there in its stead.
 
     Returns
     -------
@@ -178,17 +179,11 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
     sources = dict.fromkeys(channels, "model") | {THETA_IN: PRESCRIBED}
     if isinstance(load, TorqueLoad):
         sources[TAU_OUT] = PRESCRIBED
-    elif isinstance(load, AngleLoad):
-        sources[THETA_OUT] = PRESCRIBED
     return recording.with_channels(channels, sources, origin="model")
 
 
 def _run(transmission, load, given: ModelInput, initial: InitialTension, parameters: Parameters) -> dict[str, NDArray]:
-    """What the sensors would read of a run, by channel.
-
-    A torque that was measured rocks the load at almost every sample, and with it the point of a cable that stays
-    still, whose path the exact solver integrates: the general one is ten times as fast there and right to 0.02 %.
-    """
+    """What the sensors would read of a run, by channel."""
     if parameters.mechanisms or isinstance(load, TorqueLoad):
         time_s = given.recording.time_s
         finer = parameters.refinement
@@ -234,18 +229,14 @@ def _true_at_rest(read: Mapping[str, float], given: ModelInput, parameters: Para
     still = {THETA_IN: 0.0, THETA_OUT: 0.0}
     radii = parameters.drive_radius_m, parameters.load_radius_m
     seconds = read["time_s"] - float(given.recording.time_s[0])
-    true = general.true_at(parameters.mechanisms, seconds, sensed | still, radii)
+    true = true_at(parameters.mechanisms, seconds, sensed | still, radii)
     if parameters.load_stiffness_Nm_per_rad is None:
         true[TAU_OUT] = sensed[TAU_OUT]
     return true
 
 
-def _load(given: ModelInput, parameters: Parameters, load_from: LoadFrom) -> SpringLoad | TorqueLoad | AngleLoad:
+def _load(given: ModelInput, parameters: Parameters, load_from: LoadFrom) -> SpringLoad | TorqueLoad:
     name = f"{given.recording.batch}/{given.recording.id}"
-    if load_from == "angle":
-        if given.theta_out is None:
-            raise ModelError(f"{name}: no angle was measured at the load pulley")
-        return AngleLoad(given.theta_out)
     if load_from == "law" and parameters.load_stiffness_Nm_per_rad is not None:
         return spring_load(given, parameters)
     if given.tau_out is None:
