@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from cable_runs import FIXED, simulate_cable
 from ccmodel.geometry import ConduitPath
-from ccmodel.model.exact import Status, simulate_cable
+from ccmodel.model.exact import Status
 from ccmodel.model.initial import InitialTension
 
 LENGTH, BEND, MU, EA = 2.0, 3 * np.pi, 0.15, 2000.0
@@ -17,9 +18,6 @@ def line(T1, slope):
     """A sliding line as an initial profile, from the drive end's tension."""
     ends = T1 * np.exp([0.0, slope * M])
     return InitialTension([0.0, LENGTH], ends, ends)
-
-
-FIXED = np.inf
 
 
 def run(displacement, initial, far_stiffness=FIXED):

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from numba import njit
 
+from cable_runs import FIXED, simulate_cable
 from ccmodel.geometry import ConduitPath
-from ccmodel.model.exact import simulate_cable, simulate_pair
+from ccmodel.model.exact import simulate_pair
 from ccmodel.model.general import simulate
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, SpringLoad
@@ -36,7 +37,7 @@ def test_work_is_stored_or_dissipated(slope, tension, reach):
     t, weight = (t + 1) / 2, weight / 2
     # d = reach t^2 takes the square-root start away
     at = np.concatenate([[0.0], reach * t**2, [reach]])
-    response = simulate_cable(PATH, EA, MU, np.inf, at, initial, record_profiles_at=[0, at.size - 1])
+    response = simulate_cable(PATH, EA, MU, FIXED, at, initial, record_profiles_at=[0, at.size - 1])
     work = (weight * 2 * t * reach * response.T_near_N[1:-1]).sum()
     change = stored(response.profiles[at.size - 1]) - stored(response.profiles[0])
     dissipated = (
@@ -120,7 +121,7 @@ FAR = 1e-3 * np.array([0, 0, 0, -3, -5, -5, 2, 2, 6])
 
 def by_the_exact_solver():
     """Cable A with a fixed far end."""
-    r = simulate_cable(PATH, EA, MU, np.inf, NEAR, InitialTension.uniform(PATH, 10.0))
+    r = simulate_cable(PATH, EA, MU, FIXED, NEAR, InitialTension.uniform(PATH, 10.0))
     return np.stack([r.T_near_N, r.T_far_N]), 0 * FAR
 
 

@@ -31,10 +31,6 @@ def by_general(drive=DRIVE, load=SPRING, one=PAIR, initial=INITIAL, **mechanisms
     return general.simulate(one, load, np.arange(len(drive)) * 0.01, drive, initial, acting)
 
 
-def one_cable(far=300.0, rigidity=9300.0, mu=0.15):
-    return exact.simulate_cable(PATH, rigidity, mu, far, DRIVE, INITIAL)
-
-
 def as_model(**changes):
     given = ModelInput.of(recording(theta_in_rad=lambda t: 0.3 * np.sin(t)))
     return simulate(given, replace(PULLED, **changes))
@@ -75,10 +71,6 @@ def effect(place="conduit", **values):
         (lambda: by_exact(drive=with_gap(DRIVE)), "theta_in_rad is not finite at sample 3: leave"),
         (lambda: by_general(drive=with_gap(DRIVE, gap=np.inf)), "theta_in is not finite at sample 3"),
         (lambda: by_general(load=TorqueLoad(np.zeros(1))), "1 samples, the drive angle 50"),
-        (lambda: one_cable(far=-1.0), "stiffness is not negative; got -1"),
-        (lambda: one_cable(far=np.nan), "stiffness is not negative; got nan"),
-        (lambda: one_cable(rigidity=0.0), "axial_rigidity_N must be positive"),
-        (lambda: one_cable(mu=-0.1), "lower bound of 0"),
         (lambda: by_exact(one=replace(PAIR, friction_coefficient=200.0)), "check the unit of the bend angles"),
         (lambda: by_general(one=replace(PAIR, friction_coefficient=200.0)), "check the unit of the bend angles"),
         (lambda: by_general(relaxation=effect("cable", r=1.2, tau=5.0)), "share r of its tension below 1"),
@@ -101,5 +93,5 @@ def test_what_cannot_be_run_is_refused_by_name(attempt, says):
 
 
 def test_a_measured_torque_is_not_for_the_exact_solver():
-    with pytest.raises(TypeError, match="takes a SpringLoad; got TorqueLoad"):
+    with pytest.raises(TypeError, match="takes a SpringLoad or a FixedLoad; got TorqueLoad"):
         by_exact(load=TorqueLoad(np.zeros(50)))

@@ -35,7 +35,7 @@ class SpringLoad:
         if not (np.isfinite(self.stiffness_Nm_per_rad) and self.stiffness_Nm_per_rad >= 0):
             raise ModelError(
                 f"a load spring's stiffness is finite and not negative; got {self.stiffness_Nm_per_rad}"
-                " (for a blocked load use AngleLoad with a constant angle)"
+                " (for a load that cannot move use FixedLoad)"
             )
 
 
@@ -74,6 +74,14 @@ class AngleLoad:
 
     def __post_init__(self):
         object.__setattr__(self, "angle_rad", series(self.angle_rad, "angle_rad"))
+
+
+@dataclass(frozen=True)
+class FixedLoad:
+    """A load pulley, or the far end of a single cable, that does not move."""
+
+
+Load = SpringLoad | TorqueLoad | AngleLoad | FixedLoad
 
 
 def series(values, name: str) -> NDArray:

@@ -12,7 +12,7 @@ MAX_FRICTION_ANGLE = 300.0
 
 @dataclass(frozen=True)
 class Transmission:
-    """A pull-pull pair of equal cables in equal conduits between a drive and a load pulley.
+    """A pull-pull pair of equal cables in equal conduits between a drive and a load pulley, or cable A alone.
 
     Attributes
     ----------
@@ -24,6 +24,8 @@ class Transmission:
         mu between cable and conduit.
     drive_radius_m, load_radius_m : float
         Pulley radii R_i and R_o, m.
+    is_single_cable : bool
+        Whether cable B is absent.
     """
 
     path: ConduitPath
@@ -31,6 +33,7 @@ class Transmission:
     friction_coefficient: float
     drive_radius_m: float
     load_radius_m: float
+    is_single_cable: bool = False
 
     def __post_init__(self):
         for name in ("axial_rigidity_N", "drive_radius_m", "load_radius_m"):

@@ -3,15 +3,12 @@
 from ccmodel.model.exact.pair import ExactResponse, simulate_pair
 from ccmodel.model.exact.profile import CableProfile
 from ccmodel.model.exact.simulation import PHASES
-from ccmodel.model.exact.single_cable import CableResponse, simulate_cable
 from ccmodel.model.response import Status
 
 __all__ = [
     "PHASES",
     "CableProfile",
-    "CableResponse",
     "ExactResponse",
     "Status",
-    "simulate_cable",
     "simulate_pair",
 ]

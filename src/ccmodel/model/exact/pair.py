@@ -1,14 +1,15 @@
-"""The exact solver on a pull-pull pair: plain arrays in, plain arrays out."""
+"""The exact solver on a pull-pull pair or a single cable: plain arrays in, plain arrays out."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 
 from numpy.typing import NDArray
 
 from ccmodel.model.exact.profile import CableProfile
 from ccmodel.model.exact.simulation import Simulation
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import SpringLoad, series
+from ccmodel.model.load import FixedLoad, SpringLoad, series
 from ccmodel.model.response import PairResponse
 from ccmodel.model.transmission import Transmission
 
@@ -25,24 +26,24 @@ class ExactResponse(PairResponse):
     moving_A_m, moving_B_m : ndarray, shape (n, 2)
         Arc length up to which the cable has slid from its drive end, and from which on it has slid towards its load
         end, since the last reversal; it sticks in between. (L, 0) where it slides as a whole.
-    profiles : dict of int to (CableProfile, CableProfile)
-        Profiles of A and B at the requested samples.
+    profiles : dict of int to tuple of CableProfile
+        Profiles of A and, for a pair, of B at the requested samples.
     """
 
     phase: NDArray
     moving_A_m: NDArray
     moving_B_m: NDArray
-    profiles: dict[int, tuple[CableProfile, CableProfile]]
+    profiles: dict[int, tuple[CableProfile, ...]]
 
 
 def simulate_pair(
     transmission: Transmission,
-    load: SpringLoad,
+    load: SpringLoad | FixedLoad,
     theta_in_rad: NDArray,
     initial: InitialTension,
     record_profiles_at: Sequence[int] = (),
 ) -> ExactResponse:
-    """Response of a pull-pull pair under Coulomb friction to a motion of its drive pulley, without a grid.
+    """Response of a transmission under Coulomb friction to a motion of its drive pulley, without a grid.
 
     The result depends on the order of the samples, not on time; the drive moves monotonically between samples. A
     spring starts where it holds the initial tensions. A load that turns freely and does not hold them settles before
@@ -52,13 +53,13 @@ def simulate_pair(
     ----------
     transmission : Transmission
         Path, cables and pulleys.
-    load : SpringLoad
+    load : SpringLoad or FixedLoad
     theta_in_rad : ndarray, shape (n,)
         Angle of the drive pulley, zero where the initial tension stands; the first sample may be elsewhere.
     initial : InitialTension
-        Tension with both pulleys at angle zero.
+        Tension with both pulleys at angle zero; that of cable B plays no part in a single cable.
     record_profiles_at : sequence of int
-        Samples at which the tension along both cables is kept.
+        Samples at which the tension along the cables is kept.
 
     Returns
     -------
@@ -70,14 +71,14 @@ def simulate_pair(
         If an input is not finite, or friction cannot hold the initial tension.
     """
     theta_in = series(theta_in_rad, "theta_in_rad")
-    if not isinstance(load, SpringLoad):
-        raise TypeError(f"the exact solver takes a SpringLoad; got {type(load).__name__}: use ccmodel.model.general")
+    if not isinstance(load, SpringLoad | FixedLoad):
+        kind = type(load).__name__
+        raise TypeError(f"the exact solver takes a SpringLoad or a FixedLoad; got {kind}: use ccmodel.model.general")
     R_i, R_o = transmission.drive_radius_m, transmission.load_radius_m
-    stiffness = load.stiffness_Nm_per_rad / R_o**2
-    offset = float(initial.tension_A_N[-1] - initial.tension_B_N[-1]) if stiffness > 0 else 0.0
-    simulation = Simulation(
-        transmission.path, transmission.friction_coefficient, transmission.axial_rigidity_N, initial
-    ).run(theta_in, R_i, offset, stiffness, record_profiles_at)
+    stiffness = inf if isinstance(load, FixedLoad) else load.stiffness_Nm_per_rad / R_o**2
+    simulation = Simulation(transmission, initial)
+    offset = simulation.held_N if stiffness > 0 else 0.0
+    simulation.run(theta_in, R_i, offset, stiffness, record_profiles_at)
     T1, T2, T3, T4, theta_out = simulation.out[:5]
     if stiffness > 0:
         theta_out += offset / stiffness

@@ -9,9 +9,10 @@ from ccmodel.failure import ModelError
 from ccmodel.model.exact import run as kernels
 from ccmodel.model.exact.path import tabulate
 from ccmodel.model.exact.profile import CableProfile, cable_profile, initial_state
-from ccmodel.model.exact.state import FIRST, HI, LAST, LO, State, blank_state
+from ccmodel.model.exact.state import FIRST, HI, LAST, LO, T_LOAD, State, blank_state
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.response import Status
+from ccmodel.model.transmission import Transmission
 
 PHASES = ("I", "II", "III", "IVa", "IVb")
 # A load that balances to less than this share of the highest tension is balanced.
@@ -32,16 +33,20 @@ class Simulation:
     status : Status
     """
 
-    def __init__(self, path, friction_coefficient, axial_rigidity_N, initial: InitialTension, single: bool = False):
-        self._path, self._friction = path, friction_coefficient
-        self._tables = tabulate(path, friction_coefficient, axial_rigidity_N)
-        self._present = np.array([True, not single])
-        self._state = initial_state(self._tables, path, friction_coefficient, initial, self._present)
-        self.profiles: dict[int, tuple[CableProfile, ...]] = {}
+    def __init__(self, transmission: Transmission, initial: InitialTension):
+        self._path, self._friction = transmission.path, transmission.friction_coefficient
+        self._tables = tabulate(self._path, self._friction, transmission.axial_rigidity_N)
+        self._present = np.array([True, not transmission.is_single_cable])
+        self._state = initial_state(self._tables, self._path, self._friction, initial, self._present)
+
+    @property
+    def held_N(self) -> float:
+        """Force T2 - T4 of the cables on the load in the present state, N."""
+        return float(self._state.value[0, T_LOAD] - self._state.value[1, T_LOAD])
 
     def run(
         self, theta_in: NDArray, radius_m: float, offset: float, stiffness: float, record_at: Sequence[int]
-    ) -> "Simulation":
+    ) -> None:
         """Simulate all samples of the drive's angle (rad); `offset` in N, `stiffness` in N/m.
 
         Raises
@@ -51,6 +56,7 @@ class Simulation:
         """
         n = theta_in.size
         self.out, self.phase = np.empty((9, n)), np.empty(n, dtype=np.int8)
+        self.profiles: dict[int, tuple[CableProfile, ...]] = {}
         progress, balance = np.array([0, 0, 0]), np.zeros(2)
         stops = [*sorted({int(i) for i in record_at}), n - 1]
         if stops[0] < 0 or stops[-1] >= n or max(stops) > n - 1:
@@ -75,7 +81,6 @@ class Simulation:
                 )
         balanced = balance[0] <= BALANCE_TOLERANCE * max(balance[1], 1e-9)
         self.status = Status.OK if balanced else Status.UNBALANCED
-        return self
 
 
 def _trial(state: State) -> State:

@@ -7,7 +7,10 @@ from ccmodel.mechanisms.load_dependent_friction import FLOOR_N, REFERENCE_N
 from ccmodel.mechanisms.pulley_eccentricity import winding
 from ccmodel.mechanisms.strand_settling import stretch_at
 from ccmodel.model.general import layout as rows
-from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
+from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad
+
+# Slack of a cable B that is not there: longer than any travel of the drive or the load, m.
+ABSENT_SLACK_M = 1e3
 
 
 def initial_state(physics, piece, node, settings, profiles, friction_factor) -> NDArray:
@@ -32,12 +35,18 @@ def initial_state(physics, piece, node, settings, profiles, friction_factor) -> 
     return T
 
 
-def load_angle(physics: rows.Physics, T: NDArray, load: SpringLoad | TorqueLoad | AngleLoad, series: NDArray) -> float:
+def remove_cable_B(piece: NDArray) -> None:
+    """Make cable B so slack, in place, that it never pulls; the force in all its pieces is the same."""
+    compliance = 1 / piece[rows.STIFFNESS, 1]
+    piece[rows.STRETCH, 1] = -ABSENT_SLACK_M * compliance / compliance.sum()
+
+
+def load_angle(physics: rows.Physics, T: NDArray, load: Load, series: NDArray) -> float:
     """Angle at which the load holds the initial tensions, rad; 0 for a load without a neutral position."""
     if isinstance(load, AngleLoad):
         return float(series[0])
     K, K3 = physics.stiffness_load, physics.cubic_stiffness
-    if isinstance(load, TorqueLoad) or (K == 0 and K3 == 0):
+    if isinstance(load, TorqueLoad | FixedLoad) or (K == 0 and K3 == 0):
         return 0.0
     theta = 0.0
     for _ in range(50):

@@ -16,18 +16,16 @@ from ccmodel.model.general import layout as rows
 from ccmodel.model.general.active import Active, active_of
 from ccmodel.model.general.grid import Grid, make_grid
 from ccmodel.model.general.march import COULOMB_BRISTLE_M, SOFT_CONDUIT_BRISTLE_M, march
-from ccmodel.model.general.rest import initial_state, load_angle
+from ccmodel.model.general.rest import initial_state, load_angle, remove_cable_B
 from ccmodel.model.general.sensors import read_by_sensors
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
+from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad
 from ccmodel.model.response import PairResponse, Status
 from ccmodel.model.transmission import Transmission
 
 ELEMENTS = 32
 # A step covers no more than this phase of a load that rings, up to so many steps a sample.
 RINGING_STEP_RAD, MOST_STEPS = 0.15, 16
-
-Load = SpringLoad | TorqueLoad | AngleLoad
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +65,7 @@ def simulate(
     Parameters
     ----------
     transmission : Transmission
-    load : SpringLoad, TorqueLoad or AngleLoad
+    load : SpringLoad, TorqueLoad, AngleLoad or FixedLoad
     time_s : ndarray, shape (n,)
         Sample times, s, increasing.
     theta_in : ndarray, shape (n,)
@@ -108,8 +106,12 @@ def simulate(
         travel_m = transmission.drive_radius_m * np.abs(np.diff(theta_in, prepend=theta_in[0])).cumsum()
         friction_factor = settings.friction_history(time_s, travel_m)
     mean, state = np.zeros((rows.MEAN_ROWS, 2)), np.zeros(rows.LOAD_ROWS)
-    tensions = initial.at(grid.boundary_m, grid.held_rad)
-    T = initial_state(physics, piece, node, settings, tensions, friction_factor[0])
+    tension_A, tension_B = initial.at(grid.boundary_m, grid.held_rad)
+    if transmission.is_single_cable:
+        tension_B = np.zeros_like(tension_B)
+    T = initial_state(physics, piece, node, settings, (tension_A, tension_B), friction_factor[0])
+    if transmission.is_single_cable:
+        remove_cable_B(piece)
     mean[rows.MEAN] = (piece[rows.SHARE] * T).sum(axis=1)
     state[rows.ANGLE] = load_angle(physics, T, load, series)
     slide = np.zeros((rows.SLIDE_ROWS, 2, node.shape[2] + 2))
@@ -237,7 +239,7 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
         radius=float(transmission.load_radius_m),
         stiffness_load=float(K_e),
         load_damping=float(load_damping(settings, K_e)),
-        kind=rows.PRESCRIBED_ANGLE if isinstance(load, AngleLoad) else rows.IMPEDANCE,
+        kind=rows.PRESCRIBED_ANGLE if isinstance(load, AngleLoad | FixedLoad) else rows.IMPEDANCE,
         general_friction=bool(settings.tension_exponent != 0 or settings.drag_N != 0 or settings.viscous != 0),
         **values,
     )
