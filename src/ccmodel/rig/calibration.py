@@ -62,12 +62,14 @@ def calibrate(table: pd.DataFrame, rig: Rig, limits: Limits = LIMITS) -> Calibra
     time = table["time_s"].to_numpy()
     resting = _resting_samples(table, limits)
     result = Calibrated({}, {}, {}, {}, float(time[resting - 1]) if resting else 0.0, {})
-    ends = (("drive", rig.drive, "in", ("T1_N", "T3_N")), ("load", rig.load, "out", ("T2_N", "T4_N")))
-    for end, side, suffix, tensions in ends:
+    for end, side, suffix in (("drive", rig.drive, "in"), ("load", rig.load, "out")):
         _angle(result, table, end, side, f"theta_{suffix}_rad", resting, rig.accuracy)
         _torque(result, table, end, side, f"tau_{suffix}_Nm", rig.accuracy)
         _sum(result, table, end, side, rig.accuracy)
-        _tensions(result, end, side, f"tau_{suffix}_Nm", tensions)
+        if rig.far_end:
+            _tension(result, end, side, f"tau_{suffix}_Nm", *rig.tensions[end])
+        else:
+            _tensions(result, end, side, f"tau_{suffix}_Nm", rig.tensions[end])
     return result
 
 
@@ -150,6 +152,18 @@ def _tensions(result: Calibrated, end: str, side: Side, torque: str, names: tupl
         result.channels[name] = (result.channels[total] + sign * difference) / 2
         result.derived_from[name] = f"({total} {'+' if sign > 0 else '-'} {torque} / {radius:g} m) / 2"
         result.accuracy[name] = accuracy
+
+
+def _tension(result: Calibrated, end: str, side: Side, torque: str, name: str) -> None:
+    """Tension of a single cable at one end: of the load cell or, where there is none, of the torque sensor."""
+    total, radius = f"F_{end}_N", side.pulley_radius_m
+    if total in result.channels:
+        result.channels[name], result.derived_from[name] = result.channels[total], total
+        result.accuracy[name] = result.accuracy[total]
+    elif torque in result.channels:
+        result.channels[name] = result.channels[torque] / radius
+        result.derived_from[name] = f"{torque} / {radius:g} m"
+        result.accuracy[name] = result.accuracy[torque] / radius
 
 
 def _minus(sign: int) -> str:

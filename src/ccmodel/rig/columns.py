@@ -73,8 +73,8 @@ def check_columns(
 
 def _stated(rig: Rig) -> list[_Sensor]:
     sensors = []
-    ends = (("drive", rig.drive, "in", ("T1_N", "T3_N")), ("load", rig.load, "out", ("T2_N", "T4_N")))
-    for end, side, suffix, tensions in ends:
+    for end, side, suffix in (("drive", rig.drive, "in"), ("load", rig.load, "out")):
+        tensions = rig.tensions[end]
         if end == "load" and side.encoder_counts_per_rev:
             sensors.append(_Sensor(("rig.load.encoder_counts_per_rev",), ("load_encoder_counts",), ("theta_out_rad",)))
         torques = {"torque_sensor": "torque_counts", "torque_constant_Nm_per_A": "current_A"}
