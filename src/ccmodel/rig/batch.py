@@ -12,6 +12,7 @@ so that a batch written before them keeps its meaning:
 - `ranges` on the rig: what a sensor can read at most, by log column, for finding saturation.
 - `load_cell`, `torque_constant_Nm_per_A`, the load's `encoder_counts_per_rev` and the accuracies of what a rig has not
   may be left out: what is stated is what the rig has.
+- `transmission: single-cable` on the rig, with its `far_end`: cable A alone.
 - `note` on the batch or on a recording: free, read by people only.
 """
 
@@ -20,7 +21,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from ccmodel.channels import TENSIONS_AT
 from ccmodel.geometry import ConduitPath
+from ccmodel.recording import FAR_ENDS
 from ccmodel.typed import InputError, NotNegative, Positive, Problem, TypedModel, load_yaml_model
 
 REQUIRED_COLUMNS = ("time_s", "drive_encoder_counts")
@@ -104,8 +107,10 @@ class Accuracy(TypedModel):
 
 
 class Rig(TypedModel):
-    """The rig: both ends, the cable, the sensors' accuracy and, by log column, their ranges."""
+    """The rig: both ends, the cables, the sensors' accuracy and, by log column, their ranges."""
 
+    transmission: Literal["pull-pull", "single-cable"] = "pull-pull"
+    far_end: Literal[FAR_ENDS] | None = None
     drive: Side
     load: LoadSide
     cable: Cable
@@ -119,6 +124,25 @@ class Rig(TypedModel):
             if low >= high:
                 raise ValueError(f"{column}: a range is [lowest, highest], found [{low}, {high}]")
         return ranges
+
+    @model_validator(mode="after")
+    def _far_end_of_a_single_cable(self):
+        load, end = self.load, self.far_end
+        if (self.transmission == "single-cable") != (end is not None):
+            raise ValueError("far_end and transmission: single-cable are stated together or not at all")
+        if end is not None and (end == "spring") != (load.spring_stiffness_Nm_per_rad is not None):
+            raise ValueError("load.spring_stiffness_Nm_per_rad is stated where far_end is spring, and only there")
+        if end == "measured-motion" and load.encoder_counts_per_rev is None:
+            raise ValueError("far_end is measured-motion, so load.encoder_counts_per_rev is needed")
+        sensors = load.load_cell, load.torque_sensor, load.torque_constant_Nm_per_A
+        if end == "measured-tension" and not any(sensors):
+            raise ValueError("far_end is measured-tension, so load.load_cell or a torque sensor there is needed")
+        return self
+
+    @property
+    def tensions(self) -> dict[str, tuple[str, ...]]:
+        """Channels of the tensions that the sensors at each end give: of cables A and B, or of A alone."""
+        return TENSIONS_AT if self.far_end is None else {end: names[:1] for end, names in TENSIONS_AT.items()}
 
     @model_validator(mode="after")
     def _accuracy_of_every_sensor(self):

@@ -67,7 +67,10 @@ def calibrate(table: pd.DataFrame, rig: Rig, limits: Limits = LIMITS) -> Calibra
         _angle(result, table, end, side, resting, rig.accuracy)
         _torque(result, table, end, side, rig.accuracy)
         _sum(result, table, end, side, rig.accuracy)
-        _tensions(result, end, side)
+        if rig.far_end:
+            _tension(result, end, side, *rig.tensions[end])
+        else:
+            _tensions(result, end, side)
     return result
 
 
@@ -150,6 +153,18 @@ def _tensions(result: Calibrated, end: str, side: Side) -> None:
         result.channels[name] = (result.channels[total] + sign * difference) / 2
         result.derived_from[name] = f"({total} {'+' if sign > 0 else '-'} {torque} / {radius:g} m) / 2"
         result.accuracy[name] = accuracy
+
+
+def _tension(result: Calibrated, end: str, side: Side, name: str) -> None:
+    """Tension of a single cable at one end: of the load cell or, where there is none, of the torque sensor."""
+    total, torque, radius = SUM_AT[end], TORQUE_AT[end], side.pulley_radius_m
+    if total in result.channels:
+        result.channels[name], result.derived_from[name] = result.channels[total], total
+        result.accuracy[name] = result.accuracy[total]
+    elif torque in result.channels:
+        result.channels[name] = result.channels[torque] / radius
+        result.derived_from[name] = f"{torque} / {radius:g} m"
+        result.accuracy[name] = result.accuracy[torque] / radius
 
 
 def _minus(sign: int) -> str:

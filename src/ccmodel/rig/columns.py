@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ccmodel.channels import SUM_AT, TENSIONS_AT, THETA_OUT, TORQUE_AT
+from ccmodel.channels import SUM_AT, THETA_OUT, TORQUE_AT
 from ccmodel.rig.batch import SENSOR_COLUMNS, Batch, Rig
 from ccmodel.rig.findings import Finding
 from ccmodel.rig.logs import Log
@@ -75,7 +75,7 @@ def check_columns(
 def _stated(rig: Rig) -> list[_Sensor]:
     sensors = []
     for end, side in (("drive", rig.drive), ("load", rig.load)):
-        tensions = TENSIONS_AT[end]
+        tensions = rig.tensions[end]
         if end == "load" and side.encoder_counts_per_rev:
             sensors.append(_Sensor(("rig.load.encoder_counts_per_rev",), ("load_encoder_counts",), (THETA_OUT,)))
         torques = {"torque_sensor": "torque_counts", "torque_constant_Nm_per_A": "current_A"}

@@ -128,5 +128,6 @@ def _recording(
         rest_s=calibrated.rest_s,
         settled_s=entry.settled_s,
         warnings=tuple(str(f) for f in found),
+        far_end=batch.rig.far_end,
     )
     return recording, found

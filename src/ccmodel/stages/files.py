@@ -69,5 +69,5 @@ def read_pairs(recordings_file: Path, simulated_file: Path) -> list[tuple[Record
 
 def write_channels(file: Path, recording: Recording) -> None:
     """Write all channels of a run over its times as CSV."""
-    table = pd.DataFrame({"time_s": recording.time_s} | {c: recording[c] for c in CHANNELS})
+    table = pd.DataFrame({"time_s": recording.time_s} | {c: recording[c] for c in CHANNELS if c in recording})
     table.to_csv(file, index=False, float_format="%.9g")
