@@ -203,9 +203,10 @@ def calibration(estimates: Parameters, observations: Sequence[Observations]) -> 
         "stiffness_N_per_m": _free(estimates.stiffness_N_per_m, *STIFFNESS_N_PER_M),
         "friction_coefficient": _free(estimates.friction_coefficient, *FRICTION),
     }
+    load_is_free = not any(e.given.recording.load_motion_is_given for e in observations)
     if estimates.load_stiffness_Nm_per_rad is not None:
         free["load_stiffness_Nm_per_rad"] = _free(estimates.load_stiffness_Nm_per_rad, *LOAD)
-    elif all("tau_in_Nm" in e.channels for e in observations):
+    elif load_is_free and all("tau_in_Nm" in e.channels for e in observations):
         # A batch that states no spring may have one all the same, which the torque measured at the load does not feel.
         size = float(
             np.median([np.ptp(e.given.recording["tau_in_Nm"]) / np.ptp(e.given.theta_in) for e in observations])
@@ -213,9 +214,9 @@ def calibration(estimates: Parameters, observations: Sequence[Observations]) -> 
         free["spring_beside_load_Nm_per_rad"] = Free(0.1 * size, 0.0, 10 * size)
     if not all(e.given.initial_tension_observed for e in observations):
         free["pretension_share"] = Free(1.0, 0.01, 100.0)  # of what each recording was aimed at
-        free["load_radius_m"] = Free(
-            estimates.load_radius_m, 0.3 * estimates.load_radius_m, 3 * estimates.load_radius_m
-        )
+        if load_is_free:
+            radius_m = estimates.load_radius_m
+            free["load_radius_m"] = Free(radius_m, 0.3 * radius_m, 3 * radius_m)
         torques = [e.given.recording["tau_in_Nm"] for e in observations if "tau_in_Nm" in e.channels]
         if torques:
             reach = max(float(np.ptp(torque)) for torque in torques)

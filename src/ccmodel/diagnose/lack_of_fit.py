@@ -18,7 +18,6 @@ from ccmodel.diagnose.drive import since_reversal, speed
 from ccmodel.diagnose.whitening import Whitened
 from ccmodel.inference.problem import Observations, each
 from ccmodel.model.run import simulate
-from ccmodel.recording import TENSIONS
 
 # Random features, how many of the quantities each looks at on average, and over which lengths (in standard deviations).
 FEATURES = 200
@@ -107,7 +106,7 @@ def _circumstances(w: Whitened, trial: CandidateFit) -> NDArray:
     said = simulate(given, trial.hypothesis.of(e.parameters).with_values(trial.values))
     omega = speed(given)
     travel, since_s = since_reversal(given)
-    tensions = [said[c] for c in TENSIONS]
+    tensions = [said[c] for c in said.tensions]
     quantities = [
         given.theta_in,
         omega,
