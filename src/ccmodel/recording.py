@@ -99,6 +99,11 @@ class Recording:
         """Channels of the tensions at the cables' ends, of cable A alone where there is no cable B."""
         return CABLES["A"] if self.far_end else TENSIONS
 
+    @property
+    def load_motion_is_given(self) -> bool:
+        """Whether the far end of a single cable is fixed or follows its recorded motion."""
+        return self.far_end in ("fixed", "measured-motion")
+
     def with_channels(self, channels: Mapping[str, NDArray], derived_from: Mapping[str, str], origin: str):
         """The same run with other channels: what a model says of it, or a part of what was measured."""
         return replace(

@@ -71,12 +71,13 @@ def write_diagnosis(file: Path, found: Diagnosis) -> None:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("ccmodel.report", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
-    origin = found.judgement.whitened[0].observations.given.recording.origin
+    recording = found.judgement.whitened[0].observations.given.recording
     with plt.rc_context(STYLE):
         text = environment.get_template("diagnosis.html.j2").render(
             said=found.report,
             headline=headline(found.report),
-            origin=ORIGIN[origin],
+            origin=ORIGIN[recording.origin],
+            single_cable=recording.far_end is not None,
             symbol=SYMBOL,
             in_question=_in_question(found.report),
             has_found=found.judgement.best is not found.judgement.calibrated,
