@@ -46,7 +46,7 @@ def digest_of_copy(tmp_path, monkeypatch):
         ("ccmodel.model.general.march", "mechanisms/stribeck.py"),
         ("ccmodel.model.general.march", "mechanisms/load_cell.py"),  # found by the registry, imported by nobody
         ("ccmodel.model.general.march", "kernel.py"),
-        ("ccmodel.model.exact.run", "model/exact/cable.py"),
+        ("ccmodel.model.exact.run", "model/exact/segment.py"),
         ("ccmodel.model.exact.run", "model/exact/path.py"),
     ],
 )

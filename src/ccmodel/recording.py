@@ -10,8 +10,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ccmodel.channels import CHANNELS, unit_of
+from ccmodel.channels import CABLES, CHANNELS, TENSIONS, unit_of
 from ccmodel.geometry import ConduitPath
+
+# What holds the far end of a single cable.
+FAR_ENDS = ("spring", "fixed", "measured-tension", "measured-motion")
 
 # Names of the origins in figures and pages: a simulated rig must never pass for a measured one.
 ORIGIN = {
@@ -53,6 +56,8 @@ class Recording:
         End of a start-up transient, s: comparisons begin there. 0 if there is none.
     warnings : tuple of str
         Faults that leave the recording usable.
+    far_end : str or None
+        What holds the far end of a single cable, one of `FAR_ENDS`; None for a pull-pull pair.
     """
 
     batch: str
@@ -69,6 +74,7 @@ class Recording:
     rest_s: float = 0.0
     settled_s: float = 0.0
     warnings: tuple[str, ...] = ()
+    far_end: str | None = None
 
     def __post_init__(self):
         for name, values in self.channels.items():
@@ -86,6 +92,16 @@ class Recording:
             return self.channels[wanted]
         channels = {name: values[wanted] for name, values in self.channels.items()}
         return replace(self, time_s=self.time_s[wanted], channels=channels)
+
+    @property
+    def tensions(self) -> tuple[str, ...]:
+        """Channels of the tensions at the cables' ends, of cable A alone where there is no cable B."""
+        return CABLES["A"] if self.far_end else TENSIONS
+
+    @property
+    def load_motion_is_given(self) -> bool:
+        """Whether the far end of a single cable is fixed or follows its recorded motion."""
+        return self.far_end in ("fixed", "measured-motion")
 
     def with_channels(self, channels: Mapping[str, NDArray], derived_from: Mapping[str, str], origin: str):
         """The same run with other channels: those of a model, or some of the measured ones."""
@@ -133,6 +149,8 @@ def _to_dataset(recording: Recording) -> xr.Dataset:
     variables["piece_bend_rad"] = ("piece", recording.path.piece_bend_rad, {"units": "rad"})
     attributes = {name: getattr(recording, name) for name in _SCALARS}
     attributes["excitation"] = json.dumps(dict(recording.excitation))
+    if recording.far_end:
+        attributes["far_end"] = recording.far_end
     attributes["warnings"] = json.dumps(list(recording.warnings))
     return xr.Dataset(variables, coords={"time_s": ("time_s", recording.time_s, {"units": "s"})}, attrs=attributes)
 
@@ -151,6 +169,7 @@ def _from_dataset(name: str, dataset: xr.Dataset) -> Recording:
         encoder_step_rad=_numbers(dataset, channels, "encoder_step_rad"),
         excitation=json.loads(dataset.attrs["excitation"]),
         warnings=tuple(json.loads(dataset.attrs["warnings"])),
+        far_end=dataset.attrs.get("far_end"),
         **scalars,
     )
 

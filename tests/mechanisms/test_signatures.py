@@ -10,7 +10,7 @@ from ccmodel.geometry import ConduitPath
 from ccmodel.mechanisms.drive_windup import STANDSTILL_RAD, torque_of_train
 from ccmodel.mechanisms.pulley_friction import PRESLIDING_RAD
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import AngleLoad, MechanicalLoad, SpringLoad
+from ccmodel.model.load import AngleLoad, SpringLoad
 from general_runs import HALF_LOOP, K_E, MU, T0, TENSIONS, L, R, last_cycle, loop_area, rms, run, sine
 
 DRIVE_ONLY = (*TENSIONS, "theta_out_rad", "tau_out_Nm")
@@ -301,8 +301,6 @@ def test_a_load_with_a_gap_rests_against_the_side_it_is_held_to(T2, known_to, pl
 def test_stiffening_curves_torque_against_angle():
     r = run(sine(), ("load-stiffening", "load", {"K3": 0.05}))
     assert r.tau_out_Nm == pytest.approx(K_E * r.theta_out_rad + 0.05 * r.theta_out_rad**3, abs=1e-9)
-    same = run(sine(), load=MechanicalLoad(K_E, 0.05))
-    assert (r.T1_N == same.T1_N).all()
 
 
 def test_inertia_grows_with_the_square_of_the_frequency():

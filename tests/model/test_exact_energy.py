@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from numba import njit
 
+from cable_runs import FIXED, simulate_cable
 from ccmodel.geometry import ConduitPath
-from ccmodel.model.exact import FixedEnd, MotionEnd, simulate_cable, simulate_pair
+from ccmodel.model.exact import simulate_pair
+from ccmodel.model.general import simulate
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import SpringLoad
+from ccmodel.model.load import AngleLoad, SpringLoad
 from ccmodel.model.transmission import Transmission
 
 LENGTH, BEND, MU, EA = 2.0, 3 * np.pi, 0.15, 2000.0
@@ -23,7 +25,7 @@ def stored(profile):
     return float((mean * np.diff(profile.x_m)).sum() / (2 * EA))
 
 
-# Each stroke is smooth: a front on its way, or the whole cable sliding. (start's slope, tension, displacement)
+# Each stroke is smooth: a front on its direction, or the whole cable sliding. (start's slope, tension, displacement)
 STROKES = [(-1, 25.0, -0.009), (+1, 5.0, 0.03), (-1, 25.0, 0.02), (+1, 40.0, -0.03)]
 
 
@@ -35,7 +37,7 @@ def test_work_is_stored_or_dissipated(slope, tension, reach):
     t, weight = (t + 1) / 2, weight / 2
     # d = reach t^2 takes the square-root start away
     at = np.concatenate([[0.0], reach * t**2, [reach]])
-    response = simulate_cable(PATH, EA, MU, FixedEnd(), at, initial, record_profiles_at=[0, at.size - 1])
+    response = simulate_cable(PATH, EA, MU, FIXED, at, initial, record_profiles_at=[0, at.size - 1])
     work = (weight * 2 * t * reach * response.T_near_N[1:-1]).sum()
     change = stored(response.profiles[at.size - 1]) - stored(response.profiles[0])
     dissipated = (
@@ -54,15 +56,15 @@ def test_work_is_stored_or_dissipated(slope, tension, reach):
     assert work == pytest.approx(change + dissipated, rel=1e-9)
 
 
-def friction_power(T_near, front_x, way):
+def friction_power(T_near, front_x, direction):
     """Friction times slip along the moving stretch, per displacement of the near end: mu phi' T v dx."""
     y, w = np.polynomial.legendre.leggauss(30)
     m = (y + 1) / 2 * M * front_x / LENGTH
     m_front = M * front_x / LENGTH
-    shape = np.exp(-way * m)
+    shape = np.exp(-direction * m)
 
-    def reach(upper):  # integral of exp(-way m) from there to the front
-        return (np.exp(-way * upper) - np.exp(-way * m_front)) * way
+    def reach(upper):  # integral of exp(-direction m) from there to the front
+        return (np.exp(-direction * upper) - np.exp(-direction * m_front)) * direction
 
     slip = reach(m) / reach(0.0)
     return (w / 2 * m_front * T_near * shape * slip).sum()
@@ -113,15 +115,33 @@ def by_nodes(near, far, elements, steps):
     return np.array(ends).T
 
 
-def test_a_slow_reference_with_nodes_converges_to_it():
-    near = 1e-3 * np.array([0, 12, 4, 8, 6, 14, 14, 3, 7])
-    far = 1e-3 * np.array([0, 0, 0, -3, -5, -5, 2, 2, 6])
-    exact = simulate_cable(PATH, EA, MU, MotionEnd(-far), near, InitialTension.uniform(PATH, 10.0))
+NEAR = 1e-3 * np.array([0, 12, 4, 8, 6, 14, 14, 3, 7])
+FAR = 1e-3 * np.array([0, 0, 0, -3, -5, -5, 2, 2, 6])
+
+
+def by_the_exact_solver():
+    """Cable A with a fixed far end."""
+    r = simulate_cable(PATH, EA, MU, FIXED, NEAR, InitialTension.uniform(PATH, 10.0))
+    return np.stack([r.T_near_N, r.T_far_N]), 0 * FAR
+
+
+def by_the_general_solver():
+    """Cable A of a pair whose pulleys both move, in small steps: the path between samples matters then."""
+    fine = np.linspace(0, NEAR.size - 1, 500 * (NEAR.size - 1) + 1)
+    near, far = (np.interp(fine, np.arange(NEAR.size), ends) for ends in (NEAR, FAR))
+    pair, initial = Transmission(PATH, EA, MU, 1.0, 1.0), InitialTension.uniform(PATH, 10.0)
+    r = simulate(pair, AngleLoad(-far), 1e-3 * np.arange(fine.size), near, initial, elements=512).complete()
+    return np.stack([r.T1_N, r.T2_N])[:, ::500], FAR
+
+
+@pytest.mark.parametrize("solver", [by_the_exact_solver, by_the_general_solver])
+def test_a_slow_reference_with_nodes_converges_to_it(solver):
+    tensions, far = solver()
     solutions = []
     for elements in (12, 24, 48):
-        solutions.append(by_nodes(near, far, elements, 4 * elements))
+        solutions.append(by_nodes(NEAR, far, elements, 4 * elements))
     # an element's tension is that of its middle: first order, which extrapolation takes away
-    ends = np.stack([exact.T_near_N, exact.T_far_N])[:, 1:]
+    ends = tensions[:, 1:]
     errors = [np.sqrt(np.mean((solution - ends) ** 2)) for solution in solutions]
     extrapolated = np.sqrt(np.mean((2 * solutions[2] - solutions[1] - ends) ** 2))
     assert errors[0] > 1.8 * errors[1] > 1.8**2 * errors[2]

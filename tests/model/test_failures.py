@@ -10,8 +10,7 @@ from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.model import exact, general
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import AngleLoad, MechanicalLoad, SpringLoad, TorqueLoad
-from ccmodel.model.response import Status
+from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
 from ccmodel.model.run import ModelInput, simulate
 from ccmodel.model.transmission import Transmission
 from model_runs import PULLED
@@ -62,10 +61,8 @@ def effect(place="conduit", **values):
         (lambda: replace(PAIR, friction_coefficient=-0.1), "lower bound of 0"),
         (lambda: replace(PAIR, friction_coefficient=np.inf), "friction_coefficient must be finite"),
         (lambda: SpringLoad(-1.0), "finite and not negative"),
-        (lambda: MechanicalLoad(inertia_kg_m2=np.inf), "inertia_kg_m2 must be finite"),
         (lambda: TorqueLoad([0.0, np.nan]), "torque_Nm is not finite at sample 1: leave"),
         (lambda: TorqueLoad([0.0], -1.0), "a spring beside a load is finite and not negative; got -1"),
-        (lambda: by_exact(load=TorqueLoad(np.zeros(50), 0.1)), "takes the general solver"),
         (lambda: AngleLoad([]), "at least one"),
         (lambda: InitialTension.uniform(PATH, -1.0), "positive along the whole cable"),
         (lambda: InitialTension.uniform(PATH, np.nan), "finite"),
@@ -73,7 +70,6 @@ def effect(place="conduit", **values):
         (lambda: by_general(drive=np.zeros(0)), "at least one"),
         (lambda: by_exact(drive=with_gap(DRIVE)), "theta_in_rad is not finite at sample 3: leave"),
         (lambda: by_general(drive=with_gap(DRIVE, gap=np.inf)), "theta_in is not finite at sample 3"),
-        (lambda: by_exact(load=TorqueLoad(np.zeros(3))), "3 samples, the drive has 50"),
         (lambda: by_general(load=TorqueLoad(np.zeros(1))), "1 samples, the drive angle 50"),
         (lambda: by_exact(one=replace(PAIR, friction_coefficient=200.0)), "check the unit of the bend angles"),
         (lambda: by_general(one=replace(PAIR, friction_coefficient=200.0)), "check the unit of the bend angles"),
@@ -96,10 +92,6 @@ def test_what_cannot_be_run_is_refused_by_name(attempt, says):
         attempt()
 
 
-def test_a_tension_that_would_have_to_push_is_said():
-    """The other endings of a run, stuck and without convergence, are tested beside their solvers."""
-    pushed = exact.ForceEnd(np.array([7.3, -1.0]))
-    response = exact.simulate_cable(PATH, 9300.0, 0.15, pushed, np.zeros(2), INITIAL)
-    assert response.status is Status.UNBALANCED
-    assert "a cable can only pull" in response.status.value
-    assert (response.T_near_N >= 0).all() and (response.T_far_N >= 0).all()
+def test_a_measured_torque_is_not_for_the_exact_solver():
+    with pytest.raises(TypeError, match="takes a SpringLoad or a FixedLoad; got TorqueLoad"):
+        by_exact(load=TorqueLoad(np.zeros(50)))

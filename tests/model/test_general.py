@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.mechanisms.kink import Kink
-from ccmodel.model.general import simulate
+from ccmodel.model.general import Active, simulate
 from ccmodel.model.general.grid import make_grid
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import AngleLoad, MechanicalLoad, SpringLoad, TorqueLoad
+from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
 from ccmodel.model.paper import simulate_pair
 from ccmodel.model.response import Status
 from general_runs import HALF_LOOP, K_E, MU, OUTPUTS, T0, TENSIONS, K, L, R, rms, run, sine, transmission
@@ -166,18 +166,9 @@ def test_blocked_load_shows_the_capstan_and_no_motion():
 
 
 def test_cubic_spring_holds_its_law():
-    r = run(sine(), load=MechanicalLoad(K_E, 0.04))
+    r = run(sine(), ("load-stiffening", "load", {"K3": 0.04}))
     assert r.tau_out_Nm == pytest.approx(K_E * r.theta_out_rad + 0.04 * r.theta_out_rad**3, abs=1e-9)
     assert pytest.approx(r.tau_out_Nm, abs=1e-7) == (r.T2_N - r.T4_N) * R
-
-
-def test_damping_and_inertia_take_their_torques():
-    theta, dt = sine(cycles=3), 1 / 500
-    r = run(theta, load=MechanicalLoad(K_E, damping_Nms_per_rad=2e-3, inertia_kg_m2=2e-4))
-    omega = np.gradient(r.theta_out_rad, dt)
-    alpha = np.gradient(omega, dt)
-    expected = K_E * r.theta_out_rad + 2e-3 * omega + 2e-4 * alpha
-    assert rms(r.tau_out_Nm[500:], expected[500:]) < 5e-3 * np.ptp(expected[500:])
 
 
 def test_inertia_oscillates_at_its_own_frequency():
@@ -186,8 +177,8 @@ def test_inertia_oscillates_at_its_own_frequency():
     frequency = np.sqrt((2 * K * R**2) / J) / (2 * np.pi)
     samples = 400
     theta = np.where(np.arange(3 * samples) > 0, 0.05, 0.0)
-    load = MechanicalLoad(0.0, inertia_kg_m2=J)
-    r = run(theta, mu=0.0, load=load, period_s=1 / frequency, samples=samples)
+    mass = ("load-inertia", "load", {"J": J, "zeta": 0.0})
+    r = run(theta, mass, mu=0.0, load=SpringLoad(0.0), period_s=1 / frequency, samples=samples)
     crossings = np.flatnonzero(np.diff(np.sign(r.theta_out_rad - 0.05)))
     assert 2 * np.diff(crossings).mean() == pytest.approx(samples, rel=5e-3)
 
@@ -195,12 +186,12 @@ def test_inertia_oscillates_at_its_own_frequency():
 def test_a_ring_that_samples_hardly_show_is_followed_between_them():
     """Ten samples a ring: with a step for each, the ring would be late by a third of itself after four."""
     ring_s = 2 * np.pi * np.sqrt(1e-4 / (2 * K * R**2 + K_E))
-    load = MechanicalLoad(K_E, inertia_kg_m2=1e-4)
+    mass = ("load-inertia", "load", {"J": 1e-4, "zeta": 0.0})
 
     def pulled(samples):
         rings = np.arange(5 * samples + 1) / samples
         theta = 0.025 * (1 - np.cos(np.pi * np.clip(rings, 0, 1)))
-        return run(theta, mu=0.0, load=load, period_s=ring_s, samples=samples).theta_out_rad
+        return run(theta, mass, mu=0.0, period_s=ring_s, samples=samples).theta_out_rad
 
     fine = pulled(640)
     assert rms(pulled(10), fine[::64]) < 0.02 * np.ptp(fine)
@@ -254,9 +245,10 @@ def test_friction_and_balance_hold_for_any_path_and_motion(mu, T, bends, turns, 
 
 def test_a_run_that_cannot_go_on_says_so():
     """A spring that pushes on harder than the cables hold: what was solved until then is returned, and why no more."""
-    load = MechanicalLoad(1e-4, cubic_Nm_per_rad3=-10.0)
     theta = np.linspace(0, 5, 100)
-    r = simulate(transmission(), load, np.arange(100) * 0.01, theta, InitialTension.uniform(HALF_LOOP, T0))
+    pushing = [Active("load-stiffening", "load", {"K3": -10.0})]
+    initial = InitialTension.uniform(HALF_LOOP, T0)
+    r = simulate(transmission(), SpringLoad(1e-4), np.arange(100) * 0.01, theta, initial, pushing)
     assert r.status is Status.NO_CONVERGENCE
     assert 0 < r.reached < 100
     assert "load" in r.status.value

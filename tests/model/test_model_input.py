@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from builders import recording
-from ccmodel.model.general import Active
-from ccmodel.model.general import run as general
+from ccmodel.model.general import Active, sensors
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 
@@ -101,6 +100,6 @@ def test_what_sensors_would_have_read_without_their_faults(faults):
     true |= {"F_drive_N": 14.0, "F_load_N": 12.0}
     radii = 0.006, 0.005
     steady = {c: np.full(2, value) for c, value in true.items()}
-    read = {c: float(v[1]) for c, v in general._read(active, np.array([0.0, 0.4]), steady, radii).items()}
+    read = {c: float(v[1]) for c, v in sensors.read_by_sensors(active, np.array([0.0, 0.4]), steady, radii).items()}
     assert (read != true) == (faults[0][0] != "time-skew")
-    assert general.true_at(active, 0.4, read, radii) == pytest.approx(true, rel=1e-4)
+    assert sensors.true_at(active, 0.4, read, radii) == pytest.approx(true, rel=1e-4)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import SpringLoad, TorqueLoad
+from ccmodel.model.load import SpringLoad
 from ccmodel.model.paper import simulate_pair
 from ccmodel.model.transmission import Transmission
 
@@ -149,27 +149,6 @@ def test_radius_alone_changes_little():
     assert np.abs(loops[0] - loops[1]).max() < 0.02 * np.ptp(loops[0])
 
 
-def test_prescribed_torque_of_the_spring_gives_the_spring_back():
-    theta = sine(0.6)
-    spring = run(theta)
-    torque = run(theta, load=TorqueLoad(spring.tau_out_Nm))
-    assert torque.theta_out_rad == pytest.approx(spring.theta_out_rad, abs=2e-5)
-    assert pytest.approx(spring.T1_N, abs=0.05) == torque.T1_N
-
-
-def test_a_load_that_turns_against_the_drive_keeps_its_torque():
-    """Both ends of a cable drawn apart, then let in, with a torque of a course of its own."""
-    theta = sine(0.3, cycles=1)
-    torque = 0.02 * np.sin(2 * np.pi * np.arange(theta.size) / 170)
-    coarse, fine = (run(theta, load=TorqueLoad(torque), sections=n) for n in (32, 128))
-    assert coarse.tau_out_Nm == pytest.approx(torque, abs=1e-9)
-    assert np.sqrt(np.mean((coarse.theta_out_rad - fine.theta_out_rad) ** 2)) < 2e-3
-    for r in (coarse, fine):
-        for near, far in ((r.T1_N, r.T2_N), (r.T3_N, r.T4_N)):
-            taut = (near > 0) & (far > 0)
-            assert np.abs(np.log(near[taut] / far[taut])).max() <= 0.156 * np.pi + 1e-9
-
-
 @pytest.mark.parametrize("curvature", [-1.0, 0.4, 1.0])
 def test_a_profile_that_bends_keeps_its_ends_and_what_friction_holds(curvature):
     path = ConduitPath([0.4, 0.6, 0.2], [0.0, 2.0, 1.0])
@@ -192,8 +171,6 @@ def test_initial_ends_beyond_friction_are_brought_to_its_bound():
 def test_bad_input_is_refused_by_name():
     with pytest.raises(ModelError, match="theta_in is not finite at sample 3"):
         run(np.array([0, 0.1, 0.2, np.nan]))
-    with pytest.raises(ModelError, match="load torque has 2 samples"):
-        run(np.zeros(3), load=TorqueLoad(np.zeros(2)))
     with pytest.raises(ValueError, match="not negative"):
         SpringLoad(-1.0)
     with pytest.raises(ValueError, match="positive length"):

@@ -68,17 +68,19 @@ def calibration(estimates: Parameters, observations: Sequence[Observations]) -> 
         "friction_coefficient": _free(estimates.friction_coefficient, *settings.FRICTION),
     }
     has_torque = [o for o in observations if TAU_IN in o.channels]
+    load_is_free = not any(o.given.recording.load_motion_is_given for o in observations)
     if estimates.load_stiffness_Nm_per_rad is not None:
         free["load_stiffness_Nm_per_rad"] = _free(estimates.load_stiffness_Nm_per_rad, *settings.LOAD_NM_PER_RAD)
-    elif len(has_torque) == len(observations):
+    elif load_is_free and len(has_torque) == len(observations):
         # A spring parallel to the load, which the torque sensor at the load does not measure.
         ratios = [np.ptp(o.given.recording[TAU_IN]) / np.ptp(o.given.theta_in) for o in observations]
         start, most = (factor * float(np.median(ratios)) for factor in settings.PARALLEL_SPRING)
         free["spring_beside_load_Nm_per_rad"] = Free(start, 0.0, most)
     if not all(o.given.initial_tension_observed for o in observations):
         free["pretension_share"] = Free(1.0, *settings.PRETENSION_SHARE)
-        radius = estimates.load_radius_m
-        free["load_radius_m"] = Free(radius, *(ratio * radius for ratio in settings.RADIUS_RATIO))
+        if load_is_free:
+            radius = estimates.load_radius_m
+            free["load_radius_m"] = Free(radius, *(ratio * radius for ratio in settings.RADIUS_RATIO))
         if has_torque:
             reach = max(float(np.ptp(o.given.recording[TAU_IN])) for o in has_torque)
             free |= {name: Free(0.0, -reach, reach) for name in (ZERO_OF[TAU_IN], ZERO_OF[TAU_OUT])}

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from ccmodel.channels import TAU_IN, TENSIONS, THETA_OUT
+from ccmodel.channels import TAU_IN, THETA_OUT
 from ccmodel.diagnose import settings
 from ccmodel.diagnose.candidate import CandidateFit
 from ccmodel.diagnose.drive import since_reversal, speed
@@ -98,7 +98,7 @@ def _inputs(w: Whitened, candidate: CandidateFit) -> NDArray:
     simulated = simulate(given, candidate.model(w.observations.parameters))
     omega = speed(given)
     travel, since_s = since_reversal(given)
-    tensions = [simulated[c] for c in TENSIONS]
+    tensions = [simulated[c] for c in simulated.tensions]
     quantities = [
         given.theta_in,
         omega,

@@ -10,7 +10,7 @@
    the equation excludes its neutral value (a bristle length of zero), ``nearly_neutral`` says how close to the paper's
    model it comes near that value.
 5. An equation that the march needs at every step stands in the mechanism's file as a compiled function
-   (`ccmodel.kernel`), which `ccmodel.model.general.march` imports.
+   (`ccmodel.kernel`), which `ccmodel.model.general.equations` imports.
 """
 
 from collections.abc import Callable, Mapping

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 
-# A profile may exceed the friction bound by what printing and reading numbers back costs, no more.
+# A profile may exceed the friction bound by the rounding of printed numbers, no more.
 BOUND_TOLERANCE = 1e-9
 
 
@@ -66,9 +66,9 @@ class InitialTension:
     ) -> "InitialTension":
         """Profiles with the given tensions at the drive and the load end of each cable.
 
-        Friction holds no more than |ln(T_load / T_drive)| = mu phi. Ends that are further apart (measured with an
-        error, or mu underestimated) are brought to that bound about their geometric mean, which is what a cable
-        that slips at rest would do.
+        Friction holds no more than |ln(T_load / T_drive)| = mu phi. Ends that are further apart (through a measurement
+        error or an underestimated mu) are moved to that bound about their geometric mean, as a cable that slips at
+        rest does.
 
         Parameters
         ----------
@@ -77,10 +77,10 @@ class InitialTension:
         A_N, B_N : (float, float)
             Tension at the drive end and at the load end, N. A cable with an end at zero or below is slack.
         curvatures : (float, float)
-            How far ln T halfway through the bend lies off the straight line between the ends, of what friction can
-            hold there, -1 to 1: the ends do not show it, and how the cable was tensioned decides.
+            Distance of ln T halfway through the bend from the straight line between the ends, over the largest that
+            friction can hold, -1 to 1. It depends on how the cable was tensioned, and the ends do not show it.
         kinks_rad : float
-            Bend that the path does not show, as far as it holds tension at rest.
+            Bend at kinks, which is not in the path, as far as it holds tension at rest.
         """
         bound = friction_coefficient * (path.bend_rad + kinks_rad)
         profiles = []
@@ -92,20 +92,15 @@ class InitialTension:
             off = np.clip(curvature, -1, 1) * (0.5 * bound - abs(half))
             profiles.append(np.exp([mean - half, mean + off, mean + half]))
         corners = np.array([0.0, path.halfway_m, path.length_m])
-        if not any(curvatures):  # A corner that is none would only cost time.
+        if not any(curvatures):  # a corner without a change of slope would only cost time
             return cls(corners[::2], *(T[::2] for T in profiles))
         return cls(corners, *profiles)
-
-    def of_cable(self, name: str) -> "InitialTension":
-        """The profile of cable "A" or "B", as both cables', for runs of one cable alone."""
-        tension = {"A": self.tension_A_N, "B": self.tension_B_N}[name]
-        return InitialTension(self.x_m, tension, tension)
 
     def at(self, x: NDArray, phi: NDArray) -> tuple[NDArray, NDArray]:
         """Tensions of A and B (N) at arc lengths `x` (m), the bend from the drive end to each of which is `phi` (rad).
 
-        Tension changes where the conduits bend, at a kink by as much of its bend as `phi` has. All arrays have the
-        shape of `x`.
+        Tension changes where the conduits bend, and at a kink by the share of its bend that `phi` contains. All arrays
+        have the shape of `x`.
         """
         corner_phi = np.interp(self.x_m, x, phi)
         return tuple(_interpolate(phi, corner_phi, T) for T in (self.tension_A_N, self.tension_B_N))
@@ -129,6 +124,7 @@ class InitialTension:
 
 
 def _slopes(m: NDArray, tension: NDArray, cable: str) -> NDArray:
+    """Slope d ln T / dm between corners; `ModelError` where friction cannot hold it."""
     if tension[0] == 0:
         return np.zeros(m.size - 1)
     run, rise = np.diff(m), np.diff(np.log(tension))
@@ -139,13 +135,14 @@ def _slopes(m: NDArray, tension: NDArray, cable: str) -> NDArray:
             f"cable {cable}: friction cannot hold the initial tension between corners {worst} and {worst + 1},"
             f" |d ln T| = {abs(rise[worst]):.6g} where mu d phi = {run[worst]:.6g}"
         )
-    # A profile on the bound is a sliding line up to rounding of the logarithm.
+    # A profile on the bound is a sliding line, up to rounding of the logarithm.
     on_bound = excess > -4e-15
     slope = np.divide(rise, run, out=np.zeros_like(run), where=run > 0)
     return np.where(on_bound & (run > 0), np.sign(rise), np.clip(slope, -1, 1))
 
 
 def _interpolate(phi: NDArray, corner_phi: NDArray, tension: NDArray) -> NDArray:
+    """Tension at `phi`, ln T linear between corners; zero for a slack cable."""
     if not tension.any():
         return np.zeros_like(phi)
     return np.exp(np.interp(phi, corner_phi, np.log(tension)))

@@ -1,4 +1,4 @@
-"""Loads that the transmission can work against."""
+"""Loads that the transmission works against."""
 
 from dataclasses import dataclass
 from math import inf
@@ -21,10 +21,10 @@ class SpringLoad:
     stiffness_Nm_per_rad : float
         K_e, >= 0.
     rest_known_to_Nm : float
-        How well the torque is known with which a run begins; >= 0. Where there is a gap, a smaller one does not tell
-        which of its sides the load lies against.
+        Uncertainty of the torque at the start of a run; >= 0. A smaller torque does not show which side of a gap the
+        load touches.
     rest_gap_position : float
-        Where in the gap it rests then, -1 to 1.
+        Position in the gap at rest in that case, -1 to 1.
     """
 
     stiffness_Nm_per_rad: float
@@ -35,37 +35,8 @@ class SpringLoad:
         if not (np.isfinite(self.stiffness_Nm_per_rad) and self.stiffness_Nm_per_rad >= 0):
             raise ModelError(
                 f"a load spring's stiffness is finite and not negative; got {self.stiffness_Nm_per_rad}"
-                " (for a blocked load use AngleLoad with a constant angle)"
+                " (for a load that cannot move use FixedLoad)"
             )
-
-
-@dataclass(frozen=True)
-class MechanicalLoad:
-    """A spring that stiffens, with inertia and damping: tau_out = K_e theta + K_3 theta^3 + B omega + J alpha.
-
-    Attributes
-    ----------
-    stiffness_Nm_per_rad : float
-        K_e, >= 0; theta_out is counted from the neutral position (from the start if there is no spring at all).
-    cubic_Nm_per_rad3 : float
-        K_3; softening (negative) is allowed as long as the torque still rises with the angle.
-    damping_Nms_per_rad : float
-        B >= 0.
-    inertia_kg_m2 : float
-        J >= 0.
-    """
-
-    stiffness_Nm_per_rad: float = 0.0
-    cubic_Nm_per_rad3: float = 0.0
-    damping_Nms_per_rad: float = 0.0
-    inertia_kg_m2: float = 0.0
-
-    def __post_init__(self):
-        for name in ("stiffness_Nm_per_rad", "damping_Nms_per_rad", "inertia_kg_m2"):
-            if not 0 <= getattr(self, name) < inf:
-                raise ModelError(f"a load's {name} must be finite and not negative; got {getattr(self, name)}")
-        if not np.isfinite(self.cubic_Nm_per_rad3):
-            raise ModelError(f"a load's cubic_Nm_per_rad3 must be finite; got {self.cubic_Nm_per_rad3}")
 
 
 @dataclass(frozen=True)
@@ -77,8 +48,7 @@ class TorqueLoad:
     torque_Nm : ndarray, shape (n,)
         tau_out, the torque of the cables on the load.
     beside_Nm_per_rad : float
-        A spring that holds the load pulley too and that the torque's sensor does not feel, slack where a run starts;
-        >= 0. Only the general solver knows it.
+        A spring at the load pulley that the torque sensor does not feel, without torque at the start of a run; >= 0.
     """
 
     torque_Nm: NDArray
@@ -88,11 +58,6 @@ class TorqueLoad:
         if not 0 <= self.beside_Nm_per_rad < inf:
             raise ModelError(f"a spring beside a load is finite and not negative; got {self.beside_Nm_per_rad}")
         object.__setattr__(self, "torque_Nm", series(self.torque_Nm, "torque_Nm"))
-
-    def check_alone(self) -> None:
-        """For solvers that know no spring beside the torque."""
-        if self.beside_Nm_per_rad:
-            raise ModelError("a spring beside a measured torque takes the general solver")
 
 
 @dataclass(frozen=True)
@@ -111,8 +76,16 @@ class AngleLoad:
         object.__setattr__(self, "angle_rad", series(self.angle_rad, "angle_rad"))
 
 
+@dataclass(frozen=True)
+class FixedLoad:
+    """A load pulley, or the far end of a single cable, that does not move."""
+
+
+Load = SpringLoad | TorqueLoad | AngleLoad | FixedLoad
+
+
 def series(values, name: str) -> NDArray:
-    """`values` as one finite number a sample, at least one; `ModelError` where they are not."""
+    """`values` as a contiguous array of one finite number a sample; `ModelError` where they are not."""
     values = np.ascontiguousarray(values, dtype=float)
     if values.ndim != 1 or values.size == 0:
         raise ModelError(f"{name} is one row of samples, at least one; got an array of shape {values.shape}")

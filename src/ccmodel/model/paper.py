@@ -1,23 +1,23 @@
 """The paper's own discretisation of a pull-pull pair: nodes along each cable, its equations (9) to (21).
 
 Agrawal, Peine and Yao, "Modeling of transmission characteristics across a cable-conduit system", IEEE Transactions
-on Robotics 26 (2010), Sections III.B and IV. It stays as the reference that other solvers are compared with.
+on Robotics 26 (2010), Sections III.B and IV. It is the reference that the other solvers are compared with.
 
 A cable has nodes i = 1 .. n + 1 with tension T_i and displacement u_i, positive towards the load. A segment is
-moving (case 1), stationary (case 2), or moving in part (case 3). Motion enters at an end and reaches as far as the
+moving (case 1), stationary (case 2), or partly moving (case 3). Motion enters at an end and reaches as far as the
 last moving node: the nodes up to there lie on a capstan line
 
     T_i = c E_i,   E_i = exp(S mu phi_i),   S = sign of the motion,                              (13)
     u_j - u_i = c (P_j - P_i),   P_j the sum over segments of (R / K mu) S E_i (exp(S mu dphi_i) - 1),   (14)
 
 and the next segment, with its far node at rest, is stretched by its mean tension (17) to (19). Both make one linear
-equation for c, whatever the last moving node is; the right one is the first that leaves the node beyond it at rest.
+equation for c for each candidate of the last moving node; the first that leaves the node beyond it at rest holds.
 When the moving parts of the two ends have met, the whole cable slides along one line.
 
-In one place this departs from the letter. (19) sets the stretch of a segment in part moving from its mean tension
-alone. A segment left behind on a capstan line holds a slightly different stretch (14), so at every reversal tension
-would jump by (mu dphi)^2 / 6 of itself without any motion, and the coupled pair chatters on these jumps. Here the
-change of the mean tension gives the change of the stretch: the same formula and order, and no motion, no change.
+This departs from the paper in one place. (19) sets the stretch of a partly moving segment from its mean tension
+alone. A segment on a capstan line has a slightly different stretch (14), so at every reversal the tension would jump
+by (mu dphi)^2 / 6 of itself without any motion, and the coupled pair chatters on these jumps. Here the change of the
+mean tension gives the change of the stretch: the same formula and order, but without motion nothing changes.
 
 The load pulley couples the cables: its motion is what balances (T2 - T4) R_o against the load (21).
 """
@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from ccmodel.failure import ModelError
 from ccmodel.kernel import kernel
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import SpringLoad, TorqueLoad
+from ccmodel.model.load import SpringLoad, series
 from ccmodel.model.response import PairResponse, Status
 from ccmodel.model.transmission import Transmission
 
@@ -37,17 +37,17 @@ SECTIONS = 16  # of each cable, as in the paper's Section IV
 
 def simulate_pair(
     transmission: Transmission,
-    load: SpringLoad | TorqueLoad,
+    load: SpringLoad,
     theta_in: NDArray,
     initial: InitialTension,
     sections: int = SECTIONS,
 ) -> PairResponse:
-    """Run the pair through a motion of the drive pulley.
+    """Response of the pair to a motion of its drive pulley.
 
     Parameters
     ----------
     transmission : Transmission
-    load : SpringLoad or TorqueLoad
+    load : SpringLoad
     theta_in : ndarray, shape (n,)
         Drive angle at each sample, rad; the first is the angle at which `initial` holds.
     initial : InitialTension
@@ -63,12 +63,9 @@ def simulate_pair(
     ModelError
         If an input is not finite or of the wrong shape, or a step finds no balance at the load.
     """
-    theta_in = np.ascontiguousarray(theta_in, dtype=float)
-    is_spring = isinstance(load, SpringLoad)
-    stiffness = load.stiffness_Nm_per_rad if is_spring else 0.0
-    torque = np.zeros_like(theta_in) if is_spring else np.ascontiguousarray(load.torque_Nm, dtype=float)
-    _check(theta_in, torque, sections)
-
+    theta_in = series(theta_in, "theta_in")
+    if sections < 1:
+        raise ModelError(f"each cable needs at least one section; got {sections}")
     path = transmission.path
     x = _nodes(path, sections)
     phi = path.bend_at(x)
@@ -77,8 +74,7 @@ def simulate_pair(
     E, P = _capstan_lines(x, phi, transmission)
     T, theta_out, failed = _march(
         theta_in,
-        torque,
-        stiffness,
+        load.stiffness_Nm_per_rad,
         transmission.drive_radius_m,
         transmission.load_radius_m,
         T_A,
@@ -90,7 +86,7 @@ def simulate_pair(
     if failed >= 0:
         raise ModelError(
             f"no load angle balances the cables at sample {failed} (drive at {theta_in[failed]:.4g} rad): "
-            "check the load torque, the pulley radii and the stiffness"
+            "check the pulley radii and the stiffness"
         )
     R_i, R_o = transmission.drive_radius_m, transmission.load_radius_m
     T1, T2, T3, T4 = T
@@ -105,19 +101,6 @@ def simulate_pair(
         status=Status.OK,
         reached=theta_in.size,
     )
-
-
-def _check(theta_in, torque, sections):
-    if sections < 1:
-        raise ModelError(f"each cable needs at least one section; got {sections}")
-    if theta_in.ndim != 1 or theta_in.size == 0:
-        raise ModelError(f"theta_in must be one row of samples; got shape {theta_in.shape}")
-    if torque.shape != theta_in.shape:
-        raise ModelError(f"the load torque has {torque.size} samples, the drive angle {theta_in.size}")
-    for name, values in (("theta_in", theta_in), ("load torque", torque)):
-        bad = np.flatnonzero(~np.isfinite(values))
-        if bad.size:
-            raise ModelError(f"{name} is not finite at sample {bad[0]}")
 
 
 def _nodes(path, sections):
@@ -142,9 +125,9 @@ def _capstan_lines(x, phi, transmission):
 
 @kernel
 def _drive_front(T, u, a, E, P, h):
-    """Last moving node when the drive end is taken to displacement `a`; (segment in part moving, line constant c).
+    """Front from the drive end, moved to displacement `a`: (index of the partly moving segment, c of its line).
 
-    The segment is n (one past the last) when the motion has arrived at the load end.
+    The index is n, one past the last segment, where the motion has arrived at the load end.
     """
     n = h.size
     S = 1 if a > u[0] else -1
@@ -158,7 +141,7 @@ def _drive_front(T, u, a, E, P, h):
 
 @kernel
 def _load_front(T, u, b, E, P, h):
-    """The same from the load end, taken to displacement `b`; segment -1 when it has arrived at the drive end."""
+    """The same from the load end, moved to displacement `b`; index -1 where the motion has arrived at the drive end."""
     n = h.size
     S = 1 if b > u[n] else -1
     row = (S + 1) // 2
@@ -170,11 +153,11 @@ def _load_front(T, u, b, E, P, h):
 
 
 @kernel
-def _still_point(u, a, b, P_left, P_right, E_left, E_right):
-    """Both ends drawn apart or let in: two lines from one still point; (node left of it, weight, tension there).
+def _stagnation_point(u, a, b, P_left, P_right, E_left, E_right):
+    """Stagnation point of a cable whose ends move in opposite directions: (node on its drive side, weight of the next).
 
-    Node m stays where it was if the line to its left and the line to its right give it the same tension. That
-    changes sign between two nodes; the still point is put between them in proportion.
+    Node m stays at rest if the lines on both sides give it the same tension. The difference of the two changes sign
+    between two nodes; the stagnation point lies between them in proportion.
     """
     n = u.size - 1
     previous = 0.0
@@ -190,9 +173,9 @@ def _still_point(u, a, b, P_left, P_right, E_left, E_right):
 
 @kernel
 def _move_cable(T, u, a, b, drive, E, P, h, T_new, u_new):
-    """New state of one cable with its ends taken to `a` and `b`; `drive` is what `_drive_front` gave for `a`.
+    """Write the state of one cable with its ends moved to `a` and `b` into `T_new`, `u_new`.
 
-    Writes `T_new`, `u_new`.
+    `drive` is the result of `_drive_front` for `a`.
     """
     n = h.size
     if b - a <= 0:  # slack: no tension and no memory
@@ -215,7 +198,7 @@ def _move_cable(T, u, a, b, drive, E, P, h, T_new, u_new):
     S_load = 1 if b > u[n] else -1
     if moves_drive and moves_load and S_drive != S_load:
         if k_drive >= k_load:
-            _slide_from_still_point(u, a, b, S_load, E, P, T_new, u_new)
+            _slide_from_stagnation(u, a, b, S_load, E, P, T_new, u_new)
             return
     else:
         S = S_drive if moves_drive else S_load
@@ -243,19 +226,20 @@ def _move_cable(T, u, a, b, drive, E, P, h, T_new, u_new):
 
 
 @kernel
-def _slide_from_still_point(u, a, b, S_load, E, P, T_new, u_new):
+def _slide_from_stagnation(u, a, b, S_load, E, P, T_new, u_new):
+    """Write the state of a cable that slides in opposite directions on both sides of a stagnation point."""
     n = u.size - 1
     right = (S_load + 1) // 2
     left = 1 - right
-    m, weight = _still_point(u, a, b, P[left], P[right], E[left], E[right])
+    m, weight = _stagnation_point(u, a, b, P[left], P[right], E[left], E[right])
     T_new[:] = 0.0
     for node, share in ((m, 1 - weight), (m + 1, weight)):
-        # Total stretch fixes the tension at the still point; the two nodes beside it are blended.
+        # The total stretch gives the tension at the stagnation point, blended between the two nodes next to it.
         stretch = P[left, node] / E[left, node] + (P[right, n] - P[right, node]) / E[right, node]
-        T_still = (b - a) / stretch
+        T_stagnation = (b - a) / stretch
         for i in range(n + 1):
             side = left if i <= node else right
-            T_new[i] += share * T_still * E[side, i] / E[side, node]
+            T_new[i] += share * T_stagnation * E[side, i] / E[side, node]
     u_new[0] = a
     for i in range(n):
         side = left if i < m + weight else right
@@ -265,30 +249,30 @@ def _slide_from_still_point(u, a, b, S_load, E, P, T_new, u_new):
 
 @kernel
 def _imbalance(theta, cables, step, load, lines):
-    """Torque of the cables less that of the load when the load pulley stands at `theta`; leaves the new state there.
+    """Torque of the cables less that of the load at load angle `theta`; writes the cables' new state.
 
-    Falls as theta grows: the load end of A is let in, that of B drawn out.
+    It falls as theta grows: the load end of A is let in, that of B drawn out.
     """
     T, u, T_new, u_new = cables
     a, fronts, u_load = step
-    K_e, torque, R_o, theta_start = load
+    K_e, R_o, theta_start = load
     E, P, h = lines
     n = h.size
     turn = R_o * (theta - theta_start)
     _move_cable(T[0], u[0], a[0], u_load[0] - turn, fronts[0], E, P, h, T_new[0], u_new[0])
     _move_cable(T[1], u[1], a[1], u_load[1] + turn, fronts[1], E, P, h, T_new[1], u_new[1])
-    return (T_new[0, n] - T_new[1, n]) * R_o - (K_e * theta + torque)
+    return (T_new[0, n] - T_new[1, n]) * R_o - K_e * theta
 
 
 @kernel
 def _balance(theta, guess, cables, step, load, lines):
-    """Load angle at which the torques balance, by bracketing and false position (Illinois); and whether there is one.
+    """Load angle at which the torques balance, by bracketing and false position (Illinois), and whether it exists.
 
-    `guess` is how far the load may have turned. On return `cables` holds the state there.
+    `guess` is the first step of the bracket. On return `cables` holds the state at that angle.
     """
     lower, f_lower = theta, _imbalance(theta, cables, step, load, lines)
     n = lines[2].size
-    if abs(f_lower) <= 1e-13 * load[2] * (cables[0][0, n] + cables[0][1, n]):  # rounding must not set the load moving
+    if abs(f_lower) <= 1e-13 * load[1] * (cables[0][0, n] + cables[0][1, n]):  # rounding alone must not move the load
         return theta, True
     stride = guess if f_lower > 0 else -guess
     upper = theta + stride
@@ -316,8 +300,8 @@ def _balance(theta, guess, cables, step, load, lines):
 
 
 @kernel
-def _march(theta_in, torque, K_e, R_i, R_o, T_A0, T_B0, h, E, P):
-    """Step through the samples; end tensions (4, n), load angle (n,) and the sample without a balance, or -1."""
+def _march(theta_in, K_e, R_i, R_o, T_A0, T_B0, h, E, P):
+    """Step through the samples: end tensions (4, n), load angle (n,), and the first sample without a balance, or -1."""
     n = h.size
     samples = theta_in.size
     T, u = np.empty((2, n + 1)), np.zeros((2, n + 1))
@@ -338,7 +322,7 @@ def _march(theta_in, torque, K_e, R_i, R_o, T_A0, T_B0, h, E, P):
         a[0] = -R_i * (theta_in[j] - theta_in[0])
         a[1] = -a[0]
         fronts = (_drive_front(T[0], u[0], a[0], E, P, h), _drive_front(T[1], u[1], a[1], E, P, h))
-        load = (K_e, torque[j], R_o, theta_start)
+        load = (K_e, R_o, theta_start)
         balanced, found = _balance(theta, turn, cables, (a, fronts, u_load), load, lines)
         if not found:
             return out_T, out_theta, j

@@ -1,4 +1,4 @@
-"""A sine of the drive as the paper's Section IV tells it: phases I to IV, and instants 1 to 8 between them."""
+"""A sine of the drive in the terms of the paper's Section IV: phases I to IV, and instants 1 to 8 between them."""
 
 from dataclasses import dataclass
 
@@ -22,7 +22,7 @@ class PhaseStudy:
     time_s, theta_in_rad : ndarray, shape (5 n / 4 + 1,)
         n samples a cycle.
     response : ExactResponse
-        What the pair does, with profiles at the samples of `instants` and `halfway`.
+        With profiles at the samples of `instants` and `halfway`.
     phase : ndarray of int, shape (5 n / 4 + 1,)
         Index into `PAPERS_PHASES`.
     instants : dict of int to int
@@ -41,12 +41,12 @@ class PhaseStudy:
 
     @property
     def first_reversal(self) -> int:
-        """Sample at which the drive turns back for the first time, and the cycle begins."""
+        """Sample of the drive's first reversal, at which the cycle begins."""
         return (self.time_s.size - 1) // 5
 
     @property
     def cycle(self) -> slice:
-        """Samples of the cycle, its first and last one the same state."""
+        """Samples of the cycle; the first and the last are the same state."""
         return slice(self.first_reversal, None)
 
 
@@ -80,17 +80,17 @@ def simulate_phases(
     phase = papers_phases(response)
     instants = _instants(phase, samples_per_cycle)
     halfway = {k: (instants[k] + instants[k + 1]) // 2 for k in (2, 6) if k in instants and k + 1 in instants}
-    # The instants are known only once the motion is; a second run, of milliseconds, keeps their profiles.
+    # The instants follow from the response; a second run, of milliseconds, keeps the profiles there.
     wanted = sorted({*instants.values(), *halfway.values()})
     response = simulate_pair(transmission, load, theta_in, initial, record_profiles_at=wanted)
     return PhaseStudy(i / (samples_per_cycle * frequency_Hz), theta_in, response, phase, instants, halfway)
 
 
 def papers_phases(response: ExactResponse) -> NDArray:
-    """Phase of each sample as the paper's Figs. 5 to 7 call it, an index into `PAPERS_PHASES`; shape (n,).
+    """Phase of each sample after the paper's Figs. 5 to 7, an index into `PAPERS_PHASES`; shape (n,).
 
-    The paper lets phase I follow the reversal that ends phase IV: the load rests. One cable still hangs slack then,
-    for which the solver says IVb; it is I as long as the load rests.
+    In the paper phase I follows the reversal that ends phase IV, since the load rests. One cable still hangs slack
+    then, which the solver calls IVb; such samples count as phase I while the load rests.
     """
     rests = np.diff(response.theta_out_rad, prepend=np.nan) == 0
     through_reversal = response.phase == PHASES.index("IVb")
@@ -98,6 +98,7 @@ def papers_phases(response: ExactResponse) -> NDArray:
 
 
 def _instants(phase: NDArray, samples_per_cycle: int) -> dict[int, int]:
+    """Sample of each of the paper's instants that occurs."""
     found = {}
     for first, reversal in ((1, samples_per_cycle // 4), (5, 3 * samples_per_cycle // 4)):
         found[first] = reversal

@@ -1,4 +1,4 @@
-"""What every solver says of a run of the pair, and how a run can end."""
+"""The response that every solver returns, and how a simulation can end."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -9,27 +9,22 @@ from ccmodel.failure import ModelError
 
 
 class Status(Enum):
-    """How a simulation ended; the text says what to do about it."""
+    """How a simulation ended; the text advises what to do about it."""
 
     OK = "every sample was reached"
-    STUCK = (
-        "the path between two samples did not come to an end within its number of events: sample the drive and the"
-        " load more finely around the first sample that is missing"
-    )
     UNBALANCED = (
-        "the cables cannot hold the load that was given: a cable can only pull; check the sign of the given torque or"
-        " force and its zero"
+        "the cables do not balance the load: check the stiffness of the load's spring against that of the cables"
     )
     NO_CONVERGENCE = (
-        "the cables and the load find no balance there, not in the smallest substep either: look at the load torque"
-        " and at the drive's step before this sample, keep parameters within their ranges, or give friction a"
-        " presliding length"
+        "no balance of cables and load was found there, not even in the smallest substep: check the load torque and"
+        " the drive's step before this sample, keep parameters within their ranges, or give friction a presliding"
+        " length"
     )
 
 
 @dataclass(frozen=True, kw_only=True)
 class PairResponse:
-    """What a pair of cables did, sample by sample; after a failure the samples that were not reached are left out.
+    """Response of a pair of cables, sample by sample; after a failure it ends with the last sample that was solved.
 
     Attributes
     ----------
@@ -41,7 +36,7 @@ class PairResponse:
         Torque of the drive on its pulley, and of the cables on the load, N m.
     status : Status
     reached : int
-        Number of samples that were reached.
+        Number of samples that were solved.
     """
 
     T1_N: NDArray
@@ -55,12 +50,12 @@ class PairResponse:
     reached: int
 
     def complete(self):
-        """Itself if every sample was reached in balance.
+        """The response itself, if every sample was solved in balance.
 
         Raises
         ------
         ModelError
-            With the status's advice, if not.
+            With the advice of the status, if not.
         """
         if self.status is not Status.OK:
             name = self.status.name.lower().replace("_", "-")

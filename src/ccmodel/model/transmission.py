@@ -1,4 +1,4 @@
-"""What the model needs to know of a transmission: the pair of cables, the two pulleys and the load."""
+"""The transmission: path, cables and pulleys."""
 
 from dataclasses import dataclass
 from math import inf
@@ -6,25 +6,26 @@ from math import inf
 from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 
-# Beyond this mu phi the capstan factor leaves what double precision can carry.
+# Beyond this mu phi the capstan factor is out of the range of double precision.
 MAX_FRICTION_ANGLE = 300.0
 
 
 @dataclass(frozen=True)
 class Transmission:
-    """A pull-pull pair of equal cables in equal conduits between a drive and a load pulley.
+    """A pull-pull pair of equal cables in equal conduits between a drive and a load pulley, or cable A alone.
 
     Attributes
     ----------
     path : ConduitPath
         The conduits' common path.
     axial_rigidity_N : float
-        K of the paper's (5), T = K u' with u' the strain: the product of the stiffness measured on a length and
-        that length, N.
+        K of the paper's (5), T = K u' with u' the strain: stiffness of a length of cable times that length, N.
     friction_coefficient : float
         mu between cable and conduit.
     drive_radius_m, load_radius_m : float
         Pulley radii R_i and R_o, m.
+    is_single_cable : bool
+        Whether cable B is absent.
     """
 
     path: ConduitPath
@@ -32,16 +33,17 @@ class Transmission:
     friction_coefficient: float
     drive_radius_m: float
     load_radius_m: float
+    is_single_cable: bool = False
 
     def __post_init__(self):
         for name in ("axial_rigidity_N", "drive_radius_m", "load_radius_m"):
             if not 0 < getattr(self, name) < inf:
-                raise ModelError(f"{name} must be positive and finite; got {getattr(self, name)}: look at its unit")
+                raise ModelError(f"{name} must be positive and finite; got {getattr(self, name)}: check its unit")
         check_friction(self.friction_coefficient, self.path)
 
 
 def check_friction(friction_coefficient: float, path: ConduitPath) -> None:
-    """Refuse a coefficient that no cable in `path` can have, by `ModelError`."""
+    """Raise `ModelError` for a coefficient that no cable in `path` can have."""
     if not 0 <= friction_coefficient < inf:
         raise ModelError(
             f"friction_coefficient must be finite and not negative; got {friction_coefficient}: in a fit, give it a"

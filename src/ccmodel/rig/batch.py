@@ -10,6 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from ccmodel.channels import ANGLE_AT, SUM_AT, TENSIONS_AT, TORQUE_AT
 from ccmodel.geometry import ConduitPath
+from ccmodel.recording import FAR_ENDS
 from ccmodel.typed import InputError, NotNegative, Positive, Problem, TypedModel, load_yaml_model
 
 REQUIRED_COLUMNS = ("time_s", "drive_encoder_counts")
@@ -104,12 +105,14 @@ class End(NamedTuple):
     angle: str
     torque: str
     force: str
-    tensions: tuple[str, str]
+    tensions: tuple[str, ...]
 
 
 class Rig(TypedModel):
     """The rig: both ends, the cable, the accuracy of the sensors and, by log column, their ranges."""
 
+    transmission: Literal["pull-pull", "single-cable"] = "pull-pull"
+    far_end: Literal[FAR_ENDS] | None = None
     drive: Side
     load: LoadSide
     cable: Cable
@@ -119,8 +122,10 @@ class Rig(TypedModel):
     @property
     def ends(self) -> tuple[End, End]:
         """Drive end and load end."""
-        sides = {"drive": self.drive, "load": self.load}
-        return tuple(End(n, s, ANGLE_AT[n], TORQUE_AT[n], SUM_AT[n], TENSIONS_AT[n]) for n, s in sides.items())
+        sides, cables = {"drive": self.drive, "load": self.load}, 1 if self.far_end else 2
+        return tuple(
+            End(n, side, ANGLE_AT[n], TORQUE_AT[n], SUM_AT[n], TENSIONS_AT[n][:cables]) for n, side in sides.items()
+        )
 
     @field_validator("ranges")
     @classmethod
@@ -129,6 +134,20 @@ class Rig(TypedModel):
             if low >= high:
                 raise ValueError(f"{column}: a range is [lowest, highest], found [{low}, {high}]")
         return ranges
+
+    @model_validator(mode="after")
+    def _far_end_of_a_single_cable(self):
+        load, end = self.load, self.far_end
+        if (self.transmission == "single-cable") != (end is not None):
+            raise ValueError("far_end and transmission: single-cable are stated together or not at all")
+        if end is not None and (end == "spring") != (load.spring_stiffness_Nm_per_rad is not None):
+            raise ValueError("load.spring_stiffness_Nm_per_rad is stated where far_end is spring, and only there")
+        if end == "measured-motion" and load.encoder_counts_per_rev is None:
+            raise ValueError("far_end is measured-motion, so load.encoder_counts_per_rev is needed")
+        sensors = load.load_cell, load.torque_sensor, load.torque_constant_Nm_per_A
+        if end == "measured-tension" and not any(sensors):
+            raise ValueError("far_end is measured-tension, so load.load_cell or a torque sensor there is needed")
+        return self
 
     @model_validator(mode="after")
     def _accuracy_of_every_sensor(self):

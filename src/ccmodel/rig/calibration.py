@@ -70,7 +70,7 @@ def calibrate(table: pd.DataFrame, rig: Rig, limits: Limits = LIMITS) -> Calibra
         _angle(result, table, end, resting, rig.accuracy)
         _torque(result, table, end, rig.accuracy)
         _force(result, table, end, rig.accuracy)
-        _tensions(result, end)
+        (_single_tension if rig.far_end else _tensions)(result, end)
     return result
 
 
@@ -149,6 +149,17 @@ def _tensions(result: Calibrated, end: End) -> None:
     for name, sign in zip(end.tensions, (1, -1), strict=True):
         formula = f"({force} {'+' if sign > 0 else '-'} {torque} / {radius:g} m) / 2"
         result.add(name, (result.channels[force] + sign * difference) / 2, formula, accuracy)
+
+
+def _single_tension(result: Calibrated, end: End) -> None:
+    """Tension of a single cable at one end, from the load cell or else from the torque sensor."""
+    (name,) = end.tensions
+    force, torque, radius = end.force, end.torque, end.side.pulley_radius_m
+    if force in result.channels:
+        result.add(name, result.channels[force], force, result.accuracy[force])
+    elif torque in result.channels:
+        formula = f"{torque} / {radius:g} m"
+        result.add(name, result.channels[torque] / radius, formula, result.accuracy[torque] / radius)
 
 
 def _minus(sign: int) -> str:

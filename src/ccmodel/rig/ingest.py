@@ -129,5 +129,6 @@ def _recording(
         rest_s=calibrated.rest_s,
         settled_s=entry.settled_s,
         warnings=tuple(map(str, findings)),
+        far_end=batch.rig.far_end,
     )
     return recording, findings

@@ -1,4 +1,4 @@
-"""The conduit as the kernels see it: nodes in m = mu phi, with compliance between them and at them."""
+"""The conduit's path as tables over m = mu phi: nodes, and the cable's compliance between and at them."""
 
 import math
 from typing import NamedTuple
@@ -8,26 +8,26 @@ from numpy.typing import NDArray
 
 from ccmodel.geometry import ConduitPath
 
-# Below this mu phi a piece's capstan loss is less than rounding: it is straight.
+# Below this mu phi the capstan loss of a piece is less than rounding, and the piece counts as straight.
 STRAIGHT = 1e-15
 
 
-# Rows of `PathTables.table`, each seen from one end: m at the nodes; of the bend after a node dx / (EA dm), the arc
-# length at which it begins and dx/dm; the straight stretch's length / EA at a node; and the integral of
-# exp(-sigma m) dx / EA up to and with the node's straight stretch, for sigma = -1 and +1.
+# Rows of `PathTables.table`, each seen from one end. m at the nodes. Of the bend after a node: dx / (EA dm), the arc
+# length at its start, dx / dm. Of the straight piece at a node: length / EA. The integral of exp(-sigma m) dx / EA up
+# to a node, its straight piece included, for sigma = -1 and +1.
 NODE, PER_M, X_START, X_PER_M, LUMP, PASSED = range(6)
 
 
 class PathTables(NamedTuple):
     """Tables of a path, seen from both ends.
 
-    Bends lie between nodes; straight stretches are lumps of compliance at a node, since tension depends on m alone.
+    Bends lie between nodes. Straight pieces are lumped compliances at a node, since tension depends on m alone.
 
     Attributes
     ----------
     table : ndarray, shape (2, 7, n + 1)
-        First axis: from the drive end inward, from the load end inward; second axis as named above. A bend's values
-        stand at the node before it.
+        First axis: from the drive end inward, from the load end inward; second axis: the rows above. The values of a
+        bend stand at the node before it.
     ratio : tuple of two floats
         exp(-total), exp(+total): T_load / T_drive of a line of slope -1, +1.
     total : float
@@ -43,7 +43,7 @@ class PathTables(NamedTuple):
 
 
 def tabulate(path: ConduitPath, friction_coefficient: float, axial_rigidity_N: float) -> PathTables:
-    """Tables of `path` for a cable of rigidity EA (N) under friction mu."""
+    """Tables of `path` for a cable of axial rigidity EA (N) and friction mu."""
     node, bend, x_start, x_per_m, straight = [0.0], [], [], [], [0.0]
     x = 0.0
     for length, angle in zip(path.piece_length_m, path.piece_bend_rad, strict=True):

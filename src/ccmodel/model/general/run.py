@@ -1,7 +1,7 @@
-"""Set up the march, run it, and say what the sensors would read."""
+"""Set up the march over the samples, run it, and pass its outputs through the sensors."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,60 +9,38 @@ from numpy.typing import NDArray
 from ccmodel import mechanisms as registry
 from ccmodel.channels import F_DRIVE, F_LOAD, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
 from ccmodel.failure import ModelError
-from ccmodel.mechanisms.contract import Sensing, Settings
-from ccmodel.mechanisms.load_dependent_friction import FLOOR_N, REFERENCE_N
+from ccmodel.mechanisms.contract import Settings
 from ccmodel.mechanisms.load_inertia import load_damping
-from ccmodel.mechanisms.pulley_eccentricity import winding
 from ccmodel.mechanisms.pulley_friction import bearing
-from ccmodel.mechanisms.strand_settling import stretch_at
-from ccmodel.model.general import march as rows
+from ccmodel.model.general import layout as rows
+from ccmodel.model.general.active import Active, active_of
 from ccmodel.model.general.grid import Grid, make_grid
+from ccmodel.model.general.march import COULOMB_BRISTLE_M, SOFT_CONDUIT_BRISTLE_M, march
+from ccmodel.model.general.rest import initial_state, load_angle, remove_cable_B
+from ccmodel.model.general.sensors import read_by_sensors
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import AngleLoad, MechanicalLoad, SpringLoad, TorqueLoad
+from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad
 from ccmodel.model.response import PairResponse, Status
 from ccmodel.model.transmission import Transmission
 
 ELEMENTS = 32
-# A load that rings turns by no more than this much of its phase in a step, as far as so many steps a sample do.
+# A step covers no more than this phase of a load that rings, up to so many steps a sample.
 RINGING_STEP_RAD, MOST_STEPS = 0.15, 16
-# Each round leaves as much of a sensor's fault as the fault is of the reading.
-FAULTS_ROUNDS = 8
-
-Load = SpringLoad | MechanicalLoad | TorqueLoad | AngleLoad
-
-
-@dataclass(frozen=True)
-class Active:
-    """A mechanism that is in a model.
-
-    Attributes
-    ----------
-    name : str
-        One of `ccmodel.mechanisms.names()`.
-    place : str
-        One of the mechanism's places.
-    values : mapping of str to float
-        A value for each of its parameters.
-    """
-
-    name: str
-    place: str
-    values: Mapping[str, float]
 
 
 @dataclass(frozen=True, kw_only=True)
 class GeneralResponse(PairResponse):
-    """What the general solver says beyond every solver's response; tau_out is the torque beyond the load's bearing.
+    """Response of the general solver; tau_out is the torque on the load's side of the pulley's bearing.
 
     Attributes
     ----------
     time_s : ndarray, shape (n,)
     read : mapping of str to ndarray
-        What the sensors would read: theta_in_rad, theta_out_rad, tau_in_Nm, tau_out_Nm, F_drive_N, F_load_N.
+        Readings of the sensors: theta_in_rad, theta_out_rad, tau_in_Nm, tau_out_Nm, F_drive_N, F_load_N.
     newton_iterations, substeps : int
         Work done.
     loose_steps : int
-        Steps that were taken though out of balance by up to 1e-5 of the highest tension.
+        Steps accepted although out of balance by up to 1e-5 of the highest tension.
     """
 
     time_s: NDArray
@@ -87,24 +65,24 @@ def simulate(
     Parameters
     ----------
     transmission : Transmission
-    load : SpringLoad, MechanicalLoad, TorqueLoad or AngleLoad
+    load : SpringLoad, TorqueLoad, AngleLoad or FixedLoad
     time_s : ndarray, shape (n,)
         Sample times, s, increasing.
     theta_in : ndarray, shape (n,)
         Drive angle at each sample, rad; the first is the angle at which `initial` holds. Linear in between.
     initial : InitialTension
     mechanisms : sequence of Active, or mapping of name to {"place": ..., "values": {...}}
-        What acts besides the paper's physics. A mapping may leave out the place of a mechanism that has only one,
-        and values, which then are the mechanism's starting values.
+        Effects beyond the paper's physics. A mapping may leave out the place of a mechanism that has only one, and the
+        values, which then are the mechanism's starting values.
     elements : int
         Cells of each cable.
     steps : int
-        Steps from one sample to the next; as many times what a load that rings needs.
+        Steps from one sample to the next, multiplied by what a ringing load needs.
 
     Returns
     -------
     GeneralResponse
-        With a status: a step without a solution breaks the run off, and what was solved until then is returned.
+        A step without a solution ends the run; the samples before it are returned, with a status.
 
     Raises
     ------
@@ -114,7 +92,7 @@ def simulate(
         If a mechanism's name is not known.
     """
     time_s, theta_in = (np.ascontiguousarray(a, dtype=float) for a in (time_s, theta_in))
-    active = _active(mechanisms)
+    active = active_of(mechanisms)
     settings = settings_of(active)
     series = _series(load)
     _check(time_s, theta_in, series, elements)
@@ -123,31 +101,38 @@ def simulate(
     grid = make_grid(transmission.path, elements, settings.kinks)
     physics = _physics(transmission, load, settings, elements)
     piece, node = _constants(transmission, settings, grid)
-    course = np.ones(1)
+    friction_factor = np.ones(1)
     if settings.friction_history is not None:
         travel_m = transmission.drive_radius_m * np.abs(np.diff(theta_in, prepend=theta_in[0])).cumsum()
-        course = settings.friction_history(time_s, travel_m)
+        friction_factor = settings.friction_history(time_s, travel_m)
     mean, state = np.zeros((rows.MEAN_ROWS, 2)), np.zeros(rows.LOAD_ROWS)
-    T = _initial_state(physics, piece, node, settings, initial.at(grid.boundary_m, grid.held_rad), course[0])
+    tension_A, tension_B = initial.at(grid.boundary_m, grid.held_rad)
+    if transmission.is_single_cable:
+        tension_B = np.zeros_like(tension_B)
+    T = initial_state(physics, piece, node, settings, (tension_A, tension_B), friction_factor[0])
+    if transmission.is_single_cable:
+        remove_cable_B(piece)
     mean[rows.MEAN] = (piece[rows.SHARE] * T).sum(axis=1)
-    state[rows.ANGLE] = _load_angle(physics, T, load, series)
+    state[rows.ANGLE] = load_angle(physics, T, load, series)
     slide = np.zeros((rows.SLIDE_ROWS, 2, node.shape[2] + 2))
     drive = tuple(map(float, (transmission.drive_radius_m, *settings.drive_eccentricity)))
     out, counts = np.empty((7, time_s.size)), np.zeros(3, dtype=np.int64)
     steps *= _steps(physics, transmission, time_s)
-    solved = rows.march(
-        physics, piece, node, slide, mean, state, time_s, theta_in, drive, course, series, steps, out, counts
+    solved = march(
+        physics, piece, node, slide, mean, state, time_s, theta_in, drive, friction_factor, series, steps, out, counts
     )
-
-    status = Status.OK if solved == time_s.size else Status.NO_CONVERGENCE
-    time_s, theta_in, out = time_s[:solved], theta_in[:solved], out[:, :solved]
-    T1, T2, T3, T4, theta_out, tau_out, tau_in = out
     if isinstance(load, TorqueLoad) and load.beside_Nm_per_rad:
-        tau_out = series[:solved]  # what the sensor feels
+        out[5, :solved] = series[:solved]  # the sensor does not feel the spring beside it
+    return _response(transmission, active, settings, time_s[:solved], theta_in[:solved], out, counts)
+
+
+def _response(transmission, active, settings, time_s, theta_in, out, counts) -> GeneralResponse:
+    """Outputs of the march up to the last sample of `time_s`, and what the sensors read of them."""
+    T1, T2, T3, T4, theta_out, tau_out, tau_in = out[:, : time_s.size]
     if settings.drive_friction_Nm != 0.0:
-        rubs = bearing(theta_in, settings.drive_presliding_rad)
-        rubs *= settings.drive_friction_Nm
-        tau_in += rubs
+        friction = bearing(theta_in, settings.drive_presliding_rad)
+        friction *= settings.drive_friction_Nm
+        tau_in += friction
     channels = {
         THETA_IN: theta_in,
         THETA_OUT: theta_out,
@@ -156,7 +141,6 @@ def simulate(
         F_DRIVE: T1 + T3,
         F_LOAD: T2 + T4,
     }
-    read = _read(active, time_s, channels, (transmission.drive_radius_m, transmission.load_radius_m))
     return GeneralResponse(
         T1_N=T1,
         T2_N=T2,
@@ -165,10 +149,10 @@ def simulate(
         theta_out_rad=theta_out,
         tau_in_Nm=tau_in,
         tau_out_Nm=tau_out,
-        status=status,
-        reached=solved,
+        status=Status.OK if time_s.size == out.shape[1] else Status.NO_CONVERGENCE,
+        reached=time_s.size,
         time_s=time_s,
-        read=read,
+        read=read_by_sensors(active, time_s, channels, (transmission.drive_radius_m, transmission.load_radius_m)),
         newton_iterations=int(counts[0]),
         substeps=int(counts[1]),
         loose_steps=int(counts[2]),
@@ -178,7 +162,7 @@ def simulate(
 def settings_of(mechanisms: Mapping[str, Mapping] | Sequence[Active]) -> Settings:
     """What mechanisms, given as to `simulate`, tell the solver."""
     settings = registry.neutral_settings()
-    for a in _active(mechanisms):
+    for a in active_of(mechanisms):
         mechanism = registry.get(a.name)
         if mechanism.modifies_physics is not None:
             try:
@@ -186,55 +170,6 @@ def settings_of(mechanisms: Mapping[str, Mapping] | Sequence[Active]) -> Setting
             except ValueError as e:
                 raise ModelError(str(e)) from None
     return settings
-
-
-def load_law(settings: Settings, load: SpringLoad, time_s: NDArray, theta: NDArray, start_Nm: float) -> NDArray:
-    """Torque (N m, shape (n,)) of a spring load with what acts on it, along a course of its pulley.
-
-    Parameters
-    ----------
-    settings : Settings
-    load : SpringLoad
-    time_s, theta : ndarray, shape (n,)
-        The pulley's course; only its changes matter.
-    start_Nm : float
-        Torque before it.
-    """
-    stiffness, K3 = load.stiffness_Nm_per_rad, settings.cubic_stiffness
-    angle = theta - theta[0] + _rest_angle(stiffness, K3, settings.half_gap, start_Nm, load)
-    beyond = np.sign(angle) * np.maximum(np.abs(angle) - settings.half_gap, 0.0)
-    speed = np.gradient(theta, time_s)
-    inertial = load_damping(settings, stiffness) * speed + settings.inertia * np.gradient(speed, time_s)
-    return stiffness * beyond + K3 * beyond**3 + inertial
-
-
-def _active(mechanisms) -> list[Active]:
-    given = []
-    if isinstance(mechanisms, Mapping):
-        for name, entry in mechanisms.items():
-            known = registry.get(name)
-            place = entry.get("place", known.places[0] if len(known.places) == 1 else None)
-            given.append(Active(name, place, entry.get("values", known.start)))
-    else:
-        given = list(mechanisms)
-    for a in given:
-        known = registry.get(a.name)
-        if a.place not in known.places:
-            raise ModelError(f"{a.name} acts at {' or '.join(known.places)}; got {a.place!r}")
-        wanted = {p.name for p in known.parameters}
-        if not known.default.keys() | a.values.keys() >= wanted >= a.values.keys():
-            raise ModelError(
-                f"{a.name} has the parameters {', '.join(sorted(wanted))}; got {', '.join(sorted(a.values)) or 'none'}"
-            )
-        if not np.isfinite(list(a.values.values())).all():
-            raise ModelError(f"{a.name} has a parameter that is not finite: {dict(a.values)}")
-        for p in known.parameters:
-            if p.low > 0 and not p.signed and a.values.get(p.name, p.default) < 0:
-                raise ModelError(
-                    f"{a.name} has {p.name} = {a.values[p.name]:g} {p.unit}, which must not be negative; "
-                    f"plausible is {p.low:g} to {p.high:g}"
-                )
-    return [replace(a, values=registry.get(a.name).default | dict(a.values)) for a in given]
 
 
 def _series(load: Load) -> NDArray | None:
@@ -265,7 +200,7 @@ def _check(time_s, theta_in, series, elements):
 
 
 def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tuple[NDArray, NDArray]:
-    """Rows of pieces and nodes. The ends' compliances are pieces of their own beyond a node without friction."""
+    """Constants of pieces and nodes; a compliant end is a piece of its own, next to a node without friction."""
     ratio_K, ratio_mu = (np.array([[1.0], [r]]) for r in (settings.stiffness_ratio_B, settings.friction_ratio_B))
     EA = transmission.axial_rigidity_N * ratio_K
     segment, cell, length = grid.segment_m, grid.cell_m, transmission.path.length_m
@@ -290,13 +225,10 @@ def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tu
 
 
 def _physics(transmission: Transmission, load: Load, settings: Settings, elements: int) -> rows.Physics:
-    is_mechanical = isinstance(load, MechanicalLoad)
-    K_e = load.stiffness_Nm_per_rad if isinstance(load, SpringLoad | MechanicalLoad) else 0.0
+    K_e = load.stiffness_Nm_per_rad if isinstance(load, SpringLoad) else 0.0
     K_e = load.beside_Nm_per_rad if isinstance(load, TorqueLoad) else K_e
     values = {name: getattr(settings, name) for name in registry.march_settings()}
     values = {n: tuple(map(float, v)) if isinstance(v, tuple) else float(v) for n, v in values.items()}
-    values["cubic_stiffness"] += load.cubic_Nm_per_rad3 if is_mechanical else 0.0
-    values["inertia"] += load.inertia_kg_m2 if is_mechanical else 0.0
     return rows.Physics(
         has_settling=settings.settling_N > 0,
         has_relaxation=settings.relaxing_share != 0,
@@ -306,17 +238,17 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
         presliding=settings.bristle_m > 0,
         radius=float(transmission.load_radius_m),
         stiffness_load=float(K_e),
-        load_damping=float(load_damping(settings, K_e) + (load.damping_Nms_per_rad if is_mechanical else 0.0)),
-        kind=rows.PRESCRIBED_ANGLE if isinstance(load, AngleLoad) else rows.IMPEDANCE,
+        load_damping=float(load_damping(settings, K_e)),
+        kind=rows.PRESCRIBED_ANGLE if isinstance(load, AngleLoad | FixedLoad) else rows.IMPEDANCE,
         general_friction=bool(settings.tension_exponent != 0 or settings.drag_N != 0 or settings.viscous != 0),
         **values,
     )
 
 
 def _steps(physics: rows.Physics, transmission: Transmission, time_s: NDArray) -> int:
-    """Steps from one sample to the next that follow a load with mass as it rings on the cables; a power of two.
+    """Steps from one sample to the next that resolve a load with mass as it rings on the cables; a power of two.
 
-    More of them where a fit takes a difference over the mass would be a jump, and powers of two have few.
+    The number must not change where a fit takes a difference over the mass, and powers of two are far apart.
     """
     if physics.inertia == 0 or physics.kind == rows.PRESCRIBED_ANGLE or time_s.size < 2:
         return 1
@@ -328,102 +260,5 @@ def _steps(physics: rows.Physics, transmission: Transmission, time_s: NDArray) -
 
 def _coulomb_bristle(transmission: Transmission, settings: Settings, elements: int) -> float:
     over_cable = settings.conduit_compliance * transmission.axial_rigidity_N / transmission.path.length_m
-    soft = rows.SOFT_CONDUIT_BRISTLE_M * ELEMENTS / elements
-    return max(rows.COULOMB_BRISTLE_M, min(1.0, 10 * over_cable) * soft)
-
-
-def _initial_state(physics, piece, node, settings, profiles, course) -> NDArray:
-    """State in which the cables hold the initial tension, with the bristles that this takes; that tension (N)."""
-    T = np.stack(profiles)
-    if settings.drive_end_compliance > 0:
-        T = np.concatenate([T[:, :1], T], axis=1)
-    if settings.load_end_compliance > 0:
-        T = np.concatenate([T, T[:, -1:]], axis=1)
-    stretch = T / piece[rows.STIFFNESS]
-    settles = piece[rows.LOST] > 0
-    if settles.any():
-        stretch[settles] = stretch_at(T[settles], piece[rows.LOST][settles], piece[rows.STIFFNESS][settles])
-    piece[rows.STRETCH], piece[rows.ELASTIC] = stretch, T
-    both = T[:, :-1] + T[:, 1:]
-    factor = course * (1 + physics.stribeck_rise)
-    if physics.tension_exponent != 0:
-        factor = factor * (np.hypot(both / 2, FLOOR_N) / REFERENCE_N) ** physics.tension_exponent
-    hold = np.tanh(node[rows.HALF_BEND] * factor) * both + node[rows.DRAG]
-    xi = np.divide(T[:, :-1] - T[:, 1:], hold, out=np.zeros_like(both), where=hold > 0)
-    node[rows.BRISTLE] = np.clip(xi, -1, 1)
-    return T
-
-
-def _load_angle(physics: rows.Physics, T: NDArray, load: Load, series: NDArray) -> float:
-    """Angle at which the load holds the initial tensions, rad; 0 for a load that knows no neutral position."""
-    if isinstance(load, AngleLoad):
-        return float(series[0])
-    K, K3 = physics.stiffness_load, physics.cubic_stiffness
-    if isinstance(load, TorqueLoad) or (K == 0 and K3 == 0):
-        return 0.0
-    theta = 0.0
-    for _ in range(50):
-        torque = physics.radius * winding(theta, *physics.load_eccentricity)[1] * (T[0, -1] - T[1, -1])
-        theta = _rest_angle(K, K3, physics.half_gap, torque, load)
-        if physics.load_eccentricity[0] == 0:
-            break
-    return float(theta)
-
-
-def _deflection(K: float, K3: float, torque: float) -> float:
-    """Angle (rad) at which K z + K3 z^3 is the torque; by Newton's method from the linear spring's."""
-    if K == 0:
-        return float(np.cbrt(torque / K3))
-    z = torque / K
-    for _ in range(50 if K3 else 0):
-        z -= (K * z + K3 * z**3 - torque) / (K + 3 * K3 * z * z)
-    return float(z)
-
-
-def _rest_angle(K: float, K3: float, half_gap: float, torque: float, load: SpringLoad | MechanicalLoad) -> float:
-    """Angle (rad) of a load at rest that the cables turn with a torque.
-
-    One that is held against its spring lies against a side of its gap. One that is all but free may stand anywhere:
-    where the torque is not known to be there, at the place that is given. The one goes over into the other around what
-    the torque is known to.
-    """
-    known_to, place = (load.rest_known_to_Nm, load.rest_gap_position) if isinstance(load, SpringLoad) else (0.0, 0.0)
-    held = float(np.clip(2 * abs(torque) / known_to - 1.5, 0.0, 1.0)) if known_to else float(torque != 0)
-    side = held * float(np.sign(torque)) + (1 - held) * place
-    return _deflection(K, K3, torque) + half_gap * side
-
-
-def true_at(active: Sequence[Active], seconds: float, read: Mapping[str, float], radii: tuple[float, float]) -> dict:
-    """What sensors would have read without their faults, so many seconds into a recording in which nothing moves.
-
-    Parameters
-    ----------
-    active : sequence of Active
-    seconds : float
-        Since the recording began.
-    read : mapping of str to float
-        What each channel of a run reads.
-    radii : (float, float)
-        Of the drive and the load pulley, m.
-
-    Returns
-    -------
-    dict of str to float
-        The same channels.
-    """
-    faults = [a for a in active if registry.get(a.name).modifies_observation is not None]
-    true = dict(read)
-    for _ in range(FAULTS_ROUNDS if faults else 0):
-        steady = {c: np.full(2, value) for c, value in true.items()}
-        faulty = _read(faults, np.array([0.0, seconds]), steady, radii)
-        true = {c: true[c] + read[c] - float(faulty[c][1]) for c in true}
-    return true
-
-
-def _read(active: Sequence[Active], time_s: NDArray, channels: dict[str, NDArray], radii: tuple[float, float]):
-    for a in active:
-        mechanism = registry.get(a.name)
-        if mechanism.modifies_observation is not None:
-            sensing = Sensing(time_s, channels, *radii)
-            channels = channels | mechanism.modifies_observation(sensing, a.place, a.values)
-    return channels
+    soft = SOFT_CONDUIT_BRISTLE_M * ELEMENTS / elements
+    return max(COULOMB_BRISTLE_M, min(1.0, 10 * over_cable) * soft)

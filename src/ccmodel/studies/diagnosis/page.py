@@ -70,12 +70,13 @@ def write_diagnosis(file: Path, found: Diagnosis) -> None:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    origin = found.judgement.whitened[0].observations.given.recording.origin
+    recording = found.judgement.whitened[0].observations.given.recording
     with plt.rc_context(STYLE):
         text = environment.get_template("page.html.j2").render(
             said=found.report,
             headline=headline(found.report),
-            origin=ORIGIN[origin],
+            origin=ORIGIN[recording.origin],
+            single_cable=recording.far_end is not None,
             symbol=SYMBOL,
             baseline=_baseline(found.report),
             has_found=found.judgement.best is not found.judgement.calibrated,

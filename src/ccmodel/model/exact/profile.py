@@ -1,0 +1,154 @@
+"""Tension profiles of the exact solver: from an initial profile into a state, and from a state out as plain arrays."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ccmodel.geometry import ConduitPath
+from ccmodel.model.exact.front import position
+from ccmodel.model.exact.path import LUMP, NODE, PASSED, PER_M, X_PER_M, X_START, PathTables
+from ccmodel.model.exact.run import MARGIN
+from ccmodel.model.exact.state import (
+    C_M,
+    C_SLOPE,
+    C_T,
+    E0,
+    FIRST,
+    HI,
+    LAST,
+    LINE,
+    LO,
+    MODE,
+    OFFSET,
+    PAIR,
+    SIGMA,
+    SLOPE,
+    STIFFNESS,
+    T_DRIVE,
+    T_LOAD,
+    TE,
+    WHOLE,
+    R,
+    State,
+    blank_state,
+)
+from ccmodel.model.initial import InitialTension
+
+# Elongation of a cable that is not there: it hangs slack whatever the drive does, m.
+ABSENT_M = -1e30
+
+
+@dataclass(frozen=True)
+class CableProfile:
+    """Tension along one cable at one sample, at every corner of ln T over arc length and at every piece's end.
+
+    Attributes
+    ----------
+    x_m : ndarray, shape (k,)
+        Arc length from the drive end.
+    bend_rad : ndarray, shape (k,)
+        Bend angle from the drive end up to there.
+    tension_N : ndarray, shape (k,)
+    """
+
+    x_m: NDArray
+    bend_rad: NDArray
+    tension_N: NDArray
+
+
+def initial_state(
+    tables: PathTables, path: ConduitPath, friction_coefficient: float, initial: InitialTension, present: NDArray
+) -> State:
+    """State at rest under an initial tension; a cable that is not `present` (shape (2,)) has no stiffness.
+
+    Raises
+    ------
+    ModelError
+        If friction cannot hold the initial tension.
+    """
+    m, slope_A, slope_B = initial.log_slopes(path, friction_coefficient)
+    state = blank_state(4 * MARGIN + 2 * m.size)
+    for c, (tension, slope) in enumerate(((initial.tension_A_N, slope_A), (initial.tension_B_N, slope_B))):
+        if present[c]:
+            _store(state, tables, c, m, tension, slope)
+        else:
+            state.value[c, E0] = ABSENT_M
+            state.kind[c, MODE] = WHOLE
+            state.kind[c, LINE] = -1
+    state.value[PAIR, OFFSET] = state.value[0, T_LOAD] - state.value[1, T_LOAD]
+    return state
+
+
+def _store(state: State, tables: PathTables, c: int, m: NDArray, tension: NDArray, slope: NDArray) -> None:
+    """Store an initial profile of cable `c` as corners."""
+    low = (state.corner.shape[2] - m.size) // 2
+    place = slice(low, low + m.size)
+    state.corner[C_M, c, place], state.corner[C_T, c, place] = m, tension
+    state.corner[C_M, c, low + m.size - 1] = tables.total
+    state.corner[C_SLOPE, c, low : low + m.size - 1] = slope
+    state.kind[c, [LO, FIRST]], state.kind[c, [HI, LAST]] = low, low + m.size - 1
+    state.value[c, T_DRIVE], state.value[c, T_LOAD] = tension[0], tension[-1]
+    state.value[c, E0] = _elongation(tables, m, tension, slope)
+    # On a line of slope +1 the compliance per drive-end tension is that of sigma = -1.
+    state.value[c, STIFFNESS : STIFFNESS + 2] = 1.0 / tables.table[0, [PASSED + 1, PASSED], -1]
+    if tables.total == 0.0 or tension[0] == 0.0:
+        state.kind[c, MODE] = WHOLE
+        state.kind[c, LINE] = -1
+
+
+def _elongation(tables: PathTables, m: NDArray, tension: NDArray, slope: NDArray) -> float:
+    """Elongation under a profile: the integral of T dx / EA, m."""
+    at = np.union1d(m, tables.table[0, NODE])
+    segment = np.clip(np.searchsorted(m, at[:-1], side="right") - 1, 0, max(m.size - 2, 0))
+    start = tension[segment] * np.exp(slope[segment] * (at[:-1] - m[segment]))
+    run = np.diff(at)
+    rise = slope[segment] * run
+    mean = np.divide(np.expm1(rise), rise, out=np.ones_like(rise), where=rise != 0)
+    total = 0.0
+    if run.size:
+        piece = np.clip(np.searchsorted(tables.table[0, NODE], at[:-1], side="right") - 1, 0, tables.table.shape[2] - 2)
+        total = float((tables.table[0, PER_M][piece] * start * mean * run).sum())
+    at_node = np.clip(np.searchsorted(m, tables.table[0, NODE], side="right") - 1, 0, m.size - 2)
+    values = tension[at_node] * np.exp(slope[at_node] * (tables.table[0, NODE] - m[at_node]))
+    return total + float((tables.table[0, LUMP] * values).sum())
+
+
+def cable_profile(
+    state: State, tables: PathTables, path: ConduitPath, friction_coefficient: float, c: int
+) -> CableProfile:
+    """Profile of cable `c` (0: A, 1: B) in a state."""
+    m, tension = _corners(state, tables, c)
+    x_piece = np.concatenate([[0.0], np.cumsum(path.piece_length_m)])
+    m_piece = friction_coefficient * np.concatenate([[0.0], np.cumsum(path.piece_bend_rad)])
+    table = tables.table[0]
+    within = m[(m > 0) & (m < tables.total)]
+    piece = np.clip(np.searchsorted(table[NODE], within, side="right") - 1, 0, None)
+    x = np.concatenate([x_piece, table[X_START, piece] + table[X_PER_M, piece] * (within - table[NODE, piece])])
+    m_all = np.concatenate([m_piece, within])
+    order = np.lexsort((m_all, x))
+    slack = not tension.min() > 0
+    values = np.zeros(x.size) if slack else np.exp(np.interp(m_all[order], m, np.log(tension)))
+    return CableProfile(x[order], path.bend_at(x[order]), values)
+
+
+def _corners(state: State, tables: PathTables, c: int) -> tuple[NDArray, NDArray]:
+    """Corners of cable `c`, the fronts' sliding lines included: m from the drive end, and tension (N)."""
+    ends = state.value[c, T_DRIVE], state.value[c, T_LOAD]
+    kind = state.kind[c]
+    if kind[MODE] == WHOLE:
+        return np.array([0.0, max(tables.total, 0.0)]), np.array(ends)
+    points = []
+    for end in range(2):
+        if state.kind[c, SIGMA + 3 * end]:
+            front = state.front[2 * c + end]
+            tension = front[TE] * np.exp(front[SLOPE] * np.log1p(front[R]))
+            points.append((abs(end * tables.total - position(state, c, end)), tension))
+    fronts = [p[0] for p in points]
+    low = fronts[0] if state.kind[c, SIGMA] else 0.0
+    high = fronts[-1] if state.kind[c, SIGMA + 3] else tables.total
+    for i in range(kind[LO], kind[HI] + 1):
+        if low < state.corner[C_M, c, i] < high:
+            points.append((state.corner[C_M, c, i], state.corner[C_T, c, i]))
+    points = [(0.0, ends[0]), *sorted(points), (tables.total, ends[1])]
+    return np.array([p[0] for p in points]), np.array([p[1] for p in points])

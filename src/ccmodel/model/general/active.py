@@ -1,0 +1,73 @@
+"""Mechanisms that are in a model, with values for their parameters."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ccmodel import mechanisms as registry
+from ccmodel.failure import ModelError
+from ccmodel.mechanisms.contract import Mechanism
+
+
+@dataclass(frozen=True)
+class Active:
+    """A mechanism that is in a model.
+
+    Attributes
+    ----------
+    name : str
+        One of `ccmodel.mechanisms.names()`.
+    place : str
+        One of the mechanism's places.
+    values : mapping of str to float
+        A value for each of its parameters.
+    """
+
+    name: str
+    place: str
+    values: Mapping[str, float]
+
+
+def active_of(mechanisms: Mapping[str, Mapping] | Sequence[Active]) -> list[Active]:
+    """Mechanisms as given to `ccmodel.model.general.simulate`, checked, with a value for every parameter.
+
+    Raises
+    ------
+    ModelError
+        If a place, a parameter's name or a value is not one that the mechanism can have.
+    ccmodel.mechanisms.UnknownMechanismError
+        If a mechanism's name is not known.
+    """
+    if isinstance(mechanisms, Mapping):
+        mechanisms = [_from_entry(name, entry) for name, entry in mechanisms.items()]
+    found = []
+    for a in mechanisms:
+        known = registry.get(a.name)
+        _check(a, known)
+        found.append(replace(a, values=known.default | dict(a.values)))
+    return found
+
+
+def _from_entry(name: str, entry: Mapping) -> Active:
+    known = registry.get(name)
+    place = entry.get("place", known.places[0] if len(known.places) == 1 else None)
+    return Active(name, place, entry.get("values", known.start))
+
+
+def _check(a: Active, known: Mechanism) -> None:
+    if a.place not in known.places:
+        raise ModelError(f"{a.name} acts at {' or '.join(known.places)}; got {a.place!r}")
+    names = {p.name for p in known.parameters}
+    if not known.default.keys() | a.values.keys() >= names >= a.values.keys():
+        raise ModelError(
+            f"{a.name} has the parameters {', '.join(sorted(names))}; got {', '.join(sorted(a.values)) or 'none'}"
+        )
+    if not np.isfinite(list(a.values.values())).all():
+        raise ModelError(f"{a.name} has a parameter that is not finite: {dict(a.values)}")
+    for p in known.parameters:
+        if p.low > 0 and not p.signed and a.values.get(p.name, p.default) < 0:
+            raise ModelError(
+                f"{a.name} has {p.name} = {a.values[p.name]:g} {p.unit}, which must not be negative; "
+                f"plausible is {p.low:g} to {p.high:g}"
+            )

@@ -1,0 +1,67 @@
+"""Rows of the arrays that a run and its steps share, and the numbers of a run.
+
+Everything is packed into a few arrays of rows, since each array that one compiled function hands to another costs time
+at every call.
+"""
+
+from collections import namedtuple
+
+from ccmodel import mechanisms as registry
+
+IMPEDANCE, PRESCRIBED_ANGLE = 0, 1
+
+# A slack piece keeps this share of its stiffness, so that its nodes have a position; its tension counts as zero.
+SLACK_SHARE = 1e-9
+
+# piece, shape (rows, 2, n + 1): the cable between nodes. Constants (N/m, m, -, -), state, results of the step.
+STIFFNESS, LOST, RELAXING, SHARE, STRETCH, LOST_TENSION, ELASTIC, TENSION, TANGENT, PULL = range(10)
+# node, shape (rows, 2, n): constants (rad, N, N s/m), state, the step's equations and their elimination.
+(
+    HALF_BEND,
+    DRAG,
+    VISCOUS,
+    BRISTLE,
+    RESTED,
+    RESTED_NEXT,
+    GRIP,
+    BRISTLE_NEXT,
+    NEAR,
+    FAR,
+    GIVES,
+    EXCESS,
+    ALPHA,
+    BETA,
+    ETA,
+    GAMMA,
+    GRIP_NOW,
+    GRIP_SLOPE,
+) = range(18)
+# slide, shape (rows, 2, n + 2): drive end, nodes, load end, m. Of this step, of Newton's step, and of those before.
+NOW, STEP, SAVED, LAST, BEFORE = range(5)
+# mean, shape (rows, 2): mean tension of a cable, which a compliant conduit responds to, N.
+(
+    MEAN,
+    MEAN_NEXT,
+    MEAN_LAST,
+    MEAN_BEFORE,
+    MEAN_STEP,
+    MEAN_EXCESS,
+    MEAN_SAVED,
+    FIXED,
+    BY_END,
+    END_FIXED,
+    END_BY_END,
+) = range(11)
+# load, shape (rows,): angle (rad), rotation (rad) and duration (s) of the last step, speed (rad/s), speed before that,
+# bristle of the bearing; then speed, bristle and torque (N m) of this step.
+ANGLE, ROTATION, DT, OMEGA, OMEGA_BEFORE, BEARING, OMEGA_NEXT, BEARING_NEXT, TORQUE = range(9)
+PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10, 18, 5, 11, 9
+
+# Constants of a run: its own, and every setting of the mechanisms.
+Physics = namedtuple(
+    "Physics",
+    "has_settling has_relaxation bristle presliding radius stiffness_load load_damping kind general_friction "
+    + " ".join(registry.march_settings()),
+)
+
+FAST = {"reassoc", "contract", "nsz", "arcp"}  # not nnan: a NaN must be seen

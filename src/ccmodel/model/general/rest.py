@@ -1,0 +1,80 @@
+"""The chain at rest before the drive moves: stretch and friction under the initial tension, and the load's angle."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ccmodel.mechanisms.load_dependent_friction import FLOOR_N, REFERENCE_N
+from ccmodel.mechanisms.pulley_eccentricity import winding
+from ccmodel.mechanisms.strand_settling import stretch_at
+from ccmodel.model.general import layout as rows
+from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad
+
+# Slack of a cable B that is not there: longer than any travel of the drive or the load, m.
+ABSENT_SLACK_M = 1e3
+
+
+def initial_state(physics, piece, node, settings, profiles, friction_factor) -> NDArray:
+    """Write the state under the initial tension into `piece` and `node`; returns the tension of each piece (N)."""
+    T = np.stack(profiles)
+    if settings.drive_end_compliance > 0:
+        T = np.concatenate([T[:, :1], T], axis=1)
+    if settings.load_end_compliance > 0:
+        T = np.concatenate([T, T[:, -1:]], axis=1)
+    stretch = T / piece[rows.STIFFNESS]
+    settles = piece[rows.LOST] > 0
+    if settles.any():
+        stretch[settles] = stretch_at(T[settles], piece[rows.LOST][settles], piece[rows.STIFFNESS][settles])
+    piece[rows.STRETCH], piece[rows.ELASTIC] = stretch, T
+    both = T[:, :-1] + T[:, 1:]
+    factor = friction_factor * (1 + physics.stribeck_rise)
+    if physics.tension_exponent != 0:
+        factor = factor * (np.hypot(both / 2, FLOOR_N) / REFERENCE_N) ** physics.tension_exponent
+    hold = np.tanh(node[rows.HALF_BEND] * factor) * both + node[rows.DRAG]
+    xi = np.divide(T[:, :-1] - T[:, 1:], hold, out=np.zeros_like(both), where=hold > 0)
+    node[rows.BRISTLE] = np.clip(xi, -1, 1)
+    return T
+
+
+def remove_cable_B(piece: NDArray) -> None:
+    """Make cable B so slack, in place, that it never pulls; the force in all its pieces is the same."""
+    compliance = 1 / piece[rows.STIFFNESS, 1]
+    piece[rows.STRETCH, 1] = -ABSENT_SLACK_M * compliance / compliance.sum()
+
+
+def load_angle(physics: rows.Physics, T: NDArray, load: Load, series: NDArray) -> float:
+    """Angle at which the load holds the initial tensions, rad; 0 for a load without a neutral position."""
+    if isinstance(load, AngleLoad):
+        return float(series[0])
+    K, K3 = physics.stiffness_load, physics.cubic_stiffness
+    if isinstance(load, TorqueLoad | FixedLoad) or (K == 0 and K3 == 0):
+        return 0.0
+    theta = 0.0
+    for _ in range(50):
+        torque = physics.radius * winding(theta, *physics.load_eccentricity)[1] * (T[0, -1] - T[1, -1])
+        theta = _angle_at_rest(K, K3, physics.half_gap, torque, load)
+        if physics.load_eccentricity[0] == 0:
+            break
+    return float(theta)
+
+
+def _deflection(K: float, K3: float, torque: float) -> float:
+    """Solve K z + K3 z^3 = torque for the angle z (rad), by Newton's method from the linear spring's angle."""
+    if K == 0:
+        return float(np.cbrt(torque / K3))
+    z = torque / K
+    for _ in range(50 if K3 else 0):
+        z -= (K * z + K3 * z**3 - torque) / (K + 3 * K3 * z * z)
+    return float(z)
+
+
+def _angle_at_rest(K: float, K3: float, half_gap: float, torque: float, load: SpringLoad) -> float:
+    """Angle (rad) of a load at rest under a torque of the cables.
+
+    A load that is held against its spring touches one side of its gap. A load that is all but free may stand anywhere
+    in it: where the torque is below what is known of it, at `rest_gap_position`. Between 0.75 and 1.25 times
+    `rest_known_to_Nm` the one case passes into the other.
+    """
+    known_to, position = load.rest_known_to_Nm, load.rest_gap_position
+    held = float(np.clip(2 * abs(torque) / known_to - 1.5, 0.0, 1.0)) if known_to else float(torque != 0)
+    side = held * float(np.sign(torque)) + (1 - held) * position
+    return _deflection(K, K3, torque) + half_gap * side

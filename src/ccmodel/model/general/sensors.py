@@ -1,0 +1,52 @@
+"""Sensors with faults: from true values to readings, and back at rest."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ccmodel import mechanisms as registry
+from ccmodel.mechanisms.contract import Sensing
+from ccmodel.model.general.active import Active
+
+# Each iteration reduces the error to the share that the fault is of the reading.
+FAULT_ITERATIONS = 8
+
+
+def true_at(active: Sequence[Active], seconds: float, read: Mapping[str, float], radii: tuple[float, float]) -> dict:
+    """What the sensors would have read without their faults, `seconds` into a recording in which nothing moves.
+
+    Parameters
+    ----------
+    active : sequence of Active
+    seconds : float
+        Since the start of the recording.
+    read : mapping of str to float
+        Reading of each channel of a run.
+    radii : (float, float)
+        Radii of the drive and the load pulley, m.
+
+    Returns
+    -------
+    dict of str to float
+        The same channels, by fixed-point iteration.
+    """
+    faults = [a for a in active if registry.get(a.name).modifies_observation is not None]
+    true = dict(read)
+    for _ in range(FAULT_ITERATIONS if faults else 0):
+        steady = {c: np.full(2, value) for c, value in true.items()}
+        faulty = read_by_sensors(faults, np.array([0.0, seconds]), steady, radii)
+        true = {c: true[c] + read[c] - float(faulty[c][1]) for c in true}
+    return true
+
+
+def read_by_sensors(
+    active: Sequence[Active], time_s: NDArray, channels: dict[str, NDArray], radii: tuple[float, float]
+) -> dict[str, NDArray]:
+    """Readings of the sensors (n samples a channel) from true values, with the faults that act on them."""
+    for a in active:
+        mechanism = registry.get(a.name)
+        if mechanism.modifies_observation is not None:
+            sensing = Sensing(time_s, channels, *radii)
+            channels = channels | mechanism.modifies_observation(sensing, a.place, a.values)
+    return channels

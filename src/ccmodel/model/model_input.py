@@ -1,0 +1,134 @@
+"""The model's input from a recording: motions behind the encoders' counts, measured load, readings at rest."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from ccmodel.channels import F_LOAD, TAU_OUT, THETA_IN, THETA_OUT
+from ccmodel.encoder.reconstruction import reconstruct_motion
+from ccmodel.encoder.smoothing import OFFSET_SCORES
+from ccmodel.recording import Recording, stride
+
+# A measured load torque is the torque and its sensor's noise. The noise would move the load back and forth; a hand, a
+# spring or a brake does nothing above this frequency at the rates that rigs run at (0.1 to 1 Hz).
+LOAD_CUTOFF_HZ = 10.0
+
+# Before the first count, a drive has moved by up to a count, and the torque with it.
+STILL_RAD = 1e-5
+
+PRESCRIBED = "prescribed"  # `derived_from` of a channel that the model takes as input
+
+
+@dataclass(frozen=True)
+class ModelInput:
+    """The model's input from a recording, computed once however often the model runs.
+
+    Attributes
+    ----------
+    recording : Recording
+    theta_in : ndarray, shape (n,)
+        The drive's motion behind its encoder's counts, rad; 0 at the rest at the start where there is one.
+    drive_deviations : ndarray, shape (draws, n)
+        Likely deviations of that motion from the true one, rad; no draws where the drive's angle was not counted.
+    drive_encoder_offset : ndarray, shape (n,)
+        Effect on that motion of one standard deviation of the encoder's sub-count offset at the first rest, rad.
+    theta_out : ndarray, shape (n,), or None
+        The load's motion behind its encoder's counts, rad; None where it was not recorded.
+    tau_out, F_load : ndarray, shape (n,), or None
+        Torque (N m) and sum of tensions (N) measured at the load pulley without the sensors' noise; None where they
+        were not recorded.
+    resting : mapping of str to ndarray
+        Readings of each channel while the drive did not move, and time_s, each of shape (resting samples,); empty
+        without a rest.
+    """
+
+    recording: Recording
+    theta_in: NDArray
+    drive_deviations: NDArray
+    drive_encoder_offset: NDArray
+    theta_out: NDArray | None
+    tau_out: NDArray | None
+    F_load: NDArray | None
+    resting: Mapping[str, NDArray]
+
+    @classmethod
+    def of(cls, recording: Recording, step_s: float | None = None) -> "ModelInput":
+        """Input from a recording; reduced to a sample every `step_s` after all samples have been used."""
+        theta_in, deviations, offset = _motion(recording, THETA_IN)
+        theta_out = _motion(recording, THETA_OUT)[0] if THETA_OUT in recording else None
+        tau_out, F_load = (_filtered(recording, channel) for channel in (TAU_OUT, F_LOAD))
+        rest = _rest(recording, theta_in)
+        every = stride(recording, step_s)
+        series = (theta_in, deviations, offset, theta_out, tau_out, F_load)
+        thinned = (None if values is None else values[..., ::every] for values in series)
+        resting = {c: values[rest] for c, values in (recording.channels | {"time_s": recording.time_s}).items()}
+        return cls(recording[::every], *thinned, resting)
+
+    @classmethod
+    def prescribed(cls, like: Recording, time_s: NDArray, theta_in: NDArray, pretension_N: float) -> "ModelInput":
+        """Input of a motion that was not recorded, known exactly, of a recording's rig with even initial tension.
+
+        Parameters
+        ----------
+        like : Recording
+            Gives the conduits' path and the far end.
+        time_s, theta_in : ndarray, shape (n,)
+            s; rad.
+        pretension_N : float
+        """
+        recording = replace(
+            like,
+            time_s=time_s,
+            channels={THETA_IN: theta_in},
+            derived_from={THETA_IN: PRESCRIBED},
+            pretension_N=pretension_N,
+            encoder_step_rad={},
+            excitation={},
+            rest_s=0.0,
+            settled_s=0.0,
+        )
+        return cls(recording, theta_in, np.zeros((0, theta_in.size)), np.zeros(theta_in.size), None, None, None, {})
+
+    @cached_property
+    def resting_mean(self) -> dict[str, float]:
+        """Mean reading of each channel, and mean time, while the drive did not move; empty without a rest."""
+        return {c: float(values.mean()) for c, values in self.resting.items() if values.size}
+
+    @property
+    def initial_tension_observed(self) -> bool:
+        """Whether a rest shows the tension at all ends of the cables."""
+        return all(tension in self.resting_mean for tension in self.recording.tensions)
+
+    @property
+    def deviations_given_offset(self) -> NDArray:
+        """`drive_deviations` for a known sub-count offset at the first rest."""
+        return self.drive_deviations - OFFSET_SCORES[: len(self.drive_deviations), None] * self.drive_encoder_offset
+
+
+def _motion(recording: Recording, channel: str) -> tuple[NDArray, NDArray, NDArray]:
+    """Motion behind an encoder's counts, likely deviations from it, and the effect of the sub-count offset, rad."""
+    if channel not in recording.encoder_step_rad:
+        return recording[channel], np.zeros((0, recording.time_s.size)), np.zeros(recording.time_s.size)
+    step_rad = recording.encoder_step_rad[channel]
+    found = reconstruct_motion(recording.time_s, recording[channel], step_rad, recording.rest_s)
+    return found.theta_rad, found.deviations_rad, found.encoder_offset_rad
+
+
+def _rest(recording: Recording, theta_in: NDArray) -> slice:
+    """Samples at the start at which the drive does not move; its count rests for longer."""
+    moved = (recording.time_s >= recording.rest_s) | (np.abs(theta_in - theta_in[0]) > STILL_RAD)
+    return slice(0, int(np.argmax(moved)) if moved.any() else recording.time_s.size)
+
+
+def _filtered(recording: Recording, channel: str) -> NDArray | None:
+    """A channel without what lies above `LOAD_CUTOFF_HZ`, without delay; None where it was not recorded."""
+    if channel not in recording:
+        return None
+    rate = 1 / np.median(np.diff(recording.time_s))
+    if rate <= 2.5 * LOAD_CUTOFF_HZ:
+        return recording[channel]
+    return sosfiltfilt(butter(2, LOAD_CUTOFF_HZ, fs=rate, output="sos"), recording[channel])
