@@ -3,6 +3,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 CORES ?= 2
+# The former name of REGRESSORS.
+REGRESSORS ?= $(RIVALS)
 
 .PHONY: help results real data test bench table-one coverage proof proof-full proof-real lint lock clean
 
@@ -51,15 +53,15 @@ table-one: $(VENV)/.ready  ## ask which left-out effect errs as the paper's Tabl
 	$(BIN)/ccmodel table-one config/table-one.yaml --out results/table-one --figure docs/figures/table-one.png \
 	  --cores $(CORES)
 
-proof: $(VENV)/.ready  ## diagnose a handful of concealed cases and score them: results/proof/quick.md
+proof: $(VENV)/.ready  ## diagnose four cases with concealed effects and score them: results/proof/quick.md
 	$(BIN)/python -m proof quick --out results/proof/quick --cores $(CORES)
 	$(BIN)/python -m proof score results/proof/quick --out results/proof/quick.json --page results/proof/quick.md \
-	  --figures results/proof/figures --command "make proof" --of "A handful whose seeds never change." --strict
+	  --figures results/proof/figures --command "make proof" --selection "Four cases with fixed seeds." --strict
 
-proof-full: $(VENV)/.ready  ## the full proof, or N cases of it drawn at random: docs/proof.md; goes on where it was stopped
-	$(BIN)/snakemake --snakefile proof/Snakefile --cores $(CORES) --keep-going $(if $(N)$(RIVALS),--config $(if $(N),cases=$(N)) $(if $(RIVALS),rivals=true))
+proof-full: $(VENV)/.ready  ## the full validation, or N of its cases drawn at random: docs/proof.md; resumes an interrupted run
+	$(BIN)/snakemake --snakefile proof/Snakefile --cores $(CORES) --keep-going $(if $(N)$(REGRESSORS),--config $(if $(N),cases=$(N)) $(if $(REGRESSORS),regressors=true))
 
-proof-real: $(VENV)/.ready  ## put something into the public da Vinci recordings and diagnose them: make proof-real DATA=path
+proof-real: $(VENV)/.ready  ## seed faults in the public da Vinci recordings and diagnose them: make proof-real DATA=path
 	@test -n "$(DATA)" || { echo "make proof-real needs DATA=path of the mis-tool-characterization data" >&2; exit 2; }
 	@$(BIN)/ccmodel import-mis-tool "$(DATA)" --out results/real/raw
 	$(BIN)/python -m proof real results/real/raw --out results/proof/real --page docs/real-concealment.md

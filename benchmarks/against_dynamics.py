@@ -42,25 +42,35 @@ RADIUS_M, SPRING_NM_PER_RAD, STIFFNESS_N_PER_M, LENGTH_M, MU = 0.006, 0.05, 7750
 PAGE_PATH = Path(__file__).parents[1] / "docs" / "verification.md"
 PAGE = """# The general solver against explicit dynamics
 
-Written by `python benchmarks/against_dynamics.py` on {today}; do not edit.
+Written by `python benchmarks/against_dynamics.py` on {today}. The script overwrites this page.
 
-Each effect alone, in one form and with the same parameters in both: the virtual rig (masses, springs and bristles in
-small explicit steps) and the general solver (implicit, without inertia, 32 elements, a sample a millisecond). A half
-loop of 1.2 m, 7.3 N of pretension and a sine of 0.7 rad at 1 Hz unless it says otherwise.
+Each mechanism acts alone, with the same equation and parameters in two solvers that share no code:
 
-T1 to T4 are rms differences in percent of the tension's peak to peak, the limit being {limit} %. In the same unit, as
-the largest of the four tensions: "the effect itself", which is what it changes in the solver, and "the rig's last
-refinement", which is what halving its cells, bristles and masses still changed.
+- the virtual rig: masses, springs and bristles in small explicit time steps, refined by halving its cells, bristles and
+  masses together;
+- the general solver: implicit, without inertia, 32 elements, one sample per millisecond.
+
+The transmission is a half loop of 1.2 m with 7.3 N of pretension. The drive is a sine of 0.7 rad at 1 Hz. A row states
+where it differs. Effects of sensors are not part of the dynamics and are not in the table.
+
+| column | meaning |
+|---|---|
+| T1 to T4 | rms difference of each tension, % of its peak to peak; the limit is {limit} % |
+| effect | rms change that the mechanism makes in the general solver, same unit, largest of the four tensions |
+| last refinement | rms change by the last refinement of the rig, same unit, largest of the four tensions |
+| cells | cells of the refined rig |
+| result | `agree` within the limit; `the rig chatters` if its last refinement exceeds a third of the limit |
 
 {table}
 
 ## Friction that falls with speed
 
-In both, a contact takes on what its speed makes of it over 20 um of sliding. If friction fell with speed at once, a
-light cable had no unique motion: sliding slower than the fall is unstable within microseconds, and what comes of it is
-set by the grid. The rows with a renewal length of a bristle show the rig doing so. It also chatters with the longer one
-where friction falls by much over a wide range of speeds. There the solver, which has no inertia, gives a course without
-chatter, and the difference holds the chatter itself.
+In both solvers the friction of a contact follows its speed over 20 µm of sliding (the renewal length). If friction
+followed the speed at once, a light cable would have no unique motion: sliding at a speed at which friction falls is
+unstable within microseconds, and the grid determines the result. The rows with a renewal length of 0.025 µm, the length
+of a bristle, show this on the rig. With 20 µm the rig still chatters if friction falls strongly over a wide range of
+speeds. The general solver has no inertia and gives a solution without chatter; the difference in these rows contains
+the rig's chatter.
 """
 
 
@@ -371,7 +381,7 @@ def compare(case: Case) -> Row:
     return Row(case, difference_percent(solved, finer), float(effect), float(change), level)
 
 
-HEAD = """| effect | parameters | T1 | T2 | T3 | T4 | the effect itself | the rig's last refinement | its cells | |
+HEAD = """| mechanism | parameters | T1 | T2 | T3 | T4 | effect | last refinement | cells | result |
 |---|---|---|---|---|---|---|---|---|---|"""
 
 

@@ -39,7 +39,7 @@ def one_batch(seed: int) -> dict[str, list[float]] | str:
     for e, own in zip(problem.observations, drawn.own, strict=True):
         for name, true in own.items():
             interval = said.own_intervals[e.name][name]
-            found[f"own {name}"].append(((interval.low + interval.high) / 2 - true) / interval.sd)
+            found[f"recording's own {name}"].append(((interval.low + interval.high) / 2 - true) / interval.sd)
     return dict(found)
 
 
@@ -67,19 +67,21 @@ def report(found, refused: list[str], batches: int, took_s: float, command: str)
 Made by `{command}` on {date.today().isoformat()}: 
 {batches} batches in {took_s / 60:.0f} minutes.
 
-Each batch is {len(CONDITIONS)} recordings of {round(DURATION_S * 200)} samples at 200 Hz, made with the exact solver:
-a half loop and a whole one at 7 and 4 N, with stiffness, friction and load spring drawn for the batch. Each recording
-has its own friction (1 %), pretension (1 %), tension profile in each cable (5 to 40 % of what friction holds), sensor
-zeros (anywhere within the paper's accuracy) and noise (0.1 mN m, 0.05 N), and both angles are counted (0.18 deg). The
-fit starts a fifth off and finds three values for the batch and eight for each recording. Seeds from {FIRST_SEED} on
-unless said otherwise above; nothing about the intervals was chosen by them.
+Each batch has {len(CONDITIONS)} recordings of {round(DURATION_S * 200)} samples at 200 Hz, simulated with the exact
+solver: a half loop and a whole loop, at 7 and 4 N. Stiffness, friction and load spring are drawn per batch. Drawn per
+recording are
 
-A 90 % interval should hold the truth in 90 % of the batches: by chance a count lies outside the limits once in
-{1 / UNLIKELY:.0f}.
-"mean" and "sd" are of the error over its stated standard deviation, which should be 0 and 1. Values of a recording's
-own are not independent within a batch, so that the limits are somewhat too narrow for them.
+- friction (1 %), pretension (1 %) and the tension profile of each cable (5 to 40 % of what friction can hold);
+- sensor zeros (uniform within the paper's accuracy) and noise (0.1 mN m, 0.05 N).
 
-| parameter | intervals | held | share | limits | mean | sd | interval is |
+Both angles are counted (0.18 deg). The fit starts 20 % off, and estimates three parameters per batch and eight per
+recording. Seeds start at {FIRST_SEED} unless stated above; no choice about the intervals was made with them.
+
+A 90 % interval should contain the true value in 90 % of the batches. By chance a number of hits is outside the limits
+once in {1 / UNLIKELY:.0f}. "mean" and "sd" are those of the error over its stated standard deviation, and should be 0
+and 1. Parameters of one batch's recordings are not independent, so the limits for them are somewhat too narrow.
+
+| parameter | intervals | hits | share | limits | mean | sd | interval is |
 |---|---|---|---|---|---|---|---|
 {rows}
 

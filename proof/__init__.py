@@ -1,1 +1,1 @@
-"""Proof on concealed effects: a builder of cases that a diagnosis cannot know, and a scorer that believes nothing."""
+"""Validation on concealed effects: builds the cases, has each diagnosed in isolation, and scores the results."""

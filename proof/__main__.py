@@ -1,4 +1,4 @@
-"""The proof's command line: ``python -m proof``."""
+"""The validation's command line: ``python -m proof``."""
 
 from proof.cli import main
 

@@ -1,7 +1,7 @@
-"""Results of a proof in one small file, so that a page can be scored again, and a proof go on, wherever it is cloned.
+"""All results of a run in one compressed file, so that a page can be scored again and a run resumed in another clone.
 
-Reports and models stay where they were made; a result names all that its score rests on, and the seed makes the rest
-again.
+The archive holds ``result.json`` of every case, which is everything that the score needs. Reports and model files are
+not archived; they follow from the seed.
 """
 
 import gzip
@@ -10,9 +10,14 @@ from pathlib import Path
 
 
 def pack(cases: Path, file: Path) -> int:
-    """Write the ``result.json`` of every folder in `cases` to a file, a line each; returns how many.
+    """Write ``result.json`` of every folder in `cases` to a gzipped file, one JSON object a line.
 
-    The same results give the same bytes.
+    Equal results give equal bytes.
+
+    Returns
+    -------
+    int
+        The number of results written.
     """
     lines = []
     for result in sorted(cases.glob("*/result.json")):
@@ -24,25 +29,30 @@ def pack(cases: Path, file: Path) -> int:
 
 
 def unpack(file: Path, cases: Path, made_by: dict[str, str]) -> int:
-    """Bring back what `pack` wrote, as far as it is of these sources and this builder and is not there; how many.
+    """Restore archived results with the given digests; results that exist already are kept.
 
     Parameters
     ----------
     file : Path
-        One that is not there holds nothing.
+        The archive. A missing file counts as an empty one.
     cases : Path
-        Folder that gets a folder a case.
+        Folder that gets one folder a case.
     made_by : dict
-        Digests under the names that they have in a result.
+        Digests of the diagnosis and of the builder, as `proof.conceal.made_by` gives them.
+
+    Returns
+    -------
+    int
+        The number of results restored.
     """
     if not file.exists():
         return 0
-    brought = 0
+    restored = 0
     for line in gzip.decompress(file.read_bytes()).decode().splitlines():
         result = json.loads(line)
-        to = cases / result.pop("number") / "result.json"
-        if made_by.items() <= result.items() and not to.exists():
-            to.parent.mkdir(parents=True, exist_ok=True)
-            to.write_text(json.dumps(result, indent=1), encoding="utf-8")
-            brought += 1
-    return brought
+        target = cases / result.pop("number") / "result.json"
+        if made_by.items() <= result.items() and not target.exists():
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(json.dumps(result, indent=1), encoding="utf-8")
+            restored += 1
+    return restored

@@ -1,4 +1,4 @@
-"""Cases on disk: the batch that a diagnosis is given, and what only the scorer sees."""
+"""Cases on disk: the batch that is diagnosed, and the held-out recordings that only the scorer reads."""
 
 import hashlib
 import json
@@ -18,31 +18,32 @@ from virtualrig.sensors import log, sensed_sides
 from virtualrig.trajectory import Preparation, SimulationError, Trajectory
 
 NOTE = "recordings of a simulated rig; its physics is not disclosed"
-RAISE = 1.5
+# The tension limit is multiplied by this factor each time a run exceeds it.
+LIMIT_FACTOR = 1.5
 HIGHEST_LIMIT_N = 2000.0
-# By which friction differs from run to run: what a model with the right physics cannot know of a recording.
-FLOOR_FRICTION = 1.01
-# Within which a drive that stood elsewhere in its count comes to where the counts say.
-DISPLACED_IN_S = 0.3
+# Run-to-run change of friction in the noise floor: a model with the true physics does not know a run's own friction.
+REPEAT_FRICTION_FACTOR = 1.01
+# Time over which the drive's sub-count offset is added to the motion, s.
+OFFSET_RISE_S = 0.3
 
 
 def build(case: Case, out: Path) -> dict:
-    """Write a case's batch to `out`/cases and what is kept back to `out`/kept-back.
+    """Write a case's batch to `out`/cases and its held-out recordings to `out`/kept-back.
 
     Returns
     -------
     dict
-        The manifest's entry: digests of the key, the batch and what is kept back. No answer.
+        The manifest's entry: digests of the answer, of the batch and of the held-out recordings. It holds no answer.
     """
-    batch, kept = out / "cases" / case.name, out / "kept-back" / case.name
+    batch, held_out = out / "cases" / case.name, out / "kept-back" / case.name
     record(case, case.recordings, batch)
-    floors = floors_of(case, record(case, case.kept_back, kept))
-    (kept / "floor.json").write_text(json.dumps(floors, indent=1), encoding="utf-8")
-    return {"key": case.digest, "batch": folder_digest(batch), "kept-back": folder_digest(kept)}
+    floors = noise_floors(case, record(case, case.kept_back, held_out))
+    (held_out / "floor.json").write_text(json.dumps(floors, indent=1), encoding="utf-8")
+    return {"key": case.digest, "batch": folder_digest(batch), "kept-back": folder_digest(held_out)}
 
 
 def folder_digest(folder: Path) -> str:
-    """Digest of a folder's files, names included."""
+    """SHA-256 of the names and contents of a folder's files."""
     digest = hashlib.sha256()
     for file in sorted(folder.iterdir()):
         digest.update(file.name.encode() + b"\0" + hashlib.sha256(file.read_bytes()).digest())
@@ -50,20 +51,28 @@ def folder_digest(folder: Path) -> str:
 
 
 def simulate(campaign: Campaign, plan: RecordingPlan, preparation: Preparation) -> Trajectory:
-    """Run a recording with the lowest tension limit, and so the longest time step, that holds it."""
+    """Simulate a recording, raising the tension limit until the run stays below it.
+
+    The lowest sufficient limit gives the longest stable time step.
+
+    Raises
+    ------
+    SimulationError
+        If the run exceeds `HIGHEST_LIMIT_N`.
+    """
     limit = campaign.numerics.tension_limit_N
     while True:
         numerics = campaign.numerics.model_copy(update={"tension_limit_N": limit})
         try:
             return run(campaign.model_copy(update={"numerics": numerics}), plan, preparation)
         except SimulationError:
-            limit *= RAISE
+            limit *= LIMIT_FACTOR
             if limit > HIGHEST_LIMIT_N:
                 raise
 
 
-def shown(campaign: Campaign, trajectory: Trajectory) -> dict[str, NDArray]:
-    """Channels as faulty sensors without noise would show them."""
+def noise_free_channels(campaign: Campaign, trajectory: Trajectory) -> dict[str, NDArray]:
+    """Sensor readings without noise, sensor faults included; each of shape (samples,)."""
     drive, load = sensed_sides(trajectory, campaign.rig)
     return {
         "theta_out_rad": load.angle_rad,
@@ -75,11 +84,14 @@ def shown(campaign: Campaign, trajectory: Trajectory) -> dict[str, NDArray]:
 
 
 @dataclass(frozen=True)
-class Displaced:
-    """A motion that begins by as much more as the drive's first count leaves open."""
+class OffsetMotion:
+    """A motion with a constant offset (rad), added smoothly over `OFFSET_RISE_S` after the rest.
+
+    It stands for the drive angle within its first encoder count, which no log shows.
+    """
 
     motion: Excitation
-    by_rad: float
+    offset_rad: float
 
     @property
     def duration_s(self) -> float:
@@ -87,63 +99,78 @@ class Displaced:
         return self.motion.duration_s
 
     def angle_and_rate(self, time_s: NDArray) -> tuple[NDArray, NDArray]:
-        """Drive angle (rad) and its rate (rad/s) at `time_s` (s)."""
+        """Drive angle (rad) and its rate (rad/s) at `time_s` (s); same shape as `time_s`."""
         angle, rate = self.motion.angle_and_rate(time_s)
-        way, slope = smooth_step((time_s - self.motion.rest_s) / DISPLACED_IN_S)
-        return angle + self.by_rad * way, rate + self.by_rad * slope / DISPLACED_IN_S
+        step, slope = smooth_step((time_s - self.motion.rest_s) / OFFSET_RISE_S)
+        return angle + self.offset_rad * step, rate + self.offset_rad * slope / OFFSET_RISE_S
 
 
-def floor_of(
+def noise_floor(
     campaign: Campaign, plan: RecordingPlan, preparation: Preparation, trajectory: Trajectory
 ) -> dict[str, float]:
-    """Root mean square error that the true physics would leave in each channel of a recording that went like this.
+    """Root mean square error of a model with the true physics, by channel: repeatability plus sensors.
 
-    It does not know this run's friction to better than one per cent, where in its count the drive stood at rest, the
-    sensors' noise and the zeros of the torques. Where in its count the load stood counts twice, as its zero is taken
-    from the same rest. The pretension is what two load cells show at rest: each is then off by half of what their
-    zeros differ by.
+    The recording is simulated again with friction 1 % higher and the drive offset by one standard deviation of its
+    sub-count position. The difference is added in quadrature to the sensors' noise and to the uncertainty of their
+    zeros. The load's sub-count position counts twice, because its zero is read at the same rest. Both load cells give
+    the pretension at rest, so that each is off by half the difference of their zeros.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    plan : RecordingPlan
+    preparation : Preparation
+        Friction, pretension and tension profile of this run.
+    trajectory : Trajectory
+        The run.
     """
     sensors = campaign.sensors
-    count = (2 * np.pi / sensors.encoder.counts_per_rev) ** 2 / 12
-    other = replace(preparation, friction_coefficient=preparation.friction_coefficient * FLOOR_FRICTION)
-    moved = plan.model_copy(update={"excitation": Displaced(plan.excitation, np.sqrt(count))})
-    a = shown(campaign, trajectory)
-    b = shown(campaign, simulate(campaign, moved, other))
-    torque = _variance(sensors.torque) + sensors.torque.accuracy_Nm**2 / 3
-    force = _variance(sensors.load_cell) + sensors.load_cell.accuracy_N**2 / 6
-    unknown = {
-        "theta_out_rad": 2 * count,
+    count_variance = (2 * np.pi / sensors.encoder.counts_per_rev) ** 2 / 12
+    repeat = replace(preparation, friction_coefficient=preparation.friction_coefficient * REPEAT_FRICTION_FACTOR)
+    offset = plan.model_copy(update={"excitation": OffsetMotion(plan.excitation, np.sqrt(count_variance))})
+    first = noise_free_channels(campaign, trajectory)
+    second = noise_free_channels(campaign, simulate(campaign, offset, repeat))
+    torque = _noise_variance(sensors.torque) + sensors.torque.accuracy_Nm**2 / 3
+    force = _noise_variance(sensors.load_cell) + sensors.load_cell.accuracy_N**2 / 6
+    sensor_variance = {
+        "theta_out_rad": 2 * count_variance,
         "tau_in_Nm": torque,
         "tau_out_Nm": torque,
         "F_drive_N": force,
         "F_load_N": force,
     }
-    return {name: float(np.sqrt(np.mean((a[name] - b[name]) ** 2) + unknown[name])) for name in a}
+    return {name: float(np.sqrt(np.mean((first[name] - second[name]) ** 2) + sensor_variance[name])) for name in first}
 
 
-def _variance(sensor: TorqueSensor | LoadCell) -> float:
-    """Of white and slow noise, in the sensor's unit squared."""
+def _noise_variance(sensor: TorqueSensor | LoadCell) -> float:
+    """Variance of white and slow noise together, in the sensor's unit squared."""
     noise = sensor.noise_Nm if isinstance(sensor, TorqueSensor) else sensor.noise_N
     return noise**2 * (1 + (sensor.slow_noise.ratio if sensor.slow_noise else 0.0) ** 2)
 
 
 def record(case: Case, plans: Sequence[RecordingPlan], folder: Path) -> dict[str, tuple[Preparation, Trajectory]]:
-    """Write a batch of some of a case's recordings into a folder of its own; by id, how each began and went."""
-    # What a build that was stopped left behind.
+    """Simulate some of a case's recordings and write them as a batch to a new folder.
+
+    Returns
+    -------
+    dict of str to (Preparation, Trajectory)
+        Initial state and trajectory of each recording, by id.
+    """
+    # An interrupted build may have left a partial folder.
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    campaign, went = case.campaign, {}
+    campaign, runs = case.campaign, {}
     for plan in plans:
         draw = recording_generator(case.seed, case.name, plan.id)
         preparation = prepare(campaign, plan, draw)
         trajectory = simulate(campaign, plan, preparation)
-        went[plan.id] = preparation, trajectory
+        runs[plan.id] = preparation, trajectory
         (folder / log_name(plan)).write_bytes(compress(log(trajectory, campaign.sensors, campaign.rig, draw)))
     described = description(campaign, case.name, NOTE, plans)
     (folder / "batch.yaml").write_text(as_yaml(described), encoding="utf-8")
-    return went
+    return runs
 
 
-def floors_of(case: Case, went: Mapping[str, tuple[Preparation, Trajectory]]) -> dict[str, dict[str, float]]:
-    """Floors of the kept-back recordings by their ids (`floor_of`), from how each began and went."""
-    return {plan.id: floor_of(case.campaign, plan, *went[plan.id]) for plan in case.kept_back}
+def noise_floors(case: Case, runs: Mapping[str, tuple[Preparation, Trajectory]]) -> dict[str, dict[str, float]]:
+    """`noise_floor` of every held-out recording, by id; `runs` is what `record` returned for them."""
+    return {plan.id: noise_floor(case.campaign, plan, *runs[plan.id]) for plan in case.kept_back}

@@ -1,32 +1,18 @@
-"""A concealed case, all of it drawn from one seed."""
+"""A concealed case, drawn as a whole from one seed."""
 
 import hashlib
 import json
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
 
 from proof.effects import ENTRIES, merged
-from proof.plan import EffectPlan, Plan, PlannedRecording, Protocol, SensorsPlan, read_plan
-from virtualrig.config import (
-    Cable,
-    Campaign,
-    Encoder,
-    Estimates,
-    Load,
-    LoadCell,
-    Numerics,
-    Piece,
-    RecordingPlan,
-    Rig,
-    Sensors,
-    SlowNoise,
-    TorqueSensor,
-)
+from proof.plan import EffectPlan, Plan, read_plan
+from proof.recording_draw import Conditions, draw_held_out, draw_recordings
+from proof.rig_draw import draw_campaign, log_uniform
+from virtualrig.config import Campaign, RecordingPlan
 from virtualrig.effects import Effects
-from virtualrig.motion import Excitation, Triangle, WanderingSine
 
 CLEAN = "none"
 SEVERITIES = 3
@@ -34,20 +20,21 @@ SEVERITIES = 3
 
 @dataclass(frozen=True)
 class Truth:
-    """One effect of a case.
+    """One concealed effect of a case. The field names are those of the answer, whose digest results hold.
 
     Attributes
     ----------
     name, place : str
-        As in the effects' list; an effect outside the list has a name that begins with "unlisted-".
+        As in the diagnosis's candidates. The name of an effect outside the candidates begins with "unlisted-".
     strength : float
-        Where in its range, on a logarithmic scale, its size was drawn: 0 is hardly seen, 1 is plain.
+        Position of the size in its range on a logarithmic scale: 0 is barely visible, 1 is large.
     severity : int
-        The strength in thirds, 1 to 3.
+        The third of the range that the strength lies in, 1 to 3.
     size : float
+        The drawn size, in `unit`.
     unit : str
-    values : dict
-        Under the names of the list, as far as they mean the same there and in the rig.
+    values : dict of str to float
+        True parameter values under the mechanism's names, for parameters defined alike in the rig and the mechanism.
     """
 
     name: str
@@ -61,31 +48,34 @@ class Truth:
 
 @dataclass(frozen=True)
 class Case:
-    """A rig, what is recorded on it, and what is hidden in it.
+    """A rig, its concealed effects and its recordings.
 
     Attributes
     ----------
     name : str
-        Says nothing.
+        A hash, which reveals neither the kind nor the effects.
     seed : int
-    asked : dict
-        Kind and effect that were asked for, None where they were drawn.
+    requested : dict
+        Requested kind and effect; None where they were drawn.
     kind : str
         clean, single, pair, unlisted, removed or poor.
     protocol : str
         Name of the protocol in the plan.
     truth : tuple of Truth
-        What is hidden; empty for a clean case.
+        The concealed effects; empty for a clean case.
     without : tuple of str
-        Names that the diagnosis is told to do without.
+        Mechanisms removed from the diagnosis's candidates.
     campaign : Campaign
-        The rig; it holds no batches.
-    recordings, kept_back : tuple of RecordingPlan
+        The rig and its sensors, without batches.
+    recordings : tuple of RecordingPlan
+        The batch that is diagnosed.
+    kept_back : tuple of RecordingPlan
+        Held-out recordings, made after the diagnosis has ended.
     """
 
     name: str
     seed: int
-    asked: dict[str, str | None]
+    requested: dict[str, str | None]
     kind: str
     protocol: str
     truth: tuple[Truth, ...]
@@ -96,7 +86,7 @@ class Case:
 
     @property
     def key(self) -> dict:
-        """The answer, as the scorer takes it."""
+        """The answer: the true effects and the rig, in the form that the scorer reads."""
         poor = read_plan().protocols[self.protocol].poor
         rig = self.campaign.rig
         return {
@@ -117,7 +107,7 @@ class Case:
 
     @property
     def digest(self) -> str:
-        """What the builder leaves of the answer."""
+        """SHA-256 of the answer, the only trace of it in a result."""
         return hashlib.sha256(json.dumps(self.key, sort_keys=True).encode()).hexdigest()
 
 
@@ -128,24 +118,26 @@ def draw(seed: int, kind: str | None = None, effect: str | None = None) -> Case:
     ----------
     seed : int
     kind : str, optional
-        One of the plan's kinds; drawn by their shares where none is given.
+        One of the plan's kinds; drawn by their shares if not given.
     effect : str, optional
-        The effect of a single or removed case, by its name in the list; drawn where none is given.
+        Name of the effect of a single, removed, poor or unlisted case; drawn if not given.
     """
     plan = read_plan()
-    asked = {"kind": kind, "effect": effect}
+    requested = {"kind": kind, "effect": effect}
     random = np.random.default_rng(np.random.SeedSequence([seed, 0xCA5E]))
     kind = kind or _one_of(plan.kinds, random)
     protocol_name = _protocol_of(kind, plan, random)
     protocol = plan.protocols[protocol_name]
     spring = log_uniform(plan.rig.load_stiffness_Nm_per_rad, random)
-    hidden = [_effect(*chosen, spring, random) for chosen in _chosen(kind, effect, plan, random)]
-    truth = tuple(t for t, _ in hidden)
-    campaign = _campaign(seed, plan, spring, Effects.model_validate(merged([e for _, e in hidden])), random)
-    truth = tuple(_with_the_rigs_own(t, campaign) for t in truth)
-    pretension_N = random.uniform(*plan.rig.pretension_N)
-    bend_rad = random.uniform(*(protocol.bend_rad or plan.rig.bend_rad))
-    length_m = campaign.rig.cable.length_m
+    drawn = [_effect(*chosen, spring, random) for chosen in _chosen(kind, effect, plan, random)]
+    truth = tuple(t for t, _ in drawn)
+    campaign = draw_campaign(seed, plan, spring, Effects.model_validate(merged([e for _, e in drawn])), random)
+    truth = tuple(_with_rig_damping(t, campaign) for t in truth)
+    conditions = Conditions(
+        pretension_N=random.uniform(*plan.rig.pretension_N),
+        bend_rad=random.uniform(*(protocol.bend_rad or plan.rig.bend_rad)),
+        length_m=campaign.rig.cable.length_m,
+    )
     without: tuple[str, ...] = ()
     if kind == "removed":
         without = tuple(t.name for t in truth)
@@ -153,20 +145,15 @@ def draw(seed: int, kind: str | None = None, effect: str | None = None) -> Case:
     return Case(
         name=_name(seed, kind, effect),
         seed=seed,
-        asked=asked,
+        requested=requested,
         kind=kind,
         protocol=protocol_name,
         truth=truth,
         without=without,
         campaign=campaign,
-        recordings=_recordings(protocol, plan, pretension_N, bend_rad, length_m, random),
-        kept_back=_kept_back(protocol, plan, pretension_N, bend_rad, length_m, random),
+        recordings=draw_recordings(protocol, plan, conditions, random),
+        kept_back=draw_held_out(protocol, plan, conditions, random),
     )
-
-
-def log_uniform(between: tuple[float, float], random: Generator) -> float:
-    """A number that is uniform in its logarithm."""
-    return float(np.exp(random.uniform(*np.log(between))))
 
 
 def _name(seed: int, kind: str, effect: str | None) -> str:
@@ -184,7 +171,7 @@ def _protocol_of(kind: str, plan: Plan, random: Generator) -> str:
 
 
 def _chosen(kind: str, effect: str | None, plan: Plan, random: Generator) -> list[tuple[str, EffectPlan, float]]:
-    """Names, plans and strengths of the effects of a case."""
+    """Names, plans and strengths of a case's effects."""
     if kind == "clean":
         return []
     if kind == "unlisted":
@@ -210,11 +197,11 @@ def _effect(name: str, spec: EffectPlan, strength: float, spring: float, random:
     return Truth(name, place, float(strength), severity, size, spec.unit, values), entered
 
 
-def _with_the_rigs_own(truth: Truth, campaign: Campaign) -> Truth:
-    """A viscous film's value with what else resists in proportion to speed in this rig.
+def _with_rig_damping(truth: Truth, campaign: Campaign) -> Truth:
+    """A viscous film's true value, with all other resistance of this rig that is proportional to speed.
 
-    That is the drag on its cables, of the same law, and the damping of its load, as a drag on both cables would do it.
-    No recording tells these from the film.
+    Added are the drag on its cables, which follows the same law, and the damping of its load, expressed as a drag on
+    both cables. No recording can separate these from the film.
     """
     if truth.name != "viscous-friction":
         return truth
@@ -222,148 +209,3 @@ def _with_the_rigs_own(truth: Truth, campaign: Campaign) -> Truth:
     cables = campaign.numerics.drag_rate_per_s * rig.cable.density_kg_per_m
     load = rig.load.damping_Nms_per_rad / (2 * rig.pulley_radius_m**2 * rig.cable.length_m)
     return replace(truth, values={"c": truth.values["c"] + cables + load})
-
-
-def _campaign(seed: int, plan: Plan, spring: float, effects: Effects, random: Generator) -> Campaign:
-    rig, numerics = plan.rig, plan.numerics.model_dump()
-    limit = numerics.pop("first_tension_limit_N")
-    length_m = round(random.uniform(*rig.length_m), 4)
-    stiffness = log_uniform(rig.stiffness_N_per_m, random)
-    friction = random.uniform(*rig.friction_coefficient)
-    return Campaign(
-        seed=seed,
-        rig=Rig(
-            pulley_radius_m=rig.pulley_radius_m,
-            cable=Cable(
-                stiffness_N_per_m=stiffness,
-                length_m=length_m,
-                friction_coefficient=friction,
-                density_kg_per_m=rig.density_kg_per_m,
-            ),
-            estimates=Estimates(
-                stiffness_N_per_m=_rounded(stiffness * _off_by(plan, random)),
-                length_m=length_m,
-                friction_coefficient=_rounded(friction * _off_by(plan, random)),
-            ),
-            load=Load(
-                spring_stiffness_Nm_per_rad=_rounded(spring, 5),
-                inertia_kg_m2=rig.load_inertia_kg_m2,
-                damping_Nms_per_rad=rig.load_damping_Nms_per_rad,
-            ),
-            effects=effects,
-        ),
-        sensors=_sensors(plan.sensors, random),
-        repeatability=plan.repeatability,
-        numerics=Numerics(**numerics, tension_limit_N=limit),
-        batches={},
-    )
-
-
-def _off_by(plan: Plan, random: Generator) -> float:
-    """Estimate over truth."""
-    far = random.uniform() < plan.estimates.far_share
-    factor = 1 + random.uniform(*(plan.estimates.far if far else plan.estimates.near))
-    return factor if random.uniform() < 0.5 else 1 / factor
-
-
-def _rounded(value: float, digits: int = 3) -> float:
-    return float(f"{value:.{digits}g}")
-
-
-def _sensors(plan: SensorsPlan, random: Generator) -> Sensors:
-    noise = random.uniform(*plan.noise_factor)
-    slow = SlowNoise(
-        ratio=random.uniform(*plan.slow_ratio),
-        lasts_samples=log_uniform(plan.slow_s, random) * plan.sample_rate_Hz,
-    )
-    return Sensors(
-        sample_rate_Hz=plan.sample_rate_Hz,
-        encoder=Encoder(counts_per_rev=plan.counts_per_rev, accuracy_rad=_rounded(2 * np.pi / plan.counts_per_rev)),
-        torque=TorqueSensor(
-            constant_Nm_per_A=plan.constant_Nm_per_A,
-            accuracy_Nm=plan.torque_accuracy_Nm,
-            noise_Nm=plan.torque_noise_Nm * noise,
-            range_Nm=plan.torque_range_Nm,
-            slow_noise=slow,
-        ),
-        load_cell=LoadCell(
-            sensitivity_V_per_N=plan.sensitivity_V_per_N,
-            zero_V=plan.zero_V,
-            accuracy_N=plan.load_cell_accuracy_N,
-            noise_N=plan.load_cell_noise_N * noise,
-            range_N=plan.load_cell_range_N,
-            slow_noise=slow,
-        ),
-    )
-
-
-def _recording(id_: str, pretension_N: float, bend_rad: float, length_m: float, motion: Excitation) -> RecordingPlan:
-    return RecordingPlan(
-        id=id_,
-        pretension_N=_rounded(pretension_N, 4),
-        conduit=(Piece(length_m=length_m, bend_rad=_rounded(bend_rad, 5)),),
-        excitation=motion,
-    )
-
-
-def _recordings(
-    protocol: Protocol, plan: Plan, pretension_N: float, bend_rad: float, length_m: float, random: Generator
-) -> tuple[RecordingPlan, ...]:
-    made: dict[str, RecordingPlan] = {}
-    for one in protocol.recordings:
-        motion = made[one.again].excitation if one.again else _varied(one, plan, random)
-        made[one.id] = _recording(one.id, one.pretension * pretension_N, one.bend * bend_rad, length_m, motion)
-    return tuple(made.values())
-
-
-def _varied(one: PlannedRecording, plan: Plan, random: Generator) -> Excitation:
-    """A planned motion as it is carried out: rest, start-up, size and speed differ from case to case."""
-    spread = plan.motion
-    by = {
-        "rest_s": lambda _: random.uniform(*spread.rest_s),
-        "start_up_cycles": lambda _: random.uniform(*spread.start_up_cycles),
-        "amplitude_rad": lambda value: value * random.uniform(*spread.amplitude_factor),
-        "frequency_Hz": lambda value: value * random.uniform(*spread.frequency_factor),
-        "angles_rad": lambda values: tuple(v * random.uniform(*spread.amplitude_factor) for v in values),
-    }
-    changed = {key: change(getattr(one.motion, key)) for key, change in by.items() if hasattr(one.motion, key)}
-    changed = {key: _three_digits(value) for key, value in changed.items()}
-    return type(one.motion).model_validate(one.motion.model_dump() | changed)
-
-
-def _three_digits(value: float | Sequence[float]) -> float | tuple[float, ...]:
-    return _rounded(value) if isinstance(value, float) else tuple(_rounded(v) for v in value)
-
-
-def _kept_back(
-    protocol: Protocol, plan: Plan, pretension_N: float, bend_rad: float, length_m: float, random: Generator
-) -> tuple[RecordingPlan, ...]:
-    return tuple(
-        _recording(
-            f"back-{i + 1}",
-            pretension_N * random.uniform(*protocol.kept_back.pretension),
-            bend_rad * random.uniform(*protocol.kept_back.bend),
-            length_m,
-            _kept_back_motion(plan, random),
-        )
-        for i in range(plan.kept_back.recordings)
-    )
-
-
-def _kept_back_motion(plan: Plan, random: Generator) -> Excitation:
-    kept = plan.kept_back
-    shape = {
-        "amplitude_rad": _rounded(random.uniform(*kept.amplitude_rad)),
-        "frequency_Hz": _rounded(random.uniform(*kept.frequency_Hz)),
-        "rest_s": _rounded(random.uniform(*plan.motion.rest_s)),
-        "cycles": kept.cycles,
-    }
-    if random.uniform() < kept.wandering_share:
-        return WanderingSine(
-            wave="wandering-sine",
-            **shape,
-            spread=random.uniform(*kept.spread),
-            seed=int(random.integers(2**31)),
-            start_up_cycles=random.uniform(*plan.motion.start_up_cycles),
-        )
-    return Triangle(wave="triangle", **shape, turn_share=kept.turn_share)

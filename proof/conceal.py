@@ -1,4 +1,4 @@
-"""The diagnosis as a process that can reach the batch and nothing else."""
+"""Runs the diagnosis as a process that can reach its batch and nothing else."""
 
 import hashlib
 import json
@@ -18,11 +18,14 @@ from proof.build import folder_digest
 
 SOURCES = Path(__file__).parents[1] / "src" / "ccmodel"
 GUARD = Path(__file__).with_name("guard.py")
+# Files that determine a case and its result.
 BUILDER = (
     "proof.yaml",
     "plan.py",
     "effects.py",
     "cases.py",
+    "rig_draw.py",
+    "recording_draw.py",
     "build.py",
     "judge.py",
     "measured.py",
@@ -30,7 +33,7 @@ BUILDER = (
     "guard.py",
 )
 TIMEOUT_S = 1800
-# Where libraries keep data, and devices such as /dev/urandom; no home, no folder that this project is in.
+# Data of libraries, and devices such as /dev/urandom. No home folder, and no folder that holds this project.
 SYSTEM = (
     "/usr/share",
     "/usr/lib",
@@ -46,26 +49,36 @@ SYSTEM = (
 
 
 @dataclass(frozen=True)
-class Ran:
+class Completed:
     """How a concealed command ended.
 
     Attributes
     ----------
     code : int
-        Its exit code.
-    said : str
-        The end of what it said on standard error.
+        Exit code; -1 after a timeout.
+    stderr : str
+        The last 2000 characters of standard error.
     tampering : tuple of str
-        What it tried to reach, one line each; the case is refused where there is any.
+        Accesses that were refused, one line each. A case with any is not counted.
     """
 
     code: int
-    said: str
+    stderr: str
     tampering: tuple[str, ...]
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether the command succeeded without tampering."""
+        return self.code == 0 and not self.tampering
+
+    @property
+    def failure(self) -> str:
+        """Exit code and the end of standard error, for a result."""
+        return f"exit code {self.code}: {self.stderr.strip()[-500:]}"
 
 
 def digest_of(sources: Path = SOURCES) -> str:
-    """Digest of every file of a package, compiled ones aside."""
+    """First 16 digits of the SHA-256 of a package's files, compiled files excluded."""
     digest = hashlib.sha256()
     for file in sorted(f for f in sources.rglob("*") if f.is_file() and "__pycache__" not in f.parts):
         digest.update(str(file.relative_to(sources)).encode() + b"\0" + file.read_bytes())
@@ -73,26 +86,32 @@ def digest_of(sources: Path = SOURCES) -> str:
 
 
 def builder_digest() -> str:
-    """Digest of all that makes a case and its result: the rig, the plan, and the way from there to here."""
+    """First 8 digits of the SHA-256 of everything that determines a case and its result, the virtual rig included."""
     files = [Path(__file__).with_name(name) for name in BUILDER]
     parts = [digest_of(SOURCES.with_name("virtualrig")).encode(), *(file.read_bytes() for file in files)]
     return hashlib.sha256(b"\0".join(parts)).hexdigest()[:8]
 
 
 def made_by(sources: Path = SOURCES) -> dict[str, str]:
-    """What tells a result of this diagnosis and of these cases from any other, under the names that it has there."""
+    """Digests of the diagnosis and of the builder, under their keys in a result."""
     return {"sources": digest_of(sources), "builder": builder_digest()}
 
 
 def stage(sources: Path = SOURCES) -> Path:
-    """A copy of the diagnosis's package alone, in a folder that goes by its digest, so that it compiles once."""
+    """Copy the diagnosis's package to a folder named by its digest, so that each version is compiled once.
+
+    Returns
+    -------
+    Path
+        The folder that holds the copy.
+    """
     staged = Path(tempfile.gettempdir()) / f"ccmodel-alone-{os.getuid()}" / digest_of(sources)
     if not staged.exists():
         fresh = Path(tempfile.mkdtemp(dir=_made(staged.parent)))
-        # With what is compiled already: that knows its sources by their time stamps, which are kept.
+        # Compiled files are copied too. They recognise their sources by time stamps, which copytree keeps.
         shutil.copytree(sources, fresh / "ccmodel")
         (fresh / "caches").mkdir()
-        # Another process may have been faster; its copy is the same.
+        # If another process staged the same sources first, its copy is used.
         try:
             fresh.rename(staged)
         except OSError:
@@ -100,32 +119,58 @@ def stage(sources: Path = SOURCES) -> Path:
     return staged
 
 
-def run(commands: Sequence[Sequence[str]], folder: Path, sources: Path = SOURCES) -> Ran:
-    """Run ccmodel commands, one after the other in one process, with `folder` as its whole world.
+def run(commands: Sequence[Sequence[str]], folder: Path, sources: Path = SOURCES) -> Completed:
+    """Run ccmodel commands in sequence in one process that can read and write only `folder`.
 
     Parameters
     ----------
     commands : sequence of sequence of str
-        Arguments of each; paths in them are relative to `folder`.
+        Arguments of each command; paths are relative to `folder`.
     folder : Path
-        Holds the batch and takes the results.
+        Holds the batch and receives the results.
     sources : Path
-        The package that is run.
+        The package to run.
     """
     staged = stage(sources)
-    hears, tells = os.pipe()
+    report_read, report_write = os.pipe()
     scratch = _made(folder / "scratch")
+    settings = _guard_settings(commands, folder, staged, report_write)
+    with os.fdopen(report_read, "rb") as report:
+        try:
+            done = subprocess.run(
+                [sys.executable, "-I", "-S", str(GUARD), json.dumps(settings)],
+                cwd=folder,
+                env=_environment(scratch, staged),
+                pass_fds=[report_write],
+                capture_output=True,
+                timeout=TIMEOUT_S,
+            )
+            code, stderr = done.returncode, done.stderr.decode(errors="replace")
+        except subprocess.TimeoutExpired:
+            code, stderr = -1, f"took longer than {TIMEOUT_S} s"
+        finally:
+            os.close(report_write)
+            shutil.rmtree(scratch, ignore_errors=True)
+        tampering = report.read().decode(errors="replace").splitlines()
+    return Completed(code, stderr[-2000:], tuple(dict.fromkeys(tampering)))
+
+
+def _guard_settings(commands: Sequence[Sequence[str]], folder: Path, staged: Path, report_fd: int) -> dict:
+    """Argument of `proof.guard.main`."""
     libraries = sorted({str(Path(numpy.__file__).parents[1]), sysconfig.get_path("purelib")})
     standard = [sysconfig.get_path("stdlib"), os.path.join(sysconfig.get_path("stdlib"), "lib-dynload")]
-    told = {
+    return {
         "standard": standard,
         "path": [str(staged), *libraries],
         "readable": [*standard, *libraries, *SYSTEM],
         "writable": [str(staged), str(folder)],
         "commands": list(map(list, commands)),
-        "tell": tells,
+        "report_fd": report_fd,
     }
-    environment = {
+
+
+def _environment(scratch: Path, staged: Path) -> dict[str, str]:
+    return {
         "PATH": "/usr/bin:/bin",
         "LANG": "C.UTF-8",
         "HOME": str(scratch),
@@ -133,28 +178,10 @@ def run(commands: Sequence[Sequence[str]], folder: Path, sources: Path = SOURCES
         "MPLCONFIGDIR": str(staged / "caches"),
         "MPLBACKEND": "agg",
     }
-    with os.fdopen(hears, "rb") as heard:
-        try:
-            done = subprocess.run(
-                [sys.executable, "-I", "-S", str(GUARD), json.dumps(told)],
-                cwd=folder,
-                env=environment,
-                pass_fds=[tells],
-                capture_output=True,
-                timeout=TIMEOUT_S,
-            )
-            code, said = done.returncode, done.stderr.decode(errors="replace")
-        except subprocess.TimeoutExpired:
-            code, said = -1, f"took longer than {TIMEOUT_S} s"
-        finally:
-            os.close(tells)
-            shutil.rmtree(scratch, ignore_errors=True)
-        tampering = heard.read().decode(errors="replace").splitlines()
-    return Ran(code, said[-2000:], tuple(dict.fromkeys(tampering)))
 
 
 def core_s() -> float:
-    """Seconds that this process and those it waited for have spent on a core: however busy the machine is."""
+    """Processor time of this process and of those it has waited for, s. It does not depend on the machine's load."""
     return sum(os.times()[:4])
 
 
@@ -164,47 +191,47 @@ def diagnose(
     without: Sequence[str] = (),
     sources: Path = SOURCES,
     options: Sequence[str] = (),
-    beside: Path | None = None,
-) -> Ran:
-    """Diagnose a copy of a batch in an otherwise empty folder; results are brought to `out`.
+    baseline: Path | None = None,
+) -> Completed:
+    """Diagnose a copy of a batch in an otherwise empty folder, and copy the results to `out`.
 
     Parameters
     ----------
     batch, out : Path
     without : sequence of str
-        Mechanisms that are taken off the list.
+        Mechanisms removed from the candidates.
     sources : Path
         The diagnosis's package.
     options : sequence of str
-        Further words of the command; they name no file.
-    beside : Path, optional
-        A model file that the folder gets besides the batch: asked is what is missing besides what it has.
+        Further command-line options; they name no file.
+    baseline : Path, optional
+        Model file of the baseline, which is copied beside the batch.
     """
     before = folder_digest(batch)
     with tempfile.TemporaryDirectory(prefix="batch-") as folder:
         world = Path(folder)
-        # Without their time stamps: how long each took to make is no business of the diagnosis.
+        # Time stamps are not copied: they would show how long each file took to make.
         shutil.copytree(batch, world / batch.name, copy_function=shutil.copyfile)
-        words = [*options, *(word for name in without for word in ("--without", name))]
-        if beside is not None:
-            shutil.copy(beside, world / "known.json")
-            words += ["--beside", "known.json"]
-        ran = run([["diagnose", batch.name, "--out", "out", *words]], world, sources)
+        arguments = [*options, *(argument for name in without for argument in ("--without", name))]
+        if baseline is not None:
+            shutil.copy(baseline, world / "baseline.json")
+            arguments += ["--baseline", "baseline.json"]
+        completed = run([["diagnose", batch.name, "--out", "out", *arguments]], world, sources)
         altered = ("altered the batch",) if folder_digest(world / batch.name) != before else ()
         if (world / "out").exists():
             shutil.copytree(world / "out", out, dirs_exist_ok=True)
-    return Ran(ran.code, ran.said, ran.tampering + altered)
+    return Completed(completed.code, completed.stderr, completed.tampering + altered)
 
 
-def predict(blinded: Path, models: Mapping[Path, Path], sources: Path = SOURCES) -> Ran:
-    """Predict a batch with model files in an otherwise empty folder; predictions are brought to the folder of each.
+def predict(blinded: Path, models: Mapping[Path, Path], sources: Path = SOURCES) -> Completed:
+    """Predict a batch with several models in an otherwise empty folder.
 
     Parameters
     ----------
     blinded : Path
         The batch.
     models : mapping of Path to Path
-        Model files, and the folders that get what they say.
+        Model file to the folder that gets its predictions.
     sources : Path
         The diagnosis's package.
     """
@@ -215,11 +242,11 @@ def predict(blinded: Path, models: Mapping[Path, Path], sources: Path = SOURCES)
         for k, model in enumerate(models):
             shutil.copyfile(model, world / f"model-{k}.json")
             commands.append(["predict", blinded.name, "--model", f"model-{k}.json", "--out", f"out-{k}"])
-        ran = run(commands, world, sources)
+        completed = run(commands, world, sources)
         for k, out in enumerate(models.values()):
             if (world / f"out-{k}").exists():
                 shutil.copytree(world / f"out-{k}", out, dirs_exist_ok=True)
-    return ran
+    return completed
 
 
 def _made(folder: Path) -> Path:

@@ -1,4 +1,4 @@
-"""Figures of the proof's page."""
+"""Figures of the validation's page."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-# Okabe and Ito's colours, told apart by all kinds of eyes; shapes differ too.
+# Colours of Okabe and Ito, distinguishable with any colour vision; the markers differ too.
 BLUE, ORANGE, GREY, GREEN, PURPLE = "#0072B2", "#E69F00", "#999999", "#009E73", "#CC79A7"
 COLUMNS = 4
 KINDS = {
@@ -18,14 +18,14 @@ KINDS = {
     "unlisted": ("D", ORANGE),
     "poor": ("v", PURPLE),
 }
-NAMES = {"unlisted": "not on the list", "poor": "poor protocol"}
+NAMES = {"unlisted": "no candidate", "poor": "poor protocol"}
 
 
 def write_figures(scored: dict, folder: Path) -> list[str]:
-    """Draw all figures that there are results for; their file names."""
+    """Draw every figure for which there are results; returns their file names."""
     folder.mkdir(parents=True, exist_ok=True)
     drawn = {
-        "proof-noticing.png": (_noticing, scored["noticing"]),
+        "proof-noticing.png": (_detection_by_error, scored["detection_by_error"]),
         "proof-detection.png": (_detection, scored["detection"]),
         "proof-reliability.png": (_reliability, scored["reliability"]),
         "proof-kept-back.png": (_kept_back, scored["kept_back"]),
@@ -40,20 +40,20 @@ def write_figures(scored: dict, folder: Path) -> list[str]:
     return names
 
 
-def _noticing(rows: list[dict]) -> Figure:
-    """How often single effects are noticed and named, by how far recalibration leaves them from the floor."""
+def _detection_by_error(rows: list[dict]) -> Figure:
+    """Rates of detection and identification of single effects over the recalibrated model's error."""
     figure = Figure(figsize=(4.5, 3.4), layout="constrained")
     panel = figure.subplots()
-    for what, colour, marker, aside in (("noticed", BLUE, "o", 1.0), ("named first", ORANGE, "s", 1.05)):
+    for what, colour, marker, shift in (("detected", BLUE, "o", 1.0), ("identified first", ORANGE, "s", 1.05)):
         rates = [row[what.split()[0]] for row in rows]
         rate = np.array([r["rate"] for r in rates])
-        reach = np.clip([rate - [r["low"] for r in rates], [r["high"] for r in rates] - rate], 0, None)
-        x = [aside * row["size"] for row in rows]
-        panel.errorbar(x, rate, reach, fmt=marker, color=colour, ms=5, capsize=2, label=f"{what}, 95 % Wilson")
+        half_widths = np.clip([rate - [r["low"] for r in rates], [r["high"] for r in rates] - rate], 0, None)
+        x = [shift * row["error_before"] for row in rows]
+        panel.errorbar(x, rate, half_widths, fmt=marker, color=colour, ms=5, capsize=2, label=f"{what}, 95 % Wilson")
     for row in rows:
-        panel.annotate(f"{row['noticed']['n']}", (row["size"], -0.09), fontsize=7, ha="center")
-    panel.set(xscale="log", ylim=(-0.15, 1.05), ylabel="share of single effects (their number below)")
-    panel.set_xlabel("error after recalibration alone, times the floor")
+        panel.annotate(f"{row['detected']['n']}", (row["error_before"], -0.09), fontsize=7, ha="center")
+    panel.set(xscale="log", ylim=(-0.15, 1.05), ylabel="share of single effects (number below)")
+    panel.set_xlabel("error of the recalibrated model (noise floors)")
     ends = panel.get_xlim()
     panel.set_xticks([1, 2, 5, 10, 20, 50], ["1", "2", "5", "10", "20", "50"])
     panel.set_xlim(ends)
@@ -63,19 +63,21 @@ def _noticing(rows: list[dict]) -> Figure:
 
 
 def _detection(detection: dict) -> Figure:
-    """A panel an effect: each case at its size, and the curve of noticing."""
+    """One panel an effect: each case at its size, and the logistic curve of detection."""
     rows = -(-len(detection) // COLUMNS)
     figure = Figure(figsize=(9, 0.6 + 1.35 * rows), layout="constrained")
     panels = figure.subplots(rows, COLUMNS, squeeze=False, sharey=True)
     marks = {
-        "named first": (BLUE, "o", lambda p: p["named"]),
-        "noticed only": (ORANGE, "^", lambda p: p["noticed"] and not p["named"]),
-        "not noticed": (GREY, "x", lambda p: not p["noticed"]),
+        "identified first": (BLUE, "o", lambda p: p["identified"]),
+        "detected only": (ORANGE, "^", lambda p: p["detected"] and not p["identified"]),
+        "not detected": (GREY, "x", lambda p: not p["detected"]),
     }
     for panel, (name, found) in zip(panels.flat, detection.items(), strict=False):
         for label, (colour, marker, belongs) in marks.items():
             some = [p for p in found["points"] if belongs(p)]
-            panel.plot([p["size"] for p in some], [p["noticed"] for p in some], marker, color=colour, ms=4, label=label)
+            panel.plot(
+                [p["size"] for p in some], [p["detected"] for p in some], marker, color=colour, ms=4, label=label
+            )
         if found["half_size"]:
             x = np.geomspace(*found["drawn"], 60)
             panel.plot(x, 1 / (1 + (x / found["half_size"]) ** -found["slope"]), color="black", lw=0.8)
@@ -84,7 +86,7 @@ def _detection(detection: dict) -> Figure:
             xlim=(found["drawn"][0] / 1.3, found["drawn"][1] * 1.3),
             ylim=(-0.15, 1.15),
             yticks=[0, 1],
-            yticklabels=["missed", "noticed"],
+            yticklabels=["missed", "detected"],
         )
         panel.set_title(name, fontsize=8)
         panel.set_xlabel({"1": "share"}.get(found["unit"], found["unit"]), fontsize=7)
@@ -96,22 +98,22 @@ def _detection(detection: dict) -> Figure:
 
 
 def _reliability(bins: list[dict]) -> Figure:
-    """How often a name was right against the probability stated for it."""
+    """Reliability diagram: the rate at which a name was right over its stated confidence."""
     figure = Figure(figsize=(4, 4), layout="constrained")
     panel = figure.subplots()
     stated, right = [b["stated"] for b in bins], np.array([b["rate"] for b in bins])
-    reach = np.clip([right - [b["low"] for b in bins], [b["high"] for b in bins] - right], 0, None)
+    half_widths = np.clip([right - [b["low"] for b in bins], [b["high"] for b in bins] - right], 0, None)
     panel.plot([0, 1], [0, 1], color=GREY, lw=0.8, ls="--", label="as stated")
-    panel.errorbar(stated, right, reach, fmt="o", color=BLUE, ms=4, capsize=2, label="right, 95 % Wilson")
+    panel.errorbar(stated, right, half_widths, fmt="o", color=BLUE, ms=4, capsize=2, label="right, 95 % Wilson")
     for b in bins:
         panel.annotate(f" {b['n']}", (b["stated"], b["rate"]), fontsize=7, va="top")
-    panel.set(xlim=(0, 1.03), ylim=(-0.03, 1.03), xlabel="probability stated", ylabel="share that was right")
+    panel.set(xlim=(0, 1.03), ylim=(-0.03, 1.03), xlabel="stated confidence", ylabel="share that was right")
     figure.legend(loc="outside upper center", ncols=2, frameon=False)
     return figure
 
 
 def _kept_back(errors: list[dict]) -> Figure:
-    """Errors on kept-back recordings, in floors, before and after."""
+    """Errors on held-out recordings in noise floors, before and after the diagnosis."""
     figure = Figure(figsize=(4.5, 4.2), layout="constrained")
     panel = figure.subplots()
     for kind, (marker, colour) in KINDS.items():
@@ -122,19 +124,19 @@ def _kept_back(errors: list[dict]) -> Figure:
     panel.plot(ends, ends, color=GREY, lw=0.8, ls="--")
     panel.axhline(1, color=GREY, lw=0.8)
     panel.set(xscale="log", yscale="log", xlim=ends, ylim=ends)
-    panel.set(xlabel="after recalibration alone, times the floor", ylabel="after the diagnosis, times the floor")
+    panel.set(xlabel="recalibrated model (noise floors)", ylabel="diagnosed model (noise floors)")
     figure.legend(loc="outside upper center", ncols=3, frameon=False)
     return figure
 
 
 def _confusion(table: dict[str, dict[str, int]]) -> Figure:
-    """What each single effect was called."""
+    """Confusion matrix of single effects and clean cases."""
     ends = ["agrees", "undecided", "unexplained", "none"]
-    said = [*(n for n in table if n != "none"), *ends]
-    said += [n for row in table.values() for n in row if n not in said]
-    said = list(dict.fromkeys(n for n in said if any(n in row for row in table.values())))
-    counts = np.array([[row.get(name, 0) for name in said] for row in table.values()])
-    figure = Figure(figsize=(2.6 + 0.24 * len(said), 1.8 + 0.2 * len(table)), layout="constrained")
+    reported = [*(n for n in table if n != "none"), *ends]
+    reported += [n for row in table.values() for n in row if n not in reported]
+    reported = list(dict.fromkeys(n for n in reported if any(n in row for row in table.values())))
+    counts = np.array([[row.get(name, 0) for name in reported] for row in table.values()])
+    figure = Figure(figsize=(2.6 + 0.24 * len(reported), 1.8 + 0.2 * len(table)), layout="constrained")
     panel = figure.subplots()
     shown = np.ma.masked_equal(counts, 0)
     panel.imshow(shown, cmap="Blues", norm=LogNorm(0.5, max(counts.max(), 2) * 2), aspect="auto")
@@ -142,7 +144,7 @@ def _confusion(table: dict[str, dict[str, int]]) -> Figure:
         if n:
             dark = n > counts.max() / 4
             panel.text(j, i, n, ha="center", va="center", fontsize=7, color="white" if dark else "black")
-    panel.set_xticks(range(len(said)), [{"none": "no diagnosis"}.get(n, n) for n in said], rotation=90)
+    panel.set_xticks(range(len(reported)), [{"none": "no diagnosis"}.get(n, n) for n in reported], rotation=90)
     panel.set_yticks(range(len(table)), [{"none": "clean"}.get(n, n) for n in table])
-    panel.set(xlabel="called", ylabel="hidden")
+    panel.set(xlabel="diagnosis", ylabel="true effect")
     return figure

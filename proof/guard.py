@@ -1,13 +1,12 @@
-"""Runs commands of the diagnosis with nothing in reach but the batch: ``python -I -S guard.py JSON``.
+"""Runs commands of the diagnosis with access to the batch alone: ``python -I -S guard.py JSON``.
 
-Not imported by the proof: it is the whole of what the concealed process starts from, and imports only the standard
-library. The JSON names the folders that may be read and written, those that are put on the import path, the file
-descriptor on which tampering is told, and the commands' arguments.
+The concealed process starts from this file, which imports only the standard library; nothing else imports it. The JSON
+argument names the folders that may be read and written, the import path, the file descriptor for reports of tampering
+and the arguments of the commands.
 
-Python's audit hooks see every file that is opened, every folder that is listed, every import, every process that is
-started and every connection, and cannot be taken out again. What compiled code reads past Python they do not see, and
-code that first rewrote the functions that this file calls would blind them: this keeps out whatever looks for answers,
-and not what sets out to break it.
+Python's audit hooks see every opened file, listed folder, import, started process and connection, and cannot be
+removed. They do not see what compiled code reads without Python. Code that replaces the functions called here could
+also disable them. The guard stops a diagnosis that looks for the answer, not one written to defeat the guard.
 """
 
 import json
@@ -15,17 +14,17 @@ import os
 import sys
 from importlib import import_module
 
-HIDDEN = ("virtualrig", "proof")
+FORBIDDEN_IMPORTS = ("virtualrig", "proof")
 STARTS = ("subprocess.Popen", "os.system", "os.exec", "os.fork", "os.forkpty", "os.posix_spawn", "os.spawn")
 CHANGES = ("os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.link", "os.symlink", "os.truncate", "shutil.rmtree")
-# The others have one path; what a symbolic link points to is refused when it is opened.
+# Events with two paths. The target of a symbolic link is checked when it is opened.
 PATHS = {"os.rename": 2, "os.link": 2}
 CONNECTS = ("socket.connect", "socket.bind", "socket.sendto", "socket.getaddrinfo", "os.kill")
 WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
-def guard(readable: list[str], writable: list[str], tell: int) -> None:
-    """Refuse, and tell of, whatever leaves the folders given."""
+def guard(readable: list[str], writable: list[str], report_fd: int) -> None:
+    """Refuse every access outside the given folders, and report each on a file descriptor."""
     readable, writable = map(tuple, (map(os.path.realpath, [*readable, *writable]), map(os.path.realpath, writable)))
 
     def inside(path, folders) -> bool:
@@ -35,7 +34,7 @@ def guard(readable: list[str], writable: list[str], tell: int) -> None:
         return any(place == folder or place.startswith(folder + os.sep) for folder in folders)
 
     def refuse(what: str) -> None:
-        os.write(tell, f"{what}\n".encode())
+        os.write(report_fd, f"{what}\n".encode())
         raise PermissionError(what)
 
     def hook(event: str, arguments: tuple) -> None:
@@ -47,7 +46,7 @@ def guard(readable: list[str], writable: list[str], tell: int) -> None:
         elif event in ("os.listdir", "os.scandir", "os.chdir"):
             if not inside(arguments[0] if arguments[0] is not None else os.getcwd(), readable):
                 refuse(f"looked into {arguments[0]}")
-        elif event == "import" and arguments[0].partition(".")[0] in HIDDEN:
+        elif event == "import" and arguments[0].partition(".")[0] in FORBIDDEN_IMPORTS:
             refuse(f"imported {arguments[0]}")
         elif event in CHANGES:
             for path in arguments[: PATHS.get(event, 1)]:
@@ -61,28 +60,28 @@ def guard(readable: list[str], writable: list[str], tell: int) -> None:
     sys.addaudithook(hook)
 
 
-def main(told: dict) -> None:
-    """Set up the import path, close the door and run the commands; exits with the highest of their codes."""
-    sys.path[:] = told["standard"] + told["path"]
-    # The first time it is imported it looks all over the machine for fonts, and starts a program to ask for more.
+def main(settings: dict) -> None:
+    """Set the import path, install the guard and run the commands; the exit code is the highest of theirs."""
+    sys.path[:] = settings["standard"] + settings["path"]
+    # Its first import searches the machine for fonts and starts a program, which the guard would refuse.
     import_module("matplotlib.font_manager")
-    guard(told["readable"], told["writable"], told["tell"])
+    guard(settings["readable"], settings["writable"], settings["report_fd"])
     run, codes = import_module("ccmodel.cli").main, [0]
-    for words in told["commands"]:
-        sys.argv = ["ccmodel", *words]
+    for arguments in settings["commands"]:
+        sys.argv = ["ccmodel", *arguments]
         try:
             run()
-        except SystemExit as ended:
-            codes.append(_code(ended))
+        except SystemExit as exit_:
+            codes.append(_exit_code(exit_))
     sys.exit(max(codes))
 
 
-def _code(ended: SystemExit) -> int:
-    """The exit code of what ended a command; as Python does, a text is said and counts as one."""
-    if isinstance(ended.code, str):
-        print(ended.code, file=sys.stderr)
+def _exit_code(exit_: SystemExit) -> int:
+    """Exit code of a SystemExit. As in Python, a text is printed and counts as 1."""
+    if isinstance(exit_.code, str):
+        print(exit_.code, file=sys.stderr)
         return 1
-    return ended.code or 0
+    return exit_.code or 0
 
 
 if __name__ == "__main__":

@@ -1,88 +1,116 @@
-"""The proof's page, `docs/proof.md`."""
+"""The page of the validation, `docs/proof.md`."""
 
 import os
 import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 
 from proof.plan import PLAN
+from proof.score import CALIBRATION_ERROR, COVERAGE_RATE, DIAGNOSED
 
 TITLES = {
-    "proof-noticing.png": "How often single effects are noticed and named, by what recalibration alone leaves of them",
-    "proof-detection.png": "Every case of one effect at its size, by what was made of it; a curve where there are four",
-    "proof-reliability.png": "Stated probabilities and how often they were right; numbers are claims",
-    "proof-kept-back.png": "Errors on recordings that were kept back, in the channel that is off most",
-    "proof-confusion.png": "What clean cases and those of one effect were called, of all kinds and protocols",
+    "proof-noticing.png": "Detection and identification of single effects, by the error of the recalibrated model",
+    "proof-detection.png": "Every case of one effect at its size; a logistic curve where there are four or more",
+    "proof-reliability.png": "Stated confidence and the rate at which it was right; numbers are claims",
+    "proof-kept-back.png": "Errors on held-out recordings over the noise floor, in the worst channel",
+    "proof-confusion.png": "Confusion matrix of clean cases and of cases with one effect, of all kinds and protocols",
 }
 
 
-def page(scored: dict, figures: list[str], figure_folder: Path, page_file: Path, command: str, part: str) -> str:
-    """The page's text.
+@dataclass(frozen=True)
+class Source:
+    """Where a page and its figures stand, and what made the results.
+
+    Attributes
+    ----------
+    page, figures : Path
+        The page's file, and the folder of its figures.
+    command : str
+        The command that made the results.
+    selection : str
+        Which cases were run, in a sentence.
+    """
+
+    page: Path
+    figures: Path
+    command: str
+    selection: str
+
+
+def page(scored: dict, figures: list[str], source: Source) -> str:
+    """The page as Markdown.
 
     Parameters
     ----------
     scored : dict
-        As `proof.score.score` gives it.
+        A score (`proof.score.score`).
     figures : list of str
-        File names in `figure_folder`.
-    figure_folder, page_file : Path
-    command : str
-        What made the results.
-    part : str
-        Which cases these are, in a sentence.
+        File names in the folder of figures.
+    source : Source
     """
-    plan = os.path.relpath(PLAN, page_file.parent)
-    beside = Path(os.path.relpath(figure_folder, page_file.parent))
+    plan = os.path.relpath(PLAN, source.page.parent)
     kinds = ", ".join(f"{n} {kind}" for kind, n in sorted(scored["kinds"].items()))
-    pictures = "\n\n".join(f"{TITLES[name]}:\n\n![{TITLES[name]}]({beside / name})" for name in figures)
-    return f"""# Proof on concealed effects
+    missed = table(_MISS_HEAD, map(_miss_row, scored["misses"])) if scored["misses"] else "None."
+    return f"""# Validation on concealed effects
 
-Made by `{command}` on {date.today().isoformat()}, commit {commit()}. {part}
+Made by `{source.command}` on {date.today().isoformat()}, commit {commit()}. {source.selection}
 
-{scored["cases"]} cases: {kinds}. Each is a rig of its own, drawn from a seed: values, estimates that are off, an effect
-or two with their size and place, a protocol, noise, and what varies from run to run
-([what is drawn]({plan})). The diagnosis ran on a copy of the batch in an otherwise empty folder, in a process whose
-files, imports, programs and connections are refused outside it; no answer was on disk. What was kept back was recorded
-after it had ended.
+{scored["cases"]} cases: {kinds}.
 
-"Visible" are cases in which recalibration alone leaves, on kept-back recordings, three times what two repeats differ by
-(3 sqrt(2) times the floor) in some channel. The floor is what the true physics leaves: noise, zeros, encoder steps and
-one per cent of friction. "Open" is what more cases would decide: the interval holds what must be. Places that no
-recording tells apart count as one (cable and conduit; a pulley and its cable end; the load and its pulley).
-
+{_METHOD.format(plan=plan)}
 ## Rates
 
-{table(["", "", "rate", "95 % (Wilson)", "must be", ""], map(_rate_row, scored["rates"]))}
+{table(["", "", "rate", "95 % (Wilson)", "target", "met"], map(_rate_row, scored["rates"]))}
 
-## Sizes
+## Statistics
 
-{table(["", "over", "value", "95 % (bootstrap)", "must be", ""], map(_statistic_row, scored["statistics"]))}
+{table(["", "n", "value", "95 % (bootstrap)", "target", "met"], map(_statistic_row, scored["statistics"]))}
 
-{_missed(scored)}
-{_rivals(scored["rivals"])}
+{_missed_targets(scored)}
+{_methods(scored["methods"])}
 ## Figures
 
-{pictures}
+{_pictures(figures, source)}
 
-## Where each effect begins to be seen
+## Detection limits
 
-{table(["effect", "cases", "noticed", "named first", "half are noticed at"], _detection_rows(scored["detection"]))}
+{table(["effect", "cases", "detected", "identified first", "half detected at"], _detection_rows(scored["detection"]))}
 
-## Every miss
+## Misses
 
-{table(_MISS_HEAD, map(_miss_row, scored["misses"])) if scored["misses"] else "None."}
+{missed}
+"""
+
+
+_METHOD = """Each case is a simulated rig drawn from a seed: its parameters and the errors of their stated estimates,
+none to two concealed effects with size and place, the protocol, sensor noise and run-to-run variation
+([ranges of the draws]({plan})). The diagnosis runs on a copy of the batch in an otherwise empty folder. Its process
+cannot read files, import modules, start programs or open connections outside that folder, and no answer is on disk.
+The held-out recordings are simulated after the diagnosis has ended.
+
+- **Noise floor**: the error of a model with the true physics, from sensor noise, sensor zeros, encoder resolution and
+  1 % run-to-run variation of friction.
+- **Visible**: the recalibrated model's error on held-out recordings is at least 3 sqrt(2) noise floors in some channel,
+  which is three times the difference of two repeats.
+- **No candidate**: the effect is unlisted, that is, no mechanism models it, or its mechanism is removed from the
+  candidates.
+- **Located**: the reported place is the true one. Places that no recording distinguishes count as equal: cable and
+  conduit, a pulley and its cable end, the load and its pulley.
+- **Open** in the column "met": the 95 % interval includes the target, so that more cases are needed to decide.
 """
 
 
 def commit() -> str:
-    """The checkout's commit, and whether anything was changed since."""
-    say = subprocess.run(
+    """Commit of the checkout, marked if files have changed since."""
+    described = subprocess.run(
         ["git", "describe", "--always", "--dirty", "--abbrev=10"],
         cwd=Path(__file__).parent,
         capture_output=True,
         text=True,
     )
-    return say.stdout.strip().replace("-dirty", " with changes") or "unknown"
+    return described.stdout.strip().replace("-dirty", " with changes") or "unknown"
 
 
 def table(head, rows) -> str:
@@ -91,103 +119,110 @@ def table(head, rows) -> str:
     return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in lines)
 
 
-def _rate_row(r):
+def _pictures(figures: list[str], source: Source) -> str:
+    folder = Path(os.path.relpath(source.figures, source.page.parent))
+    return "\n\n".join(f"{TITLES[name]}:\n\n![{TITLES[name]}]({folder / name})" for name in figures)
+
+
+def _rate_row(r: dict) -> list[str]:
     if r["rate"] is None:
-        return [r["what"], "0", "", "", _must(r), "no case"]
-    held = "" if r["target"] is None else _kept(r)
-    return [r["what"], f"{r['k']}/{r['n']}", f"{r['rate']:.1%}", f"{r['low']:.1%} to {r['high']:.1%}", _must(r), held]
+        return [r["what"], "0", "", "", _percent(r["target"]), "no case"]
+    interval = f"{r['low']:.1%} to {r['high']:.1%}"
+    return [r["what"], f"{r['k']}/{r['n']}", f"{r['rate']:.1%}", interval, _percent(r["target"]), met_rate(r)]
 
 
-def _must(r) -> str:
-    return "" if r["target"] is None else f"{r['target']:.0%}"
+def _percent(target: float | None) -> str:
+    return "" if target is None else f"{target:.0%}"
 
 
-def _kept(r) -> str:
-    """Whether a rate is what it must be: a coverage within its interval, any other at least."""
-    if r["what"].startswith("90 %"):
+def met_rate(r: dict) -> str:
+    """Whether a rate meets its target: a coverage includes it in its interval, any other rate reaches it."""
+    if r["target"] is None:
+        return ""
+    if r["what"] == COVERAGE_RATE:
         return "yes" if r["low"] <= r["target"] <= r["high"] else "**no**"
-    return _said(r["rate"] >= r["target"], r["low"] < r["target"] < r["high"])
+    return _met(r["rate"] >= r["target"], r["low"] < r["target"] < r["high"])
 
 
-def _said(is_reached: bool, is_open: bool) -> str:
+def _met(is_reached: bool, is_open: bool) -> str:
     return ("yes" if is_reached else "**no**") + (", open" if is_open else "")
 
 
-def _statistic_row(s):
+def _statistic_row(s: dict) -> list[str]:
     if s["value"] is None:
         return [s["what"], "0", "", "", "", "no case"]
-    must = "" if s["target"] is None else f"{s['target']:g}"
-    held = "" if s["target"] is None else _said(_reached(s), s["low"] < s["target"] < s["high"])
-    return [s["what"], s["n"], f"{s['value']:.3g}", f"{s['low']:.3g} to {s['high']:.3g}", must, held]
+    target = "" if s["target"] is None else f"{s['target']:g}"
+    met = "" if s["target"] is None else _met(_is_reached(s), s["low"] < s["target"] < s["high"])
+    return [s["what"], str(s["n"]), f"{s['value']:.3g}", f"{s['low']:.3g} to {s['high']:.3g}", target, met]
 
 
-def _reached(s) -> bool:
-    """An error must be at most its target, a share at least."""
-    return s["value"] <= s["target"] if "error" in s["what"] else s["value"] >= s["target"]
+def _is_reached(s: dict) -> bool:
+    """Whether a statistic meets its target: a calibration error is at most the target, a share at least."""
+    return s["value"] <= s["target"] if s["what"] == CALIBRATION_ERROR else s["value"] >= s["target"]
 
 
-def _missed(scored) -> str:
-    rates = [
-        r["what"] for r in scored["rates"] if r["target"] is not None and r["rate"] is not None and "no" in _kept(r)
-    ]
-    sizes = [
+def _missed_targets(scored: dict) -> str:
+    missed = [r["what"] for r in scored["rates"] if r["rate"] is not None and "no" in met_rate(r)]
+    missed += [
         s["what"]
         for s in scored["statistics"]
-        if s["target"] is not None and s["value"] is not None and not _reached(s)
+        if s["target"] is not None and s["value"] is not None and not _is_reached(s)
     ]
-    if not rates + sizes:
-        return "Nothing that there are cases for is missed."
-    return "Missed: " + "; ".join(rates + sizes) + ". Of the cases behind it the visible ones are listed below."
+    if not missed:
+        return "Every target with cases is met."
+    return f"Targets missed: {'; '.join(missed)}. The visible cases behind it are among the misses below."
 
 
-def _rivals(rows) -> str:
-    """The section on rivals; nothing where none was held to these cases."""
+def _methods(rows: list[dict]) -> str:
+    """The section on reference regressors; empty if none was applied."""
     if not rows:
         return ""
-    head = ["", "says what and where", "clean", "visible", "share of the gap closed, visible", "nearer, visible"]
-    lines = [
-        [
-            r["rival"],
-            "yes" if r is rows[-1] else "no",
-            *map(_value, (r["clean"], r["visible"], r["closed"])),
-            "" if r is rows[-1] or not r["nearer"]["n"] else f"{r['nearer']['k']}/{r['nearer']['n']}",
-        ]
-        for r in rows
-    ]
+    head = ["", "names mechanism and place", "clean", "visible", "share of the gap closed, visible", "better, visible"]
     return f"""
-## Rivals under the same data
+## Reference regressors on the same recordings
 
-Each starts from the calibrated model. Errors on kept-back recordings over the floor in the worst channel, and the share
-of the gap to the floor closed in the channel that was off most: medians, with bootstrap intervals. "Nearer" counts the
-visible cases in which a rival leaves less in the worst channel than this diagnosis does.
+Each starts from the recalibrated model and learns its residuals. "Clean" and "visible" give the error on held-out
+recordings over the noise floor, in the worst channel. The gap is the one between the recalibrated model's error and the
+noise floor, in the channel where their ratio is largest. Values are medians with 95 % bootstrap intervals. "Better"
+counts the visible cases in which the method has less error in the worst channel than this diagnosis.
 
-{table(head, lines)}
+{table(head, map(_method_row, rows))}
 """
 
 
-def _value(s) -> str:
+def _method_row(row: dict) -> list[str]:
+    is_diagnosis, better = row["method"] == DIAGNOSED, row["better"]
+    return [
+        row["method"],
+        "yes" if is_diagnosis else "no",
+        *map(_value, (row["clean"], row["visible"], row["closed"])),
+        "" if is_diagnosis or not better["n"] else f"{better['k']}/{better['n']}",
+    ]
+
+
+def _value(s: dict) -> str:
     return "" if s["value"] is None else f"{s['value']:.2f} ({s['low']:.2f} to {s['high']:.2f}), {s['n']} cases"
 
 
-def _detection_rows(detection):
+def _detection_rows(detection: dict[str, dict]) -> Iterator[list]:
     for name, found in detection.items():
         points = found["points"]
         half = "" if found["half_size"] is None else f"{found['half_size']:.2g} {found['unit']}".removesuffix(" 1")
-        yield [name, len(points), sum(p["noticed"] for p in points), sum(p["named"] for p in points), half]
+        yield [name, len(points), sum(p["detected"] for p in points), sum(p["identified"] for p in points), half]
 
 
-_MISS_HEAD = ["case", "recorded", "hidden", "size", "before, in floors", "said", "why there is nothing"]
+_MISS_HEAD = ["case", "protocol", "true effects", "size", "error before, in noise floors", "diagnosis", "failure"]
 
 
-def _miss_row(m):
-    said = "; ".join(m["named"]) or (", ".join(m["alternatives"]) if m["verdict"] == "undecided" else "")
-    report = " ".join(m["why"].split()).replace("|", "/")[-160:]
+def _miss_row(m: dict) -> list[str]:
+    reported = "; ".join(m["identified"]) or (", ".join(m["alternatives"]) if m["verdict"] == "undecided" else "")
+    failure = " ".join(m["failure"].split()).replace("|", "/")[-160:]
     return [
         f"{m['case']} ({m['kind']})",
         m["recorded"],
-        ", ".join(m["truth"]) or "nothing",
+        ", ".join(m["truth"]) or "none",
         ", ".join(m["size"]),
-        "" if m["over_floor"] is None else m["over_floor"],
-        f"{m['verdict']}{': ' if said else ''}{said}",
-        report,
+        "" if m["error_before"] is None else str(m["error_before"]),
+        f"{m['verdict']}{': ' if reported else ''}{reported}",
+        failure,
     ]

@@ -1,4 +1,4 @@
-"""What cases are drawn from (`proof/proof.yaml`), typed."""
+"""Typed settings of the draws (`proof/proof.yaml`)."""
 
 from functools import cache
 from pathlib import Path
@@ -16,7 +16,7 @@ Range = tuple[float, float]
 
 
 class RigPlan(Strict):
-    """Ranges of the rig's values."""
+    """Ranges of the rig's parameters."""
 
     length_m: Range
     stiffness_N_per_m: Range
@@ -31,7 +31,7 @@ class RigPlan(Strict):
 
 
 class EstimatesPlan(Strict):
-    """By which share the stated stiffness and friction are off."""
+    """Relative errors of the stiffness and friction that a batch states; a share `far_share` of them is from `far`."""
 
     near: Range
     far: Range
@@ -39,7 +39,7 @@ class EstimatesPlan(Strict):
 
 
 class SensorsPlan(Strict):
-    """The sensors, and ranges of their noise."""
+    """The sensors, and the ranges of their noise."""
 
     sample_rate_Hz: PositiveFloat
     counts_per_rev: PositiveInt
@@ -58,7 +58,7 @@ class SensorsPlan(Strict):
 
 
 class NumericsPlan(Strict):
-    """The rig's numerics; the tension limit is a first one, raised where a run needs it."""
+    """The rig's numerics. `first_tension_limit_N` is raised for a run that exceeds it."""
 
     cell_length_m: PositiveFloat
     cell_bend_rad: PositiveFloat
@@ -70,7 +70,7 @@ class NumericsPlan(Strict):
 
 
 class MotionPlan(Strict):
-    """What differs from recording to recording besides the protocol."""
+    """Ranges of the motion within a protocol, drawn for each recording."""
 
     rest_s: Range
     start_up_cycles: Range
@@ -79,7 +79,10 @@ class MotionPlan(Strict):
 
 
 class PlannedRecording(Strict):
-    """A recording of a protocol; `pretension` and `bend` are factors of the case's own. `again` repeats another's."""
+    """A recording of a protocol.
+
+    `pretension` and `bend` are factors of the case's own. `again` names the recording whose motion is repeated.
+    """
 
     id: str
     pretension: PositiveFloat
@@ -89,14 +92,14 @@ class PlannedRecording(Strict):
 
 
 class Conditions(Strict):
-    """Ranges of the factors of pretension and bend in which recordings are kept back."""
+    """Ranges of the factors of pretension and bend for held-out recordings."""
 
     pretension: Range
     bend: Range
 
 
 class Protocol(Strict):
-    """What is recorded of a case; a poor one cannot tell all effects apart."""
+    """The recordings of a case. A poor protocol cannot distinguish all effects."""
 
     recordings: tuple[PlannedRecording, ...] = Field(min_length=1)
     kept_back: Conditions
@@ -105,7 +108,7 @@ class Protocol(Strict):
 
 
 class KeptBackPlan(Strict):
-    """The motions that only the scorer sees."""
+    """Motions of the held-out recordings, which only the scorer reads."""
 
     recordings: PositiveInt
     amplitude_rad: Range
@@ -117,7 +120,7 @@ class KeptBackPlan(Strict):
 
 
 class EffectPlan(Strict):
-    """Where an effect can act, and how large."""
+    """Places and range of sizes of an effect; `also` holds ranges of its further parameters."""
 
     places: tuple[str, ...] = Field(min_length=1)
     size: Range
@@ -126,8 +129,8 @@ class EffectPlan(Strict):
     also: dict[str, Range] = Field(default_factory=dict)
 
 
-class Asked(Strict):
-    """A case with a seed of its own."""
+class FixedCase(Strict):
+    """A case whose seed is fixed."""
 
     seed: PositiveInt
     kind: str
@@ -135,14 +138,14 @@ class Asked(Strict):
 
 
 class Full(Strict):
-    """The full proof: how many cases, and of these how many the page is of where nothing else is said."""
+    """The full validation: its number of cases, and how many of them a run without further options takes."""
 
     cases: PositiveInt
-    part: PositiveInt
+    sample: PositiveInt
 
 
 class Plan(Strict):
-    """All of it."""
+    """All settings of the draws."""
 
     rig: RigPlan
     estimates: EstimatesPlan
@@ -157,7 +160,7 @@ class Plan(Strict):
     kept_back: KeptBackPlan
     effects: dict[str, EffectPlan]
     unlisted: dict[str, EffectPlan]
-    quick: tuple[Asked, ...]
+    quick: tuple[FixedCase, ...]
     full: Full
 
     @model_validator(mode="after")

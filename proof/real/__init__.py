@@ -1,7 +1,7 @@
-"""Measured recordings with something put into them, diagnosed where nothing else is in reach.
+"""Seeded faults in measured recordings, diagnosed in isolation.
 
-A model in use is found from some of a real instrument's recordings, as its owner would. Others, which it has not seen,
-are diagnosed beside it, with the model held: untouched, with one thing put into their channels, and beside a model that
-something was taken out of. What is put in is drawn from a seed; names say nothing of it, and no answer is on disk while
-the diagnosis runs.
+A baseline model is identified from some of a real instrument's recordings. The remaining recordings are diagnosed with
+that baseline frozen: as measured, with one fault seeded into their channels, and with one mechanism removed from the
+baseline. Faults and their sizes are drawn from a seed. The names of the cases reveal nothing, and no answer is on disk
+while the diagnosis runs.
 """

@@ -1,4 +1,4 @@
-"""The cases: what is put into the watched recordings, or taken out of the model in use, one thing at a time."""
+"""The cases: one seeded fault each, or one mechanism removed from the baseline model."""
 
 import hashlib
 import json
@@ -11,73 +11,78 @@ from proof.real.plan import RealPlan
 
 @dataclass(frozen=True)
 class RealCase:
-    """One diagnosis of the watched recordings; with neither a kind nor anything left out they are untouched.
+    """One diagnosis of the test recordings. Without a fault and with a complete baseline it is the control.
 
     Attributes
     ----------
     seed, number : int
-        Of the plan, and among its cases: the answer is made again from them.
-    kind : str or None
-        What is put in, of `proof.real.put_in.KINDS`.
+        Seed of the plan and number among its cases. The answer is made again from them.
+    fault : str or None
+        The seeded fault, a key of `proof.real.faults.FAULTS`.
     size : float
-        In the kind's unit.
-    left_out : str or None
-        "name at place" of what is taken out of the model in use.
+        In the fault's unit.
+    removed : str or None
+        "name at place" of the mechanism that the baseline lacks.
     without : tuple of str
-        What is taken off the diagnosis's list.
+        Mechanisms removed from the diagnosis's candidates.
     """
 
     seed: int
     number: int
-    kind: str | None = None
+    fault: str | None = None
     size: float = 0.0
-    left_out: str | None = None
+    removed: str | None = None
     without: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
-        """Says nothing of what it is."""
+        """A hash, which reveals neither fault nor size."""
         return "case-" + hashlib.sha256(f"{self.seed} real {self.number}".encode()).hexdigest()[:10]
 
     @property
     def digest(self) -> str:
-        """Digest of the answer."""
+        """SHA-256 of the answer."""
         return hashlib.sha256(json.dumps(asdict(self)).encode()).hexdigest()
+
+    @property
+    def is_control(self) -> bool:
+        """Whether recordings and baseline are unchanged."""
+        return self.fault is None and self.removed is None
 
 
 def cases_of(plan: RealPlan, model: dict) -> list[RealCase]:
-    """All cases, in the order in which they are run; `model` is the content of the model file in use."""
-    cases: list[dict] = [{}, *(_drawn(plan, kind, 0) for kind in plan.put_in)]
-    for left_out in map(acting_of, model["mechanisms"]):
-        cases += [{"left_out": left_out, "without": without} for without in ((), (name_of(left_out),))]
-    cases += [_drawn(plan, kind, repeat) for repeat in range(1, plan.repeats) for kind in plan.put_in]
+    """All cases, in the order in which they are run; `model` is the content of the baseline's model file."""
+    cases: list[dict] = [{}, *(_draw(plan, fault, 0) for fault in plan.faults)]
+    for removed in map(label, model["mechanisms"]):
+        cases += [{"removed": removed, "without": without} for without in ((), (name_of(removed),))]
+    cases += [_draw(plan, fault, repeat) for repeat in range(1, plan.repeats) for fault in plan.faults]
     return [RealCase(plan.seed, number, **case) for number, case in enumerate(cases)]
 
 
-def _drawn(plan: RealPlan, kind: str, repeat: int) -> dict:
-    # A generator of its own, so that a kind more or a repeat more leaves the sizes of the others as they are.
-    random = np.random.default_rng([plan.seed, repeat, *kind.encode()])
-    low, high = plan.put_in[kind].size
+def _draw(plan: RealPlan, fault: str, repeat: int) -> dict:
+    # Each size has its own generator, so that adding a fault or a repeat does not change the others.
+    random = np.random.default_rng([plan.seed, repeat, *fault.encode()])
+    low, high = plan.faults[fault].size
     size = float(np.exp(random.uniform(np.log(low), np.log(high))))
-    sign = random.choice([-1, 1]) if plan.put_in[kind].signed else 1
-    return {"kind": kind, "size": sign * size}
+    sign = random.choice([-1, 1]) if plan.faults[fault].signed else 1
+    return {"fault": fault, "size": sign * size}
 
 
-def lacking(model: dict, left_out: str | None) -> dict:
-    """A model file's content without one of its mechanisms."""
-    return model | {"mechanisms": [m for m in model["mechanisms"] if acting_of(m) != left_out]}
+def without_mechanism(model: dict, removed: str | None) -> dict:
+    """Content of a model file without one of its mechanisms."""
+    return model | {"mechanisms": [m for m in model["mechanisms"] if label(m) != removed]}
 
 
-def acting_of(mechanism: dict) -> str:
+def label(mechanism: dict) -> str:
     """A mechanism of a model file or a diagnosis as "name at place"."""
     return f"{mechanism['name']} at {mechanism['place']}"
 
 
-def name_of(acting: str) -> str:
+def name_of(label: str) -> str:
     """The name in "name at place"."""
-    return acting.partition(" at ")[0]
+    return label.partition(" at ")[0]
 
 
-def place_of(acting: str) -> str:
+def place_of(label: str) -> str:
     """The place in "name at place"."""
-    return acting.partition(" at ")[2]
+    return label.partition(" at ")[2]

@@ -1,4 +1,4 @@
-"""The page on measured recordings with something put into them, `docs/real-concealment.md`."""
+"""The page on seeded faults in measured recordings, `docs/real-concealment.md`."""
 
 import json
 from collections.abc import Sequence
@@ -6,133 +6,148 @@ from datetime import date
 from pathlib import Path
 
 from proof.page import commit, table
-from proof.real.cases import acting_of
+from proof.real.cases import label
 from proof.real.plan import RealPlan
-from proof.real.run import ALLOWED, MODEL
-from proof.real.score import RealOutcome, found_size, is_right, is_size_found, made_of
+from proof.real.run import BASELINE, TOLERANCE
+from proof.real.score import IDENTIFIED, RealOutcome, classification, estimated_size, is_right, is_size_recovered
 
-# What people make of the tables stands below this line of the page and stays when the tables are made again.
-BY_HAND = "## What follows from it"
+# The text from this heading on is written by hand and kept when the tables are made again.
+BY_HAND = "## Discussion"
 
 
-def real_page(outcomes: Sequence[RealOutcome], plan: RealPlan, in_use: Path, earlier: str = "") -> str:
-    """The page's text.
+def real_page(outcomes: Sequence[RealOutcome], plan: RealPlan, baseline: Path, earlier: str = "") -> str:
+    """The page as Markdown.
 
     Parameters
     ----------
     outcomes : sequence of RealOutcome
     plan : RealPlan
-    in_use : Path
-        Folder of the model in use.
+    baseline : Path
+        Folder of the baseline (`proof.real.run.find_baseline`).
     earlier : str
-        The page as it stands, of which what was written by hand is kept.
+        The present page, whose hand-written part is kept.
     """
-    model, allowed, first = (
-        json.loads((in_use / file).read_text(encoding="utf-8")) for file in (MODEL, ALLOWED, "first/diagnosis.json")
-    )
-    untouched = next((o for o in outcomes if not o.case.kind and not o.case.left_out), None)
-    took = sorted(o.took_s for o in outcomes)
-    sizes = [is_size_found(o) for o in outcomes if made_of(o).startswith("named") and is_right(o)]
+    control = next((o for o in outcomes if o.case.is_control), None)
+    seeded = [_fault_row(o, plan) for o in outcomes if o.case.fault]
+    removed = [_removed_row(o) for o in outcomes if o.case.removed]
     by_hand = earlier[earlier.index(BY_HAND) :] if BY_HAND in earlier else f"{BY_HAND}\n\nNot written yet.\n"
-    return f"""# Something put into measured recordings
+    return f"""# Seeded faults in measured recordings
 
-Made by `make proof-real` on {date.today().isoformat()}, commit {commit()}; the diagnosis's sources have the digest
-{allowed["diagnosis"]}.
+{_method(plan, baseline)}
+## Result
 
-**Measured** are the recordings: `{plan.batch}` of MRDLab/mis-tool-characterization, a da Vinci grasper ([what they
-are](real-instrument.md)). **Put in** is one thing at a time, by arithmetic on the raw counts, into all recordings
-alike; nothing else is changed, and the recordings themselves are in no commit. What is put in and how large is drawn
-from a seed ([bounds and sources](../proof/real/plan.yaml)); the diagnosis ran in a process of its own that can reach a
-copy of the batch and the model in use, and nothing else. No answer was on disk, and names say nothing.
+{_summary(outcomes)}
 
-**The model in use** was found from {len(plan.known)} recordings ({_ids(plan.known)}) as any owner would find it, with
-{100 * plan.allowance:g} % of peak to peak allowed: `{first["verdict"]}`{_nearest_words(first)}: {_listed(model)}.
-It leaves {_nearest_left(first):.2f} of what was allowed, in the mean square, on recordings held out. It is not the
-whole truth. Allowed from then on was therefore the first of a ladder with which a diagnosis of these same recordings,
-the model held, says that nothing else is missing: {_ladder(allowed)}.
+## Control
 
-The other {len(plan.watched)} recordings ({_ids(plan.watched)}) are the watched ones. They are diagnosed beside the
-model with {100 * allowed["allowance"]:g} % allowed, and the model is held (`--hold`): nothing of it is fitted anew but
-the zeros of the two torques.
+The test recordings without a fault: {_control(control)}
 
-{sum(map(is_right, outcomes))} of {len(outcomes)} are right; {sum(bool(o.wrong_names) for o in outcomes)} are
-confidently wrong, that is, something that it is not was named with a probability of 0.8 or more. Of {len(sizes)} that
-were named rightly {sum(map(bool, sizes))} have their size to a quarter. A diagnosis took {took[len(took) // 2]:.0f} s
-of one core in the middle, {took[-1]:.0f} s at most.
+## Seeded faults
 
-## Untouched
+- **Changed**: standard deviation of the change over the channel's peak to peak.
+- **Mean square**: residual mean square of the frozen baseline on the faulty recordings, over the square of the
+  tolerance.
+- **Right**: the mechanism is identified or among the alternatives, at its place, or an equivalent that no recording
+  distinguishes from it (a gain at one end is an inverse gain at the other). If no candidate models the fault, right is
+  `unexplained` or `undecided` at any place, with no mechanism stated with confidence.
 
-{_untouched(untouched)}
+{_rows(_FAULT_HEAD, seeded)}
 
-## Put in
+## Mechanisms removed from the baseline
 
-"Changed" is the standard deviation of what was changed, as a share of the channel's peak to peak. "Left" is the mean
-square that the model, held, leaves of these recordings, over what was allowed. Right is: named or undecided with it, at
-its place, or with its equal that no recording tells from it (a gain at one end is one at the other); of what no list
-knows, `unexplained` or `undecided` at whatever place, and nothing named confidently.
+The test recordings without a fault, with one mechanism removed from the baseline. If it is among the candidates, right
+is to identify it with its value. If it is not, right is `unexplained` or `undecided` at its place.
 
-{_rows(_PUT_IN_HEAD, [_put_in_row(o, plan) for o in outcomes if o.case.kind])}
-
-## Taken out of the model in use
-
-The untouched recordings beside the model without one of its mechanisms. On the list it should be named, with its value;
-off the list it should turn into `unexplained` or `undecided`, at the same place.
-
-{_rows(_TAKEN_HEAD, [_taken_row(o) for o in outcomes if o.case.left_out])}
+{_rows(_REMOVED_HEAD, removed)}
 
 {by_hand}"""
 
 
-_FOUND_HEAD = ["left", "said", "which is", "right", "place said", "size found"]
-_PUT_IN_HEAD = ["put in", "size", "changed", *_FOUND_HEAD]
-_TAKEN_HEAD = ["taken out", "of", "off the list", *_FOUND_HEAD]
+def _method(plan: RealPlan, baseline: Path) -> str:
+    model, tolerance, first = (
+        json.loads((baseline / file).read_text(encoding="utf-8"))
+        for file in (BASELINE, TOLERANCE, "first/diagnosis.json")
+    )
+    return f"""Made by `make proof-real` on {date.today().isoformat()}, commit {commit()}; the diagnosis's sources
+have the digest {tolerance["diagnosis"]}.
+
+- **Recordings**: `{plan.batch}` of MRDLab/mis-tool-characterization, a da Vinci grasper ([the
+  instrument](real-instrument.md)). They are measured, and in no commit.
+- **Faults**: one at a time, computed on the raw counts and seeded in all test recordings alike. Fault and size are
+  drawn from a seed ([ranges and sources](../proof/real/plan.yaml)).
+- **Isolation**: the diagnosis runs in a process that can reach only a copy of the batch and the baseline. No answer is
+  on disk, and names reveal nothing.
+- **Baseline**: identified from {len(plan.training)} training recordings ({_ids(plan.training)}) with a tolerance of
+  {100 * plan.tolerance:g} % of peak to peak. The verdict was `{first["verdict"]}`{_nearest_words(first)}:
+  {_mechanisms(model)}. Its cross-validated mean square is {_nearest_mean_square(first):.2f} times the square of the
+  tolerance.
+- **Tolerance**: {100 * tolerance["tolerance"]:g} % of peak to peak, the first of a sequence with which the frozen
+  baseline agrees with the training recordings: {_sequence(tolerance)}.
+- **Test**: the other {len(plan.test)} recordings ({_ids(plan.test)}), diagnosed with the frozen baseline (`--freeze`):
+  only the zeros of the two torques are fitted.
+"""
+
+
+def _summary(outcomes: Sequence[RealOutcome]) -> str:
+    sizes = [is_size_recovered(o) for o in outcomes if classification(o) in IDENTIFIED and is_right(o)]
+    took = sorted(o.took_s for o in outcomes)
+    return f"""- Right diagnoses: {sum(map(is_right, outcomes))} of {len(outcomes)}.
+- Confident misidentifications, with a confidence of 0.8 or more: {sum(bool(o.confidently_wrong) for o in outcomes)}.
+- Right identifications with a size within 25 %: {sum(map(bool, sizes))} of {len(sizes)}.
+- Processor time of a diagnosis: median {took[len(took) // 2]:.0f} s, maximum {took[-1]:.0f} s."""
+
+
+_FOUND_HEAD = ["mean square", "diagnosis", "classification", "right", "reported place", "estimated size"]
+_FAULT_HEAD = ["fault", "size", "changed", *_FOUND_HEAD]
+_REMOVED_HEAD = ["removed", "value", "candidate", *_FOUND_HEAD]
 
 
 def _rows(head: list[str], rows: list[list[str]]) -> str:
     return table(head, rows) if rows else "Not run."
 
 
-def _untouched(o: RealOutcome | None) -> str:
-    return f"`{_said(o)}`: {made_of(o)}, {_left(o)} of what was allowed is left." if o else "Not run."
+def _control(o: RealOutcome | None) -> str:
+    return f"`{_reported(o)}`, {classification(o)}; mean square {_mean_square(o)}." if o else "not run."
 
 
-def _put_in_row(o: RealOutcome, plan: RealPlan) -> list[str]:
-    unit = plan.put_in[o.case.kind].unit
+def _fault_row(o: RealOutcome, plan: RealPlan) -> list[str]:
+    unit = plan.faults[o.case.fault].unit
     changed = ", ".join(f"{c} {100 * share:.1f} %" for c, share in o.changed.items())
-    return [o.case.kind.replace("-", " "), _sized(o.case.size, unit), changed, *_found(o, unit)]
+    return [o.case.fault.replace("-", " "), _sized(o.case.size, unit), changed, *_found(o, unit)]
 
 
-def _taken_row(o: RealOutcome) -> list[str]:
-    return [o.case.left_out, _sized(o.truth.size, ""), "yes" if o.case.without else "", *_found(o, "")]
+def _removed_row(o: RealOutcome) -> list[str]:
+    return [o.case.removed, _sized(o.truth.size, ""), "no" if o.case.without else "yes", *_found(o, "")]
 
 
 def _found(o: RealOutcome, unit: str) -> list[str]:
     right = "yes" if is_right(o) else "**no**"
-    place = (o.said or {}).get("place") or ""
-    return [_left(o), _said(o), made_of(o), right, place, _sized(found_size(o), unit)]
+    place = (o.diagnosis or {}).get("place") or ""
+    return [_mean_square(o), _reported(o), classification(o), right, place, _sized(estimated_size(o), unit)]
 
 
-def _said(o: RealOutcome) -> str:
-    """The verdict and who it is about."""
-    if not o.said:
-        return f"none ({o.why[-120:]})"
+def _reported(o: RealOutcome) -> str:
+    """The verdict and its mechanisms with their confidences."""
+    if not o.diagnosis:
+        return f"none ({o.failure[-120:]})"
     if o.claims:
-        return f"{o.verdict}: " + "; ".join(f"{acting_of(m)} ({m['confidence']:.2f})" for m in o.claims)
-    nearest = (o.said.get("nearest") or {"mechanisms": []})["mechanisms"]
-    return f"{o.verdict}, nearest {' + '.join(map(acting_of, nearest))}" if nearest else o.verdict
+        return f"{o.verdict}: " + "; ".join(f"{label(m)} ({m['confidence']:.2f})" for m in o.claims)
+    nearest = (o.diagnosis.get("nearest") or {"mechanisms": []})["mechanisms"]
+    return f"{o.verdict}, nearest {' + '.join(map(label, nearest))}" if nearest else o.verdict
 
 
-def _left(o: RealOutcome) -> str:
-    return f"{o.said['left']['calibrated']:.2f}" if o.said else ""
+def _mean_square(o: RealOutcome) -> str:
+    return f"{o.diagnosis['mean_square']['calibrated']:.2f}" if o.diagnosis else ""
 
 
-def _nearest_left(said: dict) -> float:
-    """What the best hypothesis left, right or not."""
-    return said["nearest"]["mean_square"] if said["nearest"] else said["fit"]["mean_square"]["extended"]
+def _nearest_mean_square(diagnosis: dict) -> float:
+    """Mean square of the best candidate model, adequate or not."""
+    nearest = diagnosis["nearest"]
+    return nearest["mean_square"] if nearest else diagnosis["fit"]["mean_square"]["extended"]
 
 
-def _nearest_words(said: dict) -> str:
-    return ", and in use is what came nearest" if said["nearest"] else ""
+def _nearest_words(diagnosis: dict) -> str:
+    return ", and the nearest candidate model is taken" if diagnosis["nearest"] else ""
 
 
 def _sized(value: float | None, unit: str) -> str:
@@ -143,12 +158,13 @@ def _ids(names: Sequence[str]) -> str:
     return ", ".join(name.removeprefix("trial-") for name in names)
 
 
-def _listed(model: dict) -> str:
-    values = [(acting_of(m), ", ".join(f"{n} {v:.3g}" for n, v in m["values"].items())) for m in model["mechanisms"]]
-    return " and ".join(f"{acting} ({value})" for acting, value in values)
+def _mechanisms(model: dict) -> str:
+    values = [(label(m), ", ".join(f"{n} {v:.3g}" for n, v in m["values"].items())) for m in model["mechanisms"]]
+    return " and ".join(f"{mechanism} ({value})" for mechanism, value in values)
 
 
-def _ladder(allowed: dict) -> str:
+def _sequence(tolerance: dict) -> str:
     return ", ".join(
-        f"{100 * float(a):g} % ({t['verdict']}, {t['left']:.2f} left)" for a, t in allowed["tried"].items()
+        f"{100 * float(a):g} % ({t['verdict']}, mean square {t['mean_square']:.2f})"
+        for a, t in tolerance["tried"].items()
     )

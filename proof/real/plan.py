@@ -1,4 +1,4 @@
-"""What is put into measured recordings, how large, and how they are diagnosed (`plan.yaml`)."""
+"""Typed settings of the seeded faults and of their diagnosis (`plan.yaml`)."""
 
 from functools import cache
 from pathlib import Path
@@ -7,46 +7,46 @@ from typing import Self
 import yaml
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
-from proof.real.put_in import KINDS
+from proof.real.faults import FAULTS
 from virtualrig.strict import Share, Strict
 
 PLAN = Path(__file__).with_name("plan.yaml")
 Range = tuple[PositiveFloat, PositiveFloat]
 
 
-class PutInPlan(Strict):
-    """How large a thing that is put in can be, and what is right to say of it."""
+class FaultPlan(Strict):
+    """Range of sizes of a seeded fault, and the right diagnosis of it (see the comments of `plan.yaml`)."""
 
     size: Range
     unit: str
     signed: bool = False
-    called: str | None = None
+    mechanism: str | None = None
     parameter: str | None = None
-    same: tuple[str, ...] = ()
+    equivalent: tuple[str, ...] = ()
     place: str | None = None
 
 
 class RealPlan(Strict):
-    """All of `plan.yaml`."""
+    """All settings."""
 
     seed: PositiveInt
     batch: str
-    known: tuple[str, ...] = Field(min_length=2)
-    watched: tuple[str, ...] = Field(min_length=2)
+    training: tuple[str, ...] = Field(min_length=2)
+    test: tuple[str, ...] = Field(min_length=2)
     step_s: PositiveFloat
     cycles: PositiveInt
-    allowance: Share
-    suspects: tuple[tuple[str, ...], ...]
-    allowances: tuple[Share, ...] = Field(min_length=1)
+    tolerance: Share
+    forced_candidates: tuple[tuple[str, ...], ...]
+    tolerances: tuple[Share, ...] = Field(min_length=1)
     repeats: PositiveInt
-    put_in: dict[str, PutInPlan]
+    faults: dict[str, FaultPlan]
 
     @model_validator(mode="after")
-    def _can_be_put_in(self) -> Self:
-        if unknown := set(self.put_in) - set(KINDS):
-            raise ValueError(f"put_in: there is no {', '.join(sorted(unknown))}; there are {', '.join(KINDS)}")
-        if both := set(self.known) & set(self.watched):
-            raise ValueError(f"known and watched share {', '.join(sorted(both))}")
+    def _is_consistent(self) -> Self:
+        if unknown := set(self.faults) - set(FAULTS):
+            raise ValueError(f"faults: there is no {', '.join(sorted(unknown))}; there are {', '.join(FAULTS)}")
+        if both := set(self.training) & set(self.test):
+            raise ValueError(f"training and test share {', '.join(sorted(both))}")
         return self
 
 

@@ -1,6 +1,6 @@
-"""What diagnoses of measured recordings say of what was put into them.
+"""The diagnoses of measured recordings, scored against the seeded faults.
 
-The answers are made again from the plan's seed and the model in use; a result whose key does not match, or whose
+The answers are made again from the plan's seed and the baseline. A result with another answer's digest, or whose
 diagnosis tried to reach more than its batch, is refused and counts as none.
 """
 
@@ -9,162 +9,171 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from proof.real.cases import RealCase, acting_of, cases_of, name_of, place_of
+from proof.outcome import DECISION_THRESHOLD, refusal, same_place
+from proof.real.cases import RealCase, cases_of, label, name_of, place_of
 from proof.real.plan import RealPlan
-from proof.real.run import MODEL
-from proof.score import SURE, refusal, same_place
+from proof.real.run import BASELINE
 
-# A size is found if it is off by no more than this share.
-FOUND = 0.25
+# A size is recovered if its relative error is at most this.
+SIZE_TOLERANCE = 0.25
+IDENTIFIED = ("identified", "identified an equivalent")
+INCLUDED = ("undecided, includes it", "undecided, includes an equivalent")
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What a diagnosis could say that is right.
+    """The right diagnosis of a case.
 
     Attributes
     ----------
-    called : str or None
-        "name at place"; None where nothing on any list means the same, or nothing is missing.
+    mechanism : str or None
+        "name at place"; None if no candidate has the same meaning, or if nothing is changed.
     place : str or None
-        Where it is; None where nothing is missing.
-    same : tuple of str
-        What no recording tells from it.
+        None if nothing is changed.
+    equivalent : tuple of str
+        Mechanisms that no recording distinguishes from it.
     parameter : str or None
-        Number of the mechanism that tells the size.
+        The mechanism's parameter that the size refers to.
     size : float
-        By how much that number differs from the model's.
-    before : float
-        What the model has that number at; 0 where it lacks the mechanism.
+        Difference of that parameter from the baseline's value.
+    baseline : float
+        The baseline's value; 0 if it lacks the mechanism.
     """
 
-    called: str | None = None
+    mechanism: str | None = None
     place: str | None = None
-    same: tuple[str, ...] = ()
+    equivalent: tuple[str, ...] = ()
     parameter: str | None = None
     size: float = 0.0
-    before: float = 0.0
+    baseline: float = 0.0
 
 
 @dataclass(frozen=True)
 class RealOutcome:
-    """A case beside what was said of it."""
+    """A case, its right diagnosis and the reported one; `failure` is why there is none."""
 
     case: RealCase
     truth: Truth
-    said: dict | None
-    why: str = ""
+    diagnosis: dict | None
+    failure: str = ""
     changed: dict[str, float] = field(default_factory=dict)
     took_s: float = 0.0
 
     @property
     def verdict(self) -> str:
-        """What was said; "none" where nothing was."""
-        return self.said["verdict"] if self.said else "none"
+        """The verdict; "none" if there is no diagnosis."""
+        return self.diagnosis["verdict"] if self.diagnosis else "none"
 
     @property
     def claims(self) -> list[dict]:
-        """What is named, the first first, and then what else it might be."""
-        return [*self.said["mechanisms"], *self.said["alternatives"]] if self.said else []
+        """Identified mechanisms, the first one first, and then the alternatives."""
+        return [*self.diagnosis["mechanisms"], *self.diagnosis["alternatives"]] if self.diagnosis else []
 
     @property
-    def in_place(self) -> bool:
-        """Whether the place that is said is the right one, or so close that no recording tells them apart."""
-        return bool(self.said) and same_place(self.said["place"], self.truth.place)
+    def is_located(self) -> bool:
+        """Whether the reported place is the right one, or equivalent to it."""
+        return bool(self.diagnosis) and same_place(self.diagnosis["place"], self.truth.place)
 
     @property
-    def right_names(self) -> tuple[str, ...]:
-        """What is right to name, itself first."""
+    def right_labels(self) -> tuple[str, ...]:
+        """Mechanisms that are right to identify, the true one first; none if it is not a candidate."""
         truth = self.truth
-        return (truth.called, *truth.same) if truth.called and name_of(truth.called) not in self.case.without else ()
+        is_candidate = truth.mechanism and name_of(truth.mechanism) not in self.case.without
+        return (truth.mechanism, *truth.equivalent) if is_candidate else ()
 
     @property
-    def wrong_names(self) -> list[str]:
-        """What is named confidently, and wrongly."""
-        sure = [acting_of(claim) for claim in self.claims if claim["confidence"] >= SURE]
-        return [acting for acting in sure if acting not in self.right_names]
+    def confidently_wrong(self) -> list[str]:
+        """Wrong mechanisms that are stated with confidence."""
+        confident = [label(claim) for claim in self.claims if claim["confidence"] >= DECISION_THRESHOLD]
+        return [mechanism for mechanism in confident if mechanism not in self.right_labels]
 
 
 def truth_of(case: RealCase, plan: RealPlan, model: dict) -> Truth:
-    """What is right to say of a case."""
-    values = {acting_of(m): m["values"] for m in model["mechanisms"]}
-    if case.left_out:
-        parameter, size = next(iter(values[case.left_out].items()))
-        return Truth(case.left_out, place_of(case.left_out), (), parameter, size)
-    if case.kind is None:
+    """The right diagnosis of a case; `model` is the content of the baseline's model file."""
+    values = {label(m): m["values"] for m in model["mechanisms"]}
+    if case.removed:
+        parameter, size = next(iter(values[case.removed].items()))
+        return Truth(case.removed, place_of(case.removed), (), parameter, size)
+    if case.fault is None:
         return Truth()
-    stated = plan.put_in[case.kind]
-    place = place_of(stated.called) if stated.called else stated.place
-    before = values.get(stated.called, {}).get(stated.parameter, 0.0)
-    return Truth(stated.called, place, stated.same, stated.parameter, case.size, before)
+    fault = plan.faults[case.fault]
+    place = place_of(fault.mechanism) if fault.mechanism else fault.place
+    baseline = values.get(fault.mechanism, {}).get(fault.parameter, 0.0)
+    return Truth(fault.mechanism, place, fault.equivalent, fault.parameter, case.size, baseline)
 
 
 def read_real_outcomes(plan: RealPlan, folder: Path) -> list[RealOutcome]:
-    """Outcomes of the cases that have a result, in their order."""
-    model = json.loads((folder / "model" / MODEL).read_text(encoding="utf-8"))
+    """Outcomes of the cases that have a result, in the order of the cases."""
+    model = json.loads((folder / "baseline" / BASELINE).read_text(encoding="utf-8"))
     files = [(case, folder / "cases" / case.name / "result.json") for case in cases_of(plan, model)]
     results = [(case, json.loads(file.read_text(encoding="utf-8"))) for case, file in files if file.exists()]
     return [outcome_of(case, truth_of(case, plan, model), result) for case, result in results]
 
 
 def outcome_of(case: RealCase, truth: Truth, result: dict) -> RealOutcome:
-    """Put a result beside the answer."""
-    why = refusal(result, case)
-    said = None if why else result["said"]
-    return RealOutcome(case, truth, said, why or result["why"] or "", result["changed"], result["took_s"])
+    """Combine a result with the answer."""
+    refused = refusal(result, case)
+    diagnosis = None if refused else result["diagnosis"]
+    failure = refused or result["failure"] or ""
+    return RealOutcome(case, truth, diagnosis, failure, result["changed"], result["took_s"])
 
 
-def made_of(o: RealOutcome) -> str:
-    """What a diagnosis made of a case, in a few words."""
-    if o.verdict == "none":
-        return "no diagnosis"
-    if o.verdict == "agrees":
-        return "let be" if o.truth.place is None else "not noticed"
-    if o.verdict == "unexplained":
-        return "unexplained, in place" if o.in_place else "unexplained, elsewhere"
-    if o.verdict == "explained":
-        return _told(o, [acting_of(o.claims[0])], "named", "named as its equal", "named elsewhere", "another name")
-    said = [acting_of(claim) for claim in o.claims]
-    return _told(o, said, *(f"undecided {w}" for w in ("with it", "with its equal", "with it elsewhere", "without it")))
+def classification(o: RealOutcome) -> str:
+    """How a diagnosis compares with the truth, in a few words."""
+    match o.verdict:
+        case "none":
+            return "no diagnosis"
+        case "agrees":
+            return "true negative" if o.truth.place is None else "false negative"
+        case "unexplained":
+            return "unexplained, right place" if o.is_located else "unexplained, other place"
+        case "explained":
+            return _best_match(o, [label(o.claims[0])], "identified", "identified {}", "misidentified")
+        case _:
+            reported = [label(claim) for claim in o.claims]
+            return _best_match(
+                o, reported, "undecided, includes it", "undecided, includes {}", "undecided, excludes it"
+            )
 
 
-def _told(o: RealOutcome, said: Collection[str], itself: str, equal: str, elsewhere: str, other: str) -> str:
-    """The word for the best of what was said."""
-    right = [acting for acting in o.right_names if acting in said]
+def _best_match(o: RealOutcome, reported: Collection[str], exact: str, near: str, other: str) -> str:
+    """The class of the best of several reported mechanisms; `near` has a field for how it differs."""
+    right = [mechanism for mechanism in o.right_labels if mechanism in reported]
     if right:
-        return itself if right[0] == o.truth.called else equal
-    names = {name_of(acting) for acting in said}
-    return elsewhere if o.right_names and name_of(o.truth.called) in names else other
+        return exact if right[0] == o.truth.mechanism else near.format("an equivalent")
+    names = {name_of(mechanism) for mechanism in reported}
+    is_elsewhere = o.right_labels and name_of(o.truth.mechanism) in names
+    return near.format("at another place") if is_elsewhere else other
 
 
 def is_right(o: RealOutcome) -> bool:
-    """Whether that is right."""
-    made = made_of(o)
+    """Whether a diagnosis is right, as the page explains."""
+    found = classification(o)
     if o.truth.place is None:
-        return made == "let be"
-    if not o.right_names:
-        is_open = o.verdict in ("unexplained", "undecided") and not o.wrong_names
-        return is_open and (o.in_place or not o.case.without)
-    if o.case.left_out:
-        return made == "named" and bool(is_size_found(o))
-    return made in ("named", "named as its equal", "undecided with it", "undecided with its equal")
+        return found == "true negative"
+    if not o.right_labels:
+        is_open = o.verdict in ("unexplained", "undecided") and not o.confidently_wrong
+        return is_open and (o.is_located or not o.case.without)
+    if o.case.removed:
+        return found == "identified" and bool(is_size_recovered(o))
+    return found in (*IDENTIFIED, *INCLUDED)
 
 
-def found_size(o: RealOutcome) -> float | None:
-    """The size that was found of what is right to find, wherever a diagnosis states it; None where it does not."""
-    if not o.said or not o.truth.parameter:
+def estimated_size(o: RealOutcome) -> float | None:
+    """Estimate of the size from whichever right mechanism is reported with values; None if none is."""
+    if not o.diagnosis or not o.truth.parameter:
         return None
-    stated = [*o.said["mechanisms"], *((o.said.get("nearest") or {}).get("mechanisms") or [])]
-    for acting in o.right_names:
-        for m in stated:
-            if acting_of(m) == acting:
+    estimated = [*o.diagnosis["mechanisms"], *((o.diagnosis.get("nearest") or {}).get("mechanisms") or [])]
+    for mechanism in o.right_labels:
+        for m in estimated:
+            if label(m) == mechanism:
                 value = next(p["value"] for p in m["parameters"] if p["name"] == o.truth.parameter)
-                # A gain that stands for its equal at the other end is that one's inverse.
-                return 1 / (1 + value) - 1 if acting in o.truth.same else value - o.truth.before
+                # A gain at one end is equivalent to the inverse gain at the other.
+                return 1 / (1 + value) - 1 if mechanism in o.truth.equivalent else value - o.truth.baseline
     return None
 
 
-def is_size_found(o: RealOutcome) -> bool | None:
-    """Whether that is the size that it has; None where none was stated."""
-    size = found_size(o)
-    return None if size is None else abs(size / o.truth.size - 1) <= FOUND
+def is_size_recovered(o: RealOutcome) -> bool | None:
+    """Whether the estimated size is within `SIZE_TOLERANCE` of the true one; None if there is no estimate."""
+    size = estimated_size(o)
+    return None if size is None else abs(size / o.truth.size - 1) <= SIZE_TOLERANCE

@@ -1,4 +1,4 @@
-"""The log file of a pipeline job."""
+"""The frame of every job of the pipeline: its log and its threads."""
 
 import logging
 import sys
@@ -6,10 +6,16 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr
 
+from ccmodel.inference.pool import set_threads
+
 
 @contextmanager
-def logged(file: str) -> Iterator[None]:
-    """Write warnings, log lines and the traceback of a failure to the log file; exit with 1 on failure."""
+def logged(file: str, threads: int = 1) -> Iterator[None]:
+    """Run a job with `threads` threads; write warnings, log lines and a traceback to its log file.
+
+    A job that fails exits with 1.
+    """
+    set_threads(threads)
     with open(file, "w") as log, redirect_stderr(log):
         logging.basicConfig(stream=log, level=logging.INFO, force=True)
         try:

@@ -8,7 +8,7 @@ from ccmodel import mechanisms
 from proof import build, convergence
 from proof.build import folder_digest, record
 from proof.cases import Case, draw
-from proof.cli import app, part_of, seed_of
+from proof.cli import app, sample_of, seed_of
 from proof.effects import ENTRIES, merged
 from proof.plan import read_plan
 from virtualrig.effects import Effects
@@ -17,21 +17,21 @@ from virtualrig.trajectory import Preparation, Trajectory
 PLAN = read_plan()
 
 
-def test_the_plan_has_every_effect_of_the_list_at_all_its_places():
+def test_the_plan_has_every_candidate_mechanism_at_all_its_places():
     every = map(mechanisms.get, mechanisms.names())
     listed = {mechanism.name: set(mechanism.places) for mechanism in every if not mechanism.by_name_only}
     assert {name: set(spec.places) for name, spec in PLAN.effects.items()} == listed
     assert set(ENTRIES) == {*PLAN.effects, *PLAN.unlisted}
 
 
-def test_values_of_an_answer_have_names_of_the_list():
+def test_true_values_have_the_names_of_the_mechanisms_parameters():
     for name in PLAN.effects:
         (truth,) = draw(3, "single", name).truth
         assert set(truth.values) <= {p.name for p in mechanisms.get(name).parameters}
 
 
-def test_a_films_answer_counts_what_else_resists_as_it_does():
-    """On both cables, at one speed: drag on every length and damping of the load, as forces at the load's end."""
+def test_true_viscous_friction_includes_the_rigs_own_damping():
+    """Forces at the load end at one speed: drag along both cables and damping of the load."""
     case = draw(3, "single", "viscous-friction")
     (truth,), rig, speed = case.truth, case.campaign.rig, 0.01
     mass_kg = 2 * rig.cable.density_kg_per_m * rig.cable.length_m
@@ -77,7 +77,7 @@ def test_strengths_are_even_in_the_logarithm():
     )
 
 
-def test_a_pair_is_two_and_a_removed_one_is_told_off_the_list():
+def test_a_pair_is_two_effects_and_a_removed_one_is_no_candidate():
     assert len({t.name for t in draw(4, "pair").truth}) == 2
     removed = draw(4, "removed", "kink")
     assert removed.without == ("kink",)
@@ -85,7 +85,7 @@ def test_a_pair_is_two_and_a_removed_one_is_told_off_the_list():
     assert draw(4, "clean").truth == ()
 
 
-def test_estimates_are_off_some_of_them_by_much():
+def test_estimates_have_errors_and_some_large_ones():
     off = [draw(s, "clean").campaign.rig for s in range(100)]
     shares = np.array([abs(np.log(r.estimates.stiffness_N_per_m / r.cable.stiffness_N_per_m)) for r in off])
     assert shares.min() > np.log(1.09)
@@ -101,11 +101,11 @@ def test_two_effects_share_a_pulley_but_no_number():
 
 @pytest.fixture(scope="module")
 def poor() -> Case:
-    """A case of a single recording."""
+    """A case with a single recording."""
     return next(c for c in (draw(s, "poor", "torque-scale") for s in range(50)) if c.protocol == "one")
 
 
-def test_a_batch_says_nothing_of_its_answer(poor, tmp_path):
+def test_a_batch_reveals_no_answer(poor, tmp_path):
     record(poor, poor.recordings, tmp_path / poor.name)
     text = (tmp_path / poor.name / "batch.yaml").read_text()
     described = yaml.safe_load(text)
@@ -116,7 +116,7 @@ def test_a_batch_says_nothing_of_its_answer(poor, tmp_path):
     assert cable["stiffness_N_per_m"] != pytest.approx(poor.campaign.rig.cable.stiffness_N_per_m, rel=0.05)
 
 
-def test_a_case_is_recorded_the_same_again(poor, tmp_path):
+def test_recording_a_case_is_reproducible(poor, tmp_path):
     for name in ("a", "b"):
         record(poor, poor.recordings, tmp_path / name)
     assert folder_digest(tmp_path / "a") == folder_digest(tmp_path / "b")
@@ -126,25 +126,25 @@ def test_a_case_is_recorded_the_same_again(poor, tmp_path):
 
 
 def test_the_rig_is_fine_enough():
-    left = convergence.measure(2)
-    assert max(left.values()) < 0.5
+    errors = convergence.measure(2)
+    assert max(errors.values()) < 0.5
 
 
-def test_the_full_proof_has_other_cases_for_other_sources():
+def test_other_sources_have_other_cases():
     assert seed_of("0123456789abcdef", 3) != seed_of("0123456789abcdee", 3)
     assert seed_of("0123456789abcdef", 3) != seed_of("0123456789abcdef", 4)
 
 
-def test_a_larger_part_holds_the_smaller():
-    small, large = part_of("0123456789abcdef", 20), part_of("0123456789abcdef", 60)
+def test_a_larger_sample_holds_the_smaller():
+    small, large = sample_of("0123456789abcdef", 20), sample_of("0123456789abcdef", 60)
     assert set(small) < set(large)
     assert len(set(large)) == 60
-    assert part_of("0123456789abcdee", 20) != small
-    assert part_of("0123456789abcdef", PLAN.full.cases) == list(range(PLAN.full.cases))
+    assert sample_of("0123456789abcdee", 20) != small
+    assert sample_of("0123456789abcdef", PLAN.full.cases) == list(range(PLAN.full.cases))
 
 
 @pytest.mark.parametrize(
-    ("asked", "told"),
+    ("arguments", "message"),
     [
         (["--kind", "sinlge"], "no kind 'sinlge'"),
         (["--kind", "single", "--effect", "dahl"], "no effect 'dahl'"),
@@ -152,14 +152,14 @@ def test_a_larger_part_holds_the_smaller():
         (["--kind", "unlisted", "--effect", "kink"], "not an effect of a case of kind unlisted"),
     ],
 )
-def test_what_cannot_be_built_is_said(asked, told, tmp_path):
-    ran = CliRunner().invoke(app, ["build", "--out", str(tmp_path), *asked])
+def test_a_case_that_cannot_be_built_is_refused(arguments, message, tmp_path):
+    ran = CliRunner().invoke(app, ["build", "--out", str(tmp_path), *arguments])
     assert ran.exit_code == 2
-    assert told in " ".join(ran.output.replace("│", " ").split())
+    assert message in " ".join(ran.output.replace("│", " ").split())
     assert not list(tmp_path.iterdir())
 
 
-def test_the_floor_is_what_noise_and_the_runs_own_friction_leave(poor, monkeypatch):
+def test_the_noise_floor_adds_sensors_and_repeatability(poor, monkeypatch):
     plan, time_s = poor.kept_back[0], np.linspace(0, 5, 500)
 
     def simulated(campaign, plan, preparation):
@@ -170,10 +170,10 @@ def test_the_floor_is_what_noise_and_the_runs_own_friction_leave(poor, monkeypat
     monkeypatch.setattr(build, "simulate", simulated)
     campaign = poor.campaign.model_copy(update={"rig": poor.campaign.rig.model_copy(update={"effects": Effects()})})
     prepared = Preparation(1.0, 7.0, (0.2, 0.2))
-    floor = build.floor_of(campaign, plan, prepared, simulated(campaign, plan, prepared))
+    floor = build.noise_floor(campaign, plan, prepared, simulated(campaign, plan, prepared))
     noise, slow = campaign.sensors.torque.noise_Nm, campaign.sensors.torque.slow_noise.ratio
     expected = np.sqrt(0.01**2 + noise**2 * (1 + slow**2) + campaign.sensors.torque.accuracy_Nm**2 / 3)
     assert floor["tau_in_Nm"] == pytest.approx(expected, rel=1e-6)
     count = 2 * np.pi / 2000 / np.sqrt(12)
-    # Twice for the load's count and, once the drive has moved, once for the drive's.
+    # Two counts of the load and, once the drive moves, one of the drive.
     assert floor["theta_out_rad"] == pytest.approx(np.sqrt(3) * count, rel=0.05)

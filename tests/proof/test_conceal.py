@@ -1,4 +1,4 @@
-"""A diagnosis that looks for the answer is caught; one that does not is let be."""
+"""A diagnosis that looks for the answer is refused; an honest one is not."""
 
 import json
 import os
@@ -45,7 +45,7 @@ def batch(tmp_path):
 
 @pytest.fixture
 def diagnosis(tmp_path):
-    """Call with a body: a package whose command is that."""
+    """Call with a function body: a package whose command it is."""
 
     def made(body):
         package = tmp_path / "made" / "ccmodel"
@@ -65,39 +65,39 @@ def own_staging(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("cheat", CHEATS)
-def test_cheat_is_caught(cheat, batch, diagnosis, tmp_path):
-    body, told = CHEATS[cheat]
+def test_tampering_is_reported(cheat, batch, diagnosis, tmp_path):
+    body, message = CHEATS[cheat]
     ran = conceal.diagnose(batch, tmp_path / "out", sources=diagnosis(body))
-    assert any(told in line for line in ran.tampering)
+    assert any(message in line for line in ran.tampering)
 
 
-def test_honest_one_works_and_sees_nothing_of_us(batch, diagnosis, tmp_path):
+def test_an_honest_diagnosis_works_and_learns_nothing_of_the_project(batch, diagnosis, tmp_path):
     ran = conceal.diagnose(batch, tmp_path / "out", sources=diagnosis(HONEST))
     assert (ran.code, ran.tampering) == (0, ())
     assert (tmp_path / "out" / "diagnosis.json").read_text() == "format: 1\n"
-    assert (tmp_path / "out" / "made").read_text() == "{True}"  # time stamps say nothing of how it was made
+    assert (tmp_path / "out" / "made").read_text() == "{True}"  # time stamps do not reveal how it was made
     seen = (tmp_path / "out" / "environment").read_text()
     assert str(PROOF) not in seen
     assert str(ROOT / "src") not in seen
     assert str(batch.parent / "out") not in seen
 
 
-def test_a_model_in_use_and_words_reach_it(batch, diagnosis, tmp_path):
+def test_the_baseline_and_the_options_reach_it(batch, diagnosis, tmp_path):
     body = """
 import json, pathlib, sys
 pathlib.Path("out").mkdir()
-heard = sys.argv[1:] + [pathlib.Path("known.json").read_text()]
-pathlib.Path("out/heard.json").write_text(json.dumps(heard))
+received = sys.argv[1:] + [pathlib.Path("baseline.json").read_text()]
+pathlib.Path("out/received.json").write_text(json.dumps(received))
 """
     (tmp_path / "model.json").write_text("{}")
-    options = ["--allowance", "0.1"]
+    options = ["--tolerance", "0.1"]
     conceal.diagnose(batch, tmp_path / "out", ["backlash"], diagnosis(body), options, tmp_path / "model.json")
-    heard = json.loads((tmp_path / "out" / "heard.json").read_text())
-    words = ["diagnose", "case-1", "--out", "out", *options, "--without", "backlash", "--beside", "known.json", "{}"]
-    assert heard == words
+    received = json.loads((tmp_path / "out" / "received.json").read_text())
+    arguments = ["diagnose", "case-1", "--out", "out", *options, "--without", "backlash"]
+    assert received == [*arguments, "--baseline", "baseline.json", "{}"]
 
 
-def test_the_copy_of_the_diagnosis_is_that_of_its_sources(diagnosis):
+def test_the_staged_package_follows_its_sources(diagnosis):
     package = diagnosis("pass")
     first = conceal.stage(package)
     assert conceal.stage(package) == first
@@ -106,17 +106,17 @@ def test_the_copy_of_the_diagnosis_is_that_of_its_sources(diagnosis):
     assert not (first / "virtualrig").exists()
 
 
-def test_models_predict_one_after_the_other_and_one_that_fails_is_told(batch, diagnosis, tmp_path):
+def test_models_predict_in_sequence_and_a_failure_sets_the_exit_code(batch, diagnosis, tmp_path):
     body = """
 import pathlib, sys
 model, out = pathlib.Path(sys.argv[4]), pathlib.Path(sys.argv[6])
 if model.read_text() == "bad": sys.exit(1)
 out.mkdir()
-(out / "said").write_text(model.read_text())
+(out / "text").write_text(model.read_text())
 """
     for name in ("bad", "good"):
         (tmp_path / name).write_text(name)
     models = {tmp_path / name: tmp_path / f"from-{name}" for name in ("bad", "good")}
     assert conceal.predict(batch, models, diagnosis(body)).code == 1
-    assert (tmp_path / "from-good" / "said").read_text() == "good"
+    assert (tmp_path / "from-good" / "text").read_text() == "good"
     assert not (tmp_path / "from-bad").exists()

@@ -1,4 +1,4 @@
-"""From a seed to a result, with a diagnosis of a few lines in place of the real one."""
+"""From a seed to a result, with a stand-in of a few lines for the diagnosis."""
 
 import json
 
@@ -13,9 +13,9 @@ from proof.build import record
 from proof.cases import draw
 from proof.cli import _is_of, app
 from proof.measured import REST_S
-from proof.score import outcome
+from proof.outcome import outcome
 
-# Says that nothing is missing, and predicts what the rest shows, with the load following the drive.
+# Its verdict is `agrees`. Its prediction is constant but for the load angle, which follows the drive.
 STAND_IN = """
 import json, pathlib, sys
 import numpy as np, pandas as pd
@@ -26,18 +26,18 @@ def main():
     what, batch, out = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[sys.argv.index("--out") + 1])
     out.mkdir(exist_ok=True)
     if what == "diagnose":
-        said = {"verdict": "agrees", "location": None, "mechanisms": [], "alternatives": []}
-        (out / "diagnosis.json").write_text(json.dumps(said))
+        diagnosis = {"verdict": "agrees", "location": None, "mechanisms": [], "alternatives": []}
+        (out / "diagnosis.json").write_text(json.dumps(diagnosis))
         for name in ("calibrated", "model"):
             (out / f"{name}.json").write_text("{}")
         return
     for file in batch.glob("*.csv.gz"):
         log = pd.read_csv(file)
-        said = {"time_s": log["time_s"], "theta_out_rad": log["drive_encoder_counts"] * COUNT}
+        predicted = {"time_s": log["time_s"], "theta_out_rad": log["drive_encoder_counts"] * COUNT}
         for side, end in (("drive", "in"), ("load", "out")):
-            said[f"tau_{end}_Nm"] = log[f"{side}_current_A"] * AMPERE
-            said[f"F_{side}_N"] = (log[f"{side}_load_cell_V"] - 0.25) / 0.1
-        pd.DataFrame(said).to_csv(out / file.name.replace(".csv.gz", ".csv"), index=False)
+            predicted[f"tau_{end}_Nm"] = log[f"{side}_current_A"] * AMPERE
+            predicted[f"F_{side}_N"] = (log[f"{side}_load_cell_V"] - 0.25) / 0.1
+        pd.DataFrame(predicted).to_csv(out / file.name.replace(".csv.gz", ".csv"), index=False)
 """
 
 
@@ -57,7 +57,7 @@ def stand_in(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def result(case, stand_in, tmp_path_factory):
-    return judging.judge(case, tmp_path_factory.mktemp("judged"), stand_in, tell=lambda line: None)
+    return judging.judge(case, tmp_path_factory.mktemp("judged"), stand_in, report=lambda line: None)
 
 
 def test_results_of_other_sources_are_not_kept(result, stand_in, tmp_path):
@@ -68,29 +68,29 @@ def test_results_of_other_sources_are_not_kept(result, stand_in, tmp_path):
         assert not _is_of(made_by | other, tmp_path / "result.json")
 
 
-def test_a_run_whose_diagnosis_changed_on_the_way_is_refused(tmp_path):
+def test_a_run_is_refused_if_the_diagnosis_has_changed(tmp_path):
     ran = CliRunner().invoke(app, ["full", "--index", "1", "--out", str(tmp_path), "--digest", "0" * 16])
     assert ran.exit_code == 2
     assert "has changed since this run began" in " ".join(ran.output.split())
 
 
-def test_a_result_holds_what_was_said_and_no_answer(case, result):
+def test_a_result_holds_the_diagnosis_and_no_answer(case, result):
     assert result["diagnosis"]["verdict"] == "agrees"
     assert result["tampering"] == []
     assert "load-cell-offset" not in json.dumps({k: v for k, v in result.items() if k != "asked"})
     assert result["key"] == case.digest
 
 
-def test_errors_are_those_of_a_drive_that_the_load_follows(result):
+def test_errors_are_those_of_a_load_that_follows_the_drive(result):
     errors = result["errors"]
-    # A stiff and free transmission it is not: the load lags by much more than the floor, and the torque moves.
+    # The true load lags by much more than the noise floor, and the true torque is not constant.
     assert errors["theta_out_rad"]["before"] > 10 * errors["theta_out_rad"]["floor"]
     assert errors["tau_in_Nm"]["before"] > 0.01
     assert errors["tau_in_Nm"]["after"] == errors["tau_in_Nm"]["before"]
     assert 5e-5 < errors["tau_in_Nm"]["floor"] < 2e-3
 
 
-def test_the_scorer_makes_the_same_key_again(case, result):
+def test_the_scorer_makes_the_same_answer(case, result):
     o = outcome(result)
     assert o.key == case.key
     assert o.verdict == "agrees"
@@ -99,8 +99,8 @@ def test_the_scorer_makes_the_same_key_again(case, result):
 @pytest.mark.parametrize("change", [{"seed": 1}, {"key": "0" * 64}, {"tampering": ["imported virtualrig"]}])
 def test_a_result_that_was_tampered_with_is_refused(result, change):
     o = outcome(result | change)
-    assert o.said is None
-    assert "refused" in o.why
+    assert o.diagnosis is None
+    assert "refused" in o.failure
     assert o.errors == {}
 
 
@@ -109,12 +109,12 @@ def test_a_diagnosis_that_fails_is_a_result_too(case, tmp_path):
     package.mkdir()
     (package / "__init__.py").touch()
     (package / "cli.py").write_text("def main():\n    raise SystemExit('no idea')\n")
-    result = judging.judge(case, tmp_path / "out", package, tell=lambda line: None)
+    result = judging.judge(case, tmp_path / "out", package, report=lambda line: None)
     assert result["diagnosis"] is None
     assert "no idea" in result["why"]
 
 
-def test_what_is_kept_back_is_not_to_be_seen_in_a_blinded_copy(case, tmp_path):
+def test_a_blinded_copy_hides_the_measurements(case, tmp_path):
     record(case, case.kept_back, tmp_path / "kept")
     judging.blind(tmp_path / "kept", tmp_path / "blinded")
     name = f"{case.kept_back[0].id}.csv.gz"

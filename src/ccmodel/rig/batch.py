@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field, field_validator, model_validator
 
+from ccmodel.channels import ANGLE_AT, SUM_AT, TENSIONS_AT, TORQUE_AT
 from ccmodel.geometry import ConduitPath
 from ccmodel.typed import InputError, NotNegative, Positive, Problem, TypedModel, load_yaml_model
 
@@ -118,10 +119,8 @@ class Rig(TypedModel):
     @property
     def ends(self) -> tuple[End, End]:
         """Drive end and load end."""
-        return (
-            End("drive", self.drive, "theta_in_rad", "tau_in_Nm", "F_drive_N", ("T1_N", "T3_N")),
-            End("load", self.load, "theta_out_rad", "tau_out_Nm", "F_load_N", ("T2_N", "T4_N")),
-        )
+        sides = {"drive": self.drive, "load": self.load}
+        return tuple(End(n, s, ANGLE_AT[n], TORQUE_AT[n], SUM_AT[n], TENSIONS_AT[n]) for n, s in sides.items())
 
     @field_validator("ranges")
     @classmethod

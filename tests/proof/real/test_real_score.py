@@ -1,10 +1,10 @@
-"""What is right to say of a case, and which size it is that was found."""
+"""Which diagnoses of a case are right, and which size they estimate."""
 
 import pytest
 
 from proof.real.cases import cases_of
 from proof.real.plan import read_real_plan
-from proof.real.score import found_size, is_right, is_size_found, made_of, outcome_of, truth_of
+from proof.real.score import classification, estimated_size, is_right, is_size_recovered, outcome_of, truth_of
 
 MODEL = {
     "mechanisms": [
@@ -17,21 +17,21 @@ OFF = ("pulley-friction",)
 
 
 def judged(verdict="agrees", mechanisms=(), alternatives=(), place=None, **case):
-    """What is made of a case: of the kind, or with that left out, that `case` says."""
-    wanted = {"kind": None, "left_out": None, "without": ()} | case
+    """Outcome of the case whose fields are `case`, with a given diagnosis."""
+    wanted = {"fault": None, "removed": None, "without": ()} | case
     plan = read_real_plan()
     found = next(c for c in cases_of(plan, MODEL) if all(getattr(c, k) == v for k, v in wanted.items()))
-    said = {
+    diagnosis = {
         "verdict": verdict,
         "place": place,
         "mechanisms": [claim(m) for m in mechanisms],
         "alternatives": [claim(a, 0.4) for a in alternatives],
         "nearest": None,
-        "left": {"calibrated": 1.0, "extended": 1.0},
+        "mean_square": {"calibrated": 1.0, "extended": 1.0},
     }
     result = {
-        "said": said,
-        "why": None,
+        "diagnosis": diagnosis,
+        "failure": None,
         "tampering": [],
         "case": found.name,
         "key": found.digest,
@@ -41,85 +41,85 @@ def judged(verdict="agrees", mechanisms=(), alternatives=(), place=None, **case)
     return outcome_of(found, truth_of(found, plan, MODEL), result)
 
 
-def claim(acting, confidence=0.9, **values):
-    name, _, place = acting.partition(" at ")
+def claim(label, confidence=0.9, **values):
+    name, _, place = label.partition(" at ")
     parameters = [{"name": n, "value": v} for n, v in values.items()]
     return {"name": name, "place": place, "confidence": confidence, "parameters": parameters}
 
 
-def with_values(o, acting, **values):
-    """The same with a first name that has values."""
-    o.said["mechanisms"] = [claim(acting, **values)]
+def with_values(o, label, **values):
+    """The outcome with one identified mechanism that has values."""
+    o.diagnosis["mechanisms"] = [claim(label, **values)]
     return o
 
 
-GAIN, DRIFT = {"kind": "gain-of-drive-torque"}, {"kind": "drift-of-drive-torque"}
+GAIN, DRIFT = {"fault": "gain-of-drive-torque"}, {"fault": "drift-of-drive-torque"}
 
 
 @pytest.mark.parametrize(
-    ("o", "made", "right", "wrong"),
+    ("o", "expected", "right", "wrong"),
     [
-        (judged(), "let be", True, 0),
-        (judged("explained", ["backlash at load-pulley"]), "another name", False, 1),
-        (judged("explained", ["torque-scale at drive-sensor"], **GAIN), "named", True, 0),
-        (judged("explained", ["torque-scale at load-sensor"], **GAIN), "named elsewhere", False, 1),
-        (judged("explained", ["presliding at conduit"], **GAIN), "another name", False, 1),
-        (judged(**GAIN), "not noticed", False, 0),
+        (judged(), "true negative", True, 0),
+        (judged("explained", ["backlash at load-pulley"]), "misidentified", False, 1),
+        (judged("explained", ["torque-scale at drive-sensor"], **GAIN), "identified", True, 0),
+        (judged("explained", ["torque-scale at load-sensor"], **GAIN), "identified at another place", False, 1),
+        (judged("explained", ["presliding at conduit"], **GAIN), "misidentified", False, 1),
+        (judged(**GAIN), "false negative", False, 0),
         (
             judged("undecided", [], ["relaxation at cable", "torque-scale at drive-sensor"], **GAIN),
-            "undecided with it",
+            "undecided, includes it",
             True,
             0,
         ),
-        (judged("undecided", [], ["relaxation at cable"], **GAIN), "undecided without it", False, 0),
-        (judged("unexplained", place="conduit", **GAIN), "unexplained, elsewhere", False, 0),
+        (judged("undecided", [], ["relaxation at cable"], **GAIN), "undecided, excludes it", False, 0),
+        (judged("unexplained", place="conduit", **GAIN), "unexplained, other place", False, 0),
         (
-            judged("explained", ["torque-scale at drive-sensor"], kind="gain-of-load-torque"),
-            "named as its equal",
+            judged("explained", ["torque-scale at drive-sensor"], fault="gain-of-load-torque"),
+            "identified an equivalent",
             True,
             0,
         ),
-        (judged("unexplained", place="drive-sensor", **DRIFT), "unexplained, in place", True, 0),
-        (judged("unexplained", place="conduit", **DRIFT), "unexplained, elsewhere", True, 0),
-        (judged("undecided", [], ["relaxation at cable"], **DRIFT), "undecided without it", True, 0),
-        (judged("explained", ["relaxation at cable"], **DRIFT), "another name", False, 1),
-        (judged(**DRIFT), "not noticed", False, 0),
+        (judged("unexplained", place="drive-sensor", **DRIFT), "unexplained, right place", True, 0),
+        (judged("unexplained", place="conduit", **DRIFT), "unexplained, other place", True, 0),
+        (judged("undecided", [], ["relaxation at cable"], **DRIFT), "undecided, excludes it", True, 0),
+        (judged("explained", ["relaxation at cable"], **DRIFT), "misidentified", False, 1),
+        (judged(**DRIFT), "false negative", False, 0),
         (
-            judged("unexplained", place="drive-pulley", left_out=PULLEY, without=OFF),
-            "unexplained, in place",
+            judged("unexplained", place="drive-pulley", removed=PULLEY, without=OFF),
+            "unexplained, right place",
             True,
             0,
         ),
-        (judged("unexplained", place="load", left_out=PULLEY, without=OFF), "unexplained, elsewhere", False, 0),
+        (judged("unexplained", place="load", removed=PULLEY, without=OFF), "unexplained, other place", False, 0),
         (
-            judged("undecided", [], ["constant-drag at conduit"], "drive-pulley", left_out=PULLEY, without=OFF),
-            "undecided without it",
+            judged("undecided", [], ["constant-drag at conduit"], "drive-pulley", removed=PULLEY, without=OFF),
+            "undecided, excludes it",
             True,
             0,
         ),
     ],
 )
-def test_what_is_right(o, made, right, wrong):
-    assert made_of(o) == made
+def test_classification(o, expected, right, wrong):
+    assert classification(o) == expected
     assert is_right(o) is right
-    assert len(o.wrong_names) == wrong
+    assert len(o.confidently_wrong) == wrong
 
 
-def test_what_was_taken_out_is_to_be_named_with_its_value():
+def test_a_removed_mechanism_must_be_identified_with_its_value():
     for value, right in ((0.03, True), (0.025, True), (0.02, False)):
-        o = with_values(judged("explained", left_out=PULLEY), PULLEY, friction_torque=value)
-        assert made_of(o) == "named"
-        assert found_size(o) == value
+        o = with_values(judged("explained", removed=PULLEY), PULLEY, friction_torque=value)
+        assert classification(o) == "identified"
+        assert estimated_size(o) == value
         assert is_right(o) is right
 
 
-def test_of_drag_the_size_is_what_was_added():
-    o = with_values(judged("explained", kind="drag"), PULLEY, friction_torque=0.042)
-    assert found_size(o) == pytest.approx(0.012)
-    assert is_size_found(o) is (abs(0.012 / o.case.size - 1) <= 0.25)
+def test_the_size_of_a_drag_is_its_difference_from_the_baseline():
+    o = with_values(judged("explained", fault="drag"), PULLEY, friction_torque=0.042)
+    assert estimated_size(o) == pytest.approx(0.012)
+    assert is_size_recovered(o) is (abs(0.012 / o.case.size - 1) <= 0.25)
 
 
-def test_a_gain_at_the_other_end_is_the_inverse():
-    o = judged("explained", kind="gain-of-load-torque")
+def test_an_equivalent_gain_is_the_inverse():
+    o = judged("explained", fault="gain-of-load-torque")
     with_values(o, "torque-scale at drive-sensor", gain=1 / (1 + o.case.size) - 1)
-    assert found_size(o) == pytest.approx(o.case.size)
+    assert estimated_size(o) == pytest.approx(o.case.size)

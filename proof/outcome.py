@@ -1,0 +1,211 @@
+"""A case's true effects together with what the diagnosis reported.
+
+Only names, places and confidences are read from a diagnosis, and its models' predictions of held-out recordings. The
+answer is made again from the case's seed. A result with another answer's digest, or whose diagnosis tried to reach
+more than its batch, is refused. A refused result counts as a failure in every rate.
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from proof.cases import CLEAN, draw
+
+# A mechanism with at least this confidence counts as stated with confidence.
+DECISION_THRESHOLD = 0.8
+# More mechanisms or alternatives than these are not counted.
+MOST_MECHANISMS = 2
+MOST_ALTERNATIVES = 4
+# Least error over the noise floor of a visible effect: three times the difference of two repeats, which is
+# sqrt(2) times the noise floor.
+VISIBLE = 3 * np.sqrt(2)
+# Least error over the noise floor at which the share of the gap that was closed is computed.
+LEAST_GAP = 1.5
+# Pairs of places that no recording distinguishes.
+EQUIVALENT_PLACES = {
+    ("cable", "conduit"),
+    ("load-pulley", "load-end"),
+    ("drive-pulley", "drive-end"),
+    ("load", "load-pulley"),
+}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A case's answer and the diagnosis of it.
+
+    Attributes
+    ----------
+    key : dict
+        The answer (`proof.cases.Case.key`).
+    diagnosis : dict or None
+        None if there is none or if the result was refused.
+    failure : str
+        Why there is no diagnosis.
+    errors : dict
+        By channel, the root mean square errors on held-out recordings "before" and "after" the diagnosis, and the
+        noise floor ("floor"), in the channel's unit.
+    took_s : float
+        Processor time, s.
+    regressors : dict
+        By reference regressor and channel, the root mean square error on held-out recordings.
+    """
+
+    key: dict
+    diagnosis: dict | None
+    failure: str = ""
+    errors: dict = field(default_factory=dict)
+    took_s: float = 0.0
+    regressors: dict = field(default_factory=dict)
+
+    @property
+    def kind(self) -> str:
+        """Kind of the case."""
+        return self.key["kind"]
+
+    @property
+    def true_names(self) -> set[str]:
+        """Names of the concealed effects."""
+        return {t["name"] for t in self.key["truth"]} - {CLEAN}
+
+    @property
+    def verdict(self) -> str:
+        """The verdict; "none" if there is no diagnosis."""
+        return self.diagnosis["verdict"] if self.diagnosis else "none"
+
+    @property
+    def identified(self) -> list[dict]:
+        """Identified mechanisms; none if there are more than a diagnosis may report."""
+        identified = self.diagnosis["mechanisms"] if self.diagnosis and self.verdict == "explained" else []
+        return identified if len(identified) <= MOST_MECHANISMS else []
+
+    @property
+    def first_identified(self) -> str | None:
+        """Name of the first identified mechanism."""
+        return self.identified[0]["name"] if self.identified else None
+
+    @property
+    def alternatives(self) -> list[str]:
+        """Names of the candidates that an undecided diagnosis reports."""
+        if self.verdict != "undecided":
+            return []
+        names = dict.fromkeys(c["name"] for c in self.diagnosis["mechanisms"] + self.diagnosis["alternatives"])
+        return list(names)[:MOST_ALTERNATIVES]
+
+    @property
+    def claims(self) -> list[tuple[float, bool]]:
+        """Every stated confidence, and whether it belongs to a concealed effect."""
+        claims = self.diagnosis["mechanisms"] + self.diagnosis["alternatives"] if self.diagnosis else []
+        return [(c["confidence"], c["name"] in self.true_names) for c in claims]
+
+    @property
+    def error_before(self) -> float:
+        """Error of the recalibrated model over the noise floor, in the worst channel; NaN if not known."""
+        return max((e["before"] / e["floor"] for e in self.errors.values()), default=np.nan)
+
+    @property
+    def error_after(self) -> float:
+        """Error of the diagnosed model over the noise floor, in the worst channel; NaN if not known."""
+        return max((e["after"] / e["floor"] for e in self.errors.values()), default=np.nan)
+
+    @property
+    def is_visible(self) -> bool:
+        """Whether the recalibrated model's error is at least `VISIBLE` noise floors; True if it is not known."""
+        return not self.errors or self.error_before >= VISIBLE
+
+    @property
+    def gap_closed(self) -> float | None:
+        """Share of the gap between the recalibrated model's error and the noise floor that the diagnosis closes.
+
+        It is taken in the channel with the largest gap. None below `LEAST_GAP`.
+        """
+        if not self.errors or self.error_before < LEAST_GAP:
+            return None
+        channel = self.worst_channel
+        return self.gap_closed_by(self.errors[channel]["after"])
+
+    @property
+    def worst_channel(self) -> str:
+        """Channel with the largest error of the recalibrated model over the noise floor."""
+        return max(self.errors, key=lambda c: self.errors[c]["before"] / self.errors[c]["floor"])
+
+    def gap_closed_by(self, error: float) -> float:
+        """Share of the gap in the worst channel that a model with this error closes."""
+        e = self.errors[self.worst_channel]
+        return (e["before"] - error) / (e["before"] - e["floor"])
+
+    @property
+    def is_detected(self) -> bool:
+        """Whether the diagnosis reports that physics is missing."""
+        return self.verdict not in ("agrees", "none")
+
+    @property
+    def is_identified_first(self) -> bool:
+        """Whether the first identified mechanism is a concealed effect."""
+        return self.first_identified in self.true_names
+
+    @property
+    def includes_truth(self) -> bool:
+        """Whether a concealed effect is identified first or is among the alternatives."""
+        return self.is_identified_first or bool(self.true_names & set(self.alternatives))
+
+    @property
+    def is_confidently_wrong(self) -> bool:
+        """Whether a mechanism stated with confidence is none of the concealed effects, or too many are reported."""
+        reported = self.diagnosis["mechanisms"] if self.diagnosis else []
+        wrong = (c["confidence"] >= DECISION_THRESHOLD and c["name"] not in self.true_names for c in reported)
+        return len(reported) > MOST_MECHANISMS or any(wrong)
+
+
+class Answered(Protocol):
+    """A case whose answer has a digest."""
+
+    name: str
+    digest: str
+
+
+def outcome(result: dict) -> Outcome:
+    """Combine a result of `proof.judge.judge` with its answer, made again from the seed."""
+    case = draw(result["seed"], **result["asked"])
+    refused = refusal(result, case)
+    diagnosis = None if refused else result["diagnosis"]
+    return Outcome(
+        key=case.key,
+        diagnosis=diagnosis,
+        failure=refused or result["why"] or "",
+        errors=result["errors"] if diagnosis else {},
+        took_s=result["took_s"],
+        regressors=result["rivals"] if diagnosis else {},
+    )
+
+
+def refusal(result: dict, case: Answered) -> str:
+    """Why a result does not count for a case; empty if it does."""
+    if result["tampering"]:
+        return "refused: it " + "; ".join(result["tampering"][:3])
+    if result["key"] != case.digest or result["case"] != case.name:
+        return "refused: its digest of the answer is not that of the answer made from the seed"
+    return ""
+
+
+def read_outcomes(folder: Path, names: Sequence[str] | None = None) -> list[Outcome]:
+    """Outcomes of the results in the named subfolders, or in all, in the order of the names."""
+    if names is None:
+        files = sorted(folder.glob("*/result.json"))
+    else:
+        files = [folder / name / "result.json" for name in sorted(names)]
+    return [outcome(json.loads(file.read_text())) for file in files]
+
+
+def same_place(a: str | None, b: str | None) -> bool:
+    """Whether two places are equal, or equivalent because no recording distinguishes them."""
+    return a is not None and (a == b or (a, b) in EQUIVALENT_PLACES or (b, a) in EQUIVALENT_PLACES)
+
+
+def is_located(o: Outcome) -> bool:
+    """Whether the reported place is that of a concealed effect."""
+    return bool(o.diagnosis) and any(same_place(o.diagnosis["place"], t["place"]) for t in o.key["truth"])
