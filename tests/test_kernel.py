@@ -1,5 +1,6 @@
 """Compiled code is not taken from the cache once a source it was made from has changed."""
 
+import ast
 import re
 import shutil
 import tomllib
@@ -78,3 +79,16 @@ def test_an_untested_numba_is_refused_in_one_sentence(version):
     sentence = f"ccmodel was tested with numba>=0.68,<0.69 only, found {version}: pip install 'numba>=0.68,<0.69'"
     with pytest.raises(ImportError, match=f"^{re.escape(sentence)}$"):
         check_numba(version)
+
+
+def test_only_the_module_of_kernels_imports_numba():
+    """A function compiled by numba itself would be open to the races that `kernel` prevents."""
+    package = Path(ccmodel.__file__).parent
+    importing = {
+        file.relative_to(package).name
+        for file in package.rglob("*.py")
+        for node in ast.walk(ast.parse(file.read_text()))
+        if (isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "numba")
+        or (isinstance(node, ast.Import) and any(alias.name.partition(".")[0] == "numba" for alias in node.names))
+    }
+    assert importing == {"kernel.py"}

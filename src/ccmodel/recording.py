@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import netCDF4
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
@@ -121,10 +120,9 @@ def stride(recording: Recording, step_s: float | None) -> int:
 
 def write_recordings(path: Path, recordings: list[Recording], provenance: Mapping) -> None:
     """Write recordings to a netCDF file, one group each, with `provenance` (versions, hashes) on the root."""
-    with netCDF4.Dataset(path, "w") as root:
-        root.setncatts({"format": "ccmodel recordings 1", "provenance": json.dumps(provenance)})
-    for recording in recordings:
-        _to_dataset(recording).to_netcdf(path, mode="a", group=recording.id, engine="netcdf4")
+    root = xr.Dataset(attrs={"format": "ccmodel recordings 1", "provenance": json.dumps(provenance)})
+    groups = {recording.id: _to_dataset(recording) for recording in recordings}
+    xr.DataTree.from_dict({"/": root, **groups}).to_netcdf(path, engine="netcdf4")
 
 
 def read_recordings(path: Path) -> list[Recording]:

@@ -11,9 +11,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-import yaml
 from numpy.random import Generator, SeedSequence
 from numpy.typing import NDArray
+from ruamel.yaml import YAML
 
 from virtualrig.config import BatchPlan, Campaign, RecordingPlan, Repeatability
 from virtualrig.dynamics import simulate
@@ -182,20 +182,17 @@ def _write_description(campaign: Campaign, name: str, folder: Path) -> None:
 
 def as_yaml(described: dict) -> str:
     """The text of a batch.yaml."""
-    return yaml.dump(described, Dumper=_PlainDumper, sort_keys=False)
-
-
-class _PlainDumper(yaml.SafeDumper):
-    """YAML without anchors: what both sides share is written out for each."""
-
-    def ignore_aliases(self, data) -> bool:
-        return True
+    writer, text = YAML(), io.StringIO()
+    # Without anchors: the constants that both sides share are written out for each.
+    writer.representer.ignore_aliases = lambda data: True
+    writer.dump(described, text)
+    return text.getvalue()
 
 
 def _check_replaceable(folder: Path) -> None:
     if not folder.exists():
         return
     description = folder / "batch.yaml"
-    known = yaml.safe_load(description.read_text(encoding="utf-8")) if description.is_file() else None
+    known = YAML(typ="safe").load(description) if description.is_file() else None
     if not isinstance(known, dict) or known.get("origin") != ORIGIN:
         raise BatchExistsError(f"{folder} does not hold a batch of the virtual rig and is left alone; move it away")

@@ -7,8 +7,8 @@ there unless they are given, and a key that is missing, misspelt or of no use is
 from pathlib import Path
 from typing import Annotated, Self
 
-import yaml
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
+from ruamel.yaml import YAML
 
 from virtualrig.effects import Effects
 from virtualrig.motion import Excitation
@@ -194,4 +194,4 @@ class Campaign(Strict):
 
 def read_campaign(path: Path) -> Campaign:
     """Read and check a campaign's YAML file."""
-    return Campaign.model_validate(yaml.safe_load(Path(path).read_text(encoding="utf-8")))
+    return Campaign.model_validate(YAML(typ="safe").load(Path(path)))

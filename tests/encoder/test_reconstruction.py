@@ -33,7 +33,7 @@ def triangle(time):
 
 
 def steps(time):
-    """Least jerk, each step of half a second, holds of one and a half."""
+    """Minimum-jerk steps of half a second, holds of one and a half."""
     levels = [0.0, 0.5, 0.2, 0.6]
     return sum((b - a) * rising((time - REST - 2 * i) / 0.5) for i, (a, b) in enumerate(pairwise(levels)))
 
@@ -61,7 +61,7 @@ def recorded(motion, step=COARSE, rate=250, seed=0):
 
 
 def errors(motion, step, rate, seeds=8):
-    """Errors of the estimate against the rest, in counts, and their stated standard deviations; (seeds, n) each."""
+    """Errors of the motion from the rest on, in counts, and their stated standard deviations; (seeds, n) each."""
     found = []
     for seed in range(seeds):
         time, truth, counted, rest = recorded(motion, step, rate, seed)
@@ -83,23 +83,23 @@ def test_motions_are_recovered(motion, moving, all_of_it, step, rate):
     error, _ = errors(motion, step, rate, seeds=4)
     truth = recorded(motion, step, rate)[1]
     moves = abs(np.gradient(truth)) > 1e-9
-    # Where in its count the drive rests is a constant to the motion after it.
+    # The offset of the first rest within its count is constant in the motion after it.
     within = error[:, moves] - error[:, moves].mean(axis=1, keepdims=True)
     assert rms(within) < moving
     assert rms(error) < all_of_it
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
-def test_what_is_left_is_stated(motion):
+def test_the_stated_uncertainty_covers_the_error(motion):
     error, sigma = errors(motion, COARSE, 250)
     covered = abs(error) < 1.645 * sigma + 1e-9
     assert covered.mean() > 0.7
-    # Not for the price of saying nothing: an unknown place in a count is 0.29.
+    # The stated uncertainty is not merely large: an unknown offset within a count alone is 0.29.
     assert rms(sigma) < 0.45
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
-def test_it_stays_within_the_counts(motion):
+def test_the_motion_stays_within_the_counts(motion):
     time, _, counted, rest = recorded(motion)
     estimate = reconstruct_motion(time, counted, COARSE, rest)
     assert abs(estimate.theta_rad + estimate.zero_rad - counted).max() < 0.55 * COARSE
@@ -177,7 +177,7 @@ def test_slower_than_a_count_in_a_hundred_samples():
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
-def test_the_same_motion_seen_otherwise(motion):
+def test_invariance_to_time_scale_direction_and_zero(motion):
     time, _, counted, rest = recorded(motion)
     plain = reconstruct_motion(time, counted, COARSE, rest)
     near = {"abs": 0.03 * COARSE}
@@ -213,6 +213,6 @@ def test_a_glitch_is_survived(glitch):
 
 
 @pytest.mark.parametrize(("n", "step"), [(3, 0.1), (10, 0.0)])
-def test_what_it_refuses(n, step):
+def test_invalid_input_is_refused(n, step):
     with pytest.raises(ValueError, match="must be"):
         reconstruct_motion(np.arange(n), np.zeros(n), step, 0.0)

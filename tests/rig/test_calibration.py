@@ -103,7 +103,7 @@ def test_rest(drive, load, rest_s):
     tension_3=st.lists(st.floats(0, 50), min_size=20, max_size=20),
     sign=st.sampled_from([1, -1]),
 )
-def test_there_and_back_within_quantisation(theta, tension_1, tension_3, sign):
+def test_calibration_inverts_the_sensors_within_their_resolution(theta, tension_1, tension_3, sign):
     theta, t1, t3 = (np.array(x[: len(theta)]) for x in (theta, tension_1, tension_3))
     counts = np.round(sign * theta / STEP)
     current = (sign * (t1 - t3) * R / KT).round(5)

@@ -26,7 +26,7 @@ def test_a_good_batch(bench, tmp_path):
     assert read_recordings(tmp_path / "r.nc")[1]["T4_N"] == pytest.approx(ingested.recordings[1]["T4_N"])
 
 
-# What is done to log "one", then row, column and part of the one line that must be said of it.
+# Damage to log "one", then row, column and part of the text of its only finding.
 def write_bytes(change):
     return lambda bench: bench.log().write_bytes(change(bench.log().read_bytes()))
 
@@ -226,7 +226,7 @@ def test_a_dead_sensor_takes_its_channels_with_it(bench, name):
     assert set(two.channels) - set(one.channels) == channels
 
 
-def test_load_encoder_that_stops_is_told_and_kept(bench):
+def test_a_load_encoder_that_stops_is_a_warning_and_kept(bench):
     changed("load_encoder_counts", lambda t: t.load_encoder_counts.where(t.index < 120, -30))(bench)
     ingested = ingest_batch(bench.folder)
     (finding,) = ingested.findings
@@ -361,7 +361,7 @@ def test_rig_without_a_sensor_lacks_its_channels_without_a_finding(bench):
     assert set(ingested.recordings[0].channels) == {"theta_in_rad", "tau_in_Nm", "F_load_N"}
 
 
-def test_sensors_that_are_stated_and_in_no_log_are_told_once(bench):
+def test_a_stated_sensor_that_is_in_no_log_is_one_warning(bench):
     ingested = ingest_batch(drop(bench, ["one", "two"], LACKING).write().folder)
     assert [f.severity for f in ingested.findings] == ["warning"] * 3
     assert {f.file for f in ingested.findings} == {str(bench.folder / "batch.yaml")}
@@ -373,7 +373,7 @@ def test_sensors_that_are_stated_and_in_no_log_are_told_once(bench):
     assert [set(r.channels) for r in ingested.recordings] == [{"theta_in_rad", "tau_in_Nm", "F_load_N"}] * 2
 
 
-def test_a_current_is_not_missed_where_there_is_a_torque_sensor(bench):
+def test_a_torque_sensor_replaces_a_current(bench):
     bench.described["rig"]["drive"]["torque_sensor"] = {"Nm_per_count": 4e-5}
     for name, frame in bench.tables.items():
         bench.tables[name] = frame.rename(columns={"drive_current_A": "drive_torque_counts"})
@@ -382,7 +382,7 @@ def test_a_current_is_not_missed_where_there_is_a_torque_sensor(bench):
     assert "tau_in_Nm" in ingested.recordings[0]
 
 
-def test_most_logs_decide_what_a_rig_has(bench):
+def test_the_majority_of_logs_decides_which_sensors_a_rig_has(bench):
     drop(add_logs(bench, "three"), ["one", "two"], ["load_current_A"])
     ingested = ingest_batch(bench.write().folder)
     (finding,) = ingested.findings
@@ -391,7 +391,7 @@ def test_most_logs_decide_what_a_rig_has(bench):
     assert ["tau_out_Nm" in r for r in ingested.recordings] == [False, False, True]
 
 
-def test_a_refused_log_has_no_say_in_what_a_rig_has(bench):
+def test_a_refused_log_does_not_count_in_the_majority(bench):
     drop(add_logs(bench, "three", "four"), ["one", "two"], ["load_current_A"])
     bench.write()
     for name in ("three", "four"):
@@ -405,7 +405,7 @@ def test_a_refused_log_has_no_say_in_what_a_rig_has(bench):
     ]
 
 
-def test_the_only_log_of_a_batch_is_not_believed_against_its_description(bench):
+def test_the_only_log_of_a_batch_must_have_all_stated_sensors(bench):
     del bench.tables["two"], bench.described["recordings"][1]
     ingested = ingest_batch(drop(bench, ["one"], LACKING).write().folder)
     (finding,) = ingested.findings
@@ -418,7 +418,7 @@ def test_the_only_log_of_a_batch_is_not_believed_against_its_description(bench):
     assert set(ingested.recordings[0].channels) == {"theta_in_rad", "tau_in_Nm", "F_load_N"}
 
 
-def test_load_encoder_that_the_description_does_not_know(bench):
+def test_a_load_encoder_without_its_constants_is_not_used(bench):
     del bench.described["rig"]["load"]["encoder_counts_per_rev"]
     ingested = ingest_batch(bench.write().folder)
     assert {f.text for f in ingested.findings} == {
@@ -427,7 +427,7 @@ def test_load_encoder_that_the_description_does_not_know(bench):
     assert "theta_out_rad" not in ingested.recordings[0]
 
 
-def test_uneven_and_yet_lost_beyond_use(bench):
+def test_uneven_sampling_with_too_long_a_gap(bench):
     late = 0.003 * (np.arange(400) % 4 == 0)
     changed("time_s", lambda t: t.time_s + late)(bench)
     assert "few or none are lost" in ingest_batch(bench.folder).findings[0].text
@@ -458,7 +458,7 @@ def test_step_of_the_drive_encoder_is_not_its_accuracy(bench):
     assert recording.accuracy["theta_in_rad"] == 0.001
 
 
-def test_frozen_channel_is_told_and_kept_unless_the_drive_rests(bench):
+def test_a_frozen_channel_is_a_warning_unless_the_drive_rests(bench):
     changed("load_current_A", lambda t: t.load_current_A.where(t.index >= 350, t.load_current_A.abs().min()))(bench)
     findings = ingest_batch(bench.folder).findings
     assert [(f.column, f.row) for f in findings] == [("load_current_A", 2)]
@@ -489,7 +489,7 @@ def test_logs_in_a_folder_of_the_batch(bench):
 
 
 @pytest.mark.parametrize("step", ["read_log", "check_sensors", "calibrate"])
-def test_what_nobody_foresaw_costs_one_recording_only(bench, monkeypatch, step):
+def test_an_unexpected_error_refuses_one_recording_only(bench, monkeypatch, step):
     real, calls = getattr(ingest, step), []
 
     def first_fails(*args):
@@ -506,7 +506,7 @@ def test_what_nobody_foresaw_costs_one_recording_only(bench, monkeypatch, step):
     assert "(ZeroDivisionError: odd log)" in finding.text
 
 
-def test_what_nobody_foresaw_in_a_description_is_a_finding(bench, monkeypatch):
+def test_an_unexpected_error_in_a_description_is_a_finding(bench, monkeypatch):
     def fails(folder):
         raise KeyError("odd")
 
@@ -517,7 +517,7 @@ def test_what_nobody_foresaw_in_a_description_is_a_finding(bench, monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["my batch", "{batch}", ".hidden"])
-def test_folder_whose_name_no_batch_can_have(bench, name):
+def test_a_folder_with_an_invalid_name(bench, name):
     assert not valid_name(name)
     folder = bench.write().folder.rename(bench.folder.parent / name)
     (finding,) = ingest_batch(folder).findings
@@ -525,7 +525,7 @@ def test_folder_whose_name_no_batch_can_have(bench, name):
     assert f"'{name}' cannot be a batch's name" in finding.text and "rename the folder" in finding.text
 
 
-def test_sensor_that_the_description_does_not_know(bench):
+def test_a_sensor_without_its_constants_is_not_used(bench):
     del bench.described["rig"]["drive"]["load_cell"]
     ingested = ingest_batch(bench.write().folder)
     assert {str(f).split(": ", 1)[1] for f in ingested.findings} == {
@@ -535,7 +535,7 @@ def test_sensor_that_the_description_does_not_know(bench):
 
 
 @pytest.mark.parametrize("name", ["half-loop", "loops", "pretension", "radius"])
-def test_batches_of_the_virtual_rig_come_in_without_a_finding(name):
+def test_the_committed_batches_have_no_finding(name):
     ingested = ingest_batch(RAW / name)
     assert ingested.findings == []
     assert len(ingested.recordings) == len(ingested.batch.recordings)

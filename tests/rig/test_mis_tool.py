@@ -111,7 +111,7 @@ def test_a_cut_last_line(tmp_path):
     assert "the last line is cut" in finding.text
 
 
-def test_wild_trials_are_findings_and_the_good_one_comes_through(tmp_path):
+def test_faulty_trials_are_findings_and_the_others_are_imported(tmp_path):
     reset = trial(seed=1)
     reset[5000:, 1] -= 4096
     stuck = trial(seed=2)
@@ -133,7 +133,7 @@ def test_wild_trials_are_findings_and_the_good_one_comes_through(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "reported"),
     [
         ("The data set\n- 10 columns,\n- 52 trials.\n\n1. Cite it.\n", False),
         ("", True),
@@ -144,11 +144,11 @@ def test_wild_trials_are_findings_and_the_good_one_comes_through(tmp_path):
     ],
     ids=["prose", "empty", "header only", "one row", "one row without header", "few columns"],
 )
-def test_files_that_are_no_trials(tmp_path, content, told):
+def test_files_that_are_no_trials(tmp_path, content, reported):
     write(tmp_path / "tool", "00.TXT", text(trial()))
     write(tmp_path / "tool", "01.TXT", content)
     imported = import_mis_tool(tmp_path / "tool", tmp_path / "raw")
-    assert [(Path(f.file).name, f.severity) for f in imported.findings] == ([("01.TXT", "refused")] if told else [])
+    assert [(Path(f.file).name, f.severity) for f in imported.findings] == ([("01.TXT", "refused")] if reported else [])
     assert json.loads((tmp_path / "raw/findings.json").read_text()) == [asdict(f) for f in imported.findings]
 
 
@@ -177,7 +177,7 @@ def test_an_import_replaces_nothing_else(tmp_path):
         import_mis_tool(tmp_path / "tool", tmp_path / "tool/00.TXT")
 
 
-def test_signs_in_doubt_are_told(tmp_path):
+def test_signs_in_doubt_are_findings(tmp_path):
     samples = trial()
     samples[:, 5] = np.random.default_rng(0).normal(0, 10, len(samples)).round()
     write(tmp_path / "tool", "00.TXT", text(samples))

@@ -32,7 +32,7 @@ def read(tmp_path, text):
     return load_yaml_model(path, Outer)
 
 
-def test_numbers_as_people_write_them(tmp_path):
+def test_numbers_with_exponents(tmp_path):
     model = read(tmp_path, GOOD + "friction: 5e-2\n")
     assert [p.length_m for p in model.pieces] == [1.0, 0.5]
     assert model.friction == 0.05
@@ -94,7 +94,7 @@ def test_one_clear_line_a_problem(tmp_path, text, line, message):
 
 
 @pytest.mark.parametrize("text", ["yes", "12:30", "0x", "1 000"])
-def test_what_yaml_1_2_reads_as_text_is_no_number(tmp_path, text):
+def test_text_of_yaml_1_2_is_no_number(tmp_path, text):
     with pytest.raises(InputError, match=f"friction: must be a number, found '{text}'"):
         read(tmp_path, GOOD + f"friction: {text}\n")
 
@@ -121,7 +121,7 @@ def test_bytes_that_are_no_text(tmp_path):
         load_yaml_model(tmp_path / "x.yaml", Outer)
 
 
-def test_keys_are_text_as_they_stand(tmp_path):
+def test_keys_are_text(tmp_path):
     model = read(tmp_path, GOOD + "by_name:\n  2026-01-01: &a {length_m: 1}\n  yes: {<<: *a, sign: -1}\n  1: *a\n")
     assert {name: (p.length_m, p.sign) for name, p in model.by_name.items()} == {
         "2026-01-01": (1, 1),
