@@ -233,9 +233,9 @@ def test_alternatives_are_others_than_what_is_named_each_once():
 @pytest.mark.parametrize(
     ("alternatives", "likeliest", "sentence"),
     [
-        (["kink"], ["kink"], "it may be kink at conduit, of which"),
+        (["kink"], ["kink"], "it may be kink at conduit, but"),
         (["kink", "stribeck"], ["kink"], "cannot tell kink at conduit or stribeck at conduit apart"),
-        (["kink", "stribeck"], ["kink", "stribeck"], "it may be kink at conduit and stribeck at conduit together, of"),
+        (["kink", "stribeck"], ["kink", "stribeck"], "it may be kink at conduit and stribeck at conduit together, but"),
     ],
 )
 def test_two_that_act_together_are_not_said_to_be_two_that_cannot_be_told_apart(alternatives, likeliest, sentence):
