@@ -20,7 +20,7 @@ from ccmodel.diagnose.diagnosis import Diagnosis
 from ccmodel.diagnose.hypothesis import plausible
 from ccmodel.diagnose.location import PARTS, mismatch
 from ccmodel.recording import ORIGIN
-from ccmodel.report.figures import COLOURS, STYLE
+from ccmodel.report.figures import COLOURS, STYLE, legend_below
 
 LOOPS = 3
 RIVALS = 8
@@ -91,39 +91,41 @@ def write_diagnosis(file: Path, found: Diagnosis) -> None:
 
 
 def _rivals(found: Diagnosis) -> list[dict]:
+    """Baseline and the candidates with the smallest mean squares, a row each."""
     j = found.judgement
     ranked = sorted(zip(j.trials, j.probability, strict=True), key=lambda item: item[0].left.mean())
-    rows = [(j.calibrated, None), *ranked[:RIVALS]]
-    return [
-        {
-            "what": str(trial.hypothesis),
-            "left": float(trial.left.mean()),
-            "learnable": max(j.learnable[trial.hypothesis].mean, 0.0) if trial.hypothesis in j.learnable else None,
-            "p": p,
-            "why": _why(trial, found),
-        }
-        for trial, p in rows
-    ]
+    rows = []
+    for fit, p in [(j.calibrated, None), *ranked[:RIVALS]]:
+        lack_of_fit = j.learnable.get(fit.hypothesis)
+        rows.append(
+            {
+                "what": str(fit.hypothesis),
+                "left": float(fit.left.mean()),
+                "learnable": None if lack_of_fit is None else max(lack_of_fit.mean, 0.0),
+                "p": p,
+                "why": _why(fit, found),
+            }
+        )
+    return rows
 
 
-def _why(trial: CandidateFit, found: Diagnosis) -> str:
+def _why(fit: CandidateFit, found: Diagnosis) -> str:
     """The reason why a candidate was selected or not."""
     j = found.judgement
-    if trial is j.calibrated:
+    lack_of_fit = j.learnable.get(fit.hypothesis)
+    if fit is j.calibrated:
         return "agrees" if found.said["verdict"] == "agrees" else "the baseline"
-    if trial is j.best:
+    if fit is j.best:
         return "most probable"
-    if not plausible(trial.hypothesis, trial.values):
+    if not plausible(fit.hypothesis, fit.values):
         return "needs implausible values"
-    if is_right(trial, j.calibrated, j.learnable):
-        if j.one_fault and len(trial.hypothesis.acting) > 1:
-            return f"adequate, but one fault at the {' or '.join(j.one_fault)} is as adequate"
-        ratio = trial.left.mean() / j.best.left.mean()
-        return f"adequate, with {ratio:.3g} times the mean square" if ratio > 1 else "adequate, with more parameters"
-    learnable = j.learnable.get(trial.hypothesis)
-    if learnable is not None and learnable.surely > LEARNABLE:
-        return "lack of fit"
-    return "others have a smaller mean square"
+    if not is_right(fit, j.calibrated, j.learnable):
+        excessive = lack_of_fit is not None and lack_of_fit.surely > LEARNABLE
+        return "lack of fit" if excessive else "others have a smaller mean square"
+    if j.one_fault and len(fit.hypothesis.acting) > 1:
+        return f"adequate, but one fault at the {' or '.join(j.one_fault)} is as adequate"
+    ratio = fit.left.mean() / j.best.left.mean()
+    return f"adequate, with {ratio:.3g} times the mean square" if ratio > 1 else "adequate, with more parameters"
 
 
 def _map(found: Diagnosis) -> Figure:
@@ -160,24 +162,20 @@ def _loops(found: Diagnosis) -> Figure:
     scale = TABLE[channel].scale
     figure, axes = plt.subplots(1, len(order), figsize=(3.1 * len(order), 3.1), squeeze=False)
     for ax, i in zip(axes[0], order, strict=True):
-        w = j.weighed[i]
-        e = w.observations
-        c = e.channels.index(channel)
-        theta = e.given.theta_in[e.judged]
-        ax.plot(theta, scale * e.measured[c], color=FAINT, lw=2.2, label="recording")
-        for trial, colour, line, name in (
-            (j.calibrated, COLOURS[0], "--", _baseline(found.said)),
-            (chosen[i], COLOURS[1], "-", WITH_FOUND),
-        ):
-            if name == WITH_FOUND and trial is j.calibrated:
-                continue
-            predicted = replace(e, parameters=trial.hypothesis.of(e.parameters)).modelled(trial.held_out[i])[c]
-            ax.plot(theta, scale * predicted, color=colour, lw=1.0, ls=line, label=name)
-        ax.set_title(e.given.recording.id, fontsize=9)
+        observed = j.weighed[i].observations
+        c = observed.channels.index(channel)
+        theta = observed.given.theta_in[observed.judged]
+        ax.plot(theta, scale * observed.measured[c], color=FAINT, lw=2.2, label="recording")
+        models = [(j.calibrated, COLOURS[0], "--", _baseline(found.said))]
+        if chosen[i] is not j.calibrated:
+            models.append((chosen[i], COLOURS[1], "-", WITH_FOUND))
+        for fit, colour, line, label in models:
+            model = replace(observed, parameters=fit.hypothesis.of(observed.parameters))
+            ax.plot(theta, scale * model.modelled(fit.held_out[i])[c], color=colour, lw=1.0, ls=line, label=label)
+        ax.set_title(observed.given.recording.id, fontsize=9)
         ax.set_xlabel(TABLE[THETA_IN].axis)
     axes[0][0].set_ylabel(TABLE[channel].axis)
-    handles, labels = axes[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    legend_below(figure, axes[:, :1], columns=3)
     return figure
 
 
