@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.channels import CABLES
 from ccmodel.failure import ModelError
 from ccmodel.mechanisms.pulley_eccentricity import winding
 from ccmodel.mechanisms.pulley_friction import bearing
@@ -70,7 +71,7 @@ def cable(
         raise ModelError(
             "a single cable knows the paper's physics only; with mechanisms simulate from the load's angle"
         )
-    side, tension = {"A": (1, "T2_N"), "B": (-1, "T4_N")}[name]
+    side, tension = {"A": 1, "B": -1}[name], CABLES[name][1]
     if (far == "tension" and tension not in recording) or (far == "angle" and given.theta_out is None):
         raise ModelError(f"{recording.batch}/{recording.id}: {far} at the far end of cable {name} was not recorded")
     if far == "tension":

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.channels import F_DRIVE, F_LOAD, TABLE_ONE, TAU_IN, TAU_OUT, THETA_OUT
+from ccmodel.channels import F_DRIVE, F_LOAD, SUM_AT, TABLE_ONE, TAU_IN, TAU_OUT, TENSIONS_AT, THETA_OUT
 from ccmodel.geometry import ConduitPath
 from ccmodel.model.exact import pair as exact
 from ccmodel.model.general import run as general
@@ -90,7 +90,9 @@ def plain(rig: Rig, condition: Condition, stiffness: float, friction: float) -> 
     initial = InitialTension.uniform(_path(rig), rig.pretension_N)
     load = SpringLoad(condition.load_stiffness_Nm_per_rad)
     response = exact.simulate_pair(_transmission(rig, stiffness, friction), load, motion(rig, condition)[1], initial)
-    return _last_cycle([getattr(response.complete(), channel) for channel in TABLE_ONE], rig)
+    read = {channel: getattr(response.complete(), channel) for channel in TABLE_ONE}
+    sums = {SUM_AT[end]: read[first] + read[second] for end, (first, second) in TENSIONS_AT.items()}
+    return _table_channels(read | sums, rig)
 
 
 def motion(rig: Rig, condition: Condition) -> tuple[NDArray, NDArray]:
@@ -124,8 +126,5 @@ def _table_channels(read: Mapping[str, NDArray], rig: Rig) -> NDArray:
     drive, load = read[TAU_IN] / rig.pulley_radius_m, read[TAU_OUT] / rig.pulley_radius_m
     F_drive, F_load = read[F_DRIVE], read[F_LOAD]
     tensions = [(F_drive + drive) / 2, (F_load + load) / 2, (F_drive - drive) / 2, (F_load - load) / 2]
-    return _last_cycle([read[THETA_OUT], read[TAU_IN], read[TAU_OUT], *tensions], rig)
-
-
-def _last_cycle(channels: Sequence[NDArray], rig: Rig) -> NDArray:
-    return np.stack(channels)[:, -rig.motion.samples_per_cycle :]
+    channels = np.stack([read[THETA_OUT], read[TAU_IN], read[TAU_OUT], *tensions])
+    return channels[:, -rig.motion.samples_per_cycle :]
