@@ -44,7 +44,8 @@ def headline(said: dict) -> str:
     if said["is_held"]:
         left_out, missing = f"has changed since the {model} was fitted", "has changed"
     if said["verdict"] == "agrees":
-        return f"{batch}: the {model} agrees with the recordings; they show nothing that {missing}."
+        nothing = "no change" if said["is_held"] else "no missing physics"
+        return f"{batch}: the {model} agrees with the recordings; they show {nothing}."
     if said["verdict"] == "explained":
         names = (f"{registry.get(m['name']).summary} ({m['name']}, {m['place']})" for m in said["mechanisms"])
         return f"{batch}: {' and '.join(names)} {left_out}; in the model, it lowers the held-out error from {fall}."
