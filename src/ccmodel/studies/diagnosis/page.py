@@ -23,40 +23,40 @@ from ccmodel.recording import ORIGIN
 from ccmodel.report.figures import COLOURS, STYLE, legend_below
 
 LOOPS = 3
-RIVALS = 8
+CANDIDATES = 8
 FAINT = "#9a9a9a"
 WITH_FOUND = "with the mechanisms found"
 # By the short names of diagnosis.json.
 SYMBOL = {channel.short_name: channel.symbol for channel in TABLE.values()}
 
 
-def _baseline(said: dict) -> str:
+def _baseline(report: dict) -> str:
     """The baseline model in words."""
-    return "model given" if said["is_held"] else "calibrated model"
+    return "model given" if report["is_held"] else "calibrated model"
 
 
-def headline(said: dict) -> str:
+def headline(report: dict) -> str:
     """The result of a diagnosis in one sentence."""
-    batch, worst = said["batch"], _worst_channel(said)
-    e = said["fit"]["error"][worst]
+    batch, worst = report["batch"], _worst_channel(report)
+    e = report["fit"]["error"][worst]
     fall = f"{e['before'] / e['noise']:.1f} to {e['after'] / e['noise']:.1f} times the noise in {SYMBOL[worst]}"
-    model, left_out, missing = _baseline(said), "was left out", "is missing"
-    if said["is_held"]:
+    model, left_out, missing = _baseline(report), "was left out", "is missing"
+    if report["is_held"]:
         left_out, missing = f"has changed since the {model} was fitted", "has changed"
-    if said["verdict"] == "agrees":
-        nothing = "no change" if said["is_held"] else "no missing physics"
+    if report["verdict"] == "agrees":
+        nothing = "no change" if report["is_held"] else "no missing physics"
         return f"{batch}: the {model} agrees with the recordings; they show {nothing}."
-    if said["verdict"] == "explained":
-        names = (f"{registry.get(m['name']).summary} ({m['name']}, {m['place']})" for m in said["mechanisms"])
+    if report["verdict"] == "explained":
+        names = (f"{registry.get(m['name']).summary} ({m['name']}, {m['place']})" for m in report["mechanisms"])
         return f"{batch}: {' and '.join(names)} {left_out}; in the model, it lowers the held-out error from {fall}."
-    if said["verdict"] == "undecided":
-        names, together = _placed(said["alternatives"]), _placed(said["likeliest"])
+    if report["verdict"] == "undecided":
+        names, together = _placed(report["alternatives"]), _placed(report["likeliest"])
         if len(together) > 1:
             names = [f"{' and '.join(together)} together", *(name for name in names if name not in together)]
         if len(names) == 1:
             return f"{batch}: something {missing}; it may be {names[0]}, but these recordings do not confirm it."
         return f"{batch}: something {missing}, and these recordings cannot tell {' or '.join(names)} apart."
-    place = said["location"]["place"]
+    place = report["location"]["place"]
     return f"{batch}: something {missing} at the {place}, and no known mechanism explains it."
 
 
@@ -75,13 +75,13 @@ def write_diagnosis(file: Path, found: Diagnosis) -> None:
     origin = found.judgement.weighed[0].observations.given.recording.origin
     with plt.rc_context(STYLE):
         text = environment.get_template("page.html.j2").render(
-            said=found.said,
+            report=found.said,
             headline=headline(found.said),
             origin=ORIGIN[origin],
             symbol=SYMBOL,
             baseline=_baseline(found.said),
             has_found=found.judgement.best is not found.judgement.calibrated,
-            rivals=_rivals(found),
+            candidates=_candidates(found),
             listed=found.judgement.listed,
             summaries={name: registry.get(name) for name in registry.names()},
             map=_encoded(_map(found)),
@@ -91,19 +91,19 @@ def write_diagnosis(file: Path, found: Diagnosis) -> None:
     file.write_text(text, encoding="utf-8")
 
 
-def _rivals(found: Diagnosis) -> list[dict]:
+def _candidates(found: Diagnosis) -> list[dict]:
     """Baseline and the candidates with the smallest mean squares, a row each."""
     j = found.judgement
     ranked = sorted(zip(j.trials, j.probability, strict=True), key=lambda item: item[0].left.mean())
     rows = []
-    for fit, p in [(j.calibrated, None), *ranked[:RIVALS]]:
+    for fit, p in [(j.calibrated, None), *ranked[:CANDIDATES]]:
         lack_of_fit = j.learnable.get(fit.hypothesis)
         rows.append(
             {
-                "what": str(fit.hypothesis),
-                "left": float(fit.left.mean()),
-                "learnable": None if lack_of_fit is None else max(lack_of_fit.mean, 0.0),
-                "p": p,
+                "candidate": str(fit.hypothesis),
+                "mean_square": float(fit.left.mean()),
+                "lack_of_fit": None if lack_of_fit is None else max(lack_of_fit.mean, 0.0),
+                "probability": p,
                 "why": _why(fit, found),
             }
         )
@@ -180,9 +180,9 @@ def _loops(found: Diagnosis) -> Figure:
     return figure
 
 
-def _worst_channel(said: dict) -> str:
+def _worst_channel(report: dict) -> str:
     """Short name of the channel whose baseline error is largest over its noise."""
-    error = said["fit"]["error"]
+    error = report["fit"]["error"]
     return max(error, key=lambda c: error[c]["before"] / error[c]["noise"])
 
 
