@@ -79,6 +79,11 @@ def test_a_study_of_what_no_diagnosis_finds_is_refused():
         expand_studies(config, ["a", "b"])
 
 
+def test_a_study_cannot_have_the_name_of_a_judgement():
+    with pytest.raises(ValueError, match=r"studies.accuracy: that is the name of another study"):
+        Config.model_validate({"studies": {"accuracy": {"batches": ["b"]}}, "accuracy": {}})
+
+
 def test_each_becomes_a_study_a_batch():
     config = Config.model_validate({"studies": {"load": {"batches": "each"}}})
     assert {n: s.batches for n, s in expand_studies(config, ["a", "b"]).items()} == {"load-a": ["a"], "load-b": ["b"]}

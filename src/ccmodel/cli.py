@@ -77,11 +77,11 @@ def left_out(results: Folder) -> None:
     from ccmodel.report.page import left_out_of
 
     messages = left_out_of(results)
-    for line in messages.warnings:
+    for line in messages["warnings"]:
         _print_finding(line, "warning")
-    for line in messages.left_out:
+    for line in messages["left_out"]:
         _print_finding(line, "refused")
-    if messages.left_out:
+    if messages["left_out"]:
         raise typer.Exit(1)
 
 

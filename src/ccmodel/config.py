@@ -43,6 +43,8 @@ class Config(TypedModel):
         for name, means in ((ESTIMATED, "the batches' own estimates"), (EXTENDED, "the models of the diagnoses")):
             if name in self.fits:
                 raise ValueError(f"'{name}' names {means}; call the fit something else")
+        if taken := self.studies.keys() & self.judgements.keys():
+            raise ValueError(f"studies.{min(taken)}: that is the name of another study; call it something else")
         for name, study in self.studies.items():
             study.check(f"study '{name}'", self)
         for name, study in self.judgements.items():

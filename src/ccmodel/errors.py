@@ -87,20 +87,7 @@ def error_table(pairs: Iterable[tuple[Recording, Recording | None]], parameters:
             measured = recorded[channel][window]
             rmse = float(np.sqrt(np.mean((simulated[channel][window] - measured) ** 2)))
             span = float(np.ptp(measured))
-            rows.append(
-                {
-                    "batch": recorded.batch,
-                    "recording": recorded.id,
-                    "origin": recorded.origin,
-                    "parameters": parameters,
-                    "channel": channel,
-                    "unit": unit_of(channel),
-                    "rmse": rmse,
-                    "peak_to_peak": span,
-                    "nrmse_percent": 100 * rmse / span if span > 0 else np.nan,
-                    "window_from_s": recorded.time_s[window][0],
-                    "window_to_s": recorded.time_s[window][-1],
-                    "samples": measured.size,
-                }
-            )
+            what = (recorded.batch, recorded.id, recorded.origin, parameters, channel, unit_of(channel))
+            error = (rmse, span, 100 * rmse / span if span > 0 else np.nan)
+            rows.append((*what, *error, *recorded.time_s[window][[0, -1]], measured.size))
     return pd.DataFrame(rows, columns=list(COLUMNS)).astype(COLUMNS)

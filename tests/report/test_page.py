@@ -8,7 +8,7 @@ import pytest
 from ccmodel.errors import COLUMNS
 from ccmodel.inference.fit import FitResult
 from ccmodel.inference.intervals import Interval, Scatter, Undetermined
-from ccmodel.report.page import LeftOut, about, interval, write_page
+from ccmodel.report.page import about, interval, write_page
 
 APART = "friction_coefficient and extra_bend_rad are not determined apart; known is mu + 0.05 x e = 0.16"
 FIT = FitResult(
@@ -32,7 +32,7 @@ def page(tmp_path):
     def write(result: FitResult) -> str:
         errors = pd.DataFrame([], columns=list(COLUMNS)).astype(COLUMNS)
         fits = [{"fit": "fitted", **result.as_dict()}]
-        write_page(tmp_path / "index.html", [], [], errors, fits, LeftOut([], []))
+        write_page(tmp_path / "index.html", [], [], errors, fits, {"left_out": [], "warnings": []})
         return (tmp_path / "index.html").read_text()
 
     return write

@@ -60,7 +60,7 @@ def cases(stiffness_off=0.0, accuracy=0.0005):
     found = []
     for i, pretension in enumerate((6.0, 7.0, 8.0)):
         study = STUDY.model_copy(update={"pretension_N": pretension})
-        recorded = model_runs.run(CABLE, model_runs.even(study), 0.05, study)
+        recorded = model_runs.run(CABLE, model_runs.even(study), study, 0.05)
         recorded = replace(
             recorded, batch="b", id=f"r{i}-a", origin="virtual-rig", accuracy=dict.fromkeys(recorded.channels, accuracy)
         )

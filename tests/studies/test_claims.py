@@ -8,7 +8,7 @@ import pytest
 from ccmodel.repeats import condition_of, estimates, pooled_scatter
 from ccmodel.report.figures import save_figure
 from ccmodel.studies.claims import model_runs
-from ccmodel.studies.claims.claim import NO, OPEN, YES
+from ccmodel.studies.claims.claim import Verdict
 from ccmodel.studies.claims.figure import model_figure, recordings_figure
 from ccmodel.studies.claims.settings import Claims
 from ccmodel.studies.claims.study import claims_of
@@ -24,9 +24,9 @@ def pairs_over(paths_and_pretensions, scatter=0.003):
     pairs = []
     for i, (path, pretension) in enumerate(paths_and_pretensions):
         study = STUDY.model_copy(update={"pretension_N": pretension, "amplitude_rad": 0.6})
-        said = model_runs.run(CABLE, path, 0.05, study)
+        said = model_runs.run(CABLE, path, study, 0.05)
         for letter, sign in (("a", 1), ("b", -1)):
-            run = model_runs.run(replace(CABLE, friction_scale=1 + sign * scatter), path, 0.05, study)
+            run = model_runs.run(replace(CABLE, friction_scale=1 + sign * scatter), path, study, 0.05)
             pairs.append((replace(run, batch="b", id=f"r{i}-{letter}", origin="virtual-rig"), said))
     return pairs
 
@@ -48,7 +48,7 @@ def found():
              "phases-and-pretension", "radius", "loop-placement"]
 )  # fmt: skip
 def test_what_the_model_does_is_borne_out(found, name):
-    assert found[name].borne_out == YES
+    assert found[name].borne_out == Verdict.YES
 
 
 def test_recordings_of_the_model_hold_the_model_within_their_intervals(found):
@@ -67,12 +67,12 @@ def test_a_trend_the_other_way_is_not_borne_out():
     pairs = pairs_over([(model_runs.even(STUDY, n * np.pi), 2.5) for n in (2, 1)])
     swapped = [(replace(r, path=s.path), s) for (r, _), (s, _) in zip(pairs, pairs[::-1], strict=True)]
     claims = claims_of({"bend": swapped, "pretension": [], "radius": []}, None, CLAIMS, HOW)
-    assert claims[0].borne_out == NO
+    assert claims[0].borne_out == Verdict.NO
 
 
 def test_without_recordings_nothing_is_determined_and_no_number_is_made_up():
     claims = claims_of({"bend": [], "pretension": [], "radius": []}, None, CLAIMS, HOW)
-    assert {claim.borne_out for claim in claims} == {OPEN}
+    assert {claim.borne_out for claim in claims} == {Verdict.OPEN}
 
 
 def test_without_recordings_the_figures_can_still_be_drawn(tmp_path):
@@ -93,7 +93,7 @@ def test_the_figures_call_the_virtual_rig_what_it_is(found, tmp_path):
 def test_without_repeats_there_is_no_interval_and_it_is_said():
     pairs = pairs_over([(model_runs.even(STUDY, n * np.pi), 2.5) for n in (1, 2)])[::2]
     claim = claims_of({"bend": pairs, "pretension": [], "radius": []}, None, CLAIMS, HOW)[0]
-    assert claim.borne_out == OPEN
+    assert claim.borne_out == Verdict.OPEN
     assert all(row.low is None and row.gap == "no repeats: no interval" for row in claim.rows)
     assert all(np.isfinite(row.value) for row in claim.rows)
 

@@ -79,7 +79,7 @@ def test_work_lost_is_the_area_of_the_drives_loop():
 
 def test_the_models_loop_is_that_of_its_closed_forms():
     """Evenly bent: slope 1 with both cables taut, exp(-mu phi) with one slack; width 2 R sinh(mu phi) (T2 + T4)."""
-    said = model_runs.run(CABLE, model_runs.even(STUDY), 0.05, STUDY)
+    said = model_runs.run(CABLE, model_runs.even(STUDY), STUDY, 0.05)
     values, _ = measure(said, ["slope", "width"], HOW)
     middle = int(np.argmin(np.abs(said["tau_out_Nm"][-1000:]))) - 1000
     sum_N = said["T2_N"][middle] + said["T4_N"][middle]
@@ -87,7 +87,7 @@ def test_the_models_loop_is_that_of_its_closed_forms():
     assert values["width"] == pytest.approx(1e3 * 2 * 0.006 * np.sinh(0.156 * np.pi) * sum_N, rel=0.005)
 
     low = STUDY.model_copy(update={"pretension_N": 3.5})
-    values, _ = measure(model_runs.run(CABLE, model_runs.even(low), 0.05, low), ["slack_slope"], HOW)
+    values, _ = measure(model_runs.run(CABLE, model_runs.even(low), low, 0.05), ["slack_slope"], HOW)
     assert values["slack_slope"] == pytest.approx(np.exp(-0.156 * np.pi), rel=0.01)
 
 
@@ -95,7 +95,7 @@ def test_the_two_cases_of_phase_four():
     shares = []
     for pretension in (0.7, 3.5, 7.0):
         study = STUDY.model_copy(update={"pretension_N": pretension})
-        values, _ = measure(model_runs.run(CABLE, model_runs.even(study), 0.05, study), ["IVa_share", "IVb_share"], HOW)
+        values, _ = measure(model_runs.run(CABLE, model_runs.even(study), study, 0.05), ["IVa_share", "IVb_share"], HOW)
         shares.append((values["IVa_share"] > 1, values["IVb_share"] > 1))
     assert shares == [(True, True), (True, False), (False, False)]
 

@@ -63,8 +63,8 @@ rule write_report:
                 "parameters": (
                     CONFIG.parameters_of(study) if hasattr(study, "parameters") else ""
                 ),
-                "has_summary": bool(study.tables),
             }
+            | ({"summary": tables(name)[-1]} if study.tables else {})
             for name, study in STUDIES.items()
         ],
         sources=[source_digest("ccmodel.report.page")]

@@ -1,7 +1,6 @@
 """The page of a run: errors, the parts of the studies, fits, and the recordings that were left out."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -17,40 +16,6 @@ from ccmodel.typed import InputError
 LEFT_OUT = "left-out.json"
 # Table I of the paper, %: its fitted model against its own half-loop recording.
 PAPER_TABLE_I = dict(zip(TABLE_ONE, (3.7, 19.4, 3.7, 12.8, 4.1, 9.9, 5.5), strict=True))
-
-
-@dataclass(frozen=True)
-class Part:
-    """A study on the page; `ccmodel/studies/<kind>/part.html.j2` shows all parts of its kind.
-
-    Attributes
-    ----------
-    kind, name : str
-        Folder of the study in `ccmodel.studies`; name in the configuration.
-    heading : str
-        Name of the section in the navigation.
-    settings : dict
-        Settings of the study.
-    parameters : str
-        Parameter set of the model, if the study has one.
-    summary : dict
-        Content of the study's JSON file, if it has one.
-    """
-
-    kind: str
-    name: str
-    heading: str
-    settings: dict = field(default_factory=dict)
-    parameters: str = ""
-    summary: dict = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class LeftOut:
-    """Messages of a run: on input that was left out, and on input that was used with a warning."""
-
-    left_out: list[str]
-    warnings: list[str]
 
 
 def write_report(
@@ -70,40 +35,36 @@ def write_report(
     errors_file : Path
         The table of errors (Parquet).
     studies : sequence of dict
-        Attributes of a `Part` for each study; ``has_summary`` stands for its summary.
+        ``kind``, ``name``, ``heading``, ``settings``, ``parameters`` of each, and its JSON file, if any: ``summary``.
     """
-    batches, fits = ([read_json(f) for f in files] for files in (summary_files, fit_files))
-    messages = _messages(raw, unusable, batches, fits, [read_json(f) for f in simulation_files])
-    write_json(page_file.parent / LEFT_OUT, asdict(messages))
-    parts = [Part("diagnosis", f.parent.name, "Diagnoses", summary=read_json(f)) for f in diagnosis_files]
-    for study in studies:
-        summary = read_json(page_file.parent / f"tables/{study['name']}.json") if study.pop("has_summary") else {}
-        parts.append(Part(**study, summary=summary))
+    batches, fits, simulations = ([read_json(f) for f in fs] for fs in (summary_files, fit_files, simulation_files))
+    messages = _messages(raw, unusable, batches, fits, simulations)
+    write_json(page_file.parent / LEFT_OUT, messages)
+    diagnoses = [{"kind": "diagnosis", "heading": "Diagnoses", "summary": f} for f in diagnosis_files]
+    parts = [p | {"summary": read_json(p["summary"])} if "summary" in p else p for p in (*diagnoses, *studies)]
     write_page(page_file, parts, batches, pd.read_parquet(errors_file), fits, messages)
 
 
 def _messages(
     raw: Path, unusable: Sequence[str], batches: Sequence[dict], fits: Sequence[dict], simulations: Sequence[dict]
-) -> LeftOut:
-    findings = [Finding(**f) for batch in batches for f in batch["findings"]]
+) -> dict[str, list[str]]:
+    """Lines on input that was left out, and on input that was used with a warning."""
     imported = raw / "findings.json"
-    if imported.exists():
-        findings = [Finding(**f) for f in read_json(imported)] + findings
+    findings = [Finding(**f) for f in (read_json(imported) if imported.exists() else [])]
+    findings += [Finding(**f) for batch in batches for f in batch["findings"]]
     failures = [line for simulation in simulations for line in simulation["failures"]]
-    return LeftOut(
-        left_out=[
-            *unusable,
-            *(str(f) for f in findings if f.severity == "refused"),
-            *(f"fit {f['fit']}: {f['message']}" for f in fits if not f["succeeded"]),
-            # A recording fails with every parameter set; one message is enough.
-            *dict.fromkeys(f"not simulated: {line}" for line in failures),
-        ],
-        warnings=[str(f) for f in findings if f.severity == "warning"],
-    )
+    left_out = [
+        *unusable,
+        *(str(f) for f in findings if f.severity == "refused"),
+        *(f"fit {f['fit']}: {f['message']}" for f in fits if not f["succeeded"]),
+        # A recording fails with every parameter set; one message is enough.
+        *dict.fromkeys(f"not simulated: {line}" for line in failures),
+    ]
+    return {"left_out": left_out, "warnings": [str(f) for f in findings if f.severity == "warning"]}
 
 
-def left_out_of(results: Path) -> LeftOut:
-    """Messages of the last run into a results folder.
+def left_out_of(results: Path) -> dict[str, list[str]]:
+    """Messages of the last run into a results folder: ``left_out`` and ``warnings``.
 
     Raises
     ------
@@ -113,26 +74,28 @@ def left_out_of(results: Path) -> LeftOut:
     file = results / LEFT_OUT
     if not file.exists():
         raise InputError(f"{file}: not there, so no run came to its end; its own messages say why")
-    return LeftOut(**read_json(file))
+    return read_json(file)
 
 
 def write_page(
-    file: Path, parts: Iterable[Part], batches: Sequence[dict], errors: pd.DataFrame, fits: Sequence[dict],
-    messages: LeftOut,
+    file: Path, parts: Iterable[dict], batches: Sequence[dict], errors: pd.DataFrame, fits: Sequence[dict],
+    messages: dict[str, list[str]],
 ) -> None:  # fmt: skip
     """Write the page; it refers to the figures in `figures/` next to it.
 
     Parameters
     ----------
     file : Path
-    parts : iterable of Part
-        In the order of the page.
+    parts : iterable of dict
+        Studies in the order of the page, as in `write_report`, with the content of their ``summary``. The template
+        ``studies/<kind>/part.html.j2`` shows all parts of a kind.
     batches : sequence of dict
         Summaries of the ingested batches.
     errors : DataFrame
         All errors, with the columns of `ccmodel.errors.COLUMNS`.
     fits : sequence of dict
-    messages : LeftOut
+    messages : dict of str to list of str
+        As `left_out_of` reads them.
     """
     environment = Environment(
         loader=PackageLoader("ccmodel", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
@@ -140,9 +103,9 @@ def write_page(
     )  # fmt: skip
     environment.filters |= {"interval": interval, "about": about, "number": number}
     channels = [c for c in CHANNELS if c in set(errors["channel"])]
-    sections: dict[str, list[Part]] = {}
+    sections: dict[str, list[dict]] = {}
     for part in parts:
-        sections.setdefault(part.kind, []).append(part)
+        sections.setdefault(part["kind"], []).append(part)
     text = environment.get_template("report/page.html.j2").render(
         headline=_headline(errors),
         origins=sorted({ORIGIN[o] for o in errors["origin"]}),
@@ -158,8 +121,7 @@ def write_page(
         notes={b["batch"]["batch"]: b["batch"]["note"] for b in batches if b["batch"] and b["batch"].get("note")},
         rows=_rows(errors),
         fits=fits,
-        left_out=messages.left_out,
-        warnings=messages.warnings,
+        **messages,
     )
     file.write_text(text)
 

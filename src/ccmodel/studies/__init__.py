@@ -6,8 +6,8 @@ A study is a folder with
    the runs that the study needs and the tables and figures that it makes,
 2. ``study.py``: ``SETTINGS``, that class, and ``judge(settings, runs, measuring)``, the computation, which returns an
    `ccmodel.studies.run.Outcome`,
-3. ``figure.py``: its figures,
-4. ``part.html.j2``: its part of the page, whose ``parts`` are `ccmodel.report.page.Part`,
+3. ``figure.py``: its figures, if there is more to it than the figures,
+4. ``part.html.j2``: its part of the page; `ccmodel.report.page.write_page` gives it ``parts``,
 
 and a field of `ccmodel.config.Config`. The rule in ``workflow/rules/studies.smk`` and the page take it from there.
 

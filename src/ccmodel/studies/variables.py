@@ -1,10 +1,11 @@
 """The variable of a study: its value in a recording, and the label of a value in a legend."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from ccmodel.recording import ORIGIN, Recording
+from ccmodel.steps.files import Pair
 
 
 def value_of(recording: Recording, variable: str) -> float | str:
@@ -65,6 +66,15 @@ def labelled(recordings: Iterable[Recording], variable: str) -> list[tuple[str, 
     mixed = len({r.origin for r in ordered}) > 1
     suffix = {r.origin: f", {ORIGIN[r.origin]}" if mixed else "" for r in ordered}
     return [(label_of(value_of(r, variable), variable) + suffix[r.origin], r) for r in ordered]
+
+
+def by_label(pairs: Sequence[Pair], variable: str) -> dict[str, list[Pair]]:
+    """Pairs by the label of their recording, in the order of the variable's values."""
+    pair_of = {id(recorded): (recorded, simulated) for recorded, simulated in pairs}
+    groups: dict[str, list[Pair]] = {}
+    for label, recorded in labelled((r for r, _ in pairs), variable):
+        groups.setdefault(label, []).append(pair_of[id(recorded)])
+    return groups
 
 
 def origins_of(recordings: Iterable[Recording]) -> str:

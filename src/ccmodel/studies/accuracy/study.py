@@ -26,7 +26,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import t
 
-from ccmodel.channels import TENSIONS, THETA_IN
+from ccmodel.channels import MEASURED, TENSIONS, THETA_IN, short_name
 from ccmodel.failure import ModelError
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import PRESCRIBED, ModelInput, simulate
@@ -40,10 +40,7 @@ from ccmodel.studies.run import Outcome, Run
 
 SETTINGS = Accuracy
 
-JUDGED = (
-    "theta_out", "tau_in", "tau_out", "F_drive", "F_load", "T1", "T2", "T3", "T4", "width", "backlash", "lost_motion",
-    "work_lost",
-)  # fmt: skip
+JUDGED = (*map(short_name, (*MEASURED, *TENSIONS)), "width", "backlash", "lost_motion", "work_lost")
 FEWEST = 3  # pairs for a standard deviation
 BY_RECORDING = {
     "batch": str, "recording": str, "origin": str, "quantity": str, "unit": str, "recorded": float, "modelled": float,

@@ -2,11 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 
-YES, PART, NO, OPEN = "yes", "in part", "no", "not determined"
 MODEL_ALONE = "model study (simulated)"
+
+
+class Verdict(StrEnum):
+    """Whether a claim is borne out."""
+
+    YES = "yes"
+    PART = "in part"
+    NO = "no"
+    OPEN = "not determined"
 
 
 @dataclass(frozen=True)
@@ -52,8 +61,7 @@ class Claim:
     ----------
     name, section, says : str
         Our name for it, the paper's section, and the statement in our words.
-    borne_out : str
-        "yes", "in part", "no" or "not determined".
+    borne_out : Verdict
     sentence : str
         The numbers in a sentence.
     rows : list of Row
@@ -62,7 +70,7 @@ class Claim:
     name: str
     section: str
     says: str
-    borne_out: str
+    borne_out: Verdict
     sentence: str
     rows: list[Row] = field(default_factory=list)
 

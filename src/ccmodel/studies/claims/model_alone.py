@@ -6,18 +6,7 @@ from ccmodel.failure import ModelError
 from ccmodel.model.paper import SECTIONS as PAPER_SECTIONS
 from ccmodel.model.parameters import Parameters
 from ccmodel.studies.claims import model_runs
-from ccmodel.studies.claims.claim import (
-    MODEL_ALONE,
-    NO,
-    OPEN,
-    PART,
-    YES,
-    Claim,
-    Row,
-    percent,
-    spread_percent,
-    three_digits,
-)
+from ccmodel.studies.claims.claim import MODEL_ALONE, Claim, Row, Verdict, percent, spread_percent, three_digits
 from ccmodel.studies.claims.settings import Claims
 from ccmodel.studies.loops.measures import QUANTITIES, measure
 from ccmodel.studies.loops.settings import Measuring
@@ -25,13 +14,13 @@ from ccmodel.studies.variables import label_of
 
 
 def model_claims(parameters: Parameters | None, claims: Claims, how: Measuring) -> list[Claim]:
-    """Claims on the model; none without parameters or without a load spring."""
-    if parameters is None or parameters.load_stiffness_Nm_per_rad is None:
+    """Claims on the model; none without parameters."""
+    if parameters is None:
         return []
     try:
         return [_load(parameters, claims, how), _placement(parameters, claims, how), _sections(parameters, claims)]
     except ModelError as error:
-        return [Claim("model-studies", "VI", "studies of the model alone", OPEN, str(error))]
+        return [Claim("model-studies", "VI", "studies of the model alone", Verdict.OPEN, str(error))]
 
 
 def _rows(quantities: tuple[str, ...], condition: str, at: float, values: dict, gaps: dict) -> list[Row]:
@@ -46,7 +35,7 @@ def _load(parameters: Parameters, claims: Claims, how: Measuring) -> Claim:
     study, quantities = claims.model, ("lost_motion", "width", "backlash", "slack_share")
     taut, slack, rows = [], [], []
     for stiffness in study.load_stiffness_Nm_per_rad:
-        simulated = model_runs.run(parameters, model_runs.even(study), stiffness, study)
+        simulated = model_runs.run(parameters, model_runs.even(study), study, stiffness)
         values, gaps = measure(simulated, quantities, how)
         rows += _rows(quantities, f"load {stiffness:g} N·m/rad", stiffness, values, gaps)
         if "slack_share" in values and "lost_motion" in values:
@@ -54,7 +43,8 @@ def _load(parameters: Parameters, claims: Claims, how: Measuring) -> Claim:
     changes = {q: spread_percent([v[q] for _, v in taut if q in v]) for q in ("lost_motion", "width")}
     holds = bool(taut) and all(c is not None and c < claims.small_percent for c in changes.values())
     whole = spread_percent([v["lost_motion"] for _, v in taut + slack])
-    verdict = OPEN if not taut else NO if not holds else PART if whole > claims.small_percent else YES
+    verdict = Verdict.PART if whole is not None and whole > claims.small_percent else Verdict.YES
+    verdict = Verdict.OPEN if not taut else verdict if holds else Verdict.NO
     says = "the deadband depends on friction under pretension, not on the load"
     return Claim("deadband-and-load", "VI", says, verdict, _load_sentence(taut, slack, changes), rows)
 
@@ -86,7 +76,7 @@ def _placement(parameters: Parameters, claims: Claims, how: Measuring) -> Claim:
         found[place], gaps = measure(simulated, quantities, how)
         rows += _rows(quantities, f"loop {place}", i, found[place], gaps)
     profile = [spread_percent([v[q] for v in found.values() if q in v]) for q in ("lost_motion", "slope")]
-    verdict = OPEN if None in profile else YES if max(profile) > claims.small_percent else NO
+    verdict = Verdict.OPEN if None in profile else Verdict.YES if max(profile) > claims.small_percent else Verdict.NO
     parts = []
     for place, values in found.items():
         lost, width, slope = (three_digits(values.get(q)) for q in ("lost_motion", "width", "slope"))
@@ -104,12 +94,11 @@ def _placement(parameters: Parameters, claims: Claims, how: Measuring) -> Claim:
 def _sections(parameters: Parameters, claims: Claims) -> Claim:
     """Error of the paper's discretisation over the number of its sections."""
     study, rows, parts, enough = claims.model, [], [], []
-    stiffness = parameters.load_stiffness_Nm_per_rad
     for bend in study.sections_bend_rad:
         path, name = model_runs.even(study, bend), label_of(bend, "bend")
-        exact = model_runs.run(parameters, path, stiffness, study)
+        exact = model_runs.run(parameters, path, study)
         errors = {
-            n: model_runs.error_percent(model_runs.run(parameters, path, stiffness, study, n), exact)
+            n: model_runs.error_percent(model_runs.run(parameters, path, study, sections=n), exact)
             for n in study.sections
         }
         rows += [
@@ -125,5 +114,5 @@ def _sections(parameters: Parameters, claims: Claims) -> Claim:
         " the exact solver: " + "; ".join(parts) + "."
     )
     says = f"simulates with {PAPER_SECTIONS} sections of each cable, and names no error"
-    verdict = YES if all(enough) else PART if any(enough) else NO
+    verdict = Verdict.YES if all(enough) else Verdict.PART if any(enough) else Verdict.NO
     return Claim("sections", "III-B and IV", says, verdict, sentence, rows)

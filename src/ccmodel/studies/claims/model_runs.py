@@ -26,17 +26,19 @@ def drive(study: ModelStudies) -> NDArray:
 
 
 def run(
-    parameters: Parameters, path: ConduitPath, stiffness_Nm_per_rad: float, study: ModelStudies, sections: int = 0
-) -> Recording:
+    parameters: Parameters, path: ConduitPath, study: ModelStudies, load_Nm_per_rad: float | None = None,
+    sections: int = 0,
+) -> Recording:  # fmt: skip
     """One run against a spring; initially both cables have the study's pretension.
 
     Parameters
     ----------
     parameters : Parameters
-        Cable, friction and pulleys.
+        Cable, friction, pulleys and, without `load_Nm_per_rad`, the load's spring.
     path : ConduitPath
-    stiffness_Nm_per_rad : float
     study : ModelStudies
+    load_Nm_per_rad : float, optional
+        Stiffness of another spring.
     sections : int
         Sections of each cable in the paper's discretisation; 0 for the exact solver.
 
@@ -50,32 +52,18 @@ def run(
     ModelError
         If the solver does not reach the last sample.
     """
-    transmission = Transmission(
-        path=path,
-        axial_rigidity_N=parameters.stiffness_N_per_m * parameters.reference_length_m,
-        friction_coefficient=parameters.friction,
-        drive_radius_m=parameters.drive_radius_m,
-        load_radius_m=parameters.load_radius_m,
-    )
-    theta, load = drive(study), SpringLoad(stiffness_Nm_per_rad)
+    p, theta = parameters, drive(study)
+    rigidity = p.stiffness_N_per_m * p.reference_length_m
+    transmission = Transmission(path, rigidity, p.friction, p.drive_radius_m, p.load_radius_m)
+    load = SpringLoad(load_Nm_per_rad or p.load_stiffness_Nm_per_rad)
     initial = InitialTension.uniform(path, study.pretension_N)
     if sections:
         response = paper.simulate_pair(transmission, load, theta, initial, sections)
     else:
-        response = exact.simulate_pair(transmission, load, theta, initial)
-        if response.status is not exact.Status.OK:
-            raise ModelError(f"{response.status.name} at sample {response.reached}: {response.status.value}")
+        response = exact.simulate_pair(transmission, load, theta, initial).complete()
     channels = {THETA_IN: theta} | {c: getattr(response, c) for c in TABLE_ONE}
-    return Recording(
-        batch="model-study",
-        id="model",
-        origin="model",
-        time_s=np.arange(theta.size) / study.samples_a_cycle,
-        channels=channels,
-        derived_from=dict.fromkeys(channels, "model"),
-        pretension_N=study.pretension_N,
-        path=path,
-    )
+    sources, time_s = dict.fromkeys(channels, "model"), np.arange(theta.size) / study.samples_a_cycle
+    return Recording("model-study", "model", "model", time_s, channels, sources, study.pretension_N, path)
 
 
 def even(study: ModelStudies, bend_rad: float | None = None) -> ConduitPath:
@@ -122,5 +110,4 @@ def sections_needed(errors: Mapping[int, float], limit_percent: float) -> int | 
 
 def loop_placements(parameters: Parameters, study: ModelStudies) -> dict[str, Recording]:
     """Runs with the loop at each of its places, against the load's own spring."""
-    stiffness = parameters.load_stiffness_Nm_per_rad
-    return {place: run(parameters, path, stiffness, study) for place, path in placements(study).items()}
+    return {place: run(parameters, path, study) for place, path in placements(study).items()}

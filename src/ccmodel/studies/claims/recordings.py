@@ -6,7 +6,7 @@ certainly small. Otherwise it is not determined.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,22 +18,11 @@ from ccmodel.recording import Recording
 from ccmodel.repeats import Estimate, difference, estimates
 from ccmodel.steps.files import Pair
 from ccmodel.studies.claims import model_runs
-from ccmodel.studies.claims.claim import (
-    MODEL_ALONE,
-    NO,
-    OPEN,
-    PART,
-    YES,
-    Claim,
-    Row,
-    percent,
-    spread_percent,
-    three_digits,
-)
+from ccmodel.studies.claims.claim import MODEL_ALONE, Claim, Row, Verdict, percent, spread_percent, three_digits
 from ccmodel.studies.claims.settings import Claims, ModelStudies
 from ccmodel.studies.loops.measures import QUANTITIES, measure
 from ccmodel.studies.loops.settings import Measuring
-from ccmodel.studies.variables import labelled, origins_of, value_of
+from ccmodel.studies.variables import by_label, origins_of, value_of
 
 
 @dataclass(frozen=True)
@@ -85,34 +74,31 @@ def recorded_claims(
 
 
 def _series(pairs: Sequence[Pair], variable: str, quantity: str, claims: Claims, how: Measuring) -> _Series:
-    simulated_of = {id(recorded): simulated for recorded, simulated in pairs}
-    conditions: dict[str, list[Recording]] = {}
-    for label, recording in labelled((r for r, _ in pairs), variable):
-        conditions.setdefault(label, []).append(recording)
-    numbers = {label: _numbers(group, quantity, how) for label, group in conditions.items()}
-    usable = [label for label, (values, _) in numbers.items() if values]
-    q = QUANTITIES[quantity]
-    means = estimates([numbers[label][0] for label in usable], relative=not q.is_share)
+    conditions, q = by_label(pairs, variable), QUANTITIES[quantity]
+    numbers = {label: _numbers([r for r, _ in group], quantity, how) for label, group in conditions.items()}
+    usable = {label: values for label, (values, _) in numbers.items() if values}
+    means = dict(zip(usable, estimates(list(usable.values()), relative=not q.is_share), strict=True))
     rows = []
     for label, group in conditions.items():
-        place = (quantity, q.unit, label, float(value_of(group[0], variable)), origins_of(group))
-        simulated = [s for s in (simulated_of[id(r)] for r in group) if s is not None]
-        modelled, _ = _numbers(simulated, quantity, how)
+        modelled, _ = _numbers([s for _, s in group if s is not None], quantity, how)
         model = float(np.mean(modelled)) if modelled else None
-        if label not in usable:
-            rows.append(Row(*place, model=model, gap=numbers[label][1]))
-            continue
-        mean = means[usable.index(label)]
-        reach = mean.reach(claims.coverage)
-        low, high = (None, None) if reach is None else (mean.value - reach, mean.value + reach)
-        if q.is_share and low is not None:
-            low, high = max(low, 0.0), min(high, 100.0)
-        gap = "no repeats: no interval" if reach is None else ""
-        rows.append(Row(*place, mean.count, mean.value, low, high, model, gap))
-    return _Series(rows, means)
+        at = float(value_of(group[0][0], variable))
+        row = Row(quantity, q.unit, label, at, origins_of(r for r, _ in group), model=model, gap=numbers[label][1])
+        rows.append(_with_interval(row, means[label], claims.coverage) if label in means else row)
+    return _Series(rows, list(means.values()))
+
+
+def _with_interval(row: Row, mean: Estimate, coverage: float) -> Row:
+    """A row with a mean over recordings and its interval; a share stays within 0 and 100 %."""
+    row, reach = replace(row, recordings=mean.count, value=mean.value, gap=""), mean.reach(coverage)
+    if reach is None:
+        return replace(row, gap="no repeats: no interval")
+    low, high = (0.0, 100.0) if QUANTITIES[row.quantity].is_share else (-np.inf, np.inf)
+    return replace(row, low=max(mean.value - reach, low), high=min(mean.value + reach, high))
 
 
 def _numbers(recordings: Sequence[Recording], quantity: str, how: Measuring) -> tuple[list[float], str]:
+    """A quantity of each recording that has it, and the reason of the last one that does not."""
     values, gap = [], "no recording"
     for recording in recordings:
         found, gaps = measure(recording, [quantity], how)
@@ -131,34 +117,34 @@ def _trend(trend: _Trend, pairs: Sequence[Pair], claims: Claims, how: Measuring)
 def _has_sign(series: _Series, sign: int, claims: Claims) -> str:
     """Whether means rise (sign +1) or fall (-1) from one condition to the next."""
     if not series.is_repeated:
-        return OPEN
+        return Verdict.OPEN
     means = series.estimates
     if all(sign * s.value > s.reach(claims.coverage) for s in (difference(a, b) for a, b in pairwise(means))):
-        return YES
+        return Verdict.YES
     whole = difference(means[0], means[-1])
     mean = float(np.mean([m.value for m in means]))
     if sign * whole.value + whole.reach(claims.coverage) < 0.01 * claims.small_percent * abs(mean):
-        return NO
-    return OPEN
+        return Verdict.NO
+    return Verdict.OPEN
 
 
 def _joint(verdicts: Sequence[str]) -> str:
     kinds = set(verdicts)
     if len(kinds) == 1:
         return kinds.pop()
-    return PART if YES in kinds else OPEN
+    return Verdict.PART if Verdict.YES in kinds else Verdict.OPEN
 
 
 def _phases(pairs: Sequence[Pair], claims: Claims, how: Measuring) -> Claim:
     """Phases IVa and IVb over pretension."""
     series = {q: _series(pairs, "pretension", q, claims, how) for q in ("IVa_share", "IVb_share")}
-    verdict = OPEN
+    verdict = Verdict.OPEN
     seen_a, seen_b = ([e.value > claims.seen_percent for e in s.estimates] for s in series.values())
     if len(seen_a) > 2 and len(seen_b) == len(seen_a):
         # Conditions are in rising order of pretension.
         ends = (seen_a[0], seen_a[-1], seen_b[0], seen_b[-1]) == (True, False, True, False)
         middle = any(a and not b for a, b in zip(seen_a, seen_b, strict=True))
-        verdict = YES if ends and middle else NO
+        verdict = Verdict.YES if ends and middle else Verdict.NO
     says = "a high pretension shows no phase IV, a middling one IVa, a low one IVb as well"
     return Claim("phases-and-pretension", "V-B", says, verdict, *_sentence_and_rows(series))
 
@@ -173,12 +159,12 @@ def _radius(pairs: Sequence[Pair], parameters: Parameters | None, claims: Claims
         rows += series.rows
         place = (f"{quantity}_spread", "%", "all radii", np.nan, series.rows[0].source if series.rows else "")
         if spread is None:
-            verdicts.append(OPEN)
+            verdicts.append(Verdict.OPEN)
             rows.append(Row(*place, model=model, gap="fewer than two radii, or no repeats"))
             continue
         value, reach = spread
         low, high = max(0.0, value - reach), value + reach
-        verdicts.append(YES if high < small else NO if low > small else OPEN)
+        verdicts.append(Verdict.YES if high < small else Verdict.NO if low > small else Verdict.OPEN)
         rows.append(Row(*place, sum(e.count for e in series.estimates), value, low, high, model))
         parts.append(f"{QUANTITIES[quantity].text} {value:.2g} % (at most {high:.2g} %; model {percent(model)} %)")
     sentence = "Between the radii the means differ by: " + "; ".join(parts) + "." if parts else "Nothing to compare."
@@ -194,10 +180,8 @@ def _backlash_alone(
     paths: Sequence[ConduitPath], parameters: Parameters | None, study: ModelStudies, how: Measuring
 ) -> list[float]:
     """Backlash of the model on each path, at the study's pretension; none if the model cannot be run."""
-    if parameters is None or parameters.load_stiffness_Nm_per_rad is None:
-        return []
     try:
-        runs = [model_runs.run(parameters, path, parameters.load_stiffness_Nm_per_rad, study) for path in paths]
+        runs = [model_runs.run(parameters, path, study) for path in paths] if parameters is not None else []
     except ModelError:
         return []
     return [v for run in runs for v in measure(run, ["backlash"], how)[0].values()]

@@ -10,7 +10,7 @@ from ccmodel.model.parameters import Parameters
 from ccmodel.recording import Recording
 from ccmodel.steps.files import Pair
 from ccmodel.studies.claims import model_runs
-from ccmodel.studies.claims.claim import Claim, Row
+from ccmodel.studies.claims.claim import Claim
 from ccmodel.studies.claims.figure import model_figure, recordings_figure
 from ccmodel.studies.claims.model_alone import model_claims
 from ccmodel.studies.claims.recordings import recorded_claims
@@ -19,7 +19,6 @@ from ccmodel.studies.loops.settings import Measuring
 from ccmodel.studies.run import Outcome, Run
 
 SETTINGS = Claims
-_STATED = ("name", "section", "says", "borne_out")
 
 
 def judge(claims: Claims, runs: Sequence[Run], measuring: Measuring) -> Outcome:
@@ -30,8 +29,8 @@ def judge(claims: Claims, runs: Sequence[Run], measuring: Measuring) -> Outcome:
     pairs = {variable: [p for run in runs if run.label == variable for p in run.pairs] for variable in claims.studies}
     parameters = next((run.fitted.parameters for run in runs if run.fitted.parameters is not None), None)
     found = claims_of(pairs, parameters, claims, measuring)
-    table = pd.DataFrame([_line(claim, row) for claim in found for row in claim.rows])
-    stated = [{name: getattr(claim, name) for name in (*_STATED, "sentence")} for claim in found]
+    table = pd.DataFrame([{"claim": c.name} | _stated(c) | asdict(row) for c in found for row in c.rows])
+    stated = [{"name": c.name} | _stated(c) | {"sentence": c.sentence} for c in found]
     figures = [recordings_figure(found), model_figure(found, _loops(parameters, claims))]
     return Outcome(figures, [table], {"coverage": claims.coverage, "claims": stated})
 
@@ -50,12 +49,13 @@ def claims_of(
     claims : Claims
     how : Measuring
     """
+    if parameters is not None and parameters.load_stiffness_Nm_per_rad is None:
+        parameters = None
     return recorded_claims(pairs, parameters, claims, how) + model_claims(parameters, claims, how)
 
 
-def _line(claim: Claim, row: Row) -> dict:
-    stated = {name: getattr(claim, name) for name in _STATED}
-    return {"claim": stated.pop("name"), **stated, **asdict(row)}
+def _stated(claim: Claim) -> dict[str, str]:
+    return {"section": claim.section, "says": claim.says, "borne_out": str(claim.borne_out)}
 
 
 def _loops(parameters: Parameters | None, claims: Claims) -> dict[str, Recording]:

@@ -19,42 +19,43 @@ from ccmodel.diagnose.location import PHASES, mismatch
 from ccmodel.diagnose.settings import ADEQUATE_LACK_OF_FIT
 from ccmodel.diagnose.verdict import nested_choice
 from ccmodel.recording import ORIGIN
-from ccmodel.report.figures import COLOURS, STYLE
+from ccmodel.report.figures import COLOURS, STYLE, legend_below
 
 LOOPS = 3
-RIVALS = 8
+CANDIDATES = 8
 FAINT = "#9a9a9a"
 WITH_FOUND = "with the mechanisms found"
 # By the short names of diagnosis.json.
 SYMBOL = {channel.short_name: channel.symbol for channel in TABLE.values()}
 
 
-def _baseline(said: dict) -> str:
+def _baseline(report: dict) -> str:
     """The baseline model in words."""
-    return "model given" if said["is_held"] else "calibrated model"
+    return "model given" if report["is_held"] else "calibrated model"
 
 
-def headline(said: dict) -> str:
+def headline(report: dict) -> str:
     """The result of a diagnosis in one sentence."""
-    batch, worst = said["batch"], _worst_channel(said)
-    e = said["fit"]["error"][worst]
+    batch, worst = report["batch"], _worst_channel(report)
+    e = report["fit"]["error"][worst]
     fall = f"{e['before'] / e['noise']:.1f} to {e['after'] / e['noise']:.1f} times the noise in {SYMBOL[worst]}"
-    model, left_out, missing = _baseline(said), "was left out", "is missing"
-    if said["is_held"]:
+    model, left_out, missing = _baseline(report), "was left out", "is missing"
+    if report["is_held"]:
         left_out, missing = f"has changed since the {model} was fitted", "has changed"
-    if said["verdict"] == "agrees":
-        return f"{batch}: the {model} agrees with the recordings; they show nothing that {missing}."
-    if said["verdict"] == "explained":
-        names = (f"{registry.get(m['name']).summary} ({m['name']}, {m['place']})" for m in said["mechanisms"])
+    if report["verdict"] == "agrees":
+        nothing = "no change" if report["is_held"] else "no missing physics"
+        return f"{batch}: the {model} agrees with the recordings; they show {nothing}."
+    if report["verdict"] == "explained":
+        names = (f"{registry.get(m['name']).summary} ({m['name']}, {m['place']})" for m in report["mechanisms"])
         return f"{batch}: {' and '.join(names)} {left_out}; in the model, it lowers the held-out error from {fall}."
-    if said["verdict"] == "undecided":
-        names, together = _placed(said["alternatives"]), _placed(said["likeliest"])
+    if report["verdict"] == "undecided":
+        names, together = _placed(report["alternatives"]), _placed(report["likeliest"])
         if len(together) > 1:
             names = [f"{' and '.join(together)} together", *(name for name in names if name not in together)]
         if len(names) == 1:
             return f"{batch}: something {missing}; it may be {names[0]}, but these recordings do not confirm it."
         return f"{batch}: something {missing}, and these recordings cannot tell {' or '.join(names)} apart."
-    place = said["location"]["place"]
+    place = report["location"]["place"]
     return f"{batch}: something {missing} at the {place}, and no known mechanism explains it."
 
 
@@ -73,14 +74,14 @@ def write_diagnosis(file: Path, found: Diagnosis) -> None:
     recording = found.judgement.whitened[0].observations.given.recording
     with plt.rc_context(STYLE):
         text = environment.get_template("page.html.j2").render(
-            said=found.report,
+            report=found.report,
             headline=headline(found.report),
             origin=ORIGIN[recording.origin],
             single_cable=recording.far_end is not None,
             symbol=SYMBOL,
             baseline=_baseline(found.report),
             has_found=found.judgement.best is not found.judgement.calibrated,
-            rivals=_rivals(found),
+            candidates=_candidates(found),
             listed=found.judgement.well_specified,
             summaries={name: registry.get(name) for name in registry.names()},
             map=_encoded(_map(found)),
@@ -90,40 +91,42 @@ def write_diagnosis(file: Path, found: Diagnosis) -> None:
     file.write_text(text, encoding="utf-8")
 
 
-def _rivals(found: Diagnosis) -> list[dict]:
+def _candidates(found: Diagnosis) -> list[dict]:
+    """Baseline and the candidates with the smallest mean squares, a row each."""
     j = found.judgement
     ranked = sorted(zip(j.candidates, j.probability, strict=True), key=lambda item: item[0].mean_square)
-    rows = [(j.calibrated, None), *ranked[:RIVALS]]
-    return [
-        {
-            "what": str(candidate.hypothesis),
-            "left": candidate.mean_square,
-            "learnable": max(lack.mean, 0.0) if (lack := j.lack_of_fit.get(candidate.hypothesis)) else None,
-            "p": p,
-            "why": _why(candidate, found),
-        }
-        for candidate, p in rows
-    ]
+    rows = []
+    for fit, p in [(j.calibrated, None), *ranked[:CANDIDATES]]:
+        lack = j.lack_of_fit.get(fit.hypothesis)
+        rows.append(
+            {
+                "candidate": str(fit.hypothesis),
+                "mean_square": fit.mean_square,
+                "lack_of_fit": None if lack is None else max(lack.mean, 0.0),
+                "probability": p,
+                "why": _why(fit, found),
+            }
+        )
+    return rows
 
 
-def _why(candidate: CandidateFit, found: Diagnosis) -> str:
+def _why(fit: CandidateFit, found: Diagnosis) -> str:
     """The reason why a candidate was selected or not."""
     j = found.judgement
-    if candidate is j.calibrated:
+    if fit is j.calibrated:
         return "agrees" if found.report["verdict"] == "agrees" else "the baseline"
-    if candidate is j.best:
+    if fit is j.best:
         return "most probable"
-    if not candidate.is_plausible:
+    if not fit.is_plausible:
         return "needs implausible values"
-    if j.comparison.is_adequate(candidate):
-        if j.single_fault_places and candidate.hypothesis.is_pair:
-            return f"adequate, but one fault at the {' or '.join(j.single_fault_places)} is as adequate"
-        ratio = candidate.mean_square / j.best.mean_square
-        return f"adequate, with {ratio:.3g} times the mean square" if ratio > 1 else "adequate, with more parameters"
-    lack = j.lack_of_fit.get(candidate.hypothesis)
-    if lack is not None and lack.lower_bound > ADEQUATE_LACK_OF_FIT:
-        return "lack of fit"
-    return "others have a smaller mean square"
+    if not j.comparison.is_adequate(fit):
+        lack = j.lack_of_fit.get(fit.hypothesis)
+        excessive = lack is not None and lack.lower_bound > ADEQUATE_LACK_OF_FIT
+        return "lack of fit" if excessive else "others have a smaller mean square"
+    if j.single_fault_places and fit.hypothesis.is_pair:
+        return f"adequate, but one fault at the {' or '.join(j.single_fault_places)} is as adequate"
+    ratio = fit.mean_square / j.best.mean_square
+    return f"adequate, with {ratio:.3g} times the mean square" if ratio > 1 else "adequate, with more parameters"
 
 
 def _map(found: Diagnosis) -> Figure:
@@ -162,29 +165,26 @@ def _loops(found: Diagnosis) -> Figure:
     figure, axes = plt.subplots(1, len(order), figsize=(3.1 * len(order), 3.1), squeeze=False)
     for ax, i in zip(axes[0], order, strict=True):
         w = j.whitened[i]
-        e = w.observations
-        c = e.channels.index(channel)
-        theta = e.given.theta_in[e.judged]
-        ax.plot(theta, scale * e.measured[c], color=FAINT, lw=2.2, label="recording")
-        for candidate, colour, line, name in (
-            (j.calibrated, COLOURS[0], "--", _baseline(found.report)),
-            (chosen[i], COLOURS[1], "-", WITH_FOUND),
-        ):
-            if name == WITH_FOUND and candidate is j.calibrated:
-                continue
-            predicted = e.with_parameters(candidate.held_out(i, w)).modelled({})[c]
-            ax.plot(theta, scale * predicted, color=colour, lw=1.0, ls=line, label=name)
-        ax.set_title(e.given.recording.id, fontsize=9)
+        observed = w.observations
+        c = observed.channels.index(channel)
+        theta = observed.given.theta_in[observed.judged]
+        ax.plot(theta, scale * observed.measured[c], color=FAINT, lw=2.2, label="recording")
+        models = [(j.calibrated, COLOURS[0], "--", _baseline(found.report))]
+        if chosen[i] is not j.calibrated:
+            models.append((chosen[i], COLOURS[1], "-", WITH_FOUND))
+        for fit, colour, line, label in models:
+            model = observed.with_parameters(fit.held_out(i, w))
+            ax.plot(theta, scale * model.modelled({})[c], color=colour, lw=1.0, ls=line, label=label)
+        ax.set_title(observed.given.recording.id, fontsize=9)
         ax.set_xlabel(TABLE[THETA_IN].axis)
     axes[0][0].set_ylabel(TABLE[channel].axis)
-    handles, labels = axes[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    legend_below(figure, axes[:, :1], columns=3)
     return figure
 
 
-def _worst_channel(said: dict) -> str:
+def _worst_channel(report: dict) -> str:
     """Short name of the channel whose baseline error is largest over its noise."""
-    error = said["fit"]["error"]
+    error = report["fit"]["error"]
     return max(error, key=lambda c: error[c]["before"] / error[c]["noise"])
 
 

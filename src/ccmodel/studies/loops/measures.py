@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from ccmodel.channels import CABLES, F_DRIVE, F_LOAD, TABLE, TAU_IN, TAU_OUT, TENSIONS, THETA_IN, THETA_OUT
+from ccmodel.channels import CABLES, MEASURED, TABLE, TAU_IN, TAU_OUT, TENSIONS, THETA_IN, THETA_OUT
 from ccmodel.errors import last_cycle
 from ccmodel.recording import Recording
 from ccmodel.studies.loops.settings import Measuring
@@ -209,7 +209,7 @@ def _peak(channel: str) -> Quantity:
 
 
 QUANTITIES = {
-    **{TABLE[c].short_name: _peak(c) for c in (THETA_OUT, TAU_IN, TAU_OUT, F_DRIVE, F_LOAD, *TENSIONS)},
+    **{TABLE[c].short_name: _peak(c) for c in (*MEASURED, *TENSIONS)},
     "width": Quantity("width of the torque loop", "mN·m", 1e3, width, TORQUE_LOOP),
     "backlash": Quantity("backlash of the torque loop (its flat part)", "mN·m", 1e3, deadband, TORQUE_LOOP),
     "lost_motion": Quantity("lost motion", "rad", 1.0, partial(deadband, loop=MOTION_LOOP), MOTION_LOOP),

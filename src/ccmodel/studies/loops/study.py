@@ -17,7 +17,7 @@ from ccmodel.report.figures import COLOURS, name_axes
 from ccmodel.steps.files import Pair
 from ccmodel.studies.loops.settings import Measuring, Study
 from ccmodel.studies.run import Outcome, Run
-from ccmodel.studies.variables import labelled, origins_of
+from ccmodel.studies.variables import by_label, origins_of
 
 SETTINGS = Study
 
@@ -61,8 +61,8 @@ def loops_figure(pairs: Sequence[Pair], study: Study, x: str = TAU_IN, y: str = 
 
     With the two torques, the paper's Figs. 10 and 11. Each value of `study.rows` has a row of panels.
     """
-    rows = _by_label(pairs, study.rows) if study.rows else {"": pairs}
-    conditions = _by_label(pairs, study.variable)
+    rows = by_label(pairs, study.rows) if study.rows else {"": pairs}
+    conditions = by_label(pairs, study.variable)
     size = (9, 0.8 + 3.4 * len(rows))
     figure, axes = plt.subplots(len(rows), 2, figsize=size, sharex=True, sharey=True, squeeze=False)
     for (row_label, row_pairs), (left, right) in zip(rows.items(), axes, strict=True):
@@ -84,7 +84,7 @@ def loops_figure(pairs: Sequence[Pair], study: Study, x: str = TAU_IN, y: str = 
 def loops_apart_figure(pairs: Sequence[Pair], study: Study) -> Figure:
     """The paper's Fig. 12: a panel for the recordings of each condition, and one for the model of all of them."""
     x, y = TAU_IN, TAU_OUT
-    conditions = _by_label(pairs, study.variable)
+    conditions = by_label(pairs, study.variable)
     rows = -(-(len(conditions) + 1) // 2)
     figure, axes = plt.subplots(rows, 2, figsize=(9, 0.8 + 3.2 * rows), sharex=True, sharey=True, squeeze=False)
     for ax in axes.flat[len(conditions) + 1 :]:
@@ -110,15 +110,6 @@ _DRAW = {
     "drive-loops": partial(loops_figure, x=THETA_IN, y=TAU_IN),
     "torque-loops-apart": loops_apart_figure,
 }
-
-
-def _by_label(pairs: Sequence[Pair], variable: str) -> dict[str, list[Pair]]:
-    """Pairs by the label of their recording's condition, in the order of the variable's values."""
-    pair_of = {id(recorded): (recorded, simulated) for recorded, simulated in pairs}
-    groups: dict[str, list[Pair]] = {}
-    for label, recorded in labelled((r for r, _ in pairs), variable):
-        groups.setdefault(label, []).append(pair_of[id(recorded)])
-    return groups
 
 
 def _styles() -> Iterator[dict]:

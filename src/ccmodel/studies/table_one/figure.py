@@ -49,11 +49,9 @@ def _patterns(ax: Axes, ranked: pd.DataFrame, norm: str, study: TableOne) -> Non
             errors = [row[f"error_{c}"] for c in TABLE_ONE]
             label = f"by {by}: {_short(row['effect'])} ({row['distance']:.2f})"
             ax.plot(at, errors, ms=4, lw=1, color=colour, label=label, **style)
-    ax.set_yscale("log")
-    ax.set_ylim(0.3, 60)
+    ax.set(yscale="log", ylim=(0.3, 60), ylabel="rms error (%)")
     ax.set_yticks([0.5, 1, 2, 5, 10, 20, 50], labels=["0.5", "1", "2", "5", "10", "20", "50"])
     ax.set_xticks(at, [TABLE[c].tex for c in TABLE_ONE])
-    ax.set_ylabel("rms error (%)")
     ax.set_title(f"errors over {norm}", loc="left")
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), fontsize=7)
 
@@ -67,18 +65,12 @@ def _fitted(ax: Axes, ranked: pd.DataFrame, singles: pd.DataFrame, study: TableO
         own = cases[cases["effect"] == row["effect"]]
         label = f"{_short(row['effect'])} ({row['distance']:.2f})"
         ax.plot(own["stiffness_ratio"], own["friction_ratio"], ".", ms=4, color=colour, alpha=0.7, label=label)
-    paper = (
-        fitted.stiffness_N_per_m / measured.stiffness_N_per_m,
-        fitted.friction_coefficient / measured.friction_coefficient,
-    )
-    ax.plot(*paper, "k*", ms=14, label="paper: fitted over measured")
+    stiffness_ratio = fitted.stiffness_N_per_m / measured.stiffness_N_per_m
+    friction_ratio = fitted.friction_coefficient / measured.friction_coefficient
+    ax.plot(stiffness_ratio, friction_ratio, "k*", ms=14, label="paper: fitted over measured")
     ax.plot(1, 1, "k+", ms=10, label="nothing left out")
-    ax.set(
-        xlim=(0.3, 1.15),
-        ylim=(0.8, 1.35),
-        xlabel="fitted stiffness over the rig's",
-        ylabel="fitted friction over the rig's",
-    )
+    ax.set(xlim=(0.3, 1.15), xlabel="fitted stiffness over the rig's")
+    ax.set(ylim=(0.8, 1.35), ylabel="fitted friction over the rig's")
     ax.set_title("plain model fitted to rigs of the measured stiffness, no free cable", loc="left")
     ax.legend(loc="upper left", fontsize=7)
 
@@ -95,9 +87,9 @@ def _ranking(ax: Axes, ranked: pd.DataFrame, study: TableOne) -> None:
     flat = flat_distance(target(study))
     ax.axvline(flat, color="black", lw=0.8, ls="--", label=f"the same error everywhere ({flat:.2f})")
     ax.set_yticks(at, [_short(e) for e in distances.index], fontsize=7)
-    ax.set_ylim(-0.7, len(distances) - 0.3)
-    ax.set_xlim(0, None)
-    ax.set_xlabel("distance to Table I: rms of ln (error / the paper's)")
+    ax.set(
+        xlim=(0, None), xlabel="distance to Table I: rms of ln (error / the paper's)", ylim=(-0.7, len(distances) - 0.3)
+    )
     ax.set_title("every effect at its nearest", loc="left")
     ax.legend(loc="lower left", fontsize=7)
 

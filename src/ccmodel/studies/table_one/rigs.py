@@ -7,8 +7,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.channels import F_DRIVE, F_LOAD, TAU_IN, TAU_OUT, THETA_OUT
-from ccmodel.failure import ModelError
+from ccmodel.channels import F_DRIVE, F_LOAD, SUM_AT, TABLE_ONE, TAU_IN, TAU_OUT, TENSIONS_AT, THETA_OUT
 from ccmodel.geometry import ConduitPath
 from ccmodel.model.exact import pair as exact
 from ccmodel.model.general import run as general
@@ -91,16 +90,9 @@ def plain(rig: Rig, condition: Condition, stiffness: float, friction: float) -> 
     initial = InitialTension.uniform(_path(rig), rig.pretension_N)
     load = SpringLoad(condition.load_stiffness_Nm_per_rad)
     response = exact.simulate_pair(_transmission(rig, stiffness, friction), load, motion(rig, condition)[1], initial)
-    if response.status is not exact.Status.OK:
-        raise ModelError(f"{response.status.name}: {response.status.value}")
-    read = {
-        THETA_OUT: response.theta_out_rad,
-        TAU_IN: response.tau_in_Nm,
-        TAU_OUT: response.tau_out_Nm,
-        F_DRIVE: response.T1_N + response.T3_N,
-        F_LOAD: response.T2_N + response.T4_N,
-    }
-    return _table_channels(read, rig)
+    read = {channel: getattr(response.complete(), channel) for channel in TABLE_ONE}
+    sums = {SUM_AT[end]: read[first] + read[second] for end, (first, second) in TENSIONS_AT.items()}
+    return _table_channels(read | sums, rig)
 
 
 def motion(rig: Rig, condition: Condition) -> tuple[NDArray, NDArray]:
@@ -131,15 +123,8 @@ def _transmission(rig: Rig, stiffness: float, friction: float) -> Transmission:
 
 def _table_channels(read: Mapping[str, NDArray], rig: Rig) -> NDArray:
     """Table I's channels over the last cycle; the tensions are derived from torques and sums, as in the paper."""
-    R = rig.pulley_radius_m
-    drive, load = read[TAU_IN] / R, read[TAU_OUT] / R
-    channels = (
-        read[THETA_OUT],
-        read[TAU_IN],
-        read[TAU_OUT],
-        (read[F_DRIVE] + drive) / 2,
-        (read[F_LOAD] + load) / 2,
-        (read[F_DRIVE] - drive) / 2,
-        (read[F_LOAD] - load) / 2,
-    )
-    return np.stack(channels)[:, -rig.motion.samples_per_cycle :]
+    drive, load = read[TAU_IN] / rig.pulley_radius_m, read[TAU_OUT] / rig.pulley_radius_m
+    F_drive, F_load = read[F_DRIVE], read[F_LOAD]
+    tensions = [(F_drive + drive) / 2, (F_load + load) / 2, (F_drive - drive) / 2, (F_load - load) / 2]
+    channels = np.stack([read[THETA_OUT], read[TAU_IN], read[TAU_OUT], *tensions])
+    return channels[:, -rig.motion.samples_per_cycle :]
