@@ -41,25 +41,35 @@ RADIUS_M, SPRING_NM_PER_RAD, STIFFNESS_N_PER_M, LENGTH_M, MU = 0.006, 0.05, 7750
 PAGE_PATH = Path(__file__).parents[1] / "docs" / "verification.md"
 PAGE = """# The general solver against explicit dynamics
 
-Written by `python benchmarks/against_dynamics.py` on {today}; do not edit.
+Written by `python benchmarks/against_dynamics.py` on {today}. The script overwrites this page.
 
-Each effect is simulated alone, with the same law and parameters, by the virtual rig (masses, springs and bristles in
-small explicit steps) and by the general solver (implicit, without inertia, 32 elements, one sample a millisecond). The
-conduit is half a loop of 1.2 m, the pretension 7.3 N and the drive a sine of 0.7 rad at 1 Hz unless stated otherwise.
+Each mechanism acts alone, with the same equation and parameters in two solvers that share no code:
 
-T1 to T4 are rms differences in percent of the tension's peak to peak; the limit is {limit} %. The next two columns have
-the same unit and give the largest of the four tensions. "Effect" is the change that the effect causes in the solver.
-"Last refinement" is the change in the rig when its cells, bristles and masses were last halved.
+- the virtual rig: masses, springs and bristles in small explicit time steps, refined by halving its cells, bristles and
+  masses together;
+- the general solver: implicit, without inertia, 32 elements, one sample per millisecond.
+
+The transmission is a half loop of 1.2 m with 7.3 N of pretension. The drive is a sine of 0.7 rad at 1 Hz. A row states
+where it differs. Effects of sensors are not part of the dynamics and are not in the table.
+
+| column | meaning |
+|---|---|
+| T1 to T4 | rms difference of each tension, % of its peak to peak; the limit is {limit} % |
+| effect | rms change that the mechanism makes in the general solver, same unit, largest of the four tensions |
+| last refinement | rms change by the last refinement of the rig, same unit, largest of the four tensions |
+| cells | cells of the refined rig |
+| result | `agree` within the limit; `the rig chatters` if its last refinement exceeds a third of the limit |
 
 {table}
 
 ## Friction that falls with speed
 
-In both simulations the friction of a contact follows its speed over 20 um of sliding. If it followed at once, the
-motion of a light cable would not be unique: sliding in the falling range is unstable within microseconds, and the grid
-decides the outcome. The rows with the renewal length of one bristle show this in the rig. With the longer renewal
-length the rig chatters too, if friction falls by a large amount over a wide range of speeds. The solver has no inertia
-and no chatter, and the difference then includes the chatter.
+In both solvers the friction of a contact follows its speed over 20 µm of sliding (the renewal length). If friction
+followed the speed at once, a light cable would have no unique motion: sliding at a speed at which friction falls is
+unstable within microseconds, and the grid determines the result. The rows with a renewal length of 0.025 µm, the length
+of a bristle, show this on the rig. With 20 µm the rig still chatters if friction falls strongly over a wide range of
+speeds. The general solver has no inertia and gives a solution without chatter; the difference in these rows contains
+the rig's chatter.
 """
 
 
@@ -167,7 +177,7 @@ def compare(case: Case) -> Row:
     return Row(case, difference_percent(solved, finer), float(effect), float(change), level)
 
 
-HEAD = """| effect | parameters | T1 | T2 | T3 | T4 | effect | last refinement | cells of the rig | |
+HEAD = """| mechanism | parameters | T1 | T2 | T3 | T4 | effect | last refinement | cells | result |
 |---|---|---|---|---|---|---|---|---|---|"""
 
 

@@ -39,7 +39,7 @@ def one_batch(seed: int) -> dict[str, list[float]] | str:
     for observations, own in zip(problem.observations, drawn.own, strict=True):
         for name, true in own.items():
             interval = fitted.own_intervals[observations.name][name]
-            errors[f"own {name}"].append(((interval.low + interval.high) / 2 - true) / interval.sd)
+            errors[f"recording's own {name}"].append(((interval.low + interval.high) / 2 - true) / interval.sd)
     return dict(errors)
 
 
@@ -72,12 +72,12 @@ Made by `{command}` on {date.today().isoformat()}:
 - **Recording**: friction (1 %), pretension (1 %), a tension profile in each cable (5 to 40 % of what friction can
   hold), sensor zeros (uniform within the paper's accuracy) and white noise (0.1 mN m, 0.05 N) are drawn for each
   recording. Both angles are quantised (0.18 deg).
-- **Fit**: from starting values with errors of 20 %, three parameters of the batch and eight of each recording ("own").
+- **Fit**: from starting values with errors of 20 %, three parameters of the batch and eight of each recording's own.
 - **Seeds**: from {FIRST_SEED} on unless the command says otherwise. No choice about the intervals was made with them.
 
 The nominal coverage is 90 %. "Limits" are those of the count in a binomial test at the {100 * LEVEL:.0f} % level.
 "Mean" and "sd" are those of the error over its stated standard deviation; for calibrated intervals they are 0 and 1.
-The own parameters of a batch are correlated, so that their limits are somewhat too narrow.
+The recordings' own parameters in a batch are correlated, so that their limits are somewhat too narrow.
 
 | parameter | intervals | covered | coverage | limits | mean | sd | interval is |
 |---|---|---|---|---|---|---|---|

@@ -29,7 +29,8 @@ from ccmodel.diagnose.candidate import fit
 from ccmodel.diagnose.diagnosis import calibration, first_cycles
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.diagnose.whitening import weigh
-from ccmodel.inference.problem import Observations, each
+from ccmodel.inference.observations import Observations
+from ccmodel.inference.pool import each
 from ccmodel.model.files import read_model
 from ccmodel.model.parameters import Parameters
 from ccmodel.rig.ingest import ingest_batch

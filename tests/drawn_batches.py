@@ -11,7 +11,8 @@ import pandas as pd
 
 from builders import RIG
 from ccmodel.geometry import ConduitPath
-from ccmodel.inference.problem import Free, Observations, Problem
+from ccmodel.inference.observations import Observations
+from ccmodel.inference.problem import Free, Problem
 from ccmodel.model.exact.pair import simulate_pair
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad

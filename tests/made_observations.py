@@ -1,4 +1,4 @@
-"""Recordings of the paper's model with noise, weighed: a diagnosis's observations without logs."""
+"""Whitened observations of the paper's model with noise, without logs."""
 
 from dataclasses import replace
 
@@ -7,8 +7,9 @@ import numpy as np
 from builders import recording
 from ccmodel.diagnose.candidate import fit
 from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.whitening import weigh
-from ccmodel.inference.problem import Free, Observations
+from ccmodel.diagnose.whitening import whiten
+from ccmodel.inference.observations import Observations
+from ccmodel.inference.problem import Free
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 
@@ -17,33 +18,33 @@ NOISE = {"tau_in_Nm": 1e-4, "tau_out_Nm": 1e-4, "F_drive_N": 0.05, "F_load_N": 0
 ACCURACY = {"tau_in_Nm": 1e-4, "tau_out_Nm": 1e-4, "F_drive_N": 0.1, "F_load_N": 0.1}
 
 
-def weighed(amplitude=0.6, frequency=1.0, pretension_N=7.0, seed=0, spoil=lambda said: {}, truth=PARAMETERS):
-    """One recording; `spoil` says what is added to channels of what the model with `truth` says."""
+def whitened(amplitude=0.6, frequency=1.0, pretension_N=7.0, seed=0, spoil=lambda simulated: {}, truth=PARAMETERS):
+    """One recording of the model with `truth`; `spoil` returns errors to be added, by channel."""
     random = np.random.default_rng(seed)
     drive = recording(
         id=f"r{seed}",
         pretension_N=pretension_N,
         theta_in_rad=lambda t: amplitude * np.sin(2 * np.pi * frequency * np.clip(t - 0.3, 0, None)),
     )
-    said = simulate(ModelInput.of(drive), truth)
-    added = spoil(said)
-    channels = {c: v + added.get(c, 0.0) for c, v in said.channels.items()}
+    simulated = simulate(ModelInput.of(drive), truth)
+    added = spoil(simulated)
+    channels = {c: v + added.get(c, 0.0) for c, v in simulated.channels.items()}
     channels |= {c: channels[c] + sd * random.standard_normal(channels[c].size) for c, sd in NOISE.items()}
     measured = replace(
-        said,
+        simulated,
         channels=channels,
         origin="virtual-rig",
         derived_from=dict.fromkeys(channels, "made by hand"),
         accuracy=ACCURACY,
         rest_s=0.3,
     )
-    return weigh(Observations.of(measured, PARAMETERS), PARAMETERS)
+    return whiten(Observations.of(measured, PARAMETERS), PARAMETERS)
 
 
-def batch(spoil=lambda said: {}, truth=PARAMETERS):
+def batch(spoil=lambda simulated: {}, truth=PARAMETERS):
     """Four recordings of different motions and pretensions."""
     conditions = ((0.6, 1.0, 7.0), (0.4, 0.7, 7.0), (0.6, 1.0, 5.0), (0.5, 1.3, 6.0))
-    return [weighed(*condition, seed=k, spoil=spoil, truth=truth) for k, condition in enumerate(conditions)]
+    return [whitened(*condition, seed=k, spoil=spoil, truth=truth) for k, condition in enumerate(conditions)]
 
 
 def calibrated(recordings):

@@ -1,12 +1,16 @@
 """Compiled code is not taken from the cache once a source it was made from has changed."""
 
+import re
 import shutil
+import tomllib
 from pathlib import Path
 
+import numba
 import pytest
 
 import ccmodel
 from ccmodel import provenance
+from ccmodel.kernel import TESTED_NUMBA, check_numba
 from ccmodel.mechanisms.presliding import dahl
 from ccmodel.model.exact.run import run
 from ccmodel.model.general.march import march
@@ -58,3 +62,16 @@ def test_a_change_elsewhere_does_not(digest_of_copy):
     with (copy / "report" / "figures.py").open("a") as file:
         file.write("# a change\n")
     assert digest("ccmodel.model.general.march") == before
+
+
+def test_the_tested_range_of_numba_is_that_of_the_package():
+    project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())
+    assert f"numba>={TESTED_NUMBA[0]},<{TESTED_NUMBA[1]}" in project["project"]["dependencies"]
+    check_numba(numba.__version__)
+
+
+@pytest.mark.parametrize("version", ["0.67.9", "0.69.0", "0.69.0rc1", "1.0", "0.9"])
+def test_an_untested_numba_is_refused_in_one_sentence(version):
+    sentence = f"ccmodel was tested with numba>=0.68,<0.69 only, found {version}: pip install 'numba>=0.68,<0.69'"
+    with pytest.raises(ImportError, match=f"^{re.escape(sentence)}$"):
+        check_numba(version)

@@ -9,7 +9,15 @@ def names(module):
 
 def test_a_step_consists_of_what_it_imports():
     simulate = names("ccmodel.stages.simulate")
-    assert {"simulate.py", "files.py", "pair.py", "geometry.py", "motion.py", "recording.py", "batch.py"} <= simulate
+    assert {
+        "simulate.py",
+        "files.py",
+        "pair.py",
+        "geometry.py",
+        "reconstruction.py",
+        "recording.py",
+        "batch.py",
+    } <= simulate
     assert not {"figures.py", "errors.py", "mis_tool.py", "page.html.j2"} & simulate
 
 

@@ -129,7 +129,7 @@ def diagnose(
 
 def _tolerance(stated: list[str]) -> float | dict[str, float]:
     """One share for all channels, or one a channel."""
-    from ccmodel.inference.problem import MEASURED
+    from ccmodel.channels import MEASURED
 
     try:
         shares = {channel: float(share) for channel, _, share in (one.rpartition("=") for one in stated)}
@@ -192,6 +192,30 @@ def table_one(
     from ccmodel.stages.table_one import table_one as run
 
     typer.echo(run(settings, out, figure, cores, tell=lambda text: _err.print(text, style="dim", markup=False)))
+
+
+@app.command()
+def mechanisms(
+    name: Annotated[str | None, typer.Argument(help="Print the whole entry of this one.")] = None,
+    markdown: Annotated[bool, typer.Option("--markdown", help="Print docs/mechanisms.md.")] = False,
+) -> None:
+    """List the mechanisms: names, places, parameters with range and unit."""
+    from rich.table import Table
+
+    from ccmodel.mechanisms import UnknownMechanismError, catalogue
+
+    if markdown:
+        typer.echo(catalogue.page())
+    elif name is None:
+        table = Table("name", "places", "parameters", "what it is", box=None)
+        for row in catalogue.rows():
+            table.add_row(*row)
+        Console(soft_wrap=False, highlight=False).print(table, markup=False)
+    else:
+        try:
+            typer.echo(catalogue.entry(name))
+        except UnknownMechanismError as error:
+            raise InputError(str(error)) from None
 
 
 @app.command()

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from ccmodel import mechanisms
-from ccmodel.inference.problem import MEASURED
+from ccmodel.channels import MEASURED
 from ccmodel.model.parameters import FORMER_NAMES, FREE, OWN
 from ccmodel.rig.batch import valid_name
 from ccmodel.typed import InputError, Positive, TypedModel, load_yaml_model

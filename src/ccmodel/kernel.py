@@ -1,47 +1,71 @@
-"""Compiling kernels, with a cache on disk that knows of all their sources."""
+"""Compilation of kernels with numba, and a cache on disk that is keyed by all of a kernel's sources."""
 
 from functools import partial
 from uuid import uuid4
 
+import numba
 from numba import njit, types
 from numba.extending import intrinsic
 
 from ccmodel.provenance import source_digest
 
-# numba numbers the files of a kernel's variants 1, 2, ... and two processes that compile at once, each another variant,
-# give both the same name: one would then run the other's code. With a name of each process this cannot be.
+# Versions of numba with which the private attributes used here were tested: from the first, below the second. The range
+# in pyproject.toml is the same.
+TESTED_NUMBA = ("0.68", "0.69")
+
+# numba numbers the cache files of a kernel's signatures 1, 2, ... Two processes that compile different signatures at
+# once give both files the same number, and one process then loads the code of the other. A name for each process
+# prevents this.
 _PROCESS = uuid4().hex[:8]
 
 
-def kernel(function=None, **options):
-    """Compile `function`, cached until its module or anything that this imports from the package changes.
+def check_numba(version: str) -> None:
+    """Refuse a version of numba whose private attributes were not tested.
 
-    numba looks at the time stamp of a kernel's own file alone: one that calls kernels of another file would be taken
-    from the cache though that file has changed. The cache goes by a kernel's name, so the name tells of the sources.
+    Raises
+    ------
+    ImportError
+        If `version` is not within `TESTED_NUMBA`.
+    """
+    first, end = (tuple(map(int, bound.split("."))) for bound in TESTED_NUMBA)
+    if not first <= tuple(map(int, version.split(".")[:2])) < end:
+        tested = f"numba>={TESTED_NUMBA[0]},<{TESTED_NUMBA[1]}"
+        raise ImportError(f"ccmodel was tested with {tested} only, found {version}: pip install '{tested}'")
+
+
+check_numba(numba.__version__)
+
+
+def kernel(function=None, **options):
+    """Compile `function`; cache it until its module, or a module of the package that it imports, changes.
+
+    numba compares the time stamp of a kernel's own file only: a change in a file that the kernel calls would go
+    unnoticed. The cache is keyed by the kernel's name, so the digest of all sources is added to the name.
 
     Parameters
     ----------
     function : callable, optional
-        Left out where the decorator is used with options.
+        Absent if the decorator is used with options.
     **options
-        Of `numba.njit`.
+        Options of `numba.njit`.
     """
     if function is None:
         return partial(kernel, **options)
     function.__qualname__ += f"_{source_digest(function.__module__)}"
     compiled = njit(cache=True, nogil=True, no_cfunc_wrapper=True, **options)(function)
-    if hasattr(compiled, "get_call_template"):  # not where numba is switched off
-        _take_values(compiled)
+    if hasattr(compiled, "get_call_template"):  # absent if numba is switched off
+        _ignore_literals(compiled)
     if cache := getattr(compiled, "_cache", None):
         files = cache._cache_file
         files._data_name_pattern = files._data_name_pattern.replace("{", f"{_PROCESS}-{{")
     return compiled
 
 
-def _take_values(compiled):
-    """Have one variant of a kernel serve all constants that others call it with.
+def _ignore_literals(compiled):
+    """Compile a kernel once for all literal arguments that other kernels call it with.
 
-    numba would compile a cable's kernels anew for cable 0, cable 1 and either of them, and likewise for its ends.
+    Otherwise numba compiles the kernels of a cable separately for cable 0, for cable 1 and for a variable index, and
+    likewise for the ends of the cables.
     """
     template_of = compiled.get_call_template
 
@@ -53,31 +77,32 @@ def _take_values(compiled):
     compiled.get_call_template = by_type
 
 
-# Made part of whatever calls it: for what every sample goes through.
+# A kernel inlined into its callers, for code that every sample passes.
 small_kernel = kernel(forceinline=True)
 
 
 @intrinsic
 def borrowed(typing_context, value):
-    """`value`, an array or a tuple with arrays in it, without a share in its memory; for use inside kernels.
+    """`value`, an array or a tuple with arrays, without a reference to its memory; for use inside kernels.
 
-    Else every kernel that is handed an array counts itself in and out, with locked instructions that take longer than
-    its arithmetic. Whoever calls the outermost kernel keeps the arrays alive.
+    Otherwise every kernel that receives an array increments and decrements its reference count, with atomic
+    instructions that take longer than the kernel's arithmetic. The caller of the outermost kernel keeps the arrays
+    alive.
     """
 
     def generate(context, builder, signature, arguments):
-        return _disowned(context, builder, value, arguments[0])
+        return _without_owner(context, builder, value, arguments[0])
 
     return value(value), generate
 
 
-def _disowned(context, builder, kind, value):
-    """LLVM value of the numba type `kind` with no owner named in any of its arrays."""
+def _without_owner(context, builder, kind, value):
+    """LLVM value of the numba type `kind` with the owner removed from each of its arrays."""
     if isinstance(kind, types.Array):
         array = context.make_array(kind)(context, builder, value)
         array.meminfo = array.meminfo.type(None)
         return array._getvalue()
     if isinstance(kind, types.BaseTuple):
-        parts = [_disowned(context, builder, part, builder.extract_value(value, i)) for i, part in enumerate(kind)]
+        parts = [_without_owner(context, builder, part, builder.extract_value(value, i)) for i, part in enumerate(kind)]
         return context.make_tuple(builder, kind, parts)
     return value

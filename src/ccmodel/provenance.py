@@ -60,9 +60,15 @@ def _file_of(name: str) -> Path | None:
 
 @cache
 def _imports(file: Path) -> list[str]:
-    """What a file imports of the package; with `from a import b`, both a and a.b, as b may be a module."""
+    """What a file imports of the package; with `from a import b`, both a and a.b, as b may be a module.
+
+    A package that lists its folder (`iter_modules`) imports all modules in it.
+    """
     names = []
     for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Name) and node.id == "iter_modules":
+            package = ".".join(file.parent.relative_to(_ROOT).parts)
+            names += [f"{package}.{module.stem}" for module in file.parent.glob("*.py")]
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):

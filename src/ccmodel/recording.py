@@ -10,14 +10,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ccmodel.channels import CHANNELS, unit_of
 from ccmodel.geometry import ConduitPath
-
-# Channel names carry their unit; T1..T4 are the cable-end tensions of the paper (A: 1 drive, 2 load; B: 3, 4).
-ANGLES = ("theta_in_rad", "theta_out_rad")
-TORQUES = ("tau_in_Nm", "tau_out_Nm")
-SUMS = ("F_drive_N", "F_load_N")
-TENSIONS = ("T1_N", "T2_N", "T3_N", "T4_N")
-CHANNELS = ANGLES + TORQUES + SUMS + TENSIONS
 
 # How figures and pages call each origin: nothing may leave a reader in doubt about where its numbers come from.
 ORIGIN = {
@@ -164,8 +158,3 @@ def _from_dataset(name: str, dataset: xr.Dataset) -> Recording:
 
 def _numbers(dataset: xr.Dataset, channels, attribute: str) -> dict[str, float]:
     return {c: float(dataset[c].attrs[attribute]) for c in channels if attribute in dataset[c].attrs}
-
-
-def unit_of(channel: str) -> str:
-    """The unit that a channel's name ends in, as it is printed."""
-    return {"rad": "rad", "Nm": "N m", "N": "N"}[channel.rsplit("_", 1)[1]]

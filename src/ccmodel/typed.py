@@ -1,48 +1,55 @@
-"""Typed YAML files: what every file of settings or of descriptions in this project shares.
+"""Typed YAML files: settings and descriptions read into pydantic models, with errors for the person who wrote the file.
 
-A model derives from `TypedModel`; `load_yaml_model` reads a file into it or raises `InputError`, whose text is made
-for the person who wrote the file: one line a problem, with the file, the line in it, the key, what was found and
-what to do.
+A model derives from `TypedModel`; `load_yaml_model` reads a YAML 1.2 file into it or raises `InputError`, one line a
+problem: the file, the line in it, the key, the value found and the remedy.
 """
 
 import difflib
 import json
-import re
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, ClassVar, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Self, TypeVar, Union, get_args, get_origin
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.composer import Composer
+from ruamel.yaml.constructor import DuplicateKeyError, RoundTripConstructor
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
+from ruamel.yaml.tag import Tag
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 M = TypeVar("M", bound=BaseModel)
 
+# Lists and mappings within each other that a file may hold; our own formats need 6.
+MAX_DEPTH = 50
+
 
 class TypedModel(BaseModel):
-    """Base of every typed file: frozen, no key beyond those named, no silent conversions, no NaN or infinity."""
+    """Base of every typed file: frozen, no unknown keys, no silent conversions, no NaN or infinity."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-    # Former names of keys, at any depth, which files written earlier may still have.
+    # Current name of every key that was renamed, at any depth; files may still have the former name.
     renamed: ClassVar[Mapping[str, str]] = {}
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing wrong with a file.
+    """One error in a file.
 
     Attributes
     ----------
     file : str
         The file.
     line : int or None
-        Line in it, counted from 1; None where the file could not be read at all.
+        Line in it, counted from 1; None if the error concerns the whole file.
     text : str
-        What is wrong, in one line.
+        The error and its remedy, in one line.
     """
 
     file: str
@@ -54,19 +61,24 @@ class Problem:
 
 
 class InputError(Exception):
-    """Something a user gave cannot be used; the text says what, where and what to do.
+    """A file, folder or value given by the user cannot be used; the text says which, where, why and what to do.
 
     Parameters
     ----------
     message : str
-        Text for a person, one line a problem.
+        Text for the user, one line a problem.
     problems : sequence of Problem
-        The same, taken apart, where a file was read.
+        The same problems with file and line, if a file was read.
     """
 
     def __init__(self, message: str, problems: Sequence[Problem] = ()):
         super().__init__(message)
         self.problems = tuple(problems)
+
+    @classmethod
+    def of(cls, *problems: Problem) -> Self:
+        """The error whose message is one line for each problem."""
+        return cls("\n".join(map(str, problems)), problems)
 
 
 def load_yaml_model(path: Path, model: type[M]) -> M:
@@ -77,7 +89,7 @@ def load_yaml_model(path: Path, model: type[M]) -> M:
     path : Path
         The file.
     model : type
-        What it must hold.
+        Model of its content.
 
     Returns
     -------
@@ -87,107 +99,97 @@ def load_yaml_model(path: Path, model: type[M]) -> M:
     Raises
     ------
     InputError
-        If the file is missing, no YAML, gives a key twice or does not fit the model: every problem in a line.
+        If the file is missing, is not YAML, has a key twice or does not fit the model: one line for every problem.
     """
-    node, data = _read_yaml(Path(path), getattr(model, "renamed", {}))
+    content = _read_yaml(Path(path))
+    data = _with_current_names(content, getattr(model, "renamed", {}), path)
     try:
-        # JSON mode: lists may become tuples and text paths or choices, while numbers stay strict.
-        return model.model_validate_json(data)
+        # JSON mode accepts a list for a tuple and text for a path or a choice, but stays strict on numbers.
+        return model.model_validate_json(json.dumps(data, default=str))
     except ValidationError as error:
-        problems = [Problem(str(path), _line_of(node, loc), text) for loc, text in _explain(error, model)]
-        raise _input_error(problems) from error
+        raise InputError.of(
+            *(Problem(str(path), _line_of(content, loc), t) for loc, t in _explain(error, model))
+        ) from error
 
 
 def nearest(name: str, known: Iterable[str], cutoff: float = 0.75) -> str | None:
-    """Name among `known` that `name` is most likely a misspelling of; None if none is as like it as `cutoff`."""
+    """The known name that `name` most likely misspells; None if no similarity (`difflib`) reaches `cutoff`."""
     by_lower = {k.lower(): k for k in known}
     matches = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=cutoff)
     return by_lower[matches[0]] if matches else None
 
 
-class _Loader(yaml.SafeLoader):
-    """YAML as people write it: 5e4 is a number, a key is text as it stands, and one given twice is a mistake."""
+class _TextKeys(Composer):
+    """Reads every key as text, also one that looks like a number or a date: JSON has no other keys."""
 
-    def construct_mapping(self, node, deep=False):
-        seen = set()
-        for i, (key, value) in enumerate(node.value if isinstance(node, yaml.MappingNode) else []):
-            if not isinstance(key, yaml.ScalarNode):
-                raise _problem_at(
-                    key, "a key must be a word, found a list or a mapping (put text with brackets in quotes)"
+    def compose_node(self, parent, index):
+        node = super().compose_node(parent, index)
+        if isinstance(parent, MappingNode) and index is None:
+            if not isinstance(node, ScalarNode):
+                raise _error_at(
+                    node, "a key must be a word, found a list or a mapping (put text with brackets in quotes)"
                 )
-            if key.tag == "tag:yaml.org,2002:merge":
-                continue
-            if key.value in seen:
-                raise _problem_at(key, f"key {key.value!r} is given twice: remove one")
-            seen.add(key.value)
-            # JSON knows no dates, numbers or nothing as keys.
-            node.value[i] = (yaml.ScalarNode("tag:yaml.org,2002:str", key.value, key.start_mark, key.end_mark), value)
-        return super().construct_mapping(node, deep)
+            if node.tag != "tag:yaml.org,2002:merge":
+                node.ctag = Tag(suffix="tag:yaml.org,2002:str")
+        return node
+
+
+class _ValuesWithLines(RoundTripConstructor):
+    """Gives the line of every value that cannot be read."""
 
     def construct_object(self, node, deep=False):
+        if node in self.recursive_objects:
+            raise _error_at(node, "holds what cannot be read as keys and values: an alias of itself")
         try:
             return super().construct_object(node, deep)
         except (ValueError, TypeError, LookupError, AttributeError, OverflowError) as error:
-            # What looks like a date or is tagged as a number and is none ends in whatever its constructor stumbles on.
-            if not isinstance(node, yaml.ScalarNode):
-                raise
-            raise _problem_at(
-                node, f"{node.value!r} cannot be read ({error}): if it is text, put it in quotes"
-            ) from error
+            # The constructors of dates and of tagged values do not check their text.
+            text = f"{node.value!r} cannot be read ({error}): if it is text, put it in quotes"
+            raise _error_at(node, text) from error
 
 
-def _problem_at(node: yaml.Node, text: str) -> yaml.MarkedYAMLError:
-    return yaml.MarkedYAMLError(problem=text, problem_mark=node.start_mark)
+def _error_at(node: Node, text: str) -> MarkedYAMLError:
+    return MarkedYAMLError(problem=text, problem_mark=node.start_mark)
 
 
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float", re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$"), list("-+.0123456789")
-)
-
-
-def _read_yaml(path: Path, renamed: Mapping[str, str]) -> tuple[yaml.Node, str]:
-    """The file's nodes, for finding lines, and its content as JSON, every key under its current name."""
+def _read_yaml(path: Path) -> CommentedMap:
+    """Keys and values of a YAML file; `.lc` has their lines."""
+    reader = YAML(typ="rt", pure=True)
+    reader.Composer, reader.Constructor, reader.max_depth = _TextKeys, _ValuesWithLines, MAX_DEPTH
+    line = None
     try:
-        text = path.read_text(encoding="utf-8")
+        content = reader.load(path.read_text(encoding="utf-8"))
+        if isinstance(content, CommentedMap):
+            return content
+        text = f"must hold keys and values, found {_kind(content)}"
     except FileNotFoundError:
-        raise _input_error([Problem(str(path), None, "there is no such file")]) from None
+        text = "there is no such file"
     except (OSError, UnicodeDecodeError) as error:
-        raise _input_error([Problem(str(path), None, f"cannot be read as text ({error})")]) from error
-    try:
-        loader = _Loader(text)
-        node = loader.get_single_node()
-        data = loader.construct_document(node) if node is not None else None
-        as_json = json.dumps(_under_current_names(data, renamed, path), default=str)
-    except yaml.MarkedYAMLError as error:
+        text = f"cannot be read as text ({error})"
+    except DuplicateKeyError as error:
+        line, text = error.problem_mark.line + 1, error.problem.partition(" with value")[0] + ": remove one"
+    except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
+        line = mark.line + 1 if mark else None
         what = error.problem or "it cannot be understood"
-        advice = "" if "given twice" in what else "not valid YAML: "
-        raise _input_error([Problem(str(path), mark.line + 1 if mark else None, advice + what)]) from error
-    except yaml.YAMLError as error:
-        raise _input_error([Problem(str(path), None, "not valid YAML: " + " ".join(str(error).split()))]) from error
-    except (TypeError, ValueError, RecursionError) as error:
-        # An alias that contains itself, brackets nested without end, an escape that is no character.
-        raise _input_error(
-            [Problem(str(path), None, f"holds what cannot be read as keys and values ({error})")]
-        ) from error
-    if not isinstance(data, dict):
-        found = "nothing" if data is None else f"a {type(data).__name__}"
-        raise _input_error([Problem(str(path), None, f"must hold keys and values, found {found}")])
-    return node, as_json
+        text = "not valid YAML: " + what.partition(", if necessary")[0]  # without advice to programmers
+    except (YAMLError, ValueError) as error:  # a control character, or an escape that is no character
+        text = "not valid YAML: " + " ".join(str(error).split())
+    raise InputError.of(Problem(str(path), line, text))
 
 
-def _under_current_names(data: Any, renamed: Mapping[str, str], path: Path) -> Any:
+def _kind(content: Any) -> str:
+    return "nothing" if content is None else "a list" if isinstance(content, list) else f"a {type(content).__name__}"
+
+
+def _with_current_names(data: Any, renamed: Mapping[str, str], path: Path) -> Any:
     if isinstance(data, list):
-        return [_under_current_names(entry, renamed, path) for entry in data]
+        return [_with_current_names(entry, renamed, path) for entry in data]
     if not isinstance(data, dict):
         return data
     for former in renamed.keys() & data.keys():
         warnings.warn(f"{path}: '{former}' is now called '{renamed[former]}'", FutureWarning, stacklevel=2)
-    return {renamed.get(key, key): _under_current_names(value, renamed, path) for key, value in data.items()}
-
-
-def _input_error(problems: list[Problem]) -> InputError:
-    return InputError("\n".join(map(str, problems)), problems)
+    return {renamed.get(key, key): _with_current_names(value, renamed, path) for key, value in data.items()}
 
 
 _EXPECTED = {
@@ -212,7 +214,7 @@ _EXPECTED = {
 
 
 def _explain(error: ValidationError, model: type[BaseModel]) -> list[tuple[tuple, str]]:
-    """Where and what, for every problem; a misspelt key is one problem, not also a missing key or a short list."""
+    """Place and text of every problem; a misspelt key is one problem, not also a missing key or a short list."""
     explained, meant = [], set()
     errors = [e for e in error.errors(include_url=False) if not _is_follow_on(e)]
     for e in errors:
@@ -232,7 +234,7 @@ def _explain(error: ValidationError, model: type[BaseModel]) -> list[tuple[tuple
 
 
 def _is_follow_on(e: dict) -> bool:
-    """A list that is too short only because pydantic does not count the entries that have problems of their own."""
+    """Whether a list is too short only because pydantic does not count the entries that have problems themselves."""
     return e["type"] == "too_short" and len(e["input"]) >= e["ctx"]["min_length"]
 
 
@@ -252,7 +254,7 @@ def _wrong_value(e: dict) -> str:
 
 
 def _dotted(loc: Sequence) -> str:
-    """The place of a key as people write it: recordings[2].pretension_N."""
+    """The path of a key as people write it: recordings[2].pretension_N."""
     return "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in loc).lstrip(".")
 
 
@@ -261,7 +263,7 @@ def _inside(loc: Sequence) -> str:
 
 
 def _keys_at(annotation: Any, loc: Sequence) -> list[str]:
-    """Keys that the model at `loc` knows, seen from a type: a model, a list or mapping of models, or a choice."""
+    """Keys of the model at `loc` within a type: a model, a list or mapping of models, or a union."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         if not loc:
             return list(annotation.model_fields)
@@ -275,23 +277,18 @@ def _keys_at(annotation: Any, loc: Sequence) -> list[str]:
     if origin is dict:
         return _keys_at(args[1], loc[1:]) if loc else list(get_args(args[0]))
     if origin in (Union, UnionType):
-        # The place of a problem inside a choice may begin with the name of the member that was tried.
+        # pydantic begins the path of a problem within a union with the name of the member that it tried.
         found = [_keys_at(a, rest) for a in args for rest in (loc, loc[1:])]
         return next((keys for keys in found if keys), [])
     return []
 
 
-def _line_of(node: yaml.Node, loc: Sequence) -> int:
-    """Line of the key at `loc`, or of the nearest thing around it that is there."""
-    line = node.start_mark.line + 1
-    for place in loc:
-        if isinstance(node, yaml.MappingNode):
-            pair = next(((k, v) for k, v in node.value if k.value == str(place)), None)
-        elif isinstance(node, yaml.SequenceNode) and isinstance(place, int):
-            pair = (node.value[place], node.value[place]) if place < len(node.value) else None
-        else:
-            pair = None
-        if pair is None:
+def _line_of(content: Any, loc: Sequence) -> int:
+    """Line of the key at `loc`, or of the nearest enclosing key that the file has."""
+    line = content.lc.line
+    for key in loc:
+        try:
+            line, content = content.lc.data[key][0], content[key]
+        except (AttributeError, LookupError, TypeError):  # a single value, or a key that is missing
             break
-        line, node = pair[0].start_mark.line + 1, pair[1]
-    return line
+    return line + 1

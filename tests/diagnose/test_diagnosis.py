@@ -15,10 +15,10 @@ from typer.testing import CliRunner
 from builders import write_batch
 from ccmodel import cli
 from ccmodel.diagnose.candidate import CandidateFit
-from ccmodel.diagnose.diagnosis import _alternatives, _mechanism
 from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.diagnose.result import _alternatives, _mechanism
 from ccmodel.failure import ModelError
-from ccmodel.inference import problem
+from ccmodel.inference import pool
 from ccmodel.model.files import read_model
 from ccmodel.report.diagnosis import headline
 from ccmodel.stages import diagnose as stage
@@ -80,7 +80,7 @@ def test_recordings_of_the_model_itself_agree_with_it(clean):
 
 @pytest.mark.parametrize("cores", [1, 2])
 def test_the_same_input_gives_the_same_json(clean, tmp_path, monkeypatch, cores):
-    monkeypatch.setattr(problem, "CORES", cores)
+    monkeypatch.setattr(pool, "_threads", cores)
     with threadpool_limits(limits=cores, user_api="blas"):
         assert run("diagnose", clean[0], "--out", tmp_path).exit_code == 0
     assert (tmp_path / "diagnosis.json").read_bytes() == (clean[1] / "diagnosis.json").read_bytes()
@@ -138,7 +138,7 @@ def test_beside_a_model_that_has_it_nothing_else_is_missing(rubbed, tmp_path):
         said = json.loads((tmp_path / "diagnosis.json").read_text())
         assert said["verdict"] == "agrees"
         assert {"pulley-friction"} == {m.name for m in read_model(tmp_path / "model.json").mechanisms}
-    assert any("held" in n["why"] for n in said["not_judged"])
+    assert any("frozen" in n["why"] for n in said["not_judged"])
     held, given = read_model(tmp_path / "model.json"), read_model(known / "model.json")
     assert held.stiffness_N_per_m == given.stiffness_N_per_m
     assert held.mechanisms == given.mechanisms
@@ -220,13 +220,13 @@ def test_alternatives_are_others_than_what_is_named_each_once():
     there, elsewhere = ("pulley-friction", "drive-pulley"), ("pulley-friction", "load-pulley")
     shares = {(scale,): 0.5, (drag,): 0.2, (there,): 0.1, (elsewhere,): 0.15}
     confidence = {Hypothesis(acting): share for acting, share in shares.items()}
-    found = _alternatives(SimpleNamespace(verdict="undecided"), (), confidence)
+    found = _alternatives(SimpleNamespace(verdict="undecided", confidence=confidence), {})
     assert [(a["name"], a["place"], a["confidence"]) for a in found] == [
         (*scale, 0.5),
         (*elsewhere, 0.25),
         (*drag, 0.2),
     ]
-    found = _alternatives(SimpleNamespace(verdict="explained"), (there,), confidence)
+    found = _alternatives(SimpleNamespace(verdict="explained", confidence=confidence), dict([there]))
     assert [a["name"] for a in found] == ["torque-scale", "constant-drag"]
 
 
@@ -306,10 +306,10 @@ def test_a_motion_without_its_columns_is_refused(clean, tmp_path):
 def test_a_number_stands_where_a_finer_solver_would_have_it():
     key, found = "constant-drag/conduit/f0", {}
     for moved in (0.0, 0.03):
-        trial = CandidateFit(
+        candidate = CandidateFit(
             Hypothesis((("constant-drag", "conduit"),)), {}, {key: 0.5}, [], [], np.array([[0.04**2]]), np.inf, [], []
         )
-        found[moved] = _mechanism(trial, 0, 0.9, np.array([moved]))["parameters"][0]
+        found[moved] = _mechanism(candidate, 0, 0.9, np.array([moved]))["parameters"][0]
     plain, corrected = found[0.0], found[0.03]
     assert (plain["value"], corrected["value"]) == (0.5, pytest.approx(0.53))
     reach = plain["high"] - plain["value"]
@@ -326,7 +326,7 @@ def test_the_pipeline_says_which_recordings_it_had_to_do_without(tmp_path, monke
     ingest(batch, tmp_path / "cut.nc", tmp_path / "cut.json")
     told = []
 
-    def run(recordings, estimates, not_judged, **options):
+    def run(recordings, estimates, options, not_judged):
         told.extend(not_judged)
         raise ModelError("what comes after is not asked here")
 

@@ -1,12 +1,14 @@
-"""The experiment that would tell rivals apart."""
+"""The experiment that separates candidate models."""
 
 import numpy as np
 import pytest
 
 from ccmodel.diagnose.candidate import CandidateFit
-from ccmodel.diagnose.comparison import Judgement
-from ccmodel.diagnose.experiment import RATE_HZ, _apart, _motions, _planned, candidates, proposed, recordings_wanted
+from ccmodel.diagnose.comparison import Comparison
+from ccmodel.diagnose.experiment import _motions, _planned, _separation, experiments, proposed, recordings_wanted
 from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.diagnose.settings import EXPERIMENT_RATE_HZ
+from ccmodel.diagnose.verdict import Judgement
 from ccmodel.inference.problem import Free
 from made_observations import PARAMETERS, batch
 
@@ -15,33 +17,34 @@ FREE = {name: Free(value, value / 10, value * 10) for name, value in VALUES.item
 KNOWN_TO = 0.01  # of itself, each value
 
 
-def trial(recordings, *acting, known_to=KNOWN_TO, **numbers):
+def fitted(recordings, *acting, known_to=KNOWN_TO, **numbers):
     values = VALUES | numbers
     covariance = np.diag([(known_to * value) ** 2 for value in values.values()])
-    aside = [np.ones(w.observations.measured.size) for w in recordings]
-    return CandidateFit(Hypothesis(acting), FREE, values, [], [], covariance, np.ones(len(values)), [], aside)
+    residuals = [np.ones(w.observations.measured.size) for w in recordings]
+    return CandidateFit(Hypothesis(acting), FREE, values, [], [], covariance, np.ones(len(values)), [], residuals)
 
 
 def judged(recordings, *rivals):
     shares = [1 / len(rivals)] * len(rivals)
-    return Judgement("undecided", trial(recordings), rivals[0], list(rivals), shares, 1.0, [], {}, recordings)
+    found = Comparison(recordings, fitted(recordings), list(rivals), {})
+    return Judgement("undecided", rivals[0], found, list(rivals), shares, 1.0, [])
 
 
 def test_it_is_within_what_the_rig_has_done():
     recordings = batch()
     largest = max(np.ptp(w.observations.given.theta_in) / 2 for w in recordings)
     bends = {w.observations.given.recording.path.bend_rad for w in recordings}
-    for candidate in candidates(recordings):
-        assert np.abs(candidate.theta_in).max() <= largest * (1 + 1e-9)
-        assert 0 < candidate.pretension_share <= 1
-        assert candidate.like.path.bend_rad in bends
-        assert candidate.like.pretension_N == max(w.observations.given.recording.pretension_N for w in recordings)
+    for experiment in experiments(recordings):
+        assert np.abs(experiment.theta_in).max() <= largest * (1 + 1e-9)
+        assert 0 < experiment.pretension_share <= 1
+        assert experiment.like.path.bend_rad in bends
+        assert experiment.like.pretension_N == max(w.observations.given.recording.pretension_N for w in recordings)
 
 
 @pytest.mark.parametrize("fastest", [0.5, 3.0])
 def test_no_motion_is_faster_than_the_rig(fastest):
     for text, theta in _motions(0.6, fastest):
-        assert np.abs(np.diff(theta)).max() * RATE_HZ < fastest * 1.05, text
+        assert np.abs(np.diff(theta)).max() * EXPERIMENT_RATE_HZ < fastest * 1.05, text
         assert theta[0] == 0.0
 
 
@@ -50,8 +53,8 @@ def test_slow_and_fast_friction_are_told_apart_by_speed():
     recordings = batch()
     bearing = {f"pulley-friction/drive-pulley/{name}": 2e-3 for name in ("friction_torque", "presliding")}
     rivals = [
-        trial(recordings, ("viscous-friction", "conduit"), **{"viscous-friction/conduit/c": 30.0}),
-        trial(recordings, ("pulley-friction", "drive-pulley"), **bearing),
+        fitted(recordings, ("viscous-friction", "conduit"), **{"viscous-friction/conduit/c": 30.0}),
+        fitted(recordings, ("pulley-friction", "drive-pulley"), **bearing),
     ]
     found = proposed(judged(recordings, *rivals), PARAMETERS)
     assert found["separates"] == ["viscous-friction", "pulley-friction"]
@@ -59,7 +62,7 @@ def test_slow_and_fast_friction_are_told_apart_by_speed():
 
 
 def test_recordings_are_asked_for_until_one_rival_leads():
-    """The odds of a judgement: exp(looks x difference^2 / 2), a look twenty times a channel of a recording."""
+    """The odds of a comparison: exp(n d^2 / 2) with 20 effective samples a channel and recording."""
     assert recordings_wanted(1.0, 5) == 1
     for apart in (0.05, 0.1):
         n = recordings_wanted(apart, 5)
@@ -67,17 +70,17 @@ def test_recordings_are_asked_for_until_one_rival_leads():
 
 
 @pytest.mark.parametrize("known_to, apart", [(0.5, False), (1e-5, True)])
-def test_a_difference_that_a_refit_takes_up_tells_nothing_apart(known_to, apart):
+def test_a_difference_that_a_refit_takes_up_tells_nothing_separation(known_to, apart):
     """Two rivals that are one, but for a stiffness that the recordings do not tell."""
     recordings = batch()
     drag = {"constant-drag/conduit/f0": 0.5}
     rivals = [
-        trial(recordings, ("constant-drag", "conduit"), known_to=known_to, **drag | {"stiffness_N_per_m": k})
+        fitted(recordings, ("constant-drag", "conduit"), known_to=known_to, **drag | {"stiffness_N_per_m": k})
         for k in (8500.0, 9500.0)
     ]
     template = recordings[0].observations
-    experiment = candidates(recordings)[0]
+    experiment = experiments(recordings)[0]
     planned = [_planned(experiment, rival, template, PARAMETERS) for rival in rivals]
-    as_fitted, refitted = _apart(planned), _apart(planned, rivals)
+    as_fitted, refitted = _separation(planned), _separation(planned, rivals)
     assert as_fitted > 0.5
     assert (refitted > 0.5 * as_fitted) == apart

@@ -4,22 +4,22 @@ import numpy as np
 import pytest
 
 from ccmodel import mechanisms
-from ccmodel.diagnose.candidate import scaled
-from ccmodel.diagnose.hypothesis import Hypothesis, plausible, singles
+from ccmodel.diagnose.hypothesis import Hypothesis, plausible, single_mechanisms
+from ccmodel.diagnose.screening import scaled
 from ccmodel.model.parameters import mechanism_parameter
 from made_observations import PARAMETERS
 
 
 def test_every_mechanism_is_asked_at_each_of_its_places_but_what_is_asked_for_by_name():
-    asked = {h.acting[0] for h in singles()}
+    asked = {h.acting[0] for h in single_mechanisms()}
     every = {(name, place) for name in mechanisms.names() for place in mechanisms.get(name).places}
     assert every - asked == {("drive-windup", "drive-pulley")}
     assert asked < every
 
 
-@pytest.mark.parametrize("hypothesis", singles(), ids=str)
+@pytest.mark.parametrize("hypothesis", single_mechanisms(), ids=str)
 def test_probes_are_plausible_and_within_reach_of_a_fit(hypothesis):
-    probes = list(hypothesis.probes())
+    probes = list(hypothesis.screening_values())
     assert probes
     for probe in probes:
         assert plausible(hypothesis, probe)
@@ -30,15 +30,15 @@ def test_probes_are_plausible_and_within_reach_of_a_fit(hypothesis):
 
 def test_a_probe_is_scaled_about_the_neutral_value():
     drag = Hypothesis((("constant-drag", "conduit"),))
-    probe = next(drag.probes())
+    probe = next(drag.screening_values())
     ((key, value),) = probe.items()
     assert scaled(drag, probe, 2.0)[key] == pytest.approx(2 * value)
     assert scaled(drag, probe, -1.0) is None
     gain = Hypothesis((("torque-scale", "load-sensor"),))
-    ((key, value),) = next(gain.probes()).items()
+    ((key, value),) = next(gain.screening_values()).items()
     assert scaled(gain, {key: value}, -1.0)[key] == pytest.approx(-value)
     uneven = Hypothesis((("cable-asymmetry", "cable"),))
-    for probe in uneven.probes():
+    for probe in uneven.screening_values():
         back = scaled(uneven, probe, -1.0)
         for key, value in probe.items():
             assert back[key] - 1 == pytest.approx(1 - value)
@@ -62,7 +62,7 @@ def test_a_number_far_out_of_its_range_is_not_plausible():
 
 
 def test_a_mass_is_tried_at_many_sizes_under_one_damping():
-    probes = list(Hypothesis((("load-inertia", "load"),)).probes())
+    probes = list(Hypothesis((("load-inertia", "load"),)).screening_values())
     masses = np.array([p["load-inertia/load/J"] for p in probes])
     assert (masses[1:] / masses[:-1]).max() < 1.25
     assert len({p["load-inertia/load/zeta"] for p in probes}) == 1
@@ -78,7 +78,7 @@ def test_what_the_model_has_already_is_fitted_and_neither_named_nor_asked_for():
     assert both.names == ("torque-scale",)
     assert [(m.name, m.place) for m in both.of(PARAMETERS).mechanisms] == [friction, gain]
     assert set(both.free(both.start)) > set(model.free(model.start)) != set()
-    asked = {h.acting[0] for h in singles(model=model)}
+    asked = {h.acting[0] for h in single_mechanisms(model=model)}
     assert friction not in asked
     assert ("pulley-friction", "load-pulley") in asked
 
@@ -91,6 +91,6 @@ def test_what_is_held_stays_as_it_is_unless_it_is_what_has_changed():
     assert model.free({}) == {}
     assert model.of(known).value_of(key) == 7e-3
     changed = model.and_also(Hypothesis((friction,)))
-    assert changed in {model.and_also(h) for h in singles(model=model)}
+    assert changed in {model.and_also(h) for h in single_mechanisms(model=model)}
     assert list(changed.free(changed.start | {key: 7e-3})) == list(changed.start)
     assert [(m.name, m.place) for m in changed.of(known).mechanisms] == [friction]

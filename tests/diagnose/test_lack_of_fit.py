@@ -1,3 +1,5 @@
+"""The part of residuals that recordings predict of one another."""
+
 from dataclasses import replace
 
 import numpy as np
@@ -5,7 +7,7 @@ import pytest
 
 from ccmodel.diagnose.candidate import CandidateFit
 from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.lack_of_fit import structure
+from ccmodel.diagnose.lack_of_fit import lack_of_fit
 from made_observations import batch
 
 
@@ -14,57 +16,57 @@ def recordings():
     return batch()
 
 
-def trial(recordings, errors):
-    """A trial that leaves noise and, in each channel, `errors` of a recording's observations."""
+def fitted(recordings, errors):
+    """A candidate whose residuals are noise and, in each channel, `errors` of a recording's observations."""
     random = np.random.default_rng(1)
-    aside = []
+    residuals = []
     for k, w in enumerate(recordings):
         e = w.observations
         shape = e.measured.shape
-        aside.append((random.standard_normal(shape) + errors(k, e)).ravel())
-    return CandidateFit(Hypothesis(), {}, {}, [], [], np.eye(1), np.ones(1), [], aside)
+        residuals.append((random.standard_normal(shape) + errors(k, e)).ravel())
+    return CandidateFit(Hypothesis(), {}, {}, [], [], np.eye(1), np.ones(1), [], residuals)
 
 
-def test_noise_teaches_nothing(recordings):
-    found = structure(recordings, trial(recordings, lambda k, e: 0.0))
+def test_noise_is_not_predicted(recordings):
+    found = lack_of_fit(recordings, fitted(recordings, lambda k, e: 0.0))
     assert found.mean < 0.02
-    assert found.surely < 0.01
+    assert found.lower_bound < 0.01
 
 
-def test_what_follows_the_drive_is_learnt(recordings):
-    found = structure(recordings, trial(recordings, lambda k, e: np.sin(4 * e.given.theta_in[e.judged])))
-    assert found.surely > 0.2
+def test_errors_that_follow_the_drive_are_predicted(recordings):
+    found = lack_of_fit(recordings, fitted(recordings, lambda k, e: np.sin(4 * e.given.theta_in[e.judged])))
+    assert found.lower_bound > 0.2
 
 
-def test_what_differs_from_run_to_run_cannot_be_learnt(recordings):
+def test_differences_from_run_to_run_are_not_predicted(recordings):
     signs = [1, -1, 1, -1]
-    found = structure(recordings, trial(recordings, lambda k, e: signs[k] * np.sin(4 * e.given.theta_in[e.judged])))
-    assert found.surely < 0.02
+    found = lack_of_fit(recordings, fitted(recordings, lambda k, e: signs[k] * np.sin(4 * e.given.theta_in[e.judged])))
+    assert found.lower_bound < 0.02
 
 
-def test_a_single_recording_is_learnt_in_stretches(recordings):
+def test_a_single_recording_is_predicted_in_stretches(recordings):
     one = recordings[:1]
-    found = structure(one, trial(one, lambda k, e: 2 * np.sin(4 * e.given.theta_in[e.judged])))
-    assert found.gain.size == 4
+    found = lack_of_fit(one, fitted(one, lambda k, e: 2 * np.sin(4 * e.given.theta_in[e.judged])))
+    assert found.reduction.size == 4
     assert found.mean > 0.2
 
 
-def test_a_channel_that_one_recording_lacks_is_learnt_from_the_others(recordings):
-    lacking = [recordings[0].acting(recordings[0].observations.parameters), *recordings[1:]]
+def test_a_channel_may_be_missing_in_a_recording(recordings):
+    lacking = [recordings[0].with_parameters(recordings[0].observations.parameters), *recordings[1:]]
     object.__setattr__(lacking[0], "observations", lacking[0].observations.without("tau_out_Nm"))
-    found = structure(lacking, trial(lacking, lambda k, e: np.sin(4 * e.given.theta_in[e.judged])))
-    assert found.surely > 0.2
+    found = lack_of_fit(lacking, fitted(lacking, lambda k, e: np.sin(4 * e.given.theta_in[e.judged])))
+    assert found.lower_bound > 0.2
 
 
-def test_what_a_right_model_is_allowed_to_leave_may_follow_laws(recordings):
-    """An tolerance of half the noise's mean square: a law of that size is no objection, a larger one is."""
+def test_errors_within_the_tolerance_do_not_count(recordings):
+    """A tolerance of half the noise's mean square: predictable errors of that size do not count, larger ones do."""
     allowed = [replace(w, observations=_allowing(w.observations, 0.5)) for w in recordings]
-    small = structure(allowed, trial(allowed, lambda k, e: 0.8 * np.sin(4 * e.given.theta_in[e.judged])))
-    large = structure(allowed, trial(allowed, lambda k, e: 2.0 * np.sin(4 * e.given.theta_in[e.judged])))
-    assert small.surely < 0 < large.surely
+    small = lack_of_fit(allowed, fitted(allowed, lambda k, e: 0.8 * np.sin(4 * e.given.theta_in[e.judged])))
+    large = lack_of_fit(allowed, fitted(allowed, lambda k, e: 2.0 * np.sin(4 * e.given.theta_in[e.judged])))
+    assert small.lower_bound < 0 < large.lower_bound
 
 
 def _allowing(e, share):
-    """The same observations with an tolerance that makes up a share of each variance."""
+    """The same observations with a tolerance that makes up a share of each variance."""
     sigma = np.ptp(e.measured, axis=1, keepdims=True) / np.sqrt(share) * np.ones_like(e.measured)
     return replace(e, sigma=sigma, tolerance=np.ones(len(e.channels)))

@@ -1,20 +1,26 @@
-"""The place of a mismatch that no mechanism accounts for."""
+"""The place of a mismatch that no mechanism explains."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from ccmodel.diagnose.comparison import Judgement
-from ccmodel.diagnose.location import _sticking_out, location
-from ccmodel.diagnose.whitening import weigh
+from ccmodel.diagnose.comparison import Comparison
+from ccmodel.diagnose.location import _prominent, location
+from ccmodel.diagnose.verdict import Judgement
+from ccmodel.diagnose.whitening import whiten
 from ccmodel.model.general.run import Active
 from made_observations import NOISE, PARAMETERS, batch, calibrated
 
 
-def wave(said, channel):
-    """What no spring, cable or friction does: a ripple of the drive angle."""
-    return {channel: 10 * NOISE[channel] * np.sin(25 * said["theta_in_rad"])}
+def unexplained(recordings):
+    base = calibrated(recordings)
+    return Judgement("unexplained", base, Comparison(recordings, base, [], {}), [], [], 1.0, [])
+
+
+def wave(simulated, channel):
+    """A ripple of the drive angle, which no spring, cable or friction causes."""
+    return {channel: 10 * NOISE[channel] * np.sin(25 * simulated["theta_in_rad"])}
 
 
 @pytest.mark.parametrize(
@@ -27,32 +33,35 @@ def wave(said, channel):
         ("F_load_N", "load-sensor"),
     ],
 )
-def test_a_channel_that_is_off_alone_gives_its_place_away(channel, place):
-    recordings = batch(lambda said: wave(said, channel))
-    base = calibrated(recordings)
-    found = location(Judgement("unexplained", base, base, [], [], 1.0, [], {}, recordings))
+def test_an_error_in_one_channel_is_located_at_its_sensor(channel, place):
+    recordings = batch(lambda simulated: wave(simulated, channel))
+    found = location(unexplained(recordings))
     assert found["place"] == place
     assert found["channels"][0] == channel.rsplit("_", 1)[0]
 
 
-def test_a_load_of_another_law_leaves_cables_right_that_are_driven_by_its_torque():
+def test_a_load_of_another_law_is_located_at_the_load():
     stiff = Active("load-stiffening", "load", {"K3": 0.1})
     recordings = batch(truth=replace(PARAMETERS, mechanisms=(stiff,)))
-    base = calibrated(recordings)
-    assert location(Judgement("unexplained", base, base, [], [], 1.0, [], {}, recordings))["place"] == "load"
+    assert location(unexplained(recordings))["place"] == "load"
 
 
-def test_a_ripple_of_both_torques_sits_in_between():
-    recordings = batch(lambda said: wave(said, "tau_in_Nm") | wave(said, "tau_out_Nm") | wave(said, "theta_out_rad"))
-    base = calibrated(recordings)
-    assert location(Judgement("unexplained", base, base, [], [], 1.0, [], {}, recordings))["place"] == "conduit"
+def test_errors_at_both_ends_are_located_between_them():
+    def ripples(simulated):
+        return {c: wave(simulated, c)[c] for c in ("tau_in_Nm", "tau_out_Nm", "theta_out_rad")}
+
+    recordings = batch(
+        lambda simulated: (
+            wave(simulated, "tau_in_Nm") | wave(simulated, "tau_out_Nm") | wave(simulated, "theta_out_rad")
+        )
+    )
+    assert location(unexplained(recordings))["place"] == "conduit"
 
 
-def test_the_only_channel_there_is_gives_a_place_all_the_same():
-    one = [only(w.observations, "tau_in_Nm") for w in batch(lambda said: wave(said, "tau_in_Nm"))]
-    recordings = [weigh(e, PARAMETERS) for e in one]
-    base = calibrated(recordings)
-    found = location(Judgement("unexplained", base, base, [], [], 1.0, [], {}, recordings))
+def test_a_single_channel_gives_a_place():
+    one = [only(w.observations, "tau_in_Nm") for w in batch(lambda simulated: wave(simulated, "tau_in_Nm"))]
+    recordings = [whiten(e, PARAMETERS) for e in one]
+    found = location(unexplained(recordings))
     assert (found["place"], found["channels"]) == ("drive-pulley", ["tau_in"])
 
 
@@ -62,8 +71,8 @@ def only(observations, channel):
     return observations
 
 
-def test_what_noise_leaves_anyway_makes_no_channel_stick_out():
-    """Beside an angle that is off by twice its noise, channels at 1.2 times theirs are as good as right."""
+def test_noise_makes_no_channel_prominent():
+    """The angle is off by twice its noise; a channel at 1.15 times its noise is not named with it."""
     square = {"theta_out": 2.1**2, "tau_in": 1.15**2, "tau_out": 1.3**2, "F_drive": 0.9**2}
-    assert _sticking_out(square, 0.35) == ["theta_out", "tau_out"]
-    assert _sticking_out({"theta_out": 0.9, "tau_in": 0.8}, 0.35) == ["theta_out"]
+    assert _prominent(square, 0.35) == ["theta_out", "tau_out"]
+    assert _prominent({"theta_out": 0.9, "tau_in": 0.8}, 0.35) == ["theta_out"]

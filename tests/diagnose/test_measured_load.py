@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,13 +9,18 @@ import pytest
 from builders import recording
 from ccmodel.cli import diagnose
 from ccmodel.config import Config, load_config
+from ccmodel.diagnose import candidate
+from ccmodel.diagnose.calibration import calibration
 from ccmodel.diagnose.candidate import _best, _starts, fit
-from ccmodel.diagnose.comparison import judge
-from ccmodel.diagnose.diagnosis import calibration, first_cycles
 from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.diagnose.observations import first_cycles
+from ccmodel.diagnose.selection import Selection
+from ccmodel.diagnose.verdict import judge
 from ccmodel.diagnose.whitening import Whitened
 from ccmodel.failure import ModelError
-from ccmodel.inference.problem import Free, Observations
+from ccmodel.inference.least_squares import Solution
+from ccmodel.inference.observations import Observations
+from ccmodel.inference.problem import Free, Problem
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 from ccmodel.typed import InputError
@@ -36,7 +40,7 @@ def jaw(load_Nm, id="r", pretension_N=7.0, **extra):
     return replace(made, **extra)
 
 
-def weighed(recorded, sigma=(1e-3, 1e-4)):
+def whitened(recorded, sigma=(1e-3, 1e-4)):
     e = Observations.of(recorded, replace(TRUE, spring_beside_load_Nm_per_rad=0.0), CHANNELS, step_s=0.02)
     e = replace(e, sigma=np.repeat(np.array(sigma)[:, None], e.measured.shape[1], axis=1))
     rows = e.measured.size
@@ -45,7 +49,7 @@ def weighed(recorded, sigma=(1e-3, 1e-4)):
 
 def test_a_fit_finds_pretension_friction_and_spring_without_a_rest():
     """From ten times the pretension, where no cable ever goes slack; two recordings were aimed at two pretensions."""
-    batch = [weighed(jaw(load, str(k), T)) for k, (load, T) in enumerate(((-0.005, 7.0), (-0.04, 9.0)))]
+    batch = [whitened(jaw(load, str(k), T)) for k, (load, T) in enumerate(((-0.005, 7.0), (-0.04, 9.0)))]
     free = {
         "pretension_share": Free(2.0, 0.01, 100.0),
         "friction_coefficient": Free(0.15, 0.01, 1.0),
@@ -58,7 +62,7 @@ def test_a_fit_finds_pretension_friction_and_spring_without_a_rest():
 
 
 def test_the_spring_beside_the_load_is_asked_for_only_where_the_load_was_measured():
-    e = weighed(jaw(-0.01)).observations
+    e = whitened(jaw(-0.01)).observations
     assert "spring_beside_load_Nm_per_rad" in calibration(e.parameters, [e])
     assert "spring_beside_load_Nm_per_rad" not in calibration(replace(e.parameters, load_stiffness_Nm_per_rad=0.1), [e])
 
@@ -80,15 +84,15 @@ def test_so_many_cycles_of_a_sine_are_compared_and_all_of_anything_else():
     assert first_cycles(steps, 3) is steps
 
 
-def test_a_suspect_is_fitted_in_full_though_the_screening_passes_it_over():
-    batch = [weighed(jaw(load, str(k))) for k, load in enumerate((-0.004, -0.008))]
+def test_a_forced_candidate_is_fitted_whatever_its_screening_score():
+    batch = [whitened(jaw(load, str(k))) for k, load in enumerate((-0.004, -0.008))]
     free = {"friction_coefficient": Free(0.15, 0.01, 1.0), "spring_beside_load_Nm_per_rad": Free(0.02, 0.0, 1.0)}
-    start = {name: f.start for name, f in free.items()}
-    suspect = Hypothesis((("pulley-friction", "drive-pulley"),))
-    found = judge(batch, free, start, known=[], forced_candidates=[suspect])
-    assert [t.hypothesis for t in found.trials] == [suspect]
-    assert found.nearest is found.trials[0]
-    assert judge(batch, free, start, known=[]).nearest is None
+    base = fit(batch, Hypothesis(), free, {name: f.start for name, f in free.items()})
+    forced = Hypothesis((("pulley-friction", "drive-pulley"),))
+    found = judge(*Selection(free, [], [forced]).run(batch, base))
+    assert [c.hypothesis for c in found.candidates] == [forced]
+    assert found.nearest is found.candidates[0]
+    assert judge(*Selection(free, []).run(batch, base)).nearest is None
 
 
 @pytest.mark.parametrize(
@@ -99,12 +103,12 @@ def test_a_suspect_is_fitted_in_full_though_the_screening_passes_it_over():
         ([[]], "one mechanism or of two"),
     ],
 )
-def test_a_suspect_that_is_not_known_is_refused(forced_candidates, said):
+def test_a_forced_candidate_that_is_not_known_is_refused(forced_candidates, said):
     with pytest.raises(ValueError, match=said):
         Config(diagnosing={"forced_candidates": forced_candidates})
 
 
-def test_an_allowance_may_differ_by_channel():
+def test_a_tolerance_may_differ_by_channel():
     recorded = jaw(-0.01)
     plain, allowing = (
         Observations.of(recorded, TRUE, CHANNELS, step_s=0.02, tolerance=a) for a in (0.0, {"tau_in_Nm": 0.1})
@@ -129,7 +133,7 @@ def test_an_allowance_may_differ_by_channel():
         (["tau_in_Nm=0.9"], "less than 0.5"),
     ],
 )
-def test_an_allowance_that_cannot_be_used_is_refused(tmp_path, stated, said):
+def test_a_tolerance_that_cannot_be_used_is_refused(tmp_path, stated, said):
     with pytest.raises(InputError, match=f"--tolerance: .*{said}"):
         diagnose(tmp_path, tmp_path / "out", tolerance=stated)
 
@@ -140,21 +144,21 @@ def test_the_configuration_for_the_public_recordings_says_how_they_would_be_diag
     assert config.diagnosing.forced_candidates
 
 
-def test_a_fit_feels_its_way_from_a_slack_cable_too_where_the_pretension_is_not_known():
-    x0, low, high = np.array([2.0, 10.0]), np.array([0.0, 3.0]), np.array([5.0, 50.0])
-    taut, slack = _starts(["friction_coefficient", "pretension_share"], x0, low, high)
-    assert taut == pytest.approx(x0)
-    assert slack[0] == 2.0
-    assert low[1] < slack[1] == pytest.approx(3.0)  # a fifth would lie below what is allowed
-    assert len(_starts(["friction_coefficient"], x0[:1], low[:1], high[:1])) == 1
+def test_a_fit_starts_from_a_slack_cable_too_where_the_initial_tension_is_not_observed():
+    free = {"friction_coefficient": Free(2.0, 0.0, 5.0), "pretension_share": Free(10.0, 3.0, 50.0)}
+    taut, slack = _starts(Problem([], free))
+    assert taut == pytest.approx([2.0, 10.0])
+    assert slack == pytest.approx([2.0, 2.0])
+    assert len(_starts(Problem([], {"friction_coefficient": Free(2.0)}))) == 1
 
 
-def test_the_better_start_is_taken_and_one_that_cannot_be_run_only_if_none_can():
-    def solved(x):
+def test_the_better_start_is_taken_and_one_that_cannot_be_run_only_if_none_can(monkeypatch):
+    def minimise(problem, x, how):
         if x < 0:
             raise ModelError("cannot be run")
-        return SimpleNamespace(x=x, cost=abs(x - 3.0))
+        return Solution(x, abs(x - 3.0), [], None, "", 1)
 
-    assert _best(solved, [-1.0, 7.0, 2.0]).x == 2.0
+    monkeypatch.setattr(candidate, "minimise", minimise)
+    assert _best(None, [-1.0, 7.0, 2.0]).x == 2.0
     with pytest.raises(ModelError):
-        _best(solved, [-1.0])
+        _best(None, [-1.0])

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from ccmodel.channels import TENSIONS
 from ccmodel.failure import ModelError
 from ccmodel.inference.fit import fit
-from ccmodel.inference.problem import Free, Observations, Problem
-from ccmodel.inference.search import solve
-from ccmodel.recording import TENSIONS
+from ccmodel.inference.least_squares import solve
+from ccmodel.inference.observations import Observations
+from ccmodel.inference.problem import Free, Problem
 from drawn_batches import CONDITIONS, SPREAD, draw, problem_of
 
 
@@ -38,7 +39,7 @@ def dense_jacobian(problem, x):
         J = np.zeros((block.errors.size, x.size))
         J[:, block.columns] = block.derivatives.reshape(-1, block.columns.size)
         rows.append(J)
-    return np.concatenate([*rows, np.diag(problem.expected)])
+    return np.concatenate([*rows, np.diag(problem.prior_precision)])
 
 
 def test_finds_what_the_batch_was_made_with_from_a_fifth_off(drawn, found):
@@ -173,7 +174,7 @@ def uphill(monkeypatch):
 
 
 def test_a_stalled_search_is_refused_with_its_reason(problem, uphill, monkeypatch):
-    monkeypatch.setattr("ccmodel.inference.search.UNKNOWNS_DIRECT", 0)
+    monkeypatch.setattr("ccmodel.inference.least_squares.UNKNOWNS_DIRECT", 0)
     said = fit(problem)
     assert not said.succeeded
     assert said.message.startswith("stalled")

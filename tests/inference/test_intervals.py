@@ -10,8 +10,8 @@ from scipy.stats import binom
 from ccmodel.inference import intervals
 from ccmodel.inference.fit import fit
 from ccmodel.inference.intervals import REACH, bootstrap, covariance, profile
+from ccmodel.inference.least_squares import information_and_gradient, solve
 from ccmodel.inference.problem import Block, Free, Problem
-from ccmodel.inference.search import information_and_slope, solve
 from drawn_batches import CONDITIONS, SPREAD, draw, problem_of
 
 EXTRA_BEND = Free(0.0, -1.0, 3.0)
@@ -142,8 +142,8 @@ def test_errors_that_are_accounted_for_do_not_count_again():
     for _ in range(40):
         block = Block(np.arange(2), np.zeros((1, n)), J)
         inverse = np.linalg.inv(information)
-        likely = intervals.left_by_fit(block, inverse, slow(40))
-        (left,) = intervals.left_by_fit(block, inverse, slow(1) + random.standard_normal((1, 1, n)))
+        likely = intervals.residual_part(block, inverse, slow(40))
+        (left,) = intervals.residual_part(block, inverse, slow(1) + random.standard_normal((1, 1, n)))
         block = replace(block, errors=left)
         said = (np.diag(intervals.noise_of(block, each)) for each in ([], [likely]))
         found.append([d / intervals.WIDER**2 / np.diag(information) for d in said])
@@ -176,8 +176,8 @@ def test_what_the_fit_leaves_of_an_error_is_what_a_new_fit_leaves_of_it(solved):
     error[k] = 0.05 * observations.sigma[k] * (1 + np.sin(np.linspace(0, 40, error[k].size)))
     moved = Problem([replace(observations, measured=observations.measured - error)], problem.shared, problem.own)
     (added,) = (a - b for a, b in zip(moved.errors(solution.x), problem.errors(solution.x), strict=True))
-    information = block.information + np.diag(problem.expected**2)
-    (said,) = intervals.left_by_fit(block, np.linalg.inv(information), added[None])
+    information = block.information + np.diag(problem.prior_precision**2)
+    (said,) = intervals.residual_part(block, np.linalg.inv(information), added[None])
     found = moved.errors(solve(moved, solution.x).x)[0] - problem.errors(solution.x)[0]
     assert np.linalg.norm(said) < 0.8 * np.linalg.norm(added)
     assert np.linalg.norm(said - found) < 0.05 * np.linalg.norm(added - said)
@@ -196,9 +196,9 @@ def test_what_rounding_does_to_a_fit_stands_in_its_covariance(solved):
     for i, (e, block) in enumerate(zip(problem.observations, solution.blocks, strict=True)):
         k, step = e.channels.index("theta_out_rad"), e.given.recording.encoder_step_rad["theta_out_rad"]
         place = e.modelled(problem.values_of(solution.x, i))[k] / step + random.uniform(size=(400, 1))
-        errors = (np.floor(place) + 0.5 - place) * step / e.sigma[k] * np.sqrt(problem.looks / e.measured.shape[1])
+        errors = (np.floor(place) + 0.5 - place) * step / e.sigma[k] * np.sqrt(problem.weight(e))
         scores[:, block.columns] += errors @ block.derivatives[k]
-    information, _ = information_and_slope(problem, solution.x, solution.blocks)
+    information, _ = information_and_gradient(problem, solution.x, solution.blocks)
     moved = scores @ np.linalg.inv(information)
     shared = slice(0, len(problem.shared))
     np.testing.assert_allclose(np.diag(said)[shared], moved.var(axis=0)[shared], rtol=0.25)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from ccmodel.inference.fit import fit
-from ccmodel.inference.problem import Free, Observations, Problem
+from ccmodel.inference.observations import Observations
+from ccmodel.inference.problem import Free, Problem
 from ccmodel.model.parameters import Parameters
 from ccmodel.rig.ingest import ingest_batch
 from drawn_batches import SPREAD

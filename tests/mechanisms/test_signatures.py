@@ -7,7 +7,7 @@ import pytest
 
 from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
-from ccmodel.mechanisms.drive_windup import STANDS_WITHIN_RAD, wound
+from ccmodel.mechanisms.drive_windup import STANDSTILL_RAD, torque_of_train
 from ccmodel.mechanisms.pulley_friction import PRESLIDING_RAD
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, MechanicalLoad, SpringLoad
@@ -343,7 +343,7 @@ def driven_by_a_motor(samples, cycles=3, amplitude=0.3, stiffness=0.2, friction=
 def test_a_windup_says_the_torque_while_the_pulley_stands(samples, way):
     """Against a train that is followed step by step: to a twelfth of what the pulley's law alone errs by there."""
     time_s, theta, true, law = driven_by_a_motor(samples)
-    read = way * wound(time_s, way * theta, way * law, MOTOR["compliance"], MOTOR["lost_motion"])
+    read = way * torque_of_train(time_s, way * theta, way * law, MOTOR["compliance"], MOTOR["lost_motion"])
     settled = (time_s > 0.6) & (time_s < 2.6)
     stands = settled & (np.abs(np.gradient(theta)) < STANDING)
     assert 0.05 < stands.mean() < 0.3
@@ -354,10 +354,10 @@ def test_a_windup_says_the_torque_while_the_pulley_stands(samples, way):
 def test_a_windup_shows_at_turns_alone():
     theta = sine()
     torque = 0.05 * np.sign(np.gradient(theta)) + 0.1 * theta
-    read = wound(np.arange(theta.size) / 500, theta, torque, 0.2, 0.01)
+    read = torque_of_train(np.arange(theta.size) / 500, theta, torque, 0.2, 0.01)
     changed = read != torque
     assert changed.any()
-    assert (np.abs(theta[changed]) > 0.6 - STANDS_WITHIN_RAD).all()
+    assert (np.abs(theta[changed]) > 0.6 - STANDSTILL_RAD).all()
 
 
 # Sensors: nothing but the channel that the name says

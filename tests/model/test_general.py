@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
-from ccmodel.mechanisms.contract import Kink
+from ccmodel.mechanisms.kink import Kink
 from ccmodel.model.general import simulate
 from ccmodel.model.general.grid import make_grid
 from ccmodel.model.initial import InitialTension

@@ -1,9 +1,9 @@
-"""Something unknown as a rival: how much of the errors that a hypothesis leaves could still be learnt.
+"""Lack of fit: the part of a candidate's residuals that can be predicted in recordings not used for the prediction.
 
-A flexible model with no physics in it, a Gaussian process by random Fourier features, learns the errors from what the
-rig was doing and predicts those of recordings that it has not seen. Where it takes something off them there is law in
-what a hypothesis leaves, and the hypothesis is not the explanation, however little it leaves. What merely differs from
-run to run cannot be learnt from other runs.
+A Gaussian process, approximated by random Fourier features, learns the leave-one-out residuals from the state of the
+rig and predicts those of the recording that was left out. A reduction of their mean square is model discrepancy: the
+candidate is not the explanation, however small its residuals are. Differences from run to run cannot be predicted from
+other runs and do not count.
 """
 
 from collections.abc import Sequence
@@ -13,101 +13,92 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from ccmodel.channels import TAU_IN, TENSIONS, THETA_OUT
+from ccmodel.diagnose import settings
 from ccmodel.diagnose.candidate import CandidateFit
 from ccmodel.diagnose.drive import since_reversal, speed
 from ccmodel.diagnose.whitening import Whitened
-from ccmodel.inference.problem import Observations, each
+from ccmodel.inference.pool import each
 from ccmodel.model.run import simulate
-from ccmodel.recording import TENSIONS
-
-# Random features, how many of the quantities each looks at on average, and over which lengths (in standard deviations).
-FEATURES = 200
-LOOKS_AT = 3.0
-LENGTHS = (0.5, 1.2, 3.0)
-# Strengths of the penalty on what is learnt, relative to the mean square of a feature.
-PENALTIES = (0.01, 0.1, 1.0, 10.0)
-# A single recording is learnt in as many stretches.
-STRETCHES = 4
-SEED = 0
 
 
 @dataclass(frozen=True)
 class LackOfFit:
-    """What could be learnt of a trial's errors.
+    """Predictable part of a candidate's residuals.
 
     Attributes
     ----------
-    gain : ndarray, shape (recordings,)
-        By how much the mean square of a recording's whitened errors falls by what the others teach, beyond what a
-        right model is allowed to leave; negative where it falls by less or rises. Of a single recording, by stretches.
+    reduction : ndarray, shape (recordings,)
+        By recording, reduction of the mean square of its whitened residuals by the prediction from the others, minus
+        the share of the tolerance; negative where the prediction is worse. Of a single recording, by stretches.
     """
 
-    gain: NDArray
+    reduction: NDArray
 
     @property
     def mean(self) -> float:
-        """Of all recordings."""
-        return float(self.gain.mean())
+        """Mean over recordings."""
+        return float(self.reduction.mean())
 
     @property
-    def surely(self) -> float:
-        """What can be learnt by more than chance: the lower end of the mean's 95 % interval."""
-        n = self.gain.size
-        return self.mean - float(student.ppf(0.975, n - 1) * self.gain.std(ddof=1) / np.sqrt(n))
+    def lower_bound(self) -> float:
+        """Lower end of the 95 % interval of the mean."""
+        n = self.reduction.size
+        quantile = float(student.ppf(0.5 + settings.LACK_OF_FIT_COVERAGE / 2, n - 1))
+        return self.mean - quantile * float(self.reduction.std(ddof=1)) / np.sqrt(n)
 
 
-def structure(weighed: Sequence[Whitened], trial: CandidateFit) -> LackOfFit:
-    """Learn a trial's held-out errors from what the rig was doing, each recording's from the others'."""
-    about = each(weighed, lambda i, w: _circumstances(w, trial))
-    errors = each(weighed, lambda i, w: _by_channel(w.observations, trial.aside[i], weighed))
-    if len(weighed) == 1:
-        about, errors = (np.array_split(part[0], STRETCHES) for part in (about, errors))
-    features = _featured(about)
-    share = [1 / len(e) for e in errors]
+def lack_of_fit(whitened: Sequence[Whitened], candidate: CandidateFit) -> LackOfFit:
+    """Predict a candidate's leave-one-out residuals from the state of the rig, each recording from all others."""
+    inputs = each(whitened, lambda i, w: _inputs(w, candidate))
+    residuals = each(whitened, lambda i, w: _by_channel(w, candidate.loo_residuals[i], whitened))
+    if len(whitened) == 1:
+        inputs, residuals = (np.array_split(part[0], settings.STRETCHES) for part in (inputs, residuals))
+    features = _features(inputs)
+    share = [1 / len(e) for e in residuals]
     gram = [s * F.T @ F for s, F in zip(share, features, strict=True)]
-    cross = [s * F.T @ e for s, F, e in zip(share, features, errors, strict=True)]
+    cross = [s * F.T @ e for s, F, e in zip(share, features, residuals, strict=True)]
     size = np.trace(sum(gram)) / len(gram[0])
-    gains = [_gains(features, errors, gram, cross, penalty * size) for penalty in PENALTIES]
-    best = max(gains, key=np.mean)
-    allowed = np.mean([w.observations.tolerance_share for w in weighed])
-    return LackOfFit((best if best.mean() > 0 else np.zeros_like(best)) - allowed)
+    reductions = [_reductions(features, residuals, gram, cross, penalty * size) for penalty in settings.PENALTIES]
+    best = max(reductions, key=np.mean)
+    tolerated = np.mean([w.observations.tolerance_share for w in whitened])
+    return LackOfFit((best if best.mean() > 0 else np.zeros_like(best)) - tolerated)
 
 
-def _gains(features, errors, gram, cross, penalty: float) -> NDArray:
-    """By recording, what is taken off its mean square by a ridge regression on the others."""
+def _reductions(features, residuals, gram, cross, penalty: float) -> NDArray:
+    """By recording, the reduction of its mean square by a ridge regression on the others."""
     G, b = sum(gram) + penalty * np.eye(len(gram[0])), sum(cross)
-    gains = []
-    for F, e, own, own_cross in zip(features, errors, gram, cross, strict=True):
-        learnt = F @ np.linalg.solve(G - own, b - own_cross)
-        gains.append(np.mean(e**2) - np.mean((e - learnt) ** 2))
-    return np.array(gains)
+    found = []
+    for F, e, own, own_cross in zip(features, residuals, gram, cross, strict=True):
+        predicted = F @ np.linalg.solve(G - own, b - own_cross)
+        found.append(np.mean(e**2) - np.mean((e - predicted) ** 2))
+    return np.array(found)
 
 
-def _featured(about: Sequence[NDArray]) -> list[NDArray]:
-    """Constant, linear and random Fourier features of quantities, by recording; shape (samples, features)."""
-    random = np.random.default_rng(SEED)
-    every = np.concatenate(about)
+def _features(inputs: Sequence[NDArray]) -> list[NDArray]:
+    """Constant, linear and random Fourier features by recording; shape (samples, features)."""
+    random = np.random.default_rng(settings.FEATURES_SEED)
+    every = np.concatenate(inputs)
     mean, scale = every.mean(axis=0), every.std(axis=0)
     scale[scale == 0] = 1.0
-    shape = (every.shape[1], FEATURES)
-    looks = random.random(shape) < LOOKS_AT / every.shape[1]
-    directions = looks * random.standard_normal(shape) / random.choice(LENGTHS, FEATURES)
-    shift = random.uniform(0, 2 * np.pi, FEATURES)
+    shape = (every.shape[1], settings.FEATURES)
+    used = random.random(shape) < settings.INPUTS_PER_FEATURE / every.shape[1]
+    directions = used * random.standard_normal(shape) / random.choice(settings.LENGTH_SCALES, settings.FEATURES)
+    shift = random.uniform(0, 2 * np.pi, settings.FEATURES)
     found = []
-    for quantities in about:
+    for quantities in inputs:
         x = (quantities - mean) / scale
         found.append(np.column_stack([np.ones(len(x)), x, np.sqrt(2) * np.cos(x @ directions + shift)]))
     return found
 
 
-def _circumstances(w: Whitened, trial: CandidateFit) -> NDArray:
-    """What errors may depend on, sample by sample, as far as the model knows it; shape (samples, quantities)."""
-    e = w.observations
-    given, time_s = e.given, e.given.recording.time_s
-    said = simulate(given, trial.hypothesis.of(e.parameters).with_values(trial.values))
+def _inputs(w: Whitened, candidate: CandidateFit) -> NDArray:
+    """State of the rig at every sample, as the model simulates it; shape (samples, quantities)."""
+    given, time_s = w.observations.given, w.observations.given.recording.time_s
+    simulated = simulate(given, candidate.model(w.observations.parameters))
     omega = speed(given)
     travel, since_s = since_reversal(given)
-    tensions = [said[c] for c in TENSIONS]
+    tensions = [simulated[c] for c in TENSIONS]
     quantities = [
         given.theta_in,
         omega,
@@ -116,19 +107,20 @@ def _circumstances(w: Whitened, trial: CandidateFit) -> NDArray:
         np.tanh(travel / (0.2 * np.abs(travel).max() or 1.0)),
         time_s,
         np.minimum(since_s, 3.0),
-        said["theta_out_rad"],
-        said["tau_in_Nm"],
+        simulated[THETA_OUT],
+        simulated[TAU_IN],
         *tensions,
         np.full_like(time_s, given.recording.path.bend_rad),
         np.full_like(time_s, np.mean(tensions)),
     ]
-    return np.column_stack(quantities)[e.judged]
+    return np.column_stack(quantities)[w.observations.judged]
 
 
-def _by_channel(e: Observations, errors: NDArray, weighed: Sequence[Whitened]) -> NDArray:
-    """Errors by channel of any recording, none where a channel is missing; shape (samples, channels)."""
-    channels = sorted({c for w in weighed for c in w.observations.channels})
-    found = np.zeros((e.measured.shape[1], len(channels)))
-    for channel, values in zip(e.channels, errors[: e.measured.size].reshape(e.measured.shape), strict=True):
+def _by_channel(w: Whitened, residuals: NDArray, whitened: Sequence[Whitened]) -> NDArray:
+    """Residuals by channel of any recording, zero where a channel is missing; shape (samples, channels)."""
+    channels = sorted({c for one in whitened for c in one.observations.channels})
+    found = np.zeros((w.measured.shape[1], len(channels)))
+    rows = residuals[: w.measured.size].reshape(w.measured.shape)
+    for channel, values in zip(w.observations.channels, rows, strict=True):
         found[:, channels.index(channel)] = values
     return found

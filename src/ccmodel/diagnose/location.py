@@ -1,27 +1,21 @@
-"""Where model and recordings differ: by channel, by phase of the motion, by place along the transmission."""
+"""Location of the mismatch: its place in the transmission, its channels and its phases of the motion."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
+from ccmodel.channels import PLACES_OF, short_name
+from ccmodel.diagnose import settings
 from ccmodel.diagnose.candidate import CandidateFit
-from ccmodel.diagnose.comparison import Judgement
 from ccmodel.diagnose.drive import is_moving, since_reversal
-from ccmodel.diagnose.isolation import PLACES_OF, channels_of, cleared
+from ccmodel.diagnose.isolation import channels_of, isolate
+from ccmodel.diagnose.verdict import Judgement
 from ccmodel.diagnose.whitening import Whitened
 from ccmodel.model.run import ModelInput
 
-# Parts of a motion by what the drive does.
-PARTS = ("at rest", "after a reversal", "under way")
-# A reversal's mark is looked for over this share of the drive's stroke after it.
-AFTER_REVERSAL = 0.25
-# A channel is named if it carries this share of the error beyond noise that the worst one does, in units of its noise;
-# a part of the motion likewise.
-NAMED_SHARE, PARTS_SHARE = 0.35, 0.7
-# One suspect alone accounts for a mismatch if without it no more than this share of it is left. Of places that this
-# does not tell apart the screening chooses.
-ALONE = 0.05
+# Phases of the drive's motion.
+PHASES = ("at rest", "after a reversal", "under way")
+# Place of a mismatch that no single part at fault explains: between drive and load.
 BETWEEN = ("conduit",)
 
 TEXT = {
@@ -38,25 +32,25 @@ TEXT = {
 
 
 def location(judgement: Judgement) -> dict:
-    """Place, channels and parts of the motion that carry the mismatch, and a sentence."""
+    """Place, channels and phases of the mismatch, and a sentence."""
     if judgement.verdict == "agrees":
         return {"place": None, "channels": [], "phases": [], "text": "model and recordings agree within the noise"}
-    acting = judgement.best.hypothesis.acting
-    places = list(dict.fromkeys(place for _, place in acting)) or judgement.one_fault or _places(judgement)
-    table = mismatch(judgement.weighed, judgement.calibrated)
-    square = {c: float(np.nanmean(np.square(list(parts.values())))) for c, parts in table.items()}
-    channels = _sticking_out(square, NAMED_SHARE)
-    squares = {p: np.array([table[c][p] ** 2 for c in channels]) for p in PARTS}
-    by_part = {p: float(np.nanmean(s)) for p, s in squares.items() if np.isfinite(s).any()}
-    parts = sorted(_sticking_out(by_part, PARTS_SHARE), key=PARTS.index)
+    hypothesis = judgement.best.hypothesis
+    places = hypothesis.places or judgement.single_fault_places or _places(judgement)
+    table = mismatch(judgement.whitened, judgement.calibrated)
+    square = {c: float(np.nanmean(np.square(list(phases.values())))) for c, phases in table.items()}
+    channels = _prominent(square, settings.NAMED_CHANNEL)
+    squares = {p: np.array([table[c][p] ** 2 for c in channels]) for p in PHASES}
+    by_phase = {p: float(np.nanmean(s)) for p, s in squares.items() if np.isfinite(s).any()}
+    phases = sorted(_prominent(by_phase, settings.NAMED_PHASE), key=PHASES.index)
     verb = "is" if len(channels) == 1 else "are"
-    where = (" and " if acting else " or ").join(TEXT[place] for place in places)
-    text = f"The mismatch sits {where}: {', '.join(channels)} {verb} off most, {' and '.join(parts)}."
-    return {"place": places[0], "channels": channels, "phases": parts, "text": text}
+    where = (" and " if hypothesis.acting else " or ").join(TEXT[place] for place in places)
+    text = f"The mismatch sits {where}: {', '.join(channels)} {verb} off most, {' and '.join(phases)}."
+    return {"place": places[0], "channels": channels, "phases": phases, "text": text}
 
 
-def _sticking_out(square: dict[str, float], share: float) -> list[str]:
-    """Of mean squares over what a right model leaves, the names of those furthest beyond it, the worst first."""
+def _prominent(square: dict[str, float], share: float) -> list[str]:
+    """Names whose mean squares exceed the noise floor by at least a share of the worst one's, the worst first."""
     beyond = {name: max(value - 1.0, 0.0) for name, value in square.items()}
     worst = max(beyond.values())
     ranked = sorted(square, key=lambda name: -square[name])
@@ -64,40 +58,41 @@ def _sticking_out(square: dict[str, float], share: float) -> list[str]:
 
 
 def _places(judgement: Judgement) -> list[str]:
-    """Where the mismatch sits as far as it can be said without a mechanism that accounts for it, likeliest first.
+    """Possible places of a mismatch that no mechanism explains, the most likely first.
 
-    What no suspect alone accounts for (`ccmodel.diagnose.isolation`) lies in between, and there nearly everything
-    that can be wrong is wrong along the conduits.
+    If no part alone is at fault (`ccmodel.diagnose.isolation`), the fault lies between drive and load, where nearly
+    every effect acts along the conduits. Places that this does not separate are ordered by their screening scores.
     """
-    weighed, calibrated = judgement.weighed, judgement.calibrated
-    left, places = min(cleared(weighed, calibrated), default=(0.0, PLACES_OF[channels_of(weighed)[0]]))
-    suspects = places if left <= ALONE * max(float(calibrated.left.mean() - 1.0), 0.0) else BETWEEN
-    found = [s.hypothesis.acting[0][1] for s in judgement.scores if s.values]
-    return list(dict.fromkeys([*(place for place in found if place in suspects), *suspects]))
+    whitened, calibrated = judgement.whitened, judgement.calibrated
+    least, places = min(isolate(whitened, calibrated), default=(0.0, PLACES_OF[channels_of(whitened)[0]]))
+    possible = places if least <= settings.ISOLATED_SHARE * judgement.comparison.excess else BETWEEN
+    scored = [s.hypothesis.acting[0][1] for s in judgement.scores if s.values]
+    return list(dict.fromkeys([*(place for place in scored if place in possible), *possible]))
 
 
-def mismatch(weighed: Sequence[Whitened], trial: CandidateFit) -> dict[str, dict[str, float]]:
-    """Root mean square of the held-out errors over what a right model leaves, by channel and part of the motion."""
-    sums: dict[str, dict[str, list]] = {}
-    for i, w in enumerate(weighed):
-        e = replace(w.observations, parameters=trial.hypothesis.of(w.observations.parameters))
-        floor = np.array([w.floor[c] for c in e.channels])[:, None]
-        errors = e.errors(trial.held_out[i]) * e.sigma / floor
-        part = parts_of(e.given)[e.judged]
-        for c, channel in enumerate(e.channels):
-            by_part = sums.setdefault(channel.rsplit("_", 1)[0], {p: [] for p in PARTS})
-            for k, p in enumerate(PARTS):
-                by_part[p].append(errors[c][part == k])
+def mismatch(whitened: Sequence[Whitened], candidate: CandidateFit) -> dict[str, dict[str, float]]:
+    """Root mean square of the held-out errors over the noise floor, by channel and phase of the motion."""
+    collected: dict[str, dict[str, list]] = {}
+    for i, w in enumerate(whitened):
+        o = w.observations.with_parameters(candidate.held_out(i, w))
+        floor = np.array([w.noise_floor[c] for c in o.channels])[:, None]
+        errors = o.errors({}) * o.sigma / floor
+        phase = phases_of(o.given)[o.judged]
+        for c, channel in enumerate(o.channels):
+            by_phase = collected.setdefault(short_name(channel), {p: [] for p in PHASES})
+            for k, p in enumerate(PHASES):
+                by_phase[p].append(errors[c][phase == k])
     return {
-        channel: {p: _rms(np.concatenate(values)) for p, values in by_part.items()} for channel, by_part in sums.items()
+        channel: {p: _rms(np.concatenate(values)) for p, values in by_phase.items()}
+        for channel, by_phase in collected.items()
     }
 
 
-def parts_of(given: ModelInput) -> np.ndarray:
-    """Index into `PARTS` of every sample, shape (n,)."""
+def phases_of(given: ModelInput) -> np.ndarray:
+    """Index into `PHASES` of every sample, shape (n,)."""
     moving = is_moving(given)
-    just_turned = np.abs(since_reversal(given)[0]) < AFTER_REVERSAL * np.ptp(given.theta_in)
-    return np.where(moving, np.where(just_turned, 1, 2), 0)
+    just_reversed = np.abs(since_reversal(given)[0]) < settings.AFTER_REVERSAL * np.ptp(given.theta_in)
+    return np.where(moving, np.where(just_reversed, 1, 2), 0)
 
 
 def _rms(values: np.ndarray) -> float:

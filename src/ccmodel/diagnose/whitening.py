@@ -1,13 +1,12 @@
-"""The recordings of a batch made ready for a diagnosis: what differs from run to run is part of their noise.
+"""Whitened observations: errors of a recording divided by the square root of their covariance.
 
-Friction that is a per cent higher, a sensor's zero, where in its count an encoder rests, what is not known of the
-drive's motion: each is a direction in which a recording may lie off what the right model says. Together with the
-sensors' noise they make the covariance of a recording's errors. Errors that were whitened by it are what hypotheses
-are judged by, and no fit needs unknowns for what differs from run to run.
+The covariance has two parts: the sensors' noise, and nuisances that differ from run to run. Nuisances are friction,
+sensor zeros, encoder offsets and the uncertain drive motion, each a direction in the space of errors with a prior
+standard deviation. They are marginalised, so that no fit needs unknowns for them.
 
-A zero that is off by more than its sensor's accuracy, friction that is ten per cent higher in every recording, is one
-number, lost among thousands of samples. How far off the errors put each is therefore counted besides them, as a look
-of its own.
+A nuisance far outside its prior, such as friction that is 10 % higher in every recording, is one number among
+thousands of samples. The posterior means of the nuisances are therefore appended to the whitened errors, each with the
+weight of one effective sample.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,115 +15,139 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.inference.problem import Observations
+from ccmodel.channels import THETA_OUT, ZERO_OF
+from ccmodel.diagnose import settings
+from ccmodel.inference.effective_samples import IN_DIAGNOSIS
+from ccmodel.inference.jacobian import STEP, jacobian, size_of
+from ccmodel.inference.observations import Observations
 from ccmodel.model.general.run import settings_of
-from ccmodel.model.parameters import ZERO_OF, Parameters
-from ccmodel.model.sensitivity import STEP, size_of
+from ccmodel.model.parameters import Parameters
 
-# Independent looks that a channel of a recording gives at a hypothesis: samples are far more, and alike.
-LOOKS = 20
-# Standard deviation of what may be anywhere from -1 to 1, and the places that are looked at where it matters.
-ANYWHERE = 1 / np.sqrt(3)
-WITHIN_GAP = (0.0, -1.0, 1.0)
-FRICTION_SPREAD = 0.01  # of itself, from run to run: what cables of the paper's kind are taken to repeat by
+# Step of the differences by a nuisance, relative to its size.
+NUISANCE_STEP = 10 * STEP
 
 
 @dataclass(frozen=True)
 class Whitened:
-    """A recording with the covariance of its errors.
+    """Observations with the covariance of their errors, linearised about a model.
 
     Attributes
     ----------
     observations : Observations
     directions : ndarray, shape (rows, k)
-        Orthonormal directions of what differs from run to run, among the errors over the sensors' noise.
-    shrink : ndarray, shape (k,)
-        By how much whitening shrinks the errors along each.
-    likeliest : ndarray, shape (numbers, rows)
-        What makes of errors over the sensors' noise the likeliest differences of this run (in friction, in zeros), each
-        over its spread.
-    floor : dict of str to float
-        Root mean square of what a right model leaves, by channel, in its unit.
+        Orthonormal directions of the nuisances, among errors over the sensors' noise.
+    shrinkage : ndarray, shape (k,)
+        Share by which whitening reduces the errors along each direction.
+    nuisance_mean : ndarray, shape (nuisances, rows)
+        Maps errors over the sensors' noise to the posterior mean of each scalar nuisance over its prior standard
+        deviation.
+    noise_floor : dict of str to float
+        Root mean square error of a correct model by channel, in its unit: sensor noise and repeatability.
     """
 
     observations: Observations
     directions: NDArray
-    shrink: NDArray
-    likeliest: NDArray
-    floor: Mapping[str, float]
+    shrinkage: NDArray
+    nuisance_mean: NDArray
+    noise_floor: Mapping[str, float]
 
-    def whitened(self, errors: NDArray) -> NDArray:
+    @property
+    def name(self) -> str:
+        """Batch and recording."""
+        return self.observations.name
+
+    @property
+    def id(self) -> str:
+        """The recording's name within its batch."""
+        return self.observations.id
+
+    @property
+    def measured(self) -> NDArray:
+        """Values of the observations, shape (channels, samples)."""
+        return self.observations.measured
+
+    def whiten(self, errors: NDArray) -> NDArray:
         """Errors over the sensors' noise, whitened; shape (rows,)."""
-        return errors - self.directions @ (self.shrink * (self.directions.T @ errors))
+        return errors - self.directions @ (self.shrinkage * (self.directions.T @ errors))
 
-    def counted(self, errors: NDArray) -> NDArray:
-        """The same, and below it the likeliest differences, each weighed as a look; shape (rows + numbers,)."""
-        rows_a_look = self.observations.measured.shape[1] / LOOKS
-        return np.concatenate([self.whitened(errors), np.sqrt(rows_a_look) * (self.likeliest @ errors)])
+    def with_nuisances(self, errors: NDArray) -> NDArray:
+        """Whitened errors, followed by the nuisances' posterior means; shape (rows + nuisances,)."""
+        rows_per_sample = self.measured.shape[1] / IN_DIAGNOSIS
+        return np.concatenate([self.whiten(errors), np.sqrt(rows_per_sample) * (self.nuisance_mean @ errors)])
 
-    def acting(self, parameters: Parameters) -> "Whitened":
-        """The same recording beside another model."""
-        return replace(self, observations=replace(self.observations, parameters=parameters))
+    def errors(self, values: Mapping[str, float]) -> NDArray:
+        """Whitened errors of the model with some parameters replaced, and nuisances; shape (rows + nuisances,)."""
+        return self.with_nuisances(self.observations.errors(values).ravel())
+
+    def with_parameters(self, parameters: Parameters) -> "Whitened":
+        """The same for a model with other parameters, under the same covariance."""
+        return replace(self, observations=self.observations.with_parameters(parameters))
 
 
-def weigh(observations: Observations, parameters: Parameters) -> Whitened:
-    """Work out what may differ from run to run, about a model that is fitted already."""
-    e = replace(observations, parameters=parameters)
-    N, numbers = run_differences(e)
-    friction = N[:, 0].reshape(e.sigma.shape) * e.sigma
-    floor = np.sqrt((e.sigma**2).mean(axis=1) + (friction**2).mean(axis=1))
+def whiten(observations: Observations, model: Parameters) -> Whitened:
+    """Observations with the covariance of their errors, linearised about a fitted model."""
+    o = observations.with_parameters(model)
+    N, scalars = nuisances(o)
+    friction = N[:, 0].reshape(o.sigma.shape) * o.sigma
+    floor = np.sqrt((o.sigma**2).mean(axis=1) + (friction**2).mean(axis=1))
     U, s, Vt = np.linalg.svd(N, full_matrices=False)
-    likeliest = (Vt.T[:numbers] * (s / (1 + s**2))) @ U.T
-    return Whitened(e, U, shrink_of(s), likeliest, dict(zip(e.channels, floor.tolist(), strict=True)))
+    nuisance_mean = (Vt.T[:scalars] * (s / (1 + s**2))) @ U.T
+    return Whitened(o, U, shrinkage_of(s), nuisance_mean, dict(zip(o.channels, floor.tolist(), strict=True)))
 
 
-def run_differences(e: Observations) -> tuple[NDArray, int]:
-    """What differs from run to run, a standard deviation of each in units of the noise, and how many are numbers.
+def nuisances(o: Observations) -> tuple[NDArray, int]:
+    """Effects of the nuisances on the errors, a prior standard deviation of each, in units of the noise.
 
     Returns
     -------
     ndarray, shape (rows, k)
-        Numbers first, friction before all others; then what is not known of the drive's motion.
+        Scalar nuisances first, friction before all others; then draws of the drive motion's error.
     int
+        Number of scalar nuisances.
     """
-    said = e.modelled({})
-    nuisances = _nuisances(e, e.parameters)
-    differ = [spread * (e.modelled({name: value + step}) - said) / step for name, value, spread, step in nuisances]
-    drawn = e.drive_errors({})
-    columns = [*(d / e.sigma for d in differ), *(d / np.sqrt(len(drawn)) for d in drawn)]
-    return np.stack([c.ravel() for c in columns], axis=1), len(nuisances)
+    simulated, scalars = o.modelled({}), _scalar_nuisances(o)
+    effects = []
+    for name, value, spread in scalars:
+        step = NUISANCE_STEP * size_of(name, value)
+        derivative = jacobian(lambda x, n=name: o.modelled({n: x[0]}), np.array([value]), np.array([step]), simulated)
+        effects.append(spread * derivative[..., 0] / o.sigma)
+    drawn = o.drive_errors({})
+    columns = [*effects, *(d / np.sqrt(len(drawn)) for d in drawn)]
+    return np.stack([c.ravel() for c in columns], axis=1), len(scalars)
 
 
-def shrink_of(s: NDArray) -> NDArray:
-    """By how much whitening shrinks errors along directions that are so many standard deviations of the noise long."""
+def shrinkage_of(s: NDArray) -> NDArray:
+    """Share by which whitening reduces errors along directions of `s` standard deviations of the noise."""
     return 1 - 1 / np.hypot(1, s)
 
 
-def weighed_about(one: Whitened, model: Parameters) -> Whitened:
-    """A recording weighed anew about a model of it, its load where in a gap of that model it most likely rested.
+def relinearised(one: Whitened, model: Parameters) -> Whitened:
+    """Observations with the covariance linearised about another model.
 
-    With mass behind the gap either side makes another ringing of it, and no straight line leads from one to the other.
+    The load's position in a gap of that model is the most likely one of a few: a load with mass rings differently on
+    either side of its gap, and no linearisation leads from one to the other.
     """
 
-    def left(place: float) -> float:
-        errors = one.acting(replace(model, load_gap_position=place)).observations.errors({})
-        return float(np.mean(one.whitened(errors.ravel()) ** 2))
+    def mean_square(position: float) -> float:
+        at = one.observations.with_parameters(replace(model, load_gap_position=position))
+        return float(np.mean(one.whiten(at.errors({}).ravel()) ** 2))
 
-    place = min(WITHIN_GAP, key=left) if settings_of(model.mechanisms).half_gap else model.load_gap_position
-    about = weigh(one.observations, replace(model, load_gap_position=place))
-    return about.acting(replace(one.observations.parameters, load_gap_position=place))
+    has_gap = settings_of(model.mechanisms).half_gap
+    position = min(settings.GAP_POSITIONS, key=mean_square) if has_gap else model.load_gap_position
+    about = whiten(one.observations, replace(model, load_gap_position=position))
+    return about.with_parameters(replace(one.observations.parameters, load_gap_position=position))
 
 
-def _nuisances(e: Observations, parameters: Parameters) -> Sequence[tuple[str, float, float, float]]:
-    """Name, value, spread from run to run and step of each number that differs; friction first."""
-    recording = e.given.recording
+def _scalar_nuisances(o: Observations) -> Sequence[tuple[str, float, float]]:
+    """Name, value and prior standard deviation of each; friction first."""
+    recording, parameters = o.given.recording, o.parameters
     mu = parameters.friction_coefficient
-    found = [("friction_coefficient", mu, FRICTION_SPREAD * mu)]
+    found = [("friction_coefficient", mu, settings.FRICTION_SPREAD * mu)]
     for channel, name in ZERO_OF.items():
-        if channel in e.channels and channel in recording.accuracy:
+        if channel in o.channels and channel in recording.accuracy:
             found.append((name, getattr(parameters, name), recording.accuracy[channel]))
     if settings_of(parameters.mechanisms).half_gap:
-        found.append(("load_gap_position", parameters.load_gap_position, ANYWHERE))
-    if "theta_out_rad" in e.channels and (step := recording.encoder_step_rad.get("theta_out_rad")):
+        found.append(("load_gap_position", parameters.load_gap_position, settings.GAP_SPREAD))
+    if THETA_OUT in o.channels and (step := recording.encoder_step_rad.get(THETA_OUT)):
         found.append(("theta_out_zero_rad", parameters.theta_out_zero_rad, step / np.sqrt(12)))
-    return [(name, value, spread, STEP * size_of(name, value) * 10) for name, value, spread in found]
+    return found

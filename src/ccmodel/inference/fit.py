@@ -1,4 +1,4 @@
-"""Solving a fit, and saying how it went."""
+"""A fit with its uncertainties, as plain data."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
@@ -20,50 +20,51 @@ from ccmodel.inference.intervals import (
     scatter,
     undetermined,
 )
+from ccmodel.inference.least_squares import Solution, solve
 from ccmodel.inference.problem import Problem
-from ccmodel.inference.search import Solution, solve
 
-# Optima of several starts are one if no unknown differs by more than this share of its size.
+# Optima of several starts count as one if no unknown differs by more than this share of its size.
 SAME = 1e-3
+# Half-width of the range from which further starts are drawn, as a share of each unknown's size.
 START_SPREAD = 0.3
 SEED = 1
-# From so many recordings on, drawing sets of them anew says something of how they differ.
+# Fewest recordings for a bootstrap over recordings.
 ENOUGH_RECORDINGS = 6
-# Beyond this ratio of what resampled recordings and the intervals say, the intervals are not to be trusted.
+# Ratio of the bootstrap's standard deviation to the interval's from which a warning is given.
 DISAGREE = 2.0
 
 
 @dataclass(frozen=True)
 class FitResult:
-    """What a fit found, or why there is none.
+    """The result of a fit, or the reason why there is none.
 
     Attributes
     ----------
     succeeded : bool
     message : str
-        Why the search stopped, or what went wrong.
+        Why the search stopped, or the error.
     values : dict
         Shared values by parameter name, SI units; empty where the fit failed.
     intervals : dict
-        The 90 % interval of each shared value: of the population, where recordings differ in it.
+        The 90 % interval of each shared value; of the population mean, if recordings differ in it.
     profiles : dict
-        The same from the profile of those that were asked for.
+        The same from the profile likelihood, for the unknowns that were requested.
     own, own_intervals : dict
         By recording, its own values and their intervals; `friction` among the latter is the recording's own mu.
     scatter : dict
-        By parameter, how far the recordings' own values differ, beside what was expected.
+        By parameter, the scatter of the recordings' own values and the scatter of their prior.
     resampled : dict
-        Standard deviation of each shared value over resampled sets of recordings; empty where there are too few.
+        Bootstrap standard deviation of each shared value over sets of recordings; empty with too few of them.
     at_bound : list of str
-        Unknowns that ended on one of their bounds: the data, or the bounds, are not enough.
+        Unknowns that ended on one of their bounds: the recordings do not determine them, or the bounds are too narrow.
     undetermined : list of Undetermined
-        Unknowns that the recordings do not tell apart, with what they do tell.
+        Combinations of unknowns that the recordings do not determine.
     warnings : list of str
     cost : float or None
         Mean square of the errors over their noise.
     evaluations : int
     recordings : list of str
-        What was fitted.
+        The recordings that were fitted.
     """
 
     succeeded: bool
@@ -83,7 +84,7 @@ class FitResult:
     recordings: list[str] = field(default_factory=list)
 
     def as_dict(self) -> dict:
-        """Plain data for a JSON file: None for what is infinite, which JSON cannot say."""
+        """Plain data for a JSON file, with None for infinite numbers, which JSON does not have."""
         return _finite(asdict(self))
 
 
@@ -96,20 +97,20 @@ def _finite(data):
 
 
 def fit(problem: Problem, starts: int = 1, profiled: Sequence[str] = ()) -> FitResult:
-    """Fit a problem, from several starts, and say how sure the values are.
+    """Fit a problem from several starts and estimate the uncertainty of the values.
 
     Parameters
     ----------
     problem : Problem
     starts : int
-        The configured one, and others drawn about it within 30 % of each unknown's size, from a fixed seed.
+        Number of starts: the configured one, and others drawn within 30 % of each unknown's size, from a fixed seed.
     profiled : sequence of str
-        Shared unknowns whose intervals are taken from their profile, too.
+        Shared unknowns whose intervals are also taken from their profile likelihood.
 
     Returns
     -------
     FitResult
-        A failed fit is a result that says so, not an exception.
+        A failed fit is a result with its reason, not an exception.
     """
     names = [e.name for e in problem.observations]
     if not names:
@@ -141,21 +142,21 @@ def _starts(problem: Problem, count: int) -> Sequence[NDArray]:
 
 
 def _warnings(problem: Problem, best: Solution, solutions: list[Solution], failures: list[str]) -> list[str]:
-    said = [f"one of the starts failed: {text}" for text in failures]
+    found = [f"one of the starts failed: {text}" for text in failures]
     shared = slice(0, len(problem.shared))
     apart = [s for s in solutions if (np.abs(s.x - best.x)[shared] > SAME * problem.sizes[shared]).any()]
     if apart:
-        said.append(f"{len(apart)} of {len(solutions)} starts ended elsewhere, at a higher or equal error")
-    return said
+        found.append(f"{len(apart)} of {len(solutions)} starts ended elsewhere, at a higher or equal error")
+    return found
 
 
 def _result(problem: Problem, found: Solution, warnings: list[str], profiled: Sequence[str]) -> FitResult:
     spread = covariance(problem, found)
     variance = np.diag(spread)
-    lost = undetermined(problem, found)
-    nowhere = {name: Interval(-inf, inf, inf) for group in lost for name in group.parameters}
-    known = intervals(problem, found, variance) | nowhere
-    profiles, lost_on_the_way = _profiles(problem, found, [n for n in profiled if isfinite(known[n].sd)], variance)
+    groups = undetermined(problem, found)
+    unbounded = {name: Interval(-inf, inf, inf) for group in groups for name in group.parameters}
+    known = intervals(problem, found, variance) | unbounded
+    profiles, without_profile = _profiles(problem, found, [n for n in profiled if isfinite(known[n].sd)], variance)
     scattered = scatter(problem, found)
     resampled = bootstrap(problem, found) if len(problem.observations) >= ENOUGH_RECORDINGS else {}
     return FitResult(
@@ -169,8 +170,8 @@ def _result(problem: Problem, found: Solution, warnings: list[str], profiled: Se
         scatter=scattered,
         resampled=resampled,
         at_bound=[n for n, active in zip(problem.names, found.active, strict=True) if active],
-        undetermined=lost,
-        warnings=[*warnings, *lost_on_the_way, *_unlikely(scattered), *_disagreeing(known, resampled)],
+        undetermined=groups,
+        warnings=[*warnings, *without_profile, *_unlikely(scattered), *_disagreeing(known, resampled)],
         cost=problem.mean_square(found.x),
         evaluations=found.evaluations,
         recordings=[e.name for e in problem.observations],
@@ -185,14 +186,14 @@ def _own(problem: Problem, x: NDArray) -> dict[str, dict[str, float]]:
 def _profiles(
     problem: Problem, found: Solution, names: Sequence[str], variance: NDArray
 ) -> tuple[dict[str, Interval], list[str]]:
-    """Intervals from profiles, and a line on each that the model could not be run along."""
-    profiles, said = {}, []
+    """Intervals from profiles, and a line for each profile along which the model could not be run."""
+    profiles, failures = {}, []
     for name in names:
         try:
             profiles[name] = profile(problem, found, name, variance)
         except (ModelError, ValueError) as error:
-            said.append(f"no profile of {name}: {error}")
-    return profiles, said
+            failures.append(f"no profile of {name}: {error}")
+    return profiles, failures
 
 
 def _unlikely(scattered: dict[str, Scatter]) -> list[str]:

@@ -1,10 +1,10 @@
-"""How sure fitted values are: intervals, what is not determined, and two checks that ask no linear theory.
+"""Uncertainty of fitted values: intervals, undetermined combinations, and two checks without linear theory.
 
-An unknown that belongs to each recording (its friction, its zeros) is fitted with an expectation of how far it lies
-from the population's; that scatter from recording to recording governs the intervals, since thirty thousand samples
-of one run are not thirty thousand experiments. What the drive's unknown part and the rounding of counted angles add
-is worked out from likely errors of both, run through the model; what the sensors' noise and all else add, from the
-residuals as they are, correlated in time, less what those errors leave in them.
+Own unknowns of a recording (its friction, its zeros) have a prior about the population's value. Their scatter from
+recording to recording governs the intervals: thirty thousand samples of one run are not thirty thousand experiments.
+Three sources of error add up. The uncertain drive motion and the rounding of counted angles are drawn and run through
+the model. Sensor noise and everything else is estimated from the residuals, with their autocorrelation, minus the
+contribution of the drawn errors to these residuals.
 """
 
 from collections import defaultdict
@@ -14,32 +14,33 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
+from scipy.optimize import root_scalar
 from scipy.stats import chi2, norm, t
 
+from ccmodel.inference.least_squares import Solution, information_and_gradient, solve
 from ccmodel.inference.problem import Block, Problem
-from ccmodel.inference.search import Solution, information_and_slope, solve
 from ccmodel.repeats import condition_of, pooled_scatter
 
 COVERAGE = 0.90
 REACH = float(norm.ppf(0.5 + COVERAGE / 2))  # Standard deviations from the middle to the end of an interval.
-# Residuals further apart in time than this share of a recording are taken to know nothing of each other.
+# Residuals further apart in time than this share of a recording count as uncorrelated.
 CORRELATED_SHARE = 0.05
-# What a fit leaves has lost what the unknowns took up, and its covariance is itself an estimate: by how much intervals
-# must be wider at this share (Kiefer and Vogelsang, Econometric Theory 21, 2005, table 1: Bartlett's window, 95 %).
+# Residuals of a fit are smaller than errors, and their autocovariance is itself an estimate: the factor by which
+# intervals must be wider (Kiefer and Vogelsang, Econometric Theory 21, 2005, table 1: Bartlett's window, 95 %).
 WIDER = 1 + (2.1859 * CORRELATED_SHARE + 0.3142 * CORRELATED_SHARE**2 - 0.3427 * CORRELATED_SHARE**3) / 1.6449
-# Scatter from recording to recording that is less likely than this, were it what is expected, widens the intervals.
+# Intervals are widened if scatter from recording to recording has a smaller probability than this under its prior.
 UNLIKELY_SCATTER = 0.01
-# Directions known worse than this, relative to what each unknown would be known by alone, are rounding.
+# Eigenvalues of the scaled information below this are rounding.
 ROUNDING = 1e-12
-# Part that an unknown must have in a direction that is not known to be named with it.
+# Component of an unknown in an undetermined direction from which it is named with it.
 INVOLVED = 0.1
-PROFILE_STEPS = 8
-PROFILE_TOLERANCE = 0.01  # In standard deviations.
+# A profile is followed so many standard deviations of linear theory, and its end is found to so many of them.
+PROFILE_REACH, PROFILE_TOLERANCE = 5.0, 1e-3
 
 
 @dataclass(frozen=True)
 class Interval:
-    """A 90 % interval and the standard deviation behind it, in the unknown's unit; infinite where nothing is known."""
+    """A 90 % interval and the standard deviation behind it, in the unknown's unit; infinite without information."""
 
     low: float
     high: float
@@ -53,13 +54,13 @@ class Interval:
 
 @dataclass(frozen=True)
 class Undetermined:
-    """Shared unknowns that the recordings do not tell apart.
+    """Shared unknowns of which the recordings determine a combination only.
 
     Attributes
     ----------
     parameters : list of str
     text : str
-        For people: which, and what is known in their stead.
+        For people: the unknowns, and the combination that is known.
     """
 
     parameters: list[str]
@@ -68,17 +69,17 @@ class Undetermined:
 
 @dataclass(frozen=True)
 class Scatter:
-    """How far an unknown differs from recording to recording: as expected, and as found.
+    """Scatter of an unknown from recording to recording: of its prior, and as found.
 
     Attributes
     ----------
     expected, found : float
         Standard deviations; `found` is about the expected value.
     likelihood : float
-        Of a scatter this large, were the expected one true.
+        p-value of the scatter found under the prior.
     of_repeats : float or None
-        Standard deviation among repeats of a condition alone, pooled over the conditions; None without repeats. What
-        differs between conditions, which a model may get wrong, is not in it.
+        Standard deviation among repeats of a condition, pooled over conditions; None without repeats. It does not
+        contain differences between conditions, which may be errors of the model.
     freedom : int
         Degrees of freedom behind `of_repeats`.
     """
@@ -91,31 +92,32 @@ class Scatter:
 
     @property
     def widens(self) -> bool:
-        """Whether chance does not explain it."""
+        """Whether the scatter is significantly larger than its prior."""
         return self.likelihood < UNLIKELY_SCATTER
 
 
 def covariance(problem: Problem, solution: Solution) -> NDArray:
-    """Covariance of all unknowns about the truth, shape (unknowns, unknowns); infinite where nothing is known.
+    """Covariance of all unknowns about the truth, shape (unknowns, unknowns); infinite without information.
 
-    Inverse information, on either side of which stands the noise: what is expected to differ from recording to
-    recording, what the drive's unknown part and rounding make, and what else the residuals show, correlated in time.
+    The sandwich estimator: inverse information on either side of the covariance of the score. The latter contains the
+    priors' scatter, the uncertain drive motion, rounding, and the autocorrelated rest of the residuals.
     """
-    information, _ = information_and_slope(problem, solution.x, solution.blocks)
+    information, _ = information_and_gradient(problem, solution.x, solution.blocks)
     alone, values, vectors = _directions(information)
     known = values > ROUNDING
     inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(alone, alone)
-    noise = np.diag((problem.expected * scatter_scale(problem, solution)) ** 2)
+    noise = np.diag((problem.prior_precision * scatter_scale(problem, solution)) ** 2)
     drives, rounded = problem.drive_errors(solution.x), problem.rounding_errors(solution.x)
-    # A variance from a few draws is itself uncertain: Student's reach over that of the normal distribution.
+    # A variance from few draws is itself uncertain: Student's quantile over that of the normal distribution.
     few = (t.ppf(0.5 + COVERAGE / 2, max(sum(map(len, drives)), 1)) / REACH) ** 2
     for block, drive, rounding in zip(solution.blocks, drives, rounded, strict=True):
         at = np.ix_(block.columns, block.columns)
-        left = [left_by_fit(block, inverse[at], errors) for errors in (drive, rounding)]
-        noise[at] += few * _noise_of_likely(block, drive) + _noise_of_likely(block, rounding) + noise_of(block, left)
+        in_residuals = [residual_part(block, inverse[at], errors) for errors in (drive, rounding)]
+        noise[at] += few * _score_covariance(block, drive) + _score_covariance(block, rounding)
+        noise[at] += noise_of(block, in_residuals)
     found = inverse @ noise @ inverse
-    lost = (np.abs(vectors[:, ~known]) > INVOLVED).any(axis=1)
-    found[lost, lost] = np.inf
+    unknown = (np.abs(vectors[:, ~known]) > INVOLVED).any(axis=1)
+    found[unknown, unknown] = np.inf
     return found
 
 
@@ -143,13 +145,13 @@ def own_intervals(problem: Problem, solution: Solution, spread: NDArray) -> dict
 
 
 def noise_of(block: Block, accounted: Sequence[NDArray] = ()) -> NDArray:
-    """Covariance of a recording's score by the noise in it, as its residuals show it; shape (k, k).
+    """Covariance of a recording's score due to the noise that its residuals show; shape (k, k).
 
     Parameters
     ----------
     block : Block
     accounted : sequence of ndarray, each of shape (draws, channels, samples)
-        Likely errors of sources whose noise stands elsewhere, as the fit leaves them: none of it counts here.
+        Draws of the residuals of error sources that are counted elsewhere; their autocovariance is subtracted.
     """
     noise = np.zeros((block.columns.size, block.columns.size))
     for channel, (sensitivity, residual) in enumerate(zip(block.derivatives, block.errors, strict=True)):
@@ -157,22 +159,22 @@ def noise_of(block: Block, accounted: Sequence[NDArray] = ()) -> NDArray:
     return WIDER**2 * noise
 
 
-def left_by_fit(block: Block, inverse: NDArray, errors: NDArray) -> NDArray:
-    """What the fit leaves of likely errors of a recording, shape (draws, channels, samples).
+def residual_part(block: Block, inverse: NDArray, errors: NDArray) -> NDArray:
+    """Part of a recording's errors that remains in its residuals, shape (draws, channels, samples).
 
-    Errors e move the unknowns by -inv(H) J^T e, so that (I - J inv(H) J^T) e stands in the residuals. `inverse` is
-    inv(H) among the block's unknowns, H the information of all recordings. What errors of other recordings leave here,
-    by way of the shared unknowns, is not in it.
+    Errors e move the unknowns by -inv(H) J^T e, so that (I - J inv(H) J^T) e remains in the residuals. `inverse` is
+    inv(H) among the block's unknowns, H the information of all recordings. Errors of other recordings, which act
+    through the shared unknowns, are neglected.
     """
     taken = np.einsum("csk,dcs->dk", block.derivatives, errors) @ inverse
     return errors - np.einsum("csk,dk->dcs", block.derivatives, taken)
 
 
-def _noise_of_likely(block: Block, errors: NDArray) -> NDArray:
-    """Covariance of a recording's score by a source of which likely errors are known; shape (k, k).
+def _score_covariance(block: Block, errors: NDArray) -> NDArray:
+    """Covariance of a recording's score due to a source of which draws of the error are known; shape (k, k).
 
-    The drive's motion and rounding err slowly, where an angle turns or rests all that while. Much of that the fit takes
-    for something else, and what is left does not show it: only the errors before the fit say what they do to it.
+    Errors of the drive's motion and of rounding last as long as an angle reverses or rests. The fit absorbs much of
+    them, so that residuals do not show them: the covariance is taken from the errors before the fit.
     """
     scores = np.einsum("csk,dcs->dk", block.derivatives, errors)
     return scores.T @ scores / max(len(errors), 1)
@@ -181,28 +183,28 @@ def _noise_of_likely(block: Block, errors: NDArray) -> NDArray:
 def _correlated(sensitivity: NDArray, residual: NDArray, accounted: Sequence[NDArray]) -> NDArray:
     """Sum over pairs of samples of sensitivity x covariance of the residuals x sensitivity.
 
-    The residual is the sum of what the fit leaves of each source of noise. These know nothing of each other, so their
-    autocovariances add, and that of the sources `accounted` for comes off. The difference of two estimates may have
-    frequencies of negative power, which no noise has: there is nothing of it.
+    Sources of noise are independent, so their autocovariances in the residual add, and those of the sources
+    `accounted` for are subtracted. The difference of two estimates may have negative power at some frequencies, which
+    is set to zero.
     """
     n = residual.size
     lags = max(1, int(CORRELATED_SHARE * n))
     own = _autocovariance(residual[None], lags) - sum(_autocovariance(errors, lags) for errors in accounted)
     taper = own * (1 - np.arange(lags + 1) / (lags + 1))
-    # Twice as long as the recording, so that its end does not follow on its beginning.
+    # Padded to twice the recording's length against circular convolution.
     size = next_fast_len(2 * n, real=True)
     around = np.zeros(size)
     around[: lags + 1] = taper
     around[-lags:] = taper[:0:-1]
     power = np.maximum(np.fft.rfft(around).real, 0.0)
-    # All frequencies but the first (and the last, if they are even) stand for two.
+    # One-sided spectrum: all frequencies but the first (and the last of an even number) count twice.
     power[1 : (size + 1) // 2] *= 2
     waves = np.fft.rfft(sensitivity, size, axis=0)
     return (waves.conj().T @ (power[:, None] * waves)).real / size
 
 
 def _autocovariance(errors: NDArray, lags: int) -> NDArray:
-    """Mean over draws of the product of samples 0 to `lags` apart, of errors of shape (draws, n); 0 of no draws."""
+    """Autocovariance at lags 0 to `lags`, averaged over draws; errors of shape (draws, n), zero without draws."""
     draws, n = errors.shape
     size = next_fast_len(n + lags, real=True)
     power = (np.abs(np.fft.rfft(errors, size)) ** 2).sum(axis=0)
@@ -210,13 +212,13 @@ def _autocovariance(errors: NDArray, lags: int) -> NDArray:
 
 
 def scatter(problem: Problem, solution: Solution) -> dict[str, Scatter]:
-    """How the recordings' own values scatter, for those of which something is expected; by parameter."""
+    """Scatter of the recordings' own values that have a prior; by parameter."""
     n, found = len(problem.observations), {}
     for place, (name, free) in enumerate(problem.own.items()):
         if free.spread is None:
             continue
         at = len(problem.shared) + place + len(problem.own) * np.arange(n)
-        square = float((problem.unexpected(solution.x)[at] ** 2).sum())
+        square = float((problem.prior_errors(solution.x)[at] ** 2).sum())
         alike = defaultdict(list)
         for e, value in zip(problem.observations, solution.x[at].tolist(), strict=True):
             alike[condition_of(e.given.recording)].append(value)
@@ -227,30 +229,29 @@ def scatter(problem: Problem, solution: Solution) -> dict[str, Scatter]:
 
 
 def scatter_scale(problem: Problem, solution: Solution) -> NDArray:
-    """How many times the expected scatter each unknown scatters; 1 unless chance does not explain it."""
+    """Ratio of found to prior scatter of each unknown; 1 unless it is significantly larger."""
     scale = np.ones(len(problem.names))
-    for name, said in scatter(problem, solution).items():
-        if said.widens:
+    for name, one in scatter(problem, solution).items():
+        if one.widens:
             place = len(problem.shared) + list(problem.own).index(name)
-            scale[place :: len(problem.own)] = said.found / said.expected
+            scale[place :: len(problem.own)] = one.found / one.expected
     return scale
 
 
 def undetermined(problem: Problem, solution: Solution) -> list[Undetermined]:
-    """Shared unknowns that the recordings do not tell apart.
+    """Shared unknowns that the recordings do not determine.
 
-    An unknown is not determined if its interval is wider than what its bounds leave anyway, or than itself where it
-    has none.
+    An unknown is undetermined if its interval is wider than its bounds, or, without bounds, than twice its size.
     """
     names, n = list(problem.shared), len(problem.shared)
-    information = sum((i for i, _ in shared_parts(problem, solution)), np.diag(problem.expected[:n] ** 2))
+    information = sum((i for i, _ in shared_parts(problem, solution)), np.diag(problem.prior_precision[:n] ** 2))
     alone, values, vectors = _directions(information)
     low, high = (b[:n] for b in problem.bounds)
     extent = np.where(np.isfinite(high - low), high - low, 2 * problem.sizes[:n])
     sd = np.abs(vectors) / alone[:, None] / np.sqrt(np.maximum(values, np.finfo(float).tiny))
-    lost = (2 * REACH * sd > extent[:, None]).any(axis=0)
+    undetermined_directions = (2 * REACH * sd > extent[:, None]).any(axis=0)
     found = []
-    for k in np.flatnonzero(lost):
+    for k in np.flatnonzero(undetermined_directions):
         involved = np.flatnonzero(np.abs(vectors[:, k]) > INVOLVED)
         text = _known_instead(
             [names[j] for j in involved], vectors[involved, k] / alone[involved], solution.x[involved]
@@ -260,7 +261,7 @@ def undetermined(problem: Problem, solution: Solution) -> list[Undetermined]:
 
 
 def _known_instead(names: list[str], direction: NDArray, values: NDArray) -> str:
-    """A sentence on unknowns that can change together along `direction` without being noticed."""
+    """A sentence on unknowns that can change together along `direction` without a change of the cost."""
     if len(names) == 1:
         return f"{names[0]} is not determined by these recordings"
     together = f"{', '.join(names[:-1])} and {names[-1]} are not determined apart"
@@ -273,38 +274,38 @@ def _known_instead(names: list[str], direction: NDArray, values: NDArray) -> str
 
 
 def _directions(information: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Information with each unknown measured by what it alone would be known by: that, eigenvalues, eigenvectors."""
+    """Square root of the information's diagonal, and eigenvalues and eigenvectors of the information scaled by it."""
     alone = np.sqrt(np.diag(information))
-    # What no recording depends on at all is a direction of its own, without information.
+    # An unknown on which no recording depends is a direction of its own, with an eigenvalue of zero.
     alone = np.where(alone > 0, alone, 1.0)
     values, vectors = np.linalg.eigh(information / np.outer(alone, alone))
     return alone, values, vectors
 
 
 def shared_parts(problem: Problem, solution: Solution) -> list[tuple[NDArray, NDArray]]:
-    """Every recording's say on the shared unknowns, its own taken out: information and score."""
+    """Information and score of each recording about the shared unknowns, its own unknowns eliminated."""
     n, found = len(problem.shared), []
     for block in solution.blocks:
         own = block.columns[n:]
         H, g = block.information, block.score
-        H[n:, n:] += np.diag(problem.expected[own] ** 2)
-        g[n:] += (problem.unexpected(solution.x) * problem.expected)[own]
+        H[n:, n:] += np.diag(problem.prior_precision[own] ** 2)
+        g[n:] += (problem.prior_errors(solution.x) * problem.prior_precision)[own]
         out = H[:n, n:] @ np.linalg.pinv(H[n:, n:], rcond=1e-14, hermitian=True)
         found.append((H[:n, :n] - out @ H[n:, :n], g[:n] - out @ g[n:]))
     return found
 
 
 def bootstrap(problem: Problem, solution: Solution, draws: int = 500, seed: int = 1) -> dict[str, float]:
-    """Standard deviation of each shared unknown over resampled sets of recordings.
+    """Standard deviation of each shared unknown over bootstrap samples of the recordings.
 
-    One step of Newton's method from the optimum stands for each refit. A check of `intervals`: it knows of no
-    expected scatter, only of what the recordings did, and wants half a dozen of them.
+    One Newton step from the optimum stands for each refit. A check of `intervals` that uses no prior scatter; it needs
+    at least half a dozen recordings.
     """
-    said = shared_parts(problem, solution)
+    parts = shared_parts(problem, solution)
     random = np.random.default_rng(seed)
     steps = []
     for _ in range(draws):
-        drawn = [said[i] for i in random.integers(len(said), size=len(said))]
+        drawn = [parts[i] for i in random.integers(len(parts), size=len(parts))]
         information, score = (sum(each) for each in zip(*drawn, strict=True))
         alone, values, vectors = _directions(information)
         known = values > ROUNDING
@@ -313,10 +314,10 @@ def bootstrap(problem: Problem, solution: Solution, draws: int = 500, seed: int 
 
 
 def profile(problem: Problem, solution: Solution, name: str, variance: NDArray) -> Interval:
-    """The interval of a shared unknown from its profile: all others are fitted anew for each of its values.
+    """The interval of a shared unknown from its profile likelihood: all others are refitted at each of its values.
 
-    The cost may rise as far as it does along one standard deviation of the linear theory (which knows of correlated
-    residuals, as the cost does not), times the interval's reach squared. What it adds is how the cost bends on the way.
+    The cost itself neglects the autocorrelation of residuals. Its rise is therefore measured in units of the rise that
+    linear theory predicts for one standard deviation from `covariance`: the profile adds the cost's curvature.
 
     Parameters
     ----------
@@ -328,7 +329,7 @@ def profile(problem: Problem, solution: Solution, name: str, variance: NDArray) 
     """
     k = problem.names.index(name)
     sd = float(np.sqrt(variance[k]))
-    information, _ = information_and_slope(problem, solution.x, solution.blocks)
+    information, _ = information_and_gradient(problem, solution.x, solution.blocks)
     plain = float(np.linalg.pinv(information, rcond=1e-14, hermitian=True)[k, k])
     unit = sd**2 / plain
     low, high = (_profile_end(problem, solution, k, side * sd, unit) for side in (-1, 1))
@@ -336,17 +337,19 @@ def profile(problem: Problem, solution: Solution, name: str, variance: NDArray) 
 
 
 def _profile_end(problem: Problem, solution: Solution, k: int, sd: float, unit: float) -> float:
-    """Where the root of the rise of cost, which is nearly linear, comes to the interval's reach; or the bound."""
-    low, high = (b[k] for b in problem.bounds)
-    reach, x = REACH, solution.x
-    for _ in range(PROFILE_STEPS):
-        value = float(np.clip(solution.x[k] + reach * sd, low, high))
-        start = x.copy()
-        start[k] = value
-        found = solve(problem, start, fixed=[k])
-        x = found.x
-        risen = np.sqrt(max(found.cost - solution.cost, 0.0) / unit)
-        if abs(risen - REACH) < PROFILE_TOLERANCE or (value in (low, high) and risen < REACH):
-            return value
-        reach *= REACH / max(risen, 0.2 * REACH)
-    return value
+    """Value at which the root of the cost's rise reaches the interval's; the bound, if it is lower there.
+
+    `sd` has the sign of the side.
+    """
+    bound = problem.bounds[int(sd > 0)][k]
+    most = min(PROFILE_REACH, (bound - solution.x[k]) / sd)
+
+    def excess(reach: float) -> float:
+        start = solution.x.copy()
+        start[k] += reach * sd
+        cost = solve(problem, start, fixed=[k]).cost if reach else solution.cost
+        return float(np.sqrt(max(cost - solution.cost, 0.0) / unit)) - REACH
+
+    if most <= 0 or excess(most) < 0:
+        return float(solution.x[k] + max(most, 0.0) * sd)
+    return float(solution.x[k] + sd * root_scalar(excess, bracket=(0.0, most), xtol=PROFILE_TOLERANCE).root)

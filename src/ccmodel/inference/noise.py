@@ -1,4 +1,4 @@
-"""What a right model would leave of a recording: the sensors' noise, the encoders' steps, the drive's unknown part."""
+"""Noise of a recording under the correct model: sensor noise, encoder steps, and the uncertain drive motion."""
 
 from dataclasses import replace
 
@@ -9,22 +9,22 @@ from scipy.ndimage import uniform_filter1d
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 
-# A rest of fewer samples than this does not show a sensor's noise; what the rig states then stands for it.
+# Fewest samples of a rest from which a sensor's noise is estimated; with fewer the stated accuracy is taken.
 FEWEST_AT_REST = 20
-# No sensor is trusted to be better than a tenth of its stated accuracy, however still its rest looks.
+# Least noise of a sensor, as a share of its stated accuracy, however small its scatter at rest.
 BEST_SHARE = 0.1
-# Time over which the scatter of a few likely drive motions is averaged.
+# Time over which the variance of a few draws of the drive motion is averaged.
 ALIKE_S = 0.05
-# Where in its count a load may be that a motion starts from: evenly over the count, which nothing tells beforehand.
+# Sub-count offsets of the load encoder, uniform over a count.
 PHASES = (np.arange(16) + 0.5) / 16 - 0.5
 
 
 def sensor_noise(given: ModelInput) -> dict[str, float]:
     """Standard deviation of each channel's noise, in its unit.
 
-    From the scatter about a straight line through the rest at the recording's start; from the stated accuracy where
-    there is no rest to speak of. A counted angle has the deviation of its step, whatever the rest shows, and a
-    channel without anything to go by a hundredth of its range.
+    The scatter about a straight line through the rest at the recording's start, or the stated accuracy if the rest is
+    too short. A counted angle has the standard deviation of its step, a channel without rest and accuracy a hundredth
+    of its range.
     """
     recording, found = given.recording, {}
     for channel, values in recording.channels.items():
@@ -41,27 +41,29 @@ def sensor_noise(given: ModelInput) -> dict[str, float]:
 
 
 def drive_errors(given: ModelInput, parameters: Parameters, offset_is_free: bool = False) -> dict[str, NDArray]:
-    """What is unknown of the drive's motion, as it shows in each channel: a few likely errors, shape (draws, n).
+    """Draws of the error in each channel that the uncertain drive motion causes, shape (draws, n).
 
-    Where in its count the drive first rests is part of it unless it is `placed`: an unknown of the fit.
+    The sub-count offset of the drive encoder is part of that error unless `offset_is_free`, an unknown of the fit.
     """
-    said = simulate(given, parameters)
+    simulated = simulate(given, parameters)
     deviations = given.deviations_given_offset if offset_is_free else given.drive_deviations
     aside = [simulate(replace(given, theta_in=given.theta_in + d), parameters) for d in deviations]
-    return {c: np.array([a[c] - said[c] for a in aside]).reshape(-1, said.time_s.size) for c in said.channels}
+    return {
+        c: np.array([a[c] - simulated[c] for a in aside]).reshape(-1, simulated.time_s.size) for c in simulated.channels
+    }
 
 
 def rounding_errors(angle_rad: NDArray, step_rad: float) -> NDArray:
-    """What an encoder's counts may be wrong by over a motion, wherever in a count it starts; shape (phases, n), rad.
+    """Rounding error of an encoder over a motion, for each sub-count offset of its start; shape (phases, n), rad.
 
-    Where the motion turns or rests, a count's error lasts: it is not the white noise that its deviation suggests.
+    The error lasts as long as the motion reverses or rests: it is not white noise.
     """
     counts = angle_rad / step_rad + PHASES[:, None]
     return (np.round(counts) - counts) * step_rad
 
 
 def size_over_time(errors: NDArray, time_s: NDArray) -> NDArray:
-    """Standard deviation of a few likely errors at each sample, averaged over a while; shape (n,)."""
+    """Standard deviation over a few draws at each sample, smoothed over `ALIKE_S`; shape (n,)."""
     if not errors.size:
         return np.zeros_like(time_s)
     samples = max(1, round(ALIKE_S / float(np.median(np.diff(time_s)))))

@@ -1,29 +1,72 @@
-"""Physics that the paper's model leaves out: one file an effect (`ccmodel.mechanisms.contract`)."""
+"""Physics that the paper's model leaves out: one file an effect (`ccmodel.mechanisms.contract`), found by listing."""
 
+from collections.abc import Iterator
 from difflib import get_close_matches
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
+from typing import Any
 
-from ccmodel.mechanisms.contract import PLACES, Mechanism, Parameter, Sensing, Settings
+from ccmodel.mechanisms.contract import PAPER_LOOK_ALIKES, PLACES, Mechanism, Parameter, Sensing, Settings
 
-__all__ = ["PLACES", "Mechanism", "Parameter", "Sensing", "Settings", "UnknownMechanismError", "get", "names"]
+__all__ = [
+    "PLACES",
+    "Mechanism",
+    "Parameter",
+    "Sensing",
+    "Settings",
+    "UnknownMechanismError",
+    "get",
+    "march_settings",
+    "names",
+    "neutral_settings",
+]
 
 
 class UnknownMechanismError(ValueError):
-    """A name that no mechanism has; the text gives the nearest."""
+    """No mechanism has this name; the text gives the nearest names."""
 
 
 @cache
 def _registry() -> dict[str, Mechanism]:
-    found = {}
+    found: dict[str, Mechanism] = {}
+    for mechanism in _declared():
+        if mechanism.name in found:
+            raise ValueError(f"two mechanisms are called {mechanism.name}")
+        found[mechanism.name] = mechanism
+    for mechanism in found.values():
+        if unknown := set(mechanism.mistaken_for) - {*found, *PAPER_LOOK_ALIKES}:
+            raise ValueError(f"{mechanism.name} is mistaken for what does not exist: {', '.join(sorted(unknown))}")
+    return dict(sorted(found.items()))
+
+
+def _declared() -> Iterator[Mechanism]:
     for module_info in iter_modules(__path__):
         module = import_module(f"{__name__}.{module_info.name}")
-        for mechanism in (*getattr(module, "MECHANISMS", ()), *filter(None, [getattr(module, "MECHANISM", None)])):
-            if mechanism.name in found:
-                raise ValueError(f"two mechanisms are called {mechanism.name}")
-            found[mechanism.name] = mechanism
-    return dict(sorted(found.items()))
+        yield from getattr(module, "MECHANISMS", ())
+        yield from filter(None, [getattr(module, "MECHANISM", None)])
+
+
+@cache
+def _neutral() -> dict[str, Any]:
+    neutral: dict[str, Any] = {}
+    for mechanism in _registry().values():
+        if taken := neutral.keys() & mechanism.settings.keys():
+            raise ValueError(f"{mechanism.name} declares settings of another mechanism: {', '.join(sorted(taken))}")
+        neutral |= mechanism.settings
+    return neutral
+
+
+def neutral_settings() -> Settings:
+    """The solver's settings at their neutral values, which is the paper's model."""
+    return Settings(_neutral())
+
+
+def march_settings() -> tuple[str, ...]:
+    """Names of the settings that the compiled march takes: numbers, and tuples of numbers."""
+    return tuple(
+        name for name, value in _neutral().items() if isinstance(value, float) or (isinstance(value, tuple) and value)
+    )
 
 
 def names() -> tuple[str, ...]:

@@ -1,13 +1,6 @@
-"""Two cables that are not alike.
+"""Two cables that differ in friction or stiffness."""
 
-Equation: cable B has mu times ``ratio`` and EA times ``K_ratio`` of cable A's.
-
-Signature: a residual that is odd in the direction of motion: cable A's stroke fits and B's does not.
-
-Mistaken for the gain of a load cell. Exchange the cables: the residual goes with them.
-"""
-
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+from ccmodel.mechanisms.contract import PAPER, Mechanism, Parameter
 
 
 def _modifies_physics(settings, place, values):
@@ -21,11 +14,16 @@ MECHANISM = Mechanism(
     name="cable-asymmetry",
     places=("cable",),
     parameters=(
-        Parameter("ratio", "1", 0.6, 1.4, 1.1, neutral=1.0, ratio=True),
-        Parameter("K_ratio", "1", 0.6, 1.4, 1.0, neutral=1.0, ratio=True),
+        Parameter("ratio", "1", 0.6, 1.4, 1.1, "friction coefficient, B over A", neutral=1.0, ratio=True),
+        Parameter("K_ratio", "1", 0.6, 1.4, 1.0, "axial rigidity, B over A", neutral=1.0, ratio=True),
     ),
     summary="friction or stiffness differs between the cables",
-    mistaken_for="load-cell-scale",
-    separated_by="exchange of the cables",
+    equation="Cable B has ratio times the friction coefficient mu and K_ratio times the axial rigidity EA of cable A.",
+    signature="The residual is odd in the direction of motion: one cable's stroke fits and the other's does not.",
+    mistaken_for=("load-cell-scale",),
+    separated_by="exchange of the cables: the residual moves with them",
+    source=(f"{PAPER}: (1) to (5), with parameters of each cable's own"),
+    depends_on_time=False,
+    settings={"friction_ratio_B": 1.0, "stiffness_ratio_B": 1.0},
     modifies_physics=_modifies_physics,
 )

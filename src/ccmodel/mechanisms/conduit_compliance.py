@@ -1,15 +1,6 @@
-"""A conduit that gives way to its cable: it is pressed together, and its bends are drawn in.
+"""A conduit that shortens under its cable's tension: it is compressed, and its bends are drawn in."""
 
-Equation: the path of a cable shortens by ``compliance`` times the change of that cable's mean tension, evenly along
-its length.
-
-Signature: the apparent stiffness is low however far the friction front has run in.
-
-Mistaken for a softer cable and for a compliant termination. Partial motion against full slip tells: the cable's own
-softness acts as far as the front has come, a termination's at its end, a conduit's with the mean tension.
-"""
-
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+from ccmodel.mechanisms.contract import PAPER, Mechanism, Parameter
 
 
 def _modifies_physics(settings, place, values):
@@ -19,9 +10,20 @@ def _modifies_physics(settings, place, values):
 MECHANISM = Mechanism(
     name="conduit-compliance",
     places=("conduit",),
-    parameters=(Parameter("compliance", "m/N", 3e-6, 80e-6, 20e-6),),
+    parameters=(Parameter("compliance", "m/N", 3e-6, 80e-6, 20e-6, "shortening of the path per mean tension"),),
     summary="a conduit shortens under its cable's mean tension",
-    mistaken_for="K, termination-compliance",
-    separated_by="partial motion against full slip",
+    equation=(
+        "The path of a cable shortens by compliance times the change of that cable's mean tension, evenly along its "
+        "length."
+    ),
+    signature="The apparent stiffness is low, independent of how far the friction front has advanced.",
+    mistaken_for=("K", "termination-compliance"),
+    separated_by=(
+        "partial motion against full slip: the cable's compliance acts up to the friction front, a termination's at "
+        "its end, a conduit's with the mean tension"
+    ),
+    source=(f"{PAPER}, Section VI: changes in the path of the conduit due to lateral forces"),
+    depends_on_time=False,
+    settings={"conduit_compliance": 0.0},
     modifies_physics=_modifies_physics,
 )

@@ -1,12 +1,4 @@
-"""Constant drag: a liner or a seal that grips the cable whatever its tension.
-
-Equation: friction f0 / L per length besides mu T dphi; f0 is the drag of one whole cable.
-
-Signature: a loss that stays as the tension goes to zero.
-
-Mistaken for friction that depends on tension and for friction in a pulley. The loss against pretension tells: drag is
-its intercept at zero tension.
-"""
+"""Constant drag: a liner or a seal that grips the cable independently of its tension."""
 
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
@@ -18,9 +10,17 @@ def _modifies_physics(settings, place, values):
 MECHANISM = Mechanism(
     name="constant-drag",
     places=("conduit",),
-    parameters=(Parameter("f0", "N", 0.1, 5.0, 0.5),),
+    parameters=(Parameter("f0", "N", 0.1, 5.0, 0.5, "drag of one whole cable"),),
     summary="friction that does not depend on tension",
-    mistaken_for="load-dependent-friction, pulley-friction",
-    separated_by="the loss's intercept at low pretension",
+    equation="Friction per length is mu T dphi/dx + f0 / L.",
+    signature="A loss remains as the tension goes to zero.",
+    mistaken_for=("load-dependent-friction", "pulley-friction"),
+    separated_by="loss against pretension: the drag is the intercept at zero tension",
+    source=(
+        "Gao, Luedtke, Gourdon, Ruths, Israelachvili and Landman, Frictional forces and Amontons' law: from the "
+        "molecular to the macroscopic scale, Journal of Physical Chemistry B 108(11), 3410-3425, 2004"
+    ),
+    depends_on_time=False,
+    settings={"drag_N": 0.0},
     modifies_physics=_modifies_physics,
 )

@@ -1,25 +1,25 @@
-"""What a mechanism is: where it acts, the numbers it has, and how these enter the general solver.
+"""The contract of a mechanism: everything that the project knows of one effect, in that effect's file.
 
-1. One file of this package holds one mechanism as ``MECHANISM`` (or a few close relatives as ``MECHANISMS``); the
-   package finds it by itself.
-2. Its docstring says the equation, what it looks like in a recording, what it is mistaken for and which experiment
-   tells the two apart.
-3. It acts in one of two ways. ``modifies_physics`` writes its values into `Settings` before a run.
-   ``modifies_observation`` changes what the sensors show after a run. Neither touches what its values do not name.
-4. A mechanism that is not in a model leaves the numbers bit for bit as they are. One whose parameters are at their
-   neutral values gives the paper's model, or tends to it as a parameter with an open neutral value (a bristle
-   length of zero, a speed of zero) gets there.
-5. An equation that the march over the samples needs at every step stands in the mechanism's file as a compiled
-   function that the solver imports (`ccmodel.kernel`).
+1. A file of this package holds one mechanism as ``MECHANISM``, or close relatives as ``MECHANISMS``. The registry
+   finds it by listing the folder.
+2. Text fields hold the equation, the signature in a recording, the look-alikes, the experiment that separates them
+   and the source. The command line, ``docs/mechanisms.md`` and the report are made from them.
+3. ``modifies_physics`` writes into the solver's `Settings` before a run; ``settings`` declares what it writes, at the
+   neutral values. ``modifies_observation`` changes what the sensors read after a run. A mechanism has one of the two.
+4. A model without the mechanism and a model with it at its neutral values give the same numbers, bit for bit. Where
+   the equation excludes its neutral value (a bristle length of zero), ``nearly_neutral`` says how close to the paper's
+   model it comes near that value.
+5. An equation that the march needs at every step stands in the mechanism's file as a compiled function
+   (`ccmodel.kernel`), which `ccmodel.model.general.march` imports.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from math import sqrt
-from typing import NamedTuple
+from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
+
+from ccmodel.channels import SUM_AT, TORQUE_AT
 
 PLACES = (
     "drive-pulley",
@@ -32,39 +32,44 @@ PLACES = (
     "drive-sensor",
     "load-sensor",
 )
-
-
-PRESLIDING_RAD = 2e-3  # Over which a bearing's friction builds up where nothing says otherwise.
+PAPER = (
+    "Agrawal, Peine and Yao, Modeling of transmission characteristics across a cable-conduit system, IEEE Transactions "
+    "on Robotics 26(5), 914-924, 2010, doi:10.1109/TRO.2010.2064014"
+)
+# What a mechanism may be mistaken for besides other mechanisms: parameters and states of the paper's model.
+PAPER_LOOK_ALIKES = ("K", "mu", "slack")
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a mechanism.
+    """One parameter of a mechanism.
 
     Attributes
     ----------
     name : str
-        As it stands in diagnoses and model files.
+        Its name in diagnoses and model files.
     unit : str
         SI; "1" for a pure number.
     low, high : float
-        The range in which it is plausible.
+        Plausible range.
     start : float
         Where a fit begins.
+    meaning : str
+        What it measures, in a few words.
     neutral : float
-        The value at which the mechanism is not there.
+        The value at which the mechanism has no effect.
     scale : {"log", "linear"}
-        How a fit should step over the range.
+        How a fit steps over the range.
     signed : bool
-        Whether the range holds for the size of the number and either sign is possible.
+        Whether the range holds for the magnitude and both signs are possible.
     ratio : bool
-        Whether it compares two parts that are neutrally alike: a strength of its own, whichever of them is the larger.
+        Whether it compares two parts that are alike at the neutral value. Each ratio is a strength of its own.
     screening_grid : tuple of float
-        Shares of the range at which a mechanism is tried out before it is fitted, where the usual ones will not do.
+        Shares of the range at which screening evaluates the mechanism; empty for the usual shares.
     continuation : bool
-        Whether the least a mechanism leaves is found only from high values of this one, step by step down.
+        Whether a fit reaches the least cost only by continuation: from a high value of this one, step by step down.
     default : float or None
-        Its value in a model that does not say one; None where one must be said.
+        Value in a model that omits it; None if a model must give it.
     """
 
     name: str
@@ -72,6 +77,7 @@ class Parameter:
     low: float
     high: float
     start: float
+    meaning: str
     neutral: float = 0.0
     scale: str = "log"
     signed: bool = False
@@ -81,100 +87,33 @@ class Parameter:
     default: float | None = None
 
     def at(self, share: float) -> float:
-        """A value within the range, in the measure in which a fit should step over it."""
+        """Value at a share of the range, on the parameter's scale."""
         if self.scale == "log":
             return float(self.low * (self.high / self.low) ** share)
         return float(self.low + share * (self.high - self.low))
 
 
-class Kink(NamedTuple):
-    """A sharp bend: its share of the length, its angle (rad), and what share of its friction holds tension at rest."""
-
-    share: float
-    bend_rad: float
-    hold: float = 1.0
-
-
-@dataclass
 class Settings:
-    """Everything that the general solver can be told beyond the paper's model; as made, it is the paper's model.
+    """What the general solver takes beyond the paper's model: an attribute for each setting that a mechanism declares.
 
-    The fields are the solver's named places. Lengths in m, forces in N, angles in rad, times in s.
-
-    Attributes
+    Parameters
     ----------
-    kinks : list of Kink
-        Conduit.
-    bristle_m : float
-        Conduit: presliding length z0 of Dahl's bristle; 0 is Coulomb friction.
-    stribeck_rise, stribeck_speed, stribeck_fall : float
-        Conduit: share by which friction at rest exceeds that in fast sliding, the speed (m/s) of its fall, and the
-        power of speed that it falls with.
-    viscous : float
-        Conduit: drag per speed and length, N s/m per m.
-    tension_exponent : float
-        Conduit: n of mu (T / T_ref)^n.
-    drag_N : float
-        Conduit: friction of a whole cable that does not depend on tension.
-    friction_course : callable or None
-        Conduit: factor of mu at given times (s) and ways that the drive has wound (m), all of shape (samples,).
-    friction_ratio_B, stiffness_ratio_B : float
-        Cable: mu and EA of cable B over those of cable A.
-    relaxing_share, relaxing_time_s : float
-        Cable: standard linear solid.
-    settling_N : float
-        Cable: tension scale below which strands settle.
-    drive_end_compliance, load_end_compliance, conduit_compliance : float
-        Ends and conduit: m/N.
-    drive_friction_Nm, load_friction_Nm : float
-        Pulleys: friction torques.
-    drive_presliding_rad, load_presliding_rad : float
-        Pulleys: angles over which these build up.
-    drive_eccentricity, load_eccentricity : (float, float)
-        Pulleys: e and psi (rad) of R (1 + e sin(theta + psi)).
-    half_gap : float
-        Load pulley: half the dead zone between pulley and load, rad.
-    cubic_stiffness, inertia, ring_damping : float
-        Load: K_3 (N m/rad^3), J (kg m^2) and the damping of J on the load's spring as a share of the critical one, on
-        top of what the load has by itself.
+    neutral : mapping of str to object
+        Settings at their neutral values, which together are the paper's model.
     """
 
-    kinks: list[Kink] = field(default_factory=list)
-    bristle_m: float = 0.0
-    stribeck_rise: float = 0.0
-    stribeck_speed: float = 1e-3
-    stribeck_fall: float = 2.0
-    viscous: float = 0.0
-    tension_exponent: float = 0.0
-    drag_N: float = 0.0
-    friction_course: Callable[[NDArray, NDArray], NDArray] | None = None
-    friction_ratio_B: float = 1.0
-    stiffness_ratio_B: float = 1.0
-    relaxing_share: float = 0.0
-    relaxing_time_s: float = 30.0
-    settling_N: float = 0.0
-    drive_end_compliance: float = 0.0
-    load_end_compliance: float = 0.0
-    conduit_compliance: float = 0.0
-    drive_friction_Nm: float = 0.0
-    load_friction_Nm: float = 0.0
-    drive_presliding_rad: float = PRESLIDING_RAD
-    load_presliding_rad: float = PRESLIDING_RAD
-    drive_eccentricity: tuple[float, float] = (0.0, 0.0)
-    load_eccentricity: tuple[float, float] = (0.0, 0.0)
-    half_gap: float = 0.0
-    cubic_stiffness: float = 0.0
-    inertia: float = 0.0
-    ring_damping: float = 0.0
+    def __init__(self, neutral: Mapping[str, Any]):
+        self.__dict__.update(neutral)
 
-    def damping(self, stiffness: float) -> float:
-        """N m s/rad of a load with a spring of so many N m/rad."""
-        return 2 * self.ring_damping * sqrt(self.inertia * stiffness)
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name not in self.__dict__:
+            raise AttributeError(f"no mechanism declares the setting {name!r}; there are {', '.join(self.__dict__)}")
+        self.__dict__[name] = value
 
 
 @dataclass(frozen=True)
 class Sensing:
-    """What the sensors are about to show, for a mechanism to change.
+    """What the sensors are about to read.
 
     Attributes
     ----------
@@ -191,6 +130,22 @@ class Sensing:
 
 
 @dataclass(frozen=True)
+class NearlyNeutral:
+    """How close the model comes to the paper's near a neutral value that the equation itself excludes.
+
+    Attributes
+    ----------
+    values : mapping of str to float
+        Parameters that differ from their neutral values, and the values near these.
+    error : float
+        Bound on the root mean square difference of any channel from the paper's model, as a share of peak to peak.
+    """
+
+    values: Mapping[str, float]
+    error: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Mechanism:
     """An effect that the paper's model leaves out.
 
@@ -200,28 +155,46 @@ class Mechanism:
     places : tuple of str
         Where it can act, of `PLACES`.
     parameters : tuple of Parameter
+    summary : str
+        One line for tables and pages.
+    equation, signature : str
+        Its law, in the parameters' symbols; what it does to a recording.
+    mistaken_for : tuple of str
+        Look-alikes: other mechanisms, or `PAPER_LOOK_ALIKES`.
+    separated_by : str
+        The experiment that separates them.
+    source : str
+        Author, journal, year, DOI of the equation or of where the effect is named.
+    depends_on_time : bool
+        Whether its effect depends on the rate of the motion, not only on its path.
+    nearly_neutral : NearlyNeutral or None
+        None where the model at the neutral values is the paper's, bit for bit, and depends smoothly on them.
+    model_form_error : float
+        Share of the mechanism's effect on recordings (mean square) that this simple form may miss on a rig.
+    by_name_only : bool
+        Whether a diagnosis considers it only as a forced candidate.
+    settings : mapping of str to object
+        The solver's settings that it writes, at their neutral values. Numbers and tuples of numbers reach the march.
     modifies_physics : callable or None
         ``modifies_physics(settings, place, values)`` writes into `Settings`.
     modifies_observation : callable or None
         ``modifies_observation(sensing, place, values)`` returns the channels that change.
-    summary : str
-        One line for tables and pages.
-    mistaken_for, separated_by : str
-        What looks like it, and the experiment that tells.
-    model_form_error : float
-        Share of what the effect does to recordings (in mean square) that this simple form of it may miss on a rig.
-    by_name_only : bool
-        Whether it is asked for only where somebody suspects it.
     """
 
     name: str
     places: tuple[str, ...]
     parameters: tuple[Parameter, ...]
     summary: str
-    mistaken_for: str
+    equation: str
+    signature: str
+    mistaken_for: tuple[str, ...]
     separated_by: str
+    source: str
+    depends_on_time: bool
+    nearly_neutral: NearlyNeutral | None = None
     model_form_error: float = 0.001
     by_name_only: bool = False
+    settings: Mapping[str, Any] = field(default_factory=dict)
     modifies_physics: Callable[[Settings, str, Mapping[str, float]], None] | None = None
     modifies_observation: Callable[[Sensing, str, Mapping[str, float]], dict[str, NDArray]] | None = None
 
@@ -230,11 +203,11 @@ class Mechanism:
         if unknown or not self.places:
             raise ValueError(f"{self.name}: places are {', '.join(PLACES)}; got {', '.join(self.places) or 'none'}")
         if (self.modifies_physics is None) == (self.modifies_observation is None):
-            raise ValueError(f"{self.name}: a mechanism either enters the solver or changes what sensors read")
+            raise ValueError(f"{self.name}: a mechanism modifies either the physics or the observation")
 
     @property
     def strengths(self) -> tuple[Parameter, ...]:
-        """What says how much of it there is: its ratios, each by itself, or else its first parameter."""
+        """Parameters that measure its size: its ratios, each by itself, or else its first parameter."""
         return tuple(p for p in self.parameters if p.ratio) or self.parameters[:1]
 
     @property
@@ -244,12 +217,12 @@ class Mechanism:
 
     @property
     def neutral(self) -> dict[str, float]:
-        """Parameter values at which it is not there."""
+        """Parameter values at which it has no effect."""
         return {p.name: p.neutral for p in self.parameters}
 
     @property
     def default(self) -> dict[str, float]:
-        """Values of the parameters that a model may leave out."""
+        """Values of the parameters that a model may omit."""
         return {p.name: p.default for p in self.parameters if p.default is not None}
 
     @property
@@ -265,14 +238,9 @@ def side(place: str) -> str:
 
 def sensor_torque(place: str) -> str:
     """Name of the torque channel on the side of a sensor place."""
-    return {"drive": "tau_in_Nm", "load": "tau_out_Nm"}[side(place)]
+    return TORQUE_AT[side(place)]
 
 
 def sensor_sum(place: str) -> str:
     """Name of the load cell's channel on the side of a sensor place."""
-    return {"drive": "F_drive_N", "load": "F_load_N"}[side(place)]
-
-
-def all_finite(values: Mapping[str, float]) -> bool:
-    """Whether every value is a finite number."""
-    return bool(np.isfinite(list(values.values())).all())
+    return SUM_AT[side(place)]

@@ -1,16 +1,16 @@
-"""A kink: a sharp bend that the measured path does not show.
+"""A kink: a sharp bend that the measured path does not show."""
 
-Equation: the bend angle phi(x) jumps by beta at x = s L, in both conduits, since they run side by side. At rest
-tension changes there by hold times what friction makes of as much bend elsewhere: by all of it in conduits that had
-their kink when the cables were tensioned, by nothing in conduits that were bent afterwards. No rest shows which; how
-far the front has to go before it passes does.
+from typing import NamedTuple
 
-Signature: the friction front stalls part-way, and the loss in full slip exceeds mu times the measured bend.
+from ccmodel.mechanisms.contract import PAPER, Mechanism, NearlyNeutral, Parameter
 
-Mistaken for a larger mu, and for a compliant termination. The time at which the front passes tells, and gives s.
-"""
 
-from ccmodel.mechanisms.contract import Kink, Mechanism, Parameter
+class Kink(NamedTuple):
+    """A sharp bend: its place as a share of the length, its angle (rad), and the share of its friction held at rest."""
+
+    share: float
+    bend_rad: float
+    hold: float = 1.0
 
 
 def _modifies_physics(settings, place, values):
@@ -20,19 +20,42 @@ def _modifies_physics(settings, place, values):
         raise ValueError(f"a kink's bend is not negative; got beta = {values['beta']} rad")
     if not 0 <= values["hold"] <= 1:
         raise ValueError(f"what a kink holds at rest is a share between 0 and 1; got hold = {values['hold']}")
-    settings.kinks.append(Kink(values["s"], values["beta"], values["hold"]))
+    settings.kinks += (Kink(values["s"], values["beta"], values["hold"]),)
 
 
 MECHANISM = Mechanism(
     name="kink",
     places=("conduit",),
     parameters=(
-        Parameter("beta", "rad", 0.2, 1.5, 0.6),
-        Parameter("s", "1", 0.05, 0.95, 0.5, neutral=0.5, scale="linear"),
-        Parameter("hold", "1", 0.0, 1.0, 0.5, neutral=1.0, scale="linear", screening_grid=(0.5,), default=1.0),
+        Parameter("beta", "rad", 0.2, 1.5, 0.6, "angle of the bend"),
+        Parameter("s", "1", 0.05, 0.95, 0.5, "place, as a share of the length", neutral=0.5, scale="linear"),
+        Parameter(
+            "hold",
+            "1",
+            0.0,
+            1.0,
+            0.5,
+            "share of its friction that holds tension at rest",
+            neutral=1.0,
+            scale="linear",
+            screening_grid=(0.5,),
+            default=1.0,
+        ),
     ),
     summary="extra bend at one place of the conduits",
-    mistaken_for="mu, termination-compliance",
-    separated_by="the front's timing",
+    equation=(
+        "The bend angle phi(x) jumps by beta at x = s L, in both conduits, which run side by side. At rest the tension "
+        "changes there by hold times the change that friction makes over as much bend elsewhere: hold = 1 for conduits "
+        "that had their kink when the cables were tensioned, hold = 0 for conduits that were bent afterwards. A rest "
+        "does not show hold; the travel of the friction front before it passes does."
+    ),
+    signature="The friction front stalls part-way, and the loss in full slip exceeds mu times the measured bend.",
+    mistaken_for=("mu", "termination-compliance"),
+    separated_by="the time at which the friction front passes, which also gives s",
+    source=(f"{PAPER}, Section VI: kinks introduced inadvertently"),
+    depends_on_time=False,
+    # A kink of no bend still puts a node at its place, which is another grid: not the same bits.
+    nearly_neutral=NearlyNeutral({"beta": 1e-6}, 1e-6),
+    settings={"kinks": ()},
     modifies_physics=_modifies_physics,
 )

@@ -1,19 +1,10 @@
-"""Friction coefficient that falls with the tension, as contact of an elastic liner does.
-
-Equation: mu (T / T_ref)^n with n between 0 and -1/3 and a little beyond (a Hertzian contact has -1/3). T_ref only
-says at which tension mu holds; it is fixed here, so that n can be compared between rigs.
-
-Signature: ln(T1 / T2) in full slip, which Coulomb friction makes a number of the conduit's shape alone, changes with
-the tension.
-
-Mistaken for constant drag, which also weighs more at low tension. Three pretensions tell: drag leaves a loss where
-the tension goes to zero, a power law does not.
-"""
+"""A friction coefficient that falls with tension, as in the contact of an elastic liner."""
 
 from ccmodel.elementary import quick_exp, quick_log
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
+# Tension at which mu holds; fixed, so that n can be compared between rigs.
 REFERENCE_N = 5.0
 # The power law would grow without bound where a cable goes slack; it levels off around this tension.
 FLOOR_N = 0.1
@@ -34,9 +25,21 @@ def _modifies_physics(settings, place, values):
 MECHANISM = Mechanism(
     name="load-dependent-friction",
     places=("conduit",),
-    parameters=(Parameter("n", "1", -0.35, -0.05, -0.15, scale="linear"),),
+    parameters=(Parameter("n", "1", -0.35, -0.05, -0.15, "exponent of the tension", scale="linear"),),
     summary="friction coefficient falls with tension",
-    mistaken_for="constant-drag",
-    separated_by="three pretensions",
+    equation=(
+        "The friction coefficient is mu (T / T_ref)^n with T_ref = 5 N and n between 0 and about -1/3, the exponent of "
+        "a Hertzian contact. Below about 0.1 N the factor levels off."
+    ),
+    signature=(
+        "ln(T1 / T2) in full slip changes with tension, while with Coulomb friction the conduit's shape alone sets it."
+    ),
+    mistaken_for=("constant-drag",),
+    separated_by="three pretensions: a drag leaves a loss at zero tension, a power law does not",
+    source=(
+        "Archard, Elastic deformation and the laws of friction, Proceedings of the Royal Society A 243, 190-205, 1957"
+    ),
+    depends_on_time=False,
+    settings={"tension_exponent": 0.0},
     modifies_physics=_modifies_physics,
 )

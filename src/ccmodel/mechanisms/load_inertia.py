@@ -1,33 +1,40 @@
-"""A load with mass.
+"""A load with mass."""
 
-Equation: J alpha besides the load's spring K_e, and B omega that damps it, B = 2 zeta sqrt(J K_e).
+from math import sqrt
 
-Signature: a torque that grows with the square of the frequency, against the angle; where the cables hold still the
-load rings on them.
+from ccmodel.mechanisms.contract import PAPER, Mechanism, Parameter, Settings
 
-Mistaken for a clock that is late. A sweep of frequencies tells: a delay's error grows with the first power.
-"""
+# A mass that is a few per cent off rings out of phase with the recording. Screening therefore tries this many masses,
+# with high damping, under which a resonance is seen from further off; the fit then lowers the damping by continuation.
+MASSES = tuple(k / 24 for k in range(1, 24))
 
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+
+def load_damping(settings: Settings, stiffness: float) -> float:
+    """Damping of the load (N m s/rad) on a spring of `stiffness` (N m/rad)."""
+    return 2 * settings.damping_ratio * sqrt(settings.inertia * stiffness)
 
 
 def _modifies_physics(settings, place, values):
-    settings.inertia, settings.ring_damping = values["J"], values["zeta"]
+    settings.inertia, settings.damping_ratio = values["J"], values["zeta"]
 
-
-# A ring that is a few per cent out of tune soon rings against what it should account for. So many masses are tried, and
-# with much damping, under which a ring is heard from further off; then with less and less.
-TRIED = tuple(k / 24 for k in range(1, 24))
 
 MECHANISM = Mechanism(
     name="load-inertia",
     places=("load",),
     parameters=(
-        Parameter("J", "kg m^2", 1e-5, 1e-3, 1e-4, screening_grid=TRIED),
-        Parameter("zeta", "1", 1e-3, 0.3, 0.1, screening_grid=(0.85,), continuation=True, default=0.0),
+        Parameter("J", "kg m^2", 1e-5, 1e-3, 1e-4, "moment of inertia", screening_grid=MASSES),
+        Parameter("zeta", "1", 1e-3, 0.3, 0.1, "damping ratio", screening_grid=(0.85,), continuation=True, default=0.0),
     ),
     summary="the load's moment of inertia",
-    mistaken_for="time-skew",
-    separated_by="a sweep of frequencies",
+    equation="tau_out = K_e theta + B dtheta/dt + J d2theta/dt2, with B = 2 zeta sqrt(J K_e).",
+    signature=(
+        "The torque's deviation from the spring's grows with the square of the frequency. While the cables hold still "
+        "the load rings on them."
+    ),
+    mistaken_for=("time-skew",),
+    separated_by="a frequency sweep: the error of a delay grows with the first power",
+    source=(f"{PAPER}, Section VI: load dynamics"),
+    depends_on_time=True,
+    settings={"inertia": 0.0, "damping_ratio": 0.0},
     modifies_physics=_modifies_physics,
 )

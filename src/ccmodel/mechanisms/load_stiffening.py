@@ -1,11 +1,4 @@
-"""A load spring that is not straight.
-
-Equation: tau_out = K_e theta + K_3 theta^3 (on top of what the load itself has).
-
-Signature: tau_out against theta_out is curved.
-
-Mistaken for backlash. The torque near zero tells: flat with backlash, straight with a cubic.
-"""
+"""A load spring that stiffens with its angle."""
 
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
@@ -17,9 +10,17 @@ def _modifies_physics(settings, place, values):
 MECHANISM = Mechanism(
     name="load-stiffening",
     places=("load",),
-    parameters=(Parameter("K3", "N m/rad^3", 1e-3, 1.0, 0.03, signed=True),),
+    parameters=(Parameter("K3", "N m/rad^3", 1e-3, 1.0, 0.03, "cubic stiffness", signed=True),),
     summary="the load's spring stiffens with its angle",
-    mistaken_for="backlash",
-    separated_by="torque near zero angle",
+    equation="tau_out = K_e theta + K3 theta^3, on top of the load's own law.",
+    signature="tau_out against theta_out is curved.",
+    mistaken_for=("backlash",),
+    separated_by="torque near zero angle: flat with backlash, straight with a cubic spring",
+    source=(
+        "Kovacic and Brennan (editors), The Duffing Equation: Nonlinear Oscillators and their Behaviour, Wiley, 2011, "
+        "doi:10.1002/9780470977859"
+    ),
+    depends_on_time=False,
+    settings={"cubic_stiffness": 0.0},
     modifies_physics=_modifies_physics,
 )

@@ -1,26 +1,16 @@
-"""Presliding: before it slides, the cable leans on bristles that give way.
-
-Equation (Dahl): with v the sliding speed, the bristle z follows dz/dt = v (1 - sgn(v) z / z0), and friction is
-mu N z / z0. It depends on the way that was slid, not on the speed, so a step of any size has a closed form as long
-as it keeps its direction.
-
-Signature: corners at every reversal, sharp in the paper's model, are rounded over some z0 of sliding.
-
-Mistaken for termination compliance, which also softens the start of a stroke. Nested reversals of small amplitude
-tell: with bristles the tension creeps from one of them to the next, with a termination the small loops close.
-"""
+"""Presliding: before it slides, the cable deflects the asperities of its contact elastically."""
 
 from ccmodel.elementary import quick_exp
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+from ccmodel.mechanisms.contract import Mechanism, NearlyNeutral, Parameter
 
 
 @kernel(inline="always")
 def dahl(xi, slide, z0):
     """Bristle xi = z / z0 after sliding by `slide` (m) in one direction, and its derivative by `slide` (1/m)."""
     direction = 1.0 if slide >= 0.0 else -1.0
-    left = quick_exp(-abs(slide) / z0)
-    return direction + (xi - direction) * left, (1.0 - direction * xi) * left / z0
+    decay = quick_exp(-abs(slide) / z0)
+    return direction + (xi - direction) * decay, (1.0 - direction * xi) * decay / z0
 
 
 def _modifies_physics(settings, place, values):
@@ -30,12 +20,28 @@ def _modifies_physics(settings, place, values):
 MECHANISM = Mechanism(
     name="presliding",
     places=("conduit",),
-    parameters=(Parameter("z0", "m", 5e-6, 200e-6, 50e-6),),
+    parameters=(Parameter("z0", "m", 5e-6, 200e-6, 50e-6, "presliding length of the bristle"),),
     summary="friction builds up over a bristle length",
-    mistaken_for="termination-compliance",
-    separated_by="nested reversals of small amplitude",
-    # One bristle stands for asperities whose lengths differ many times; elastic-slip elements with lengths from 1 to 12
-    # show what that costs.
+    equation=(
+        "Dahl's law: at a sliding speed v the bristle z follows dz/dt = v (1 - sgn(v) z / z0), and friction is "
+        "mu N z / z0. It depends on the sliding distance and not on the speed, so a step of any size in one direction "
+        "has a closed form."
+    ),
+    signature="Corners at reversals, sharp in the paper's model, are rounded over a few z0 of sliding.",
+    mistaken_for=("termination-compliance",),
+    separated_by=(
+        "nested reversals of small amplitude: with bristles the tension creeps from one to the next, with a "
+        "termination the small loops close"
+    ),
+    source=(
+        "Dahl, Solid friction damping of mechanical vibrations, AIAA Journal 14(12), 1675-1682, 1976, "
+        "doi:10.2514/3.61511"
+    ),
+    depends_on_time=False,
+    nearly_neutral=NearlyNeutral({"z0": 1e-10}, 1e-6),
+    # One bristle stands for asperities of many lengths; elastic-slip elements with lengths from 1 to 12 miss this
+    # share (Iwan, Journal of Applied Mechanics 33(4), 893-900, 1966, doi:10.1115/1.3625199).
     model_form_error=0.08,
+    settings={"bristle_m": 0.0},
     modifies_physics=_modifies_physics,
 )

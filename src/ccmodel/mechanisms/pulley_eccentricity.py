@@ -1,12 +1,4 @@
-"""A pulley that is not round, or not centred.
-
-Equation: the radius at which the cables leave is R (1 + e sin(theta + psi)); the way that they make is the integral
-of this over the angle.
-
-Signature: an error that repeats with the angle, whatever the speed and the tension.
-
-Mistaken for a load that stiffens. The phase of the angle tells: start the stroke elsewhere on the pulley.
-"""
+"""A pulley that is not round, or not centred."""
 
 import numpy as np
 
@@ -16,13 +8,13 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter, side
 
 @kernel
 def winding(theta, e, psi):
-    """Way of the cable over R, the integral of the radius (rad); radius over R; and the derivative of the latter."""
+    """Cable travel over R (rad), the radius over R, and the derivative of the latter by the angle."""
     return theta - e * np.cos(theta + psi), 1.0 + e * np.sin(theta + psi), e * np.cos(theta + psi)
 
 
 @kernel
-def wound(theta, turn, e, psi):
-    """Way over R that a turn from theta makes (rad), without cancellation in a small turn."""
+def winding_change(theta, turn, e, psi):
+    """Cable travel over R (rad) of a rotation `turn` from theta, without cancellation for a small one."""
     return turn + 2.0 * e * np.sin(theta + psi + 0.5 * turn) * np.sin(0.5 * turn)
 
 
@@ -39,12 +31,29 @@ MECHANISM = Mechanism(
     name="pulley-eccentricity",
     places=("drive-pulley", "load-pulley"),
     parameters=(
-        Parameter("e", "1", 0.01, 0.08, 0.03),
-        # Two probes half a turn apart would not do: one that is off by a right angle shows nothing of the strength.
-        Parameter("psi", "rad", -np.pi, np.pi, 0.0, scale="linear", screening_grid=(0.125, 0.375, 0.625, 0.875)),
+        Parameter("e", "1", 0.01, 0.08, 0.03, "eccentricity over the radius"),
+        # Two values of psi half a turn apart would not do: one that is off by a right angle has no gradient in e.
+        Parameter(
+            "psi",
+            "rad",
+            -np.pi,
+            np.pi,
+            0.0,
+            "phase of the eccentricity",
+            scale="linear",
+            screening_grid=(0.125, 0.375, 0.625, 0.875),
+        ),
     ),
     summary="a pulley's radius changes with its angle",
-    mistaken_for="load-stiffening",
-    separated_by="strokes that start at other angles",
+    equation=(
+        "The cables leave at the radius R (1 + e sin(theta + psi)). The cable travel is the integral of this radius "
+        "over the angle."
+    ),
+    signature="The error repeats with the angle, independent of speed and tension.",
+    mistaken_for=("load-stiffening",),
+    separated_by="strokes that start at other angles of the pulley",
+    source="Litvin and Fuentes, Gear Geometry and Applied Theory, 2nd edition, Cambridge University Press, 2004",
+    depends_on_time=False,
+    settings={"drive_eccentricity": (0.0, 0.0), "load_eccentricity": (0.0, 0.0)},
     modifies_physics=_modifies_physics,
 )

@@ -1,25 +1,18 @@
-"""Friction in a pulley's bearing.
-
-Equation: a torque tau_b sgn(omega) against the pulley's motion, built up over a presliding angle with Dahl's law, as in
-`ccmodel.mechanisms.presliding`: some mrad in ball bearings, more where a seal or a wound cable gives way.
-
-Signature: at the drive tau_in is off by a square wave in step with the speed, and all else is right. At the load
-(T2 - T4) R shows a step at each reversal that the torque of the load itself does not show.
-
-Mistaken for a torque sensor's gain and for constant drag. The load tells: a gain's error grows with the torque, a
-bearing's has the sign of the speed and one size.
-"""
+"""Friction in a pulley's bearing."""
 
 import numpy as np
 
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import PRESLIDING_RAD, Mechanism, Parameter, side
+from ccmodel.mechanisms.contract import PAPER, Mechanism, Parameter, side
 from ccmodel.mechanisms.presliding import dahl
+
+# Angle over which a bearing's friction builds up unless a model states it.
+PRESLIDING_RAD = 2e-3
 
 
 @kernel
 def bearing(theta, presliding_rad):
-    """Friction over friction torque (-1 to 1) along a course of angles (rad, shape (n,)) that starts unloaded."""
+    """Friction over friction torque (-1 to 1) along angles (rad, shape (n,)) from an unloaded start."""
     share = np.zeros_like(theta)
     for j in range(1, theta.size):
         share[j] = dahl(share[j - 1], theta[j] - theta[j - 1], presliding_rad)[0]
@@ -37,20 +30,43 @@ MECHANISM = Mechanism(
     name="pulley-friction",
     places=("drive-pulley", "load-pulley"),
     parameters=(
-        Parameter("friction_torque", "N m", 0.5e-3, 50e-3, 5e-3),
+        Parameter("friction_torque", "N m", 0.5e-3, 50e-3, 5e-3, "friction torque of the bearing"),
         Parameter(
             "presliding",
             "rad",
             0.5e-3,
             20e-3,
             PRESLIDING_RAD,
+            "angle over which it builds up",
             neutral=PRESLIDING_RAD,
             screening_grid=(0.4,),
             default=PRESLIDING_RAD,
         ),
     ),
     summary="a friction torque in a pulley's bearing",
-    mistaken_for="torque-scale, constant-drag",
-    separated_by="parity of the error against speed and load",
+    equation=(
+        "A torque friction_torque sgn(omega) opposes the pulley's motion. After a reversal it builds up over the angle "
+        "presliding by Dahl's law: a few mrad in ball bearings, more where a seal or a wound cable yields."
+    ),
+    signature=(
+        "At the drive tau_in is off by a square wave in phase with the speed, and all other channels fit. At the load "
+        "(T2 - T4) R steps at each reversal, and the load's own torque does not."
+    ),
+    mistaken_for=("torque-scale", "constant-drag"),
+    separated_by=(
+        "error against speed and load: a gain's error grows with the torque, a bearing's has the sign of the speed and "
+        "one magnitude"
+    ),
+    source=(
+        f"{PAPER}, Section VI: friction effects at "
+        "the two pulleys; with the law of Dahl, AIAA Journal 14(12), 1675-1682, 1976, doi:10.2514/3.61511"
+    ),
+    depends_on_time=False,
+    settings={
+        "drive_friction_Nm": 0.0,
+        "drive_presliding_rad": PRESLIDING_RAD,
+        "load_friction_Nm": 0.0,
+        "load_presliding_rad": PRESLIDING_RAD,
+    },
     modifies_physics=_modifies_physics,
 )

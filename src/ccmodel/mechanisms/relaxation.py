@@ -1,31 +1,21 @@
-"""Relaxation: a stretched cable (and its conduit) slowly gives up part of its tension.
-
-Equation: standard linear solid. Of the elastic tension T_e a share r q is lost, T = T_e - r q, and q follows T_e
-with the time constant tau, dq/dt = (T_e - q) / tau. The cable is fresh (q = 0) when a run starts, so its initial
-tension decays as well. Between samples T_e is taken as linear in time, and q is then exact.
-
-Signature: tension decays at rest and over cycles, while the angles stay. The paper measured 10.5 % in 30 s on its
-rig and left it out.
-
-Mistaken for a load cell that drifts. Both ends and both cables relax together; a cell drifts alone.
-"""
+"""Relaxation: a stretched cable and its conduit slowly lose part of their tension."""
 
 import numpy as np
 
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+from ccmodel.mechanisms.contract import PAPER, Mechanism, Parameter
 
 
 @kernel
 def lag_weights(step_over_tau):
-    """Weights (q, T_e before, T_e after) that make up q after a step, for T_e linear in the step."""
+    """Weights of q, of T_e before and of T_e after a step in q after it, for T_e linear in the step."""
     y = step_over_tau
-    keep = np.exp(-y)
+    decay = np.exp(-y)
     if y < 1e-4:
         mean = 1.0 - y / 2 + y * y / 6
-        return keep, y / 2 - y * y / 3, y / 2 - y * y / 6
-    mean = (1.0 - keep) / y
-    return keep, mean - keep, 1.0 - mean
+        return decay, y / 2 - y * y / 3, y / 2 - y * y / 6
+    mean = (1.0 - decay) / y
+    return decay, mean - decay, 1.0 - mean
 
 
 def _modifies_physics(settings, place, values):
@@ -40,9 +30,27 @@ def _modifies_physics(settings, place, values):
 MECHANISM = Mechanism(
     name="relaxation",
     places=("cable",),
-    parameters=(Parameter("r", "1", 0.01, 0.2, 0.05), Parameter("tau", "s", 5.0, 100.0, 30.0, neutral=30.0)),
+    parameters=(
+        Parameter("r", "1", 0.01, 0.2, 0.05, "share of the tension that is lost"),
+        Parameter("tau", "s", 5.0, 100.0, 30.0, "time constant", neutral=30.0),
+    ),
     summary="tension decays at rest and over cycles",
-    mistaken_for="load-cell-drift",
-    separated_by="both ends and both cables together, at rest",
+    equation=(
+        "Standard linear solid: the tension is T = T_e - r q with the elastic tension T_e and dq/dt = (T_e - q) / tau. "
+        "The cable is fresh (q = 0) when a run starts, so its initial tension decays as well. Between samples T_e is "
+        "taken as linear in time, for which q is exact."
+    ),
+    signature=(
+        "Tension decays at rest and over cycles while the angles stay. The paper measured 10.5 % with 30 s on its rig "
+        "and neglected it."
+    ),
+    mistaken_for=("load-cell-drift",),
+    separated_by="both ends and both cables at rest: they relax together, a load cell drifts alone",
+    source=(
+        f"{PAPER}, Sections V and VI; with the "
+        "standard linear solid of Lakes, Viscoelastic Materials, Cambridge University Press, 2009"
+    ),
+    depends_on_time=True,
+    settings={"relaxing_share": 0.0, "relaxing_time_s": 30.0},
     modifies_physics=_modifies_physics,
 )

@@ -1,35 +1,26 @@
-"""Strands of the cable that settle: a cable that is softer at low tension.
-
-Equation: with strain u' the tension is T = EA (u' - u_s (1 - exp(-u' / u_s))), u_s = T_scale / EA: without stiffness
-where the cable is slack, its full stiffness a few T_scale above, and the stretch u_s lost on the way.
-
-Signature: soft near slack, stiff elsewhere.
-
-Mistaken for backlash and for slack. A sweep at low pretension tells: settling depends on the tension of the cable
-itself, backlash on the torque of the load.
-"""
+"""Strand settling: a cable whose stiffness falls at low tension, until its strands bed in."""
 
 import numpy as np
 
 from ccmodel.elementary import quick_exp
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+from ccmodel.mechanisms.contract import Mechanism, NearlyNeutral, Parameter
 
 
 @kernel(inline="always")
-def settling_tension(stretch, lost, stiffness):
-    """Tension (N) of a piece at a stretch (m) >= 0, and its stiffness (N/m); `lost` is u_s times its length (m)."""
-    left = quick_exp(-stretch / lost)
-    return stiffness * (stretch - lost * (1.0 - left)), stiffness * (1.0 - left)
+def settling_tension(stretch, settled, stiffness):
+    """Tension (N) of a piece at a stretch (m) >= 0, and its stiffness (N/m); `settled` is u_s times its length (m)."""
+    decay = quick_exp(-stretch / settled)
+    return stiffness * (stretch - settled * (1.0 - decay)), stiffness * (1.0 - decay)
 
 
-def stretch_at(tension, lost, stiffness):
-    """Stretch (m) at which `settling_tension` gives `tension` (N); arrays of one shape."""
-    stretch = tension / stiffness + lost
+def stretch_at(tension, settled, stiffness):
+    """Stretch (m) at which `settling_tension` gives `tension` (N), by Newton's method; arrays of one shape."""
+    stretch = tension / stiffness + settled
     for _ in range(60):
-        left = np.exp(-stretch / lost)
-        slope = np.maximum(stiffness * (1 - left), 1e-9 * stiffness)
-        stretch = np.maximum(stretch - (stiffness * (stretch - lost * (1 - left)) - tension) / slope, 0.0)
+        decay = np.exp(-stretch / settled)
+        slope = np.maximum(stiffness * (1 - decay), 1e-9 * stiffness)
+        stretch = np.maximum(stretch - (stiffness * (stretch - settled * (1 - decay)) - tension) / slope, 0.0)
     return stretch
 
 
@@ -40,9 +31,20 @@ def _modifies_physics(settings, place, values):
 MECHANISM = Mechanism(
     name="strand-settling",
     places=("cable",),
-    parameters=(Parameter("T_scale", "N", 0.5, 10.0, 2.0),),
+    parameters=(Parameter("T_scale", "N", 0.5, 10.0, 2.0, "tension scale of the settling"),),
     summary="cable stiffness falls at low tension",
-    mistaken_for="backlash, slack",
-    separated_by="a sweep at low pretension",
+    equation=(
+        "At strain u' the tension is T = EA (u' - u_s (1 - exp(-u' / u_s))) with u_s = T_scale / EA: the stiffness is "
+        "zero in a slack cable and reaches EA a few T_scale above it."
+    ),
+    signature="The transmission is soft near slack and stiff elsewhere.",
+    mistaken_for=("backlash", "slack"),
+    separated_by=(
+        "a sweep at low pretension: settling depends on the cable's own tension, backlash on the load's torque"
+    ),
+    source="Feyrer, Wire Ropes: Tension, Endurance, Reliability, 2nd edition, Springer, 2015, on the rope modulus",
+    depends_on_time=False,
+    nearly_neutral=NearlyNeutral({"T_scale": 1e-2}, 1e-8),
+    settings={"settling_N": 0.0},
     modifies_physics=_modifies_physics,
 )

@@ -1,15 +1,6 @@
-"""A termination that gives: free cable, crimps and anchors between pulley and conduit.
+"""Compliance of a termination: free cable, crimps and anchors between pulley and conduit."""
 
-Equation: F / k_c of stretch in series at one end of each cable, without friction, by ``compliance`` = 1 / k_c.
-
-Signature: the apparent stiffness lies below the one measured on the cable. The paper measured 13.88 kN/m and fitted
-7.5 to 7.75 kN/m, with 0.4 m of free cable and two terminations in none of its equations.
-
-Mistaken for a softer cable. Two lengths of conduit tell, and small motions: a termination gives before the friction
-front has run in, the cable behind it not yet.
-"""
-
-from ccmodel.mechanisms.contract import Mechanism, Parameter, side
+from ccmodel.mechanisms.contract import PAPER, Mechanism, NearlyNeutral, Parameter, side
 
 
 def _modifies_physics(settings, place, values):
@@ -23,9 +14,20 @@ def _modifies_physics(settings, place, values):
 MECHANISM = Mechanism(
     name="termination-compliance",
     places=("drive-end", "load-end"),
-    parameters=(Parameter("compliance", "m/N", 3e-6, 150e-6, 20e-6),),
+    parameters=(Parameter("compliance", "m/N", 3e-6, 150e-6, 20e-6, "compliance of one end of each cable"),),
     summary="a compliance in series at a cable's end",
-    mistaken_for="K",
-    separated_by="two conduit lengths, partial motion",
+    equation="Each cable stretches by compliance times its tension at one end, in series and without friction.",
+    signature=(
+        "The apparent stiffness lies below the one measured on the cable. The paper measured 13.88 kN/m and fitted 7.5 "
+        "to 7.75 kN/m, with 0.4 m of free cable and two terminations in none of its equations."
+    ),
+    mistaken_for=("K",),
+    separated_by=(
+        "two conduit lengths; partial motion, in which a termination yields before the friction front has advanced"
+    ),
+    source=(f"{PAPER}, Section V: measured and fitted stiffness"),
+    depends_on_time=False,
+    nearly_neutral=NearlyNeutral({"compliance": 1e-12}, 1e-7),
+    settings={"drive_end_compliance": 0.0, "load_end_compliance": 0.0},
     modifies_physics=_modifies_physics,
 )

@@ -1,20 +1,11 @@
-"""Two loggers whose clocks do not agree.
-
-Equation: the channels of one side are stamped late by ``delay``: at time t they show what was at t - delay. A model
-runs in the drive's clock, whose angle it is given; a drive side that is late by a delay is then a load side that is
-early by it.
-
-Signature: loops open or close with frequency, in every pair of channels of which one is on either side.
-
-Mistaken for viscous friction and for inertia of the load. A chirp tells: a delay's error grows with the frequency
-to the first power and is alike in all channels of a side.
-"""
+"""Clocks of the two sides that disagree."""
 
 import numpy as np
 
+from ccmodel.channels import F_LOAD, TAU_OUT, THETA_OUT
 from ccmodel.mechanisms.contract import Mechanism, Parameter, side
 
-_LOAD_CHANNELS = ("theta_out_rad", "tau_out_Nm", "F_load_N")
+_LOAD_CHANNELS = (THETA_OUT, TAU_OUT, F_LOAD)
 
 
 def _modifies_observation(sensing, place, values):
@@ -26,9 +17,21 @@ def _modifies_observation(sensing, place, values):
 MECHANISM = Mechanism(
     name="time-skew",
     places=("drive-sensor", "load-sensor"),
-    parameters=(Parameter("delay", "s", 2e-3, 50e-3, 10e-3),),
+    parameters=(Parameter("delay", "s", 2e-3, 50e-3, 10e-3, "delay of one side's channels"),),
     summary="one side's clock is late",
-    mistaken_for="viscous-friction, load-inertia",
-    separated_by="a chirp",
+    equation=(
+        "The channels of one side read at time t what they would have read at t - delay. The model runs on the drive's "
+        "clock, whose angle is its input, so a late drive side is simulated as an early load side."
+    ),
+    signature="Loops open or close with frequency, in every pair of channels with one on each side.",
+    mistaken_for=("viscous-friction", "load-inertia"),
+    separated_by=(
+        "a chirp: a delay's error grows with the first power of frequency and is the same in all channels of a side"
+    ),
+    source=(
+        "Mills, Internet time synchronization: the network time protocol, IEEE Transactions on Communications 39(10), "
+        "1482-1493, 1991, doi:10.1109/26.103043, on clock offset"
+    ),
+    depends_on_time=True,
     modifies_observation=_modifies_observation,
 )

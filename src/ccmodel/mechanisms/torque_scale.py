@@ -1,11 +1,4 @@
-"""A torque sensor, or a motor's torque constant, with a wrong gain.
-
-Equation: the channel reads (1 + gain) times the torque.
-
-Signature: an error in proportion to the torque, zero where the torque is.
-
-Mistaken for friction in a pulley. The sign of the speed tells: a gain's error does not know it.
-"""
+"""A torque sensor, or a motor's torque constant, with a wrong gain."""
 
 from ccmodel.mechanisms.contract import Mechanism, Parameter, sensor_torque
 
@@ -18,9 +11,13 @@ def _modifies_observation(sensing, place, values):
 MECHANISM = Mechanism(
     name="torque-scale",
     places=("drive-sensor", "load-sensor"),
-    parameters=(Parameter("gain", "1", 0.02, 0.1, 0.05, signed=True),),
-    summary="a torque reads too high or too low by a share",
-    mistaken_for="pulley-friction",
-    separated_by="sign of speed",
+    parameters=(Parameter("gain", "1", 0.02, 0.1, 0.05, "error of the gain", signed=True),),
+    summary="a torque's gain is off",
+    equation="The channel reads (1 + gain) tau.",
+    signature="The error is proportional to the torque and zero where the torque is.",
+    mistaken_for=("pulley-friction",),
+    separated_by="sign of the speed, on which a gain's error does not depend",
+    source="Isermann, Fault-Diagnosis Systems, Springer, 2006, doi:10.1007/3-540-30368-5, on sensor gain faults",
+    depends_on_time=False,
     modifies_observation=_modifies_observation,
 )

@@ -1,11 +1,4 @@
-"""Viscous friction: a film of lubricant that is sheared.
-
-Equation: a drag c v per length of conduit on top of Coulomb friction, whatever the tension.
-
-Signature: loops widen with speed and not with tension; at low speed nothing is left of it.
-
-Mistaken for Stribeck friction (whose loops narrow with speed) and for a clock that is late. Three speeds tell.
-"""
+"""Viscous friction: a film of lubricant under shear."""
 
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
@@ -14,14 +7,21 @@ def _modifies_physics(settings, place, values):
     settings.viscous = values["c"]
 
 
-# From a film that is all but nothing to one that takes half of what Coulomb friction does: 15 mN to 3 N over a metre of
-# conduit at some 3 mm/s.
 MECHANISM = Mechanism(
     name="viscous-friction",
     places=("conduit",),
-    parameters=(Parameter("c", "N s/m^2", 5.0, 1000.0, 50.0),),
+    # From a negligible film to half of Coulomb friction: 15 mN to 3 N over a metre of conduit at 3 mm/s.
+    parameters=(Parameter("c", "N s/m^2", 5.0, 1000.0, 50.0, "drag per sliding speed and length"),),
     summary="drag in proportion to sliding speed",
-    mistaken_for="stribeck, time-skew",
-    separated_by="three speeds",
+    equation="Friction per length is mu T dphi/dx + c v, with v the sliding speed.",
+    signature="Loops widen with speed and not with tension; at low speed the effect vanishes.",
+    mistaken_for=("stribeck", "time-skew"),
+    separated_by="three speeds: with Stribeck friction loops narrow with speed",
+    source=(
+        "Olsson, Astrom, Canudas de Wit, Gafvert and Lischinsky, Friction models and friction compensation, European "
+        "Journal of Control 4(3), 176-195, 1998, doi:10.1016/S0947-3580(98)70113-X"
+    ),
+    depends_on_time=True,
+    settings={"viscous": 0.0},
     modifies_physics=_modifies_physics,
 )

@@ -3,15 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from ccmodel.channels import TABLE, THETA_OUT, ZERO_OF
 from ccmodel.model.general.run import Active
-
-# What a sensor reads where there is nothing, by its channel.
-ZERO_OF = {
-    "tau_in_Nm": "tau_in_zero_Nm",
-    "tau_out_Nm": "tau_out_zero_Nm",
-    "F_drive_N": "F_drive_zero_N",
-    "F_load_N": "F_load_zero_N",
-}
 
 
 @dataclass(frozen=True)
@@ -159,11 +152,8 @@ OWN = (
     "tension_curvature_B",
     "drive_encoder_offset",
     "load_gap_position",
-    "theta_out_zero_rad",
-    "tau_in_zero_Nm",
-    "tau_out_zero_Nm",
-    "F_drive_zero_N",
-    "F_load_zero_N",
+    TABLE[THETA_OUT].zero,
+    *ZERO_OF.values(),
 )
 FREE = (
     "stiffness_N_per_m",
@@ -173,8 +163,5 @@ FREE = (
     "load_stiffness_Nm_per_rad",
     "spring_beside_load_Nm_per_rad",
     "pretension_N",
-    "tau_in_zero_Nm",
-    "tau_out_zero_Nm",
-    "F_drive_zero_N",
-    "F_load_zero_N",
+    *ZERO_OF.values(),
 )

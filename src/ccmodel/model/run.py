@@ -9,15 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
-from ccmodel.encoder.motion import SIDES, drive_motion
+from ccmodel.channels import F_DRIVE, F_LOAD, TAU_IN, TAU_OUT, TENSIONS, THETA_IN, THETA_OUT, ZERO_OF
+from ccmodel.encoder.reconstruction import reconstruct_motion
+from ccmodel.encoder.smoothing import OFFSET_SCORES
 from ccmodel.failure import ModelError
 from ccmodel.model.exact import pair as exact
 from ccmodel.model.general import run as general
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
-from ccmodel.model.parameters import ZERO_OF, Parameters
+from ccmodel.model.parameters import Parameters
 from ccmodel.model.transmission import Transmission
-from ccmodel.recording import TENSIONS, Recording, stride
+from ccmodel.recording import Recording, stride
 
 # A load torque that was measured is the load's course and the sensor's noise. The noise would rock the load end; a
 # hand, a spring or a brake does nothing above this frequency at the rates that rigs run at (0.1 to 1 Hz).
@@ -66,9 +68,9 @@ class ModelInput:
     @classmethod
     def of(cls, recording: Recording, step_s: float | None = None) -> "ModelInput":
         """Input from a recording; from a sample every `step_s` of it, once every sample has served its part."""
-        theta_in, deviations, place = _motion(recording, "theta_in_rad")
-        theta_out = _motion(recording, "theta_out_rad")[0] if "theta_out_rad" in recording else None
-        tau_out = _without_noise(recording["tau_out_Nm"], recording.time_s) if "tau_out_Nm" in recording else None
+        theta_in, deviations, place = _motion(recording, THETA_IN)
+        theta_out = _motion(recording, THETA_OUT)[0] if THETA_OUT in recording else None
+        tau_out = _without_noise(recording[TAU_OUT], recording.time_s) if TAU_OUT in recording else None
         rest = _rest(recording, theta_in)
         every = stride(recording, step_s)
         series = (theta_in, deviations, place, theta_out, tau_out)
@@ -91,8 +93,8 @@ class ModelInput:
         recording = replace(
             like,
             time_s=time_s,
-            channels={"theta_in_rad": theta_in},
-            derived_from={"theta_in_rad": PRESCRIBED},
+            channels={THETA_IN: theta_in},
+            derived_from={THETA_IN: PRESCRIBED},
             pretension_N=pretension_N,
             encoder_step_rad={},
             excitation={},
@@ -114,7 +116,7 @@ class ModelInput:
     @property
     def deviations_given_offset(self) -> NDArray:
         """`drive_deviations` where it is known where in its count the drive first rests."""
-        return self.drive_deviations - SIDES[: len(self.drive_deviations), None] * self.drive_encoder_offset
+        return self.drive_deviations - OFFSET_SCORES[: len(self.drive_deviations), None] * self.drive_encoder_offset
 
 
 def simulate_recording(recording: Recording, parameters: Parameters) -> Recording:
@@ -164,22 +166,20 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
     tau_in, tau_out, F_drive, F_load = (read[c] + getattr(parameters, zero) for c, zero in ZERO_OF.items())
     drive, load_side = tau_in / parameters.drive_radius_m, tau_out / parameters.load_radius_m
     channels = {
-        "theta_in_rad": read["theta_in_rad"],
-        "theta_out_rad": _zeroed(read["theta_out_rad"], recording) + parameters.theta_out_zero_rad,
-        "tau_in_Nm": tau_in,
-        "tau_out_Nm": tau_out,
-        "F_drive_N": F_drive,
-        "F_load_N": F_load,
-        "T1_N": (F_drive + drive) / 2,
-        "T2_N": (F_load + load_side) / 2,
-        "T3_N": (F_drive - drive) / 2,
-        "T4_N": (F_load - load_side) / 2,
+        THETA_IN: read[THETA_IN],
+        THETA_OUT: _zeroed(read[THETA_OUT], recording) + parameters.theta_out_zero_rad,
+        TAU_IN: tau_in,
+        TAU_OUT: tau_out,
+        F_DRIVE: F_drive,
+        F_LOAD: F_load,
     }
-    sources = dict.fromkeys(channels, "model") | {"theta_in_rad": PRESCRIBED}
+    tensions = (F_drive + drive, F_load + load_side, F_drive - drive, F_load - load_side)
+    channels |= {name: twice / 2 for name, twice in zip(TENSIONS, tensions, strict=True)}
+    sources = dict.fromkeys(channels, "model") | {THETA_IN: PRESCRIBED}
     if isinstance(load, TorqueLoad):
-        sources["tau_out_Nm"] = PRESCRIBED
+        sources[TAU_OUT] = PRESCRIBED
     elif isinstance(load, AngleLoad):
-        sources["theta_out_rad"] = PRESCRIBED
+        sources[THETA_OUT] = PRESCRIBED
     return recording.with_channels(channels, sources, origin="model")
 
 
@@ -198,12 +198,12 @@ def _run(transmission, load, given: ModelInput, initial: InitialTension, paramet
         return dict(response.complete().read)
     response = exact.simulate_pair(transmission, load, given.theta_in, initial).complete()
     return {
-        "theta_in_rad": given.theta_in,
-        "theta_out_rad": response.theta_out_rad,
-        "tau_in_Nm": response.tau_in_Nm,
-        "tau_out_Nm": response.tau_out_Nm,
-        "F_drive_N": response.T1_N + response.T3_N,
-        "F_load_N": response.T2_N + response.T4_N,
+        THETA_IN: given.theta_in,
+        THETA_OUT: response.theta_out_rad,
+        TAU_IN: response.tau_in_Nm,
+        TAU_OUT: response.tau_out_Nm,
+        F_DRIVE: response.T1_N + response.T3_N,
+        F_LOAD: response.T2_N + response.T4_N,
     }
 
 
@@ -216,8 +216,8 @@ def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension
     if not given.initial_tension_observed:
         return InitialTension.uniform(path, scale * parameters.pretension_share * given.recording.pretension_N)
     true = _true_at_rest(given.resting_mean, given, parameters)
-    F_drive, F_load = true["F_drive_N"], true["F_load_N"]
-    drive, load = true["tau_in_Nm"] / parameters.drive_radius_m, true["tau_out_Nm"] / parameters.load_radius_m
+    F_drive, F_load = true[F_DRIVE], true[F_LOAD]
+    drive, load = true[TAU_IN] / parameters.drive_radius_m, true[TAU_OUT] / parameters.load_radius_m
     T1, T3 = scale * (F_drive + drive) / 2, scale * (F_drive - drive) / 2
     T2, T4 = scale * (F_load + load) / 2, scale * (F_load - load) / 2
     curvatures = parameters.tension_curvature_A, parameters.tension_curvature_B
@@ -231,12 +231,12 @@ def _true_at_rest(read: Mapping[str, float], given: ModelInput, parameters: Para
     A torque that stands for the load in a run stays as it was read, at rest as ever after.
     """
     sensed = {c: read[c] - getattr(parameters, zero) for c, zero in ZERO_OF.items()}
-    still = {"theta_in_rad": 0.0, "theta_out_rad": 0.0}
+    still = {THETA_IN: 0.0, THETA_OUT: 0.0}
     radii = parameters.drive_radius_m, parameters.load_radius_m
     seconds = read["time_s"] - float(given.recording.time_s[0])
     true = general.true_at(parameters.mechanisms, seconds, sensed | still, radii)
     if parameters.load_stiffness_Nm_per_rad is None:
-        true["tau_out_Nm"] = sensed["tau_out_Nm"]
+        true[TAU_OUT] = sensed[TAU_OUT]
     return true
 
 
@@ -258,7 +258,7 @@ def _load(given: ModelInput, parameters: Parameters, load_from: LoadFrom) -> Spr
 
 def spring_load(given: ModelInput, parameters: Parameters) -> SpringLoad:
     """The load's spring, and what is known of how it rests at the start of a recording."""
-    known_to = KNOWN_TO * given.recording.accuracy.get("tau_out_Nm", 0.0)
+    known_to = KNOWN_TO * given.recording.accuracy.get(TAU_OUT, 0.0)
     return SpringLoad(parameters.load_stiffness_Nm_per_rad, known_to, parameters.load_gap_position)
 
 
@@ -267,8 +267,8 @@ def _motion(recording: Recording, channel: str) -> tuple[NDArray, NDArray, NDArr
     if channel not in recording.encoder_step_rad:
         return recording[channel], np.zeros((0, recording.time_s.size)), np.zeros(recording.time_s.size)
     step_rad = recording.encoder_step_rad[channel]
-    found = drive_motion(recording.time_s, recording[channel], step_rad, recording.rest_s)
-    return found.theta_rad, found.deviations_rad, found.place_rad
+    found = reconstruct_motion(recording.time_s, recording[channel], step_rad, recording.rest_s)
+    return found.theta_rad, found.deviations_rad, found.encoder_offset_rad
 
 
 def _rest(recording: Recording, theta_in: NDArray) -> slice:
@@ -286,7 +286,7 @@ def _without_noise(torque: NDArray, time_s: NDArray) -> NDArray:
 
 def _zeroed(theta_out: NDArray, recording: Recording) -> NDArray:
     from_rest = recording.rest_s > 0 and recording.settled_s <= recording.rest_s
-    if from_rest or "theta_out_rad" not in recording:
+    if from_rest or THETA_OUT not in recording:
         return theta_out - theta_out[0]
     judged = recording.time_s >= recording.settled_s
-    return theta_out - theta_out[judged].mean() + recording["theta_out_rad"][judged].mean()
+    return theta_out - theta_out[judged].mean() + recording[THETA_OUT][judged].mean()

@@ -3,7 +3,6 @@
 import base64
 import io
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import jinja2
@@ -17,10 +16,10 @@ from matplotlib.figure import Figure
 
 from ccmodel import mechanisms as registry
 from ccmodel.diagnose.candidate import CandidateFit
-from ccmodel.diagnose.comparison import LEARNABLE, is_right, nested_errors
 from ccmodel.diagnose.diagnosis import Diagnosis
-from ccmodel.diagnose.hypothesis import plausible
-from ccmodel.diagnose.location import PARTS, mismatch
+from ccmodel.diagnose.location import PHASES, mismatch
+from ccmodel.diagnose.settings import ADEQUATE_LACK_OF_FIT
+from ccmodel.diagnose.verdict import nested_choice
 from ccmodel.recording import ORIGIN
 from ccmodel.report.figures import AXIS, COLOURS, STYLE
 
@@ -72,34 +71,34 @@ def write_diagnosis(file: Path, found: Diagnosis) -> None:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("ccmodel.report", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
-    origin = found.judgement.weighed[0].observations.given.recording.origin
+    origin = found.judgement.whitened[0].observations.given.recording.origin
     with plt.rc_context(STYLE):
         text = environment.get_template("diagnosis.html.j2").render(
-            said=found.said,
-            headline=headline(found.said),
+            said=found.report,
+            headline=headline(found.report),
             origin=ORIGIN[origin],
             symbol=SYMBOL,
-            in_question=_in_question(found.said),
+            in_question=_in_question(found.report),
             has_found=found.judgement.best is not found.judgement.calibrated,
             rivals=_rivals(found),
-            listed=found.judgement.listed,
+            listed=found.judgement.well_specified,
             summaries={name: registry.get(name) for name in registry.names()},
             map=_encoded(_map(found)),
             loops=_encoded(_loops(found)),
-            recordings=[w.observations.given.recording.id for w in found.judgement.weighed],
+            recordings=[w.observations.given.recording.id for w in found.judgement.whitened],
         )
     file.write_text(text, encoding="utf-8")
 
 
 def _rivals(found: Diagnosis) -> list[dict]:
     j = found.judgement
-    ranked = sorted(zip(j.trials, j.probability, strict=True), key=lambda item: item[0].left.mean())
+    ranked = sorted(zip(j.candidates, j.probability, strict=True), key=lambda item: item[0].mean_square)
     rows = [(j.calibrated, None), *ranked[:RIVALS]]
     return [
         {
             "what": str(trial.hypothesis),
-            "left": float(trial.left.mean()),
-            "learnable": max(j.learnable[trial.hypothesis].mean, 0.0) if trial.hypothesis in j.learnable else None,
+            "left": trial.mean_square,
+            "learnable": max(j.lack_of_fit[trial.hypothesis].mean, 0.0) if trial.hypothesis in j.lack_of_fit else None,
             "p": p,
             "why": _why(trial, found),
         }
@@ -111,18 +110,18 @@ def _why(trial: CandidateFit, found: Diagnosis) -> str:
     """Why a hypothesis was not taken, or that it was."""
     j = found.judgement
     if trial is j.calibrated:
-        return "agrees" if found.said["verdict"] == "agrees" else "what is asked about"
+        return "agrees" if found.report["verdict"] == "agrees" else "what is asked about"
     if trial is j.best:
         return "the likeliest"
-    if not plausible(trial.hypothesis, trial.values):
+    if not trial.is_plausible:
         return "only with more of it than there can be"
-    if is_right(trial, j.calibrated, j.learnable):
-        if j.one_fault and len(trial.hypothesis.acting) > 1:
-            return f"would do, as would one fault at the {' or '.join(j.one_fault)}"
-        ratio = trial.left.mean() / j.best.left.mean()
+    if j.comparison.is_adequate(trial):
+        if j.single_fault_places and trial.hypothesis.is_pair:
+            return f"would do, as would one fault at the {' or '.join(j.single_fault_places)}"
+        ratio = trial.mean_square / j.best.mean_square
         return f"would do, but leaves {ratio:.3g} times as much" if ratio > 1 else "would do, but has more unknowns"
-    learnable = j.learnable.get(trial.hypothesis)
-    if learnable is not None and learnable.surely > LEARNABLE:
+    learnable = j.lack_of_fit.get(trial.hypothesis)
+    if learnable is not None and learnable.lower_bound > ADEQUATE_LACK_OF_FIT:
         return "what it leaves follows laws that it does not know"
     return "others leave less"
 
@@ -130,16 +129,16 @@ def _why(trial: CandidateFit, found: Diagnosis) -> str:
 def _map(found: Diagnosis) -> Figure:
     """Errors over the noise, channel by part of the motion, before and, where something was found, after."""
     j = found.judgement
-    before = mismatch(j.weighed, j.calibrated)
+    before = mismatch(j.whitened, j.calibrated)
     highest = max(np.nanmax([list(v.values()) for v in before.values()]), 3.0)
-    shown = {_in_question(found.said): before}
+    shown = {_in_question(found.report): before}
     if j.best is not j.calibrated:
-        shown[WITH_FOUND] = mismatch(j.weighed, j.best)
+        shown[WITH_FOUND] = mismatch(j.whitened, j.best)
     figure, axes = plt.subplots(1, len(shown), figsize=(4 * len(shown), 2.9), sharey=True, squeeze=False)
     for ax, (title, table) in zip(axes[0], shown.items(), strict=True):
-        values = np.array([[table[c][p] for p in PARTS] for c in table])
+        values = np.array([[table[c][p] for p in PHASES] for c in table])
         ax.imshow(values, cmap="cividis", norm=matplotlib.colors.LogNorm(0.7, highest), aspect="auto")
-        ax.set_xticks(range(len(PARTS)), PARTS)
+        ax.set_xticks(range(len(PHASES)), PHASES)
         ax.set_yticks(range(len(table)), [SYMBOL[c] for c in table])
         ax.set_title(title, fontsize=9)
         ax.grid(False)
@@ -153,24 +152,26 @@ def _map(found: Diagnosis) -> Figure:
 def _loops(found: Diagnosis) -> Figure:
     """Torque loops of the recordings that were off most, before and after, held out."""
     j = found.judgement
-    chosen = nested_errors(j)
+    chosen = nested_choice(j)
     channel = _worst_channel(found)
-    order = [i for i in np.argsort(j.calibrated.left)[::-1] if channel in j.weighed[i].observations.channels][:LOOPS]
+    order = [i for i in np.argsort(j.calibrated.by_recording)[::-1] if channel in j.whitened[i].observations.channels][
+        :LOOPS
+    ]
     label, scale = AXIS.get(channel, (f"{channel.rsplit('_', 1)[0]} (N)", 1))
     figure, axes = plt.subplots(1, len(order), figsize=(3.1 * len(order), 3.1), squeeze=False)
     for ax, i in zip(axes[0], order, strict=True):
-        w = j.weighed[i]
+        w = j.whitened[i]
         e = w.observations
         c = e.channels.index(channel)
         theta = e.given.theta_in[e.judged]
         ax.plot(theta, scale * e.measured[c], color=FAINT, lw=2.2, label="recording")
         for trial, colour, line, name in (
-            (j.calibrated, COLOURS[0], "--", _in_question(found.said)),
+            (j.calibrated, COLOURS[0], "--", _in_question(found.report)),
             (chosen[i], COLOURS[1], "-", WITH_FOUND),
         ):
             if name == WITH_FOUND and trial is j.calibrated:
                 continue
-            said = replace(e, parameters=trial.hypothesis.of(e.parameters)).modelled(trial.held_out[i])[c]
+            said = e.with_parameters(trial.held_out(i, w)).modelled({})[c]
             ax.plot(theta, scale * said, color=colour, lw=1.0, ls=line, label=name)
         ax.set_title(e.given.recording.id, fontsize=9)
         ax.set_xlabel(AXIS["theta_in_rad"][0])
@@ -181,9 +182,9 @@ def _loops(found: Diagnosis) -> Figure:
 
 
 def _worst_channel(found: Diagnosis) -> str:
-    error = found.said["fit"]["error"]
+    error = found.report["fit"]["error"]
     worst = max(error, key=lambda c: error[c]["before"] / error[c]["noise"])
-    channels = found.judgement.weighed[int(np.argmax(found.judgement.calibrated.left))].observations.channels
+    channels = found.judgement.whitened[int(np.argmax(found.judgement.calibrated.by_recording))].observations.channels
     return next((c for c in channels if c.rsplit("_", 1)[0] == worst), channels[0])
 
 

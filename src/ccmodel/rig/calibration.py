@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ccmodel.channels import ANGLE_AT, SUM_AT, TENSIONS_AT, TORQUE_AT
 from ccmodel.rig.batch import Accuracy, Rig, Side
 from ccmodel.rig.findings import LIMITS, Limits
 
@@ -62,12 +63,11 @@ def calibrate(table: pd.DataFrame, rig: Rig, limits: Limits = LIMITS) -> Calibra
     time = table["time_s"].to_numpy()
     resting = _resting_samples(table, limits)
     result = Calibrated({}, {}, {}, {}, float(time[resting - 1]) if resting else 0.0, {})
-    ends = (("drive", rig.drive, "in", ("T1_N", "T3_N")), ("load", rig.load, "out", ("T2_N", "T4_N")))
-    for end, side, suffix, tensions in ends:
-        _angle(result, table, end, side, f"theta_{suffix}_rad", resting, rig.accuracy)
-        _torque(result, table, end, side, f"tau_{suffix}_Nm", rig.accuracy)
+    for end, side in (("drive", rig.drive), ("load", rig.load)):
+        _angle(result, table, end, side, resting, rig.accuracy)
+        _torque(result, table, end, side, rig.accuracy)
         _sum(result, table, end, side, rig.accuracy)
-        _tensions(result, end, side, f"tau_{suffix}_Nm", tensions)
+        _tensions(result, end, side)
     return result
 
 
@@ -87,8 +87,8 @@ def _still_samples(counts: NDArray, limits: Limits) -> int:
     return int(np.flatnonzero(counts[:still] == values[np.argmax(how_often)])[-1]) + 1
 
 
-def _angle(result: Calibrated, table, end: str, side: Side, channel: str, resting: int, accuracy: Accuracy) -> None:
-    column = f"{end}_encoder_counts"
+def _angle(result: Calibrated, table, end: str, side: Side, resting: int, accuracy: Accuracy) -> None:
+    column, channel = f"{end}_encoder_counts", ANGLE_AT[end]
     if column not in table:
         return
     if side.encoder_counts_per_rev is None:
@@ -106,8 +106,8 @@ def _angle(result: Calibrated, table, end: str, side: Side, channel: str, restin
     result.encoder_step_rad[channel] = step
 
 
-def _torque(result: Calibrated, table, end: str, side: Side, channel: str, accuracy: Accuracy) -> None:
-    counts, current = f"{end}_torque_counts", f"{end}_current_A"
+def _torque(result: Calibrated, table, end: str, side: Side, accuracy: Accuracy) -> None:
+    counts, current, channel = f"{end}_torque_counts", f"{end}_current_A", TORQUE_AT[end]
     sensor, constant = side.torque_sensor, side.torque_constant_Nm_per_A
     if counts in table and sensor is None:
         result.missing[counts] = f"rig.{end}.torque_sensor"
@@ -128,7 +128,7 @@ def _torque(result: Calibrated, table, end: str, side: Side, channel: str, accur
 
 
 def _sum(result: Calibrated, table, end: str, side: Side, accuracy: Accuracy) -> None:
-    column, channel, cell = f"{end}_load_cell_V", f"F_{end}_N", side.load_cell
+    column, channel, cell = f"{end}_load_cell_V", SUM_AT[end], side.load_cell
     if column not in table:
         return
     if cell is None:
@@ -139,14 +139,14 @@ def _sum(result: Calibrated, table, end: str, side: Side, accuracy: Accuracy) ->
     result.accuracy[channel] = accuracy.load_cell_N
 
 
-def _tensions(result: Calibrated, end: str, side: Side, torque: str, names: tuple[str, str]) -> None:
-    total, radius = f"F_{end}_N", side.pulley_radius_m
+def _tensions(result: Calibrated, end: str, side: Side) -> None:
+    total, torque, radius = SUM_AT[end], TORQUE_AT[end], side.pulley_radius_m
     if total not in result.channels or torque not in result.channels:
         return
     difference = result.channels[torque] / radius
     # Errors of the two sensors are independent of each other.
     accuracy = float(np.hypot(result.accuracy[total], result.accuracy[torque] / radius) / 2)
-    for name, sign in zip(names, (1, -1), strict=True):
+    for name, sign in zip(TENSIONS_AT[end], (1, -1), strict=True):
         result.channels[name] = (result.channels[total] + sign * difference) / 2
         result.derived_from[name] = f"({total} {'+' if sign > 0 else '-'} {torque} / {radius:g} m) / 2"
         result.accuracy[name] = accuracy

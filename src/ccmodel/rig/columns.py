@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ccmodel.channels import SUM_AT, TENSIONS_AT, THETA_OUT, TORQUE_AT
 from ccmodel.rig.batch import SENSOR_COLUMNS, Batch, Rig
 from ccmodel.rig.findings import Finding
 from ccmodel.rig.logs import Log
@@ -73,16 +74,16 @@ def check_columns(
 
 def _stated(rig: Rig) -> list[_Sensor]:
     sensors = []
-    ends = (("drive", rig.drive, "in", ("T1_N", "T3_N")), ("load", rig.load, "out", ("T2_N", "T4_N")))
-    for end, side, suffix, tensions in ends:
+    for end, side in (("drive", rig.drive), ("load", rig.load)):
+        tensions = TENSIONS_AT[end]
         if end == "load" and side.encoder_counts_per_rev:
-            sensors.append(_Sensor(("rig.load.encoder_counts_per_rev",), ("load_encoder_counts",), ("theta_out_rad",)))
+            sensors.append(_Sensor(("rig.load.encoder_counts_per_rev",), ("load_encoder_counts",), (THETA_OUT,)))
         torques = {"torque_sensor": "torque_counts", "torque_constant_Nm_per_A": "current_A"}
         torques = {f"rig.{end}.{key}": f"{end}_{column}" for key, column in torques.items() if getattr(side, key)}
         if torques:
-            sensors.append(_Sensor(tuple(torques), tuple(torques.values()), (f"tau_{suffix}_Nm", *tensions)))
+            sensors.append(_Sensor(tuple(torques), tuple(torques.values()), (TORQUE_AT[end], *tensions)))
         if side.load_cell:
-            sensors.append(_Sensor((f"rig.{end}.load_cell",), (f"{end}_load_cell_V",), (f"F_{end}_N", *tensions)))
+            sensors.append(_Sensor((f"rig.{end}.load_cell",), (f"{end}_load_cell_V",), (SUM_AT[end], *tensions)))
     return sensors
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from ccmodel import mechanisms as registry
 from ccmodel import provenance
 from ccmodel.config import Diagnosing
-from ccmodel.diagnose.diagnosis import Diagnosis
+from ccmodel.diagnose.diagnosis import Diagnosis, Options
 from ccmodel.diagnose.diagnosis import diagnose as run
 from ccmodel.failure import ModelError
 from ccmodel.model.files import model_as_dict, read_model
@@ -52,9 +52,8 @@ def diagnose(
         known = read_model(baseline) if baseline else None
         if freeze and known is None:
             raise InputError("--freeze: there is no model to hold; name one with --baseline")
-        found = run(
-            ingested.recordings, estimates, not_judged, without, tell, **_options(judged), baseline=known, freeze=freeze
-        )
+        options = _options(judged, without)
+        found = run(ingested.recordings, estimates, options, known, freeze, not_judged, tell)
     except (ModelError, ValueError) as error:
         raise InputError(f"{batch}: {error}") from None
     return _write(found, inputs, out)
@@ -65,8 +64,8 @@ def _refused(findings: Iterable[Mapping]) -> list[dict[str, str]]:
     return [{"what": Path(f["file"]).name, "why": f["text"]} for f in findings if f["severity"] == "refused"]
 
 
-def _options(judged: Diagnosing | None) -> dict:
-    return (judged or Diagnosing()).model_dump(exclude_none=True)
+def _options(judged: Diagnosing | None, without: Sequence[str] = ()) -> Options:
+    return Options(**(judged or Diagnosing()).model_dump(exclude_none=True), without=without)
 
 
 def diagnose_recordings(recordings_file: Path, out: Path, judged: Diagnosing | None = None) -> None:
@@ -77,7 +76,7 @@ def diagnose_recordings(recordings_file: Path, out: Path, judged: Diagnosing | N
         if estimates is None or not recordings:
             raise ModelError("no recording that can be used")
         not_judged = _refused(read_json(recordings_file.with_suffix(".json"))["findings"])
-        found = run(recordings, estimates, not_judged, **_options(judged))
+        found = run(recordings, estimates, _options(judged), not_judged=not_judged)
     except (ModelError, ValueError) as error:
         out.mkdir(parents=True, exist_ok=True)
         write_json(out / "diagnosis.json", {"batch": recordings_file.stem, "verdict": None, "why": str(error)})
@@ -90,12 +89,12 @@ def diagnose_recordings(recordings_file: Path, out: Path, judged: Diagnosing | N
 
 def _write(found: Diagnosis, inputs: dict, out: Path) -> dict:
     out.mkdir(parents=True, exist_ok=True)
-    said = found.said | {"headline": headline(found.said), "provenance": inputs}
+    said = found.report | {"headline": headline(found.report), "provenance": inputs}
     write_json(out / "diagnosis.json", said)
     for name, trial in (("calibrated", found.judgement.calibrated), ("model", found.judgement.best)):
         write_json(out / f"{name}.json", model_as_dict(found.model(trial), inputs))
     (out / "nearest.json").unlink(missing_ok=True)  # of an earlier run
-    if found.said["nearest"]:
+    if found.report["nearest"]:
         write_json(out / "nearest.json", model_as_dict(found.model(found.judgement.nearest), inputs))
     write_diagnosis(out / "report.html", found)
     return said

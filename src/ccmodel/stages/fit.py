@@ -8,7 +8,8 @@ from ccmodel import provenance
 from ccmodel.config import Fit
 from ccmodel.failure import ModelError
 from ccmodel.inference.fit import FitResult, fit
-from ccmodel.inference.problem import Free, Observations, Problem
+from ccmodel.inference.observations import Observations
+from ccmodel.inference.problem import Free, Problem
 from ccmodel.model.parameters import Parameters
 from ccmodel.recording import read_recordings
 from ccmodel.stages.files import estimates_of, write_json

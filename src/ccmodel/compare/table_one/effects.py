@@ -16,17 +16,6 @@ SET_UP = ("pretension", "load-stiffness")
 SET_UP_PLACE = "set-up"
 DIFFERENCE = "difference"
 
-# Effects that know the time; all others see only the order of the samples, and one rate stands for all.
-KNOWS_TIME = (
-    "load-cell-drift",
-    "load-inertia",
-    "relaxation",
-    "running-in",
-    "stribeck",
-    "time-skew",
-    "viscous-friction",
-)
-
 
 @dataclass(frozen=True)
 class Effect:
@@ -126,5 +115,5 @@ def _is_plausible(parameter: Parameter, value: float) -> bool:
 
 
 def knows_time(effects: Sequence[Effect]) -> bool:
-    """Whether the rate matters to any of them."""
-    return any(e.name in KNOWS_TIME for e in effects)
+    """Whether any of them depends on the rate; all others depend on the order of the samples only."""
+    return any(not e.is_set_up and registry.get(e.name).depends_on_time for e in effects)

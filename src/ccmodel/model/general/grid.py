@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.geometry import ConduitPath
-from ccmodel.mechanisms.contract import Kink
+from ccmodel.mechanisms.kink import Kink
 
 # How much of the cells the bend attracts; the rest is spread by length, for what acts per length.
 BEND_WEIGHT = 0.8

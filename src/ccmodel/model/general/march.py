@@ -19,12 +19,13 @@ from collections import namedtuple
 
 import numpy as np
 
+from ccmodel import mechanisms as registry
 from ccmodel.elementary import quick_tanh
 from ccmodel.kernel import borrowed, kernel
 from ccmodel.mechanisms.backlash import dead_zone
 from ccmodel.mechanisms.load_dependent_friction import power_of_tension
 from ccmodel.mechanisms.presliding import dahl
-from ccmodel.mechanisms.pulley_eccentricity import winding, wound
+from ccmodel.mechanisms.pulley_eccentricity import winding, winding_change
 from ccmodel.mechanisms.relaxation import lag_weights
 from ccmodel.mechanisms.strand_settling import settling_tension
 from ccmodel.mechanisms.stribeck import renewed
@@ -101,11 +102,11 @@ NOW, STEP, SAVED, LAST, BEFORE = range(5)
 ANGLE, TURN, DT, OMEGA, OMEGA_BEFORE, BEARING, OMEGA_NEXT, BEARING_NEXT, TORQUE = range(9)
 PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10, 18, 5, 11, 9
 
-# Numbers of a run.
+# Constants of a run: its own, and every setting of the mechanisms.
 Physics = namedtuple(
     "Physics",
-    "has_settling has_relaxation tau conduit_compliance bristle presliding exponent rise vs fall radius eccentricity "
-    "phase stiffness_load cubic half_gap damping inertia load_friction load_presliding kind general_friction",
+    "has_settling has_relaxation bristle presliding radius stiffness_load load_damping kind general_friction "
+    + " ".join(registry.march_settings()),
 )
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}  # not nnan: a NaN must be seen
@@ -175,7 +176,7 @@ def _set_hold(ph, piece, node, c):
     T, grip, now, slope = piece[TENSION, c], node[GRIP, c], node[GRIP_NOW, c], node[GRIP_SLOPE, c]
     for i in range(node.shape[2]):
         half = 0.5 * (max(T[i], 0.0) + max(T[i + 1], 0.0))
-        factor, by_tension = power_of_tension(half, ph.exponent)
+        factor, by_tension = power_of_tension(half, ph.tension_exponent)
         g = quick_tanh(grip[i] * factor)
         now[i] = g
         slope[i] = half * (1.0 - g * g) * grip[i] * by_tension
@@ -211,7 +212,7 @@ def _nodes(ph, piece, node, slide, dt, bristle):
                 fd[i] *= hold
                 r[i] = T[i] - T[i + 1] - x * hold
         else:
-            if ph.exponent != 0.0:
+            if ph.tension_exponent != 0.0:
                 _set_hold(ph, piece, node, c)
                 grip = node[GRIP_NOW, c]
             for i in range(n):
@@ -232,26 +233,26 @@ def _load(ph, piece, load, turn, torque, dt):
     """Torque out of balance at the load pulley, its slope by the angle less what the cables add, and the radius."""
     n = piece.shape[2] - 1
     theta = load[ANGLE] + turn
-    _, round_, round_slope = winding(theta, ph.eccentricity, ph.phase)
+    _, round_, round_slope = winding(theta, ph.load_eccentricity[0], ph.load_eccentricity[1])
     R = ph.radius * round_
     z, inside = dead_zone(theta, ph.half_gap)
-    tau = torque + ph.stiffness_load * z + ph.cubic * z**3
-    slope = (ph.stiffness_load + 3 * ph.cubic * z * z) * inside
+    tau = torque + ph.stiffness_load * z + ph.cubic_stiffness * z**3
+    slope = (ph.stiffness_load + 3 * ph.cubic_stiffness * z * z) * inside
     omega = 0.0
     if dt > 0.0:
         ratio = dt / load[DT] if load[DT] > 0.0 else 1.0
         a1, a2 = (1 + 2 * ratio) / (1 + ratio), ratio * ratio / (1 + ratio)
         omega = (a1 * turn - a2 * load[TURN]) / dt
         alpha = (a1 * (omega - load[OMEGA]) - a2 * (load[OMEGA] - load[OMEGA_BEFORE])) / dt
-        tau += ph.damping * omega + ph.inertia * alpha
-        slope += (ph.damping + ph.inertia * a1 / dt) * a1 / dt
+        tau += ph.load_damping * omega + ph.inertia * alpha
+        slope += (ph.load_damping + ph.inertia * a1 / dt) * a1 / dt
     bearing = load[BEARING]
-    if ph.load_friction > 0.0:
-        bearing, by_turn = dahl(load[BEARING], turn, ph.load_presliding)
-        slope += ph.load_friction * (by_turn if turn != 0.0 else 1.0 / ph.load_presliding)
+    if ph.load_friction_Nm > 0.0:
+        bearing, by_turn = dahl(load[BEARING], turn, ph.load_presliding_rad)
+        slope += ph.load_friction_Nm * (by_turn if turn != 0.0 else 1.0 / ph.load_presliding_rad)
     difference = max(piece[TENSION, 0, n], 0.0) - max(piece[TENSION, 1, n], 0.0)
     load[OMEGA_NEXT], load[BEARING_NEXT], load[TORQUE] = omega, bearing, tau
-    return R * difference - tau - ph.load_friction * bearing, slope - ph.radius * round_slope * difference, R
+    return R * difference - tau - ph.load_friction_Nm * bearing, slope - ph.radius * round_slope * difference, R
 
 
 @kernel(error_model="numpy", fastmath=FAST)
@@ -381,7 +382,7 @@ def _mean_tension(piece, c):
 def _evaluate(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, weights):
     """Everything that a step leaves out of balance: sum of squares (N^2), highest tension, and the load's terms."""
     n = node.shape[2]
-    way = ph.radius * wound(load[ANGLE], turn, ph.eccentricity, ph.phase)
+    way = ph.radius * winding_change(load[ANGLE], turn, ph.load_eccentricity[0], ph.load_eccentricity[1])
     slide[NOW, 0, n + 1], slide[NOW, 1, n + 1] = way, -way
     _tensions(ph, piece, slide, mean, weights)
     error = _nodes(ph, piece, node, slide, dt, bristle)
@@ -413,7 +414,7 @@ def _copy_means(mean, to, source):
 def _newton(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, counts):
     """Solve a step from the slides in `NOW` and a turn of the load; (whether it converged, the load's turn)."""
     free = ph.kind == IMPEDANCE
-    weights = lag_weights(dt / ph.tau) if ph.has_relaxation and dt > 0.0 else (1.0, 0.0, 0.0)
+    weights = lag_weights(dt / ph.relaxing_time_s) if ph.has_relaxation and dt > 0.0 else (1.0, 0.0, 0.0)
     soft = ph.conduit_compliance > 0.0
     # With conduits that give way all nodes turn around at once at a reversal, and full steps overshoot far.
     patience = 2 if soft and not ph.presliding else PATIENCE
@@ -468,7 +469,7 @@ def _newton(ph, piece, node, slide, mean, load, turn, torque, dt, bristle, count
 def _commit(ph, piece, node, slide, mean, load, turn, dt):
     """Take over a solved step."""
     n = node.shape[2]
-    weights = lag_weights(dt / ph.tau) if ph.has_relaxation and dt > 0.0 else (1.0, 0.0, 0.0)
+    weights = lag_weights(dt / ph.relaxing_time_s) if ph.has_relaxation and dt > 0.0 else (1.0, 0.0, 0.0)
     soft = ph.conduit_compliance > 0.0
     for c in range(2):
         d = slide[NOW, c]
@@ -488,7 +489,7 @@ def _commit(ph, piece, node, slide, mean, load, turn, dt):
                 piece[ELASTIC, c, i] = elastic
         for i in range(n):
             node[BRISTLE, c, i] = node[BRISTLE_NEXT, c, i]
-    if ph.rise > 0.0 and dt > 0.0:
+    if ph.stribeck_rise > 0.0 and dt > 0.0:
         for c in range(2):
             _renew(ph, node, slide, c, dt, RESTED)
     if dt > 0.0:
@@ -503,7 +504,7 @@ def _renew(ph, node, slide, c, dt, into):
     """What the contacts of a cable remember after the slides in `NOW`, into row `into`."""
     rested, d, following = node[RESTED, c], slide[NOW, c], node[into, c]
     for i in range(node.shape[2]):
-        following[i] = renewed(rested[i], d[i + 1], dt, ph.vs, ph.fall)
+        following[i] = renewed(rested[i], d[i + 1], dt, ph.stribeck_speed, ph.stribeck_exponent)
 
 
 @kernel(error_model="numpy", fastmath=FAST)
@@ -516,7 +517,7 @@ def _set_grip(ph, node, slide, course, dt):
     change = 0.0
     for c in range(2):
         before, rested, half_bend, grip = node[RESTED_NEXT, c], node[ALPHA, c], node[HALF_BEND, c], node[GRIP, c]
-        if ph.rise > 0.0 and dt > 0.0:
+        if ph.stribeck_rise > 0.0 and dt > 0.0:
             _renew(ph, node, slide, c, dt, ALPHA)
         else:
             rested[:] = node[RESTED, c]
@@ -524,11 +525,11 @@ def _set_grip(ph, node, slide, course, dt):
             change = max(change, abs(rested[i] - before[i]))
             before[i] = rested[i]
         for i in range(node.shape[2]):
-            grip[i] = half_bend[i] * course * (1.0 + ph.rise * rested[i])
-        if ph.exponent == 0.0:
+            grip[i] = half_bend[i] * course * (1.0 + ph.stribeck_rise * rested[i])
+        if ph.tension_exponent == 0.0:
             for i in range(node.shape[2]):
                 grip[i] = quick_tanh(grip[i])
-    return ph.rise * change
+    return ph.stribeck_rise * change
 
 
 @kernel(error_model="numpy")
@@ -566,7 +567,7 @@ def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, course, s
     last_turn, before_turn, last_pull, before_pull, last_dt = 0.0, 0.0, 0.0, 0.0, 0.0
     node[RESTED] = 1.0
     _set_grip(ph, node, slide, course[0], 0.0)
-    fixed_grip = ph.rise == 0.0 and course.size == 1
+    fixed_grip = ph.stribeck_rise == 0.0 and course.size == 1
     prescribed = ph.kind == PRESCRIBED_ANGLE
     way_before = winding(theta_in[0], drive[1], drive[2])[0]
     for j in range(m):
@@ -610,7 +611,7 @@ def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, course, s
                     if look > 0 and change < GRIP_TOLERANCE:  # as expected
                         break
                 solved, turn = _newton(ph, piece, node, slide, mean, load, turn, torque, step_dt, bristle, counts)
-                if not solved or ph.rise == 0.0:
+                if not solved or ph.stribeck_rise == 0.0:
                     break
             if not solved:
                 part *= 0.5
@@ -632,9 +633,9 @@ def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, course, s
         out[0, j], out[1, j] = max(piece[TENSION, 0, 0], 0.0), max(piece[TENSION, 0, n], 0.0)
         out[2, j], out[3, j] = max(piece[TENSION, 1, 0], 0.0), max(piece[TENSION, 1, n], 0.0)
         out[4, j] = load[ANGLE]
-        bearing = ph.load_friction * load[BEARING]
+        bearing = ph.load_friction_Nm * load[BEARING]
         if prescribed:
-            R = ph.radius * winding(load[ANGLE], ph.eccentricity, ph.phase)[1]
+            R = ph.radius * winding(load[ANGLE], ph.load_eccentricity[0], ph.load_eccentricity[1])[1]
             out[5, j] = R * (out[1, j] - out[3, j]) - bearing
         else:
             out[5, j] = load[TORQUE]

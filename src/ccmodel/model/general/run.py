@@ -7,9 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
+from ccmodel.channels import F_DRIVE, F_LOAD, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
 from ccmodel.failure import ModelError
-from ccmodel.mechanisms.contract import Sensing, Settings, all_finite
+from ccmodel.mechanisms.contract import Sensing, Settings
 from ccmodel.mechanisms.load_dependent_friction import FLOOR_N, REFERENCE_N
+from ccmodel.mechanisms.load_inertia import load_damping
 from ccmodel.mechanisms.pulley_eccentricity import winding
 from ccmodel.mechanisms.pulley_friction import bearing
 from ccmodel.mechanisms.strand_settling import stretch_at
@@ -118,13 +120,13 @@ def simulate(
     _check(time_s, theta_in, series, elements)
     series = np.zeros(1) if series is None else series
 
-    grid = make_grid(transmission.path, elements, tuple(settings.kinks))
+    grid = make_grid(transmission.path, elements, settings.kinks)
     physics = _physics(transmission, load, settings, elements)
     piece, node = _constants(transmission, settings, grid)
     course = np.ones(1)
-    if settings.friction_course is not None:
-        way_m = transmission.drive_radius_m * np.abs(np.diff(theta_in, prepend=theta_in[0])).cumsum()
-        course = settings.friction_course(time_s, way_m)
+    if settings.friction_history is not None:
+        travel_m = transmission.drive_radius_m * np.abs(np.diff(theta_in, prepend=theta_in[0])).cumsum()
+        course = settings.friction_history(time_s, travel_m)
     mean, state = np.zeros((rows.MEAN_ROWS, 2)), np.zeros(rows.LOAD_ROWS)
     T = _initial_state(physics, piece, node, settings, initial.at(grid.boundary_m, grid.held_rad), course[0])
     mean[rows.MEAN] = (piece[rows.SHARE] * T).sum(axis=1)
@@ -147,12 +149,12 @@ def simulate(
         rubs *= settings.drive_friction_Nm
         tau_in += rubs
     channels = {
-        "theta_in_rad": theta_in,
-        "theta_out_rad": theta_out,
-        "tau_in_Nm": tau_in,
-        "tau_out_Nm": tau_out,
-        "F_drive_N": T1 + T3,
-        "F_load_N": T2 + T4,
+        THETA_IN: theta_in,
+        THETA_OUT: theta_out,
+        TAU_IN: tau_in,
+        TAU_OUT: tau_out,
+        F_DRIVE: T1 + T3,
+        F_LOAD: T2 + T4,
     }
     read = _read(active, time_s, channels, (transmission.drive_radius_m, transmission.load_radius_m))
     return GeneralResponse(
@@ -175,7 +177,7 @@ def simulate(
 
 def settings_of(mechanisms: Mapping[str, Mapping] | Sequence[Active]) -> Settings:
     """What mechanisms, given as to `simulate`, tell the solver."""
-    settings = Settings()
+    settings = registry.neutral_settings()
     for a in _active(mechanisms):
         mechanism = registry.get(a.name)
         if mechanism.modifies_physics is not None:
@@ -202,7 +204,7 @@ def load_law(settings: Settings, load: SpringLoad, time_s: NDArray, theta: NDArr
     angle = theta - theta[0] + _rest_angle(stiffness, K3, settings.half_gap, start_Nm, load)
     beyond = np.sign(angle) * np.maximum(np.abs(angle) - settings.half_gap, 0.0)
     speed = np.gradient(theta, time_s)
-    inertial = settings.damping(stiffness) * speed + settings.inertia * np.gradient(speed, time_s)
+    inertial = load_damping(settings, stiffness) * speed + settings.inertia * np.gradient(speed, time_s)
     return stiffness * beyond + K3 * beyond**3 + inertial
 
 
@@ -224,7 +226,7 @@ def _active(mechanisms) -> list[Active]:
             raise ModelError(
                 f"{a.name} has the parameters {', '.join(sorted(wanted))}; got {', '.join(sorted(a.values)) or 'none'}"
             )
-        if not all_finite(a.values):
+        if not np.isfinite(list(a.values.values())).all():
             raise ModelError(f"{a.name} has a parameter that is not finite: {dict(a.values)}")
         for p in known.parameters:
             if p.low > 0 and not p.signed and a.values.get(p.name, p.default) < 0:
@@ -291,31 +293,23 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
     is_mechanical = isinstance(load, MechanicalLoad)
     K_e = load.stiffness_Nm_per_rad if isinstance(load, SpringLoad | MechanicalLoad) else 0.0
     K_e = load.beside_Nm_per_rad if isinstance(load, TorqueLoad) else K_e
+    values = {name: getattr(settings, name) for name in registry.march_settings()}
+    values = {n: tuple(map(float, v)) if isinstance(v, tuple) else float(v) for n, v in values.items()}
+    values["cubic_stiffness"] += load.cubic_Nm_per_rad3 if is_mechanical else 0.0
+    values["inertia"] += load.inertia_kg_m2 if is_mechanical else 0.0
     return rows.Physics(
         has_settling=settings.settling_N > 0,
         has_relaxation=settings.relaxing_share != 0,
-        tau=float(settings.relaxing_time_s),
-        conduit_compliance=float(settings.conduit_compliance),
         bristle=float(settings.bristle_m)
         if settings.bristle_m > 0
         else _coulomb_bristle(transmission, settings, elements),
         presliding=settings.bristle_m > 0,
-        exponent=float(settings.tension_exponent),
-        rise=float(settings.stribeck_rise),
-        vs=float(settings.stribeck_speed),
-        fall=float(settings.stribeck_fall),
         radius=float(transmission.load_radius_m),
-        eccentricity=float(settings.load_eccentricity[0]),
-        phase=float(settings.load_eccentricity[1]),
         stiffness_load=float(K_e),
-        cubic=float(settings.cubic_stiffness + (load.cubic_Nm_per_rad3 if is_mechanical else 0.0)),
-        half_gap=float(settings.half_gap),
-        damping=float(settings.damping(K_e) + (load.damping_Nms_per_rad if is_mechanical else 0.0)),
-        inertia=float(settings.inertia + (load.inertia_kg_m2 if is_mechanical else 0.0)),
-        load_friction=float(settings.load_friction_Nm),
-        load_presliding=float(settings.load_presliding_rad),
+        load_damping=float(load_damping(settings, K_e) + (load.damping_Nms_per_rad if is_mechanical else 0.0)),
         kind=rows.PRESCRIBED_ANGLE if isinstance(load, AngleLoad) else rows.IMPEDANCE,
         general_friction=bool(settings.tension_exponent != 0 or settings.drag_N != 0 or settings.viscous != 0),
+        **values,
     )
 
 
@@ -351,9 +345,9 @@ def _initial_state(physics, piece, node, settings, profiles, course) -> NDArray:
         stretch[settles] = stretch_at(T[settles], piece[rows.LOST][settles], piece[rows.STIFFNESS][settles])
     piece[rows.STRETCH], piece[rows.ELASTIC] = stretch, T
     both = T[:, :-1] + T[:, 1:]
-    factor = course * (1 + physics.rise)
-    if physics.exponent != 0:
-        factor = factor * (np.hypot(both / 2, FLOOR_N) / REFERENCE_N) ** physics.exponent
+    factor = course * (1 + physics.stribeck_rise)
+    if physics.tension_exponent != 0:
+        factor = factor * (np.hypot(both / 2, FLOOR_N) / REFERENCE_N) ** physics.tension_exponent
     hold = np.tanh(node[rows.HALF_BEND] * factor) * both + node[rows.DRAG]
     xi = np.divide(T[:, :-1] - T[:, 1:], hold, out=np.zeros_like(both), where=hold > 0)
     node[rows.BRISTLE] = np.clip(xi, -1, 1)
@@ -364,14 +358,14 @@ def _load_angle(physics: rows.Physics, T: NDArray, load: Load, series: NDArray) 
     """Angle at which the load holds the initial tensions, rad; 0 for a load that knows no neutral position."""
     if isinstance(load, AngleLoad):
         return float(series[0])
-    K, K3 = physics.stiffness_load, physics.cubic
+    K, K3 = physics.stiffness_load, physics.cubic_stiffness
     if isinstance(load, TorqueLoad) or (K == 0 and K3 == 0):
         return 0.0
     theta = 0.0
     for _ in range(50):
-        torque = physics.radius * winding(theta, physics.eccentricity, physics.phase)[1] * (T[0, -1] - T[1, -1])
+        torque = physics.radius * winding(theta, *physics.load_eccentricity)[1] * (T[0, -1] - T[1, -1])
         theta = _rest_angle(K, K3, physics.half_gap, torque, load)
-        if physics.eccentricity == 0:
+        if physics.load_eccentricity[0] == 0:
             break
     return float(theta)
 

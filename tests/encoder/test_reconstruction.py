@@ -3,7 +3,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from ccmodel.encoder.motion import drive_motion
+from ccmodel.encoder.reconstruction import reconstruct_motion
 
 COARSE, FINE = np.pi / 1000, 2 * np.pi / 8192
 REST = 0.4
@@ -65,7 +65,7 @@ def errors(motion, step, rate, seeds=8):
     found = []
     for seed in range(seeds):
         time, truth, counted, rest = recorded(motion, step, rate, seed)
-        estimate = drive_motion(time, counted, step, rest)
+        estimate = reconstruct_motion(time, counted, step, rest)
         found.append([(estimate.theta_rad - truth) / step, estimate.sigma_rad / step])
     return np.array(found).swapaxes(0, 1)
 
@@ -101,14 +101,14 @@ def test_what_is_left_is_stated(motion):
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_it_stays_within_the_counts(motion):
     time, _, counted, rest = recorded(motion)
-    estimate = drive_motion(time, counted, COARSE, rest)
-    assert abs(estimate.theta_rad + estimate.offset_rad - counted).max() < 0.55 * COARSE
+    estimate = reconstruct_motion(time, counted, COARSE, rest)
+    assert abs(estimate.theta_rad + estimate.zero_rad - counted).max() < 0.55 * COARSE
 
 
 @pytest.mark.parametrize("motion", [steps, ramps])
 def test_holds_are_constant(motion):
     time, truth, counted, rest = recorded(motion)
-    estimate = drive_motion(time, counted, COARSE, rest)
+    estimate = reconstruct_motion(time, counted, COARSE, rest)
     for begin in (2.0, 4.0):  # Shortly before the next step.
         hold = (time > begin + REST - 0.8) & (time < begin + REST - 0.2)
         assert np.ptp(truth[hold]) == 0
@@ -120,7 +120,7 @@ def test_holds_are_constant(motion):
 def test_no_false_reversal_before_a_hold(motion):
     for seed in range(4):
         time, _, counted, rest = recorded(motion, seed=seed)
-        estimate = drive_motion(time, counted, COARSE, rest)
+        estimate = reconstruct_motion(time, counted, COARSE, rest)
         first = time < REST + 1.8  # The first step and its hold.
         for angle in (estimate.theta_rad, *(estimate.theta_rad + estimate.deviations_rad[:2])):
             hold = angle[first][-1]
@@ -130,14 +130,14 @@ def test_no_false_reversal_before_a_hold(motion):
 
 def test_rests_where_the_drive_rests():
     time, _, counted, rest = recorded(steps)
-    estimate = drive_motion(time, counted, COARSE, rest)
+    estimate = reconstruct_motion(time, counted, COARSE, rest)
     assert abs(estimate.theta_rad[time < 0.3]).max() < 1e-9
     assert abs(estimate.sigma_rad[time < 0.3]).max() < 1e-3 * COARSE
 
 
 def test_the_deviations_are_as_large_as_stated():
     time, _, counted, rest = recorded(sine)
-    estimate = drive_motion(time, counted, COARSE, rest)
+    estimate = reconstruct_motion(time, counted, COARSE, rest)
     assert rms(estimate.deviations_rad) == pytest.approx(rms(estimate.sigma_rad), rel=0.6)
 
 
@@ -145,17 +145,17 @@ def test_a_start_in_motion():
     time = np.arange(1500) / 250
     truth = 0.6 * np.sin(np.pi * time + 0.5)
     counted = (np.floor(truth / COARSE) + 0.5) * COARSE
-    estimate = drive_motion(time, counted, COARSE, 0.0)
+    estimate = reconstruct_motion(time, counted, COARSE, 0.0)
     assert rms(estimate.theta_rad - truth) < 0.06 * COARSE
-    assert estimate.offset_rad == 0
+    assert estimate.zero_rad == 0
 
 
 def test_constant_recordings_stay_constant():
     time = np.arange(500) / 250
     for rest in (0.0, 2.0):
-        estimate = drive_motion(time, np.full(500, 7 * COARSE), COARSE, rest)
+        estimate = reconstruct_motion(time, np.full(500, 7 * COARSE), COARSE, rest)
         assert np.ptp(estimate.theta_rad) < 1e-9
-    assert drive_motion(time, np.full(500, 7 * COARSE), COARSE, 0.0).sigma_rad == pytest.approx(
+    assert reconstruct_motion(time, np.full(500, 7 * COARSE), COARSE, 0.0).sigma_rad == pytest.approx(
         COARSE / np.sqrt(12), rel=0.1
     )
 
@@ -163,8 +163,8 @@ def test_constant_recordings_stay_constant():
 def test_a_rest_that_dithers_stands_on_the_edge():
     time, _, counted, rest = recorded(sine)
     counted = counted + COARSE * ((np.arange(time.size) % 3 == 0) & (time < rest - 0.15))
-    estimate = drive_motion(time, counted, COARSE, rest)
-    assert estimate.offset_rad == pytest.approx(0.5 * COARSE, abs=0.2 * COARSE)
+    estimate = reconstruct_motion(time, counted, COARSE, rest)
+    assert estimate.zero_rad == pytest.approx(0.5 * COARSE, abs=0.2 * COARSE)
     assert np.ptp(estimate.theta_rad[time < 0.25]) < 1e-9
 
 
@@ -172,28 +172,33 @@ def test_slower_than_a_count_in_a_hundred_samples():
     time = np.arange(3000) / 250
     truth = 2.0 * COARSE * np.sin(0.3 * time)
     counted = np.floor(truth / COARSE) * COARSE
-    estimate = drive_motion(time, counted, COARSE, 0.0)
+    estimate = reconstruct_motion(time, counted, COARSE, 0.0)
     assert rms(estimate.theta_rad - truth - 0.0 - np.mean(estimate.theta_rad - truth)) < 0.3 * COARSE
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_the_same_motion_seen_otherwise(motion):
     time, _, counted, rest = recorded(motion)
-    plain = drive_motion(time, counted, COARSE, rest)
+    plain = reconstruct_motion(time, counted, COARSE, rest)
     near = {"abs": 0.03 * COARSE}
-    assert drive_motion(time + 8, counted, COARSE, rest + 8).theta_rad == pytest.approx(plain.theta_rad, **near)
-    assert drive_motion(time, 3 * counted, 3 * COARSE, rest).theta_rad == pytest.approx(
+    assert reconstruct_motion(time + 8, counted, COARSE, rest + 8).theta_rad == pytest.approx(plain.theta_rad, **near)
+    assert reconstruct_motion(time, 3 * counted, 3 * COARSE, rest).theta_rad == pytest.approx(
         3 * plain.theta_rad, abs=0.09 * COARSE
     )
-    assert drive_motion(time, -counted, COARSE, rest).theta_rad == pytest.approx(-plain.theta_rad, **near)
-    assert drive_motion(time, counted + 40 * COARSE, COARSE, rest).theta_rad == pytest.approx(plain.theta_rad, **near)
+    assert reconstruct_motion(time, -counted, COARSE, rest).theta_rad == pytest.approx(-plain.theta_rad, **near)
+    assert reconstruct_motion(time, counted + 40 * COARSE, COARSE, rest).theta_rad == pytest.approx(
+        plain.theta_rad, **near
+    )
 
 
 def test_small_gaps_are_bridged():
     time, _, counted, rest = recorded(sine)
     keep = np.ones(time.size, bool)
     keep[[300, 301, 700]] = False
-    whole, gappy = drive_motion(time, counted, COARSE, rest), drive_motion(time[keep], counted[keep], COARSE, rest)
+    whole, gappy = (
+        reconstruct_motion(time, counted, COARSE, rest),
+        reconstruct_motion(time[keep], counted[keep], COARSE, rest),
+    )
     assert gappy.theta_rad.shape == time[keep].shape
     assert abs(gappy.theta_rad - whole.theta_rad[keep]).max() < 0.5 * COARSE
 
@@ -202,7 +207,7 @@ def test_small_gaps_are_bridged():
 def test_a_glitch_is_survived(glitch):
     time, truth, counted, rest = recorded(sine)
     counted[900] += glitch * COARSE
-    estimate = drive_motion(time, counted, COARSE, rest)
+    estimate = reconstruct_motion(time, counted, COARSE, rest)
     assert np.isfinite(estimate.theta_rad).all() and np.isfinite(estimate.sigma_rad).all()
     assert rms(estimate.theta_rad[time < 3] - truth[time < 3]) < 0.5 * COARSE
 
@@ -210,4 +215,4 @@ def test_a_glitch_is_survived(glitch):
 @pytest.mark.parametrize(("n", "step"), [(3, 0.1), (10, 0.0)])
 def test_what_it_refuses(n, step):
     with pytest.raises(ValueError, match="must be"):
-        drive_motion(np.arange(n), np.zeros(n), step, 0.0)
+        reconstruct_motion(np.arange(n), np.zeros(n), step, 0.0)

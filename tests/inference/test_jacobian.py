@@ -1,4 +1,4 @@
-"""Sensitivities: against closed forms, and against differences taken with care."""
+"""Derivatives of model runs: against closed forms, and against differences of the fourth order."""
 
 from dataclasses import replace
 
@@ -7,9 +7,9 @@ import pytest
 
 from builders import recording
 from ccmodel.geometry import ConduitPath
+from ccmodel.inference.jacobian import STEP, jacobian, size_of
 from ccmodel.model.general.run import Active
 from ccmodel.model.run import ModelInput, simulate
-from ccmodel.model.sensitivity import sensitivities
 from model_runs import PULLED
 
 PRESLIDING = Active("presliding", "conduit", {"z0": 3e-5})
@@ -20,6 +20,20 @@ CHANNELS = ("T1_N", "T2_N", "T3_N", "T4_N", "theta_out_rad", "tau_in_Nm")
 def given():
     r = recording(id="sine", theta_in_rad=lambda t: 0.6 * np.sin(2 * np.pi * t))
     return ModelInput.of(r)
+
+
+def sensitivities(given, parameters, names):
+    """Derivatives of all channels by some parameters: by parameter, then channel."""
+    x = np.array([parameters.value_of(name) for name in names])
+    steps = np.array([STEP * size_of(name, value) for name, value in zip(names, x, strict=True)])
+
+    def run(at):
+        channels = simulate(given, parameters.with_values(dict(zip(names, at, strict=True)))).channels
+        return np.stack(list(channels.values()))
+
+    found = jacobian(run, x, steps, run(x))
+    channels = list(simulate(given, parameters).channels)
+    return {name: dict(zip(channels, found[..., k], strict=True)) for k, name in enumerate(names)}
 
 
 def careful(given, parameters, name, step=2e-4):

@@ -1,0 +1,111 @@
+"""Second stage: the unknowns of the calibrated model, and a first fit about which errors are whitened."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ccmodel.channels import TAU_IN, TAU_OUT, ZERO_OF
+from ccmodel.diagnose import settings
+from ccmodel.diagnose.hypothesis import PAPER, Hypothesis
+from ccmodel.inference.least_squares import Search, solve
+from ccmodel.inference.observations import Observations
+from ccmodel.inference.problem import Free, Problem
+from ccmodel.model.parameters import Parameters
+
+
+@dataclass(frozen=True)
+class InQuestion:
+    """The model whose agreement with the recordings is in question.
+
+    Attributes
+    ----------
+    hypothesis : Hypothesis
+        The paper's model, or a baseline with the mechanisms that it has.
+    estimates : Parameters
+        Values of everything that is not fitted.
+    free : dict of str to Free
+        Unknowns of the calibration, without those of mechanisms.
+    start : dict of str to float
+        Values of all unknowns from a first fit, or from the baseline.
+    """
+
+    hypothesis: Hypothesis
+    estimates: Parameters
+    free: dict[str, Free]
+    start: dict[str, float]
+
+    @property
+    def model(self) -> Parameters:
+        """The model at its starting values."""
+        return self.hypothesis.of(self.estimates).with_values(self.start)
+
+
+def model_in_question(
+    observations: Sequence[Observations], estimates: Parameters, baseline: Parameters | None, freeze: bool
+) -> InQuestion:
+    """The paper's model with a first fit, or a baseline with its own values; a frozen baseline keeps them."""
+    free = calibration(estimates, observations)
+    estimates = estimates.with_values({name: one.start for name, one in free.items()})
+    if baseline is None:
+        at_estimates = [o.with_parameters(estimates) for o in observations]
+        return InQuestion(PAPER, estimates, free, _first_fit(at_estimates, free))
+    hypothesis = Hypothesis(baseline=tuple((m.name, m.place) for m in baseline.mechanisms))
+    pretension_N = float(np.mean([o.given.recording.pretension_N for o in observations]))
+    start = _values_of(baseline, free, hypothesis, pretension_N)
+    if freeze:
+        estimates = hypothesis.of(estimates).with_values(start)
+        # The zero of a sensor may change without any change of the rig.
+        free = {name: one for name, one in free.items() if name in ZERO_OF.values()}
+        hypothesis = replace(hypothesis, is_frozen=True)
+    return InQuestion(hypothesis, estimates, free, start)
+
+
+def calibration(estimates: Parameters, observations: Sequence[Observations]) -> dict[str, Free]:
+    """Unknowns of a calibration: stiffness, friction, the load's spring, and whatever a rest does not show."""
+    free = {
+        "stiffness_N_per_m": _free(estimates.stiffness_N_per_m, *settings.STIFFNESS_N_PER_M),
+        "friction_coefficient": _free(estimates.friction_coefficient, *settings.FRICTION),
+    }
+    has_torque = [o for o in observations if TAU_IN in o.channels]
+    if estimates.load_stiffness_Nm_per_rad is not None:
+        free["load_stiffness_Nm_per_rad"] = _free(estimates.load_stiffness_Nm_per_rad, *settings.LOAD_NM_PER_RAD)
+    elif len(has_torque) == len(observations):
+        # A spring parallel to the load, which the torque sensor at the load does not measure.
+        ratios = [np.ptp(o.given.recording[TAU_IN]) / np.ptp(o.given.theta_in) for o in observations]
+        start, most = (factor * float(np.median(ratios)) for factor in settings.PARALLEL_SPRING)
+        free["spring_beside_load_Nm_per_rad"] = Free(start, 0.0, most)
+    if not all(o.given.initial_tension_observed for o in observations):
+        free["pretension_share"] = Free(1.0, *settings.PRETENSION_SHARE)
+        radius = estimates.load_radius_m
+        free["load_radius_m"] = Free(radius, *(ratio * radius for ratio in settings.RADIUS_RATIO))
+        if has_torque:
+            reach = max(float(np.ptp(o.given.recording[TAU_IN])) for o in has_torque)
+            free |= {name: Free(0.0, -reach, reach) for name in (ZERO_OF[TAU_IN], ZERO_OF[TAU_OUT])}
+    return free
+
+
+def _free(estimate: float, low: float, high: float) -> Free:
+    """An unknown within bounds, which an estimate further out widens tenfold beyond itself."""
+    if estimate > 0:
+        low, high = min(low, estimate / 10), max(high, 10 * estimate)
+    return Free(float(np.clip(estimate, low, high)), low, high)
+
+
+def _values_of(
+    baseline: Parameters, free: Mapping[str, Free], hypothesis: Hypothesis, pretension_N: float
+) -> dict[str, float]:
+    """The baseline's values of the unknowns, or their starts.
+
+    A baseline with one initial tension for all recordings has it as a share of their mean stated pretension.
+    """
+    values = {name: baseline.value_of(name) for name in [*free, *hypothesis.start]}
+    if baseline.pretension_N is not None and "pretension_share" in values:
+        values["pretension_share"] *= baseline.pretension_N / pretension_N
+    return {name: free[name].start if value is None else value for name, value in values.items()}
+
+
+def _first_fit(observations: Sequence[Observations], free: Mapping[str, Free]) -> dict[str, float]:
+    problem = Problem(observations, free, {"friction_scale": Free(1.0, 0.2, 5.0, settings.FRICTION_SPREAD)})
+    how = Search(most_evaluations=settings.FIRST_FIT_EVALUATIONS, tolerance=settings.FIRST_FIT_TOLERANCE)
+    return dict(zip(free, solve(problem, problem.start, how).x.tolist(), strict=False))

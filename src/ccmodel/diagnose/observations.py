@@ -1,0 +1,92 @@
+"""First stage: the recordings of a batch as observations, and a list of what could not be judged."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ccmodel.channels import MEASURED
+from ccmodel.diagnose import settings
+from ccmodel.failure import ModelError
+from ccmodel.inference.observations import Observations, Tolerance
+from ccmodel.model.parameters import Parameters
+from ccmodel.recording import Recording
+
+NotJudged = list[dict[str, str]]
+
+
+def observations_of(
+    recordings: Sequence[Recording],
+    estimates: Parameters,
+    tolerance: Tolerance = 0.0,
+    step_s: float = settings.STEP_S,
+    cycles: int | None = None,
+) -> tuple[list[Observations], NotJudged]:
+    """Observations of every usable recording, and what could not be judged.
+
+    If the initial tension is observed at rest in some recordings, those without are left out: friction and initial
+    tension cannot be separated in them.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be run on any of the recordings.
+    """
+    usable, not_judged = [], []
+    for recording in recordings:
+        step = max(step_s, float(np.ptp(recording.time_s)) / settings.MOST_SAMPLES)
+        try:
+            shown = first_cycles(recording, cycles)
+            usable.append(Observations.of(shown, estimates, step_s=step, tolerance=tolerance))
+        except (ModelError, ValueError) as error:
+            not_judged.append(_entry(recording.id, str(error)))
+    if not usable:
+        raise ModelError("none of the recordings can be compared with the model: " + not_judged[0]["why"])
+    observed = [o for o in usable if o.given.initial_tension_observed]
+    if observed:
+        why = "its initial tension is not observed at rest by load cells, as that of the others is"
+        not_judged += [_entry(o.id, why) for o in usable if o not in observed]
+    usable = observed or usable
+    return usable, [*not_judged, *_missing(usable), *_tolerated(tolerance)]
+
+
+def first_cycles(recording: Recording, cycles: int | None) -> Recording:
+    """A sinusoidal recording up to so many cycles after its start-up transient; any other recording whole."""
+    frequency = recording.excitation.get("frequency_Hz")
+    if cycles is None or not frequency or recording.excitation.get("wave") != "sine":
+        return recording
+    wanted = recording.time_s <= recording.time_s[0] + max(recording.settled_s, recording.rest_s) + cycles / frequency
+    return recording[: int(wanted.sum())]
+
+
+def _entry(what: str, why: str) -> dict[str, str]:
+    return {"what": what, "why": why}
+
+
+def _tolerated(tolerance: Tolerance) -> NotJudged:
+    by_channel = tolerance if isinstance(tolerance, Mapping) else {"a channel": tolerance}
+    why = "within the tolerance of this run, which counts as noise"
+    return [
+        _entry(f"errors below {100 * share:g} % of {name}'s peak to peak", why)
+        for name, share in by_channel.items()
+        if share
+    ]
+
+
+def _missing(observations: Sequence[Observations]) -> NotJudged:
+    """Channels, conditions and recordings that a complete diagnosis would need."""
+    found = []
+    recorded = {c for o in observations for c in o.channels}
+    for channel in MEASURED:
+        lacking = [o.id for o in observations if channel not in o.channels]
+        if channel not in recorded:
+            found.append(_entry(channel, "not recorded, or prescribed to the model as the load's motion or torque"))
+        elif lacking:
+            found.append(_entry(f"{channel} of {', '.join(lacking)}", "not recorded there, or not usable"))
+    if not all(o.given.initial_tension_observed for o in observations):
+        why = "not observed at rest by load cells: the initial tension is fitted as one share of the stated pretension"
+        found.append(_entry("initial tension, ratio of the pulley radii, zeros of the torques", why))
+    if len(observations) == 1:
+        found.append(_entry("held-out error", "a single recording: nothing can be held out"))
+    if len({round(o.given.recording.path.bend_rad, 3) for o in observations}) == 1:
+        found.append(_entry("friction apart from bend", "one bend angle: only the product of the two is determined"))
+    return found

@@ -1,0 +1,165 @@
+"""A judgement as plain data, the content of diagnosis.json (docs/diagnosis.md)."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from ccmodel import mechanisms as registry
+from ccmodel.channels import short_name, unit_of
+from ccmodel.diagnose import experiment, location, settings
+from ccmodel.diagnose.candidate import CandidateFit, discretisation_shift, fit
+from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.diagnose.observations import NotJudged
+from ccmodel.diagnose.verdict import Judgement, nested_choice
+from ccmodel.failure import ModelError
+from ccmodel.inference.intervals import COVERAGE
+from ccmodel.model.parameters import Parameters, mechanism_key
+
+FORMAT = 1
+
+
+def report(batch: str, judgement: Judgement, estimates: Parameters, not_judged: NotJudged) -> dict:
+    """The content of diagnosis.json."""
+    best, base, whitened = judgement.best, judgement.calibrated, judgement.whitened
+    named = best.hypothesis.acting if judgement.verdict == "explained" else ()
+    shift, failures = _discretisation(judgement) if named else (None, [])
+    open_question = judgement.verdict in ("undecided", "unexplained")
+    return {
+        "format": FORMAT,
+        "batch": batch,
+        "verdict": judgement.verdict,
+        "is_held": base.hypothesis.is_frozen,
+        "location": location.location(judgement),
+        "mechanisms": [
+            _mechanism(best, k, _name_probability(name, judgement.confidence), shift)
+            for k, (name, _) in enumerate(named)
+        ],
+        "alternatives": _alternatives(judgement, dict(named)),
+        "likeliest": [{"name": n, "place": p} for n, p in best.hypothesis.acting if judgement.verdict == "undecided"],
+        "nearest": _nearest(judgement),
+        "fit": {
+            "held_out": [w.id for w in whitened] if len(whitened) > 1 else [],
+            "calibrated": base.values,
+            "mean_square": {"calibrated": base.mean_square, "extended": best.mean_square},
+            "error": held_out_errors(judgement),
+        },
+        "next_experiment": experiment.proposed(judgement, estimates) if open_question else None,
+        "not_judged": [*not_judged, *contradicting_recording(judgement), *_at_bounds(best), *failures],
+    }
+
+
+def _nearest(judgement: Judgement) -> dict | None:
+    """The nearest candidate of an unexplained batch, and its leave-one-out mean square; otherwise None."""
+    if judgement.verdict != "unexplained" or (nearest := judgement.nearest) is None:
+        return None
+    acting = [_mechanism(nearest, k, 0.0) for k in range(len(nearest.hypothesis.acting))]
+    return {
+        "mechanisms": [{key: value for key, value in m.items() if key != "confidence"} for m in acting],
+        "mean_square": nearest.mean_square,
+        "one_fault_at": list(judgement.single_fault_places),
+    }
+
+
+def _alternatives(judgement: Judgement, named: Mapping[str, str]) -> list[dict]:
+    """Every other mechanism with a probability worth mentioning, at its most likely place."""
+    if judgement.verdict in ("agrees", "unexplained"):
+        return []
+    confidence = judgement.confidence
+    every = {acting for hypothesis in confidence for acting in hypothesis.acting}
+    places: dict[str, str] = {}
+    for name, place in sorted(every, key=lambda acting: (-_place_probability(acting, confidence), acting)):
+        places.setdefault(name, place)
+    others = [(n, p, _name_probability(n, confidence)) for n, p in places.items() if n not in named]
+    ranked = sorted(others, key=lambda one: -one[2])[: settings.MOST_ALTERNATIVES]
+    return [{"name": n, "place": p, "confidence": round(c, 4)} for n, p, c in ranked if c > settings.RIVAL]
+
+
+def _name_probability(name: str, confidence: Mapping[Hypothesis, float]) -> float:
+    """Probability that a mechanism acts at any of its places, below certainty."""
+    return min(settings.MOST_CONFIDENT, sum(p for hypothesis, p in confidence.items() if name in hypothesis.names))
+
+
+def _place_probability(acting: tuple[str, str], confidence: Mapping[Hypothesis, float]) -> float:
+    """Probability that a mechanism acts at a place."""
+    return sum(p for hypothesis, p in confidence.items() if acting in hypothesis.acting)
+
+
+def _discretisation(judgement: Judgement) -> tuple[NDArray | None, NotJudged]:
+    """Shift of the best candidate's values on a finer solver, or the reason why there is none."""
+    try:
+        return discretisation_shift(judgement.whitened, judgement.best), []
+    except ModelError as error:
+        return None, [{"what": "discretisation error of the values", "why": str(error)}]
+
+
+def _mechanism(candidate: CandidateFit, k: int, confidence: float, shift: NDArray | None = None) -> dict:
+    """A mechanism's values, corrected for the discretisation error, with intervals that contain the correction.
+
+    The model file keeps the values as fitted, which are the best on the solver that runs them.
+    """
+    name, place = candidate.hypothesis.acting[k]
+    names = list(candidate.values)
+    shift = np.zeros(len(names)) if shift is None else shift
+    sds = np.hypot(np.sqrt(np.diag(candidate.covariance).clip(0.0)), shift)
+    # With infinite degrees of freedom this is the normal distribution's quantile.
+    reach = student.ppf(0.5 + COVERAGE / 2, candidate.degrees_of_freedom) * sds
+    free = candidate.hypothesis.free(candidate.values)
+    parameters = []
+    for p in registry.get(name).parameters:
+        key = mechanism_key(name, place, p.name)
+        i, low, high = names.index(key), free[key].low, free[key].high
+        value = float(np.clip(candidate.values[key] + shift[i], low, high))
+        interval = {"low": max(float(value - reach[i]), low), "high": min(float(value + reach[i]), high)}
+        parameters.append({"name": p.name, "value": value, **interval, "unit": p.unit.replace(" ", "*")})
+    return {"name": name, "place": place, "confidence": round(confidence, 4), "parameters": parameters}
+
+
+def held_out_errors(judgement: Judgement) -> dict[str, dict]:
+    """Root mean square error on held-out recordings by channel, before and after, and the noise floor."""
+    chosen = nested_choice(judgement)
+    squares: dict[str, list[tuple[float, float, float]]] = {}
+    for i, w in enumerate(judgement.whitened):
+        o = w.observations
+        before, after = (o.with_parameters(c.held_out(i, w)).errors({}) for c in (judgement.calibrated, chosen[i]))
+        for c, channel in enumerate(o.channels):
+            row = *(np.mean((e[c] * o.sigma[c]) ** 2) for e in (before, after)), w.noise_floor[channel] ** 2
+            squares.setdefault(channel, []).append(row)
+    found = {}
+    for channel, rows in squares.items():
+        before, after, noise = np.sqrt(np.mean(rows, axis=0)).tolist()
+        name = short_name(channel)
+        found[name] = {"before": before, "after": after, "noise": noise, "unit": unit_of(channel).replace(" ", "*")}
+    return found
+
+
+def contradicting_recording(judgement: Judgement) -> NotJudged:
+    """Of an unexplained batch, the recording without which the calibrated model is adequate; a list of one or none."""
+    base, whitened = judgement.calibrated, judgement.whitened
+    if judgement.verdict != "unexplained" or len(whitened) < settings.FEWEST_TO_CONTRADICT:
+        return []
+    worst = int(np.argmax(base.by_recording))
+    others = [w for i, w in enumerate(whitened) if i != worst]
+    try:
+        without = fit(others, base.hypothesis, base.free, base.values).mean_square
+    except (ModelError, ValueError):
+        return []
+    if without > settings.ADEQUATE:
+        return []
+    why = (
+        f"the calibrated model has a mean square of {without:.2f} (1: noise) in the others without it, and of"
+        f" {float(base.by_recording[worst]):.3g} in this one: check its bend, pretension and wiring against the batch"
+        " file"
+    )
+    return [{"what": whitened[worst].id, "why": why}]
+
+
+def _at_bounds(candidate: CandidateFit) -> NotJudged:
+    """Calibrated values that stand at one of their bounds."""
+    found = []
+    for name, free in candidate.free.items():
+        value = candidate.values[name]
+        if any(np.isclose(value, bound, rtol=settings.AT_BOUND, atol=0.0) for bound in (free.low, free.high)):
+            found.append({"what": name, "why": f"stands at the end of its range, {value:.4g}: not a value to rely on"})
+    return found

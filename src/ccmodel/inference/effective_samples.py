@@ -1,0 +1,36 @@
+"""How many independent samples a channel of a recording counts as.
+
+A recording has thousands of samples, whose errors are correlated over long times: beyond the sensors' noise a model is
+wrong alike from sample to sample. Each channel of a recording therefore counts as a fixed number of independent
+samples. Neither number below is derived from the errors' autocorrelation; both were chosen.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+# Of a channel in a fit of parameters.
+IN_FITS = 100
+# Of a channel in a comparison of candidate models.
+IN_DIAGNOSIS = 20
+
+
+def fit_weight(observations) -> float:
+    """Weight of each squared error of a recording in a fit, so that a channel counts as `IN_FITS` samples at most."""
+    return min(1.0, IN_FITS / observations.measured.shape[1])
+
+
+def mean_weight(observations) -> float:
+    """Weight of each squared error of a recording where every recording counts by its mean square."""
+    return 1.0 / observations.measured.size
+
+
+def in_comparison(recordings: Sequence) -> float:
+    """Independent samples that recordings together give in a comparison of models.
+
+    The tolerance stands for errors that a model makes in the same way in every recording: its share of the variance
+    counts once, as the mean over recordings, and not once for each of them.
+    """
+    samples = np.array([IN_DIAGNOSIS * len(r.channels) for r in recordings])
+    shared = np.array([r.tolerance_share for r in recordings])
+    return float(np.sum(samples * (1 - shared)) + np.mean(samples * shared))

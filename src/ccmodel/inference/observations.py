@@ -1,0 +1,136 @@
+"""A recording prepared for a fit: the model's input, the samples that are compared and the noise of each."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ccmodel.channels import MEASURED, TAU_OUT
+from ccmodel.failure import ModelError
+from ccmodel.inference.noise import PHASES, drive_errors, rounding_errors, sensor_noise, size_over_time
+from ccmodel.model.parameters import Parameters
+from ccmodel.model.run import PRESCRIBED, LoadFrom, ModelInput, simulate
+from ccmodel.recording import Recording
+
+# Standard deviation of the model discrepancy, as a share of a channel's peak to peak: one for all, or by channel.
+Tolerance = float | Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Observations:
+    """A recording prepared for a fit.
+
+    Attributes
+    ----------
+    given : ModelInput
+    parameters : Parameters
+        The batch's estimates; the unknowns of a fit replace some of them.
+    channels : tuple of str
+        Channels that are compared.
+    judged : ndarray of bool, shape (n,)
+        Samples that are compared: those after the rest and the start-up transient.
+    measured, sigma : ndarray, shape (channels, judged samples)
+        Values and their standard deviation, in the channels' units.
+    tolerance : ndarray, shape (channels,)
+        Standard deviation of the model discrepancy within `sigma`, as a share of the channel's peak to peak.
+    offset_is_free : bool
+        Whether the sub-count offset of the drive encoder is an unknown of the fit. Otherwise it is part of the noise.
+    load_from : {"law", "torque"}
+        Whether the load's law or the measured load torque acts at the cables' far end.
+    """
+
+    given: ModelInput
+    parameters: Parameters
+    channels: tuple[str, ...]
+    judged: NDArray
+    measured: NDArray
+    sigma: NDArray
+    tolerance: NDArray
+    offset_is_free: bool = False
+    load_from: LoadFrom = "law"
+
+    @classmethod
+    def of(
+        cls,
+        recording: Recording,
+        parameters: Parameters,
+        channels: Sequence[str] = MEASURED,
+        step_s: float | None = None,
+        tolerance: Tolerance = 0.0,
+        offset_is_free: bool = False,
+    ) -> "Observations":
+        """Observations from a recording, one sample every `step_s`.
+
+        Raises
+        ------
+        ModelError
+            If none of the channels was recorded, or the model cannot be run with the parameters.
+        """
+        given = ModelInput.of(recording, step_s)
+        prescribed = {c for c, source in simulate(given, parameters).derived_from.items() if source == PRESCRIBED}
+        used = tuple(c for c in channels if c in recording and c not in prescribed)
+        if not used:
+            raise ModelError(f"{recording.batch}/{recording.id}: none of {', '.join(channels)} was recorded")
+        time_s = given.recording.time_s
+        judged = time_s >= max(recording.rest_s, recording.settled_s)
+        sensors, drive = sensor_noise(given), drive_errors(given, parameters, offset_is_free)
+        measured = np.stack([given.recording[c][judged] for c in used])
+        sigma = np.stack([np.hypot(sensors[c], size_over_time(drive[c], time_s)[judged]) for c in used])
+        by_channel = tolerance if isinstance(tolerance, Mapping) else dict.fromkeys(used, tolerance)
+        shares = np.array([by_channel.get(c, 0.0) for c in used])
+        sigma = np.hypot(sigma, (shares * np.ptp(measured, axis=1))[:, None])
+        return cls(given, parameters, used, judged, measured, sigma, shares, offset_is_free)
+
+    def without(self, channel: str) -> "Observations":
+        """The same without one of the channels."""
+        kept = [k for k, c in enumerate(self.channels) if c != channel]
+        channels = tuple(self.channels[k] for k in kept)
+        series = {name: getattr(self, name)[kept] for name in ("measured", "sigma", "tolerance")}
+        return replace(self, channels=channels, **series)
+
+    def driven_by_torque(self) -> "Observations":
+        """The same with the measured load torque in place of the load's law."""
+        return replace(self.without(TAU_OUT), load_from="torque")
+
+    def with_parameters(self, parameters: Parameters) -> "Observations":
+        """The same for a model with other parameters."""
+        return replace(self, parameters=parameters)
+
+    @property
+    def tolerance_share(self) -> float:
+        """Share of the variance `sigma**2` that the tolerance makes up, averaged over all samples."""
+        return float(np.mean(((self.tolerance * np.ptp(self.measured, axis=1))[:, None] / self.sigma) ** 2))
+
+    @property
+    def id(self) -> str:
+        """The recording's name within its batch."""
+        return self.given.recording.id
+
+    @property
+    def name(self) -> str:
+        """Batch and recording."""
+        return f"{self.given.recording.batch}/{self.given.recording.id}"
+
+    def modelled(self, values: Mapping[str, float]) -> NDArray:
+        """The model's channels with some parameters replaced, shape (channels, judged samples)."""
+        simulated = simulate(self.given, self.parameters.with_values(values), self.load_from)
+        return np.stack([simulated[c][self.judged] for c in self.channels])
+
+    def errors(self, values: Mapping[str, float]) -> NDArray:
+        """Model minus recording over the noise, shape (channels, judged samples)."""
+        return (self.modelled(values) - self.measured) / self.sigma
+
+    def drive_errors(self, values: Mapping[str, float]) -> NDArray:
+        """Draws of the error over the noise that the uncertain drive motion causes; (draws, channels, samples)."""
+        found = drive_errors(self.given, self.parameters.with_values(values), self.offset_is_free)
+        return np.stack([found[c][:, self.judged] for c in self.channels], axis=1) / self.sigma
+
+    def rounding_errors(self, values: Mapping[str, float]) -> NDArray:
+        """Draws of the rounding error over the noise of counted angles; (phases, channels, samples)."""
+        simulated, steps = self.modelled(values), self.given.recording.encoder_step_rad
+        found = np.zeros((PHASES.size, *simulated.shape))
+        for k, channel in enumerate(self.channels):
+            if channel in steps:
+                found[:, k] = rounding_errors(simulated[k], steps[channel])
+        return found / self.sigma

@@ -1,0 +1,34 @@
+"""Work on every recording, side by side, on as many threads as the run was given.
+
+Compiled solvers release Python's lock, so threads are enough. Results come in the order of the recordings and do not
+depend on the number of threads.
+"""
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+_threads: int | None = None
+
+
+def set_threads(count: int | None) -> None:
+    """Use so many threads from now on; None: one for each processor that this process may run on."""
+    global _threads
+    _threads = count
+
+
+def threads() -> int:
+    """Number of threads in use."""
+    return _threads or len(os.sched_getaffinity(0))
+
+
+def each(items: Sequence, work: Callable) -> list:
+    """``work(i, item)`` for every item; results in their order.
+
+    Raises
+    ------
+    Exception
+        The first that any of the calls raised.
+    """
+    with ThreadPoolExecutor(threads()) as pool:
+        return list(pool.map(work, range(len(items)), items))

@@ -1,0 +1,55 @@
+"""pyproject.toml names every dependency, and the conda environment of the jobs has the same list."""
+
+import ast
+import sys
+import tomllib
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+from ruamel.yaml import YAML
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+# The conda environment is that of a job. Snakemake starts the job from outside; pip and hatchling install the package.
+RUNS_JOBS, INSTALLS = {"snakemake"}, {"pip", "hatchling"}
+
+
+def by_name(requirements):
+    parsed = [Requirement(text) for text in requirements]
+    return {canonicalize_name(r.name): r.specifier for r in parsed}
+
+
+def imported(package):
+    """Top-level names of other packages that a package imports, anywhere in its modules."""
+    names = set()
+    for file in (ROOT / "src" / package).rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.Import):
+                names |= {alias.name.partition(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                names.add(node.module.partition(".")[0])
+    return names - set(sys.stdlib_module_names) - {package}
+
+
+@pytest.mark.parametrize("package", ["ccmodel", "virtualrig"])
+def test_what_a_package_imports_is_a_dependency(package):
+    distributions = packages_distributions()
+    missing = {
+        name
+        for name in imported(package)
+        if not {canonicalize_name(d) for d in distributions[name]} & by_name(PROJECT["dependencies"]).keys()
+    }
+    assert missing == set()
+
+
+def test_the_conda_environment_has_the_same_dependencies():
+    listed = by_name(YAML(typ="safe").load(ROOT / "workflow/envs/ccmodel.yaml")["dependencies"])
+    assert listed.pop("python") == Requirement(f"python{PROJECT['requires-python']}").specifier
+    wanted = by_name(PROJECT["dependencies"])
+    assert {name: listed[name] for name in listed.keys() - INSTALLS} == {
+        name: wanted[name] for name in wanted.keys() - RUNS_JOBS
+    }
+    assert listed.keys() >= INSTALLS
