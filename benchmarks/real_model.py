@@ -75,7 +75,7 @@ def held_out(
 
 
 def rows(batch: Path, model_file: Path) -> tuple[list[dict], list[Observations], dict]:
-    """One row for each channel and held-out condition, in the form of `real_regressor`, with observations and errors."""
+    """One row for each channel and held-out condition, as in `real_regressor`; then the observations and errors."""
     ingested = ingest_batch(batch)
     stated = load_config(CONFIG).diagnosing
     model = read_model(model_file)
