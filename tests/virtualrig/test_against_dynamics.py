@@ -1,4 +1,4 @@
-"""A few effects of `benchmarks/against_dynamics.py` on a coarse grid: the general solver agrees with dynamics."""
+"""The general solver agrees with explicit dynamics for a few effects of `benchmarks/against_dynamics.py`."""
 
 import sys
 
