@@ -8,11 +8,10 @@ report: "workflow/report/overview.rst"
 
 include: "workflow/rules/common.smk"
 include: "workflow/rules/ingest.smk"
-include: "workflow/rules/identify.smk"
+include: "workflow/rules/fit.smk"
 include: "workflow/rules/simulate.smk"
-include: "workflow/rules/compare.smk"
-include: "workflow/rules/phases.smk"
 include: "workflow/rules/diagnose.smk"
+include: "workflow/rules/studies.smk"
 include: "workflow/rules/report.smk"
 
 

@@ -7,12 +7,12 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from numpy.random import Generator
 
-from proof.effects import ENTRIES, merged
-from proof.plan import EffectPlan, Plan, read_plan
+from proof.plan import Plan, read_plan
 from proof.recording_draw import Conditions, draw_held_out, draw_recordings
 from proof.rig_draw import draw_campaign, log_uniform
 from virtualrig.config import Campaign, RecordingPlan
-from virtualrig.effects import Effects
+from virtualrig.effects import TWINS, Effects, merged
+from virtualrig.effects.contract import Twin
 
 CLEAN = "none"
 SEVERITIES = 3
@@ -132,7 +132,7 @@ def draw(seed: int, kind: str | None = None, effect: str | None = None) -> Case:
     drawn = [_effect(*chosen, spring, random) for chosen in _chosen(kind, effect, plan, random)]
     truth = tuple(t for t, _ in drawn)
     campaign = draw_campaign(seed, plan, spring, Effects.model_validate(merged([e for _, e in drawn])), random)
-    truth = tuple(_with_rig_damping(t, campaign) for t in truth)
+    truth = tuple(_in_rig(t, campaign) for t in truth)
     conditions = Conditions(
         pretension_N=random.uniform(*plan.rig.pretension_N),
         bend_rad=random.uniform(*(protocol.bend_rad or plan.rig.bend_rad)),
@@ -170,42 +170,35 @@ def _protocol_of(kind: str, plan: Plan, random: Generator) -> str:
     return _one_of(plan.protocol_shares, random)
 
 
-def _chosen(kind: str, effect: str | None, plan: Plan, random: Generator) -> list[tuple[str, EffectPlan, float]]:
-    """Names, plans and strengths of a case's effects."""
+def _chosen(kind: str, effect: str | None, plan: Plan, random: Generator) -> list[tuple[Twin, float]]:
+    """Effects of a case, and their strengths (`Truth.strength`)."""
     if kind == "clean":
         return []
     if kind == "unlisted":
         name = effect or str(random.choice(list(plan.unlisted)))
-        return [(name, plan.unlisted[name], random.uniform())]
+        return [(plan.unlisted[name], random.uniform())]
     if kind == "pair":
         both = random.choice(list(plan.effects), 2, replace=False)
-        return [(str(name), plan.effects[name], random.uniform(*plan.pair_strength)) for name in both]
+        return [(plan.effects[name], random.uniform(*plan.pair_strength)) for name in both]
     name = effect or str(random.choice(list(plan.effects)))
-    return [(name, plan.effects[name], random.uniform())]
+    return [(plan.effects[name], random.uniform())]
 
 
-def _effect(name: str, spec: EffectPlan, strength: float, spring: float, random: Generator) -> tuple[Truth, dict]:
-    low, high = spec.size
+def _effect(twin: Twin, strength: float, spring: float, random: Generator) -> tuple[Truth, dict]:
+    """An effect of a given strength as its truth and its settings of the rig; `spring` is the load's, N m/rad."""
+    low, high = twin.size
     size = float(low * (high / low) ** strength)
-    if spec.signed and random.uniform() < 0.5:
+    if twin.signed and random.uniform() < 0.5:
         size = -size
-    also = {key: log_uniform(between, random) for key, between in spec.also.items()}
+    also = {key: log_uniform(between, random) for key, between in twin.also.items()}
     also["phase"] = random.uniform(-np.pi, np.pi)
-    place = str(random.choice(spec.places))
-    entered, values = ENTRIES[name](size, also, place, spring)
+    place = str(random.choice(twin.places))
+    settings, values = twin.seed(size, also, place, spring)
     severity = min(int(strength * SEVERITIES) + 1, SEVERITIES)
-    return Truth(name, place, float(strength), severity, size, spec.unit, values), entered
+    return Truth(twin.name, place, float(strength), severity, size, twin.unit, values), settings
 
 
-def _with_rig_damping(truth: Truth, campaign: Campaign) -> Truth:
-    """A viscous film's true value, with all other resistance of this rig that is proportional to speed.
-
-    Added are the drag on its cables, which follows the same law, and the damping of its load, expressed as a drag on
-    both cables. No recording can separate these from the film.
-    """
-    if truth.name != "viscous-friction":
-        return truth
-    rig = campaign.rig
-    cables = campaign.numerics.drag_rate_per_s * rig.cable.density_kg_per_m
-    load = rig.load.damping_Nms_per_rad / (2 * rig.pulley_radius_m**2 * rig.cable.length_m)
-    return replace(truth, values={"c": truth.values["c"] + cables + load})
+def _in_rig(truth: Truth, campaign: Campaign) -> Truth:
+    """The true values, including what follows the same law in this rig and no recording separates from the effect."""
+    in_rig = TWINS[truth.name].in_rig
+    return replace(truth, values=in_rig(truth.values, campaign)) if in_rig else truth

@@ -22,7 +22,6 @@ GUARD = Path(__file__).with_name("guard.py")
 BUILDER = (
     "proof.yaml",
     "plan.py",
-    "effects.py",
     "cases.py",
     "rig_draw.py",
     "recording_draw.py",

@@ -8,11 +8,13 @@ import yaml
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
 from virtualrig.config import Repeatability
+from virtualrig.effects import TWINS
+from virtualrig.effects.contract import Range, Twin
 from virtualrig.motion import Excitation
 from virtualrig.strict import NonNegative, Share, Strict
 
 PLAN = Path(__file__).with_name("proof.yaml")
-Range = tuple[float, float]
+UNLISTED = "unlisted-"
 
 
 class RigPlan(Strict):
@@ -119,16 +121,6 @@ class KeptBackPlan(Strict):
     turn_share: Share
 
 
-class EffectPlan(Strict):
-    """Places and range of sizes of an effect; `also` holds ranges of its further parameters."""
-
-    places: tuple[str, ...] = Field(min_length=1)
-    size: Range
-    unit: str
-    signed: bool = False
-    also: dict[str, Range] = Field(default_factory=dict)
-
-
 class FixedCase(Strict):
     """A case whose seed is fixed."""
 
@@ -158,10 +150,28 @@ class Plan(Strict):
     pair_strength: Range
     protocols: dict[str, Protocol]
     kept_back: KeptBackPlan
-    effects: dict[str, EffectPlan]
-    unlisted: dict[str, EffectPlan]
+    order: tuple[str, ...]
     quick: tuple[FixedCase, ...]
     full: Full
+
+    @property
+    def effects(self) -> dict[str, Twin]:
+        """Effects that a mechanism models, in the order in which they are drawn."""
+        return {name: twin for name, twin in self._drawn() if not name.startswith(UNLISTED)}
+
+    @property
+    def unlisted(self) -> dict[str, Twin]:
+        """Effects that no mechanism models, in the order in which they are drawn."""
+        return {name: twin for name, twin in self._drawn() if name.startswith(UNLISTED)}
+
+    def _drawn(self) -> list[tuple[str, Twin]]:
+        return [(name, TWINS[name]) for name in (*self.order, *sorted(TWINS.keys() - set(self.order)))]
+
+    @model_validator(mode="after")
+    def _order_is_of_effects(self) -> Self:
+        if unknown := set(self.order) - TWINS.keys():
+            raise ValueError(f"the virtual rig has no effect {', '.join(sorted(unknown))}")
+        return self
 
     @model_validator(mode="after")
     def _shares_are_whole(self) -> Self:

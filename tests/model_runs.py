@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ccmodel.config import ModelStudies
 from ccmodel.model.parameters import Parameters
+from ccmodel.studies.claims.settings import ModelStudies
 
 CABLE = Parameters(7750.0, 1.2, 0.156, 0.006, 0.006, 0.05)
 PULLED = Parameters(

@@ -14,7 +14,7 @@ from ccmodel.typed import InputError
 
 
 class _FormerOptions(TyperGroup):
-    """Takes options under the names that they had before, and says what they are called now."""
+    """Accepts former names of options, with a message on the current name."""
 
     renamed: ClassVar = {
         "--allowance": "--tolerance",
@@ -24,7 +24,7 @@ class _FormerOptions(TyperGroup):
     }
 
     def parse_args(self, ctx, args):
-        """Click's own, with every option under its current name."""
+        """Parse with every option under its current name."""
         current = []
         for word in args:
             option, equals, value = word.partition("=")
@@ -44,91 +44,87 @@ Folder = Annotated[Path, typer.Argument()]
 
 @app.command()
 def check(batch: Folder) -> None:
-    """Read a batch folder and say what is wrong with it; exits 1 where something cannot be used."""
+    """Check a batch folder and print all findings; exits with 1 if a file cannot be used."""
     from ccmodel.rig.ingest import ingest_batch
 
     ingested = ingest_batch(batch)
     for recording in ingested.recordings:
         typer.echo(f"{recording.id}: {recording.time_s.size} samples, {', '.join(recording.channels)}")
     for finding in ingested.findings:
-        _say(str(finding), finding.severity)
+        _print_finding(str(finding), finding.severity)
     if any(f.severity == "refused" for f in ingested.findings):
         raise typer.Exit(1)
 
 
 @app.command("import-mis-tool")
 def import_mis_tool(
-    source: Folder, out: Annotated[Path, typer.Option(help="Folder that gets a batch folder a tool and wrist angle.")]
+    source: Folder,
+    out: Annotated[Path, typer.Option(help="Folder for the batches, one for each tool and angle.")],
 ) -> None:
-    """Turn the public da Vinci instrument recordings below SOURCE into batches."""
+    """Convert the public da Vinci instrument recordings in SOURCE to batches."""
     from ccmodel.rig import mis_tool
 
     imported = mis_tool.import_mis_tool(source, out)
     for batch in imported.batches:
         typer.echo(str(batch))
     for finding in imported.findings:
-        _say(str(finding), finding.severity)
+        _print_finding(str(finding), finding.severity)
 
 
 @app.command("left-out")
 def left_out(results: Folder) -> None:
-    """Say what the last run left out and warned of; exits 1 where something was left out."""
-    from ccmodel.stages.report import left_out_of
+    """Print what the last run left out, and its warnings; exits with 1 if it left something out."""
+    from ccmodel.report.page import left_out_of
 
-    said = left_out_of(results)
-    for line in said.warnings:
-        _say(line, "warning")
-    for line in said.left_out:
-        _say(line, "refused")
-    if said.left_out:
+    messages = left_out_of(results)
+    for line in messages.warnings:
+        _print_finding(line, "warning")
+    for line in messages.left_out:
+        _print_finding(line, "refused")
+    if messages.left_out:
         raise typer.Exit(1)
 
 
 @app.command()
 def diagnose(
     batch: Folder,
-    out: Annotated[Path, typer.Option(help="Folder that gets diagnosis.json, the page and the models.")],
-    without: Annotated[list[str], typer.Option(help="A mechanism that is not to be asked for; may be repeated.")] = [],  # noqa: B006
+    out: Annotated[Path, typer.Option(help="Folder for diagnosis.json, the page and the models.")],
+    without: Annotated[list[str], typer.Option(help="Mechanism that is no candidate; may be repeated.")] = [],  # noqa: B006
     tolerance: Annotated[
         list[str],
-        typer.Option(help="SHARE of peak to peak that a right model may leave; or as tau_in_Nm=0.02, repeated."),
+        typer.Option(help="Tolerance as a SHARE of peak to peak, or by channel as tau_in_Nm=0.02, repeated."),
     ] = [],  # noqa: B006
-    step: Annotated[float | None, typer.Option(min=1e-4, help="Compare a sample every so often, s.")] = None,
-    cycles: Annotated[int | None, typer.Option(min=1, help="Compare so many cycles of a sine.")] = None,
-    baseline: Annotated[
-        Path | None, typer.Option(help="A model file: ask what is missing besides what it has.")
-    ] = None,
-    freeze: Annotated[
-        bool, typer.Option("--freeze", help="Fit nothing of that model anew: ask what has changed.")
-    ] = False,
+    step: Annotated[float | None, typer.Option(min=1e-4, help="Time between compared samples, s.")] = None,
+    cycles: Annotated[int | None, typer.Option(min=1, help="Number of compared cycles of a sine.")] = None,
+    baseline: Annotated[Path | None, typer.Option(help="Model file to start from, instead of the estimates.")] = None,
+    freeze: Annotated[bool, typer.Option("--freeze", help="Keep all values of the baseline: find a change.")] = False,
     candidate: Annotated[
         list[str],
-        typer.Option(help="As 'kink at conduit', or two with a comma, to fit whatever the screening says."),
+        typer.Option(help="As 'kink at conduit', or two with a comma: fit it in full whatever the screening says."),
     ] = [],  # noqa: B006
-    strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 unless it agrees: for a watch.")] = False,
+    strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 unless the model agrees.")] = False,
 ) -> None:
-    """Say whether the calibrated model explains a batch, and if not: where it fails and what was left out."""
-    from ccmodel.config import Diagnosing
-    from ccmodel.stages.diagnose import diagnose as run
+    """Decide whether the calibrated model explains a batch; if not, locate and name the physics left out."""
+    from ccmodel.studies.diagnosis.run import diagnose as run
+    from ccmodel.studies.diagnosis.settings import Diagnosing
 
-    forced_candidates = [[one.strip() for one in stated.split(",")] for stated in candidate]
+    forced = [[one.strip() for one in stated.split(",")] for stated in candidate]
+    shares = _tolerance(tolerance)
     try:
-        judged = Diagnosing(
-            tolerance=_tolerance(tolerance), step_s=step, cycles=cycles, forced_candidates=forced_candidates
-        )
+        settings = Diagnosing(tolerance=shares, step_s=step, cycles=cycles, forced_candidates=forced)
     except ValidationError as error:
-        # One of a tolerance's two forms always has another type, which is no news.
-        said = next(e for e in error.errors() if e["type"] not in ("float_type", "dict_type"))
-        option = "--tolerance" if said["loc"] else "--candidate"
-        raise InputError(f"{option}: {said['msg'].removeprefix('Value error, ')}") from None
-    said = run(batch, out, without, lambda text: _err.print(text, style="dim", markup=False), judged, baseline, freeze)
-    typer.echo(said["headline"])
-    if strict and said["verdict"] != "agrees":
+        # A tolerance is a number or a dict; the error on the form that was not used is of no interest.
+        first = next(e for e in error.errors() if e["type"] not in ("float_type", "dict_type"))
+        option = "--tolerance" if first["loc"] else "--candidate"
+        raise InputError(f"{option}: {first['msg'].removeprefix('Value error, ')}") from None
+    diagnosis = run(batch, out, settings, without, _progress, baseline, freeze)
+    typer.echo(diagnosis["headline"])
+    if strict and diagnosis["verdict"] != "agrees":
         raise typer.Exit(1)
 
 
 def _tolerance(stated: list[str]) -> float | dict[str, float]:
-    """One share for all channels, or one a channel."""
+    """One share for all channels, or one for each channel."""
     from ccmodel.channels import MEASURED
 
     try:
@@ -147,22 +143,22 @@ def _tolerance(stated: list[str]) -> float | dict[str, float]:
 def predict(
     batch: Folder,
     model: Annotated[Path, typer.Option(help="A model file, as a diagnosis or a fit writes it.")],
-    out: Annotated[Path, typer.Option(help="Folder that gets a CSV a recording.")],
+    out: Annotated[Path, typer.Option(help="Folder for the predictions, a CSV for each recording.")],
 ) -> None:
-    """Say what the sensors of a batch's recordings would read, by a fitted model, and how far off that is.
+    """Predict the sensor readings of a batch's recordings by a fitted model, and print the errors.
 
-    Exits with 1 where it cannot be said.
+    Exits with 1 if a recording has no prediction.
     """
-    from ccmodel.stages.predict import predict as run
+    from ccmodel.steps.predict import predict as run
 
-    said, errors = run(batch, model, out)
+    messages, errors = run(batch, model, out)
     if len(errors):
         typer.echo("root mean square error over the last cycle, % of peak to peak")
         by_channel = errors.pivot(index="recording", columns="channel", values="nrmse_percent")
         typer.echo(by_channel[errors["channel"].unique()].to_string(float_format="%.2f"))
-    for line in said:
-        _say(line, "refused")
-    if said:
+    for line in messages:
+        _print_finding(line, "refused")
+    if messages:
         raise typer.Exit(1)
 
 
@@ -171,12 +167,12 @@ def simulate(
     motion: Annotated[Path, typer.Argument(help="CSV with the columns time_s and theta_in_rad.")],
     model: Annotated[Path, typer.Option(help="A model file, as a diagnosis or a fit writes it.")],
     batch: Annotated[Path, typer.Option(help="Folder of a batch of the rig.")],
-    out: Annotated[Path, typer.Option(help="File that gets what the sensors would read, CSV.")],
-    recording: Annotated[str | None, typer.Option(help="Whose conduits and pretension; else the first one's.")] = None,
-    pretension: Annotated[float | None, typer.Option(min=0.0, help="Of both cables, N; else that recording's.")] = None,
+    out: Annotated[Path, typer.Option(help="File for the sensor readings, CSV.")],
+    recording: Annotated[str | None, typer.Option(help="Recording with the conduits; else the first.")] = None,
+    pretension: Annotated[float | None, typer.Option(min=0.0, help="Pretension, N; else that recording's.")] = None,
 ) -> None:
-    """Say what the sensors would read if the drive of a rig moved so, by a fitted model."""
-    from ccmodel.stages.simulate_motion import simulate_motion as run
+    """Simulate the sensor readings of a rig for a motion of its drive, by a fitted model."""
+    from ccmodel.steps.predict import simulate_motion as run
 
     run(motion, model, batch, out, recording, pretension)
 
@@ -184,14 +180,14 @@ def simulate(
 @app.command("table-one")
 def table_one(
     settings: Annotated[Path, typer.Argument(help="config/table-one.yaml or one like it.")],
-    out: Annotated[Path, typer.Option(help="Folder that gets the tables.")],
-    figure: Annotated[Path, typer.Option(help="File that gets the figure, PNG or SVG.")],
-    cores: Annotated[int, typer.Option(min=1, help="Processes to share the work.")] = 1,
+    out: Annotated[Path, typer.Option(help="Folder for the tables.")],
+    figure: Annotated[Path, typer.Option(help="File for the figure, PNG or SVG.")],
+    cores: Annotated[int, typer.Option(min=1, help="Number of processes.")] = 1,
 ) -> None:
-    """Ask which left-out effect, and of which size, errs as the paper's Table I does."""
-    from ccmodel.stages.table_one import table_one as run
+    """Find the left-out effects, and their sizes, that give the errors of the paper's Table I."""
+    from ccmodel.studies.table_one.study import table_one as run
 
-    typer.echo(run(settings, out, figure, cores, tell=lambda text: _err.print(text, style="dim", markup=False)))
+    typer.echo(run(settings, out, figure, cores, _progress))
 
 
 @app.command()
@@ -226,14 +222,18 @@ def schema() -> None:
     typer.echo(json.dumps(Config.model_json_schema(), indent=1))
 
 
-def _say(line: str, severity: str) -> None:
-    style = {"warning": "yellow", "refused": "red"}[severity]
-    _err.print(f"[{style}]{'warning' if severity == 'warning' else 'left out'}[/]: ", end="")
+def _progress(text: str) -> None:
+    _err.print(text, style="dim", markup=False)
+
+
+def _print_finding(line: str, severity: str) -> None:
+    style, word = {"warning": ("yellow", "warning"), "refused": ("red", "left out")}[severity]
+    _err.print(f"[{style}]{word}[/]: ", end="")
     _err.print(line, markup=False)
 
 
 def main() -> None:
-    """Entry point: what a user gave wrong is one line each and exit code 2, not a trace."""
+    """Entry point: an input error is printed as one line for each problem, without a traceback, and exits with 2."""
     try:
         app()
     except InputError as error:

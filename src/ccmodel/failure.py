@@ -1,5 +1,5 @@
-"""How a model says that it could not be run."""
+"""The error of a model that cannot be run."""
 
 
 class ModelError(ValueError):
-    """The model cannot be run, or its step has no solution; the text says where and what to do."""
+    """The model cannot be run, or its step has no solution; the text says where, and what to do."""

@@ -1,4 +1,4 @@
-"""What every pipeline job does with its log."""
+"""The frame of every job of the pipeline: its log and its threads."""
 
 import logging
 import sys
@@ -6,10 +6,16 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr
 
+from ccmodel.inference.pool import set_threads
+
 
 @contextmanager
-def logged(file: str) -> Iterator[None]:
-    """Send warnings, log lines and the trace of a failure to a job's log file; end the job when it fails."""
+def logged(file: str, threads: int = 1) -> Iterator[None]:
+    """Run a job with `threads` threads; write warnings, log lines and a traceback to its log file.
+
+    A job that fails exits with 1.
+    """
+    set_threads(threads)
     with open(file, "w") as log, redirect_stderr(log):
         logging.basicConfig(stream=log, level=logging.INFO, force=True)
         try:

@@ -51,7 +51,7 @@ def kernel(function=None, **options):
     """
     if function is None:
         return partial(kernel, **options)
-    function.__qualname__ += f"_{source_digest(function.__module__)}"
+    function.__qualname__ += f"_{source_digest(function.__module__, discovered=False)}"
     compiled = njit(cache=True, nogil=True, no_cfunc_wrapper=True, **options)(function)
     if hasattr(compiled, "get_call_template"):  # absent if numba is switched off
         _ignore_literals(compiled)

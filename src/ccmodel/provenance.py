@@ -1,4 +1,4 @@
-"""Where a result came from: versions and digests that files of results carry, and what a step's code consists of."""
+"""Provenance of a result: versions and digests that result files carry, and the source files of a pipeline step."""
 
 import ast
 import hashlib
@@ -13,33 +13,42 @@ _ROOT = Path(ccmodel.__file__).parents[1]
 
 
 def files_in(folder: Path) -> list[Path]:
-    """The files of a batch's folder, at any depth; hidden ones (an editor's, a file browser's) are none of it."""
+    """The files of a folder, at any depth, without the hidden ones of editors and file browsers."""
     files = (f for f in Path(folder).rglob("*") if f.is_file())
     return sorted(f for f in files if not any(part.startswith(".") for part in f.relative_to(folder).parts))
 
 
 def of_inputs(paths: Iterable[Path], folder: Path = Path()) -> dict:
-    """Version of the package and the digests of the files that a result was made from, by path from `folder`."""
+    """Version of the package and digests of the input files of a result, by path relative to `folder`."""
     digests = {os.path.relpath(p, folder): hashlib.sha256(Path(p).read_bytes()).hexdigest() for p in paths}
     return {"ccmodel_version": ccmodel.__version__, "sha256": digests}
 
 
 @cache
-def source_digest(module: str) -> str:
-    """Digest of a module of the package with all of the package that it imports, and the templates beside those.
+def source_digest(module: str, discovered: bool = True) -> str:
+    """Digest of the source files of a module (`sources_of`).
 
-    Snakemake sees when a script changes, not when the package behind it does; with this among a rule's params, it
-    reruns what depends on an edited file, and only that. Compiled code is told from older code likewise
+    Snakemake notices a change of a script, not of the package behind it. With this digest among the params of a rule,
+    an edited file reruns the steps that use it and no others. The cache of compiled code is keyed by it too
     (`ccmodel.kernel`).
     """
     digest = hashlib.sha256()
-    for file in sorted(sources_of(module)):
+    for file in sorted(sources_of(module, discovered)):
         digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()[:16]
 
 
-def sources_of(module: str) -> set[Path]:
-    """Files that `source_digest` takes in."""
+def sources_of(module: str, discovered: bool = True) -> set[Path]:
+    """Source files of a module: its own, all of the package that it imports, and the templates in their folders.
+
+    Parameters
+    ----------
+    module : str
+        Name of the module.
+    discovered : bool
+        Whether a package that discovers its modules (`pkgutil.iter_modules`) includes all of them where it is imported
+        itself. A kernel calls only what its module imports by name.
+    """
     files, waiting, seen = set(), [module], set()
     while waiting:
         name = waiting.pop()
@@ -47,30 +56,27 @@ def sources_of(module: str) -> set[Path]:
             continue
         seen.add(name)
         files |= {file, *file.parent.glob("*.j2")}
-        waiting += [name.rpartition(".")[0], *_imports(file)]
+        waiting += [f"{name.rpartition('.')[0]}.__init__", *_imports(file)]
+        if discovered and not name.endswith("__init__") and "iter_modules(__path__)" in file.read_text():
+            waiting += [f"{name}.{found.stem}" for found in file.parent.glob("*.py")]
     return files
 
 
 def _file_of(name: str) -> Path | None:
-    """File of a module or package, found without importing it; None for a name inside a module."""
+    """File of a module or package, without importing it; None for a name inside a module."""
     place = _ROOT.joinpath(*name.split("."))
     candidates = (place.with_suffix(".py"), place / "__init__.py")
-    return next((file for file in candidates if name and file.exists()), None)
+    return next((file for file in candidates if file.exists()), None)
 
 
 @cache
 def _imports(file: Path) -> list[str]:
-    """What a file imports of the package; with `from a import b`, both a and a.b, as b may be a module.
-
-    A package that lists its folder (`iter_modules`) imports all modules in it.
-    """
+    """Modules that a file imports from the package; `from a import b` gives a.b if this is a module, else a."""
     names = []
     for node in ast.walk(ast.parse(file.read_text())):
-        if isinstance(node, ast.Name) and node.id == "iter_modules":
-            package = ".".join(file.parent.relative_to(_ROOT).parts)
-            names += [f"{package}.{module.stem}" for module in file.parent.glob("*.py")]
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+            inner = {f"{node.module}.{alias.name}" for alias in node.names}
+            names += [name if _file_of(name) else node.module for name in inner]
     return [name for name in names if name.partition(".")[0] == ccmodel.__name__]

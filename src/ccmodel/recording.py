@@ -1,4 +1,4 @@
-"""Recording: the one shape that measured and simulated data share."""
+"""Recording: the common type of measured and simulated data, and its netCDF file."""
 
 import json
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ccmodel.channels import CHANNELS, unit_of
 from ccmodel.geometry import ConduitPath
 
-# How figures and pages call each origin: nothing may leave a reader in doubt about where its numbers come from.
+# Names of the origins in figures and pages: a simulated rig must never pass for a measured one.
 ORIGIN = {
     "rig": "recording (measured)",
     "virtual-rig": "recording (virtual rig, simulated)",
@@ -23,37 +23,36 @@ ORIGIN = {
 
 @dataclass(frozen=True)
 class Recording:
-    """One run of a rig or of a model: channels over a common time base, and what they were obtained from.
+    """One run of a rig or a model: channels over a common time base, with their origin.
 
     Attributes
     ----------
     batch, id : str
-        The batch's name and the recording's name within it.
+        Name of the batch, and of the recording within it.
     origin : str
-        Where the numbers come from: "rig" (measured), "virtual-rig" (a simulated rig) or "model".
+        "rig" (measured), "virtual-rig" (a simulated rig) or "model".
     time_s : ndarray, shape (n,)
         Sample times, s, strictly increasing.
     channels : mapping of str to ndarray, each of shape (n,)
-        SI values by channel name (`CHANNELS`). A channel that could not be derived is absent, never zero.
+        SI values by channel name (`CHANNELS`). A channel that cannot be derived is absent, never zero.
     derived_from : mapping of str to str
-        What each channel was computed from.
+        Formula or source of each channel.
     pretension_N : float
-        Tension that was aimed at when the cables were tensioned, N.
+        Nominal tension of the cables, N.
     path : ConduitPath
-        The conduits' path.
+        Path of the conduits.
     accuracy : mapping of str to float
-        Accuracy stated for each measured channel, in the channel's unit; empty for a model.
+        Stated accuracy of each measured channel, in its unit; empty for a model.
     encoder_step_rad : mapping of str to float
-        Angle of one count, rad, of each angle that was counted.
+        Angle of one count, rad, of each angle from an encoder.
     excitation : mapping
-        A note of what was asked of the drive, not of what happened.
+        Commanded motion of the drive, as noted; the actual motion may differ.
     rest_s : float
-        Time up to which the drive has not moved yet, s; 0 where the recording begins in motion. Where there is a
-        rest, angles are zero there.
+        End of the initial rest, s, at which angles are zero on average; 0 if the recording begins in motion.
     settled_s : float
-        Time from which the recording is to be judged, s: later than 0 where it begins with a start-up transient.
+        End of a start-up transient, s: comparisons begin there. 0 if there is none.
     warnings : tuple of str
-        What was found wrong with the recording and yet left it usable.
+        Faults that leave the recording usable.
     """
 
     batch: str
@@ -74,7 +73,7 @@ class Recording:
     def __post_init__(self):
         for name, values in self.channels.items():
             if name not in CHANNELS:
-                raise ValueError(f"{name} is no channel of a recording; channels are {', '.join(CHANNELS)}")
+                raise ValueError(f"{name} is not a channel of a recording; channels are {', '.join(CHANNELS)}")
             if values.shape != self.time_s.shape:
                 raise ValueError(f"{name} has {values.size} samples, time has {self.time_s.size}")
 
@@ -82,14 +81,14 @@ class Recording:
         return channel in self.channels
 
     def __getitem__(self, wanted: str | slice):
-        """A channel by its name, or some of the samples of all channels by a slice."""
+        """A channel by its name, or by a slice the recording with these samples of all channels."""
         if isinstance(wanted, str):
             return self.channels[wanted]
         channels = {name: values[wanted] for name, values in self.channels.items()}
         return replace(self, time_s=self.time_s[wanted], channels=channels)
 
     def with_channels(self, channels: Mapping[str, NDArray], derived_from: Mapping[str, str], origin: str):
-        """The same run with other channels: what a model says of it, or a part of what was measured."""
+        """The same run with other channels: those of a model, or some of the measured ones."""
         return replace(
             self,
             channels=dict(channels),
@@ -100,12 +99,12 @@ class Recording:
 
 
 def stride(recording: Recording, step_s: float | None) -> int:
-    """Samples to step over for one every `step_s` seconds, as near as the recording's own step allows; 1 for None."""
+    """Stride in samples nearest to a step of `step_s` seconds; 1 for None."""
     return 1 if step_s is None else max(1, round(step_s / float(np.median(np.diff(recording.time_s)))))
 
 
 def write_recordings(path: Path, recordings: list[Recording], provenance: Mapping) -> None:
-    """Write recordings to one netCDF file, a group each, with `provenance` (versions, hashes) on the root."""
+    """Write recordings to a netCDF file, one group each, with `provenance` (versions, hashes) on the root."""
     with netCDF4.Dataset(path, "w") as root:
         root.setncatts({"format": "ccmodel recordings 1", "provenance": json.dumps(provenance)})
     for recording in recordings:
@@ -113,7 +112,7 @@ def write_recordings(path: Path, recordings: list[Recording], provenance: Mappin
 
 
 def read_recordings(path: Path) -> list[Recording]:
-    """Read back what `write_recordings` wrote, in the same order."""
+    """Read a file of `write_recordings`, in the same order."""
     with xr.open_datatree(path, engine="netcdf4") as tree:
         return [_from_dataset(name, node.to_dataset()) for name, node in tree.children.items()]
 

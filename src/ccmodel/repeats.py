@@ -1,4 +1,4 @@
-"""What repeats of a condition say: their mean, and a 90 % interval from the scatter that all conditions share."""
+"""Repeated recordings of a condition: means, and intervals from the scatter pooled over all conditions."""
 
 import re
 from collections.abc import Sequence
@@ -13,21 +13,34 @@ _REPEAT = re.compile(r"-[a-z]$")
 
 
 def condition_of(recording: Recording) -> str:
-    """Batch and condition of a recording: its name without the letter (-a, -b, ...) that repeats differ by."""
+    """Batch and condition of a recording: its name without the letter of the repeat (-a, -b, ...)."""
     return f"{recording.batch}/{without_repeat(recording.id)}"
 
 
 def without_repeat(name: str) -> str:
-    """A recording's name without the letter that repeats differ by."""
+    """Name of a recording without the letter of the repeat."""
     return _REPEAT.sub("", name)
 
 
 def pooled_scatter(groups: Sequence[Sequence[float]], relative: bool) -> tuple[float, int]:
-    """Standard deviation of a single recording about the mean of its condition, and its degrees of freedom.
+    """Pooled standard deviation of a recording about the mean of its condition, and its degrees of freedom.
 
-    Two repeats say little by themselves; all conditions are taken to scatter alike, relative to their means or, for
-    shares that may be zero, absolutely. A condition of zeros only is no witness of any scatter. Without a repeat
-    anywhere there is none: (0, 0).
+    Two repeats estimate a standard deviation poorly, so it is assumed equal for all conditions.
+
+    Parameters
+    ----------
+    groups : sequence of sequences of float
+        Values of the repeats of each condition. A condition whose values are all zero is not used.
+    relative : bool
+        Whether the standard deviation is a share of the mean of the condition, or absolute, for values that may be
+        zero.
+
+    Returns
+    -------
+    sd : float
+        0 without repeats.
+    freedom : int
+        0 without repeats.
     """
     square, freedom = 0.0, 0
     for group in groups:
@@ -41,7 +54,7 @@ def pooled_scatter(groups: Sequence[Sequence[float]], relative: bool) -> tuple[f
 
 @dataclass(frozen=True)
 class Estimate:
-    """A condition's mean over its repeats and how sure it is.
+    """Mean of a condition over its repeats, and its uncertainty.
 
     Attributes
     ----------
@@ -49,7 +62,7 @@ class Estimate:
     sd : float
         Standard deviation of the mean.
     freedom : int
-        Degrees of freedom behind `sd`; 0: nothing was repeated, and there is no interval.
+        Degrees of freedom of `sd`; 0 without repeats, and there is no interval.
     count : int
         Number of recordings.
     """
@@ -60,12 +73,12 @@ class Estimate:
     count: int
 
     def reach(self, coverage: float) -> float | None:
-        """Half the interval that holds the mean with probability `coverage`; None without repeats."""
+        """Half width of the confidence interval of the mean; None without repeats."""
         return float(t.ppf(0.5 + coverage / 2, self.freedom) * self.sd) if self.freedom else None
 
 
 def estimates(groups: Sequence[Sequence[float]], relative: bool) -> list[Estimate]:
-    """The mean of every condition, with the scatter pooled over all of them."""
+    """Mean of every condition, with its standard deviation from the pooled scatter."""
     sd, freedom = pooled_scatter(groups, relative)
     found = []
     for group in groups:
@@ -76,6 +89,6 @@ def estimates(groups: Sequence[Sequence[float]], relative: bool) -> list[Estimat
 
 
 def difference(first: Estimate, second: Estimate) -> Estimate:
-    """Second less first."""
+    """Second minus first; the two are independent."""
     sd = float(np.hypot(first.sd, second.sd))
     return Estimate(second.value - first.value, sd, first.freedom, first.count + second.count)

@@ -1,7 +1,8 @@
 """The same dynamics as `virtualrig.dynamics`, with every effect of `virtualrig.effects`.
 
-An effect that is not there costs next to nothing: what it would do stands behind a flag outside the loops over nodes.
-What changes slowly (friction's dependence on tension, time and place) is brought up to date every `SLOW_S`.
+An absent effect costs next to nothing: it stands behind a flag outside the loops over nodes. Friction that depends on
+tension, time and position (`Twin.slow_friction`) is evaluated every `SLOW_S`. The twins' compiled laws are chained to
+one function of each kind; effects with a state of their own stand in the loop below.
 """
 
 from collections import namedtuple
@@ -12,24 +13,20 @@ from numpy.typing import NDArray
 
 from virtualrig.chain import initial_tension, stable_step
 from virtualrig.config import Numerics, Rig
-from virtualrig.effects import DahlPresliding, Eccentricity, Effects, IwanPresliding, PulleyFriction
+from virtualrig.effects import Effects, cached, chained, laws, numbers
+from virtualrig.effects.presliding import DahlPresliding, IwanPresliding
+from virtualrig.effects.pulley_friction import PulleyFriction
 from virtualrig.grid import Grid
 from virtualrig.trajectory import Preparation, Trajectory, check_tensions
 
 SLOW_S = 1e-4
 # A conduit follows its cable's mean tension within this time: far below any motion, well above the time step.
 CONDUIT_LAG_S = 1e-4
-# Over which a friction torque that is not there would build up.
-ANY_RAD = 1.0
+# A tension (N), time (s), travel and position (m) at which every law of slow friction that is present has an effect.
+ANY_STATE = (2.3, 0.7, 0.011, 0.0037)
 
-Physics = namedtuple(
-    "Physics",
-    "bristle_length stribeck_rise stribeck_speed stribeck_exponent stribeck_renewal tension_exponent reference floor "
-    "run_in_change run_in_scale run_in_by_travel bias wear_rise wear_period wear_phase "
-    "has_settling settling_is_exponential conduit_compliance "
-    "radius drive_share drive_phase load_share load_phase bearing_torque bearing_angle "
-    "spring cubic half_gap damping inertia hysteresis_torque hysteresis_angle",
-)
+Physics = namedtuple("Physics", ["bristle_length", "radius", "spring", "damping", "inertia", *numbers(Effects())])
+slow_friction, friction_law = chained("slow_friction"), chained("friction")
 
 
 def simulate(
@@ -84,43 +81,13 @@ def simulate(
 
 
 def _physics(rig: Rig, numerics: Numerics) -> Physics:
-    e = rig.effects
-    round_ = Eccentricity(share=0.0)
-    drive, load = (pulley.eccentricity or round_ for pulley in (e.drive_pulley, e.load_pulley))
-    bearing = e.load_pulley.friction
     return Physics(
-        bristle_length=_bristle_lengths(e, numerics)[0],
-        stribeck_rise=e.stribeck.rise if e.stribeck else 0.0,
-        stribeck_speed=e.stribeck.speed_m_per_s if e.stribeck else 1.0,
-        stribeck_exponent=e.stribeck.exponent if e.stribeck else 1.0,
-        stribeck_renewal=e.stribeck.renewal_m if e.stribeck else 1.0,
-        tension_exponent=e.load_dependent_friction.exponent if e.load_dependent_friction else 0.0,
-        reference=e.load_dependent_friction.reference_N if e.load_dependent_friction else 1.0,
-        floor=e.load_dependent_friction.floor_N if e.load_dependent_friction else 0.0,
-        run_in_change=e.running_in.change if e.running_in else 0.0,
-        run_in_scale=e.running_in.scale if e.running_in else 1.0,
-        run_in_by_travel=e.running_in is not None and e.running_in.over == "travel_m",
-        bias=e.directional_friction.bias if e.directional_friction else 0.0,
-        wear_rise=e.positional_friction.rise if e.positional_friction else 0.0,
-        wear_period=e.positional_friction.period_m if e.positional_friction else 1.0,
-        wear_phase=e.positional_friction.phase_rad if e.positional_friction else 0.0,
-        has_settling=e.strand_settling is not None,
-        settling_is_exponential=e.strand_settling is not None and e.strand_settling.law == "exponential",
-        conduit_compliance=e.conduit_compliance_m_per_N,
+        bristle_length=_bristle_lengths(rig.effects, numerics)[0],
         radius=rig.pulley_radius_m,
-        drive_share=drive.share,
-        drive_phase=drive.phase_rad,
-        load_share=load.share,
-        load_phase=load.phase_rad,
-        bearing_torque=bearing.torque_Nm if bearing else 0.0,
-        bearing_angle=bearing.presliding_rad if bearing else ANY_RAD,
         spring=rig.load.spring_stiffness_Nm_per_rad,
-        cubic=e.load.cubic_Nm_per_rad3,
-        half_gap=e.load.half_gap_rad,
         damping=rig.load.damping_Nms_per_rad,
-        inertia=rig.load.inertia_kg_m2 + e.load.inertia_kg_m2,
-        hysteresis_torque=e.hysteretic_load.torque_Nm if e.hysteretic_load else 0.0,
-        hysteresis_angle=e.hysteretic_load.angle_rad if e.hysteretic_load else ANY_RAD,
+        inertia=rig.load.inertia_kg_m2 + rig.effects.load.inertia_kg_m2,
+        **numbers(rig.effects),
     )
 
 
@@ -172,14 +139,16 @@ def _initial_state(physics, grid, preparation, half_bend, drag) -> tuple[NDArray
     grip = np.tanh(half_bend)
     tension = np.stack([initial_tension(grid, *of, preparation.pretension_N) for of in zip(grip, share, strict=True)])
     both = tension[:, :-1] + tension[:, 1:]
-    factor = 1 + physics.wear_rise * np.sin(physics.wear_phase)
-    if physics.tension_exponent != 0:
-        factor = factor * (np.maximum(both / 2, physics.floor) / physics.reference) ** physics.tension_exponent
-    hold = np.tanh(half_bend * factor) * (1 + physics.stribeck_rise) * both + drag
+    strength = np.vectorize(lambda y, T: slow_friction(physics, y, T, 0.0, 0.0, 0.0))(half_bend, both / 2)
+    hold = np.tanh(strength) * (1 + physics.stribeck_rise) * both + drag
     wanted = np.divide(tension[:, :-1] - tension[:, 1:], hold, out=np.zeros_like(hold), where=hold > 0)
-    bristle = wanted
-    for _ in range(50 if physics.bias else 0):
-        bristle = wanted / (1 + physics.bias * bristle)
+    friction = np.vectorize(lambda force, z: friction_law(physics, force, z, 0.0))
+    bristle, before = wanted, np.full_like(wanted, np.nan)
+    for _ in range(50):
+        if np.array_equal(bristle, before):
+            break
+        force, before = hold * bristle, bristle
+        bristle = wanted / np.divide(friction(force, bristle), force, out=np.ones_like(hold), where=force != 0)
     return tension, np.clip(bristle, -1, 1)
 
 
@@ -192,8 +161,8 @@ def _elongation(physics, tension, stiffness, settling) -> NDArray:
         return np.sqrt((ideal + settling) ** 2 - settling**2)
     e = ideal + settling
     for _ in range(60):
-        left = np.exp(-e / settling)
-        e = np.maximum(e - (e - settling * (1 - left) - ideal) / np.maximum(1 - left, 1e-9), 0.0)
+        decay = np.exp(-e / settling)
+        e = np.maximum(e - (e - settling * (1 - decay) - ideal) / np.maximum(1 - decay, 1e-9), 0.0)
     return e
 
 
@@ -213,11 +182,13 @@ def _load_angle(physics, tension_difference) -> float:
 def _stable_step(physics, stiffness, mass, half_bend, drag, lengths, numerics) -> float:
     """Time step (s) for the stiffest state: everything stuck at the highest tension allowed."""
     limit = numerics.tension_limit_N
-    factor = (1 + physics.stribeck_rise) * (1 + physics.wear_rise) * max(1.0, 1 + physics.run_in_change)
-    if physics.tension_exponent != 0:
-        factor *= (limit / physics.reference) ** physics.tension_exponent
+    factor = 1 + physics.stribeck_rise
+    for law in laws("slow_friction"):
+        factor *= law.bound(physics, limit)
     hold = 2 * np.tanh(half_bend.max(axis=0) * factor) * limit + drag
-    bristle = (1 + abs(physics.bias)) * hold * np.mean(1 / lengths)
+    bristle = hold * np.mean(1 / lengths)
+    for law in laws("friction"):
+        bristle = law.bound(physics, limit) * bristle
     radius = physics.radius * (1 - physics.load_share)
     beyond = np.cbrt(physics.radius * limit / physics.cubic) if physics.cubic else 0.0
     torsion = (
@@ -240,8 +211,8 @@ def _bearing_course(theta, angle):
     z = np.zeros_like(theta)
     for j in range(1, theta.size):
         turn = theta[j] - theta[j - 1]
-        way = 1.0 if turn > 0 else -1.0
-        z[j] = way + (z[j - 1] - way) * np.exp(-abs(turn) / angle)
+        direction = 1.0 if turn > 0 else -1.0
+        z[j] = direction + (z[j - 1] - direction) * np.exp(-abs(turn) / angle)
     return z
 
 
@@ -250,40 +221,34 @@ def _bearing_torque(theta: NDArray, friction: PulleyFriction | None) -> NDArray 
     return friction.torque_Nm * _bearing_course(theta, friction.presliding_rad) if friction else 0.0
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _winding(theta, share, phase):
-    """Way of the cable over the mean radius, rad: the integral of the roundness."""
+    """Cable travel over the mean radius, rad: the integral of the roundness."""
     return theta - share * np.cos(theta + phase)
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _dead_zone(theta, half_gap):
     return max(theta - half_gap, 0.0) + min(theta + half_gap, 0.0)
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _bristle(z, slide_over_length):
     """Dahl's bristle after a slide, implicit: within its bounds for any step (as in `virtualrig.dynamics`)."""
     return (z + slide_over_length) / (1 + abs(slide_over_length))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _set_strength(p, strength, half_bend, tension, time, travel, drive):
-    """Friction of the nodes per sum of the tensions on both sides, as far as it changes slowly."""
-    age = travel if p.run_in_by_travel else time
-    worn = 1.0 + p.run_in_change * -np.expm1(-age / p.run_in_scale)
+    """Friction of the nodes per sum of the tensions on both sides, without what changes fast."""
     for c in range(2):
-        way = drive if c == 0 else -drive
-        factor = worn * (1.0 + p.wear_rise * np.sin(2 * np.pi * way / p.wear_period + p.wear_phase))
+        position = drive if c == 0 else -drive
         for i in range(strength.shape[1]):
-            y = half_bend[c, i] * factor
-            if p.tension_exponent != 0.0:
-                T = max(0.5 * (tension[c, i] + tension[c, i + 1]), p.floor)
-                y *= (T / p.reference) ** p.tension_exponent
-            strength[c, i] = np.tanh(y)
+            mean = 0.5 * (tension[c, i] + tension[c, i + 1])
+            strength[c, i] = np.tanh(slow_friction(p, half_bend[c, i], mean, time, travel, position))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _set_hold(p, hold, strength, rested, drag, T):
     """Friction (N) of one cable's nodes when their bristles are drawn in full."""
     n = hold.size
@@ -291,9 +256,9 @@ def _set_hold(p, hold, strength, rested, drag, T):
         hold[i] = strength[i] * (T[i] + T[i + 1]) * (1.0 + p.stribeck_rise * rested[i]) + drag[i]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _renew(p, rested, w, dt):
-    """Let the contacts of one cable's nodes take on what their speed `w` makes of them, as they slide."""
+    """Let the contacts of one cable's nodes adapt to their sliding speed `w`."""
     inverse, renewal = 1.0 / p.stribeck_speed, dt / p.stribeck_renewal
     for i in range(rested.size):
         speed = abs(w[i + 1])
@@ -306,7 +271,7 @@ def _renew(p, rested, w, dt):
         rested[i] = (rested[i] + share * np.exp(-s)) / (1.0 + share)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _set_elastic(p, elastic, x, stretch, stiffness, settling, share, gives):
     """Tension (N) of one cable's segments without dampers; `x` are the slides, `gives` the conduit's shortening."""
     n1 = elastic.size
@@ -322,7 +287,7 @@ def _set_elastic(p, elastic, x, stretch, stiffness, settling, share, gives):
                 elastic[i] = stiffness[i] * (np.sqrt(e * e + s * s) - s)
 
 
-@njit(cache=True, error_model="numpy")
+@cached
 def _run(
     p,
     theta_in,
@@ -355,7 +320,7 @@ def _run(
     share_of_one = 1.0 / elements
     dt = sample_s / steps
     slow_steps = max(1, int(SLOW_S / dt))
-    is_slow = p.tension_exponent != 0.0 or p.run_in_change != 0.0 or p.wear_rise != 0.0
+    is_slow = slow_friction(p, 1.0, *ANY_STATE) != 1.0
     keep = 1 / (1 + drag_rate * dt)
     u = np.zeros((2, nodes + 2))
     v = np.zeros((2, nodes + 2))
@@ -378,8 +343,8 @@ def _run(
     travel = 0.0
     drive = 0.0
     since_slow = slow_steps
-    start_way = _winding(theta_in[0], p.drive_share, p.drive_phase)
-    rest_way = _winding(theta_rest, p.load_share, p.load_phase)
+    drive_start = _winding(theta_in[0], p.drive_share, p.drive_phase)
+    load_start = _winding(theta_rest, p.load_share, p.load_phase)
     out = np.empty((6, samples))
 
     for sample in range(samples):
@@ -402,7 +367,7 @@ def _run(
             s = step / steps
             theta = theta_in[sample] + s * (slope_0 + s * (c2 + s * c3))
             omega = (slope_0 + s * (2 * c2 + s * 3 * c3)) / sample_s
-            drive = p.radius * (_winding(theta, p.drive_share, p.drive_phase) - start_way)
+            drive = p.radius * (_winding(theta, p.drive_share, p.drive_phase) - drive_start)
             drive_rate = p.radius * (1.0 + p.drive_share * np.sin(theta + p.drive_phase)) * omega
             travel += abs(drive_rate) * dt
             if since_slow >= slow_steps:
@@ -421,7 +386,7 @@ def _run(
             bearing = _bristle(bearing, omega_out * dt / p.bearing_angle)
             hysteresis = _bristle(hysteresis, omega_out * dt / p.hysteresis_angle)
             load_radius = p.radius * (1.0 + p.load_share * np.sin(theta_out + p.load_phase))
-            load_way = p.radius * (_winding(theta_out, p.load_share, p.load_phase) - rest_way)
+            load_travel = p.radius * (_winding(theta_out, p.load_share, p.load_phase) - load_start)
 
             for c in range(2):
                 side = 1.0 - 2.0 * c
@@ -431,7 +396,7 @@ def _run(
                 z = bristle[c]
                 _set_hold(p, hold, strength[c], rested[c], drag, T)
                 for i in range(nodes):
-                    friction = hold[i] * z[i] * (1.0 + p.bias * z[i])
+                    friction = friction_law(p, hold[i] * z[i], z[i], w[i + 1])
                     w[i + 1] = keep[i] * (w[i + 1] + dt * inverse_mass[i] * (T[i] - T[i + 1] - friction))
                 if p.stribeck_rise > 0.0:
                     _renew(p, rested[c], w, dt)
@@ -450,7 +415,7 @@ def _run(
                     x[i] += dt * w[i]
                 x[0] = side * drive
                 w[0] = side * drive_rate
-                x[nodes + 1] = side * load_way
+                x[nodes + 1] = side * load_travel
                 w[nodes + 1] = side * load_radius * omega_out
                 _set_elastic(p, elastic[c], x, stretch[c], stiffness[c], settling[c], share, gives[c])
                 base[:] = elastic[c]

@@ -1,14 +1,13 @@
 """From true quantities to the log of the sensors: counts, currents and voltages."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from virtualrig.config import Encoder, LoadCell, Rig, Sensors, SlowNoise, TorqueSensor
-from virtualrig.effects import SideSensors
+from virtualrig.effects import TWINS, SideSensors
+from virtualrig.effects.contract import Side
 from virtualrig.trajectory import Trajectory
 
 # Columns of a log in the order of the format, with decimals that keep rounding far below the noise.
@@ -25,15 +24,6 @@ DECIMALS = {
 
 class SensorRangeError(ValueError):
     """A quantity is outside the range of its sensor."""
-
-
-@dataclass(frozen=True)
-class Side:
-    """What acts on the sensors of one side; arrays of shape (samples,)."""
-
-    angle_rad: NDArray
-    torque_Nm: NDArray
-    force_N: NDArray
 
 
 def log(trajectory: Trajectory, sensors: Sensors, rig: Rig, draw: Generator) -> dict[str, NDArray]:
@@ -62,7 +52,7 @@ def log(trajectory: Trajectory, sensors: Sensors, rig: Rig, draw: Generator) -> 
 
 
 def sensed_sides(trajectory: Trajectory, rig: Rig) -> tuple[Side, Side]:
-    """What the sensors of the drive's and of the load's side take for true, without noise."""
+    """What the sensors of the drive's and of the load's side read, without noise."""
     t = trajectory
     drive = sensed(t.time_s, Side(t.theta_in_rad, t.tau_in_Nm, t.T1_N + t.T3_N), rig, rig.effects.drive_sensors)
     load = sensed(t.time_s, Side(t.theta_out_rad, t.tau_out_Nm, t.T2_N + t.T4_N), rig, rig.effects.load_sensors)
@@ -70,19 +60,13 @@ def sensed_sides(trajectory: Trajectory, rig: Rig) -> tuple[Side, Side]:
 
 
 def sensed(time_s: NDArray, truth: Side, rig: Rig, faults: SideSensors) -> Side:
-    """What one side's sensors take for true; without faults that is the truth itself, bit for bit."""
+    """Quantities as one side's sensors read them, without noise; without faults the truth itself, bit for bit."""
     if faults == SideSensors():
         return truth
-    force = (
-        (1 + faults.load_cell_gain) * truth.force_N
-        + faults.load_cell_offset_N
-        + faults.load_cell_drift_N_per_s * (time_s - time_s[0])
-        + faults.load_cell_crosstalk * truth.torque_Nm / rig.pulley_radius_m
-    )
-    angle = truth.angle_rad + faults.angle_runout_rad * np.sin(truth.angle_rad + faults.angle_runout_phase_rad)
-    torque = (1 + faults.torque_gain + faults.torque_curvature_per_Nm2 * truth.torque_Nm**2) * truth.torque_Nm
-    shown = (angle, torque, force)
-    return Side(*(np.interp(time_s - faults.delay_s, time_s, values) for values in shown))
+    reading = truth
+    for twin in filter(lambda twin: twin.read, TWINS.values()):
+        reading = twin.read(reading, truth, faults, time_s, rig.pulley_radius_m)
+    return reading
 
 
 def encode(angle_rad: NDArray, encoder: Encoder, draw: Generator) -> NDArray:

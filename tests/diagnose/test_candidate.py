@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ccmodel.diagnose import candidate
+from ccmodel.diagnose import settings
 from ccmodel.diagnose.candidate import continued, discretisation_shift, fit
 from ccmodel.diagnose.hypothesis import Hypothesis
 from made_observations import batch, calibrated
@@ -23,10 +23,10 @@ def test_the_discretisation_shift_is_that_of_a_fit_on_the_finer_solver(monkeypat
     found = fit(recordings, hypothesis, base.free, base.values | {KEY: 1e-5})
     k = list(found.values).index(KEY)
     moved = discretisation_shift(recordings, found)
-    finer = [w.with_parameters(replace(w.observations.parameters, refinement=candidate.REFINEMENT)) for w in recordings]
+    finer = [w.with_parameters(replace(w.observations.parameters, refinement=settings.REFINEMENT)) for w in recordings]
     there = fit(finer, hypothesis, base.free, found.values)
     assert found.values[KEY] + moved[k] == pytest.approx(there.values[KEY], abs=0.3 * abs(moved[k]))
-    monkeypatch.setattr(candidate, "REFINEMENT", 1)
+    monkeypatch.setattr(settings, "REFINEMENT", 1)
     assert discretisation_shift(recordings, found) == pytest.approx(np.zeros(moved.size), abs=1e-12)
 
 

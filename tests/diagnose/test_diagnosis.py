@@ -20,9 +20,9 @@ from ccmodel.diagnose.result import _alternatives, _mechanism
 from ccmodel.failure import ModelError
 from ccmodel.inference import pool
 from ccmodel.model.files import read_model
-from ccmodel.report.diagnosis import headline
-from ccmodel.stages import diagnose as stage
-from ccmodel.stages.ingest import ingest
+from ccmodel.steps.ingest import ingest
+from ccmodel.studies.diagnosis import run as stage
+from ccmodel.studies.diagnosis.page import headline
 from ccmodel.typed import InputError
 
 RUBBING_NM = 4e-3
@@ -233,12 +233,12 @@ def test_alternatives_are_others_than_what_is_named_each_once():
 @pytest.mark.parametrize(
     ("alternatives", "likeliest", "sentence"),
     [
-        (["kink"], ["kink"], "it may be kink at conduit, of which"),
+        (["kink"], ["kink"], "it may be kink at conduit, but"),
         (["kink", "stribeck"], ["kink"], "cannot tell kink at conduit or stribeck at conduit apart"),
-        (["kink", "stribeck"], ["kink", "stribeck"], "it may be kink at conduit and stribeck at conduit together, of"),
+        (["kink", "stribeck"], ["kink", "stribeck"], "it may be kink at conduit and stribeck at conduit together, but"),
     ],
 )
-def test_two_that_act_together_are_not_said_to_be_two_that_cannot_be_told_apart(alternatives, likeliest, sentence):
+def test_the_headline_separates_a_pair_from_alternatives(alternatives, likeliest, sentence):
     claims = [[{"name": name, "place": "conduit"} for name in names] for names in (alternatives, likeliest)]
     error = {"tau_in": {"before": 2.0, "after": 1.0, "noise": 1.0}}
     said = {"batch": "b", "verdict": "undecided", "is_held": False, "fit": {"error": error}}

@@ -54,7 +54,7 @@ def effect(place="conduit", **values):
         (lambda: ConduitPath([0.0], [1.0]), "positive length; got 0.0 m: leave out"),
         (lambda: ConduitPath([1.0, 0.0], [1.0, 1.0]), "positive length"),
         (lambda: ConduitPath([np.nan], [1.0]), "must be finite"),
-        (lambda: ConduitPath([1.0], [-1.0]), "counted positive whichever way"),
+        (lambda: ConduitPath([1.0], [-1.0]), "positive in either direction"),
         (lambda: replace(PAIR, axial_rigidity_N=0.0), "axial_rigidity_N must be positive"),
         (lambda: replace(PAIR, axial_rigidity_N=np.inf), "axial_rigidity_N must be positive and finite"),
         (lambda: replace(PAIR, drive_radius_m=-0.01), "drive_radius_m must be positive"),

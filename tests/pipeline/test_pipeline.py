@@ -12,8 +12,9 @@ import pytest
 import yaml
 
 from builders import write_batch
-from ccmodel.config import PHASE_FIGURES, load_config
+from ccmodel.config import load_config
 from ccmodel.recording import read_recordings
+from ccmodel.studies.phases.settings import FIGURES as PHASE_FIGURES
 
 ROOT = Path(__file__).parents[2]
 
@@ -123,6 +124,8 @@ def test_what_a_diagnosis_found_is_one_more_set_of_parameters(copy):
     assert run.returncode == 0, run.stdout + run.stderr
     results = copy / "results"
     assert json.loads((results / "diagnoses/tiny/diagnosis.json").read_text())["verdict"] == "agrees"
+    nearest = json.loads((results / "diagnoses/tiny/nearest.json").read_text())
+    assert nearest == {"succeeded": False, "message": "verdict 'agrees': the diagnosis has no nearest model"}
     errors = pd.read_parquet(results / "tables/errors.parquet")
     assert set(errors["parameters"]) == {"estimated", "fitted", "extended"}
     by_set = errors[errors["channel"] == "tau_in_Nm"].groupby("parameters", observed=True)["rmse"].mean()

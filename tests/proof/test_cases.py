@@ -9,9 +9,8 @@ from proof import build, convergence
 from proof.build import folder_digest, record
 from proof.cases import Case, draw
 from proof.cli import app, sample_of, seed_of
-from proof.effects import ENTRIES, merged
 from proof.plan import read_plan
-from virtualrig.effects import Effects
+from virtualrig.effects import TWINS, Effects, merged
 from virtualrig.trajectory import Preparation, Trajectory
 
 PLAN = read_plan()
@@ -21,7 +20,7 @@ def test_the_plan_has_every_candidate_mechanism_at_all_its_places():
     every = map(mechanisms.get, mechanisms.names())
     listed = {mechanism.name: set(mechanism.places) for mechanism in every if not mechanism.by_name_only}
     assert {name: set(spec.places) for name, spec in PLAN.effects.items()} == listed
-    assert set(ENTRIES) == {*PLAN.effects, *PLAN.unlisted}
+    assert TWINS.keys() == {*PLAN.effects, *PLAN.unlisted}
 
 
 def test_true_values_have_the_names_of_the_mechanisms_parameters():
@@ -111,7 +110,7 @@ def test_a_batch_reveals_no_answer(poor, tmp_path):
     described = yaml.safe_load(text)
     assert described["origin"] == "virtual-rig"
     assert described["batch"] == poor.name
-    assert not any(word in text for word in [*ENTRIES, *PLAN.kinds, "unlisted"])
+    assert not any(word in text for word in [*TWINS, *PLAN.kinds, "unlisted"])
     cable = described["rig"]["cable"]
     assert cable["stiffness_N_per_m"] != pytest.approx(poor.campaign.rig.cable.stiffness_N_per_m, rel=0.05)
 

@@ -5,11 +5,10 @@ from math import inf
 import pandas as pd
 import pytest
 
-from ccmodel.compare.errors import COLUMNS
-from ccmodel.config import Config
+from ccmodel.errors import COLUMNS
 from ccmodel.inference.fit import FitResult
 from ccmodel.inference.intervals import Interval, Scatter, Undetermined
-from ccmodel.report.page import about, interval, write_page
+from ccmodel.report.page import LeftOut, about, interval, write_page
 
 APART = "friction_coefficient and extra_bend_rad are not determined apart; known is mu + 0.05 x e = 0.16"
 FIT = FitResult(
@@ -33,7 +32,7 @@ def page(tmp_path):
     def write(result: FitResult) -> str:
         errors = pd.DataFrame([], columns=list(COLUMNS)).astype(COLUMNS)
         fits = [{"fit": "fitted", **result.as_dict()}]
-        write_page(tmp_path / "index.html", Config(), {}, [], errors, fits, [], [], [], {})
+        write_page(tmp_path / "index.html", [], [], errors, fits, LeftOut([], []))
         return (tmp_path / "index.html").read_text()
 
     return write

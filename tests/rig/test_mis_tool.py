@@ -1,4 +1,6 @@
 import json
+import lzma
+import os
 from dataclasses import asdict
 from pathlib import Path
 
@@ -7,10 +9,13 @@ import pytest
 import yaml
 
 from ccmodel.rig.ingest import ingest_batch
-from ccmodel.rig.mis_tool import NM_PER_COUNT, import_mis_tool
+from ccmodel.rig.mis_tool import import_mis_tool
 from ccmodel.typed import InputError
 
-REAL = Path(__file__).parents[3] / "shared/real/mis-tool-characterization/data"
+NM_PER_COUNT = 3.9811e-5  # stated by the data set
+EXCERPT = Path(__file__).parent / "data/Tool_4_Maryland_L_Pitch_1/113.TXT.xz"
+# Folder of the whole public data set, as for `make real DATA=path`.
+DATA = os.environ.get("MIS_TOOL_DATA")
 HEADER = "%Data taken by somebody\n%Freq_Hz=0.99\n%Back-end Time [ms], Back-end CUI Encoder [counts]\n"
 
 
@@ -203,20 +208,8 @@ def test_nothing_to_import(tmp_path):
         import_mis_tool(tmp_path, tmp_path / "raw")
 
 
-@pytest.mark.parametrize(
-    ("folder", "name", "frequency", "level"),
-    [
-        ("Tool_4_Maryland_L_2", "21", 0.3, 0.2),
-        ("Tool_4_Maryland_L_Pitch_1", "113", 0.5, 0.8),
-        ("Tool_4_Maryland_L_Pitch_3", "002", 0.3, 0.6),
-    ],
-)
-def test_real_trials(tmp_path, folder, name, frequency, level):
-    file = REAL / folder / f"{name}.TXT"
-    if not file.is_file():
-        pytest.skip("the public mis-tool-characterization data are not at ../shared/real beside the repository")
-    write(tmp_path / folder, file.name, file.read_text())
-    imported = import_mis_tool(tmp_path / folder, tmp_path / "raw")
+def check_real_trial(source, out, frequency, level):
+    imported = import_mis_tool(source, out)
     assert imported.findings == []
     ingested = ingest_batch(imported.batches[0])
     assert ingested.findings == []
@@ -226,3 +219,25 @@ def test_real_trials(tmp_path, folder, name, frequency, level):
     assert recording.excitation["frequency_Hz"] == pytest.approx(frequency, abs=0.002)
     assert recording.excitation["load_level"] == level
     assert np.corrcoef(recording["theta_in_rad"], recording["theta_out_rad"])[0, 1] > 0.9
+
+
+def test_a_real_trial(tmp_path):
+    write(tmp_path / "tool", "113.TXT", lzma.decompress(EXCERPT.read_bytes()).decode())
+    check_real_trial(tmp_path / "tool", tmp_path / "raw", 0.5, 0.8)
+
+
+@pytest.mark.skipif(
+    DATA is None, reason="MIS_TOOL_DATA does not name the mis-tool-characterization data (as DATA does for `make real`)"
+)
+@pytest.mark.parametrize(
+    ("folder", "name", "frequency", "level"),
+    [
+        ("Tool_4_Maryland_L_2", "21", 0.3, 0.2),
+        ("Tool_4_Maryland_L_Pitch_1", "113", 0.5, 0.8),
+        ("Tool_4_Maryland_L_Pitch_3", "002", 0.3, 0.6),
+    ],
+)
+def test_whole_real_trials(tmp_path, folder, name, frequency, level):
+    (file,) = Path(DATA).rglob(f"{folder}/{name}.TXT")
+    write(tmp_path / folder, file.name, file.read_text())
+    check_real_trial(tmp_path / folder, tmp_path / "raw", frequency, level)

@@ -1,4 +1,4 @@
-# What the rules share: the typed configuration, the batches that are there, and which file belongs to what.
+# What the rules share: the typed configuration, the batches, the studies, and the names of files.
 import sys
 from pathlib import Path
 
@@ -8,7 +8,6 @@ from ccmodel.config import (
     EACH,
     ESTIMATED,
     EXTENDED,
-    PHASE_FIGURES,
     batches_in,
     expand_studies,
     load_config,
@@ -22,17 +21,19 @@ try:
     RAW = Path(CONFIG.raw)
     RESULTS = CONFIG.results
     BATCHES, UNUSABLE = batches_in(RAW)
-    STUDIES = expand_studies(CONFIG, BATCHES)
+    LOOPS = expand_studies(CONFIG, BATCHES)
 except InputError as error:
     print(error, file=sys.stderr)
     sys.exit(2)
+
+# Every study by its name, in the order of the page.
+STUDIES = LOOPS | CONFIG.judgements
 
 
 wildcard_constraints:
     batch="[^/]+",
     parameters="[^/]+",
     scope="[^/]+",
-    study="[^/]+",
 
 
 def recordings_of(batch):
@@ -44,40 +45,36 @@ def simulated_of(parameters, batch):
 
 
 def fit_of(parameters, batch):
-    """What a batch is simulated with: the fit of its own, the one that all share, or the model that its diagnosis found."""
+    """File with the parameters of a batch: its own fit, the shared one, or the model of its diagnosis; "" for its estimates."""
+    if parameters == ESTIMATED:
+        return ""
     if parameters == EXTENDED:
         return f"{RESULTS}/diagnoses/{batch}/model.json"
     scope = batch if CONFIG.fits[parameters].batches == EACH else "shared"
     return f"{RESULTS}/fits/{parameters}/{scope}.json"
 
 
-def diagnosed():
-    """Batches that are diagnosed."""
-    return BATCHES if CONFIG.diagnose == EACH else CONFIG.diagnose
-
-
-def fits():
-    return sorted({fit_of(name, batch) for name in CONFIG.fits for batch in BATCHES})
-
-
 def runs():
-    """Every (parameter set, recordings, simulated)."""
+    """Every parameter set and batch that are simulated."""
+    diagnosed = CONFIG.diagnosed(BATCHES)
     return [
-        (p, recordings_of(b), simulated_of(p, b))
+        (p, b)
         for p in CONFIG.parameter_sets
-        for b in (diagnosed() if p == EXTENDED else BATCHES)
+        for b in (diagnosed if p == EXTENDED else BATCHES)
     ]
 
 
-def fit_if_any(parameters, batch):
-    """The fit's file in a list; an empty one for what a batch states beforehand."""
-    return [] if parameters == ESTIMATED else [fit_of(parameters, batch)]
-
-
-def claim_runs():
-    """Every (variable, parameter set, batch) of the studies that the claims are judged by."""
+def figures(name, ending):
     return [
-        (variable, CONFIG.parameters_of(STUDIES[study]), batch)
-        for variable, study in CONFIG.claims.studies.items()
-        for batch in STUDIES[study].batches
+        f"{RESULTS}/figures/{stem.format(name=name)}.{ending}"
+        for stem in STUDIES[name].figures
     ]
+
+
+def tables(name):
+    """The CSV files of a study and the JSON file that its part of the page shows."""
+    csv = [
+        f"{RESULTS}/tables/{stem.format(name=name)}.csv"
+        for stem in STUDIES[name].tables
+    ]
+    return csv + ([f"{RESULTS}/tables/{name}.json"] if csv else [])

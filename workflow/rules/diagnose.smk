@@ -6,6 +6,7 @@ rule diagnose:
         f"{RESULTS}/diagnoses/{{batch}}/report.html",
         f"{RESULTS}/diagnoses/{{batch}}/calibrated.json",
         f"{RESULTS}/diagnoses/{{batch}}/model.json",
+        f"{RESULTS}/diagnoses/{{batch}}/nearest.json",
     log:
         f"{RESULTS}/logs/diagnose/{{batch}}.log",
     benchmark:
@@ -13,9 +14,12 @@ rule diagnose:
     conda:
         "../envs/ccmodel.yaml"
     threads: 2
+    resources:
+        mem_mb=2000,
+        runtime=240,
     params:
-        judged=CONFIG.diagnosing.model_dump_json(),
-        sources=source_digest("ccmodel.stages.diagnose"),
+        settings=CONFIG.diagnosing.model_dump_json(),
+        sources=source_digest("ccmodel.studies.diagnosis.run"),
     message:
         "Diagnosing batch {wildcards.batch}"
     script:

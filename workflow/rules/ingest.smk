@@ -10,9 +10,13 @@ rule ingest:
         f"{RESULTS}/benchmarks/ingest/{{batch}}.tsv"
     conda:
         "../envs/ccmodel.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
     params:
         folder=lambda wildcards: str(RAW / wildcards.batch),
-        sources=source_digest("ccmodel.stages.ingest"),
+        sources=source_digest("ccmodel.steps.ingest"),
     message:
         "Reading batch {wildcards.batch}"
     script:

@@ -1,18 +1,43 @@
+rule tabulate_errors:
+    input:
+        recordings=[recordings_of(batch) for _, batch in runs()],
+        simulated=[simulated_of(parameters, batch) for parameters, batch in runs()],
+    output:
+        csv=f"{RESULTS}/tables/errors.csv",
+        parquet=f"{RESULTS}/tables/errors.parquet",
+    log:
+        f"{RESULTS}/logs/tabulate_errors.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/tabulate_errors.tsv"
+    conda:
+        "../envs/ccmodel.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        parameters=[parameters for parameters, _ in runs()],
+        sources=source_digest("ccmodel.report.tables"),
+    message:
+        "Comparing the model with all recordings"
+    script:
+        "../scripts/tabulate_errors.py"
+
+
 rule write_report:
     input:
         errors=f"{RESULTS}/tables/errors.parquet",
-        fits=fits(),
+        fits=sorted({fit_of(p, batch) for p in CONFIG.fits for batch in BATCHES}),
         summaries=[f"{RESULTS}/recordings/{batch}.json" for batch in BATCHES],
         simulations=[
-            simulated.removesuffix(".nc") + ".json" for _, _, simulated in runs()
+            simulated_of(p, batch).removesuffix(".nc") + ".json" for p, batch in runs()
         ],
-        figures=[f"{RESULTS}/figures/{study}.png" for study in STUDIES],
         diagnoses=[
-            f"{RESULTS}/diagnoses/{batch}/diagnosis.json" for batch in diagnosed()
+            f"{RESULTS}/diagnoses/{batch}/diagnosis.json"
+            for batch in CONFIG.diagnosed(BATCHES)
         ],
-        phases=rules.draw_phases.output if CONFIG.phases else [],
-        claims=[f"{RESULTS}/tables/claims.json"] if CONFIG.claims else [],
-        accuracy=[f"{RESULTS}/tables/accuracy.json"] if CONFIG.accuracy else [],
+        figures=[figure for name in STUDIES for figure in figures(name, "png")],
+        tables=[table for name in STUDIES for table in tables(name)],
     output:
         page=f"{RESULTS}/index.html",
         left_out=f"{RESULTS}/left-out.json",
@@ -22,11 +47,31 @@ rule write_report:
         f"{RESULTS}/benchmarks/write_report.tsv"
     conda:
         "../envs/ccmodel.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
     params:
-        config=CONFIG.model_dump_json(),
+        raw=CONFIG.raw,
         unusable=UNUSABLE,
-        studies={name: study.model_dump_json() for name, study in STUDIES.items()},
-        sources=source_digest("ccmodel.stages.report"),
+        studies=[
+            {
+                "kind": study.kind,
+                "name": name,
+                "heading": study.heading,
+                "settings": study.model_dump(mode="json"),
+                "parameters": (
+                    CONFIG.parameters_of(study) if hasattr(study, "parameters") else ""
+                ),
+                "has_summary": bool(study.tables),
+            }
+            for name, study in STUDIES.items()
+        ],
+        sources=[source_digest("ccmodel.report.page")]
+        + [
+            source_digest(f"ccmodel.studies.{kind}.settings")
+            for kind in sorted({study.kind for study in STUDIES.values()})
+        ],
     message:
         "Writing the page"
     script:

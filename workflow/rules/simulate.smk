@@ -1,7 +1,7 @@
 rule simulate:
     input:
         recordings=lambda wildcards: recordings_of(wildcards.batch),
-        fit=lambda wildcards: fit_if_any(wildcards.parameters, wildcards.batch),
+        fit=lambda wildcards: fit_of(wildcards.parameters, wildcards.batch) or [],
     output:
         simulated=f"{RESULTS}/simulated/{{parameters}}/{{batch}}.nc",
         summary=f"{RESULTS}/simulated/{{parameters}}/{{batch}}.json",
@@ -11,8 +11,12 @@ rule simulate:
         f"{RESULTS}/benchmarks/simulate/{{parameters}}/{{batch}}.tsv"
     conda:
         "../envs/ccmodel.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=30,
     params:
-        sources=source_digest("ccmodel.stages.simulate"),
+        sources=source_digest("ccmodel.steps.simulate"),
     message:
         "Running the model on batch {wildcards.batch} with parameters '{wildcards.parameters}'"
     script:

@@ -1,12 +1,12 @@
-"""Recordings of the batches of a fit -> fitted values (JSON, SI units)."""
+"""Recordings of the batches of a fit -> fitted parameters (JSON, SI units)."""
 
 from pathlib import Path
 
-from ccmodel.config import Fit
 from ccmodel.jobs import logged
-from ccmodel.stages.fit import fit_parameters
+from ccmodel.steps.fit import fit_parameters
+from ccmodel.steps.settings import Fit
 
-with logged(snakemake.log[0]):
+with logged(snakemake.log[0], snakemake.threads):
     fit_parameters(
         snakemake.wildcards.parameters,
         Fit.model_validate_json(snakemake.params.problem),

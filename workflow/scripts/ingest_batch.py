@@ -1,9 +1,9 @@
-"""A batch's raw logs -> its recordings (netCDF, SI units) and what was found in them (JSON)."""
+"""Raw logs of a batch -> its recordings (netCDF, SI units) and its summary (JSON)."""
 
 from pathlib import Path
 
 from ccmodel.jobs import logged
-from ccmodel.stages.ingest import ingest
+from ccmodel.steps.ingest import ingest
 
-with logged(snakemake.log[0]):
+with logged(snakemake.log[0], snakemake.threads):
     ingest(Path(snakemake.params.folder), Path(snakemake.output.recordings), Path(snakemake.output.summary))

@@ -1,14 +1,14 @@
-"""A batch's recordings and, if any, a fit -> what the model says of them (netCDF, SI units) and what failed (JSON)."""
+"""Recordings of a batch and, if any, a fit -> simulations (netCDF, SI units) and failures (JSON)."""
 
 from pathlib import Path
 
 from ccmodel.jobs import logged
-from ccmodel.stages.simulate import simulate
+from ccmodel.steps.simulate import simulate
 
-with logged(snakemake.log[0]):
+with logged(snakemake.log[0], snakemake.threads):
     simulate(
         Path(snakemake.input.recordings),
-        Path(snakemake.input.fit[0]) if snakemake.input.fit else None,
+        Path(snakemake.input.fit) if snakemake.input.fit else None,
         Path(snakemake.output.simulated),
         Path(snakemake.output.summary),
     )

@@ -3,8 +3,8 @@
 Each interval is replaced by a Gaussian factor (a site) that gives the same mean and variance as the interval itself
 does together with all other factors (the cavity): Minka 2001, "Expectation propagation for approximate Bayesian
 inference"; with the notation of Rasmussen and Williams 2006, "Gaussian processes for machine learning", section 3.6. A
-site is stored as its precision and its precision times mean. An interval is log-concave, so the posterior is too, and
-the sweeps converge.
+site is stored as its precision and its shift, which is precision times mean. An interval is log-concave, so the
+posterior is too, and the sweeps converge.
 """
 
 import math
@@ -44,21 +44,21 @@ def truncated_moments(mean, variance, low, high):
 
 
 @kernel
-def matched_site(mean, variance, precision, precision_mean, low, high):
+def matched_site(mean, variance, precision, shift, low, high):
     """Site of one interval by moment matching.
 
     Parameters
     ----------
     mean, variance : float
         Present posterior of the sample, with the site.
-    precision, precision_mean : float
-        Present site: exp(-precision x^2 / 2 + precision_mean x).
+    precision, shift : float
+        Present site: exp(-precision x^2 / 2 + shift x).
     low, high : float
         The interval.
 
     Returns
     -------
-    precision, precision_mean : float
+    precision, shift : float
         Site with which the cavity has the mean and variance that it has with the interval.
     log_mass : float
         Log of the probability of the interval under the cavity.
@@ -66,24 +66,18 @@ def matched_site(mean, variance, precision, precision_mean, low, high):
         Log of the scale of the present site in the marginal likelihood.
     """
     cavity_precision = max(1 / variance - precision, 1e-12)
-    cavity_mean, cavity_variance = (mean / variance - precision_mean) / cavity_precision, 1 / cavity_precision
+    cavity_mean, cavity_variance = (mean / variance - shift) / cavity_precision, 1 / cavity_precision
     blurred_variance = cavity_variance + EDGE_SD**2
     blurred_mean, blurred_tilted, log_mass = truncated_moments(cavity_mean, blurred_variance, low, high)
     gain = cavity_variance / blurred_variance
     tilted_mean = cavity_mean + gain * (blurred_mean - cavity_mean)
     tilted_variance = cavity_variance - gain * gain * (blurred_variance - blurred_tilted)
     new = max(1 / tilted_variance - cavity_precision, 0.0)
-    new_precision_mean = tilted_mean / tilted_variance - cavity_mean * cavity_precision if new > 0 else 0.0
-    log_scale = (
-        log_mass
-        + 0.5 * math.log(1 + precision * cavity_variance)
-        - 0.5
-        * (
-            (cavity_mean * cavity_precision + precision_mean) ** 2 / (cavity_precision + precision)
-            - cavity_mean * cavity_mean * cavity_precision
-        )
-    )
-    return new, new_precision_mean, log_mass, log_scale
+    new_shift = tilted_mean / tilted_variance - cavity_mean * cavity_precision if new > 0 else 0.0
+    linear = cavity_mean * cavity_precision + shift
+    exponent = linear**2 / (cavity_precision + precision) - cavity_mean * cavity_mean * cavity_precision
+    log_scale = log_mass + 0.5 * math.log(1 + precision * cavity_variance) - 0.5 * exponent
+    return new, new_shift, log_mass, log_scale
 
 
 @kernel
@@ -153,7 +147,7 @@ def banded_covariance(L, stencil):
 
 
 @kernel
-def sweep(stencil, weight, coupling, low, high, observed, precision, precision_mean):
+def sweep(stencil, weight, coupling, low, high, observed, precision, shift):
     """Compute the posterior of a curve and correct the site of every interval, in place.
 
     Parameters
@@ -168,7 +162,7 @@ def sweep(stencil, weight, coupling, low, high, observed, precision, precision_m
         The intervals.
     observed : ndarray of bool, shape (n,)
         Samples with an interval.
-    precision, precision_mean : ndarray, shape (n,)
+    precision, shift : ndarray, shape (n,)
         Sites, corrected here where `observed`.
 
     Returns
@@ -184,17 +178,15 @@ def sweep(stencil, weight, coupling, low, high, observed, precision, precision_m
     """
     order, n = len(stencil) - 1, low.size
     L = banded_cholesky(stencil, weight, coupling, precision)
-    mean = precision_mean.copy()
+    mean = shift.copy()
     solve(L, mean)
     S = banded_covariance(L, stencil)
     log_predictive = 0.0
     for i in range(n):
         if observed[i]:
-            new, new_precision_mean, log_mass, _ = matched_site(
-                mean[i], S[i, 0], precision[i], precision_mean[i], low[i], high[i]
-            )
+            new, new_shift, log_mass, _ = matched_site(mean[i], S[i, 0], precision[i], shift[i], low[i], high[i])
             precision[i] += DAMPING * (new - precision[i])
-            precision_mean[i] += DAMPING * (new_precision_mean - precision_mean[i])
+            shift[i] += DAMPING * (new_shift - shift[i])
             log_predictive += log_mass
     difference, difference_variance = np.zeros(n - order), np.zeros(n - order)
     for row in range(n - order):
@@ -229,11 +221,11 @@ def fit_basis(basis, prior, low, high, sweeps):
         Posterior of the first coefficient.
     """
     n, d = basis.shape
-    precision, precision_mean = np.full(n, 1.0), (low + high) / 2
+    precision, shift = np.full(n, 1.0), (low + high) / 2
     log_evidence, mean, covariance = 0.0, np.zeros(d), np.zeros((d, d))
     for _ in range(sweeps):
         covariance = np.linalg.inv(np.diag(prior) + (basis.T * precision) @ basis)
-        mean = covariance @ (basis.T @ precision_mean)
+        mean = covariance @ (basis.T @ shift)
         log_evidence = 0.5 * (math.log(np.linalg.det(covariance)) + np.log(prior).sum())
         for i in range(n):
             value, variance = 0.0, 0.0
@@ -241,16 +233,14 @@ def fit_basis(basis, prior, low, high, sweeps):
                 value += basis[i, a] * mean[a]
                 for b in range(d):
                     variance += basis[i, a] * covariance[a, b] * basis[i, b]
-            new, new_precision_mean, _, log_scale = matched_site(
-                value, variance, precision[i], precision_mean[i], low[i], high[i]
-            )
-            log_evidence += log_scale + 0.5 * precision_mean[i] * value
+            new, new_shift, _, log_scale = matched_site(value, variance, precision[i], shift[i], low[i], high[i])
+            log_evidence += log_scale + 0.5 * shift[i] * value
             precision[i] += DAMPING * (new - precision[i])
-            precision_mean[i] += DAMPING * (new_precision_mean - precision_mean[i])
+            shift[i] += DAMPING * (new_shift - shift[i])
     return log_evidence, mean[0], covariance[0, 0]
 
 
 def initial_sites(low: NDArray, high: NDArray, observed: NDArray) -> tuple[NDArray, NDArray]:
-    """Precision and precision times mean of all sites before the first sweep."""
+    """Precision and shift of all sites before the first sweep."""
     precision = np.where(observed, UNIFORM_PRECISION, 0.0)
     return precision, np.where(observed, UNIFORM_PRECISION * (low + high) / 2, 0.0)

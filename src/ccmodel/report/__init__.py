@@ -1,0 +1,1 @@
+"""The page of a run, the table of errors, and the style that all figures share."""

@@ -1,25 +1,14 @@
-"""`batch.yaml`: what a batch of recordings is, format 1.
+"""`batch.yaml`: the description of a batch of recordings, format 1 (`docs/rig-log-format.md`).
 
-The format stands in `docs/rig-log-format.md`. Beyond what it began with, it has grown by keys that are all optional,
-so that a batch written before them keeps its meaning:
-
-- `torque_sensor: {Nm_per_count, zero_counts}` on a side whose log carries `drive_torque_counts` or
-  `load_torque_counts`; where a log has such a column and a current, the sensor is used, for it measures what the
-  current only stands for.
-- `encoder_accuracy_rad` on a side whose encoder is not as good as `accuracy.encoder_rad` says.
-- `encoder_sign`, `torque_sign` (+1 or -1) on a side whose sensors count against the signs of the model.
-- `settled_s` on a recording that begins with a start-up transient.
-- `ranges` on the rig: what a sensor can read at most, by log column, for finding saturation.
-- `load_cell`, `torque_constant_Nm_per_A`, the load's `encoder_counts_per_rev` and the accuracies of what a rig has not
-  may be left out: what is stated is what the rig has.
-- `note` on the batch or on a recording: free, read by people only.
+All keys that were added later are optional, so a file written before them keeps its meaning.
 """
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field, field_validator, model_validator
 
+from ccmodel.channels import ANGLE_AT, SUM_AT, TENSIONS_AT, TORQUE_AT
 from ccmodel.geometry import ConduitPath
 from ccmodel.typed import InputError, NotNegative, Positive, Problem, TypedModel, load_yaml_model
 
@@ -40,7 +29,7 @@ NAMES = "a name is letters, digits and -_.+=,@ only and begins with a letter or 
 
 
 def valid_name(name: str) -> bool:
-    """Whether a batch or a recording may be called so: names become folders, files and groups of a netCDF file."""
+    """Whether a batch or recording can have this name: it becomes a folder, a file and a group of a netCDF file."""
     return all(c.isalnum() or c in "-_.+=,@" for c in name) and (name[:1].isalnum() or name[:1] == "_")
 
 
@@ -58,14 +47,18 @@ class LoadCell(TypedModel):
 
 
 class TorqueSensor(TypedModel):
-    """A torque sensor that is logged in counts: torque = (counts - zero_counts) * Nm_per_count, in N m."""
+    """A torque sensor logged in counts: torque = (counts - zero_counts) * Nm_per_count, in N m."""
 
     Nm_per_count: Positive
     zero_counts: float = 0.0
 
 
 class Side(TypedModel):
-    """Pulley and sensors at one end."""
+    """Pulley and sensors at one end.
+
+    A sign is -1 if the sensor counts against the signs of the model. If a log has torque counts and a current, the
+    torque sensor is used, since the current only estimates the torque.
+    """
 
     pulley_radius_m: Positive
     encoder_counts_per_rev: Positive
@@ -78,9 +71,9 @@ class Side(TypedModel):
 
 
 class LoadSide(Side):
-    """The load end; without a spring the load is whatever was measured at the load pulley.
+    """The load end; without a spring the load is the torque or motion measured at the load pulley.
 
-    The drive's encoder is the model's input, so every rig has it; the load's a rig may lack.
+    The encoder is optional here. At the drive it is the input of the model.
     """
 
     encoder_counts_per_rev: Positive | None = None
@@ -88,7 +81,7 @@ class LoadSide(Side):
 
 
 class Cable(TypedModel):
-    """Estimates made beforehand; the stiffness is that of `length_m` of cable, so EA is their product."""
+    """Prior estimates of the cable; the stiffness is that of `length_m` of cable, so EA is their product."""
 
     stiffness_N_per_m: Positive
     length_m: Positive
@@ -96,21 +89,38 @@ class Cable(TypedModel):
 
 
 class Accuracy(TypedModel):
-    """What the sensors are good to, in SI units; left out for a sensor that the rig has not."""
+    """Accuracy of the sensors, in SI units; absent for a sensor that the rig lacks."""
 
     encoder_rad: Positive
     torque_Nm: Positive | None = None
     load_cell_N: Positive | None = None
 
 
+class End(NamedTuple):
+    """One end of the rig, with its constants and the names of its channels."""
+
+    name: str
+    side: Side
+    angle: str
+    torque: str
+    force: str
+    tensions: tuple[str, str]
+
+
 class Rig(TypedModel):
-    """The rig: both ends, the cable, the sensors' accuracy and, by log column, their ranges."""
+    """The rig: both ends, the cable, the accuracy of the sensors and, by log column, their ranges."""
 
     drive: Side
     load: LoadSide
     cable: Cable
     accuracy: Accuracy
     ranges: dict[Literal[SENSOR_COLUMNS], tuple[float, float]] = Field(default_factory=dict)
+
+    @property
+    def ends(self) -> tuple[End, End]:
+        """Drive end and load end."""
+        sides = {"drive": self.drive, "load": self.load}
+        return tuple(End(n, s, ANGLE_AT[n], TORQUE_AT[n], SUM_AT[n], TENSIONS_AT[n]) for n, s in sides.items())
 
     @field_validator("ranges")
     @classmethod
@@ -131,14 +141,14 @@ class Rig(TypedModel):
 
 
 class Piece(TypedModel):
-    """A piece of the conduit's path of constant curvature."""
+    """A piece of the conduit with constant curvature."""
 
     length_m: Positive
     bend_rad: NotNegative
 
 
 class RecordingEntry(TypedModel):
-    """One recording: its log, and under what conditions it was made."""
+    """One recording: its log and its conditions. Samples before `settled_s` are a start-up transient."""
 
     id: str
     file: str
@@ -204,20 +214,16 @@ def load_batch(folder: Path) -> Batch:
     Raises
     ------
     InputError
-        If the folder's name is none a batch can have, the file is missing or does not follow the format, or it names
-        another batch than its folder.
+        If the folder's name is not valid, the file is missing or does not follow the format, or the batch is not named
+        like its folder.
     """
     path = Path(folder) / "batch.yaml"
     folder_name = Path(folder).resolve().name
     if not valid_name(folder_name):
-        raise _batch_error(folder, f"{folder_name!r} cannot be a batch's name: {NAMES}; rename the folder")
+        text = f"{folder_name!r} cannot be a batch's name: {NAMES}; rename the folder"
+        raise InputError.of(Problem(str(folder), None, text))
     batch = load_yaml_model(path, Batch)
     if batch.batch != folder_name:
         text = f"batch: must be the folder's name, '{folder_name}', found '{batch.batch}': rename either"
-        raise _batch_error(path, text)
+        raise InputError.of(Problem(str(path), None, text))
     return batch
-
-
-def _batch_error(place: Path, text: str) -> InputError:
-    problem = Problem(str(place), None, text)
-    return InputError(str(problem), [problem])

@@ -1,30 +1,37 @@
-"""Ingest: a batch's folder -> its recordings, and what was found wrong with it."""
+"""Ingest: the folder of a batch to its recordings and the findings."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
+
+import pandas as pd
 
 from ccmodel.recording import Recording
 from ccmodel.rig.batch import Batch, RecordingEntry, load_batch
 from ccmodel.rig.calibration import calibrate
-from ccmodel.rig.checks import check_sensors
-from ccmodel.rig.columns import check_columns
-from ccmodel.rig.findings import LIMITS, Finding, Limits
-from ccmodel.rig.logs import Log, read_log
+from ccmodel.rig.column_checks import ColumnChecks
+from ccmodel.rig.findings import Defect, Finding, LogError
+from ccmodel.rig.limits import LIMITS, Limits
+from ccmodel.rig.log import read_log
+from ccmodel.rig.sensor_checks import check_sensors
 from ccmodel.typed import InputError
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
 class Ingested:
-    """A batch that was read.
+    """A batch.
 
     Attributes
     ----------
     recordings : list of Recording
-        Those that can be used, in the batch's order.
+        The usable ones, in the order of `batch.yaml`.
     findings : list of Finding
-        Everything found wrong, a line each; a recording that is refused has exactly one.
+        All faults; a recording that is refused has exactly one.
     batch : Batch or None
-        What `batch.yaml` says: radii, spring, estimates of the cable. None if the batch is refused as a whole.
+        Content of `batch.yaml`: radii, spring, estimates of the cable. None if the batch is refused as a whole.
     """
 
     recordings: list[Recording]
@@ -38,81 +45,75 @@ def ingest_batch(folder: Path, limits: Limits = LIMITS) -> Ingested:
     Parameters
     ----------
     folder : Path
-        The batch's folder with its `batch.yaml` and logs, anywhere on disk; it is not changed.
+        Folder with `batch.yaml` and the logs, anywhere on disk; it is not changed.
     limits : Limits
-        How much may be wrong with a log that is still used.
+        Limits of the faults of a log.
 
     Returns
     -------
     Ingested
-        Recordings, findings and the batch's description. Bad data never raise: they are findings.
+        Recordings, findings and the content of `batch.yaml`. Bad data never raise: they are findings.
     """
     folder = Path(folder)
-    name = folder.resolve().name
-    try:
-        batch = load_batch(folder)
-    except InputError as error:
-        return Ingested([], [Finding(name, p.file, p.line, None, "refused", p.text) for p in error.problems])
-    except Exception as error:  # whatever is odd about one batch must not take the others with it
-        return Ingested([], [_unforeseen(name, folder / "batch.yaml", error)])
-    logs = [_read_log(folder / entry.file, batch.batch, limits) for entry in batch.recordings]
+    name, described = folder.resolve().name, str(folder / "batch.yaml")
+    batch, refused = _attempt(name, described, load_batch, folder)
+    if batch is None:
+        return Ingested([], refused)
     files = [str(folder / entry.file) for entry in batch.recordings]
-    findings, of_logs = check_columns(batch, str(folder / "batch.yaml"), files, logs)
+    logs = [_attempt(name, file, read_log, Path(file), limits) for file in files]
+    columns = ColumnChecks(batch.rig, [log[0] if log else None for log, _ in logs])
+    findings = [_finding(name, described, "warning", defect) for defect in columns.warnings]
     recordings = []
-    for entry, log, of_columns in zip(batch.recordings, logs, of_logs, strict=True):
-        recording, found = _recording_or_finding(folder, batch, entry, log, of_columns, limits)
-        findings += found
-        if recording is not None:
-            recordings.append(recording)
+    for entry, file, (log, refused) in zip(batch.recordings, files, logs, strict=True):
+        if log is not None:
+            built, refused = _attempt(name, file, _recording, batch, entry, file, log, columns, limits)
+            if built is not None:
+                recordings.append(built[0])
+                findings += built[1]
+        findings += refused
     return Ingested(recordings, findings, batch)
 
 
-def _unforeseen(batch: str, file: Path, error: Exception) -> Finding:
-    text = " ".join(f"cannot be read, for a reason that nobody thought of ({type(error).__name__}: {error})".split())
-    return Finding(batch, str(file), None, None, "refused", text)
-
-
-def _read_log(path: Path, batch: str, limits: Limits) -> Log:
+def _attempt(batch: str, file: str, step: Callable[..., T], *args) -> tuple[T | None, list[Finding]]:
+    """Result of a step, or None with the findings that refuse the file."""
     try:
-        return read_log(path, batch, limits)
-    except Exception as error:  # whatever is odd about one log must not take the others with it
-        return Log((), None, [_unforeseen(batch, path, error)])
+        return step(*args), []
+    except InputError as error:
+        return None, [_finding(batch, p.file, "refused", Defect(p.line, None, p.text)) for p in error.problems]
+    except LogError as error:
+        defect = Defect(*error.args)
+    except Exception as error:  # an error that one log causes must not stop the others
+        text = f"cannot be read because of an unexpected error ({type(error).__name__}: {error})"
+        defect = Defect(None, None, " ".join(text.split()))
+    return None, [_finding(batch, file, "refused", defect)]
 
 
-def _recording_or_finding(
-    folder: Path, batch: Batch, entry: RecordingEntry, log: Log, of_columns: list[Finding], limits: Limits
-) -> tuple[Recording | None, list[Finding]]:
-    try:
-        return _recording(folder, batch, entry, log, of_columns, limits)
-    except Exception as error:  # as above
-        return None, [_unforeseen(batch.batch, folder / entry.file, error)]
+def _finding(batch: str, file: str, severity: str, defect: Defect) -> Finding:
+    return Finding(batch, file, defect.row, defect.column, severity, defect.text)
 
 
 def _recording(
-    folder: Path, batch: Batch, entry: RecordingEntry, log: Log, of_columns: list[Finding], limits: Limits
-) -> tuple[Recording | None, list[Finding]]:
-    file = str(folder / entry.file)
-
-    def finding(row, column, severity, text):
-        return Finding(batch.batch, file, row, column, severity, text)
-
-    if log.table is None:
-        return None, log.findings
-    if any(f.severity == "refused" for f in of_columns):
-        return None, of_columns
-    table, found = check_sensors(log.table, batch.rig, batch.batch, file, limits)
-    if table is None:
-        return None, found
+    batch: Batch,
+    entry: RecordingEntry,
+    file: str,
+    log: tuple[pd.DataFrame, list[Defect]],
+    columns: ColumnChecks,
+    limits: Limits,
+) -> tuple[Recording, list[Finding]]:
+    """The recording of a log that could be read, and its warnings."""
+    rare_columns = columns.check(log[0])
+    table, faulty_sensors = check_sensors(log[0], batch.rig, limits)
     last = table["time_s"].iloc[-1]
     if entry.settled_s >= last:
-        text = f"ends at {last:g} s, before settled_s {entry.settled_s:g} s of batch.yaml: nothing left to judge"
-        return None, [finding(None, None, "refused", text)]
+        text = f"ends at {last:g} s, before settled_s {entry.settled_s:g} s of batch.yaml: no samples left"
+        raise LogError(None, None, text)
     calibrated = calibrate(table, batch.rig, limits)
-    found = log.findings + of_columns + found
-    found += [
-        finding(None, column, "warning", f"not used: batch.yaml has no {key} to make sense of it")
+    unconverted = [
+        Defect(None, column, f"not used: batch.yaml lacks {key}, which converts it")
         for column, key in calibrated.missing.items()
     ]
+    defects = [*log[1], *rare_columns, *faulty_sensors, *unconverted]
+    findings = [_finding(batch.batch, file, "warning", defect) for defect in defects]
     recording = Recording(
         batch=batch.batch,
         id=entry.id,
@@ -127,6 +128,6 @@ def _recording(
         excitation=entry.excitation,
         rest_s=calibrated.rest_s,
         settled_s=entry.settled_s,
-        warnings=tuple(str(f) for f in found),
+        warnings=tuple(map(str, findings)),
     )
-    return recording, found
+    return recording, findings

@@ -1,0 +1,106 @@
+"""Errors of a model against recordings, in SI units and normalised as in the paper's Table I."""
+
+from collections.abc import Iterable
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from ccmodel.channels import CHANNELS, THETA_IN, unit_of
+from ccmodel.model.run import PRESCRIBED
+from ccmodel.recording import Recording
+
+COLUMNS = {
+    "batch": str,
+    "recording": str,
+    "origin": str,
+    "parameters": str,
+    "channel": str,
+    "unit": str,
+    "rmse": float,
+    "peak_to_peak": float,
+    "nrmse_percent": float,
+    "window_from_s": float,
+    "window_to_s": float,
+    "samples": int,
+}
+
+
+def last_cycle(recording: Recording) -> slice:
+    """Samples of the drive's last whole cycle; of a motion without a cycle, all samples after the start-up.
+
+    A cycle runs from one upward crossing of the middle of the drive's range to the next. In between, the drive must
+    have been below a quarter of its range, so that dither about the middle is no cycle.
+    """
+    judged = np.flatnonzero(recording.time_s >= max(recording.rest_s, recording.settled_s))
+    if judged.size < 2:
+        return slice(0, recording.time_s.size)
+    first = judged[0]
+    theta = recording[THETA_IN][first:]
+    high, low = theta.max(), theta.min()
+    if high == low:
+        return slice(first, recording.time_s.size)
+    crossings = _upward_crossings((theta - low) / (high - low))
+    if len(crossings) < 2:
+        return slice(first, recording.time_s.size)
+    return slice(first + crossings[-2], first + crossings[-1] + 1)
+
+
+def _upward_crossings(share: NDArray) -> list[int]:
+    """Samples at which `share` rises through 0.5 after it was below 0.25."""
+    starts = np.flatnonzero((share[:-1] < 0.5) & (share[1:] >= 0.5)) + 1
+    crossings, armed_from = [], 0
+    for sample in starts:
+        if (share[armed_from:sample] < 0.25).any():
+            crossings.append(int(sample))
+            armed_from = sample
+    return crossings
+
+
+def error_table(pairs: Iterable[tuple[Recording, Recording | None]], parameters: str) -> pd.DataFrame:
+    """Root mean square error of each channel over the last cycle.
+
+    The normalised error is over the recording's peak to peak in that cycle; the paper's Table I does not state its
+    divisor.
+
+    Parameters
+    ----------
+    pairs : iterable of (Recording, Recording or None)
+        Recordings, each with its simulation, or None where the model could not be run.
+    parameters : str
+        Name of the model's parameter set.
+
+    Returns
+    -------
+    DataFrame
+        A row for each recording and channel, with the columns of `COLUMNS`: `rmse` and `peak_to_peak` in `unit`.
+        Channels that were not recorded, or that were given to the model, have no row.
+    """
+    rows = []
+    for recorded, simulated in pairs:
+        if simulated is None:
+            continue
+        window = last_cycle(recorded)
+        for channel in CHANNELS:
+            if channel not in recorded or simulated.derived_from.get(channel) in (PRESCRIBED, None):
+                continue
+            measured = recorded[channel][window]
+            rmse = float(np.sqrt(np.mean((simulated[channel][window] - measured) ** 2)))
+            span = float(np.ptp(measured))
+            rows.append(
+                {
+                    "batch": recorded.batch,
+                    "recording": recorded.id,
+                    "origin": recorded.origin,
+                    "parameters": parameters,
+                    "channel": channel,
+                    "unit": unit_of(channel),
+                    "rmse": rmse,
+                    "peak_to_peak": span,
+                    "nrmse_percent": 100 * rmse / span if span > 0 else np.nan,
+                    "window_from_s": recorded.time_s[window][0],
+                    "window_to_s": recorded.time_s[window][-1],
+                    "samples": measured.size,
+                }
+            )
+    return pd.DataFrame(rows, columns=list(COLUMNS)).astype(COLUMNS)

@@ -1,0 +1,20 @@
+"""Recordings and simulations -> the table of all errors."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import pandas as pd
+
+from ccmodel import provenance
+from ccmodel.errors import error_table
+from ccmodel.steps.files import read_pairs, write_table
+
+
+def tabulate_errors(runs: Iterable[tuple[str, Path, Path]], csv_file: Path, parquet_file: Path) -> None:
+    """Write the errors of all runs as CSV and Parquet; a run is a parameter set, recordings and simulations."""
+    runs = list(runs)
+    table = pd.concat([error_table(read_pairs(r, s), name) for name, r, s in runs], ignore_index=True)
+    # Pandas writes these attributes to the Parquet file.
+    table.attrs = provenance.of_inputs(file for _, *files in runs for file in files)
+    write_table(csv_file, table)
+    table.to_parquet(parquet_file, index=False)

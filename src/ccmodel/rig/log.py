@@ -1,0 +1,166 @@
+"""Checks of a log that are common to all formats: columns, cells and time.
+
+A log is refused as a whole if a fault shows that it is not what the rig wrote, since other parts may be damaged too.
+Harmless faults are warnings.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.ndimage import find_objects, label
+
+from ccmodel.rig import readers
+from ccmodel.rig.batch import COLUMNS, REQUIRED_COLUMNS
+from ccmodel.rig.findings import Defect, LogError
+from ccmodel.rig.limits import LIMITS, Limits
+from ccmodel.typed import nearest
+
+# Similarity from which an unknown column is a misspelling of a known one. Below it, the rig logs more than the format
+# has.
+MISSPELT = 0.85
+
+
+def read_log(path: Path, limits: Limits = LIMITS) -> tuple[pd.DataFrame, list[Defect]]:
+    """Read and check a log.
+
+    Parameters
+    ----------
+    path : Path
+        The log.
+    limits : Limits
+        Limits of its faults.
+
+    Returns
+    -------
+    table : DataFrame, shape (n, columns)
+        Known columns as floats; the index is the row in the file.
+    warnings : list of Defect
+        Faults within the limits.
+
+    Raises
+    ------
+    LogError
+        If the log cannot be used.
+    """
+    raw = readers.read(Path(path))
+    warnings = _check_header(list(raw.columns))
+    table = _numbers(raw[[name for name in raw.columns if name in COLUMNS]])
+    table = _drop_repeated(_drop_bad(table, limits, warnings), warnings)
+    if len(table) < limits.fewest_samples:
+        raise LogError(None, None, f"has {len(table)} samples only: too few for a recording; record it again")
+    _check_time(table["time_s"], limits, warnings)
+    return table, warnings
+
+
+def _check_header(header: list[str]) -> list[Defect]:
+    unknown = [name for name in header if name not in COLUMNS]
+    for name in unknown:
+        guess = nearest(name, [c for c in COLUMNS if c not in header], MISSPELT)
+        if guess:
+            raise LogError(1, name, f"unknown column; did you mean '{guess}'?")
+    for name in REQUIRED_COLUMNS:
+        if name not in header:
+            raise LogError(1, name, f"this column is required and missing; found {', '.join(header)}")
+    for name in header:
+        if name in COLUMNS and header.count(name) > 1:
+            raise LogError(1, name, "this column is there twice: keep one")
+    return [Defect(1, name or "(no name)", "unknown column, not used") for name in unknown]
+
+
+def _numbers(raw: pd.DataFrame) -> pd.DataFrame:
+    for name in raw:
+        if raw[name].dtype.kind not in "iuf":
+            numbers = pd.to_numeric(raw[name].astype("string"), errors="coerce")
+            bad = raw[name][(numbers.isna() & raw[name].notna()).to_numpy()]
+            if bad.size:
+                more = f" (and in {bad.size - 1} more rows)" if bad.size > 1 else ""
+                raise LogError(int(bad.index[0]), name, f"must be a number, found '{bad.iloc[0]}'{more}")
+            raw = raw.assign(**{name: numbers})
+    return raw.astype(float)
+
+
+def _drop_bad(table: pd.DataFrame, limits: Limits, warnings: list[Defect]) -> pd.DataFrame:
+    """Drop the few rows in which a cell is empty or not finite."""
+    bad = ~np.isfinite(table.to_numpy())
+    for column, is_bad in zip(table.columns, bad.T, strict=True):
+        if not is_bad.any():
+            continue
+        row = int(table.index[is_bad][0])
+        if is_bad.all():
+            raise LogError(None, column, "has no numbers: leave the column out if the rig has no such sensor")
+        run = length(longest_run(is_bad))
+        if run > limits.bad_cells_in_a_row or is_bad.mean() > limits.bad_cells_fraction:
+            raise LogError(row, column, f"{is_bad.sum()} cells have no number, {run} of them in a row")
+        many = f"{is_bad.sum()} cells have no number: their rows are" if is_bad.sum() > 1 else "no number: row"
+        warnings.append(Defect(row, column, f"{many} dropped"))
+    return table[~bad.any(axis=1)]
+
+
+def _drop_repeated(table: pd.DataFrame, warnings: list[Defect]) -> pd.DataFrame:
+    """Drop samples that repeat the one before in all columns, time included."""
+    repeated = (table.diff() == 0).all(axis=1)
+    if count := repeated.sum():
+        text = "the same sample again: dropped" + (f" ({count} such rows in all)" if count > 1 else "")
+        warnings.append(Defect(int(table.index[repeated][0]), None, text))
+    return table[~repeated]
+
+
+def _check_time(time: pd.Series, limits: Limits, warnings: list[Defect]) -> None:
+    step = np.diff(time.to_numpy())
+    if (step <= 0).any():
+        at = int(np.flatnonzero(step <= 0)[0]) + 1
+        now, before = time.iloc[at], time.iloc[at - 1]
+        raise LogError(int(time.index[at]), "time_s", f"time must increase, found {now:g} s after {before:g} s")
+    usual = _usual_step(time)
+    # A step over dropped rows is longer without being a gap; these rows have a warning already.
+    rows = np.diff(time.index)
+    excess = step - usual * rows
+    slack = (limits.gap_steps - 1) * usual
+    gaps = excess > slack * rows
+    if not gaps.any():
+        return
+    # A late sample is followed by a step that is shorter by the same time; a lost sample is not.
+    caught_up = -excess[(excess < -slack) & (rows == 1)].sum()
+    lost = max(excess[gaps].sum() - caught_up, 0.0)
+    uneven = lost < limits.uneven_fraction * excess[gaps].sum()
+    worst = np.flatnonzero(gaps)[np.argmax(excess[gaps])]
+    text = _gap_text(gaps.sum(), step[worst], usual, uneven)
+    if step[worst] > limits.gap_s or lost > limits.gap_fraction * (time.iloc[-1] - time.iloc[0]):
+        text += f" ({lost:.3g} s lost in all): too long to be bridged, record it again"
+        raise LogError(int(time.index[worst + 1]), "time_s", text)
+    first = int(time.index[np.flatnonzero(gaps)[0] + 1])
+    text += ": they came late, few or none are lost" if uneven else ": samples were dropped"
+    warnings.append(Defect(first, "time_s", text))
+
+
+def _usual_step(time: pd.Series) -> float:
+    """Median step, taken over four rows: a clock of whole ms that alternates 1 and 2 ms has no step of 1.5 ms."""
+    over = 4
+    times, rows = time.to_numpy(), time.index.to_numpy()
+    return float(np.median((times[over:] - times[:-over]) / (rows[over:] - rows[:-over])))
+
+
+def _gap_text(count: int, longest: float, usual: float, uneven: bool) -> str:
+    if uneven:
+        return (
+            f"sampled unevenly: {count} steps are long, up to {longest:.4g} s, and others short where a step is"
+            f" {usual:.4g} s"
+        )
+    what = f"{count} gaps, the longest" if count > 1 else "a gap"
+    return f"{what} of {longest:.4g} s where a step is {usual:.4g} s"
+
+
+def runs(flags: np.ndarray) -> list[slice]:
+    """All runs of true values."""
+    return [run for (run,) in find_objects(label(flags)[0])]
+
+
+def longest_run(flags: np.ndarray) -> slice:
+    """The longest run of true values, the first of several; empty if there is none."""
+    return max(runs(flags), key=length, default=slice(0, 0))
+
+
+def length(run: slice) -> int:
+    """Number of samples of a run."""
+    return run.stop - run.start

@@ -1,0 +1,78 @@
+"""Comma-separated values, UTF-8, plain or gzipped: a header, then a row a sample."""
+
+import csv
+import gzip
+import io
+import re
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ccmodel.rig.findings import LogError
+
+SUFFIXES = (".csv", ".csv.gz")
+_QUOTED_CELL = re.compile(r'(?<![^,])"([^",]*)"(?![^,])')
+
+
+def read(path: Path) -> pd.DataFrame:
+    """Read a CSV log; see `ccmodel.rig.readers`."""
+    lines = _lines(_text(path))
+    header = [name.strip().strip('"') for name in lines[0].split(",")]
+    if len(header) == 1 and any(c in header[0] for c in ";\t "):
+        raise LogError(1, None, "columns must be separated by commas and numbers written with a point")
+    if len(lines) == 1:
+        raise LogError(None, None, "has a header but no samples: record it again or take it out of batch.yaml")
+    for row, line in enumerate(lines, start=1):
+        if (cells := line.count(",") + 1) != len(header):
+            raise LogError(row, None, f"has {cells} cells, the header has {len(header)}: the log is damaged")
+    # A cell has no comma, so quotation marks can only enclose one whole cell.
+    rows = [_QUOTED_CELL.sub(r"\1", line) if '"' in line else line for line in lines[1:]]
+    table = pd.read_csv(
+        io.StringIO("\n".join(rows)),
+        quoting=csv.QUOTE_NONE,
+        header=None,
+        names=range(len(header)),
+        skip_blank_lines=False,
+        skipinitialspace=True,
+        low_memory=False,
+    )
+    return table.set_axis(header, axis=1).set_axis(np.arange(2, len(table) + 2))
+
+
+def _text(path: Path) -> str:
+    raw = path.read_bytes()
+    if raw[:2] == b"\x1f\x8b":
+        raw = _unzipped(raw)
+    elif path.suffix == ".gz" and raw:
+        raise LogError(None, None, "is called .gz but is not gzipped: rename it or copy it again")
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        row = raw[: error.start].count(b"\n") + 1
+        raise LogError(row, None, "is not text: the file is damaged, copy it again from the rig") from None
+
+
+def _unzipped(raw: bytes) -> bytes:
+    try:
+        return gzip.decompress(raw)
+    except EOFError:
+        fault = "cut short"
+    except (OSError, zlib.error):
+        fault = "damaged"
+    raise LogError(None, None, f"the gzip stream is {fault}: copy it again from the rig")
+
+
+def _lines(text: str) -> list[str]:
+    """Lines of the file without empty ones at its end."""
+    if not text.strip(", \t\r\n"):
+        raise LogError(None, None, "is empty: record it again or take it out of batch.yaml")
+    lines = text.splitlines()
+    if not text.rstrip(" \t").endswith(("\n", "\r")):
+        # Refused even if the last number seems whole: further digits and rows may be missing.
+        text = "the last line is cut (it has no line end), more may be lost: copy it again from the rig"
+        raise LogError(len(lines), None, text)
+    while not lines[-1].strip(", \t"):
+        lines.pop()
+    return lines

@@ -1,0 +1,82 @@
+"""Files that the steps exchange: recordings of a batch, its summary, fits and simulations."""
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pandas as pd
+
+from ccmodel.channels import CHANNELS
+from ccmodel.model.files import read_model
+from ccmodel.model.parameters import Parameters
+from ccmodel.recording import Recording, read_recordings
+from ccmodel.rig.batch import Batch
+
+# A recording and its simulation; None where the model could not be run.
+Pair = tuple[Recording, Recording | None]
+
+
+def read_json(file: Path) -> dict:
+    """Content of a JSON file."""
+    return json.loads(Path(file).read_text())
+
+
+def write_json(file: Path, data: dict) -> None:
+    """Write plain data as JSON."""
+    Path(file).write_text(json.dumps(data, indent=1) + "\n")
+
+
+def estimates_of(recordings_file: Path) -> Parameters | None:
+    """The batch's own estimates, from the summary next to its recordings; None for a refused batch."""
+    batch = read_json(recordings_file.with_suffix(".json"))["batch"]
+    return None if batch is None else Parameters.estimated(Batch.model_validate(batch, strict=False).rig)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Parameters that a batch is simulated with.
+
+    Attributes
+    ----------
+    parameters : Parameters or None
+        None for a refused batch, a failed fit or a batch that could not be diagnosed.
+    sds : dict of str to float
+        Standard deviations of the fitted parameters, where they are known.
+    recordings : list of str
+        Names (batch/id) of the recordings that they were fitted to.
+    """
+
+    parameters: Parameters | None
+    sds: dict[str, float] = field(default_factory=dict)
+    recordings: list[str] = field(default_factory=list)
+
+
+def fitted(recordings_file: Path, fit_file: Path | None) -> Fitted:
+    """A batch's own estimates, or the parameters in the file of a fit or a diagnosis."""
+    estimates = estimates_of(recordings_file)
+    if fit_file is None or estimates is None:
+        return Fitted(estimates)
+    result = read_json(fit_file)
+    if "parameters" in result:
+        return Fitted(read_model(fit_file), recordings=[f"{r.batch}/{r.id}" for r in read_recordings(recordings_file)])
+    if not result["succeeded"]:
+        return Fitted(None)
+    sds = {name: interval["sd"] for name, interval in result.get("intervals", {}).items()}
+    return Fitted(estimates.with_values(result["values"]), sds, result["recordings"])
+
+
+def read_pairs(recordings_file: Path, simulated_file: Path) -> list[Pair]:
+    """Every recording of a batch with its simulation."""
+    simulated = {s.id: s for s in read_recordings(simulated_file)}
+    return [(r, simulated.get(r.id)) for r in read_recordings(recordings_file)]
+
+
+def write_table(file: Path, table: pd.DataFrame, digits: int = 6) -> None:
+    """Write a table as CSV."""
+    table.to_csv(file, index=False, float_format=f"%.{digits}g")
+
+
+def write_channels(file: Path, recording: Recording) -> None:
+    """Write all channels over time as CSV."""
+    channels = {c: recording[c] for c in CHANNELS if c in recording}
+    write_table(file, pd.DataFrame({"time_s": recording.time_s} | channels), digits=9)

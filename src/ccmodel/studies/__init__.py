@@ -1,0 +1,16 @@
+"""The studies: recordings against the model, one folder for each.
+
+A study is a folder with
+
+1. ``settings.py``: its keys of the configuration, a class on `ccmodel.studies.settings.StudySettings` that also states
+   the runs that the study needs and the tables and figures that it makes,
+2. ``study.py``: ``SETTINGS``, that class, and ``judge(settings, runs, measuring)``, the computation, which returns an
+   `ccmodel.studies.run.Outcome`,
+3. ``figure.py``: its figures,
+4. ``part.html.j2``: its part of the page, whose ``parts`` are `ccmodel.report.page.Part`,
+
+and a field of `ccmodel.config.Config`. The rule in ``workflow/rules/studies.smk`` and the page take it from there.
+
+`diagnosis` belongs to one batch and has a rule and a page of its own; `table_one` has settings, a command and no part
+of the page.
+"""

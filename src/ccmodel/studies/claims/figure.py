@@ -1,0 +1,149 @@
+"""The figures of the claims: recordings and simulations over a study's variable, and the model alone."""
+
+from collections.abc import Mapping, Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ccmodel.channels import TABLE, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
+from ccmodel.errors import last_cycle
+from ccmodel.recording import Recording
+from ccmodel.report.figures import COLOURS, LINES, MARKERS, STYLE, letter_panels, name_axes, plot_channels, say_in_panel
+from ccmodel.studies.claims.claim import Claim, Row
+from ccmodel.studies.loops.measures import QUANTITIES
+
+# Panels: claim, quantities, y axis, x axis.
+PANELS = (
+    ("backlash-and-bend", ("backlash", "width"), "drive torque (mN·m)", "number of half-loops"),
+    ("slope-and-bend", ("slope", "slack_slope"), "slope of the torque loop", "number of half-loops"),
+    ("slack-and-bend", ("slack_share",), "share of the cycle (%)", "number of half-loops"),
+    ("backlash-and-pretension", ("backlash", "width"), "drive torque (mN·m)", "pretension"),
+    ("phases-and-pretension", ("IVa_share", "IVb_share"), "share of the cycle (%)", "pretension"),
+    ("radius", ("backlash", "width"), "drive torque (mN·m)", "loop radius"),
+)
+SHORT = {
+    "backlash": "backlash (flat part)",
+    "width": "width in the middle",
+    "slope": "both cables taut",
+    "slack_slope": "one cable slack",
+    "slack_share": "a cable slack",
+    "IVa_share": "phase IVa",
+    "IVb_share": "phase IVb",
+}
+
+
+def recordings_figure(claims: Sequence[Claim]) -> Figure:
+    """Means over recordings with their intervals, and the model, a panel for each claim."""
+    rows_of = {claim.name: claim.rows for claim in claims}
+    sources = set()
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(2, 3, figsize=(12, 7.2))
+        for ax, (name, quantities, ylabel, xlabel) in zip(axes.flat, PANELS, strict=True):
+            rows = [row for row in rows_of[name] if np.isfinite(row.at)]
+            sources |= {row.source for row in rows}
+            ticks = list(dict.fromkeys(row.condition for row in rows))
+            for i, quantity in enumerate(quantities):
+                shift = 0.16 * (2 * i - 1) if len(quantities) > 1 else 0.0
+                at = {tick: n + shift for n, tick in enumerate(ticks)}
+                style = {"color": COLOURS[i], "fmt": MARKERS[i], "label": SHORT[quantity]}
+                _with_intervals(ax, at, [row for row in rows if row.quantity == quantity], style)
+            ax.set_xticks(range(len(ticks)), ticks)
+            ax.set(xlim=(-0.5, max(len(ticks), 1) - 0.5), xlabel=xlabel, ylabel=ylabel)
+            ax.set_ylim(bottom=-0.03 * ax.get_ylim()[1])
+            if ax.get_legend_handles_labels()[0]:
+                ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, fontsize=8, handletextpad=0.3)
+        letter_panels(axes.flat)
+        origins = " and ".join(sorted(sources)) or "no recording"
+        figure.suptitle(f"Points: {origins}; bars: interval of the mean over repeats; black: the model of them")
+    return figure
+
+
+def _with_intervals(ax: Axes, at: Mapping[str, float], rows: Sequence[Row], style: Mapping) -> None:
+    """One quantity of a panel; `at` is the place of each condition on the x axis."""
+    known = [row for row in rows if row.value is not None]
+    reach = [[0, 0] if row.low is None else [row.value - row.low, row.high - row.value] for row in known]
+    if known:
+        x, y = [at[row.condition] for row in known], [row.value for row in known]
+        ax.errorbar(x, y, np.transpose(reach), ms=4.5, capsize=3, **style)
+    modelled = [row for row in rows if row.model is not None]
+    x, y = [at[row.condition] for row in modelled], [row.model for row in modelled]
+    ax.plot(x, y, ls="", marker="_", ms=16, mew=1.2, color="black")
+
+
+def model_figure(claims: Sequence[Claim], loops: Mapping[str, Recording]) -> Figure:
+    """The model alone: lost motion over the load, error over sections, place of the loop.
+
+    Parameters
+    ----------
+    claims : sequence of Claim
+    loops : mapping of str to Recording
+        Runs by the place of the loop.
+    """
+    rows_of = {claim.name: [row for row in claim.rows if row.model is not None] for claim in claims}
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(2, 2, figsize=(10, 7.8))
+        letter_panels(axes.flat)
+        for panel, ax, data in (
+            (_load_panel, axes[0, 0], rows_of.get("deadband-and-load")),
+            (_sections_panel, axes[0, 1], rows_of.get("sections")),
+            (_torque_panel, axes[1, 0], loops),
+            (_motion_panel, axes[1, 1], loops),
+        ):
+            panel(ax, data) if data else say_in_panel(ax, "the model could not be run")
+        figure.suptitle("Model alone: load, sections of the paper's discretisation, place of the loop")
+    return figure
+
+
+def _load_panel(ax: Axes, rows: Sequence[Row]) -> None:
+    """Lost motion and slack over the stiffness of the load; slack has a y axis of its own on the right."""
+    slack = ax.twinx()
+    slack.grid(False)
+    slack.spines["right"].set_visible(True)
+    for i, (side, quantity) in enumerate(((ax, "lost_motion"), (slack, "slack_share"))):
+        mine = [row for row in rows if row.quantity == quantity]
+        side.plot(
+            [row.at for row in mine],
+            [row.model for row in mine],
+            color=COLOURS[i],
+            marker=MARKERS[i],
+            ls=LINES[i],
+            ms=4.5,
+        )
+        q = QUANTITIES[quantity]
+        side.set_ylabel(f"{q.text} ({q.unit})", color=COLOURS[i])
+        side.set(xscale="log")
+        side.set_ylim(bottom=0)
+    ax.set_xlabel("stiffness of the load's spring (N·m/rad)")
+
+
+def _sections_panel(ax: Axes, rows: Sequence[Row]) -> None:
+    for i, bend in enumerate(dict.fromkeys(row.condition.split(",")[0] for row in rows)):
+        mine = [row for row in rows if row.condition.split(",")[0] == bend]
+        style = {"color": COLOURS[i], "marker": MARKERS[i % 4], "ls": LINES[i % 4], "ms": 4.5}
+        ax.loglog([row.at for row in mine], [row.model for row in mine], label=f"{bend} of bend", **style)
+    ax.set(xlabel="sections of each cable", ylabel="rms error, worst channel\n(% of peak to peak)")
+    ticks = sorted({int(row.at) for row in rows})
+    ax.set_xticks(ticks, [str(t) for t in ticks])
+    ax.minorticks_off()
+    ax.legend()
+
+
+def _torque_panel(ax: Axes, loops: Mapping[str, Recording]) -> None:
+    for (place, run), style in zip(loops.items(), _placement_styles(), strict=False):
+        plot_channels(ax, run, TAU_IN, TAU_OUT, last_cycle(run), label=f"loop {place}", **style)
+    name_axes(ax, TAU_IN, TAU_OUT)
+    ax.legend(loc="upper left", fontsize=8)
+
+
+def _motion_panel(ax: Axes, loops: Mapping[str, Recording]) -> None:
+    """Lag of the load angle behind the drive angle."""
+    for run, style in zip(loops.values(), _placement_styles(), strict=False):
+        cycle = run[last_cycle(run)]
+        ax.plot(cycle[THETA_IN], cycle[THETA_IN] - cycle[THETA_OUT], **style)
+    ax.set(xlabel=TABLE[THETA_IN].axis, ylabel=r"$\theta_{in} - \theta_{out}$ (rad)")
+
+
+def _placement_styles() -> list[dict]:
+    return [{"color": color, "ls": ls, "lw": 1.1} for color, ls in zip(COLOURS, LINES, strict=False)]

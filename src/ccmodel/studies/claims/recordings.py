@@ -1,0 +1,236 @@
+"""Claims that recordings decide: trends over bend and pretension, the phases, the loop radius.
+
+A trend is borne out if every step from one condition to the next has the claimed sign with certainty, by the intervals
+of the means. It is contradicted if the change from the first condition to the last certainly has the other sign, or is
+certainly small. Otherwise it is not determined.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from ccmodel.failure import ModelError
+from ccmodel.geometry import ConduitPath
+from ccmodel.model.parameters import Parameters
+from ccmodel.recording import Recording
+from ccmodel.repeats import Estimate, difference, estimates
+from ccmodel.steps.files import Pair
+from ccmodel.studies.claims import model_runs
+from ccmodel.studies.claims.claim import (
+    MODEL_ALONE,
+    NO,
+    OPEN,
+    PART,
+    YES,
+    Claim,
+    Row,
+    percent,
+    spread_percent,
+    three_digits,
+)
+from ccmodel.studies.claims.settings import Claims, ModelStudies
+from ccmodel.studies.loops.measures import QUANTITIES, measure
+from ccmodel.studies.loops.settings import Measuring
+from ccmodel.studies.variables import labelled, origins_of, value_of
+
+
+@dataclass(frozen=True)
+class _Trend:
+    """A claim that quantities rise (sign +1) or fall (-1) with a study's variable; `shown` ones decide nothing."""
+
+    name: str
+    section: str
+    says: str
+    variable: str
+    quantities: tuple[str, ...]
+    sign: int
+    shown: tuple[str, ...] = ()
+
+
+_TRENDS = (
+    _Trend("backlash-and-bend", "V-A", "the backlash widens with the angle of bend", "bend", ("backlash", "width"), 1),
+    _Trend("slope-and-bend", "V-A", "with more bend the loop is less steep while a cable is slack", "bend",
+           ("slack_slope",), -1, shown=("slope",)),
+    _Trend("slack-and-bend", "V-A", "more bend keeps a cable slack for longer", "bend", ("slack_share",), 1),
+    _Trend("backlash-and-pretension", "V-B", "the backlash widens with pretension", "pretension",
+           ("backlash", "width"), 1),
+    _Trend("slack-and-pretension", "V-B", "less pretension keeps a cable slack for longer", "pretension",
+           ("slack_share",), -1),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Series:
+    """A quantity over the conditions of a study; `estimates` are those of the conditions that have it."""
+
+    rows: list[Row]
+    estimates: list[Estimate]
+
+    @property
+    def is_repeated(self) -> bool:
+        """Whether two conditions or more, with repeats, can be compared."""
+        return len(self.estimates) > 1 and self.estimates[0].freedom > 0
+
+
+def recorded_claims(
+    pairs: Mapping[str, Sequence[Pair]], parameters: Parameters | None, claims: Claims, how: Measuring
+) -> list[Claim]:
+    """Claims on recordings, in the order of the paper; the parameters are as for `claims_of`."""
+    found = [_trend(trend, pairs[trend.variable], claims, how) for trend in _TRENDS]
+    found.append(_phases(pairs["pretension"], claims, how))
+    found.append(_radius(pairs["radius"], parameters, claims, how))
+    return found
+
+
+def _series(pairs: Sequence[Pair], variable: str, quantity: str, claims: Claims, how: Measuring) -> _Series:
+    simulated_of = {id(recorded): simulated for recorded, simulated in pairs}
+    conditions: dict[str, list[Recording]] = {}
+    for label, recording in labelled((r for r, _ in pairs), variable):
+        conditions.setdefault(label, []).append(recording)
+    numbers = {label: _numbers(group, quantity, how) for label, group in conditions.items()}
+    usable = [label for label, (values, _) in numbers.items() if values]
+    q = QUANTITIES[quantity]
+    means = estimates([numbers[label][0] for label in usable], relative=not q.is_share)
+    rows = []
+    for label, group in conditions.items():
+        place = (quantity, q.unit, label, float(value_of(group[0], variable)), origins_of(group))
+        simulated = [s for s in (simulated_of[id(r)] for r in group) if s is not None]
+        modelled, _ = _numbers(simulated, quantity, how)
+        model = float(np.mean(modelled)) if modelled else None
+        if label not in usable:
+            rows.append(Row(*place, model=model, gap=numbers[label][1]))
+            continue
+        mean = means[usable.index(label)]
+        reach = mean.reach(claims.coverage)
+        low, high = (None, None) if reach is None else (mean.value - reach, mean.value + reach)
+        if q.is_share and low is not None:
+            low, high = max(low, 0.0), min(high, 100.0)
+        gap = "no repeats: no interval" if reach is None else ""
+        rows.append(Row(*place, mean.count, mean.value, low, high, model, gap))
+    return _Series(rows, means)
+
+
+def _numbers(recordings: Sequence[Recording], quantity: str, how: Measuring) -> tuple[list[float], str]:
+    values, gap = [], "no recording"
+    for recording in recordings:
+        found, gaps = measure(recording, [quantity], how)
+        values += found.values()
+        gap = gaps.get(quantity, gap)
+    return values, gap
+
+
+def _trend(trend: _Trend, pairs: Sequence[Pair], claims: Claims, how: Measuring) -> Claim:
+    quantities = trend.quantities + trend.shown
+    series = {q: _series(pairs, trend.variable, q, claims, how) for q in quantities}
+    verdicts = [_has_sign(series[q], trend.sign, claims) for q in trend.quantities]
+    return Claim(trend.name, trend.section, trend.says, _joint(verdicts), *_sentence_and_rows(series))
+
+
+def _has_sign(series: _Series, sign: int, claims: Claims) -> str:
+    """Whether means rise (sign +1) or fall (-1) from one condition to the next."""
+    if not series.is_repeated:
+        return OPEN
+    means = series.estimates
+    if all(sign * s.value > s.reach(claims.coverage) for s in (difference(a, b) for a, b in pairwise(means))):
+        return YES
+    whole = difference(means[0], means[-1])
+    mean = float(np.mean([m.value for m in means]))
+    if sign * whole.value + whole.reach(claims.coverage) < 0.01 * claims.small_percent * abs(mean):
+        return NO
+    return OPEN
+
+
+def _joint(verdicts: Sequence[str]) -> str:
+    kinds = set(verdicts)
+    if len(kinds) == 1:
+        return kinds.pop()
+    return PART if YES in kinds else OPEN
+
+
+def _phases(pairs: Sequence[Pair], claims: Claims, how: Measuring) -> Claim:
+    """Phases IVa and IVb over pretension."""
+    series = {q: _series(pairs, "pretension", q, claims, how) for q in ("IVa_share", "IVb_share")}
+    verdict = OPEN
+    seen_a, seen_b = ([e.value > claims.seen_percent for e in s.estimates] for s in series.values())
+    if len(seen_a) > 2 and len(seen_b) == len(seen_a):
+        # Conditions are in rising order of pretension.
+        ends = (seen_a[0], seen_a[-1], seen_b[0], seen_b[-1]) == (True, False, True, False)
+        middle = any(a and not b for a, b in zip(seen_a, seen_b, strict=True))
+        verdict = YES if ends and middle else NO
+    says = "a high pretension shows no phase IV, a middling one IVa, a low one IVb as well"
+    return Claim("phases-and-pretension", "V-B", says, verdict, *_sentence_and_rows(series))
+
+
+def _radius(pairs: Sequence[Pair], parameters: Parameters | None, claims: Claims, how: Measuring) -> Claim:
+    """Difference between the largest and the smallest of the radii's means."""
+    small, verdicts, parts, rows = claims.small_percent, [], [], []
+    for quantity in ("backlash", "width", "slope"):
+        series = _series(pairs, "radius", quantity, claims, how)
+        spread = _spread(series, claims)
+        model = spread_percent([r.model for r in series.rows if r.model is not None])
+        rows += series.rows
+        place = (f"{quantity}_spread", "%", "all radii", np.nan, series.rows[0].source if series.rows else "")
+        if spread is None:
+            verdicts.append(OPEN)
+            rows.append(Row(*place, model=model, gap="fewer than two radii, or no repeats"))
+            continue
+        value, reach = spread
+        low, high = max(0.0, value - reach), value + reach
+        verdicts.append(YES if high < small else NO if low > small else OPEN)
+        rows.append(Row(*place, sum(e.count for e in series.estimates), value, low, high, model))
+        parts.append(f"{QUANTITIES[quantity].text} {value:.2g} % (at most {high:.2g} %; model {percent(model)} %)")
+    sentence = "Between the radii the means differ by: " + "; ".join(parts) + "." if parts else "Nothing to compare."
+    alone = spread_percent(_backlash_alone([r.path for r, _ in pairs], parameters, claims.model, how))
+    if alone is not None:
+        rows.append(Row("backlash_spread", "%", "all radii, one pretension", np.nan, MODEL_ALONE, model=alone))
+        sentence += f" At one and the same pretension the model's backlash differs by {percent(alone)} %."
+    says = "at one angle of bend the loop's radius makes next to no difference"
+    return Claim("radius", "V-C", says, _joint(verdicts), sentence, rows)
+
+
+def _backlash_alone(
+    paths: Sequence[ConduitPath], parameters: Parameters | None, study: ModelStudies, how: Measuring
+) -> list[float]:
+    """Backlash of the model on each path, at the study's pretension; none if the model cannot be run."""
+    if parameters is None or parameters.load_stiffness_Nm_per_rad is None:
+        return []
+    try:
+        runs = [model_runs.run(parameters, path, parameters.load_stiffness_Nm_per_rad, study) for path in paths]
+    except ModelError:
+        return []
+    return [v for run in runs for v in measure(run, ["backlash"], how)[0].values()]
+
+
+def _spread(series: _Series, claims: Claims) -> tuple[float, float] | None:
+    """Largest less smallest mean and half its interval, % of the mean of means."""
+    if not series.is_repeated:
+        return None
+    means = sorted(series.estimates, key=lambda e: e.value)
+    apart = difference(means[0], means[-1])
+    scale = 100 / abs(np.mean([m.value for m in means]))
+    return float(scale * apart.value), float(scale * apart.reach(claims.coverage))
+
+
+def _sentence_and_rows(series: Mapping[str, _Series]) -> tuple[str, list[Row]]:
+    """All numbers of some quantities in a sentence, how many intervals hold the model, and the rows."""
+    rows = [row for s in series.values() for row in s.rows]
+    known = [r for r in rows if r.low is not None and r.model is not None]
+    inside = sum(r.low <= r.model <= r.high for r in known)
+    summary = f"The model lies within {inside} of {len(known)} intervals." if known else ""
+    return " ".join(_quantity_sentence(q, s.rows) for q, s in series.items()) + " " + summary, rows
+
+
+def _quantity_sentence(quantity: str, rows: Sequence[Row]) -> str:
+    q = QUANTITIES[quantity]
+    parts = []
+    for row in rows:
+        model = three_digits(row.model)
+        if row.value is None:
+            parts.append(f"{row.condition}: – ({row.gap}; model {model})")
+        else:
+            reach = "" if row.low is None else f" ({three_digits(row.low)} to {three_digits(row.high)})"
+            parts.append(f"{row.condition}: {three_digits(row.value)}{reach}, model {model}")
+    unit = "" if q.unit == "1" else f" ({q.unit})"
+    return f"{q.text[0].upper()}{q.text[1:]}{unit}: " + "; ".join(parts) + "."

@@ -1,0 +1,132 @@
+"""A batch -> its diagnosis: diagnosis.json, a page, and the models that were compared."""
+
+import html
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from ccmodel import mechanisms as registry
+from ccmodel import provenance
+from ccmodel.diagnose.diagnosis import Diagnosis, Options
+from ccmodel.diagnose.diagnosis import diagnose as run
+from ccmodel.failure import ModelError
+from ccmodel.model.files import model_as_dict, read_model
+from ccmodel.model.parameters import Parameters
+from ccmodel.recording import read_recordings
+from ccmodel.rig.ingest import ingest_batch
+from ccmodel.steps.files import estimates_of, read_json, write_json
+from ccmodel.studies.diagnosis.page import headline, write_diagnosis
+from ccmodel.studies.diagnosis.settings import Diagnosing
+from ccmodel.typed import InputError
+
+MODELS = ("calibrated.json", "model.json")
+NEAREST = "nearest.json"
+
+
+def diagnose(
+    batch: Path,
+    out: Path,
+    settings: Diagnosing | None = None,
+    without: Sequence[str] = (),
+    report: Callable[[str], None] = lambda text: None,
+    baseline: Path | None = None,
+    freeze: bool = False,
+) -> dict:
+    """Diagnose a batch folder and write the files of its diagnosis.
+
+    Parameters
+    ----------
+    batch, out : Path
+        Batch folder; folder of the files.
+    settings : Diagnosing, optional
+    without : sequence of str
+        Mechanisms that are no candidates.
+    report : callable
+        Gets a line on each stage.
+    baseline : Path, optional
+        Model file to start from, instead of the batch's own estimates.
+    freeze : bool
+        Whether the baseline keeps all its values.
+
+    Returns
+    -------
+    dict
+        The content of diagnosis.json.
+
+    Raises
+    ------
+    InputError
+        If the batch or the model file cannot be used, or a name in `without` is no mechanism.
+    """
+    try:
+        for name in without:
+            registry.get(name)
+    except registry.UnknownMechanismError as error:
+        raise InputError(f"--without: {error}") from None
+    ingested = ingest_batch(batch)
+    if ingested.batch is None or not ingested.recordings:
+        refused = [str(f) for f in ingested.findings if f.severity == "refused"]
+        raise InputError("\n".join(refused) or f"{batch}: no recording that can be used")
+    not_judged = _refused(map(asdict, ingested.findings))
+    inputs = provenance.of_inputs(provenance.files_in(batch), batch)
+    known = read_model(baseline) if baseline else None
+    if freeze and known is None:
+        raise InputError("--freeze: there is no model to hold; name one with --baseline")
+    try:
+        estimates = Parameters.estimated(ingested.batch.rig)
+        options = _options(settings, without)
+        found = run(ingested.recordings, estimates, options, known, freeze, not_judged, report)
+    except (ModelError, ValueError) as error:
+        raise InputError(f"{batch}: {error}") from None
+    content = _write(found, inputs, out)
+    if not content["nearest"]:
+        (out / NEAREST).unlink()
+    return content
+
+
+def diagnose_recordings(recordings_file: Path, out: Path, settings: Diagnosing | None = None) -> None:
+    """Diagnose a batch that the pipeline has read; a batch that cannot be diagnosed has files with the reason."""
+    estimates, recordings = estimates_of(recordings_file), read_recordings(recordings_file)
+    inputs = provenance.of_inputs([recordings_file])
+    try:
+        if estimates is None or not recordings:
+            raise ModelError("no recording that can be used")
+        not_judged = _refused(read_json(recordings_file.with_suffix(".json"))["findings"])
+        found = run(recordings, estimates, _options(settings), not_judged=not_judged)
+    except (ModelError, ValueError) as error:
+        name, reason = recordings_file.stem, str(error)
+        out.mkdir(parents=True, exist_ok=True)
+        write_json(out / "diagnosis.json", {"batch": name, "verdict": None, "why": reason})
+        for model in (*MODELS, NEAREST):
+            write_json(out / model, _no_model(reason))
+        (out / "report.html").write_text(f"<p>{name}: not diagnosed: {html.escape(reason)}</p>\n")
+        return
+    _write(found, inputs, out)
+
+
+def _refused(findings: Iterable[Mapping]) -> list[dict[str, str]]:
+    """Files that were refused, with the reason."""
+    return [{"what": Path(f["file"]).name, "why": f["text"]} for f in findings if f["severity"] == "refused"]
+
+
+def _options(settings: Diagnosing | None, without: Sequence[str] = ()) -> Options:
+    return Options(**(settings or Diagnosing()).model_dump(exclude_none=True), without=without)
+
+
+def _no_model(reason: str) -> dict:
+    return {"succeeded": False, "message": reason}
+
+
+def _write(found: Diagnosis, inputs: dict, out: Path) -> dict:
+    """Write diagnosis.json, the page and the models; without a nearest model, its file states why."""
+    out.mkdir(parents=True, exist_ok=True)
+    content = found.report | {"headline": headline(found.report), "provenance": inputs}
+    write_json(out / "diagnosis.json", content)
+    for name, fit in zip(MODELS, (found.judgement.calibrated, found.judgement.best), strict=True):
+        write_json(out / name, model_as_dict(found.model(fit), inputs))
+    if found.report["nearest"]:
+        write_json(out / NEAREST, model_as_dict(found.model(found.judgement.nearest), inputs))
+    else:
+        write_json(out / NEAREST, _no_model(f"verdict '{found.report['verdict']}': the diagnosis has no nearest model"))
+    write_diagnosis(out / "report.html", found)
+    return content

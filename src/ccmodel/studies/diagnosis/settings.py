@@ -1,0 +1,32 @@
+"""Settings of the diagnoses."""
+
+from pydantic import Field, model_validator
+
+from ccmodel import mechanisms
+from ccmodel.steps.settings import Tolerance
+from ccmodel.typed import TypedModel
+
+
+class Diagnosing(TypedModel):
+    """How finely a diagnosis looks."""
+
+    tolerance: Tolerance = Field(
+        0.0,
+        description="share of a channel's peak to peak that a right model may leave besides noise; or by channel",
+    )
+    step_s: float | None = Field(None, gt=0, description="compare a sample every so often, s; absent: finely")
+    cycles: int | None = Field(None, ge=1, description="cycles of a sine that are compared once settled; absent: all")
+    forced_candidates: list[list[str]] = Field(
+        default_factory=list,
+        description="one or two mechanisms each, 'name at place', to fit in full whatever the screening says",
+    )
+
+    @model_validator(mode="after")
+    def _candidates_known(self):
+        for one in (one for candidate in self.forced_candidates for one in candidate):
+            name, _, place = one.partition(" at ")
+            if name not in mechanisms.names() or place not in mechanisms.get(name).places:
+                raise ValueError(f"forced_candidates: there is no mechanism '{one}'; one is stated as 'name at place'")
+        if any(len(candidate) not in (1, 2) for candidate in self.forced_candidates):
+            raise ValueError("forced_candidates: each is a list of one mechanism or of two")
+        return self

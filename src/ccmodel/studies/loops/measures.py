@@ -1,0 +1,279 @@
+"""Quantities of the loops of one cycle: backlash, slopes, slack, lost work; the same for recordings and models.
+
+The two reversals of the drive divide a cycle into two branches. At the start of a branch the load rests (the flat part
+of the loop), then it follows. While one cable is slack, the other one transmits the torque alone, and the loop is less
+steep.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from ccmodel.channels import CABLES, F_DRIVE, F_LOAD, TABLE, TAU_IN, TAU_OUT, TENSIONS, THETA_IN, THETA_OUT
+from ccmodel.errors import last_cycle
+from ccmodel.recording import Recording
+from ccmodel.studies.loops.settings import Measuring
+
+# Channel on the x axis, channel on the y axis.
+TORQUE_LOOP = (TAU_IN, TAU_OUT)
+MOTION_LOOP = (THETA_IN, THETA_OUT)
+
+
+class NotMeasurableError(Exception):
+    """A quantity cannot be obtained from a recording; the text gives the reason."""
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """The last cycle of a recording, smoothed, and its two branches.
+
+    Attributes
+    ----------
+    channels : dict of str to ndarray, shape (n,)
+    slack : ndarray of bool, shape (2, n), or None
+        Whether cable A and B are slack: the tension at both ends is below the threshold at most of the samples around.
+        The mean tension around a sample would end every slack too early. None where a tension was not recorded.
+    branches : tuple of ndarray of int
+        Samples of each branch in the order of time, from one reversal of the drive to the next. One branch consists of
+        the end and the beginning of the cycle.
+    how : Measuring
+    """
+
+    channels: dict[str, NDArray]
+    slack: NDArray | None
+    branches: tuple[NDArray, NDArray]
+    how: Measuring
+
+    @classmethod
+    def of(cls, recording: Recording, how: Measuring) -> "Cycle":
+        """The last cycle of a recording.
+
+        Raises
+        ------
+        NotMeasurableError
+            If the drive makes no whole cycle, or the cycle has too few samples.
+        """
+        window = last_cycle(recording)
+        theta = recording[THETA_IN][window]
+        n = theta.size
+        if n < 4 * how.fewest_samples:
+            raise NotMeasurableError(f"{n} samples in the last cycle, fewer than {4 * how.fewest_samples}")
+        if not abs(theta[-1] - theta[0]) < how.closed_share * np.ptp(theta):
+            raise NotMeasurableError("the drive makes no whole cycle")
+        size = max(1, round(how.smoothing_share * n))
+        channels = {c: uniform_filter1d(v, size)[window] for c, v in recording.channels.items()}
+        theta = channels[THETA_IN]
+        up, down = int(theta.argmax()), int(theta.argmin())
+        if not up < down:
+            raise NotMeasurableError("the drive does not go up and down once in its cycle")
+        slack = _slack(recording, how, size)
+        slack = None if slack is None else slack[:, window]
+        return cls(channels, slack, (np.arange(up, down + 1), np.r_[down:n, 0 : up + 1]), how)
+
+    def __getitem__(self, channel: str) -> NDArray:
+        if channel not in self.channels:
+            raise NotMeasurableError(f"{channel} was not recorded")
+        return self.channels[channel]
+
+    @property
+    def slack_cables(self) -> NDArray:
+        """`slack`; raises where it is unknown."""
+        if self.slack is None:
+            raise NotMeasurableError("a tension was not recorded")
+        return self.slack
+
+    def follows(self, branch: NDArray) -> NDArray:
+        """Whether the load has moved since the reversal, in torque, at each sample of a branch."""
+        y = self[TAU_OUT]
+        return np.abs(y[branch] - y[branch[0]]) > self.how.moved_share * float(np.ptp(y))
+
+
+def _slack(recording: Recording, how: Measuring, size: int) -> NDArray | None:
+    if not all(c in recording for c in TENSIONS):
+        return None
+    below = [np.maximum(recording[near], recording[far]) < how.slack_below_N for near, far in CABLES.values()]
+    return uniform_filter1d(np.array(below, dtype=float), size, axis=1) > 0.5
+
+
+def peak_to_peak(cycle: Cycle, channel: str) -> float:
+    """Highest less lowest value of a channel."""
+    return float(np.ptp(cycle[channel]))
+
+
+def width(cycle: Cycle, loop: tuple[str, str] = TORQUE_LOOP) -> float:
+    """Distance along x between the two branches in the middle of y's range."""
+    (first, _), (second, _) = _middle_lines(cycle, loop)
+    return abs(first - second)
+
+
+def slope(cycle: Cycle, loop: tuple[str, str] = TORQUE_LOOP) -> float:
+    """Gradient dy / dx in the middle of y's range, mean of the two branches."""
+    return float(np.mean([1 / gradient for _, gradient in _middle_lines(cycle, loop)]))
+
+
+def deadband(cycle: Cycle, loop: tuple[str, str] = TORQUE_LOOP) -> float:
+    """Change of x after a reversal of the drive until y follows, mean of the two branches.
+
+    Encoder steps and noise conceal the first small motion of y. The corner is therefore the point at which the line
+    through the next part of the branch has the value that y had at the reversal.
+    """
+    x, y = cycle[loop[0]], cycle[loop[1]]
+    span, low = float(np.ptp(y)), cycle.how.moved_share
+    found = []
+    for branch in cycle.branches:
+        moved = np.abs(y[branch] - y[branch[0]]) / span if span > 0 else np.zeros(branch.size)
+        until = int(np.argmax(moved > 3 * low)) if (moved > 3 * low).any() else branch.size
+        following = branch[:until][moved[:until] >= low]
+        corner, _ = _line(y[following], x[following], y[branch[0]], cycle.how)
+        found.append(abs(corner - x[branch[0]]))
+    return float(np.mean(found))
+
+
+def slack_share(cycle: Cycle) -> float:
+    """Share of the cycle's samples at which a cable is slack."""
+    return float(cycle.slack_cables.any(axis=0).mean())
+
+
+def slack_through_reversal_share(cycle: Cycle) -> float:
+    """Share of the cycle at which a cable is slack since before the reversal and the load follows: phase IVb."""
+    count = 0
+    for branch in cycle.branches:
+        still = np.logical_and.accumulate(cycle.slack_cables[:, branch], axis=1).any(axis=0)
+        count += int((still & cycle.follows(branch)).sum())
+    return count / cycle[TAU_OUT].size
+
+
+def slack_before_reversal_share(cycle: Cycle) -> float:
+    """Share of the cycle at which a cable is slack until the drive reverses: phase IVa."""
+    return sum(_slack_until_reversal(cycle, branch).size for branch in cycle.branches) / cycle[TAU_OUT].size
+
+
+def slack_slope(cycle: Cycle) -> float:
+    """Gradient of tau_out over tau_in while one cable is slack and the drive goes on, mean of the two branches."""
+    tau_in, tau_out = (cycle[c] for c in TORQUE_LOOP)
+    found = []
+    for branch in cycle.branches:
+        part = _slack_until_reversal(cycle, branch)
+        # Smoothing rounds off the reversal, and a cable counts as slack a little too early: only the outer half counts.
+        part = part[: -max(1, round(cycle.how.smoothing_share * tau_in.size))]
+        distance = np.abs(tau_in[part] - tau_in[part[0]]) if part.size else np.zeros(1)
+        if not distance.max() > cycle.how.moved_share * np.ptp(tau_in):
+            raise NotMeasurableError("no cable is slack before a reversal for long enough to have a slope")
+        part = part[distance > distance.max() / 2]
+        found.append(_line(tau_in[part], tau_out[part], float(tau_in[part].mean()), cycle.how)[1])
+    return float(np.mean(found))
+
+
+def work_lost(cycle: Cycle) -> float:
+    """Work of the drive over a closed cycle, J."""
+    tau, theta = (np.append(cycle[c], cycle[c][0]) for c in (TAU_IN, THETA_IN))
+    return float(abs(np.trapezoid(tau, theta)))
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity of a cycle.
+
+    Attributes
+    ----------
+    text : str
+        Its name in tables and figures.
+    unit : str
+    factor : float
+        From SI units to `unit`.
+    of_cycle : callable
+    channels : tuple of str
+        Channels from which it is computed, for its uncertainty.
+    """
+
+    text: str
+    unit: str
+    factor: float
+    of_cycle: Callable[[Cycle], float]
+    channels: tuple[str, ...]
+
+    @property
+    def is_share(self) -> bool:
+        """Whether it is a share, which may be zero, so that its scatter is absolute and not relative."""
+        return self.unit == "%"
+
+
+def _peak(channel: str) -> Quantity:
+    c = TABLE[channel]
+    text, of_cycle = f"peak to peak of {c.symbol}", partial(peak_to_peak, channel=channel)
+    return Quantity(text, c.plot_unit or c.unit, c.scale, of_cycle, (channel,))
+
+
+QUANTITIES = {
+    **{TABLE[c].short_name: _peak(c) for c in (THETA_OUT, TAU_IN, TAU_OUT, F_DRIVE, F_LOAD, *TENSIONS)},
+    "width": Quantity("width of the torque loop", "mN·m", 1e3, width, TORQUE_LOOP),
+    "backlash": Quantity("backlash of the torque loop (its flat part)", "mN·m", 1e3, deadband, TORQUE_LOOP),
+    "lost_motion": Quantity("lost motion", "rad", 1.0, partial(deadband, loop=MOTION_LOOP), MOTION_LOOP),
+    "slope": Quantity("slope of the torque loop, both cables taut", "1", 1.0, slope, TORQUE_LOOP),
+    "slack_slope": Quantity("slope of the torque loop, one cable slack", "1", 1.0, slack_slope, TORQUE_LOOP),
+    "slack_share": Quantity("share of the cycle with a slack cable", "%", 100.0, slack_share, TENSIONS),
+    "IVa_share": Quantity(
+        "share of the cycle in phase IVa (slack, drive going on)", "%", 100.0, slack_before_reversal_share, TENSIONS
+    ),
+    "IVb_share": Quantity(
+        "share of the cycle in phase IVb (slack through a reversal)", "%", 100.0, slack_through_reversal_share, TENSIONS
+    ),
+    "work_lost": Quantity("work lost in a cycle", "mJ", 1e3, work_lost, (TAU_IN, THETA_IN)),
+}
+
+
+def measure(recording: Recording, names: Sequence[str], how: Measuring) -> tuple[dict[str, float], dict[str, str]]:
+    """Quantities of a recording's last cycle, in their units, and the reason for each that is missing.
+
+    Parameters
+    ----------
+    recording : Recording
+    names : sequence of str
+        Out of `QUANTITIES`.
+    how : Measuring
+
+    Returns
+    -------
+    values : dict of str to float
+    gaps : dict of str to str
+        Each name is in one of the two.
+    """
+    try:
+        cycle = Cycle.of(recording, how)
+    except NotMeasurableError as gap:
+        return {}, dict.fromkeys(names, str(gap))
+    values, gaps = {}, {}
+    for name in names:
+        quantity = QUANTITIES[name]
+        try:
+            values[name] = quantity.factor * quantity.of_cycle(cycle)
+        except NotMeasurableError as gap:
+            gaps[name] = str(gap)
+    return values, gaps
+
+
+def _middle_lines(cycle: Cycle, loop: tuple[str, str]) -> list[tuple[float, float]]:
+    """For each branch, x in the middle of y's range, and dx / dy there."""
+    x, y = cycle[loop[0]], cycle[loop[1]]
+    middle, span = float(y.max() + y.min()) / 2, float(np.ptp(y))
+    near = [b[np.abs(y[b] - middle) <= cycle.how.middle_share * span] for b in cycle.branches]
+    return [_line(y[part], x[part], middle, cycle.how) for part in near]
+
+
+def _line(u: NDArray, v: NDArray, at: float, how: Measuring) -> tuple[float, float]:
+    """Value at `at`, and gradient, of the straight line through v over u."""
+    if u.size < how.fewest_samples or not np.ptp(u) > 0:
+        raise NotMeasurableError(f"{u.size} samples for a line that takes {how.fewest_samples} different ones")
+    gradient, value = np.polyfit(u - at, v, 1)
+    return float(value), float(gradient)
+
+
+def _slack_until_reversal(cycle: Cycle, branch: NDArray) -> NDArray:
+    """The last samples of a branch during which one cable is slack throughout and the load follows."""
+    slack = cycle.slack_cables[:, branch[::-1]]
+    until_reversal = np.logical_and.accumulate(slack, axis=1)[:, ::-1].any(axis=0)
+    return branch[until_reversal & cycle.follows(branch)]

@@ -1,0 +1,50 @@
+"""What the settings of every study state: what it needs and which files it makes."""
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from ccmodel.typed import TypedModel
+
+EACH = "each"
+
+
+class StudySettings(TypedModel):
+    """Base of a study's settings; in names of files, ``{name}`` stands for the study's name."""
+
+    # Folder of the study in ccmodel.studies, and its heading in the page's navigation.
+    kind: ClassVar[str]
+    heading: ClassVar[str]
+    # CSV files in results/tables; a study with tables also has a JSON file there, which its part of the page shows.
+    tables: ClassVar[tuple[str, ...]] = ()
+    # Figures in results/figures, each as PNG and SVG.
+    figures: ClassVar[tuple[str, ...]] = ("{name}",)
+
+    def check(self, where: str, config) -> None:
+        """Refuse settings that do not fit the rest of the configuration.
+
+        Parameters
+        ----------
+        where : str
+            What the configuration calls the study, for the message.
+        config : ccmodel.config.Config
+
+        Raises
+        ------
+        ValueError
+        """
+        wanted = getattr(self, "parameters", None)
+        if wanted is not None and wanted not in config.parameter_sets:
+            raise ValueError(f"{where} asks for parameters '{wanted}'; there are {', '.join(config.parameter_sets)}")
+
+    def needs(self, config, studies: Mapping, batches: Sequence[str]) -> list[tuple[str, str, str]]:
+        """Label, parameter set and batch of every run that the study looks at.
+
+        Parameters
+        ----------
+        config : ccmodel.config.Config
+        studies : mapping of str to Study
+            The figures of the configuration, by name.
+        batches : sequence of str
+            All batches.
+        """
+        return []

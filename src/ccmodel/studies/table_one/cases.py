@@ -1,0 +1,106 @@
+"""The cases of the study, a row each: errors after the fit, and the norms by which they can be divided."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import nullcontext
+from functools import partial
+from itertools import combinations, product
+
+import pandas as pd
+from numpy.typing import NDArray
+
+from ccmodel.channels import TABLE_ONE
+from ccmodel.failure import ModelError
+from ccmodel.studies.table_one.effects import Effect, all_effects, depends_on_time, scaled
+from ccmodel.studies.table_one.refit import NORMS, refit
+from ccmodel.studies.table_one.rigs import Condition, conditions, recorded, within_ranges
+from ccmodel.studies.table_one.settings import NotStated, TableOne
+
+CONDITION = ("rig", "load_stiffness_Nm_per_rad", "amplitude_rad", "frequency_Hz", "fit_over")
+Case = tuple[Condition, tuple[Effect, ...]]
+Report = Callable[[str], None]
+
+
+def usable_conditions(study: TableOne, open_: NotStated) -> list[Condition]:
+    """The conditions that the paper's sensors could have recorded."""
+    return [c for c in conditions(open_) if within_ranges(study.rig, c)]
+
+
+def single_cases(study: TableOne, usable: Sequence[Condition]) -> list[list[Case]]:
+    """A list for every effect and place."""
+    return [_under(usable, [(e,) for e in group]) for group in all_effects(study.grid)]
+
+
+def pair_cases(study: TableOne, usable: Sequence[Condition], best: Sequence[Effect]) -> list[list[Case]]:
+    """A list for every two of the effects given, each at some shares of its strength there."""
+    courses = [[scaled(effect, share) for share in study.pairs.shares] for effect in best]
+    places = [(e.name, e.place) for e in best]
+    return [
+        _under(usable, list(product(courses[i], courses[j])))
+        for i, j in combinations(range(len(best)), 2)
+        if places[i] != places[j]
+    ]
+
+
+def run(study: TableOne, groups: Sequence[Sequence[Case]], cores: int, report: Report) -> pd.DataFrame:
+    """Rows of all cases, in their order.
+
+    Processes share the conditions: fits under one condition have the derivatives of the plain model in common.
+    """
+    cases = [case for group in groups for case in group]
+    parts: dict[Condition, list[int]] = {}
+    for i, (condition, _) in enumerate(cases):
+        parts.setdefault(condition.without_fit, []).append(i)
+    rows: dict[int, dict] = {}
+    work = partial(_rows, study), [[cases[i] for i in part] for part in parts.values()]
+    with ProcessPoolExecutor(cores) if cores > 1 else nullcontext() as pool:
+        results = (pool.map if pool else map)(*work)
+        for done, (part, found) in enumerate(zip(parts.values(), results, strict=True), 1):
+            rows |= zip(part, found, strict=True)
+            report(f"part {done} of {len(parts)}, {len(part)} cases")
+    return pd.DataFrame([rows[i] for i in range(len(cases))])
+
+
+def _under(usable: Sequence[Condition], acting: Sequence[tuple[Effect, ...]]) -> list[Case]:
+    """Effects under all conditions; of the frequencies only the first if no effect depends on time."""
+    first_frequency = usable[0].frequency_Hz if usable else None
+    return [(c, e) for e in acting for c in usable if c.frequency_Hz == first_frequency or depends_on_time(e)]
+
+
+def _rows(study: TableOne, cases: Sequence[Case]) -> list[dict]:
+    """Rows of cases; a rig with several fits in succession is simulated once."""
+    rows, before, rig_data = [], None, None
+    for condition, effects in cases:
+        if (condition.without_fit, effects) != before:
+            before, rig_data = (condition.without_fit, effects), _rig_data(study, condition, effects)
+        rows.append(_row(study, condition, effects, rig_data))
+    return rows
+
+
+def _rig_data(study: TableOne, condition: Condition, effects: tuple[Effect, ...]) -> NDArray | str:
+    """The rig's recording, or the reason why it cannot be simulated."""
+    try:
+        return recorded(study.rig, condition, effects)
+    except (ModelError, ValueError) as error:
+        return str(error)
+
+
+def _row(study: TableOne, condition: Condition, effects: tuple[Effect, ...], rig_data: NDArray | str) -> dict:
+    row = {
+        "effect": " + ".join(f"{e.name} at {e.place}" for e in effects),
+        "numbers": "; ".join(" ".join(f"{k}={v:.6g}" for k, v in e.values.items()) for e in effects),
+        "plausible": all(e.plausible for e in effects),
+        **{name: getattr(condition, name) for name in CONDITION},
+        "failed": "",
+    }
+    if isinstance(rig_data, str):
+        return row | {"failed": rig_data}
+    try:
+        found = refit(study.rig, condition, rig_data)
+    except (ModelError, ValueError) as error:
+        return row | {"failed": str(error)}
+    row |= {"stiffness_ratio": found.stiffness_ratio, "friction_ratio": found.friction_ratio}
+    row |= {f"rmse_{c}": v for c, v in zip(TABLE_ONE, found.rmse.tolist(), strict=True)}
+    for name, norm in NORMS.items():
+        row |= {f"{name}_{c}": v for c, v in zip(TABLE_ONE, norm(rig_data).tolist(), strict=True)}
+    return row

@@ -1,0 +1,77 @@
+"""The variable of a study: its value in a recording, and the label of a value in a legend."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from ccmodel.recording import ORIGIN, Recording
+
+
+def value_of(recording: Recording, variable: str) -> float | str:
+    """The value of a study's variable in a recording, in SI units.
+
+    Parameters
+    ----------
+    recording : Recording
+    variable : str
+        "bend" (rad), "pretension" (N), "radius" (m, of the tightest bend), "frequency" (Hz) or "load_level" (share),
+        the last two as noted under `excitation`; or "recording" for the recording's name.
+
+    Returns
+    -------
+    float or str
+        NaN where the recording does not state the value, or notes something that is no number.
+    """
+    if variable == "recording":
+        return f"{recording.batch}/{recording.id}"
+    if variable == "bend":
+        return recording.path.bend_rad
+    if variable == "pretension":
+        return recording.pretension_N
+    if variable == "radius":
+        bent = recording.path.piece_bend_rad > 0
+        return float((recording.path.piece_length_m[bent] / recording.path.piece_bend_rad[bent]).min(initial=np.inf))
+    noted = {"frequency": "frequency_Hz", "load_level": "load_level"}[variable]
+    try:
+        return float(recording.excitation[noted])
+    except (KeyError, TypeError, ValueError):
+        return np.nan
+
+
+def label_of(value: float | str, variable: str) -> str:
+    """Label of a variable's value in a legend."""
+    if isinstance(value, str):
+        return value
+    if np.isnan(value):
+        return f"{variable.replace('_', ' ')} not stated"
+    if variable == "bend":
+        half_loops = value / np.pi
+        whole = abs(half_loops - round(half_loops)) < 0.01
+        return f"{half_loops:.0f} × 180°" if whole else f"{np.degrees(value):.0f}°"
+    return {
+        "pretension": f"{value:g} N",
+        "radius": f"{100 * value:.2f} cm",
+        "frequency": f"{value:g} Hz",
+        "load_level": f"load {100 * value:g} %",
+    }[variable]
+
+
+def labelled(recordings: Iterable[Recording], variable: str) -> list[tuple[str, Recording]]:
+    """Recordings with their labels, in the order of the variable's values; repeats share a label.
+
+    If measured and simulated recordings are in one study, every label names the origin.
+    """
+    ordered = sorted(recordings, key=lambda r: _sort_key(value_of(r, variable)))
+    mixed = len({r.origin for r in ordered}) > 1
+    suffix = {r.origin: f", {ORIGIN[r.origin]}" if mixed else "" for r in ordered}
+    return [(label_of(value_of(r, variable), variable) + suffix[r.origin], r) for r in ordered]
+
+
+def origins_of(recordings: Iterable[Recording]) -> str:
+    """Origins of recordings, as figures and pages name them."""
+    return " and ".join(ORIGIN[origin] for origin in sorted({r.origin for r in recordings}))
+
+
+def _sort_key(value: float | str) -> tuple:
+    """Values in their order, those not stated last."""
+    return (value,) if isinstance(value, str) else (np.isnan(value), value)

@@ -1,0 +1,105 @@
+"""The contract of a twin: an effect of the virtual rig, its law there and how the proof seeds it, in one file.
+
+1. A file of this package holds one twin as ``TWIN``, or close relatives as ``TWINS``. The package finds it by listing
+   the folder. It has the name of the mechanism that a diagnosis should find, or begins with "unlisted-".
+2. ``fields`` declares the effect's fields of a rig's configuration: of the rig itself, of each pulley, of the load, or
+   of the sensors of each side.
+3. A law of friction is a compiled function, ``slow_friction`` or ``friction``. A fault of sensors is ``read``. What
+   needs a state of its own stands in the time loop (`virtualrig.effect_dynamics`); ``numbers`` gives it the values.
+4. ``places`` to ``also`` say what the proof draws, and ``seed`` how a drawn size enters the rig and an answer.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, NamedTuple
+
+from numpy.typing import NDArray
+from pydantic import Field
+
+Range = tuple[float, float]
+OpenShare = Annotated[float, Field(gt=0, lt=1)]
+# Full stroke of the proof's motions, at which the load's stiffening is drawn.
+FULL_STROKE_RAD = 0.6
+
+
+class Side(NamedTuple):
+    """What acts on the sensors of one side, or what they read; arrays of shape (samples,)."""
+
+    angle_rad: NDArray
+    torque_Nm: NDArray
+    force_N: NDArray
+
+
+class Law(NamedTuple):
+    """A law of friction.
+
+    Attributes
+    ----------
+    value : compiled function
+        The quantity with this law, from the same without it (`Twin`).
+    bound : callable
+        ``bound(numbers, tension_N)``: the largest factor that it is changed by, at tensions up to this, for the time
+        step.
+    """
+
+    value: Callable
+    bound: Callable[[Any, float], float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Twin:
+    """An effect of the virtual rig.
+
+    Attributes
+    ----------
+    name : str
+        The mechanism's, or one that begins with "unlisted-" for an effect that a diagnosis does not know.
+    fields : mapping of str to mapping of str to (type, default)
+        Fields by group: "rig", "pulley", "load" or "sensors".
+    places : tuple of str
+        Where the proof seeds it.
+    size : (float, float)
+        Range of its size, drawn uniformly in the logarithm: from below the sensors' resolution to plain.
+    unit : str
+        Unit of the size.
+    seed : callable
+        ``seed(size, also, place, spring)`` returns what it sets in the rig's effects, nested as these, and its values
+        under the names of the mechanism's parameters, as far as these mean the same in the rig. ``also`` holds the
+        other drawn numbers and a phase (rad), ``spring`` is the load's stiffness (N m/rad).
+    signed : bool
+        Whether either sign is drawn.
+    also : mapping of str to (float, float)
+        Ranges of other numbers, drawn uniformly in the logarithm.
+    numbers : callable
+        ``numbers(effects)``: its values in the time loop, by name.
+    slow_friction : Law or None
+        ``value(p, y, tension, time, travel, position)``: half of mu times the bend angle of a node, which is
+        evaluated again every `SLOW_S`; mean tension (N), time (s), the drive's cable travel (m) and the cable's
+        position (m) since the start. ``p`` holds every twin's numbers.
+    friction : Law or None
+        ``value(p, force, bristle, speed)``: friction of a node (N), its bristle (-1 to 1) and sliding speed (m/s).
+    read : callable or None
+        ``read(reading, truth, faults, time_s, radius_m)``: what one side's sensors read, from what they read without
+        this fault and from the truth.
+    in_rig : callable or None
+        ``in_rig(values, campaign)``: an answer's values with what else in a rig has the same law.
+    """
+
+    name: str
+    fields: Mapping[str, Mapping[str, tuple[Any, Any]]]
+    places: tuple[str, ...]
+    size: Range
+    unit: str
+    seed: Callable[[float, Mapping[str, float], str, float], tuple[dict, dict[str, float]]]
+    signed: bool = False
+    also: Mapping[str, Range] = field(default_factory=dict)
+    numbers: Callable[[Any], dict[str, Any]] = lambda effects: {}
+    slow_friction: Law | None = None
+    friction: Law | None = None
+    read: Callable[[Side, Side, Any, NDArray, float], Side] | None = None
+    in_rig: Callable[[dict[str, float], Any], dict[str, float]] | None = None
+
+
+def group_of(place: str) -> str:
+    """Name in the rig's effects of the pulley or the sensors at a place."""
+    return place.replace("-", "_") + ("s" if place.endswith("sensor") else "")

@@ -1,0 +1,40 @@
+"""Faults of a load cell, which reads (1 + gain) F + offset + drift t + crosstalk tau / R."""
+
+from virtualrig.effects.contract import Twin, group_of
+
+
+def _scale(reading, truth, faults, time_s, radius_m):
+    return reading._replace(force_N=(1 + faults.load_cell_gain) * reading.force_N)
+
+
+def _offset(reading, truth, faults, time_s, radius_m):
+    return reading._replace(force_N=reading.force_N + faults.load_cell_offset_N)
+
+
+def _drift(reading, truth, faults, time_s, radius_m):
+    return reading._replace(force_N=reading.force_N + faults.load_cell_drift_N_per_s * (time_s - time_s[0]))
+
+
+def _crosstalk(reading, truth, faults, time_s, radius_m):
+    return reading._replace(force_N=reading.force_N + faults.load_cell_crosstalk * truth.torque_Nm / radius_m)
+
+
+def _twin(name, field, parameter, size, unit, read):
+    return Twin(
+        name=name,
+        fields={"sensors": {field: (float, 0.0)}},
+        places=("drive-sensor", "load-sensor"),
+        size=size,
+        unit=unit,
+        signed=True,
+        seed=lambda size, also, place, spring: ({group_of(place): {field: size}}, {parameter: size}),
+        read=read,
+    )
+
+
+TWINS = (
+    _twin("load-cell-scale", "load_cell_gain", "gain", (0.005, 0.1), "1", _scale),
+    _twin("load-cell-offset", "load_cell_offset_N", "offset", (0.1, 3.0), "N", _offset),
+    _twin("load-cell-drift", "load_cell_drift_N_per_s", "rate", (0.005, 0.2), "N/s", _drift),
+    _twin("load-cell-crosstalk", "load_cell_crosstalk", "crosstalk", (0.005, 0.1), "1", _crosstalk),
+)

@@ -1,0 +1,52 @@
+"""Presliding: friction builds up over a length of one bristle, or of many that yield one after the other."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, PositiveFloat, PositiveInt, model_validator
+
+from virtualrig.effects.contract import Twin
+from virtualrig.strict import Strict
+
+
+class DahlPresliding(Strict):
+    """One bristle of Dahl's law at every place: friction builds up over `length_m`."""
+
+    law: Literal["dahl"] = "dahl"
+    length_m: PositiveFloat
+
+
+class IwanPresliding(Strict):
+    """Equal elements in parallel that stretch and then slip, with lengths evenly spaced in the logarithm.
+
+    A contact of many asperities: the build-up has no single length, and nested loops close exactly (Iwan, Journal of
+    Applied Mechanics 33(4), 893-900, 1966).
+    """
+
+    law: Literal["iwan"] = "iwan"
+    shortest_m: PositiveFloat
+    longest_m: PositiveFloat
+    elements: Annotated[PositiveInt, Field(le=64)] = 8
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.longest_m < self.shortest_m:
+            raise ValueError(f"longest_m {self.longest_m} is below shortest_m {self.shortest_m}")
+        return self
+
+
+def _seed(size, also, place, spring):
+    root = also["spread"] ** 0.5
+    return {"presliding": {"law": "iwan", "shortest_m": size / root, "longest_m": size * root}}, {}
+
+
+TWIN = Twin(
+    name="presliding",
+    fields={
+        "rig": {"presliding": (Annotated[DahlPresliding | IwanPresliding, Field(discriminator="law")] | None, None)}
+    },
+    places=("conduit",),
+    size=(5e-6, 2e-4),
+    unit="m",
+    also={"spread": (3.0, 15.0)},  # longest over shortest element
+    seed=_seed,
+)

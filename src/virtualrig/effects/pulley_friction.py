@@ -1,0 +1,38 @@
+"""A bearing: a torque against the motion of a pulley that builds up over a small angle."""
+
+from pydantic import PositiveFloat
+
+from virtualrig.effects.contract import Twin, group_of
+from virtualrig.strict import NonNegative, Strict
+
+
+class PulleyFriction(Strict):
+    """Its torque, and the angle over which it builds up."""
+
+    torque_Nm: NonNegative
+    presliding_rad: PositiveFloat = 1e-3
+
+
+def _numbers(effects):
+    given = effects.load_pulley.friction
+    return {
+        "bearing_torque": given.torque_Nm if given else 0.0,
+        "bearing_angle": given.presliding_rad if given else 1.0,
+    }
+
+
+def _seed(size, also, place, spring):
+    friction = {"torque_Nm": size, "presliding_rad": also["presliding_rad"]}
+    return {group_of(place): {"friction": friction}}, {"friction_torque": size}
+
+
+TWIN = Twin(
+    name="pulley-friction",
+    fields={"pulley": {"friction": (PulleyFriction | None, None)}},
+    places=("drive-pulley", "load-pulley"),
+    size=(2e-4, 2e-2),
+    unit="N m",
+    also={"presliding_rad": (1e-3, 5e-3)},
+    seed=_seed,
+    numbers=_numbers,
+)

@@ -1,0 +1,19 @@
+"""A torque that reads (1 + torque_gain) times as much."""
+
+from virtualrig.effects.contract import Twin, group_of
+
+
+def _read(reading, truth, faults, time_s, radius_m):
+    return reading._replace(torque_Nm=(1 + faults.torque_gain) * reading.torque_Nm)
+
+
+TWIN = Twin(
+    name="torque-scale",
+    fields={"sensors": {"torque_gain": (float, 0.0)}},
+    places=("drive-sensor", "load-sensor"),
+    size=(0.005, 0.1),
+    unit="1",
+    signed=True,
+    seed=lambda size, also, place, spring: ({group_of(place): {"torque_gain": size}}, {"gain": size}),
+    read=_read,
+)

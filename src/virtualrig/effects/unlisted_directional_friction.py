@@ -1,0 +1,33 @@
+"""Friction that is 1 + bias times as large where the cable slides towards the drive, 1 - bias where it slides back."""
+
+from typing import Annotated
+
+from numba import njit
+from pydantic import Field
+
+from virtualrig.effects.contract import Law, Twin
+from virtualrig.strict import Strict
+
+
+class DirectionalFriction(Strict):
+    """Its bias."""
+
+    bias: Annotated[float, Field(gt=-1, lt=1)]
+
+
+@njit
+def _value(p, force, bristle, speed):
+    return force * (1.0 + p.bias * bristle)
+
+
+TWIN = Twin(
+    name="unlisted-directional-friction",
+    fields={"rig": {"directional_friction": (DirectionalFriction | None, None)}},
+    places=("conduit",),
+    size=(0.02, 0.4),
+    unit="1",
+    signed=True,
+    seed=lambda size, also, place, spring: ({"directional_friction": {"bias": size}}, {}),
+    numbers=lambda effects: {"bias": effects.directional_friction.bias if effects.directional_friction else 0.0},
+    friction=Law(_value, lambda p, tension_N: 1 + abs(p.bias)),
+)

@@ -1,0 +1,36 @@
+"""A load spring with inner friction, such as rubber, which the load's own torque shows, unlike a bearing's."""
+
+from pydantic import PositiveFloat
+
+from virtualrig.effects.contract import Twin
+from virtualrig.strict import NonNegative, Strict
+
+
+class HystereticLoad(Strict):
+    """Up to `torque_Nm` on top of the spring's torque, built up over `angle_rad`."""
+
+    torque_Nm: NonNegative
+    angle_rad: PositiveFloat
+
+
+def _numbers(effects):
+    given = effects.hysteretic_load
+    return {
+        "hysteresis_torque": given.torque_Nm if given else 0.0,
+        "hysteresis_angle": given.angle_rad if given else 1.0,
+    }
+
+
+TWIN = Twin(
+    name="unlisted-hysteretic-load",
+    fields={"rig": {"hysteretic_load": (HystereticLoad | None, None)}},
+    places=("load",),
+    size=(5e-4, 1e-2),
+    unit="N m",
+    also={"angle_rad": (0.05, 0.3)},
+    seed=lambda size, also, place, spring: (
+        {"hysteretic_load": {"torque_Nm": size, "angle_rad": also["angle_rad"]}},
+        {},
+    ),
+    numbers=_numbers,
+)

@@ -1,0 +1,50 @@
+"""A cable that is worn unevenly along its length: friction 1 + rise sin(2 pi x / period + phase), x its position."""
+
+from typing import Annotated
+
+import numpy as np
+from numba import njit
+from pydantic import Field, PositiveFloat
+
+from virtualrig.effects.contract import Law, Twin
+from virtualrig.strict import Strict
+
+
+class PositionalFriction(Strict):
+    """Its numbers."""
+
+    rise: Annotated[float, Field(ge=0, lt=1)]
+    period_m: PositiveFloat
+    phase_rad: float = 0.0
+
+
+def _numbers(effects):
+    given = effects.positional_friction
+    return {
+        "wear_rise": given.rise if given else 0.0,
+        "wear_period": given.period_m if given else 1.0,
+        "wear_phase": given.phase_rad if given else 0.0,
+    }
+
+
+@njit
+def _value(p, y, tension, time, travel, position):
+    return y * (1.0 + p.wear_rise * np.sin(2 * np.pi * position / p.wear_period + p.wear_phase))
+
+
+def _seed(size, also, place, spring):
+    wear = {"rise": size, "period_m": also["period_m"], "phase_rad": also["phase"]}
+    return {"positional_friction": wear}, {}
+
+
+TWIN = Twin(
+    name="unlisted-positional-friction",
+    fields={"rig": {"positional_friction": (PositionalFriction | None, None)}},
+    places=("conduit",),
+    size=(0.03, 0.6),
+    unit="1",
+    also={"period_m": (2e-3, 1e-2)},
+    seed=_seed,
+    numbers=_numbers,
+    slow_friction=Law(_value, lambda p, tension_N: 1 + p.wear_rise),
+)

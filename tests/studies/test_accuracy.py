@@ -1,0 +1,123 @@
+"""Bias and scatter recovered from numbers made with known ones; comparison errors of a model known to be off."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ccmodel.model.run import simulate_recording
+from ccmodel.studies.accuracy.settings import Accuracy
+from ccmodel.studies.accuracy.study import BY_RECORDING, Case, bias_and_scatter, comparison_table, summary
+from ccmodel.studies.claims import model_runs
+from ccmodel.studies.loops.settings import Measuring
+from model_runs import CABLE, STUDY
+
+ASKED, HOW = Accuracy(), Measuring()
+
+
+def made(delta, sigma_M, sigma_E, n, seed=1):
+    random = np.random.default_rng(seed)
+    truth = random.uniform(1, 10, n)
+    recorded = truth * (1 + sigma_E * random.standard_normal(n))
+    return delta * truth * (1 + sigma_M * random.standard_normal(n)), recorded
+
+
+def test_known_bias_and_scatter_are_recovered():
+    found = bias_and_scatter(*made(1.2, 0.08, 0.05, 20_000), sigma_E=0.05, coverage=0.9)
+    assert found.delta == pytest.approx(1.2, rel=0.003)
+    assert found.sigma_M == pytest.approx(0.08, rel=0.03)
+    assert not found.limited
+
+
+def test_the_bias_lies_in_its_interval_as_often_as_stated():
+    hits = 0
+    for seed in range(400):
+        found = bias_and_scatter(*made(0.9, 0.06, 0.03, 12, seed), sigma_E=0.03, coverage=0.9)
+        hits += found.delta_low < 0.9 < found.delta_high
+    assert hits / 400 == pytest.approx(0.9, abs=0.05)
+
+
+def test_a_model_is_not_shown_to_be_nearer_to_the_truth_than_the_recordings():
+    found = bias_and_scatter(*made(1.0, 0.0, 0.05, 5000), sigma_E=0.05, coverage=0.9)
+    assert found.limited
+    assert found.sigma_M == pytest.approx(found.sigma_E)
+    assert found.sigma_M == pytest.approx(0.05 / np.sqrt(2), rel=0.05)
+
+
+@pytest.mark.parametrize(("pairs", "said"), [(2, "2 pairs, fewer than the 3"), (0, "0 pairs")])
+def test_too_few_pairs_are_refused(pairs, said):
+    with pytest.raises(ValueError, match=said):
+        bias_and_scatter(np.ones(pairs), np.ones(pairs), 0.01, 0.9)
+
+
+def test_a_value_without_a_logarithm_is_refused():
+    with pytest.raises(ValueError, match="not positive"):
+        bias_and_scatter([1.0, 0.0, 1.0], [1.0, 1.0, 1.0], 0.01, 0.9)
+
+
+def cases(stiffness_off=0.0, accuracy=0.0005):
+    """Runs of the model as recordings, and a model whose stiffness is off."""
+    found = []
+    for i, pretension in enumerate((6.0, 7.0, 8.0)):
+        study = STUDY.model_copy(update={"pretension_N": pretension})
+        recorded = model_runs.run(CABLE, model_runs.even(study), 0.05, study)
+        recorded = replace(
+            recorded, batch="b", id=f"r{i}-a", origin="virtual-rig", accuracy=dict.fromkeys(recorded.channels, accuracy)
+        )
+        off = replace(CABLE, stiffness_N_per_m=CABLE.stiffness_N_per_m * (1 + stiffness_off), pretension_N=pretension)
+        sd = {"stiffness_N_per_m": 0.02 * CABLE.stiffness_N_per_m}
+        found.append(Case(recorded, simulate_recording(recorded, off), off, sd, fitted=i == 0))
+    return found
+
+
+def test_a_model_that_is_off_by_its_inputs_uncertainty_is_within_what_can_be_seen():
+    table = comparison_table(cases(stiffness_off=0.02, accuracy=1e-6), ASKED, HOW)
+    assert list(table.columns) == list(BY_RECORDING)
+    lost = table[table["quantity"] == "lost_motion"]
+    assert (lost["E"] < 0).all()
+    assert lost["u_input"].to_numpy() == pytest.approx(lost["E"].abs().to_numpy(), rel=0.05)
+    assert lost["within"].all()
+    assert lost["fitted"].sum() == 1
+
+
+def test_a_model_that_is_off_by_more_is_not():
+    table = comparison_table(cases(stiffness_off=0.2, accuracy=1e-6), ASKED, HOW)
+    assert not table.loc[table["quantity"] == "lost_motion", "within"].any()
+    line = next(line for line in summary(table, ASKED) if line["quantity"] == "lost_motion")
+    # Lost motion goes with the cable's compliance.
+    assert line["delta"] == pytest.approx(1 / 1.2, rel=0.01)
+    assert line["within"] == 0
+
+
+def test_a_sensor_that_states_no_accuracy_judges_nothing():
+    bare = [replace(case, recorded=replace(case.recorded, accuracy={})) for case in cases()]
+    table = comparison_table(bare, ASKED, HOW)
+    assert table.empty
+    assert summary(table, ASKED) == []
+
+
+def test_a_quantity_with_too_few_recordings_says_so():
+    (line, *_) = summary(comparison_table(cases()[:2], ASKED, HOW), ASKED)
+    assert line["gap"] == "2 pairs, fewer than the 3 that a scatter takes"
+    assert line["delta"] is None
+
+
+def test_an_input_that_is_not_determined_is_named():
+    (case, *_) = cases()
+    table = comparison_table([replace(case, input_sd={"friction_coefficient": np.inf})], ASKED, HOW)
+    assert (table["inputs_left_out"] == "friction_coefficient").all()
+    assert (table["u_input"] == 0).all()
+
+
+def test_repeats_count_as_far_as_the_model_was_not_told_of_them():
+    """Two recordings of one condition that differ as the model says they do, and two that differ by more."""
+    a, b = cases()[:2]
+    told = [replace(c, recorded=replace(c.recorded, id=f"r-{x}")) for c, x in ((a, "a"), (b, "b"))]
+    table = comparison_table(told, ASKED, HOW)
+    assert table["u_repeat"].max() < 1e-3 * table["recorded"].max()
+    louder = dict(b.recorded.channels) | {"tau_in_Nm": 1.02 * b.recorded["tau_in_Nm"]}
+    told[1] = replace(told[1], recorded=replace(told[1].recorded, channels=louder))
+    table = comparison_table(told, ASKED, HOW).set_index("quantity")
+    assert table.loc["tau_in", "u_repeat"].iloc[0] == pytest.approx(
+        np.log(1.02) / np.sqrt(2) * table.loc["tau_in", "recorded"].iloc[0], rel=0.01
+    )

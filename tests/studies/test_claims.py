@@ -1,0 +1,124 @@
+"""Claims on runs whose answer is known, and on too little to go by."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ccmodel.repeats import condition_of, estimates, pooled_scatter
+from ccmodel.report.figures import save_figure
+from ccmodel.studies.claims import model_runs
+from ccmodel.studies.claims.claim import NO, OPEN, YES
+from ccmodel.studies.claims.figure import model_figure, recordings_figure
+from ccmodel.studies.claims.settings import Claims
+from ccmodel.studies.claims.study import claims_of
+from ccmodel.studies.loops.settings import Measuring
+from model_runs import CABLE, STUDY
+
+CLAIMS = Claims(bend="bend", pretension="pretension", radius="radius", small_percent=5.0, model=STUDY)
+HOW = Measuring()
+
+
+def pairs_over(paths_and_pretensions, scatter=0.003):
+    """Runs of the model as recordings, two repeats with a little more and less friction each, and the model of both."""
+    pairs = []
+    for i, (path, pretension) in enumerate(paths_and_pretensions):
+        study = STUDY.model_copy(update={"pretension_N": pretension, "amplitude_rad": 0.6})
+        said = model_runs.run(CABLE, path, 0.05, study)
+        for letter, sign in (("a", 1), ("b", -1)):
+            run = model_runs.run(replace(CABLE, friction_scale=1 + sign * scatter), path, 0.05, study)
+            pairs.append((replace(run, batch="b", id=f"r{i}-{letter}", origin="virtual-rig"), said))
+    return pairs
+
+
+@pytest.fixture(scope="module")
+def found():
+    even = model_runs.even
+    pairs = {
+        "bend": pairs_over([(even(STUDY, n * np.pi), 2.5) for n in (1, 2, 3)]),
+        "pretension": pairs_over([(even(STUDY), T) for T in (0.3, 2.0, 7.0)]),
+        "radius": pairs_over([(model_runs.placements(s)["in the middle"], 7.3) for s in
+                              (STUDY.model_copy(update={"loop_radius_m": r}) for r in (0.0457, 0.0762))]),
+    }  # fmt: skip
+    return {claim.name: claim for claim in claims_of(pairs, CABLE, CLAIMS, HOW)}
+
+
+@pytest.mark.parametrize(
+    "name", ["backlash-and-bend", "slope-and-bend", "slack-and-bend", "backlash-and-pretension", "slack-and-pretension",
+             "phases-and-pretension", "radius", "loop-placement"]
+)  # fmt: skip
+def test_what_the_model_does_is_borne_out(found, name):
+    assert found[name].borne_out == YES
+
+
+def test_recordings_of_the_model_hold_the_model_within_their_intervals(found):
+    rows = found["backlash-and-bend"].rows
+    assert all(row.low < row.model < row.high for row in rows)
+    assert all(row.source == "recording (virtual rig, simulated)" for row in rows)
+
+
+def test_the_deadband_knows_nothing_of_the_load_while_both_cables_are_taut(found):
+    lost = [row.model for row in found["deadband-and-load"].rows if row.quantity == "lost_motion"]
+    assert np.ptp(lost) < 1e-6 * np.mean(lost)
+
+
+def test_a_trend_the_other_way_is_not_borne_out():
+    """The longer loop first: what is called rising falls."""
+    pairs = pairs_over([(model_runs.even(STUDY, n * np.pi), 2.5) for n in (2, 1)])
+    swapped = [(replace(r, path=s.path), s) for (r, _), (s, _) in zip(pairs, pairs[::-1], strict=True)]
+    claims = claims_of({"bend": swapped, "pretension": [], "radius": []}, None, CLAIMS, HOW)
+    assert claims[0].borne_out == NO
+
+
+def test_without_recordings_nothing_is_determined_and_no_number_is_made_up():
+    claims = claims_of({"bend": [], "pretension": [], "radius": []}, None, CLAIMS, HOW)
+    assert {claim.borne_out for claim in claims} == {OPEN}
+
+
+def test_without_recordings_the_figures_can_still_be_drawn(tmp_path):
+    claims = claims_of({"bend": [], "pretension": [], "radius": []}, None, CLAIMS, HOW)
+    for name, figure in (("a", recordings_figure(claims)), ("b", model_figure(claims, {}))):
+        save_figure(figure, tmp_path / f"{name}.png")
+        save_figure(figure, tmp_path / f"{name}.svg")
+    assert "could not be run" in (tmp_path / "b.svg").read_text()
+
+
+def test_the_figures_call_the_virtual_rig_what_it_is(found, tmp_path):
+    save_figure(recordings_figure(list(found.values())), tmp_path / "a.svg")
+    save_figure(model_figure(list(found.values()), model_runs.loop_placements(CABLE, STUDY)), tmp_path / "b.svg")
+    assert "virtual rig, simulated" in (tmp_path / "a.svg").read_text()
+    assert "loop at the drive end" in (tmp_path / "b.svg").read_text()
+
+
+def test_without_repeats_there_is_no_interval_and_it_is_said():
+    pairs = pairs_over([(model_runs.even(STUDY, n * np.pi), 2.5) for n in (1, 2)])[::2]
+    claim = claims_of({"bend": pairs, "pretension": [], "radius": []}, None, CLAIMS, HOW)[0]
+    assert claim.borne_out == OPEN
+    assert all(row.low is None and row.gap == "no repeats: no interval" for row in claim.rows)
+    assert all(np.isfinite(row.value) for row in claim.rows)
+
+
+def test_the_papers_sections_converge_to_the_exact_solver(found):
+    few, many = (row.model for row in found["sections"].rows)
+    assert many < few < 1.0
+
+
+def test_sections_needed_hold_from_there_on():
+    assert model_runs.sections_needed({4: 0.5, 8: 2.0, 16: 0.9, 32: 0.1}, 1.0) == 16
+    assert model_runs.sections_needed({4: 3.0, 8: 2.0}, 1.0) is None
+
+
+def test_scatter_is_pooled_over_conditions():
+    scatter, freedom = pooled_scatter([[9.0, 11.0], [99.0, 101.0], [5.0]], relative=False)
+    assert (scatter, freedom) == (pytest.approx(np.sqrt(2)), 2)
+    mean = estimates([[9.0, 11.0], [99.0, 101.0]], relative=False)[0]
+    # t of 2 degrees of freedom at 95 % is 2.92.
+    assert mean.reach(0.9) == pytest.approx(2.92 * np.sqrt(2) / np.sqrt(2), rel=1e-3)
+    assert pooled_scatter([[1.0], [2.0]], relative=True) == (0.0, 0)
+    assert pooled_scatter([[0.0, 0.0], [9.0, 11.0]], relative=False)[1] == 1
+
+
+def test_repeats_are_told_by_their_last_letter(found):
+    recorded = pairs_over([(model_runs.even(STUDY), 7.0)])[0][0]
+    assert condition_of(recorded) == "b/r0"
+    assert condition_of(replace(recorded, id="t-7N")) == "b/t-7N"

@@ -1,0 +1,29 @@
+rule fit:
+    input:
+        recordings=lambda wildcards: [
+            recordings_of(batch)
+            for batch in (
+                [wildcards.scope]
+                if CONFIG.fits[wildcards.parameters].batches == EACH
+                else CONFIG.fits[wildcards.parameters].batches
+            )
+        ],
+    output:
+        f"{RESULTS}/fits/{{parameters}}/{{scope}}.json",
+    log:
+        f"{RESULTS}/logs/fit/{{parameters}}/{{scope}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/fit/{{parameters}}/{{scope}}.tsv"
+    conda:
+        "../envs/ccmodel.yaml"
+    threads: 2
+    resources:
+        mem_mb=2000,
+        runtime=60,
+    params:
+        problem=lambda wildcards: CONFIG.fits[wildcards.parameters].model_dump_json(),
+        sources=source_digest("ccmodel.steps.fit"),
+    message:
+        "Fitting parameters '{wildcards.parameters}' ({wildcards.scope})"
+    script:
+        "../scripts/fit_parameters.py"

@@ -1,0 +1,42 @@
+# A rule for every study of the configuration. Its settings state its runs, tables and figures (ccmodel.studies).
+for name, study in STUDIES.items():
+    needs = study.needs(CONFIG, LOOPS, BATCHES)
+    fits = [fit_of(parameters, batch) for _, parameters, batch in needs]
+
+    rule:
+        name:
+            f"study_{name}"
+        input:
+            recordings=[recordings_of(batch) for _, _, batch in needs],
+            simulated=[simulated_of(p, batch) for _, p, batch in needs],
+            fits=sorted(set(fits) - {""}),
+        output:
+            tables=tables(name),
+            svg=figures(name, "svg"),
+            png=report(
+                figures(name, "png"),
+                caption="../report/study.rst",
+                category="Studies",
+                labels={"study": name},
+            ),
+        log:
+            f"{RESULTS}/logs/studies/{name}.log",
+        benchmark:
+            f"{RESULTS}/benchmarks/studies/{name}.tsv"
+        conda:
+            "../envs/ccmodel.yaml"
+        threads: 1
+        resources:
+            mem_mb=2000,
+            runtime=60,
+        params:
+            kind=study.kind,
+            settings=study.model_dump_json(),
+            measuring=CONFIG.measuring.model_dump_json(),
+            labels=[label for label, _, _ in needs],
+            fits=fits,
+            sources=source_digest(f"ccmodel.studies.{study.kind}.study"),
+        message:
+            f"Making study {name}"
+        script:
+            "../scripts/judge_study.py"
