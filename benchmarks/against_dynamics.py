@@ -1,26 +1,26 @@
 """The general solver against explicit dynamics, effect by effect: ``python benchmarks/against_dynamics.py``.
 
-Each effect alone, with the same parameters and in the same form in both: the virtual rig (masses, springs and bristles
-in small explicit steps) and ``ccmodel.model.general`` (implicit, without inertia, at its default of 32 elements). They
-share no code. The rig is refined: cells, bristles and the masses of cable and pulley are halved together, so that what
-is compared tends to the same physics. Where that still changes it by more than a third of the limit, it chatters.
+Each effect is simulated alone, with the same law and parameters, by the virtual rig (masses, springs and bristles in
+small explicit steps) and by ``ccmodel.model.general`` (implicit, without inertia, 32 elements). They share no code. The
+rig is refined by halving its cells, bristles and the masses of cable and pulley together, so that both converge to the
+same physics. If the last refinement changes the rig by more than a third of the limit, the rig chatters.
 
-Prints a table of the rms difference of the four cable-end tensions in percent of their peak to peak, next to what the
-rig's last refinement still changed, and writes it to ``docs/verification.md``. Effects of sensors are no dynamics and
-are not in it.
+Prints a table of the rms difference of the four end tensions in percent of their peak to peak, with the change by the
+rig's last refinement, and writes it to ``docs/verification.md``. Sensor faults do not change the motion and are not
+compared.
 """
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 
 import numpy as np
+from dynamics_cases import Case, cases
 
 from ccmodel.geometry import ConduitPath
-from ccmodel.mechanisms.stribeck import RENEWAL_M
 from ccmodel.model.general import Active
 from ccmodel.model.general import simulate as solve
 from ccmodel.model.initial import InitialTension
@@ -30,7 +30,6 @@ from virtualrig.config import Cable, Estimates, Load, Numerics, Piece, Rig
 from virtualrig.dynamics import simulate as run_rig
 from virtualrig.effects import Effects
 from virtualrig.grid import make_grid
-from virtualrig.motion import Sine
 from virtualrig.trajectory import Preparation
 
 TENSIONS = ("T1_N", "T2_N", "T3_N", "T4_N")
@@ -74,209 +73,6 @@ the rig's chatter.
 """
 
 
-@dataclass(frozen=True)
-class Case:
-    """One comparison: an effect as the rig takes it and as the solver does, and the run it is seen in.
-
-    Attributes
-    ----------
-    name, text : str
-        The effect, and its parameters for the table.
-    effects : mapping
-        Fields of `virtualrig.effects.Effects`.
-    mechanisms : sequence of (str, str, mapping)
-        Name, place and values of the solver's mechanisms.
-    pretension_N, amplitude_rad, frequency_Hz : float
-    """
-
-    name: str
-    text: str
-    effects: Mapping = field(default_factory=dict)
-    mechanisms: Sequence = ()
-    pretension_N: float = 7.3
-    amplitude_rad: float = 0.7
-    frequency_Hz: float = 1.0
-
-    @property
-    def drive(self) -> Sine:
-        """A rest, a start over a quarter of a cycle and one and a quarter cycles."""
-        return Sine(
-            wave="sine",
-            amplitude_rad=self.amplitude_rad,
-            frequency_Hz=self.frequency_Hz,
-            rest_s=0.02,
-            start_up_cycles=0.25,
-            cycles=1.25,
-        )
-
-
-def _in_the_cable(name, place, text, effects, values, **run) -> Case:
-    return Case(name, text, effects, [(name, place, values)], **run)
-
-
-def cases() -> list[Case]:
-    """Every effect that changes the motion, alone."""
-    return [
-        Case("none", "7.3 N"),
-        Case("none", "3.5 N, 1 rad, slack in part", pretension_N=3.5, amplitude_rad=1.0),
-        *(
-            _in_the_cable(
-                "presliding",
-                "conduit",
-                f"z0 {z0 * 1e6:g} um",
-                {"presliding": {"law": "dahl", "length_m": z0}},
-                {"z0": z0},
-            )
-            for z0 in (20e-6, 150e-6)
-        ),
-        *(
-            _in_the_cable(
-                "viscous-friction",
-                "conduit",
-                f"c {c:g} N s/m^2",
-                {"viscous_Ns_per_m2": c},
-                {"c": c},
-            )
-            for c in (50.0, 400.0)
-        ),
-        *(
-            _in_the_cable(
-                "load-dependent-friction",
-                "conduit",
-                f"n {n:g}",
-                {"load_dependent_friction": {"exponent": n}},
-                {"n": n},
-            )
-            for n in (-0.15, -0.35)
-        ),
-        _in_the_cable("constant-drag", "conduit", "f0 1 N", {"drag_N": 1.0}, {"f0": 1.0}),
-        *(
-            _in_the_cable(
-                "kink",
-                "conduit",
-                f"beta {beta:g} rad, s {s:g}",
-                {"kinks": [{"bend_rad": beta, "place_share": s}]},
-                {"beta": beta, "s": s},
-            )
-            for beta, s in ((0.6, 0.5), (1.2, 0.23))
-        ),
-        _in_the_cable(
-            "running-in",
-            "conduit",
-            "change 30 %, tau 2 s",
-            {"running_in": {"change": 0.3, "scale": 2.0}},
-            {"change": 0.3, "tau": 2.0},
-        ),
-        _in_the_cable(
-            "cable-asymmetry",
-            "cable",
-            "mu 1.3, K 0.8",
-            {"cable_asymmetry": {"friction_ratio": 1.3, "stiffness_ratio": 0.8}},
-            {"ratio": 1.3, "K_ratio": 0.8},
-        ),
-        _in_the_cable(
-            "relaxation",
-            "cable",
-            "r 15 %, tau 2 s",
-            {"relaxation": [{"share": 0.15, "time_constant_s": 2.0}]},
-            {"r": 0.15, "tau": 2.0},
-        ),
-        *(
-            _in_the_cable(
-                "strand-settling",
-                "cable",
-                f"T_scale 2 N at {T:g} N",
-                {"strand_settling": {"law": "exponential", "tension_scale_N": 2.0}},
-                {"T_scale": 2.0},
-                pretension_N=T,
-            )
-            for T in (7.3, 3.5)
-        ),
-        _in_the_cable(
-            "termination-compliance",
-            "drive-end",
-            "drive, 60 um/N",
-            {"termination_compliance": {"drive_m_per_N": 60e-6}},
-            {"compliance": 60e-6},
-        ),
-        _in_the_cable(
-            "termination-compliance",
-            "load-end",
-            "load, 60 um/N",
-            {"termination_compliance": {"load_m_per_N": 60e-6}},
-            {"compliance": 60e-6},
-        ),
-        *(
-            _in_the_cable(
-                "conduit-compliance",
-                "conduit",
-                f"{c * 1e6:g} um/N",
-                {"conduit_compliance_m_per_N": c},
-                {"compliance": c},
-            )
-            for c in (20e-6, 70e-6)
-        ),
-        _in_the_cable(
-            "pulley-friction",
-            "load-pulley",
-            "load, 5 mN m",
-            {"load_pulley": {"friction": {"torque_Nm": 5e-3, "presliding_rad": 2e-3}}},
-            {"friction_torque": 5e-3},
-        ),
-        *(
-            _in_the_cable(
-                "pulley-eccentricity",
-                f"{side}-pulley",
-                f"{side}, e 6 %, psi 0.7 rad",
-                {f"{side}_pulley": {"eccentricity": {"share": 0.06, "phase_rad": 0.7}}},
-                {"e": 0.06, "psi": 0.7},
-            )
-            for side in ("drive", "load")
-        ),
-        _in_the_cable("backlash", "load-pulley", "2 deg", {"load": {"half_gap_rad": 0.035}}, {"half_gap": 0.035}),
-        _in_the_cable(
-            "load-stiffening",
-            "load",
-            "K3 0.1 N m/rad^3",
-            {"load": {"cubic_Nm_per_rad3": 0.1}},
-            {"K3": 0.1},
-        ),
-        _in_the_cable(
-            "load-inertia", "load", "J 5e-4 kg m^2", {"load": {"inertia_kg_m2": 5e-4}}, {"J": 5e-4, "zeta": 0.0}
-        ),
-        *stribeck_cases(),
-    ]
-
-
-def stribeck_cases() -> list[Case]:
-    """Friction that falls with speed: first where the answer is one, then where the rig itself chatters."""
-    return [
-        stribeck(0.05, 2e-3),
-        stribeck(0.2, 2e-3),
-        stribeck(0.2, 1e-4),
-        stribeck(0.2, 2e-3, presliding_m=40e-6),
-        stribeck(0.2, 10e-3, presliding_m=40e-6),
-        stribeck(0.4, 2e-3),
-        stribeck(0.2, 10e-3),
-        stribeck(0.2, 2e-3, renewal_m=2.5e-8),
-        stribeck(0.2, 10e-3, renewal_m=2.5e-8),
-    ]
-
-
-def stribeck(rise: float, speed: float, renewal_m: float = RENEWAL_M, presliding_m: float = 0.0) -> Case:
-    """Friction that falls with speed (m/s), alone or with presliding; the solver's renewal length is always its own."""
-    effects = {"stribeck": {"rise": rise, "speed_m_per_s": speed, "exponent": 2.0, "renewal_m": renewal_m}}
-    mechanisms = [("stribeck", "conduit", {"a": rise, "vs": speed})]
-    text = f"a {100 * rise:g} %, vs {1e3 * speed:g} mm/s"
-    if presliding_m:
-        effects["presliding"] = {"law": "dahl", "length_m": presliding_m}
-        mechanisms.append(("presliding", "conduit", {"z0": presliding_m}))
-        text += f", with presliding {1e6 * presliding_m:g} um"
-    if renewal_m != RENEWAL_M:
-        text += f", in the rig renewed over {1e6 * renewal_m:g} um"
-    return Case("stribeck", text, effects, mechanisms)
-
-
 def rig_tensions(
     case: Case, level: int, cell_m: float = COARSEST_CELL_M, rate_Hz: float = SAMPLE_RATE_HZ
 ) -> np.ndarray:
@@ -311,7 +107,7 @@ def rig_tensions(
     conduit = [Piece(length_m=LENGTH_M, bend_rad=np.pi)]
     grid = make_grid(conduit, numerics.cell_length_m, numerics.cell_bend_rad)
     preparation = Preparation(MU, case.pretension_N, (0.0, 0.0))
-    trajectory = run_rig(rig, grid, numerics, preparation, time_s, *case.drive.angle_and_rate(time_s))
+    trajectory = run_rig(rig, grid, numerics, preparation, time_s, case.drive.angle_and_rate(time_s))
     return np.stack([getattr(trajectory, name) for name in TENSIONS])
 
 
@@ -339,19 +135,19 @@ def difference_percent(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Row:
-    """A line of the table, in percent as `difference_percent` has it.
+    """A row of the table, in percent (`difference_percent`).
 
     Attributes
     ----------
     case : Case
     error : ndarray, shape (4,)
-        Solver against the finest rig.
+        Difference of the solver from the finest rig.
     effect : float
-        What the effect does to the solver's tensions, the largest of four.
+        Change of the solver's tensions by the effect, the largest of four.
     change : float
-        What the rig's last refinement still changed, the largest of four.
+        Change of the rig's tensions by its last refinement, the largest of four.
     level : int
-        How often the rig was refined.
+        Number of refinements of the rig.
     """
 
     case: Case
@@ -362,14 +158,14 @@ class Row:
 
     @property
     def verdict(self) -> str:
-        """Whether they agree, as far as the rig has an answer."""
+        """Whether both agree; undecided if the rig has not converged."""
         if self.change > LIMIT_PERCENT / 3:
             return "the rig chatters"
         return "agree" if self.error.max() <= LIMIT_PERCENT else "**differ**"
 
 
 def compare(case: Case) -> Row:
-    """Refine the rig until it changes little more, and hold the solver against it."""
+    """Refine the rig until it converges, and compare the solver with it."""
     finer = rig_tensions(case, 0)
     for level in range(1, FINEST + 1):
         coarse, finer = finer, rig_tensions(case, level)
@@ -394,12 +190,12 @@ def line(row: Row) -> str:
 
 
 def report(lines: Sequence[str]) -> str:
-    """The page that holds the table."""
+    """The page as Markdown."""
     return PAGE.format(today=date.today(), limit=LIMIT_PERCENT, table="\n".join([HEAD, *lines]))
 
 
 def main() -> None:
-    """Compare every effect, or those named, printing each line as it is known; all of them together make the page."""
+    """Compare the effects named as arguments, or all; prints each row, and writes the page after a run of all."""
     wanted = sys.argv[1:]
     lines = []
     print(HEAD, flush=True)

@@ -1,22 +1,21 @@
-"""All figures of speed and accuracy from one run: ``make bench``, or ``python benchmarks/bench.py [--cold]``.
+"""All measurements of speed and accuracy in one run: ``make bench``, or ``python benchmarks/bench.py [--cold]``.
 
-Times are processor time on one core, the least of some repeats, in microseconds a sample unless a figure's name says
-otherwise; those of whole processes (..._s) are by the clock. Prints all and writes results/bench.json; the chart of
-error against time goes to docs/figures/work-precision.png.
-``--cold`` also compiles everything anew in an empty cache, which takes minutes.
+Times are the least processor time of several repeats on one core, in microseconds per sample. Names that end in ``_s``
+are wall-clock times of whole processes, in seconds. Prints all values, writes results/bench.json, and draws error over
+time to docs/figures/work-precision.png. ``--cold`` also measures with an empty compilation cache, which takes minutes.
 
 exact_vs_paper_numpy_a_sample
-    Time a sample of the paper's algorithm in plain numpy at its 16 sections, by that of the exact solver.
+    Time per sample of the paper's algorithm in plain numpy with its 16 sections, over that of the exact solver.
 exact_vs_paper_numpy
-    The same for a simulated second, each at its own sampling: 0.25 ms for the paper's algorithm (its step is part of
-    the method), 1,000 samples a cycle of 1 s for the exact solver.
+    The same ratio per simulated second. The paper's algorithm takes a sample every 0.25 ms, since the step is part of
+    the method; the exact solver takes 1,000 samples a cycle of 1 s.
 exact_vs_arithmetic
-    Time of the exact solver by that of a loop that does only what a sample cannot do without: a square root and a
-    logarithm for each of four fronts, and writing the outputs.
+    Time of the exact solver over that of a loop with the least arithmetic of a sample: a square root and a logarithm
+    for each of four fronts, and writing the outputs.
 ..._cost_exponent
-    Slope of log time over log elements; 1 is linear.
+    Slope of log time over log number of elements; 1 is linear.
 ..._bytes_per_sample_beyond_outputs
-    Growth of the peak memory with the number of samples, less that of what is returned.
+    Growth of the peak memory per sample, less the growth of the returned arrays.
 error_ratio_at_equal_speed
     `work_precision.error_ratio_at_equal_speed`.
 """
@@ -64,7 +63,7 @@ def general_us(theta_in: np.ndarray, active=(), elements: int = general.run.ELEM
 
 
 def of_exact() -> dict[str, float]:
-    """Figures of the exact solver."""
+    """Measurements of the exact solver."""
     sine, remembering = cases.sine(50), cases.after_nested_reversals(50)
     figures = {}
     for pieces in (1, 4, 16):
@@ -81,7 +80,7 @@ def of_exact() -> dict[str, float]:
 
 @njit
 def least_arithmetic(theta_in, out):
-    """What a sample of the exact solver cannot do without."""
+    """The least arithmetic of a sample of the exact solver."""
     for i in range(theta_in.size):
         position = 0.0
         for front in range(4):
@@ -93,7 +92,7 @@ def least_arithmetic(theta_in, out):
 
 
 def of_general() -> dict[str, float]:
-    """Figures of the general solver."""
+    """Measurements of the general solver."""
     models = {"": (), "_presliding": cases.presliding(), "_every_effect": cases.every_effect()}
     drives = {"": cases.sine(5, 0.6), "_noisy": cases.noisy(2), "_jumping": cases.jumping(2)}
     figures = {
@@ -116,7 +115,13 @@ def _slope(x, y) -> float:
 
 
 def of_paper(exact_us_per_sample: float) -> dict[str, float]:
-    """The paper's algorithm in plain numpy against the exact solver, and against `ccmodel.model.paper`."""
+    """Measurements of the paper's algorithm, in plain numpy and compiled.
+
+    Raises
+    ------
+    SystemExit
+        If the numpy version differs from `ccmodel.model.paper` by more than 1e-9 N.
+    """
     case = cases.paper()
     theta_in = cases.sine(1, samples_a_cycle=cases.PAPER_SAMPLES_A_CYCLE)
     given = (case.transmission, case.load, theta_in, case.initial, cases.PAPER_SECTIONS)
@@ -134,23 +139,23 @@ def of_paper(exact_us_per_sample: float) -> dict[str, float]:
 
 
 def bytes_per_sample_beyond_outputs(simulate: Callable[[np.ndarray], object]) -> float:
-    """Growth of the peak of what Python and numpy hold during a run, less the growth of what it returns."""
+    """Growth of a run's peak memory per sample, less the growth of the memory that it returns."""
     beyond = []
-    simulate(cases.sine(1, 0.6))  # what a first run leaves in memory does not count
+    simulate(cases.sine(1, 0.6))  # the first run allocates memory that later runs share
     for cycles in (20, 100):
         theta_in = cases.sine(cycles, 0.6)
         gc.collect()
         tracemalloc.start()
         response = simulate(theta_in)
-        kept, peak = tracemalloc.get_traced_memory()
+        returned, peak = tracemalloc.get_traced_memory()
         tracemalloc.stop()
         del response
-        beyond.append(peak - kept)
+        beyond.append(peak - returned)
     return (beyond[1] - beyond[0]) / (80 * cases.SAMPLES_A_CYCLE)
 
 
 def of_memory() -> dict[str, float]:
-    """Memory of both solvers."""
+    """Memory of the exact and the general solver."""
     case = cases.half_loop()
     given = case.transmission, case.load
 
@@ -166,7 +171,7 @@ def of_memory() -> dict[str, float]:
 
 
 def of_processes(cold: bool) -> dict[str, float]:
-    """Time to the first simulation."""
+    """Wall-clock time from the start of a process to its first simulation."""
     figures = {
         "first_simulation_warm_s": processes.warm_s("exact"),
         "first_general_simulation_warm_s": processes.warm_s("general"),
@@ -178,9 +183,9 @@ def of_processes(cold: bool) -> dict[str, float]:
 
 
 def main() -> None:
-    """Measure, print, write."""
+    """Measure, print and write all values."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cold", action="store_true", help="also time the first call ever, with all its compiling")
+    parser.add_argument("--cold", action="store_true", help="also time the first call with an empty compilation cache")
     parser.add_argument("--out", type=Path, default=ROOT / "results/bench.json")
     arguments = parser.parse_args()
     figures = of_exact()

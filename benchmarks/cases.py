@@ -1,4 +1,4 @@
-"""The runs that the benchmarks time."""
+"""The runs that the benchmarks measure."""
 
 from dataclasses import dataclass
 
@@ -35,9 +35,13 @@ class Case:
 
 
 def paper(loops: float = 3, pieces: int = 1) -> Case:
-    """The paper's Section IV: 2 m in three loops, 10 N, 1 kN/m; friction, pulleys and load, which it leaves open, ours.
+    """The paper's Section IV: 2 m in three loops, 10 N, 1 kN/m. The paper states no friction, pulleys and load.
 
-    `pieces` cuts the conduit into as many of equal length, bent more and less in turn.
+    Parameters
+    ----------
+    loops : float
+    pieces : int
+        The conduit has this many pieces of equal length, with more and less bend in alternation.
     """
     share = 1 + 0.5 * np.cos(np.pi * np.arange(pieces)) if pieces > 1 else np.ones(1)
     path = ConduitPath(np.full(pieces, 2.0 / pieces), 2 * np.pi * loops * share / share.sum())
@@ -49,7 +53,7 @@ def paper(loops: float = 3, pieces: int = 1) -> Case:
 
 
 def half_loop() -> Case:
-    """The paper's rig with half a loop (its Section V), against a softer spring."""
+    """The paper's rig with half a loop (its Section V), with a softer load spring."""
     path = ConduitPath([1.2], [np.pi])
     return Case(
         Transmission(path, 7750 * 1.2, 0.156, 0.006, 0.006), SpringLoad(0.05), InitialTension.uniform(path, 7.3)
@@ -62,20 +66,20 @@ def sine(cycles: int, amplitude: float = 1.0, samples_a_cycle: int = SAMPLES_A_C
 
 
 def after_nested_reversals(cycles: int, reversals: int = 1000) -> NDArray:
-    """Small cycles over a history of nested reversals that they never wipe out, rad."""
+    """Small cycles after a history of nested reversals, all of which remain in the state; rad."""
     nested = 0.2 * np.linspace(1, 0.5, reversals) * (-1) ** np.arange(reversals)
     return np.concatenate([nested, nested[-1] - 0.05 * np.sign(nested[-1]) * (1 - sine(cycles))])
 
 
 def noisy(cycles: int, amplitude: float = 0.6) -> NDArray:
-    """A sine with noise of half a coarse encoder's step, rad."""
+    """A sine with white noise of 1.5 mrad, half a step of an encoder with 2,000 counts; rad."""
     theta_in = sine(cycles, amplitude)
     theta_in[1:] += np.random.default_rng(1).normal(0, 1.5e-3, theta_in.size - 1)
     return theta_in
 
 
 def jumping(cycles: int, amplitude: float = 0.6) -> NDArray:
-    """Another angle at every sample, anywhere within the amplitude, rad."""
+    """Independent angles at every sample, uniform within the amplitude; rad."""
     theta_in = np.random.default_rng(1).uniform(-amplitude, amplitude, cycles * SAMPLES_A_CYCLE + 1)
     theta_in[0] = 0.0
     return theta_in
@@ -87,5 +91,5 @@ def presliding() -> list[Active]:
 
 
 def every_effect() -> list[Active]:
-    """Every mechanism at every place it can have, at its starting values."""
+    """Every mechanism at every one of its places, with its starting values."""
     return [Active(n, p, mechanisms.get(n).start) for n in mechanisms.names() for p in mechanisms.get(n).places]

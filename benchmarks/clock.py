@@ -1,4 +1,4 @@
-"""How long something takes: processor time, the least of some repeats, since all that others do only adds to it."""
+"""Processor time of a call: the least of several repeats, since other processes can only add to it."""
 
 import time
 from collections.abc import Callable
@@ -7,7 +7,7 @@ REPEATS = 5
 
 
 def seconds(function: Callable[[], object], repeats: int = REPEATS) -> float:
-    """Least processor time of `function` over `repeats` calls, after one that does not count, s."""
+    """Least processor time of `function` over `repeats` calls, after one call for warm-up; s."""
     function()
     best = float("inf")
     for _ in range(repeats):
@@ -18,5 +18,5 @@ def seconds(function: Callable[[], object], repeats: int = REPEATS) -> float:
 
 
 def us_per_sample(function: Callable[[], object], samples: int, repeats: int = REPEATS) -> float:
-    """The same by the number of samples, microseconds."""
+    """Least processor time of `function` per sample, microseconds."""
     return 1e6 * seconds(function, repeats) / samples

@@ -1,13 +1,20 @@
-"""A half stroke of the pair in closed form and extended precision: the truth that all solvers are measured against.
+"""A half stroke of the pair in closed form and extended precision, the reference solution for all solvers.
 
-Only for a path of one curvature, from a reversal at which both cables slide as a whole, and while neither hangs slack:
-each end then draws one line into one line of the opposite slope, and a front that has come to r = expm1(sigma dm) has
-taken displacement sigma (end tension at the reversal) c r^2 and left the end at (1 + r)^2 of its tension.
+It holds for a path of one curvature, from a reversal at which both cables slide over their whole length, as long as no
+cable is slack. A front from an end then replaces a line in ln T over mu phi by one of the opposite slope. A front that
+has reached r = expm1(sigma mu phi) has taken up the displacement sigma T_0 c r^2 and changed the end's tension from T_0
+to (1 + r)^2 T_0, where c = L / (mu Phi EA) for a conduit of length L and bend Phi.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 from cases import Case
 from numpy.typing import NDArray
+
+# Directions of the drive's displacement for cables A and B.
+SIGNS = (1, -1)
+BISECTIONS = 80
 
 
 def drive_tensions(case: Case, theta_in: NDArray) -> NDArray:
@@ -23,47 +30,87 @@ def drive_tensions(case: Case, theta_in: NDArray) -> NDArray:
     ndarray of longdouble, shape (2, n)
         N.
     """
-    one, path = case.transmission, case.transmission.path
-    R_i, R_o = np.longdouble(one.drive_radius_m), np.longdouble(one.load_radius_m)
-    M = np.longdouble(one.friction_coefficient) * np.longdouble(path.bend_rad)
-    c = np.longdouble(path.length_m) / (M * np.longdouble(one.axial_rigidity_N))
-    stiffness = np.longdouble(case.load.stiffness_Nm_per_rad) / R_o**2
-    drive = R_i * theta_in.astype(np.longdouble)
-    way = np.sign(drive[1] - drive[0])
-    signs = np.array([1, -1])  # of the drive's displacement, seen from cables A and B
-    rest = c * M * np.longdouble(case.initial.tension_A_N[0])
+    stroke = _Stroke.of(case, theta_in)
+    low, high = np.zeros_like(stroke.drive), np.full_like(stroke.drive, abs(stroke.drive - stroke.drive[0]).max())
+    for _ in range(BISECTIONS):
+        travel = (low + high) / 2
+        goes_on = stroke.excess(travel) > 0
+        low, high = np.where(goes_on, travel, low), np.where(goes_on, high, travel)
+    (T1, _), (T3, _) = stroke.tensions(low)
+    return np.array([T1, T3])
 
-    def line(elongation, slope):
-        """End tensions of a cable that slides as a whole on a line of slope `slope` in ln T over mu phi."""
-        T_drive = elongation / (c * slope * np.expm1(slope * M))
-        return T_drive, T_drive * np.exp(slope * M)
 
-    def front(square, sigma):
-        """What a front has come to (r), at most through the whole cable."""
-        return sigma * np.minimum(np.sqrt(square), abs(np.expm1(sigma * M)))
+@dataclass(frozen=True)
+class _Stroke:
+    """A stroke from a reversal, in extended precision.
 
-    # At the reversal the balance of two lines is linear in the load's displacement.
-    per_m = [line(np.longdouble(1), way * sign)[1] for sign in signs]
-    start = (per_m[0] * (rest + drive[0]) - per_m[1] * (rest - drive[0])) / (per_m[0] + per_m[1] + stiffness)
-    before = [line(rest + sign * (drive[0] - start), way * sign) for sign in signs]
+    Attributes
+    ----------
+    drive : ndarray, shape (n,)
+        Displacement of the drive, m.
+    direction : float
+        Of the stroke, 1 or -1.
+    M : float
+        Friction coefficient times bend angle.
+    c : float
+        Length over (M times axial rigidity), m/N.
+    stiffness : float
+        Of the load spring along the cable, N/m.
+    rest : float
+        Elongation of a cable at rest, m.
+    """
 
-    def tensions(load):
-        """End tensions of both cables once the load's displacement is `load`."""
-        ends = []
-        for sign, (T_drive, T_load) in zip(signs, before, strict=True):
-            sigma = sign * way
-            near = T_drive * (1 + front(abs(drive - drive[0]) / (c * T_drive), sigma)) ** 2
-            far = T_load * (1 + front(abs(load - start) / (c * T_load), -sigma)) ** 2
-            met = sigma * (near * np.exp(-sigma * M) - far) >= 0
-            whole = line(rest + sign * (drive - load), -sigma)
-            ends.append((np.where(met, whole[0], near), np.where(met, whole[1], far)))
+    drive: NDArray
+    direction: float
+    M: float
+    c: float
+    stiffness: float
+    rest: float
+
+    @classmethod
+    def of(cls, case: Case, theta_in: NDArray) -> "_Stroke":
+        """The stroke of a case."""
+        transmission, path = case.transmission, case.transmission.path
+        R_i, R_o = np.longdouble(transmission.drive_radius_m), np.longdouble(transmission.load_radius_m)
+        M = np.longdouble(transmission.friction_coefficient) * np.longdouble(path.bend_rad)
+        c = np.longdouble(path.length_m) / (M * np.longdouble(transmission.axial_rigidity_N))
+        drive = R_i * theta_in.astype(np.longdouble)
+        stiffness = np.longdouble(case.load.stiffness_Nm_per_rad) / R_o**2
+        rest = c * M * np.longdouble(case.initial.tension_A_N[0])
+        return cls(drive, np.sign(drive[1] - drive[0]), M, c, stiffness, rest)
+
+    @property
+    def load_at_reversal(self) -> float:
+        """Displacement of the load at the reversal, m. The balance of two lines is linear in it."""
+        per_m = [self.line(np.longdouble(1), self.direction * sign)[1] for sign in SIGNS]
+        elongation = [self.rest + sign * self.drive[0] for sign in SIGNS]
+        return (per_m[0] * elongation[0] - per_m[1] * elongation[1]) / (per_m[0] + per_m[1] + self.stiffness)
+
+    def line(self, elongation: NDArray, slope: float) -> tuple[NDArray, NDArray]:
+        """End tensions of a cable that slides as a whole, on a line of slope `slope` in ln T over mu phi."""
+        T_drive = elongation / (self.c * slope * np.expm1(slope * self.M))
+        return T_drive, T_drive * np.exp(slope * self.M)
+
+    def front(self, displacement: NDArray, T: NDArray, sigma: float) -> NDArray:
+        """Tension of an end that had `T` at the reversal, from the front that the displacement has sent out."""
+        r = sigma * np.minimum(np.sqrt(displacement / (self.c * T)), abs(np.expm1(sigma * self.M)))
+        return T * (1 + r) ** 2
+
+    def tensions(self, travel: NDArray) -> list[tuple[NDArray, NDArray]]:
+        """End tensions of both cables after the load has travelled so far (m) since the reversal."""
+        start = self.load_at_reversal
+        load, ends = start + self.direction * travel, []
+        for sign in SIGNS:
+            sigma = sign * self.direction
+            T_drive, T_load = self.line(self.rest + sign * (self.drive[0] - start), sigma)
+            near = self.front(abs(self.drive - self.drive[0]), T_drive, sigma)
+            far = self.front(abs(load - start), T_load, -sigma)
+            have_met = sigma * (near * np.exp(-sigma * self.M) - far) >= 0
+            whole = self.line(self.rest + sign * (self.drive - load), -sigma)
+            ends.append((np.where(have_met, whole[0], near), np.where(have_met, whole[1], far)))
         return ends
 
-    low, high = np.zeros_like(drive), np.full_like(drive, abs(drive - drive[0]).max())
-    for _ in range(80):
-        travel = (low + high) / 2
-        (_, T2), (_, T4) = tensions(start + way * travel)
-        goes_on = way * (T2 - T4 - stiffness * (start + way * travel)) > 0
-        low, high = np.where(goes_on, travel, low), np.where(goes_on, high, travel)
-    (T1, _), (T3, _) = tensions(start + way * low)
-    return np.array([T1, T3])
+    def excess(self, travel: NDArray) -> NDArray:
+        """Force that drives the load on in the stroke's direction, N."""
+        (_, T2), (_, T4) = self.tensions(travel)
+        return self.direction * (T2 - T4 - self.stiffness * (self.load_at_reversal + self.direction * travel))

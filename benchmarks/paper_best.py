@@ -1,8 +1,8 @@
-"""The paper's discretisation at its best: what the other solvers are to be measured against, however it is written.
+"""The fastest known implementation of the paper's discretisation, as a reference for the other solvers.
 
-The equations of `ccmodel.model.paper` for a spring load, whose symbols this shares. Within a stroke all follows from
-the state at its start: the line from each end and the segment that it has come to. The tension at a cable's load end
-is then piecewise linear in the load's angle, and Newton's method on it exact; nodes are only written at reversals.
+The equations and symbols are those of `ccmodel.model.paper` for a spring load. Within a stroke the state follows from
+the state at its start: the line from each end, and the segment that it has reached. The tension at a cable's load end
+is then piecewise linear in the load angle, and Newton's method is exact. Nodes are written only at reversals.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from ccmodel.model.paper import _capstan_lines
 from ccmodel.model.transmission import Transmission
 
 SLACK, WHOLE, FRONTS = -1, 0, 1
-# Out of balance by no more than this share of the tensions; with ten thousand sections rounding comes close to it.
+# Largest imbalance as a share of the tensions; rounding errors with ten thousand sections are slightly smaller.
 BALANCED = 1e-11
 
 
@@ -37,7 +37,7 @@ def simulate_pair(
 
 @njit(cache=True, inline="always")
 def _drive_front(k, w, T, a, S, E, rate):
-    """Segment, `k` or beyond, that the line from the drive end has come to, and its constant c."""
+    """Segment, `k` or later, that the line from the drive end has reached, and the line's constant c."""
     row = (S + 1) // 2
     while k < T.size - 1:
         c = (w[0, k] - a) * rate[0, row, k]
@@ -49,7 +49,7 @@ def _drive_front(k, w, T, a, S, E, rate):
 
 @njit(cache=True, inline="always")
 def _load_front(k, w, T, b, S, E, rate):
-    """The same from the load end."""
+    """Segment, `k` or earlier, that the line from the load end has reached, and the line's constant c."""
     row = (S + 1) // 2
     while k >= 0:
         c = (b - w[1, k]) * rate[1, row, k]
@@ -61,7 +61,7 @@ def _load_front(k, w, T, b, S, E, rate):
 
 @njit(cache=True, inline="always")
 def _at_load(arrived, k, w, T, u, a, b, S, E, P, rate):
-    """Tension at the load end and its derivative by `b`; then what the cable does, its line's c, the load's segment."""
+    """Tension at the load end, its derivative by `b`, the cable's mode, its line's constant c, the load's segment."""
     n, row = T.size - 1, (S + 1) // 2
     if b <= a:
         return 0.0, 0.0, SLACK, 0.0, k
@@ -77,7 +77,7 @@ def _at_load(arrived, k, w, T, u, a, b, S, E, P, rate):
 
 @njit(cache=True)
 def _write(drive, load, T, u, a, b, S, E, P):
-    """Write all nodes of a cable, at a reversal."""
+    """Write all nodes of a cable at a reversal."""
     n, row, u_load = T.size - 1, (S + 1) // 2, u[-1]
     k_drive, c_drive = drive
     mode, c, k_load = load
@@ -94,7 +94,7 @@ def _write(drive, load, T, u, a, b, S, E, P):
 
 @njit(cache=True)
 def _set_out(w, T, u, h):
-    """What a segment in part moving keeps during a stroke, seen from either end."""
+    """Invariants of a partly moving segment during a stroke, seen from either end."""
     for i in range(h.size):
         w[0, i] = u[i] + T[i] * h[i]
         w[1, i] = u[i + 1] - T[i + 1] * h[i]
@@ -102,7 +102,7 @@ def _set_out(w, T, u, h):
 
 @njit(cache=True, error_model="numpy")
 def _march(drive, K, T, h, E, P):
-    """Step through the samples; T1, T2, T3, T4 and the load's displacement."""
+    """March through the samples; returns T1, T2, T3, T4 and the load's displacement, shape (5, n)."""
     n = h.size
     u, w, rate = np.zeros((2, n + 1)), np.empty((2, 2, n)), np.empty((2, 2, n))
     for row in range(2):
@@ -114,7 +114,7 @@ def _march(drive, K, T, h, E, P):
             u[c, i + 1] = u[c, i] + (T[c, i] + T[c, i + 1]) * h[i]
         _set_out(w[c], T[c], u[c], h)
     b_A, b_B, start = u[0, n], u[1, n], (T[0, n] - T[1, n]) / K
-    q, way, last = 0.0, 0, drive[0]
+    q, direction, last = 0.0, 0, drive[0]
     front_A, front_B = (0, 0.0), (0, 0.0)
     load_A, load_B = (FRONTS, 0.0, n - 1), (FRONTS, 0.0, n - 1)
     out = np.empty((5, drive.size))
@@ -124,23 +124,23 @@ def _march(drive, K, T, h, E, P):
         if d == last:
             out[:, j] = out[:, j - 1]
             continue
-        if way * (d - last) <= 0:
-            if way != 0:
-                _write(front_A, load_A, T[0], u[0], -last, b_A - q, -way, E, P)
-                _write(front_B, load_B, T[1], u[1], last, b_B + q, way, E, P)
+        if direction * (d - last) <= 0:
+            if direction != 0:
+                _write(front_A, load_A, T[0], u[0], -last, b_A - q, -direction, E, P)
+                _write(front_B, load_B, T[1], u[1], last, b_B + q, direction, E, P)
                 _set_out(w[0], T[0], u[0], h)
                 _set_out(w[1], T[1], u[1], h)
-            way = 1 if d > last else -1
+            direction = 1 if d > last else -1
             front_A, front_B = (0, 0.0), (0, 0.0)
             load_A, load_B = (FRONTS, 0.0, n - 1), (FRONTS, 0.0, n - 1)
-        front_A = _drive_front(front_A[0], w[0], T[0], -d, -way, E, rate)
-        front_B = _drive_front(front_B[0], w[1], T[1], d, way, E, rate)
+        front_A = _drive_front(front_A[0], w[0], T[0], -d, -direction, E, rate)
+        front_B = _drive_front(front_B[0], w[1], T[1], d, direction, E, rate)
         for _ in range(50):
             T2, rate_A, mode_A, c_A, k_A = _at_load(
-                front_A[0] == n, load_A[2], w[0], T[0], u[0], -d, b_A - q, -way, E, P, rate
+                front_A[0] == n, load_A[2], w[0], T[0], u[0], -d, b_A - q, -direction, E, P, rate
             )
             T4, rate_B, mode_B, c_B, k_B = _at_load(
-                front_B[0] == n, load_B[2], w[1], T[1], u[1], d, b_B + q, way, E, P, rate
+                front_B[0] == n, load_B[2], w[1], T[1], u[1], d, b_B + q, direction, E, P, rate
             )
             excess = T2 - T4 - K * (start + q)
             if abs(excess) <= BALANCED * (T2 + T4):
@@ -149,7 +149,7 @@ def _march(drive, K, T, h, E, P):
         load_A, load_B = (mode_A, c_A, k_A), (mode_B, c_B, k_B)
         c_A = front_A[1] if mode_A == FRONTS else c_A
         c_B = front_B[1] if mode_B == FRONTS else c_B
-        row = (1 - way) // 2
+        row = (1 - direction) // 2
         out[0, j], out[1, j], out[2, j], out[3, j] = c_A * E[row, 0], T2, c_B * E[1 - row, 0], T4
         out[4, j] = start + q
         last = d

@@ -1,7 +1,7 @@
-"""The paper's algorithm as one would write it in numpy and scipy: the yardstick for the compiled solvers.
+"""The paper's algorithm in plain numpy and scipy, the reference for the speed of the compiled solvers.
 
-The same equations as `ccmodel.model.paper`, whose symbols it shares: every candidate for the last moving node at once
-by array operations, the load angle by scipy's bracketing root finder.
+The equations and symbols are those of `ccmodel.model.paper`. Array operations test every candidate for the last moving
+node at once; scipy's bracketing root finder finds the load angle.
 """
 
 import numpy as np
@@ -28,8 +28,8 @@ def simulate_pair(
     for j, angle in enumerate(theta_in - theta_in[0]):
 
         def moved(candidate, angle=angle):
-            turn = R_o * (candidate - start)
-            return cables[0].moved(-R_i * angle, ends[0] - turn), cables[1].moved(R_i * angle, ends[1] + turn)
+            pull = R_o * (candidate - start)
+            return cables[0].moved(-R_i * angle, ends[0] - pull), cables[1].moved(R_i * angle, ends[1] + pull)
 
         def imbalance(candidate):
             (T_A, _), (T_B, _) = moved(candidate)
@@ -62,7 +62,7 @@ class Cable:
         self.u = np.concatenate([[0.0], np.cumsum((T[:-1] + T[1:]) * h)])
 
     def moved(self, a, b):
-        """State with the ends taken to displacements `a` and `b`."""
+        """Tensions and displacements of the nodes after moving the ends to displacements `a` and `b`."""
         T, u, h, n = self.T, self.u, self.h, self.h.size
         if b <= a:
             return np.zeros(n + 1), np.linspace(a, b, n + 1)

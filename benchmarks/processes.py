@@ -1,4 +1,4 @@
-"""What only a process of its own shows: the time to the first simulation, and what compiling costs."""
+"""Time from the start of a new process to its first simulation, with and without compiled code in the cache."""
 
 import os
 import statistics
@@ -32,13 +32,13 @@ simulate(one, SpringLoad(0.03), np.arange(1001) / 1000, theta_in, initial).compl
 
 
 def warm_s(solver: str, repeats: int = 3) -> float:
-    """Time of a process that simulates one cycle with compiled code from the cache, its start included; median, s."""
+    """Median wall-clock time of a process that simulates one cycle with compiled code from the cache, s."""
     _run(solver)
     return statistics.median(_run(solver) for _ in range(repeats))
 
 
 def cold_s(solver: str) -> float:
-    """The same where nothing has ever been compiled, s."""
+    """Wall-clock time of such a process with an empty compilation cache, s."""
     with tempfile.TemporaryDirectory() as cache:
         return _run(solver, NUMBA_CACHE_DIR=cache)
 

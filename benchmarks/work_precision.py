@@ -1,4 +1,4 @@
-"""Error against time a sample, for every way there is to simulate the paper's case."""
+"""Error over time per sample of every solver for the paper's case."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from ccmodel.model import exact, general, paper
 
-# Half a stroke that starts at the drive's last but two reversals.
+# Half a stroke, from the third-last reversal of the drive.
 HALF_STROKE = slice(-1 - 3 * cases.SAMPLES_A_CYCLE // 4, -cases.SAMPLES_A_CYCLE // 4)
-# Okabe and Ito's colours, which the colour-blind tell apart.
+# Colours of Okabe and Ito, distinguishable with any colour vision.
 STYLES = {
     "paper, plain numpy": ("#D55E00", "s"),
     "paper, compiled": ("#E69F00", "D"),
@@ -29,10 +29,10 @@ Points = list[tuple[int, float, float]]
 
 
 def measure() -> dict[str, Points]:
-    """For each solver a list of (sections or elements a cable, microseconds a sample, error).
+    """By solver, a list of (sections or elements of a cable, microseconds per sample, relative error).
 
-    The error is the root mean square, over half a stroke, of both drive-end tensions against the closed form, by the
-    root mean square of these tensions.
+    The error is the root mean square difference of both drive-end tensions from the closed form over half a stroke,
+    over the root mean square of these tensions.
     """
     case = cases.paper()
     one, load, initial = case.transmission, case.load, case.initial
@@ -76,9 +76,9 @@ def _point(case: cases.Case, run: Callable[[NDArray, int], NDArray], cycles: int
 
 
 def error_ratio_at_equal_speed(points: dict[str, Points]) -> float:
-    """Least error of any other solver that takes no longer than the exact one, by the exact solver's error.
+    """Least error of any other solver within the exact solver's time, over the exact solver's error.
 
-    Between two measured points the error is taken as a power of the time.
+    Between measured points the error is interpolated as a power of the time.
     """
     _, exact_us, exact_error = points["exact solver"][0]
     errors = []
@@ -102,9 +102,9 @@ def draw(points: dict[str, Points], file: Path) -> None:
         axes.loglog(time_us, error, color=colour, marker=marker, markersize=14 if marker == "*" else 6, label=name)
         for i in {0, len(line) - 1} if n.any() else ():
             axes.annotate(f"{n[i]:.0f}", (time_us[i], error[i]), (6, 5), textcoords="offset points", color=colour)
-    axes.set_xlabel("time a sample (µs)")
-    axes.set_ylabel("rms error of the drive-end tensions,\nby their rms (1)")
-    axes.set_title("The paper's case, 1,000 samples a cycle; numbers are sections or elements a cable", fontsize=10)
+    axes.set_xlabel("time per sample (µs)")
+    axes.set_ylabel("relative rms error of the drive-end tensions")
+    axes.set_title("The paper's case, 1,000 samples a cycle; numbers: sections or elements of a cable", fontsize=10)
     axes.margins(x=0.1)
     axes.grid(alpha=0.3)
     figure.legend(loc="outside lower center", ncols=3, frameon=False)

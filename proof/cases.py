@@ -171,7 +171,7 @@ def _protocol_of(kind: str, plan: Plan, random: Generator) -> str:
 
 
 def _chosen(kind: str, effect: str | None, plan: Plan, random: Generator) -> list[tuple[Twin, float]]:
-    """The effects of a case and their strengths."""
+    """Effects of a case, and their strengths (`Truth.strength`)."""
     if kind == "clean":
         return []
     if kind == "unlisted":
@@ -185,6 +185,7 @@ def _chosen(kind: str, effect: str | None, plan: Plan, random: Generator) -> lis
 
 
 def _effect(twin: Twin, strength: float, spring: float, random: Generator) -> tuple[Truth, dict]:
+    """An effect of a given strength as its truth and its settings of the rig; `spring` is the load's, N m/rad."""
     low, high = twin.size
     size = float(low * (high / low) ** strength)
     if twin.signed and random.uniform() < 0.5:
@@ -198,6 +199,6 @@ def _effect(twin: Twin, strength: float, spring: float, random: Generator) -> tu
 
 
 def _in_rig(truth: Truth, campaign: Campaign) -> Truth:
-    """With whatever in this rig follows the same law, which no recording separates from the effect."""
+    """The true values, including what follows the same law in this rig and no recording separates from the effect."""
     in_rig = TWINS[truth.name].in_rig
     return replace(truth, values=in_rig(truth.values, campaign)) if in_rig else truth

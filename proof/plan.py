@@ -156,12 +156,12 @@ class Plan(Strict):
 
     @property
     def effects(self) -> dict[str, Twin]:
-        """Effects of the rig that a diagnosis may name, in the order in which they are drawn."""
+        """Effects that a mechanism models, in the order in which they are drawn."""
         return {name: twin for name, twin in self._drawn() if not name.startswith(UNLISTED)}
 
     @property
     def unlisted(self) -> dict[str, Twin]:
-        """Effects of the rig that no diagnosis knows."""
+        """Effects that no mechanism models, in the order in which they are drawn."""
         return {name: twin for name, twin in self._drawn() if name.startswith(UNLISTED)}
 
     def _drawn(self) -> list[tuple[str, Twin]]:

@@ -1,1 +1,1 @@
-"""A simulated rig to record from: explicit dynamics, independent of the model under test."""
+"""A simulated rig that records batches: explicit dynamics, independent of the model under test."""

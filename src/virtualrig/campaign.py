@@ -1,4 +1,4 @@
-"""From a campaign's configuration to batches of raw logs on disk (format 1)."""
+"""Records the batches of a campaign: from its configuration to raw logs on disk (format 1)."""
 
 import gzip
 import io
@@ -25,7 +25,7 @@ ORIGIN = "virtual-rig"
 
 
 class BatchExistsError(FileExistsError):
-    """A batch would replace a folder that this package did not make."""
+    """A batch would replace a folder that the virtual rig did not make."""
 
 
 def record_campaign(
@@ -35,25 +35,25 @@ def record_campaign(
     jobs: int,
     on_recorded: Callable[[str], None],
 ) -> None:
-    """Record the named batches into `out`, each replaced as a whole once all of its recordings are there.
+    """Record the named batches into `out`. A batch replaces an earlier one once all recordings are complete.
 
     Parameters
     ----------
     campaign : Campaign
-        The rig and what is recorded on it.
+        The rig and the plans of its recordings.
     out : Path
-        Folder that holds the batches' folders.
+        Folder that gets one folder a batch.
     batches : iterable of str
         Names of batches of the campaign.
     jobs : int
-        Number of processes. What is recorded does not depend on it.
+        Number of processes. The recordings do not depend on it.
     on_recorded : callable
-        Called with "batch/recording" as each is done.
+        Called with "batch/recording" when each is complete.
 
     Raises
     ------
     BatchExistsError
-        If a folder to be replaced does not hold a virtual rig's batch.
+        If a folder to be replaced holds anything but a batch of the virtual rig.
     """
     names = list(batches)
     for name in names:
@@ -61,7 +61,7 @@ def record_campaign(
     out.mkdir(parents=True, exist_ok=True)
     with (
         TemporaryDirectory(dir=out, prefix=".recording-") as scratch,
-        # Spawned, because forking a process that already has threads (a progress display's) can hang.
+        # Spawned, because forking a process with threads, such as a progress display, can hang.
         ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool,
     ):
         for name in names:
@@ -81,7 +81,7 @@ def record_campaign(
 
 
 def record(campaign: Campaign, batch: str, plan: RecordingPlan) -> bytes:
-    """Make one recording: the bytes of its compressed log, the same on every call."""
+    """Simulate one recording; returns the bytes of its compressed log, equal on every call."""
     draw = recording_generator(campaign.seed, batch, plan.id)
     preparation = prepare(campaign, plan, draw)
     trajectory = run(campaign, plan, preparation)
@@ -89,12 +89,12 @@ def record(campaign: Campaign, batch: str, plan: RecordingPlan) -> bytes:
 
 
 def recording_generator(seed: int, batch: str, recording: str) -> Generator:
-    """A recording's own random numbers: they depend on its name and the seed, not on what else is recorded."""
+    """Random generator of one recording, which depends only on its name, its batch and the seed."""
     return np.random.default_rng(SeedSequence([seed, zlib.crc32(f"{batch}/{recording}".encode())]))
 
 
 def prepare(campaign: Campaign, plan: RecordingPlan, draw: Generator) -> Preparation:
-    """Draw how the cables were strung for one recording."""
+    """Draw the initial state of one recording: friction, pretension and tension profile."""
     spread: Repeatability = campaign.repeatability
     low, high = spread.profile_share
     return Preparation(
@@ -110,11 +110,11 @@ def run(campaign: Campaign, plan: RecordingPlan, preparation: Preparation) -> Tr
     time_s = np.arange(round(plan.excitation.duration_s * rate) + 1) / rate
     numerics = campaign.numerics
     grid = make_grid(plan.conduit, numerics.cell_length_m, numerics.cell_bend_rad)
-    return simulate(campaign.rig, grid, numerics, preparation, time_s, *plan.excitation.angle_and_rate(time_s))
+    return simulate(campaign.rig, grid, numerics, preparation, time_s, plan.excitation.angle_and_rate(time_s))
 
 
 def compress(columns: dict[str, NDArray]) -> bytes:
-    """A log as gzipped CSV, without a file name or time stamp inside, so equal logs are equal files."""
+    """A log as gzipped CSV without file name and time stamp, so that equal logs are equal files."""
     text = io.StringIO()
     formats = [f"%.{DECIMALS[name]}f" for name in columns]
     np.savetxt(text, np.column_stack(list(columns.values())), formats, ",", header=",".join(columns), comments="")
@@ -122,13 +122,13 @@ def compress(columns: dict[str, NDArray]) -> bytes:
 
 
 def describe(campaign: Campaign, name: str) -> dict:
-    """The batch.yaml of one batch: what the experimenter knows, beforehand estimates and not the cables' truth."""
+    """Content of a batch's ``batch.yaml``: what the experimenter knows, with estimates of the cables' parameters."""
     batch: BatchPlan = campaign.batches[name]
     return description(campaign, name, batch.note, batch.recordings)
 
 
 def description(campaign: Campaign, name: str, note: str, plans: Sequence[RecordingPlan]) -> dict:
-    """The batch.yaml of any recordings made on a campaign's rig."""
+    """Content of a ``batch.yaml`` for any recordings of a campaign's rig."""
     rig, sensors = campaign.rig, campaign.sensors
     side = {
         "pulley_radius_m": rig.pulley_radius_m,
@@ -160,7 +160,7 @@ def description(campaign: Campaign, name: str, note: str, plans: Sequence[Record
                 "file": log_name(plan),
                 "pretension_N": plan.pretension_N,
                 "conduit": [piece.model_dump() for piece in plan.conduit],
-                "excitation": plan.excitation.asked,
+                "excitation": plan.excitation.metadata,
             }
             for plan in plans
         ],
@@ -181,9 +181,9 @@ def _write_description(campaign: Campaign, name: str, folder: Path) -> None:
 
 
 def as_yaml(described: dict) -> str:
-    """The text of a batch.yaml."""
+    """Text of a ``batch.yaml``."""
     writer, text = YAML(), io.StringIO()
-    # Without anchors: the constants that both sides share are written out for each.
+    # Without anchors: constants that both sides share are written twice.
     writer.representer.ignore_aliases = lambda data: True
     writer.dump(described, text)
     return text.getvalue()
@@ -195,4 +195,4 @@ def _check_replaceable(folder: Path) -> None:
     description = folder / "batch.yaml"
     known = YAML(typ="safe").load(description) if description.is_file() else None
     if not isinstance(known, dict) or known.get("origin") != ORIGIN:
-        raise BatchExistsError(f"{folder} does not hold a batch of the virtual rig and is left alone; move it away")
+        raise BatchExistsError(f"{folder} does not hold a batch of the virtual rig and is kept; move it away")

@@ -1,4 +1,4 @@
-"""A cable as a chain of masses, springs and bristles: its friction, its rest and the time step that it bears."""
+"""A cable as a chain of masses, springs and bristles: friction, initial tension and stable time step."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,18 +9,18 @@ from virtualrig.grid import Grid
 
 
 def node_grip(grid: Grid, friction_coefficient: float) -> NDArray:
-    """Friction at each node in full slip, per sum of the tensions on its two sides; shape (n,).
+    """Friction force of each node in full slip over the sum of the tensions on its two sides; shape (n,).
 
-    With (T_l - T_r) = tanh(mu phi / 2) (T_l + T_r) the ratio T_l / T_r is exp(mu phi) of the cell, without a
-    discretization error.
+    From (T_l - T_r) = tanh(mu phi / 2) (T_l + T_r) the ratio T_l / T_r is exp(mu phi) of the cell: the capstan equation
+    without discretisation error.
     """
     return np.tanh(friction_coefficient * grid.cell_bend_rad / 2)
 
 
 def initial_tension(grid: Grid, grip: NDArray, bristle: NDArray, pretension_N: float) -> NDArray:
-    """Tension of the segments (N, shape (n + 1,)) that the bristles hold in balance, `pretension_N` in the mean."""
-    held = grip * bristle
-    profile = np.cumprod(np.concatenate([[1.0], (1 - held) / (1 + held)]))
+    """Tension of the segments in equilibrium with the bristles, with the mean `pretension_N`; N, shape (n + 1,)."""
+    friction = grip * bristle
+    profile = np.cumprod(np.concatenate([[1.0], (1 - friction) / (1 + friction)]))
     length = grid.segment_length_m
     return pretension_N * profile * length.sum() / (profile @ length)
 
@@ -28,17 +28,17 @@ def initial_tension(grid: Grid, grip: NDArray, bristle: NDArray, pretension_N: f
 def stable_step(
     stiffness: NDArray, mass: NDArray, bristle: NDArray, spring: float, pulley_mass: float, numerics: Numerics
 ) -> float:
-    """Time step (s) below which the chain is stable, times the Courant share.
+    """Largest stable time step of the chain times the Courant number, s.
 
-    The highest frequency is that of one cable with every bristle stuck at the highest tension allowed, and half the
-    load pulley: in the mode where both cables work against each other, each carries a half.
+    The highest eigenfrequency is that of one cable with every bristle stuck at the tension limit and half the load
+    pulley: in the mode in which both cables oppose each other, each carries one half.
 
     Parameters
     ----------
     stiffness, mass, bristle : ndarray, shapes (n + 1,), (n,), (n,)
-        Of the segments, N/m; of the nodes, kg; of the nodes' bristles, N/m.
+        Stiffness of the segments, N/m; mass of the nodes, kg; stiffness of the nodes' bristles, N/m.
     spring, pulley_mass : float
-        Half of what hangs on the load end, as a spring (N/m) and a mass (kg) along the cable.
+        Half of the load spring (N/m) and of the pulley's inertia (kg), both along the cable.
     numerics : Numerics
     """
     inertia = np.append(mass, pulley_mass)

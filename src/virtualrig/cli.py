@@ -1,4 +1,4 @@
-"""The command line of the virtual rig."""
+"""Command line of the virtual rig."""
 
 import os
 from pathlib import Path
@@ -18,19 +18,19 @@ _errors = Console(stderr=True)
 
 @app.callback()
 def _describe() -> None:
-    """A simulated rig to record from; nothing it writes is experimental."""
+    """Record batches on a simulated rig. None of its output is experimental."""
 
 
 @app.command()
 def record(
     config: Annotated[Path, typer.Argument(exists=True, dir_okay=False, help="The campaign's YAML file.")],
-    out: Annotated[Path, typer.Option(file_okay=False, help="Folder for the batches' folders.")],
+    out: Annotated[Path, typer.Option(file_okay=False, help="Folder that gets one folder a batch.")],
     batch: Annotated[list[str] | None, typer.Option(help="Record only this batch; may be repeated.")] = None,
-    jobs: Annotated[int, typer.Option(min=1, help="Processes; what is recorded does not depend on it.")] = (
+    jobs: Annotated[int, typer.Option(min=1, help="Number of processes; the recordings do not depend on it.")] = (
         os.cpu_count() or 1
     ),
 ) -> None:
-    """Record the batches of a campaign; a batch that the virtual rig made before is replaced."""
+    """Record the batches of a campaign; earlier batches of the virtual rig are replaced."""
     try:
         campaign = read_campaign(config)
     except ValidationError as error:

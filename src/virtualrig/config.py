@@ -1,7 +1,7 @@
-"""The virtual rig's configuration, typed: every number of a campaign with its unit in its name.
+"""Typed configuration of the virtual rig, with the unit of every number in its name.
 
-What a recording was made with stands in one file: nothing has a default here but effects and slow noise, which are not
-there unless they are given, and a key that is missing, misspelt or of no use is refused.
+One file states everything that a recording was made with. Only effects and slow noise have a default, which is none. A
+missing or unknown key is refused.
 """
 
 from pathlib import Path
@@ -16,7 +16,7 @@ from virtualrig.strict import NonNegative, Share, Strict
 
 
 class Cable(Strict):
-    """What the two cables truly are; stiffness is that of `length_m` of cable, so EA is their product."""
+    """True parameters of both cables. The stiffness is that of a cable of `length_m`, so that EA is their product."""
 
     stiffness_N_per_m: PositiveFloat
     length_m: PositiveFloat
@@ -25,12 +25,12 @@ class Cable(Strict):
 
     @property
     def EA_N(self) -> float:
-        """Tension per unit strain, N."""
+        """Axial rigidity, N."""
         return self.stiffness_N_per_m * self.length_m
 
 
 class Estimates(Strict):
-    """What the experimenter measured beforehand and wrote into the batch: not what the cables truly are."""
+    """The experimenter's estimates of the cables' parameters, which are stated in the batch and have errors."""
 
     stiffness_N_per_m: PositiveFloat
     length_m: PositiveFloat
@@ -38,7 +38,7 @@ class Estimates(Strict):
 
 
 class Load(Strict):
-    """The torsional spring at the load pulley, and the little inertia and damping of what turns there."""
+    """The torsional spring at the load pulley, and the small inertia and damping of the rotating parts."""
 
     spring_stiffness_Nm_per_rad: PositiveFloat
     inertia_kg_m2: PositiveFloat
@@ -46,7 +46,7 @@ class Load(Strict):
 
 
 class Rig(Strict):
-    """Both pulleys, both cables, the load, and what else the rig has: nothing, if `effects` is left out."""
+    """Both pulleys, both cables, the load, and further effects; none by default."""
 
     pulley_radius_m: PositiveFloat
     cable: Cable
@@ -63,9 +63,10 @@ class Encoder(Strict):
 
 
 class SlowNoise(Strict):
-    """Noise that wanders, besides the white: its standard deviation over that of the white, and how long it lasts.
+    """First-order autoregressive noise in addition to the white noise.
 
-    Its correlation falls to 1/e over `lasts_samples`.
+    `ratio` is its standard deviation over that of the white noise. Its autocorrelation falls to 1/e over
+    `lasts_samples`.
     """
 
     ratio: NonNegative
@@ -73,7 +74,7 @@ class SlowNoise(Strict):
 
 
 class TorqueSensor(Strict):
-    """A motor current that stands for the pulley's torque."""
+    """A motor current, from which the pulley's torque is inferred."""
 
     constant_Nm_per_A: PositiveFloat
     accuracy_Nm: PositiveFloat
@@ -83,7 +84,7 @@ class TorqueSensor(Strict):
 
 
 class LoadCell(Strict):
-    """A load cell between slide and conduit plate."""
+    """A load cell between the slide and the conduit plate."""
 
     sensitivity_V_per_N: PositiveFloat
     zero_V: float
@@ -94,7 +95,7 @@ class LoadCell(Strict):
 
 
 class Sensors(Strict):
-    """One set at each end; `noise` is a standard deviation, white at the sampling rate; `slow_noise` comes on top."""
+    """One set of sensors at each end. A `noise` is the standard deviation of white noise at the sampling rate."""
 
     sample_rate_Hz: PositiveFloat
     encoder: Encoder
@@ -103,10 +104,10 @@ class Sensors(Strict):
 
 
 class Repeatability(Strict):
-    """How recordings of one condition differ from each other.
+    """Run-to-run variation between recordings of one condition.
 
-    `friction` and `pretension` are relative standard deviations from run to run. `profile_share` bounds the share of
-    mu phi by which ln T falls from the drive end to the load end, drawn for each cable.
+    `friction` and `pretension` are relative standard deviations. `profile_share` holds the bounds of the initial
+    profile, drawn for each cable: ln T falls from the drive end to the load end by this share of mu phi.
     """
 
     friction: Share
@@ -115,7 +116,7 @@ class Repeatability(Strict):
 
 
 class Numerics(Strict):
-    """Grid, time step and what stands in for rigid Coulomb friction."""
+    """Grid, time step, and the bristles and damping that regularise rigid Coulomb friction."""
 
     cell_length_m: PositiveFloat
     cell_bend_rad: PositiveFloat
@@ -127,14 +128,14 @@ class Numerics(Strict):
 
 
 class Piece(Strict):
-    """A piece of conduit of constant curvature; a straight one has no bend."""
+    """A piece of conduit of constant curvature. The bend of a straight piece is 0."""
 
     length_m: PositiveFloat
     bend_rad: NonNegative
 
 
 class RecordingPlan(Strict):
-    """One recording to make."""
+    """Plan of one recording."""
 
     id: str
     pretension_N: PositiveFloat
@@ -143,7 +144,7 @@ class RecordingPlan(Strict):
 
 
 class Condition(Strict):
-    """One condition of a study, recorded `repeats` times as `id`-a, `id`-b and so on."""
+    """One condition of a batch, recorded `repeats` times as `id`-a, `id`-b and so on."""
 
     id: str
     pretension_N: PositiveFloat
@@ -151,7 +152,7 @@ class Condition(Strict):
 
 
 class BatchPlan(Strict):
-    """A study: one excitation, the conditions it is applied under."""
+    """Plan of a batch: one excitation, applied under several conditions."""
 
     note: str
     excitation: Excitation
@@ -160,7 +161,7 @@ class BatchPlan(Strict):
 
     @property
     def recordings(self) -> list[RecordingPlan]:
-        """Every recording of the batch, repeats of one condition side by side."""
+        """Every recording of the batch, with the repeats of a condition in sequence."""
         return [
             RecordingPlan(
                 id=f"{condition.id}-{letter}",
@@ -174,7 +175,7 @@ class BatchPlan(Strict):
 
 
 class Campaign(Strict):
-    """A rig and all that is recorded on it, by batch name."""
+    """A rig, its sensors and the batches that are recorded on it, by name."""
 
     seed: Annotated[int, Field(ge=0)]
     rig: Rig

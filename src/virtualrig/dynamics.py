@@ -1,12 +1,12 @@
 """Explicit dynamics of both cables and the load pulley.
 
-Each cable is a chain of masses and springs that carry no compression, with a bristle at every node; the drive end is
-prescribed, the load ends hang on one pulley with its spring. Displacements count towards the drive end, so pulling at
-the drive is positive in the cable that is pulled. The integration is semi-implicit Euler with a step that the chain's
-own highest frequency sets.
+Each cable is a chain of masses and tension-only springs with a bristle at every node. The motion of the drive ends is
+prescribed; the load ends act on one pulley with its spring. Displacements are positive towards the drive end, so that a
+cable that is pulled at the drive moves in the positive direction. The integration is semi-implicit Euler with a step
+below the limit of the chain's highest eigenfrequency.
 
-This is the rig without effects, which most recordings are of. A rig with any runs in `virtualrig.effect_dynamics`,
-several times slower.
+This module simulates rigs without further effects. `virtualrig.effect_dynamics` simulates the others and is several
+times slower.
 """
 
 import numpy as np
@@ -26,19 +26,18 @@ def simulate(
     numerics: Numerics,
     preparation: Preparation,
     time_s: NDArray,
-    theta_in_rad: NDArray,
-    omega_in_rad_per_s: NDArray,
+    drive: tuple[NDArray, NDArray],
 ) -> Trajectory:
-    """Run the rig from rest in balance through a drive motion.
+    """Simulate a drive motion, from rest in equilibrium.
 
     Parameters
     ----------
     rig, grid, numerics, preparation
-        The rig, its conduits' grid, the numerical choices and the state the cables were left in.
+        The rig, the grid of its conduits, the numerical settings and the initial state.
     time_s : ndarray, shape (samples,)
         Evenly spaced sample times, s.
-    theta_in_rad, omega_in_rad_per_s : ndarray, shape (samples,)
-        Drive angle and rate at the sample times; between them the angle is the cubic through both.
+    drive : tuple of ndarray, each of shape (samples,)
+        Drive angle (rad) and rate (rad/s) at the sample times. Between them the angle is the cubic through both.
 
     Returns
     -------
@@ -51,46 +50,53 @@ def simulate(
         If a tension is not finite or exceeds `numerics.tension_limit_N`.
     """
     if rig.effects.are_in_the_motion:
-        return effect_dynamics.simulate(rig, grid, numerics, preparation, time_s, theta_in_rad, omega_in_rad_per_s)
+        return effect_dynamics.simulate(rig, grid, numerics, preparation, time_s, drive)
+    theta_out, *tensions = _channels(rig, grid, numerics, preparation, time_s, drive)
+    check_tensions(np.array(tensions), numerics.tension_limit_N)
+    T1, T2, T3, T4 = tensions
     radius = rig.pulley_radius_m
+    return Trajectory(time_s, drive[0], theta_out, *tensions, radius * (T1 - T3), radius * (T2 - T4))
+
+
+def _channels(
+    rig: Rig,
+    grid: Grid,
+    numerics: Numerics,
+    preparation: Preparation,
+    time_s: NDArray,
+    drive: tuple[NDArray, NDArray],
+) -> NDArray:
+    """Arguments of the compiled march, and its result: theta_out, T1, T2, T3, T4; shape (5, samples)."""
+    radius, load, cable = rig.pulley_radius_m, rig.load, rig.cable
     grip = node_grip(grid, preparation.friction_coefficient)
     bristle = np.repeat(np.array(preparation.profile_share)[:, None], grip.size, axis=1)
     tension = np.stack([initial_tension(grid, grip, b, preparation.pretension_N) for b in bristle])
-    stiffness = rig.cable.EA_N / grid.segment_length_m
-    mass = rig.cable.density_kg_per_m * grid.cell_length_m
-
-    sample_s = time_s[1] - time_s[0]
-    load = rig.load
+    stiffness, mass = cable.EA_N / grid.segment_length_m, cable.density_kg_per_m * grid.cell_length_m
     bristles = 2 * grip * numerics.tension_limit_N / numerics.bristle_length_m
     spring, pulley_mass = load.spring_stiffness_Nm_per_rad / radius**2 / 2, load.inertia_kg_m2 / radius**2 / 2
-    steps = int(np.ceil(sample_s / stable_step(stiffness, mass, bristles, spring, pulley_mass, numerics)))
-    theta_out = radius * (tension[0, -1] - tension[1, -1]) / load.spring_stiffness_Nm_per_rad
-    channels = _run(
-        theta_in_rad,
-        omega_in_rad_per_s,
+    sample_s = time_s[1] - time_s[0]
+    return _march(
+        *drive,
         sample_s,
-        steps,
+        int(np.ceil(sample_s / stable_step(stiffness, mass, bristles, spring, pulley_mass, numerics))),
         tension,
         bristle,
         stiffness,
-        numerics.wave_damping * np.sqrt(rig.cable.EA_N * rig.cable.density_kg_per_m),
+        numerics.wave_damping * np.sqrt(cable.EA_N * cable.density_kg_per_m),
         1 / mass,
         grip,
         numerics.bristle_length_m,
         numerics.drag_rate_per_s,
         radius,
-        theta_out,
+        radius * (tension[0, -1] - tension[1, -1]) / load.spring_stiffness_Nm_per_rad,
         load.spring_stiffness_Nm_per_rad,
         load.damping_Nms_per_rad,
         load.inertia_kg_m2,
     )
-    check_tensions(channels[1:], numerics.tension_limit_N)
-    _, T1, T2, T3, T4 = channels
-    return Trajectory(time_s, theta_in_rad, *channels, radius * (T1 - T3), radius * (T2 - T4))
 
 
 @njit(cache=True, error_model="numpy")
-def _run(
+def _march(
     theta_in,
     omega_in,
     sample_s,
@@ -109,10 +115,10 @@ def _run(
     load_damping,
     load_inertia,
 ):
-    """Integrate; returns theta_out, T1, T2, T3, T4 at the samples, shape (5, samples).
+    """Integrate over time; returns theta_out, T1, T2, T3, T4 at the samples, shape (5, samples).
 
-    Row 0 of every state is cable A, row 1 cable B. Displacements are counted from the start, where the tensions are
-    `start_tension`; the columns of `u` and `v` are the drive end, the nodes and the load end.
+    Row 0 of every state is cable A, row 1 cable B. Displacements are zero at the start, where the tensions are
+    `start_tension`. The columns of `u` and `v` are the drive end, the nodes and the load end.
     """
     samples = theta_in.size
     nodes = inverse_mass.size
@@ -134,7 +140,7 @@ def _run(
         out[4, sample] = tension[1, nodes]
         if sample == samples - 1:
             break
-        # The drive angle between two samples: the cubic through angles and rates at both.
+        # Between two samples the drive angle is the cubic through the angles and rates at both.
         rise = theta_in[sample + 1] - theta_in[sample]
         slope_0 = omega_in[sample] * sample_s
         slope_1 = omega_in[sample + 1] * sample_s
@@ -155,12 +161,12 @@ def _run(
                 x = u[cable]
                 w = v[cable]
                 z = bristle[cable]
-                # Three short loops instead of one: only so does the compiler work on several nodes at a time.
+                # The compiler vectorises three short loops, but not one loop over all.
                 for i in range(nodes):
                     friction = grip[i] * (T[i] + T[i + 1]) * z[i]
                     w[i + 1] = keep * (w[i + 1] + dt * inverse_mass[i] * (T[i] - T[i + 1] - friction))
                 # Dahl's bristle, dz/dt = v (1 - sgn(v) z / z0), implicit in z: it stays within its bounds for any
-                # step, and is exact where the speed is small, at reversals, where alone it matters.
+                # step. Its error vanishes at small speeds, and the bristle only matters near reversals.
                 for i in range(nodes):
                     stretch = w[i + 1] * dt / bristle_length
                     z[i] = (z[i] + stretch) / (1 + abs(stretch))

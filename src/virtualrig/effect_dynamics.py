@@ -35,10 +35,10 @@ def simulate(
     numerics: Numerics,
     preparation: Preparation,
     time_s: NDArray,
-    theta_in_rad: NDArray,
-    omega_in_rad_per_s: NDArray,
+    drive: tuple[NDArray, NDArray],
 ) -> Trajectory:
     """Run a rig with effects; parameters, result and errors are those of `virtualrig.dynamics.simulate`."""
+    theta_in_rad, omega_in_rad_per_s = drive
     effects, physics = rig.effects, _physics(rig, numerics)
     lengths = _bristle_lengths(effects, numerics)
     half_bend = _half_bend(grid, effects, preparation.friction_coefficient)

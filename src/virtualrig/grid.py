@@ -1,4 +1,4 @@
-"""One cable in its conduit as a chain: a node in the middle of each cell, a spring from node to node."""
+"""Grid of a cable in its conduit: a node in the middle of each cell, and a spring between nodes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from virtualrig.config import Piece
 class Grid:
     """Cells along a conduit, drive end first.
 
-    Friction acts at the nodes, which sit in the middle of the cells, so the first and the last spring are half as
-    long as a cell. Placed like this, a front that runs into the cable meets the exact tension each time it reaches a
-    further node, and the error between is a fraction of one node's friction.
+    Friction acts at the nodes in the middle of the cells, so that the first and the last spring have half the length of
+    a cell. The tension at a slip front is then exact whenever the front reaches a node; between nodes its error is a
+    fraction of one node's friction.
 
     Attributes
     ----------
@@ -28,15 +28,15 @@ class Grid:
 
     @property
     def segment_length_m(self) -> NDArray:
-        """Length of the springs: drive end to first node, node to node, last node to load end; m, shape (n + 1,)."""
+        """Length of the springs, from the drive end over the nodes to the load end; m, shape (n + 1,)."""
         half = np.concatenate([[0.0], self.cell_length_m, [0.0]]) / 2
         return half[:-1] + half[1:]
 
 
 def make_grid(pieces: Sequence[Piece], cell_length_m: float, cell_bend_rad: float) -> Grid:
-    """Divide each piece into equal cells no longer than `cell_length_m` that bend no more than `cell_bend_rad`.
+    """Divide each piece into equal cells of at most `cell_length_m` and `cell_bend_rad`.
 
-    Cells never straddle two pieces, so curved and straight stretches keep their exact length and bend.
+    A cell never extends over two pieces, so that the length and the bend of each piece are exact.
     """
     counts = [max(1, _ceil(p.length_m / cell_length_m), _ceil(p.bend_rad / cell_bend_rad)) for p in pieces]
     return Grid(
@@ -46,5 +46,5 @@ def make_grid(pieces: Sequence[Piece], cell_length_m: float, cell_bend_rad: floa
 
 
 def _ceil(ratio: float) -> int:
-    # A ratio that is whole but for rounding must not cost a cell more.
+    # Rounding errors of a whole ratio must not add a cell.
     return int(np.ceil(ratio * (1 - 1e-12)))

@@ -1,6 +1,6 @@
-"""What the drive pulley is made to do. The drive is kinematic: its angle is prescribed, whatever the torque.
+"""Prescribed motions of the drive pulley. The drive is kinematic: its angle does not depend on the torque.
 
-Every motion begins with a rest and has a bounded acceleration, as a motor's is: a jump in speed would ring the cables.
+Every motion begins with a rest. Its acceleration is bounded, because a jump in speed would make the cables ring.
 """
 
 from typing import Annotated, Literal
@@ -13,10 +13,9 @@ from virtualrig.strict import Strict
 
 
 class Sine(Strict):
-    """A rest, a start-up in which a sine grows from nothing, then the sine.
+    """A rest, a start-up in which the amplitude grows from zero, and a sine.
 
-    The start-up keeps the acceleration bounded and continuous, as a motor's is; a bare sine would begin with a jump
-    in speed that rings the cables.
+    The start-up keeps the acceleration bounded and continuous. A sine without it would begin with a jump in speed.
     """
 
     wave: Literal["sine"]
@@ -32,8 +31,8 @@ class Sine(Strict):
         return self.rest_s + (self.start_up_cycles + self.cycles) / self.frequency_Hz
 
     @property
-    def asked(self) -> dict:
-        """What a batch notes of the motion."""
+    def metadata(self) -> dict:
+        """The motion as a batch states it."""
         return {"wave": self.wave, "amplitude_rad": self.amplitude_rad, "frequency_Hz": self.frequency_Hz}
 
     def angle_and_rate(self, time_s: NDArray) -> tuple[NDArray, NDArray]:
@@ -50,7 +49,7 @@ class Sine(Strict):
 
 
 class Triangle(Strict):
-    """Strokes of constant speed, turned around at constant acceleration in `turn_share` of the time."""
+    """Strokes of constant speed, with reversals of constant acceleration in a share `turn_share` of the time."""
 
     wave: Literal["triangle"]
     amplitude_rad: PositiveFloat
@@ -61,12 +60,12 @@ class Triangle(Strict):
 
     @property
     def duration_s(self) -> float:
-        """Length of the whole motion, s: the first stroke from the middle takes half a ramp longer than later ones."""
+        """Length of the whole motion, s. The first stroke, from the middle, takes half a ramp longer than the half."""
         return self.rest_s + self.cycles / self.frequency_Hz + self._ramp_s / 2
 
     @property
-    def asked(self) -> dict:
-        """What a batch notes of the motion."""
+    def metadata(self) -> dict:
+        """The motion as a batch states it."""
         return {"wave": self.wave, "amplitude_rad": self.amplitude_rad, "frequency_Hz": self.frequency_Hz}
 
     @property
@@ -81,16 +80,16 @@ class Triangle(Strict):
         since = np.maximum(time_s - self.rest_s, 0.0)
         later = np.maximum(since - first_s, 0.0)
         strokes = np.floor(later / stroke_s)
-        way_back = 1 - 2 * (strokes % 2)
-        first_way, first_rate = _trapezoid(since, first_s, ramp_s)
-        way, rate = _trapezoid(later - strokes * stroke_s, stroke_s, ramp_s)
+        side = 1 - 2 * (strokes % 2)
+        first_progress, first_rate = _trapezoid(since, first_s, ramp_s)
+        progress, rate = _trapezoid(later - strokes * stroke_s, stroke_s, ramp_s)
         is_first = since < first_s
-        angle = np.where(is_first, speed * first_way, way_back * (self.amplitude_rad - speed * way))
-        return angle, speed * np.where(is_first, first_rate, -way_back * rate)
+        angle = np.where(is_first, speed * first_progress, side * (self.amplitude_rad - speed * progress))
+        return angle, speed * np.where(is_first, first_rate, -side * rate)
 
 
 class Chirp(Strict):
-    """A sine whose frequency rises or falls by a constant factor in equal times."""
+    """A sine with a logarithmic frequency sweep."""
 
     wave: Literal["chirp"]
     amplitude_rad: PositiveFloat
@@ -106,23 +105,23 @@ class Chirp(Strict):
         return self.rest_s + self.sweep_s
 
     @property
-    def asked(self) -> dict:
-        """What a batch notes of the motion."""
+    def metadata(self) -> dict:
+        """The motion as a batch states it."""
         return self.model_dump(include={"wave", "amplitude_rad", "first_Hz", "last_Hz", "sweep_s"})
 
     def angle_and_rate(self, time_s: NDArray) -> tuple[NDArray, NDArray]:
         """Drive angle (rad) and its rate (rad/s) at `time_s` (s); same shape as `time_s`."""
         since = np.maximum(time_s - self.rest_s, 0.0)
-        octaves_per_s = np.log(self.last_Hz / self.first_Hz) / self.sweep_s
-        rate = 2 * np.pi * self.first_Hz * np.exp(octaves_per_s * since)
-        # The integral of the rate, in a form that holds for a constant frequency too.
-        y = octaves_per_s * since
-        turned = since * np.divide(np.expm1(y), y, out=np.ones_like(y), where=y != 0)
-        return _swing(since, 2 * np.pi * self.first_Hz * turned, rate, self.start_up_cycles / self.first_Hz, self)
+        log_rate_per_s = np.log(self.last_Hz / self.first_Hz) / self.sweep_s
+        rate = 2 * np.pi * self.first_Hz * np.exp(log_rate_per_s * since)
+        # The integral of the rate over time, in a form that is also valid for a constant frequency.
+        y = log_rate_per_s * since
+        cycles = since * np.divide(np.expm1(y), y, out=np.ones_like(y), where=y != 0)
+        return _swing(since, 2 * np.pi * self.first_Hz * cycles, rate, self.start_up_cycles / self.first_Hz, self)
 
 
 class GrowingSine(Strict):
-    """A sine whose amplitude grows (or shrinks) from cycle to cycle: reversals nested in each other."""
+    """A sine whose amplitude grows or shrinks linearly, which gives nested reversals."""
 
     wave: Literal["growing-sine"]
     first_amplitude_rad: PositiveFloat
@@ -138,8 +137,8 @@ class GrowingSine(Strict):
         return self.rest_s + (self.start_up_cycles + self.cycles) / self.frequency_Hz
 
     @property
-    def asked(self) -> dict:
-        """What a batch notes of the motion."""
+    def metadata(self) -> dict:
+        """The motion as a batch states it."""
         return self.model_dump(include={"wave", "first_amplitude_rad", "amplitude_rad", "frequency_Hz"})
 
     def angle_and_rate(self, time_s: NDArray) -> tuple[NDArray, NDArray]:
@@ -154,7 +153,7 @@ class GrowingSine(Strict):
 
 
 class WanderingSine(Strict):
-    """A sine whose frequency wanders by up to `spread` of itself, as drawn from `seed`."""
+    """A sine whose frequency varies slowly by at most a share `spread`, drawn from `seed`."""
 
     wave: Literal["wandering-sine"]
     amplitude_rad: PositiveFloat
@@ -171,8 +170,8 @@ class WanderingSine(Strict):
         return self.rest_s + (self.start_up_cycles + self.cycles) / self.frequency_Hz
 
     @property
-    def asked(self) -> dict:
-        """What a batch notes of the motion."""
+    def metadata(self) -> dict:
+        """The motion as a batch states it."""
         return self.model_dump(include={"wave", "amplitude_rad", "frequency_Hz", "spread"})
 
     def angle_and_rate(self, time_s: NDArray) -> tuple[NDArray, NDArray]:
@@ -182,15 +181,15 @@ class WanderingSine(Strict):
         slow = 2 * np.pi * self.frequency_Hz * draw.uniform(0.1, 0.7, 3)
         start = draw.uniform(0, 2 * np.pi, 3)
         since = np.maximum(time_s - self.rest_s, 0.0)
-        at = slow * since[..., None] + start
+        slow_phase = slow * since[..., None] + start
         omega = 2 * np.pi * self.frequency_Hz
-        phase = omega * (since + (share / slow * (np.sin(at) - np.sin(start))).sum(axis=-1))
-        rate = omega * (1 + (share * np.cos(at)).sum(axis=-1))
+        phase = omega * (since + (share / slow * (np.sin(slow_phase) - np.sin(start))).sum(axis=-1))
+        rate = omega * (1 + (share * np.cos(slow_phase)).sum(axis=-1))
         return _swing(since, phase, rate, self.start_up_cycles / self.frequency_Hz, self)
 
 
 class StepAndHold(Strict):
-    """Smooth moves from angle to angle, each `move_s` long, with a hold of `hold_s` after each."""
+    """Smooth moves to each angle in `move_s`, with a hold of `hold_s` after each."""
 
     wave: Literal["step-and-hold"]
     angles_rad: tuple[float, ...] = Field(min_length=1)
@@ -204,8 +203,8 @@ class StepAndHold(Strict):
         return self.rest_s + len(self.angles_rad) * (self.move_s + self.hold_s)
 
     @property
-    def asked(self) -> dict:
-        """What a batch notes of the motion."""
+    def metadata(self) -> dict:
+        """The motion as a batch states it."""
         return {"wave": self.wave, "angles_rad": list(self.angles_rad), "move_s": self.move_s, "hold_s": self.hold_s}
 
     def angle_and_rate(self, time_s: NDArray) -> tuple[NDArray, NDArray]:
@@ -213,8 +212,8 @@ class StepAndHold(Strict):
         angle, rate = np.zeros_like(time_s), np.zeros_like(time_s)
         for i, rise in enumerate(np.diff(self.angles_rad, prepend=0.0)):
             start = self.rest_s + i * (self.move_s + self.hold_s)
-            way, slope = smooth_step((time_s - start) / self.move_s)
-            angle += rise * way
+            step, slope = smooth_step((time_s - start) / self.move_s)
+            angle += rise * step
             rate += rise * slope / self.move_s
         return angle, rate
 
@@ -223,7 +222,7 @@ Excitation = Annotated[Sine | Triangle | Chirp | GrowingSine | WanderingSine | S
 
 
 def _swing(since, phase, phase_rate, start_up_s, motion) -> tuple[NDArray, NDArray]:
-    """A sine of any phase (rad) that grows from nothing: angle and rate, shapes (samples,)."""
+    """Angle (rad) and rate (rad/s) of a sine of a given phase whose amplitude grows from zero; shapes (samples,)."""
     growth, slope = smooth_step(since / start_up_s)
     angle = motion.amplitude_rad * growth * np.sin(phase)
     rate = motion.amplitude_rad * (slope / start_up_s * np.sin(phase) + growth * phase_rate * np.cos(phase))
@@ -231,16 +230,16 @@ def _swing(since, phase, phase_rate, start_up_s, motion) -> tuple[NDArray, NDArr
 
 
 def _trapezoid(since, whole_s, ramp_s) -> tuple[NDArray, NDArray]:
-    """Way (s) and rate (0 to 1) of a stroke that speeds up and slows down in `ramp_s` each, `whole_s` in all."""
+    """Integral (s) of a trapezoidal rate, and the rate (0 to 1), for ramps of `ramp_s` within `whole_s`."""
     since = np.clip(since, 0.0, whole_s)
-    left = whole_s - since
-    rate = np.minimum(1.0, np.minimum(since, left) / ramp_s)
-    up, down = np.minimum(since, ramp_s), np.minimum(left, ramp_s)
-    way = up**2 / (2 * ramp_s) + (since - up) - (ramp_s - down) ** 2 / (2 * ramp_s)
-    return way, rate
+    until = whole_s - since
+    rate = np.minimum(1.0, np.minimum(since, until) / ramp_s)
+    up, down = np.minimum(since, ramp_s), np.minimum(until, ramp_s)
+    progress = up**2 / (2 * ramp_s) + (since - up) - (ramp_s - down) ** 2 / (2 * ramp_s)
+    return progress, rate
 
 
 def smooth_step(s: NDArray) -> tuple[NDArray, NDArray]:
-    """The quintic from 0 (s <= 0) to 1 (s >= 1) with no slope and no curvature at either end, and its slope."""
+    """Quintic from 0 (s <= 0) to 1 (s >= 1) with zero slope and curvature at both ends, and its slope."""
     s = np.clip(s, 0.0, 1.0)
     return s**3 * (10 - 15 * s + 6 * s**2), 30 * s**2 * (1 - s) ** 2

@@ -1,4 +1,4 @@
-"""From a trajectory to what the rig logs: counts, currents and voltages."""
+"""From true quantities to the log of the sensors: counts, currents and voltages."""
 
 import numpy as np
 from numpy.random import Generator
@@ -10,7 +10,7 @@ from virtualrig.effects import TWINS, SideSensors
 from virtualrig.effects.contract import Side
 from virtualrig.trajectory import Trajectory
 
-# Columns of a log in the order of the format, each with as many decimals as leave rounding far below the noise.
+# Columns of a log in the order of the format, with decimals that keep rounding far below the noise.
 DECIMALS = {
     "time_s": 4,
     "drive_encoder_counts": 0,
@@ -23,11 +23,11 @@ DECIMALS = {
 
 
 class SensorRangeError(ValueError):
-    """A quantity left the range of the sensor that was to record it."""
+    """A quantity is outside the range of its sensor."""
 
 
 def log(trajectory: Trajectory, sensors: Sensors, rig: Rig, draw: Generator) -> dict[str, NDArray]:
-    """What the sensors at both ends log of a trajectory.
+    """Log of the sensors at both ends.
 
     Returns
     -------
@@ -37,7 +37,7 @@ def log(trajectory: Trajectory, sensors: Sensors, rig: Rig, draw: Generator) -> 
     Raises
     ------
     SensorRangeError
-        If a torque or a tension sum is beyond the sensor's range.
+        If a torque or a tension sum is outside the sensor's range.
     """
     drive, load = sensed_sides(trajectory, rig)
     return {
@@ -70,13 +70,13 @@ def sensed(time_s: NDArray, truth: Side, rig: Rig, faults: SideSensors) -> Side:
 
 
 def encode(angle_rad: NDArray, encoder: Encoder, draw: Generator) -> NDArray:
-    """Counts of an incremental encoder that was switched on anywhere within a turn."""
+    """Counts of an incremental encoder whose zero is uniform within a revolution."""
     index = draw.uniform(-encoder.counts_per_rev / 2, encoder.counts_per_rev / 2)
     return np.floor(angle_rad * encoder.counts_per_rev / (2 * np.pi) + index).astype(int)
 
 
 def current(torque_Nm: NDArray, sensor: TorqueSensor, draw: Generator) -> NDArray:
-    """Current (A) that is read for a torque (N m): noise, and a zero that is off within the accuracy."""
+    """Measured current (A) of a torque (N m), with noise and a zero error uniform within the accuracy."""
     _check_range("torque", torque_Nm, sensor.range_Nm, "N m")
     zero_Nm = draw.uniform(-sensor.accuracy_Nm, sensor.accuracy_Nm)
     read_Nm = torque_Nm + zero_Nm + noise(torque_Nm.size, sensor.noise_Nm, sensor.slow_noise, draw)
@@ -84,7 +84,7 @@ def current(torque_Nm: NDArray, sensor: TorqueSensor, draw: Generator) -> NDArra
 
 
 def load_cell_voltage(force_N: NDArray, cell: LoadCell, draw: Generator) -> NDArray:
-    """Voltage (V) that is read for a tension sum (N): noise, and a zero that is off within the accuracy."""
+    """Measured voltage (V) of a tension sum (N), with noise and a zero error uniform within the accuracy."""
     _check_range("tension sum", force_N, cell.range_N, "N")
     zero_N = draw.uniform(-cell.accuracy_N, cell.accuracy_N)
     read_N = force_N + zero_N + noise(force_N.size, cell.noise_N, cell.slow_noise, draw)
@@ -92,13 +92,13 @@ def load_cell_voltage(force_N: NDArray, cell: LoadCell, draw: Generator) -> NDAr
 
 
 def noise(samples: int, deviation: float, slow: SlowNoise | None, draw: Generator) -> NDArray:
-    """White noise, and slow noise on top where a sensor has it; shape (samples,), in the unit of `deviation`."""
+    """White noise of a standard deviation, plus slow noise if given; shape (samples,), in the unit of `deviation`."""
     white = draw.normal(0, deviation, samples)
     if slow is None:
         return white
     keep = np.exp(-1 / slow.lasts_samples)
     kicks = draw.normal(0, slow.ratio * deviation, samples)
-    # In its steady state from the first sample on.
+    # Scaled so that the process is stationary from the first sample on.
     kicks[1:] *= np.sqrt(1 - keep**2)
     return white + lfilter([1.0], [1.0, -keep], kicks)
 

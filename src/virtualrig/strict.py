@@ -1,4 +1,4 @@
-"""What every configuration model of the virtual rig has in common."""
+"""Base class and number types of the configuration."""
 
 from typing import Annotated
 
@@ -9,6 +9,6 @@ Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class Strict(BaseModel):
-    """A frozen model that refuses unknown keys and numbers that are not finite."""
+    """A frozen pydantic model that refuses unknown keys and numbers that are not finite."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)

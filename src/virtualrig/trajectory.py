@@ -1,4 +1,4 @@
-"""What a run starts from and what it gives."""
+"""Initial state and result of a run."""
 
 from dataclasses import dataclass
 
@@ -7,16 +7,16 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Preparation:
-    """How the rig was strung for one run.
+    """Initial state of one run.
 
     Attributes
     ----------
     friction_coefficient : float
-        Coefficient mu between cables and conduits in this run.
+        Friction coefficient mu between cables and conduits in this run.
     pretension_N : float
-        Tension of both cables, N, as the mean along the conduit.
+        Mean tension along the conduit, of both cables, N.
     profile_share : tuple of float
-        By which share of mu phi ln T falls from the drive end to the load end, for cables A and B.
+        Fall of ln T from the drive end to the load end over mu phi, for cables A and B.
     """
 
     friction_coefficient: float
@@ -26,11 +26,11 @@ class Preparation:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """What truly happened, before any sensor; every array has shape (samples,).
+    """True quantities of a run, without sensors; every array has shape (samples,).
 
-    Tensions are those of the paper: T1, T2 of cable A and T3, T4 of cable B at the drive and the load end, N. Angles
-    are in rad; `theta_out_rad` counts from the load spring's neutral. `tau_in_Nm` is the torque of the drive on its
-    pulley, `tau_out_Nm` the torque on what hangs on the load pulley, beyond its bearing.
+    Tensions are those of the paper, in N: T1 and T2 of cable A, T3 and T4 of cable B, each at the drive and the load
+    end. The zero of `theta_out_rad` is the neutral position of the load spring. `tau_in_Nm` is the torque of the drive
+    on its pulley, `tau_out_Nm` the torque on the load beyond the bearing of the load pulley.
     """
 
     time_s: NDArray
@@ -45,14 +45,14 @@ class Trajectory:
 
 
 class SimulationError(RuntimeError):
-    """The simulation left the range its time step was chosen for."""
+    """A tension exceeded the limit that the time step was chosen for."""
 
 
 def check_tensions(tensions_N: NDArray, limit_N: float) -> None:
     """Refuse tensions that are not finite or exceed the limit."""
-    # Written so that a NaN fails it too.
+    # In this form a NaN is refused too.
     if not tensions_N.max() <= limit_N:
         raise SimulationError(
-            f"a tension left the {limit_N} N that the time step was chosen for; "
+            f"a tension exceeded the {limit_N} N that the time step was chosen for; "
             "lower the amplitude or raise numerics.tension_limit_N"
         )

@@ -13,7 +13,7 @@ def campaign() -> Campaign:
 
 @pytest.fixture(scope="session")
 def trajectory(campaign):
-    """Call with (batch, recording) for the undrawn trajectory over two cycles; each is simulated once."""
+    """Call with (batch, recording) for the nominal trajectory over two cycles; each is simulated once."""
     made = {}
 
     def simulated(batch, recording):

@@ -1,4 +1,4 @@
-"""Batches on disk: the committed ones, and that they can be made again."""
+"""Batches on disk: the committed ones are complete and reproducible."""
 
 import gzip
 import shutil
@@ -30,7 +30,7 @@ def small_campaign(campaign):
 
 
 @pytest.mark.parametrize("name", BATCHES)
-def test_committed_description_is_what_the_config_says(campaign, name):
+def test_committed_description_follows_from_the_config(campaign, name):
     committed = yaml.safe_load((RAW / name / "batch.yaml").read_text())
     assert committed == describe(campaign, name)
     assert committed["origin"] == "virtual-rig"
@@ -39,7 +39,7 @@ def test_committed_description_is_what_the_config_says(campaign, name):
 
 
 @pytest.mark.parametrize("name", BATCHES)
-def test_committed_logs_are_complete_and_inside_the_sensors_range(campaign, name):
+def test_committed_logs_are_complete_and_within_the_sensors_range(campaign, name):
     sensors = campaign.sensors
     for plan in campaign.batches[name].recordings:
         log = read_log(RAW / name / f"{plan.id}.csv.gz")
@@ -71,14 +71,14 @@ def test_repeats_differ_by_about_a_percent(campaign, name):
         a, b = (read_log(RAW / name / f"{condition.id}-{letter}.csv.gz") for letter in "ab")
         cycle = a.time_s > a.time_s.iloc[-1] - 2
         difference = (a.drive_current_A - b.drive_current_A)[cycle]
-        # Of the white noise, means over 20 ms leave 0.03 % of the torque's range. At 0.7 N hardly more differs: both
-        # cables slack most of the time, friction and pretension have little to act on.
+        # Means over 20 ms reduce the white noise to 0.03 % of the torque's range. At 0.7 N the difference is little
+        # more, because both cables are slack most of the time.
         smooth = difference.rolling(10).mean().dropna()
         assert 5e-4 < (smooth - smooth.mean()).std() / np.ptp(a.drive_current_A[cycle]) < 0.03, condition.id
 
 
-def test_a_committed_recording_can_be_made_again(campaign):
-    """Another processor's last bit makes a slack cable, which strikes and sticks, a few samples differ; not the run."""
+def test_a_committed_recording_is_reproducible(campaign):
+    """On another processor, rounding changes a few samples after a slack cable becomes taut."""
     plan = plan_of(campaign, "pretension", "pretension-0.7N-a")
     again = np.genfromtxt(gzip.decompress(record(campaign, "pretension", plan)).decode().splitlines(), delimiter=",")
     committed = np.genfromtxt(RAW / "pretension" / "pretension-0.7N-a.csv.gz", delimiter=",")
@@ -99,7 +99,7 @@ def test_same_seed_same_bytes_and_another_seed_another_run(small_campaign):
     assert record(changed(small_campaign, seed=small_campaign.seed + 1), "half-loop", plan) != first
 
 
-def test_one_command_records_and_records_again(small_campaign, tmp_path):
+def test_one_command_records_and_replaces(small_campaign, tmp_path):
     config, out = tmp_path / "rig.yaml", tmp_path / "raw"
     config.write_text(yaml.safe_dump(small_campaign.model_dump(mode="json")))
     command = ["record", str(config), "--out", str(out), "--jobs"]
@@ -111,7 +111,7 @@ def test_one_command_records_and_records_again(small_campaign, tmp_path):
     assert [path.name for path in out.iterdir()] == ["half-loop"]
 
 
-def test_a_batch_of_a_real_rig_is_left_alone(small_campaign, tmp_path):
+def test_a_batch_of_a_real_rig_is_kept(small_campaign, tmp_path):
     config, out = tmp_path / "rig.yaml", tmp_path / "raw"
     config.write_text(yaml.safe_dump(small_campaign.model_dump(mode="json")))
     shutil.copytree(RAW / "half-loop", out / "half-loop")

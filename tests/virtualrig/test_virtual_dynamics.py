@@ -1,4 +1,4 @@
-"""The simulated rig against closed forms, against its own refinement, and against what the paper saw."""
+"""The simulated rig against closed forms, its own refinement and the paper's observations."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from virtualrig.dynamics import simulate
 from virtualrig.grid import make_grid
 from virtualrig.trajectory import SimulationError
 
-# Standard deviations of the sensors' noise; for an encoder that of rounding to its step.
+# Standard deviations of the sensors' noise; that of an encoder is its quantisation error.
 NOISE = {"theta_out": 0.00314 / 12**0.5, "tau_in": 1e-4, "tau_out": 1e-4, "F_drive": 0.05, "F_load": 0.05}
 
 
@@ -23,7 +23,7 @@ def assert_same_to_the_sensors(campaign, one, other):
     for name, noise in NOISE.items():
         difference = np.abs(one[name] - other[name])
         assert np.sqrt(np.mean(difference**2)) < noise / 4, name
-        # Fronts start at reversals with infinite slope: there alone a sample or two may differ by more.
+        # Slip fronts start at reversals with infinite slope, where one or two samples may differ by more.
         assert np.mean(difference < noise) > 0.98, name
         assert difference.max() < 5 * noise, name
 
@@ -59,7 +59,7 @@ def test_inertia_and_damping_stay_below_the_noise(campaign, batch, recording):
 
 
 def test_the_radius_study_is_resolved_as_well(campaign):
-    # Coarser instead of finer: its short cells make it the dearest to simulate, and this bounds the error just as well.
+    # A coarser grid bounds the error equally well; a finer one would be slow, because this study has short cells.
     coarser = changed(
         campaign,
         numerics__cell_bend_rad=campaign.numerics.cell_bend_rad * 2,
@@ -79,7 +79,7 @@ def test_the_radius_study_is_resolved_as_well(campaign):
 def test_capstan_relation_in_full_slip(campaign, trajectory, batch, recording, bend_rad):
     t = trajectory(batch, recording)
     loss = campaign.rig.cable.friction_coefficient * bend_rad
-    # A steep, straight stretch of the stroke, long past the last reversal: both cables slip over their whole length.
+    # Long after the last reversal both cables slip over their whole length.
     rate = np.gradient(t.theta_in_rad, t.time_s)
     after = t.time_s > 1.5
     pulled = after & (rate > 0.7 * rate.max()) & (t.theta_in_rad > 0)
@@ -104,7 +104,7 @@ def test_tension_is_the_stretch_of_the_whole_cable_in_full_slip(campaign, trajec
     np.testing.assert_allclose(t.T1_N[sliding], expected[sliding], rtol=1e-3)
 
 
-def test_the_rig_rests_in_balance(campaign):
+def test_the_rig_rests_in_equilibrium(campaign):
     plan = plan_of(campaign, "loops", "loops-3-a", rest_s=0.3, start_up_cycles=1e-3, cycles=1e-3)
     preparation = strung(campaign, plan, profile_share=(0.4, 0.05))
     t = run(campaign, plan, preparation)
@@ -133,25 +133,25 @@ def test_exchanging_the_cables_mirrors_the_run(campaign):
     angle, rate = plan.excitation.angle_and_rate(time_s)
     preparation = strung(campaign, plan, profile_share=(0.35, 0.1))
     exchanged = strung(campaign, plan, profile_share=(0.1, 0.35))
-    one = simulate(campaign.rig, grid, numerics, preparation, time_s, angle, rate)
-    other = simulate(campaign.rig, grid, numerics, exchanged, time_s, -angle, -rate)
+    one = simulate(campaign.rig, grid, numerics, preparation, time_s, (angle, rate))
+    other = simulate(campaign.rig, grid, numerics, exchanged, time_s, (-angle, -rate))
     np.testing.assert_allclose(other.theta_out_rad, -one.theta_out_rad, atol=1e-12)
     np.testing.assert_allclose(other.T1_N, one.T3_N, atol=1e-9)
     np.testing.assert_allclose(other.T4_N, one.T2_N, atol=1e-9)
 
 
-def test_friction_only_takes_energy(campaign, trajectory):
+def test_friction_dissipates_energy(campaign, trajectory):
     t = trajectory("half-loop", "half-loop-7.3N-a")
     radius = campaign.rig.pulley_radius_m
     cycle = slice(-1000, None)  # the last two seconds: one cycle
-    put_in = np.trapezoid((radius * (t.T1_N - t.T3_N))[cycle], t.theta_in_rad[cycle])
-    got_out = np.trapezoid((radius * (t.T2_N - t.T4_N))[cycle], t.theta_out_rad[cycle])
-    assert put_in > 0
-    assert abs(got_out) < 1e-3 * put_in
+    work_in = np.trapezoid((radius * (t.T1_N - t.T3_N))[cycle], t.theta_in_rad[cycle])
+    work_out = np.trapezoid((radius * (t.T2_N - t.T4_N))[cycle], t.theta_out_rad[cycle])
+    assert work_in > 0
+    assert abs(work_out) < 1e-3 * work_in
 
 
 def slack(tension):
-    # A thousandth of the load cell's accuracy: a slack cable still drags its own mass along.
+    # The inertia of a slack cable leaves a small tension, below a hundredth of the load cell's accuracy.
     return tension < 1e-3
 
 
@@ -160,32 +160,32 @@ def test_no_cable_goes_slack_at_7_N(trajectory):
     assert min(t.T1_N.min(), t.T2_N.min(), t.T3_N.min(), t.T4_N.min()) > 1
 
 
-def test_at_3_5_N_a_cable_is_slack_while_the_drive_goes_on(trajectory):
-    """Phase IVa: slack begins before the reversal and ends before the load follows the drive back."""
+def test_at_3_5_N_a_cable_is_slack_before_the_reversal_only(trajectory):
+    """Phase IVa: slack begins before the reversal and ends before the load returns."""
     t = trajectory("pretension", "pretension-3.5N-a")
-    goes_on, turned = around_reversal(t)
-    assert slack(t.T3_N[goes_on]).any()
+    before, after = around_reversal(t)
+    assert slack(t.T3_N[before]).any()
     assert (t.T1_N[slack(t.T3_N)] > 1).all()
-    assert not (slack(t.T3_N) & turned & load_returns(t)).any()
+    assert not (slack(t.T3_N) & after & load_returns(t)).any()
 
 
 def test_at_0_7_N_slack_outlasts_the_reversal(trajectory):
-    """Phase IVb: the load already returns, driven by the one cable, while the other is still slack."""
+    """Phase IVb: the load returns, driven by one cable, while the other is still slack."""
     t = trajectory("pretension", "pretension-0.7N-a")
-    goes_on, turned = around_reversal(t)
-    assert slack(t.T3_N[goes_on]).mean() > 0.5
-    assert (slack(t.T3_N) & turned & load_returns(t)).sum() > 50
+    before, after = around_reversal(t)
+    assert slack(t.T3_N[before]).mean() > 0.5
+    assert (slack(t.T3_N) & after & load_returns(t)).sum() > 50
 
 
 def around_reversal(t):
-    """Samples of the quarter strokes before and after the drive's greatest angle at 2.52 s of `trajectory`'s runs."""
+    """Samples within 0.5 s before and after the drive's largest angle, which is at 2.52 s of `trajectory`'s runs."""
     peak = t.time_s[np.argmax(np.where(t.time_s > 2, t.theta_in_rad, -np.inf))]
     assert peak == pytest.approx(2.52, abs=0.01)
     return (t.time_s > peak - 0.5) & (t.time_s < peak), (t.time_s > peak) & (t.time_s < peak + 0.5)
 
 
 def load_returns(t):
-    # Faster than 0.05 rad/s, well above what inertia leaves of ringing while the load is held by friction.
+    # 0.05 rad/s is well above the ringing of a load that is held by friction.
     return np.gradient(t.theta_out_rad, t.time_s) < -0.05
 
 
@@ -204,7 +204,7 @@ def test_more_loops_widen_the_backlash_and_keep_a_cable_slack_for_longer(campaig
     assert 0 < slack_times[0] < slack_times[1] < slack_times[2]
 
 
-def test_a_tension_beyond_what_the_step_was_chosen_for_is_refused(campaign):
+def test_a_tension_above_the_limit_is_refused(campaign):
     tight = changed(campaign, numerics__tension_limit_N=7.5)
     plan, preparation = short(tight, "half-loop", "half-loop-7.3N-a")
     with pytest.raises(SimulationError, match=r"tension_limit_N"):

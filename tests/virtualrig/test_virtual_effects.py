@@ -88,7 +88,7 @@ def test_the_ideal_rig_is_the_same_with_and_without_the_paths_of_effects(coarse)
     time_s = np.arange(700) / 500
     motion = plan.excitation.angle_and_rate(time_s)
     plain, other = (
-        simulate(coarse.rig, grid, numerics, strung(coarse, plan), time_s, *motion)
+        simulate(coarse.rig, grid, numerics, strung(coarse, plan), time_s, motion)
         for simulate in (dynamics.simulate, effect_dynamics.simulate)
     )
     for name in (*TENSIONS, "theta_out_rad", "tau_in_Nm", "tau_out_Nm"):

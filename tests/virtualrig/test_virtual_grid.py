@@ -38,5 +38,5 @@ def test_cells_end_where_pieces_end():
     assert (grid.cell_bend_rad[~bent] == 0).all()
 
 
-def test_a_whole_ratio_costs_no_further_cell():
+def test_a_whole_ratio_adds_no_cell():
     assert make_grid([Piece(length_m=1.2, bend_rad=0.0)], 0.1, 0.05).cell_length_m.size == 12

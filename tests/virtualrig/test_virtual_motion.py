@@ -7,7 +7,7 @@ from virtualrig.motion import Chirp, GrowingSine, Sine, StepAndHold, Triangle, W
 SINE = Sine(wave="sine", amplitude_rad=0.8, frequency_Hz=0.5, rest_s=0.6, start_up_cycles=0.5, cycles=2.0)
 
 
-def test_it_rests_and_then_is_the_sine_that_was_asked_for():
+def test_a_sine_begins_with_a_rest():
     time = np.arange(0, SINE.duration_s, 1e-3)
     angle, rate = SINE.angle_and_rate(time)
     assert not angle[time <= 0.6].any()
@@ -16,7 +16,7 @@ def test_it_rests_and_then_is_the_sine_that_was_asked_for():
     np.testing.assert_allclose(angle[steady], 0.8 * np.sin(np.pi * (time[steady] - 0.6)), atol=1e-12)
 
 
-def test_rate_is_the_angle_s_and_acceleration_has_no_jump():
+def test_rate_is_the_angles_derivative_and_acceleration_has_no_jump():
     time = np.arange(0, SINE.duration_s, 1e-3)
     angle, rate = SINE.angle_and_rate(time)
     np.testing.assert_allclose(rate[1:-1], (angle[2:] - angle[:-2]) / 2e-3, atol=1e-4)
@@ -25,8 +25,8 @@ def test_rate_is_the_angle_s_and_acceleration_has_no_jump():
     assert np.abs(np.diff(acceleration)).max() / 1e-3 < 300
 
 
-def test_the_batch_notes_what_was_asked():
-    assert SINE.asked == {"wave": "sine", "amplitude_rad": 0.8, "frequency_Hz": 0.5}
+def test_a_batch_states_the_motion():
+    assert SINE.metadata == {"wave": "sine", "amplitude_rad": 0.8, "frequency_Hz": 0.5}
     assert SINE.duration_s == pytest.approx(5.6)
 
 
@@ -54,10 +54,10 @@ def test_every_motion_rests_and_then_moves_with_bounded_acceleration(motion):
     np.testing.assert_allclose(rate[1:-1], (angle[2:] - angle[:-2]) / (2 * step), atol=2e-3)
     # A sine of 0.8 rad at the chirp's 2 Hz has 126 rad/s^2; a jump in speed would show as 1e4 and more.
     assert np.abs(np.diff(rate)).max() / step < 150
-    assert motion.asked["wave"] == motion.wave
+    assert motion.metadata["wave"] == motion.wave
 
 
-def test_a_triangle_has_one_speed_between_its_turns():
+def test_a_triangle_has_constant_speed_between_reversals():
     triangle = MOTIONS[0]
     time = np.arange(0, triangle.duration_s, 1e-3)
     angle, rate = triangle.angle_and_rate(time)
@@ -78,9 +78,9 @@ def test_a_chirp_sweeps_its_frequencies():
 
 def test_reversals_of_a_growing_sine_are_nested():
     angle, _ = MOTIONS[2].angle_and_rate(np.arange(0, MOTIONS[2].duration_s, 1e-3))
-    turns = angle[1:-1][(np.diff(angle)[:-1] * np.diff(angle)[1:]) < 0]
-    assert (np.diff(np.abs(turns)) > 0).all()
-    assert (turns[1:] * turns[:-1] < 0).all()
+    reversals = angle[1:-1][(np.diff(angle)[:-1] * np.diff(angle)[1:]) < 0]
+    assert (np.diff(np.abs(reversals)) > 0).all()
+    assert (reversals[1:] * reversals[:-1] < 0).all()
 
 
 def test_a_wandering_sine_is_drawn_from_its_seed():
@@ -98,7 +98,7 @@ def test_steps_are_held():
     assert not rate.any()
 
 
-def test_a_batch_takes_any_of_them():
+def test_a_batch_accepts_every_motion():
     condition = {"id": "a", "pretension_N": 7.0, "conduit": [{"length_m": 1.2, "bend_rad": 3.0}]}
     for motion in MOTIONS:
         batch = {"note": "", "repeats": 1, "excitation": motion.model_dump(mode="json"), "conditions": [condition]}

@@ -12,7 +12,7 @@ def draw():
     return np.random.default_rng(7)
 
 
-def test_counts_step_once_an_encoder_step(campaign, draw):
+def test_counts_have_the_encoders_resolution(campaign, draw):
     encoder = campaign.sensors.encoder
     step = 2 * np.pi / encoder.counts_per_rev
     angle = np.linspace(-1, 1, 20001)
@@ -23,7 +23,7 @@ def test_counts_step_once_an_encoder_step(campaign, draw):
     assert encoder.accuracy_rad == pytest.approx(step, rel=1e-3)
 
 
-def test_current_reads_back_as_torque(campaign, draw):
+def test_current_is_proportional_to_torque(campaign, draw):
     sensor = campaign.sensors.torque
     torque = np.linspace(-0.09, 0.09, 20000)
     error = current(torque, sensor, draw) * sensor.constant_Nm_per_A - torque
@@ -31,7 +31,7 @@ def test_current_reads_back_as_torque(campaign, draw):
     assert error.std() == pytest.approx(sensor.noise_Nm, rel=0.03)
 
 
-def test_voltage_reads_back_as_force(campaign, draw):
+def test_voltage_is_proportional_to_force(campaign, draw):
     cell = campaign.sensors.load_cell
     force = np.linspace(0, 40, 20000)
     error = (load_cell_voltage(force, cell, draw) - cell.zero_V) / cell.sensitivity_V_per_N - force
@@ -39,7 +39,7 @@ def test_voltage_reads_back_as_force(campaign, draw):
     assert error.std() == pytest.approx(cell.noise_N, rel=0.03)
 
 
-def test_what_a_sensor_cannot_hold_is_refused(campaign, draw):
+def test_a_quantity_outside_the_sensors_range_is_refused(campaign, draw):
     with pytest.raises(SensorRangeError, match=r"torque reaches 0.2 N m, beyond the sensor's 0.1 N m"):
         current(np.array([0.0, -0.2]), campaign.sensors.torque, draw)
     with pytest.raises(SensorRangeError, match="tension sum"):
@@ -53,7 +53,7 @@ def test_unknown_keys_are_refused(campaign):
     assert changed(campaign, seed=3).seed == 3
 
 
-def test_slow_noise_lasts_and_white_noise_does_not(draw):
+def test_slow_noise_is_correlated_and_white_noise_is_not(draw):
     slow = SlowNoise(ratio=2.0, lasts_samples=50.0)
     made = noise(200_000, 0.5, slow, draw)
     assert made.std() == pytest.approx(0.5 * np.sqrt(5), rel=0.05)
@@ -63,13 +63,13 @@ def test_slow_noise_lasts_and_white_noise_does_not(draw):
     assert abs(np.mean(white[50:] * white[:-50])) < 0.01
 
 
-def test_a_sensor_without_slow_noise_draws_as_ever():
+def test_a_sensor_without_slow_noise_draws_white_noise_only():
     plain, with_it = (np.random.default_rng(3) for _ in range(2))
     assert noise(5, 1.0, None, plain).tolist() == with_it.normal(0, 1.0, 5).tolist()
     assert plain.random() == with_it.random()
 
 
-def test_an_encoder_off_its_axis_and_a_bent_torque(campaign):
+def test_encoder_runout_and_torque_curvature(campaign):
     t, angle, torque = np.linspace(0, 1, 50), np.linspace(-1, 1, 50), np.linspace(-0.1, 0.1, 50)
     faults = SideSensors(angle_runout_rad=0.02, angle_runout_phase_rad=0.5, torque_curvature_per_Nm2=10.0)
     shown = sensed(t, Side(angle, torque, np.ones(50)), campaign.rig, faults)

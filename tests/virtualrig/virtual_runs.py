@@ -1,4 +1,4 @@
-"""What the tests of the virtual rig share: variants of the campaign, undrawn runs, what sensors would see."""
+"""Shared by the tests of the virtual rig: variants of the campaign, runs without draws, noise-free channels."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def changed(model, **updates):
-    """A copy of a nested config with dotted keys replaced, `__` standing for the dot."""
+    """A copy of a nested config with nested keys replaced; `__` separates the levels."""
     for path, value in updates.items():
         head, _, rest = path.partition("__")
         model = model.model_copy(update={head: changed(getattr(model, head), **{rest: value}) if rest else value})
@@ -24,12 +24,12 @@ def plan_of(campaign, batch, recording, **excitation):
 
 
 def strung(campaign, plan, profile_share=(0.2, 0.2)) -> Preparation:
-    """The preparation that was aimed at, with no draw."""
+    """The nominal preparation, without a draw."""
     return Preparation(campaign.rig.cable.friction_coefficient, plan.pretension_N, profile_share)
 
 
 def channels(campaign, trajectory: Trajectory) -> dict[str, np.ndarray]:
-    """What the sensors see of a trajectory, before noise and quantization."""
+    """Channels of a trajectory before noise and quantisation."""
     radius, t = campaign.rig.pulley_radius_m, trajectory
     return {
         "theta_out": t.theta_out_rad,
