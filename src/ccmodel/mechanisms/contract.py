@@ -1,4 +1,4 @@
-"""The contract of a mechanism: everything that the project knows of one effect, in that effect's file.
+"""The contract of a mechanism: all knowledge of one effect, in that effect's file.
 
 1. A file of this package holds one mechanism as ``MECHANISM``, or close relatives as ``MECHANISMS``. The registry
    finds it by listing the folder.
@@ -34,7 +34,7 @@ PAPER = (
     "Agrawal, Peine and Yao, Modeling of transmission characteristics across a cable-conduit system, IEEE Transactions "
     "on Robotics 26(5), 914-924, 2010, doi:10.1109/TRO.2010.2064014"
 )
-# What a mechanism may be mistaken for besides other mechanisms: parameters and states of the paper's model.
+# Look-alikes that are no mechanisms: parameters and states of the paper's model.
 PAPER_LOOK_ALIKES = ("K", "mu", "slack")
 
 

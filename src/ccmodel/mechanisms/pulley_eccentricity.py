@@ -13,9 +13,9 @@ def winding(theta, e, psi):
 
 
 @kernel
-def winding_change(theta, turn, e, psi):
-    """Cable travel over R (rad) of a rotation `turn` from theta, without cancellation for a small one."""
-    return turn + 2.0 * e * np.sin(theta + psi + 0.5 * turn) * np.sin(0.5 * turn)
+def winding_change(theta, rotation, e, psi):
+    """Cable travel over R (rad) of a rotation from theta, without cancellation for a small one."""
+    return rotation + 2.0 * e * np.sin(theta + psi + 0.5 * rotation) * np.sin(0.5 * rotation)
 
 
 def _modifies_physics(settings, place, values):

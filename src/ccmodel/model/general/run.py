@@ -1,4 +1,4 @@
-"""Set up the march, run it, and say what the sensors would read."""
+"""The general solver: sets up the march, runs it and simulates the sensors' readings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -22,9 +22,9 @@ from ccmodel.model.response import PairResponse, Status
 from ccmodel.model.transmission import Transmission
 
 ELEMENTS = 32
-# A load that rings turns by no more than this much of its phase in a step, as far as so many steps a sample do.
+# A ringing load advances by at most this phase in a step, with at most so many steps a sample.
 RINGING_STEP_RAD, MOST_STEPS = 0.15, 16
-# Each round leaves as much of a sensor's fault as the fault is of the reading.
+# Fixed-point iterations; each reduces the error by the ratio of the fault to the reading.
 FAULTS_ROUNDS = 8
 
 Load = SpringLoad | MechanicalLoad | TorqueLoad | AngleLoad
@@ -51,7 +51,7 @@ class Active:
 
 @dataclass(frozen=True, kw_only=True)
 class GeneralResponse(PairResponse):
-    """What the general solver says beyond every solver's response; tau_out is the torque beyond the load's bearing.
+    """Response of the general solver; tau_out is the torque beyond the load's bearing.
 
     Attributes
     ----------
@@ -93,8 +93,8 @@ def simulate(
         Drive angle at each sample, rad; the first is the angle at which `initial` holds. Linear in between.
     initial : InitialTension
     mechanisms : sequence of Active, or mapping of name to {"place": ..., "values": {...}}
-        What acts besides the paper's physics. A mapping may leave out the place of a mechanism that has only one,
-        and values, which then are the mechanism's starting values.
+        Mechanisms on top of the paper's physics. A mapping may omit the place of a mechanism that has only one, and
+        the values, which then are the mechanism's starting values.
     elements : int
         Cells of each cable.
     steps : int
@@ -110,7 +110,7 @@ def simulate(
     ModelError
         If an input is not finite or of the wrong shape.
     ccmodel.mechanisms.UnknownMechanismError
-        If a mechanism's name is not known.
+        If there is no mechanism of a name.
     """
     time_s, theta_in = (np.ascontiguousarray(a, dtype=float) for a in (time_s, theta_in))
     active = _active(mechanisms)
@@ -175,7 +175,7 @@ def simulate(
 
 
 def settings_of(mechanisms: Mapping[str, Mapping] | Sequence[Active]) -> Settings:
-    """What mechanisms, given as to `simulate`, tell the solver."""
+    """The solver's settings with mechanisms, which are given as to `simulate`."""
     settings = registry.neutral_settings()
     for a in _active(mechanisms):
         mechanism = registry.get(a.name)
@@ -354,7 +354,7 @@ def _initial_state(physics, piece, node, settings, profiles, course) -> NDArray:
 
 
 def _load_angle(physics: rows.Physics, T: NDArray, load: Load, series: NDArray) -> float:
-    """Angle at which the load holds the initial tensions, rad; 0 for a load that knows no neutral position."""
+    """Angle at which the load holds the initial tensions, rad; 0 for a load without a neutral position."""
     if isinstance(load, AngleLoad):
         return float(series[0])
     K, K3 = physics.stiffness_load, physics.cubic_stiffness
@@ -380,11 +380,11 @@ def _deflection(K: float, K3: float, torque: float) -> float:
 
 
 def _rest_angle(K: float, K3: float, half_gap: float, torque: float, load: SpringLoad | MechanicalLoad) -> float:
-    """Angle (rad) of a load at rest that the cables turn with a torque.
+    """Angle (rad) of a load at rest under the cables' torque (N m).
 
-    One that is held against its spring lies against a side of its gap. One that is all but free may stand anywhere:
-    where the torque is not known to be there, at the place that is given. The one goes over into the other around what
-    the torque is known to.
+    A load that the torque holds against its spring lies against a side of its gap. A load without torque may stand
+    anywhere in the gap: at `load.rest_gap_position`. The transition lies around the accuracy to which the torque is
+    known.
     """
     known_to, place = (load.rest_known_to_Nm, load.rest_gap_position) if isinstance(load, SpringLoad) else (0.0, 0.0)
     held = float(np.clip(2 * abs(torque) / known_to - 1.5, 0.0, 1.0)) if known_to else float(torque != 0)
@@ -393,7 +393,7 @@ def _rest_angle(K: float, K3: float, half_gap: float, torque: float, load: Sprin
 
 
 def true_at(active: Sequence[Active], seconds: float, read: Mapping[str, float], radii: tuple[float, float]) -> dict:
-    """What sensors would have read without their faults, so many seconds into a recording in which nothing moves.
+    """Readings of the sensors without their faults, at a time of a recording in which nothing moves.
 
     Parameters
     ----------
@@ -401,7 +401,7 @@ def true_at(active: Sequence[Active], seconds: float, read: Mapping[str, float],
     seconds : float
         Since the recording began.
     read : mapping of str to float
-        What each channel of a run reads.
+        Reading of each channel.
     radii : (float, float)
         Of the drive and the load pulley, m.
 
