@@ -210,14 +210,14 @@ def _roundness(theta, share, phase):
 def _bearing_course(theta, angle):
     z = np.zeros_like(theta)
     for j in range(1, theta.size):
-        turn = theta[j] - theta[j - 1]
-        direction = 1.0 if turn > 0 else -1.0
-        z[j] = direction + (z[j - 1] - direction) * np.exp(-abs(turn) / angle)
+        rotation = theta[j] - theta[j - 1]
+        direction = 1.0 if rotation > 0 else -1.0
+        z[j] = direction + (z[j - 1] - direction) * np.exp(-abs(rotation) / angle)
     return z
 
 
 def _bearing_torque(theta: NDArray, friction: PulleyFriction | None) -> NDArray | float:
-    """Friction torque of a bearing that is turned through the angles `theta` (rad), N m."""
+    """Friction torque (N m) of a bearing along the angles `theta` (rad)."""
     return friction.torque_Nm * _bearing_course(theta, friction.presliding_rad) if friction else 0.0
 
 
@@ -250,7 +250,7 @@ def _set_strength(p, strength, half_bend, tension, time, travel, drive):
 
 @njit(error_model="numpy")
 def _set_hold(p, hold, strength, rested, drag, T):
-    """Friction (N) of one cable's nodes when their bristles are drawn in full."""
+    """Friction (N) of one cable's nodes at fully deflected bristles."""
     n = hold.size
     for i in range(n):
         hold[i] = strength[i] * (T[i] + T[i + 1]) * (1.0 + p.stribeck_rise * rested[i]) + drag[i]

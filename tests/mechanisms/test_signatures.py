@@ -1,4 +1,4 @@
-"""Each mechanism does to a run what is known of it."""
+"""The signature of each mechanism in a run of the general solver."""
 
 import itertools
 
@@ -27,18 +27,18 @@ def triangle(amplitude=0.6, cycles=2, samples=500):
 
 
 def test_presliding_rounds_reversals(base):
-    """tau_in turns its corner within some bristle lengths of sliding, and full slip is left alone."""
+    """tau_in reverses over some bristle lengths of sliding, and full slip is unchanged."""
     rounded = run(sine(), ("presliding", "conduit", {"z0": 100e-6}))
-    turned = slice(500 + 127, 500 + 140)
-    change = [np.diff(r.tau_in_Nm)[turned] / np.diff(sine())[turned] for r in (base, rounded)]
+    reversal = slice(500 + 127, 500 + 140)
+    change = [np.diff(r.tau_in_Nm)[reversal] / np.diff(sine())[reversal] for r in (base, rounded)]
     assert np.abs(change[0]).max() > 1.3 * np.abs(change[1]).max()
     assert np.log(rounded.T1_N[600] / rounded.T2_N[600]) == pytest.approx(MU * np.pi, rel=2e-2)
 
 
 def test_small_nested_reversals_creep_with_presliding_and_close_with_a_termination():
     """Both soften a small reversal alike; only bristles let tension creep from one to the next."""
-    turns = np.linspace(0, 8 * np.pi, 401)
-    theta = np.concatenate([np.linspace(0, 0.5, 200), 0.5 - 0.002 * (1 - np.cos(turns))])
+    phase = np.linspace(0, 8 * np.pi, 401)
+    theta = np.concatenate([np.linspace(0, 0.5, 200), 0.5 - 0.002 * (1 - np.cos(phase))])
     bristles = run(theta, ("presliding", "conduit", {"z0": 100e-6})).T1_N
     end = run(theta, ("termination-compliance", "drive-end", {"compliance": 40e-6})).T1_N
     swing = [np.ptp(T[500:]) for T in (run(theta).T1_N, bristles, end)]
@@ -68,8 +68,8 @@ def test_stribeck_peaks_at_break_away_and_loses_less_at_speed():
     assert fast == pytest.approx(plain, rel=0.08)
 
 
-def test_running_in_goes_with_time_or_with_the_way_whatever_the_speed():
-    """In full slip after winding to and fro the capstan exponent is that of the time, or the way, that has gone."""
+def test_running_in_follows_time_or_travel_at_any_speed():
+    """In full slip the capstan exponent is that of the elapsed time, or of the cable travel."""
     theta = np.concatenate([np.linspace(0, 2, 400), np.linspace(2, 0, 400), np.linspace(0, 2, 400)])
     exponents = {}
     for period_s in (1.0, 4.0):
@@ -77,15 +77,15 @@ def test_running_in_goes_with_time_or_with_the_way_whatever_the_speed():
             mechanism = ("running-in", "conduit", {"change": 0.3, **numbers})
             r = run(theta, mechanism, load=AngleLoad(theta), period_s=period_s)
             exponents[period_s, "per_m" in numbers] = np.log(r.T1_N[-1] / r.T2_N[-1]) / (np.pi * MU)
-    way_m, seconds = 6 * R, (theta.size - 1) / 500
+    travel_m, seconds = 6 * R, (theta.size - 1) / 500
     for period_s in (1.0, 4.0):
-        by_time, by_way = exponents[period_s, False], exponents[period_s, True]
+        by_time, by_travel = exponents[period_s, False], exponents[period_s, True]
         assert by_time == pytest.approx(1 + 0.3 * (1 - np.exp(-period_s * seconds / 2.0)), rel=1e-3)
-        assert by_way == pytest.approx(1 + 0.3 * (1 - np.exp(-30.0 * way_m)), rel=1e-3)
+        assert by_travel == pytest.approx(1 + 0.3 * (1 - np.exp(-30.0 * travel_m)), rel=1e-3)
 
 
 @pytest.mark.parametrize("delta", [1.0, 2.0])
-def test_stribeck_friction_falls_with_speed_as_the_curve_says(delta):
+def test_stribeck_friction_falls_with_speed_along_its_curve(delta):
     """In steady full slip ln(T1/T2) is the bend times mu (1 + a exp(-(v / vs)^delta))."""
     a, vs, speed = 0.4, 3e-3, 2e-3
     theta = np.linspace(0, 2.0, 800)
@@ -95,16 +95,16 @@ def test_stribeck_friction_falls_with_speed_as_the_curve_says(delta):
     assert friction == pytest.approx(MU * (1 + a * np.exp(-((speed / vs) ** delta))), rel=5e-3)
 
 
-def test_what_a_model_may_leave_out_is_as_the_list_has_it():
-    said, unsaid = (
+def test_a_parameter_that_a_model_omits_has_its_default():
+    given, omitted = (
         run(sine(), ("stribeck", "conduit", {"a": 0.3, "vs": 2e-3, **more})) for more in ({"delta": 2.0}, {})
     )
-    assert (said.T1_N == unsaid.T1_N).all()
+    assert (given.T1_N == omitted.T1_N).all()
     with pytest.raises(ModelError, match="stribeck has the parameters a, delta, vs; got a"):
         run(sine(), ("stribeck", "conduit", {"a": 0.3}))
 
 
-def test_stribeck_is_smooth_while_it_slips_and_the_same_however_finely_it_is_sampled():
+def test_stribeck_is_smooth_in_slip_and_independent_of_the_sampling():
     mechanism = ("stribeck", "conduit", {"a": 0.3, "vs": 3e-3})
     r, fine = run(sine(), mechanism), run(sine(samples=4000), mechanism, samples=4000)
     slip = slice(560, 606)
@@ -123,7 +123,7 @@ def test_full_slip_ratio_falls_with_tension_by_a_power():
     assert measured == pytest.approx(n, rel=0.02)
 
 
-def test_constant_drag_is_left_when_tension_goes():
+def test_constant_drag_remains_at_zero_tension():
     f0 = 0.8
     theta = np.linspace(0, 0.6, 200)
     r = run(theta, ("constant-drag", "conduit", {"f0": f0}), T=0.02, mu=1e-6)
@@ -180,7 +180,7 @@ def test_relaxation_does_not_depend_on_the_step():
 
 
 def test_strands_make_the_cable_soft_near_slack_only():
-    """Stiffness of the pair against a small turn, load blocked and without friction."""
+    """Stiffness of the pair against a small rotation, load blocked and without friction."""
     theta = np.linspace(0, 1e-3, 3)
     blocked = AngleLoad(np.zeros(3))
     stiffness = {}
@@ -205,8 +205,8 @@ def test_compliance_adds_to_the_cables_own(place, name):
     assert per_turn == pytest.approx(1 / (1 / 7750 + c), rel=1e-7)
 
 
-def test_a_termination_gives_before_the_front_has_come_far_and_a_conduit_hardly():
-    """Start of a pull: the cable gives over the front's length only, a termination at once, a conduit by its mean."""
+def test_a_termination_yields_at_once_and_a_conduit_with_the_mean_tension():
+    """Start of a pull: the cable stretches up to the front, a termination at once, a conduit by its mean tension."""
     theta = np.linspace(0, 2e-3, 20)
     plain = run(theta)
     end = run(theta, ("termination-compliance", "drive-end", {"compliance": 40e-6}))
@@ -242,7 +242,7 @@ def test_a_bearings_friction_builds_up_over_its_presliding_angle(place):
     assert extra == pytest.approx(torque * (1 - np.exp(-theta / presliding)), abs=1e-6)
 
 
-def test_load_pulley_friction_is_a_step_that_the_load_does_not_show():
+def test_load_pulley_friction_is_a_step_absent_from_the_loads_torque():
     torque = 4e-3
     r = run(sine(), ("pulley-friction", "load-pulley", {"friction_torque": torque}))
     assert r.tau_out_Nm == pytest.approx(K_E * r.theta_out_rad, abs=1e-9)
@@ -255,13 +255,13 @@ def test_load_pulley_friction_is_a_step_that_the_load_does_not_show():
 
 @pytest.mark.parametrize("place", ["drive-pulley", "load-pulley"])
 def test_eccentricity_repeats_with_the_angle(place):
-    """Without friction and with a stiff pair, the ways of the cables at the two pulleys are the same."""
+    """Without friction and with a stiff pair, the cable travel is the same at both pulleys."""
     e, psi = 0.05, 0.7
     theta = np.linspace(0, 4 * np.pi, 400)
     r = run(theta, ("pulley-eccentricity", place, {"e": e, "psi": psi}), mu=0.0, k=1e9, T=50.0)
     round_, eccentric = (r.theta_out_rad, theta) if place == "drive-pulley" else (theta, r.theta_out_rad)
-    way = eccentric - e * (np.cos(eccentric + psi) - np.cos(psi))
-    assert round_ == pytest.approx(way, abs=1e-4)
+    travel = eccentric - e * (np.cos(eccentric + psi) - np.cos(psi))
+    assert round_ == pytest.approx(travel, abs=1e-4)
     # Ideal pulleys lose no power.
     power_in = np.trapezoid(r.tau_in_Nm, theta)
     assert power_in == pytest.approx(0.5 * K_E * r.theta_out_rad[-1] ** 2, rel=1e-3)
@@ -283,12 +283,12 @@ def test_backlash_flattens_the_loads_torque_around_zero():
         (7.4, 0.0, 0.0, 1.0),
         (7.2, 0.0, 0.5, -1.0),
         (7.3, 0.0, 0.5, 0.5),
-        (7.4, 1.2e-3, 0.5, 0.5),  # 0.1 N on 6 mm are half of what is known
+        (7.4, 1.2e-3, 0.5, 0.5),  # 0.1 N on 6 mm are half of the known torque
         (7.4, 0.6e-3, 0.0, 0.5),
         (7.4, 0.6e-3, -1.0, 0.0),
     ],
 )
-def test_a_load_with_a_gap_rests_against_the_side_it_is_held_to(T2, known_to, place, side):
+def test_a_load_with_a_gap_rests_against_the_side_of_its_torque(T2, known_to, place, side):
     b = 0.05
     tensioned = InitialTension.between_ends(HALF_LOOP, MU, (T0, T2), (T0, T0))
     load = SpringLoad(K_E, known_to, place)
@@ -319,7 +319,7 @@ STANDING = 1e-9
 def driven_by_a_motor(samples, cycles=3, amplitude=0.3, stiffness=0.2, friction=0.02):
     """A pulley on a spring, with friction, behind a train: its angle, its torque, and that which its law alone gives.
 
-    Where the pulley stands, its law has the torque of the way that it came.
+    While the pulley stands, its law gives the torque of its last direction.
     """
     phi = amplitude * np.sin(2 * np.pi * np.arange(cycles * samples + 1) / samples)
     compliance, lost = MOTOR["compliance"], MOTOR["lost_motion"]
@@ -337,11 +337,11 @@ def driven_by_a_motor(samples, cycles=3, amplitude=0.3, stiffness=0.2, friction=
 
 
 @pytest.mark.parametrize("samples", [200, 1000])
-@pytest.mark.parametrize("way", [1.0, -1.0])
-def test_a_windup_says_the_torque_while_the_pulley_stands(samples, way):
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_windup_predicts_the_torque_while_the_pulley_stands(samples, sign):
     """Against a train that is followed step by step: to a twelfth of what the pulley's law alone errs by there."""
     time_s, theta, true, law = driven_by_a_motor(samples)
-    read = way * torque_of_train(time_s, way * theta, way * law, MOTOR["compliance"], MOTOR["lost_motion"])
+    read = sign * torque_of_train(time_s, sign * theta, sign * law, MOTOR["compliance"], MOTOR["lost_motion"])
     settled = (time_s > 0.6) & (time_s < 2.6)
     stands = settled & (np.abs(np.gradient(theta)) < STANDING)
     assert 0.05 < stands.mean() < 0.3
@@ -349,7 +349,7 @@ def test_a_windup_says_the_torque_while_the_pulley_stands(samples, way):
     assert rms(read[settled], true[settled]) < rms(law[settled], true[settled]) / 12
 
 
-def test_a_windup_shows_at_turns_alone():
+def test_a_windup_shows_at_reversals_only():
     theta = sine()
     torque = 0.05 * np.sign(np.gradient(theta)) + 0.1 * theta
     read = torque_of_train(np.arange(theta.size) / 500, theta, torque, 0.2, 0.01)
@@ -358,7 +358,7 @@ def test_a_windup_shows_at_turns_alone():
     assert (np.abs(theta[changed]) > 0.6 - STANDSTILL_RAD).all()
 
 
-# Sensors: nothing but the channel that the name says
+# Sensors: only the channel of the fault changes
 
 
 def changed(base, r):
@@ -406,10 +406,10 @@ def test_order_of_sensor_faults_is_the_order_given(base):
 
 
 def test_return_point_memory_with_presliding():
-    """A nested loop closes on itself, and the way on is as if it had not been."""
+    """A nested loop closes on itself, and the outer loop continues as without it."""
     mechanism = ("presliding", "conduit", {"z0": 20e-6})
-    way = [0.0, 0.5, 0.3, 0.5, 0.6]
-    nested = np.concatenate([np.linspace(a, b, 100, endpoint=False) for a, b in itertools.pairwise(way)])
+    corners = [0.0, 0.5, 0.3, 0.5, 0.6]
+    nested = np.concatenate([np.linspace(a, b, 100, endpoint=False) for a, b in itertools.pairwise(corners)])
     r, direct = run(np.append(nested, 0.6), mechanism), run(np.linspace(0, 0.6, 400), mechanism)
     assert r.T1_N[-1] == pytest.approx(direct.T1_N[-1], rel=2e-3)
     assert rms(r.T1_N[[100]], r.T1_N[[300]]) < 5e-3 * T0

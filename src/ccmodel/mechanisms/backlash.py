@@ -1,4 +1,16 @@
-"""Backlash between the load pulley and the load."""
+"""A dead zone between load pulley and load.
+
+Equation: The load engages only beyond half_gap on either side of its neutral angle: a spring load gives tau_out =
+K_e (theta - half_gap sgn(theta)) outside the dead zone and zero inside. At rest the load lies against the side to
+which the cables' torque holds it.
+
+Signature: The load's torque is flat around zero while the pulley turns.
+
+Separated by: torque near zero at two pretensions: backlash does not depend on pretension.
+
+Source: Nordin and Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38(10), 1633-1649,
+2002, doi:10.1016/S0005-1098(02)00047-X.
+"""
 
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
@@ -20,21 +32,10 @@ def _modifies_physics(settings, place, values):
 
 MECHANISM = Mechanism(
     name="backlash",
+    text=__doc__,
     places=("load-pulley",),
     parameters=(Parameter("half_gap", "rad", 3.5e-3, 70e-3, 15e-3, "half of the dead zone"),),
-    summary="a dead zone between load pulley and load",
-    equation=(
-        "The load engages only beyond half_gap on either side of its neutral angle: a spring load gives "
-        "tau_out = K_e (theta - half_gap sgn(theta)) outside the dead zone and zero inside. At rest the load lies "
-        "against the side to which the cables' torque holds it."
-    ),
-    signature="The load's torque is flat around zero while the pulley turns.",
     mistaken_for=("strand-settling", "slack"),
-    separated_by="torque near zero at two pretensions: backlash does not depend on pretension",
-    source=(
-        "Nordin and Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38(10), 1633-1649, "
-        "2002, doi:10.1016/S0005-1098(02)00047-X"
-    ),
     depends_on_time=False,
     settings={"half_gap": 0.0},
     modifies_physics=_modifies_physics,

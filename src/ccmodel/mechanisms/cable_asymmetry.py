@@ -1,6 +1,15 @@
-"""Two cables that differ in friction or stiffness."""
+"""Friction or stiffness differs between the cables.
 
-from ccmodel.mechanisms.contract import PAPER, Mechanism, Parameter
+Equation: Cable B has ratio times the friction coefficient mu and K_ratio times the axial rigidity EA of cable A.
+
+Signature: The residual is odd in the direction of motion: one cable's stroke fits and the other's does not.
+
+Separated by: exchange of the cables: the residual moves with them.
+
+Source: Agrawal, Peine and Yao 2010: (1) to (5), with parameters of each cable's own.
+"""
+
+from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
 def _modifies_physics(settings, place, values):
@@ -12,17 +21,13 @@ def _modifies_physics(settings, place, values):
 
 MECHANISM = Mechanism(
     name="cable-asymmetry",
+    text=__doc__,
     places=("cable",),
     parameters=(
         Parameter("ratio", "1", 0.6, 1.4, 1.1, "friction coefficient, B over A", neutral=1.0, ratio=True),
         Parameter("K_ratio", "1", 0.6, 1.4, 1.0, "axial rigidity, B over A", neutral=1.0, ratio=True),
     ),
-    summary="friction or stiffness differs between the cables",
-    equation="Cable B has ratio times the friction coefficient mu and K_ratio times the axial rigidity EA of cable A.",
-    signature="The residual is odd in the direction of motion: one cable's stroke fits and the other's does not.",
     mistaken_for=("load-cell-scale",),
-    separated_by="exchange of the cables: the residual moves with them",
-    source=(f"{PAPER}: (1) to (5), with parameters of each cable's own"),
     depends_on_time=False,
     settings={"friction_ratio_B": 1.0, "stiffness_ratio_B": 1.0},
     modifies_physics=_modifies_physics,

@@ -1,4 +1,14 @@
-"""Constant drag: a liner or a seal that grips the cable independently of its tension."""
+"""Friction that does not depend on tension.
+
+Equation: Friction per length is mu T dphi/dx + f0 / L.
+
+Signature: A loss remains as the tension goes to zero.
+
+Separated by: loss against pretension: the drag is the intercept at zero tension.
+
+Source: Gao, Luedtke, Gourdon, Ruths, Israelachvili and Landman, Frictional forces and Amontons' law: from the
+molecular to the macroscopic scale, Journal of Physical Chemistry B 108(11), 3410-3425, 2004.
+"""
 
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
@@ -9,17 +19,10 @@ def _modifies_physics(settings, place, values):
 
 MECHANISM = Mechanism(
     name="constant-drag",
+    text=__doc__,
     places=("conduit",),
     parameters=(Parameter("f0", "N", 0.1, 5.0, 0.5, "drag of one whole cable"),),
-    summary="friction that does not depend on tension",
-    equation="Friction per length is mu T dphi/dx + f0 / L.",
-    signature="A loss remains as the tension goes to zero.",
     mistaken_for=("load-dependent-friction", "pulley-friction"),
-    separated_by="loss against pretension: the drag is the intercept at zero tension",
-    source=(
-        "Gao, Luedtke, Gourdon, Ruths, Israelachvili and Landman, Frictional forces and Amontons' law: from the "
-        "molecular to the macroscopic scale, Journal of Physical Chemistry B 108(11), 3410-3425, 2004"
-    ),
     depends_on_time=False,
     settings={"drag_N": 0.0},
     modifies_physics=_modifies_physics,

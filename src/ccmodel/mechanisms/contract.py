@@ -1,9 +1,9 @@
-"""The contract of a mechanism: everything that the project knows of one effect, in that effect's file.
+"""The contract of a mechanism: all knowledge of one effect, in that effect's file.
 
 1. A file of this package holds one mechanism as ``MECHANISM``, or close relatives as ``MECHANISMS``. The registry
    finds it by listing the folder.
-2. Text fields hold the equation, the signature in a recording, the look-alikes, the experiment that separates them
-   and the source. The command line, ``docs/mechanisms.md`` and the report are made from them.
+2. Its docstring (a relative's: that of its function) is its ``text``: a title and the paragraphs of `PARAGRAPHS`. The
+   command line, ``docs/mechanisms.md`` and the report are made from it and from the fields.
 3. ``modifies_physics`` writes into the solver's `Settings` before a run; ``settings`` declares what it writes, at the
    neutral values. ``modifies_observation`` changes what the sensors read after a run. A mechanism has one of the two.
 4. A model without the mechanism and a model with it at its neutral values give the same numbers, bit for bit. Where
@@ -32,11 +32,14 @@ PLACES = (
     "drive-sensor",
     "load-sensor",
 )
+PARAGRAPHS = ("Equation", "Signature", "Separated by", "Source")
+# A source that begins with this short form is written out.
+PAPER_SHORT = "Agrawal, Peine and Yao 2010"
 PAPER = (
     "Agrawal, Peine and Yao, Modeling of transmission characteristics across a cable-conduit system, IEEE Transactions "
     "on Robotics 26(5), 914-924, 2010, doi:10.1109/TRO.2010.2064014"
 )
-# What a mechanism may be mistaken for besides other mechanisms: parameters and states of the paper's model.
+# Look-alikes that are no mechanisms: parameters and states of the paper's model.
 PAPER_LOOK_ALIKES = ("K", "mu", "slack")
 
 
@@ -152,19 +155,15 @@ class Mechanism:
     Attributes
     ----------
     name : str
+    text : str
+        A title, which is its summary, and paragraphs that begin with the names of `PARAGRAPHS`: its law in the
+        parameters' symbols; what it does to a recording; the experiment that separates it from its look-alikes; author,
+        title, journal, year and DOI of the equation or of where the effect is named.
     places : tuple of str
         Where it can act, of `PLACES`.
     parameters : tuple of Parameter
-    summary : str
-        One line for tables and pages.
-    equation, signature : str
-        Its law, in the parameters' symbols; what it does to a recording.
     mistaken_for : tuple of str
         Look-alikes: other mechanisms, or `PAPER_LOOK_ALIKES`.
-    separated_by : str
-        The experiment that separates them.
-    source : str
-        Author, journal, year, DOI of the equation or of where the effect is named.
     depends_on_time : bool
         Whether its effect depends on the rate of the motion, not only on its path.
     nearly_neutral : NearlyNeutral or None
@@ -182,14 +181,10 @@ class Mechanism:
     """
 
     name: str
+    text: str
     places: tuple[str, ...]
     parameters: tuple[Parameter, ...]
-    summary: str
-    equation: str
-    signature: str
     mistaken_for: tuple[str, ...]
-    separated_by: str
-    source: str
     depends_on_time: bool
     nearly_neutral: NearlyNeutral | None = None
     model_form_error: float = 0.001
@@ -204,6 +199,40 @@ class Mechanism:
             raise ValueError(f"{self.name}: places are {', '.join(PLACES)}; got {', '.join(self.places) or 'none'}")
         if (self.modifies_physics is None) == (self.modifies_observation is None):
             raise ValueError(f"{self.name}: a mechanism modifies either the physics or the observation")
+        if missing := set(PARAGRAPHS) - self._paragraphs.keys():
+            raise ValueError(f"{self.name}: its text has no paragraph {', '.join(sorted(missing))}")
+
+    @property
+    def _paragraphs(self) -> dict[str, str]:
+        """The text's paragraphs by name, each on one line and without a last full stop."""
+        lines = (" ".join(paragraph.split()) for paragraph in self.text.split("\n\n")[1:])
+        return {name: text.removesuffix(".") for name, _, text in (line.partition(": ") for line in lines)}
+
+    @property
+    def summary(self) -> str:
+        """One line for tables and pages, as it stands in a sentence."""
+        title = self.text.split("\n\n")[0].strip().removesuffix(".")
+        return title[0].lower() + title[1:]
+
+    @property
+    def equation(self) -> str:
+        """Its law."""
+        return self._paragraphs["Equation"] + "."
+
+    @property
+    def signature(self) -> str:
+        """What it does to a recording."""
+        return self._paragraphs["Signature"] + "."
+
+    @property
+    def separated_by(self) -> str:
+        """The experiment that separates it from its look-alikes, as it stands in a sentence."""
+        return self._paragraphs["Separated by"]
+
+    @property
+    def source(self) -> str:
+        """Where its equation is from, or where the effect is named."""
+        return self._paragraphs["Source"].replace(PAPER_SHORT, PAPER)
 
     @property
     def strengths(self) -> tuple[Parameter, ...]:

@@ -1,4 +1,19 @@
-"""Torsional compliance and backlash of the drive train: the motor reverses before the pulley does."""
+"""Torsional compliance and backlash of the drive train.
+
+Equation: Between the motor at angle phi and the pulley at theta act a torsional compliance and a lost_motion: while
+the pulley moves, phi = theta + compliance tau + lost_motion sgn(dtheta/dt) / 2. At a reversal the pulley's own
+friction holds it and theta does not determine the torque. The motor passes its reversal smoothly, so phi is taken as
+the cubic through its values before and after, and the torque follows from it. The law changes the torque only where
+the pulley stands at its reversals. With coarse encoder counts every pulley seems to, so a diagnosis considers it
+only as a forced candidate.
+
+Signature: At a reversal the torque falls before the pulley moves, the earlier the slower the motion.
+
+Separated by: the motor's own encoder, or reversals at two speeds.
+
+Source: Nordin and Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38(10), 1633-1649,
+2002, doi:10.1016/S0005-1098(02)00047-X.
+"""
 
 import numpy as np
 
@@ -79,27 +94,13 @@ def _modifies_observation(sensing, place, values):
 
 MECHANISM = Mechanism(
     name="drive-windup",
+    text=__doc__,
     places=("drive-pulley",),
     parameters=(
         Parameter("compliance", "rad/(N m)", 0.02, 2.0, 0.25, "torsional compliance of the train"),
         Parameter("lost_motion", "rad", 2e-3, 0.2, 0.05, "backlash of the train"),
     ),
-    summary="torsional compliance and backlash of the drive train",
-    equation=(
-        "Between the motor at angle phi and the pulley at theta act a torsional compliance and a lost_motion: while "
-        "the pulley moves, phi = theta + compliance tau + lost_motion sgn(dtheta/dt) / 2. At a reversal the pulley's "
-        "own friction holds it and theta does not determine the torque. The motor passes its reversal smoothly, so phi "
-        "is taken as the cubic through its values before and after, and the torque follows from it. The law changes "
-        "the torque only where the pulley stands at its reversals. With coarse encoder counts every pulley seems to, "
-        "so a diagnosis considers it only as a forced candidate."
-    ),
-    signature="At a reversal the torque falls before the pulley moves, the earlier the slower the motion.",
     mistaken_for=("pulley-friction",),
-    separated_by="the motor's own encoder, or reversals at two speeds",
-    source=(
-        "Nordin and Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38(10), 1633-1649, "
-        "2002, doi:10.1016/S0005-1098(02)00047-X"
-    ),
     depends_on_time=False,
     by_name_only=True,
     modifies_observation=_modifies_observation,

@@ -1,8 +1,20 @@
-"""A kink: a sharp bend that the measured path does not show."""
+"""Extra bend at one place of the conduits.
+
+Equation: The bend angle phi(x) jumps by beta at x = s L, in both conduits, which run side by side. At rest the
+tension changes there by hold times the change that friction makes over as much bend elsewhere: hold = 1 for conduits
+that had their kink when the cables were tensioned, hold = 0 for conduits that were bent afterwards. A rest does not
+show hold; the travel of the friction front before it passes does.
+
+Signature: The friction front stalls part-way, and the loss in full slip exceeds mu times the measured bend.
+
+Separated by: the time at which the friction front passes, which also gives s.
+
+Source: Agrawal, Peine and Yao 2010, Section VI: kinks introduced inadvertently.
+"""
 
 from typing import NamedTuple
 
-from ccmodel.mechanisms.contract import PAPER, Mechanism, NearlyNeutral, Parameter
+from ccmodel.mechanisms.contract import Mechanism, NearlyNeutral, Parameter
 
 
 class Kink(NamedTuple):
@@ -25,6 +37,7 @@ def _modifies_physics(settings, place, values):
 
 MECHANISM = Mechanism(
     name="kink",
+    text=__doc__,
     places=("conduit",),
     parameters=(
         Parameter("beta", "rad", 0.2, 1.5, 0.6, "angle of the bend"),
@@ -42,17 +55,7 @@ MECHANISM = Mechanism(
             default=1.0,
         ),
     ),
-    summary="extra bend at one place of the conduits",
-    equation=(
-        "The bend angle phi(x) jumps by beta at x = s L, in both conduits, which run side by side. At rest the tension "
-        "changes there by hold times the change that friction makes over as much bend elsewhere: hold = 1 for conduits "
-        "that had their kink when the cables were tensioned, hold = 0 for conduits that were bent afterwards. A rest "
-        "does not show hold; the travel of the friction front before it passes does."
-    ),
-    signature="The friction front stalls part-way, and the loss in full slip exceeds mu times the measured bend.",
     mistaken_for=("mu", "termination-compliance"),
-    separated_by="the time at which the friction front passes, which also gives s",
-    source=(f"{PAPER}, Section VI: kinks introduced inadvertently"),
     depends_on_time=False,
     # A kink of no bend still puts a node at its place, which is another grid: not the same bits.
     nearly_neutral=NearlyNeutral({"beta": 1e-6}, 1e-6),

@@ -1,4 +1,15 @@
-"""A friction coefficient that falls with tension, as in the contact of an elastic liner."""
+"""Friction coefficient falls with tension.
+
+Equation: The friction coefficient is mu (T / T_ref)^n with T_ref = 5 N and n between 0 and about -1/3, the exponent
+of a Hertzian contact. Below about 0.1 N the factor levels off.
+
+Signature: ln(T1 / T2) in full slip changes with tension, while with Coulomb friction the conduit's shape alone sets
+it.
+
+Separated by: three pretensions: a drag leaves a loss at zero tension, a power law does not.
+
+Source: Archard, Elastic deformation and the laws of friction, Proceedings of the Royal Society A 243, 190-205, 1957.
+"""
 
 from ccmodel.elementary import quick_exp, quick_log
 from ccmodel.kernel import kernel
@@ -24,21 +35,10 @@ def _modifies_physics(settings, place, values):
 
 MECHANISM = Mechanism(
     name="load-dependent-friction",
+    text=__doc__,
     places=("conduit",),
     parameters=(Parameter("n", "1", -0.35, -0.05, -0.15, "exponent of the tension", scale="linear"),),
-    summary="friction coefficient falls with tension",
-    equation=(
-        "The friction coefficient is mu (T / T_ref)^n with T_ref = 5 N and n between 0 and about -1/3, the exponent of "
-        "a Hertzian contact. Below about 0.1 N the factor levels off."
-    ),
-    signature=(
-        "ln(T1 / T2) in full slip changes with tension, while with Coulomb friction the conduit's shape alone sets it."
-    ),
     mistaken_for=("constant-drag",),
-    separated_by="three pretensions: a drag leaves a loss at zero tension, a power law does not",
-    source=(
-        "Archard, Elastic deformation and the laws of friction, Proceedings of the Royal Society A 243, 190-205, 1957"
-    ),
     depends_on_time=False,
     settings={"tension_exponent": 0.0},
     modifies_physics=_modifies_physics,

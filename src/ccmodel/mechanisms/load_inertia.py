@@ -1,8 +1,18 @@
-"""A load with mass."""
+"""The load's moment of inertia.
+
+Equation: tau_out = K_e theta + B dtheta/dt + J d2theta/dt2, with B = 2 zeta sqrt(J K_e).
+
+Signature: The torque's deviation from the spring's grows with the square of the frequency. While the cables hold
+still the load rings on them.
+
+Separated by: a frequency sweep: the error of a delay grows with the first power.
+
+Source: Agrawal, Peine and Yao 2010, Section VI: load dynamics.
+"""
 
 from math import sqrt
 
-from ccmodel.mechanisms.contract import PAPER, Mechanism, Parameter, Settings
+from ccmodel.mechanisms.contract import Mechanism, Parameter, Settings
 
 # A mass that is a few per cent off rings out of phase with the recording. Screening therefore tries this many masses,
 # with high damping, under which a resonance is seen from further off; the fit then lowers the damping by continuation.
@@ -20,20 +30,13 @@ def _modifies_physics(settings, place, values):
 
 MECHANISM = Mechanism(
     name="load-inertia",
+    text=__doc__,
     places=("load",),
     parameters=(
         Parameter("J", "kg m^2", 1e-5, 1e-3, 1e-4, "moment of inertia", screening_grid=MASSES),
         Parameter("zeta", "1", 1e-3, 0.3, 0.1, "damping ratio", screening_grid=(0.85,), continuation=True, default=0.0),
     ),
-    summary="the load's moment of inertia",
-    equation="tau_out = K_e theta + B dtheta/dt + J d2theta/dt2, with B = 2 zeta sqrt(J K_e).",
-    signature=(
-        "The torque's deviation from the spring's grows with the square of the frequency. While the cables hold still "
-        "the load rings on them."
-    ),
     mistaken_for=("time-skew",),
-    separated_by="a frequency sweep: the error of a delay grows with the first power",
-    source=(f"{PAPER}, Section VI: load dynamics"),
     depends_on_time=True,
     settings={"inertia": 0.0, "damping_ratio": 0.0},
     modifies_physics=_modifies_physics,

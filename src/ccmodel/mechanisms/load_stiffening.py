@@ -1,4 +1,14 @@
-"""A load spring that stiffens with its angle."""
+"""The load's spring stiffens with its angle.
+
+Equation: tau_out = K_e theta + K3 theta^3, on top of the load's own law.
+
+Signature: tau_out against theta_out is curved.
+
+Separated by: torque near zero angle: flat with backlash, straight with a cubic spring.
+
+Source: Kovacic and Brennan (editors), The Duffing Equation: Nonlinear Oscillators and their Behaviour, Wiley, 2011,
+doi:10.1002/9780470977859.
+"""
 
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
@@ -9,17 +19,10 @@ def _modifies_physics(settings, place, values):
 
 MECHANISM = Mechanism(
     name="load-stiffening",
+    text=__doc__,
     places=("load",),
     parameters=(Parameter("K3", "N m/rad^3", 1e-3, 1.0, 0.03, "cubic stiffness", signed=True),),
-    summary="the load's spring stiffens with its angle",
-    equation="tau_out = K_e theta + K3 theta^3, on top of the load's own law.",
-    signature="tau_out against theta_out is curved.",
     mistaken_for=("backlash",),
-    separated_by="torque near zero angle: flat with backlash, straight with a cubic spring",
-    source=(
-        "Kovacic and Brennan (editors), The Duffing Equation: Nonlinear Oscillators and their Behaviour, Wiley, 2011, "
-        "doi:10.1002/9780470977859"
-    ),
     depends_on_time=False,
     settings={"cubic_stiffness": 0.0},
     modifies_physics=_modifies_physics,

@@ -1,4 +1,17 @@
-"""Presliding: before it slides, the cable deflects the asperities of its contact elastically."""
+"""Friction builds up over a bristle length.
+
+Equation: Dahl's law: at a sliding speed v the bristle z follows dz/dt = v (1 - sgn(v) z / z0), and friction is mu N
+z / z0. It depends on the sliding distance and not on the speed, so a step of any size in one direction has a closed
+form.
+
+Signature: Corners at reversals, sharp in the paper's model, are rounded over a few z0 of sliding.
+
+Separated by: nested reversals of small amplitude: with bristles the tension creeps from one to the next, with a
+termination the small loops close.
+
+Source: Dahl, Solid friction damping of mechanical vibrations, AIAA Journal 14(12), 1675-1682, 1976,
+doi:10.2514/3.61511.
+"""
 
 from ccmodel.elementary import quick_exp
 from ccmodel.kernel import kernel
@@ -19,24 +32,10 @@ def _modifies_physics(settings, place, values):
 
 MECHANISM = Mechanism(
     name="presliding",
+    text=__doc__,
     places=("conduit",),
     parameters=(Parameter("z0", "m", 5e-6, 200e-6, 50e-6, "presliding length of the bristle"),),
-    summary="friction builds up over a bristle length",
-    equation=(
-        "Dahl's law: at a sliding speed v the bristle z follows dz/dt = v (1 - sgn(v) z / z0), and friction is "
-        "mu N z / z0. It depends on the sliding distance and not on the speed, so a step of any size in one direction "
-        "has a closed form."
-    ),
-    signature="Corners at reversals, sharp in the paper's model, are rounded over a few z0 of sliding.",
     mistaken_for=("termination-compliance",),
-    separated_by=(
-        "nested reversals of small amplitude: with bristles the tension creeps from one to the next, with a "
-        "termination the small loops close"
-    ),
-    source=(
-        "Dahl, Solid friction damping of mechanical vibrations, AIAA Journal 14(12), 1675-1682, 1976, "
-        "doi:10.2514/3.61511"
-    ),
     depends_on_time=False,
     nearly_neutral=NearlyNeutral({"z0": 1e-10}, 1e-6),
     # One bristle stands for asperities of many lengths; elastic-slip elements with lengths from 1 to 12 miss this

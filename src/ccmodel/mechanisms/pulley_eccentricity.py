@@ -1,4 +1,14 @@
-"""A pulley that is not round, or not centred."""
+"""A pulley's radius changes with its angle.
+
+Equation: The cables leave at the radius R (1 + e sin(theta + psi)). The cable travel is the integral of this radius
+over the angle.
+
+Signature: The error repeats with the angle, independent of speed and tension.
+
+Separated by: strokes that start at other angles of the pulley.
+
+Source: Litvin and Fuentes, Gear Geometry and Applied Theory, 2nd edition, Cambridge University Press, 2004.
+"""
 
 import numpy as np
 
@@ -13,9 +23,9 @@ def winding(theta, e, psi):
 
 
 @kernel
-def winding_change(theta, turn, e, psi):
-    """Cable travel over R (rad) of a rotation `turn` from theta, without cancellation for a small one."""
-    return turn + 2.0 * e * np.sin(theta + psi + 0.5 * turn) * np.sin(0.5 * turn)
+def winding_change(theta, rotation, e, psi):
+    """Cable travel over R (rad) of a rotation from theta, without cancellation for a small one."""
+    return rotation + 2.0 * e * np.sin(theta + psi + 0.5 * rotation) * np.sin(0.5 * rotation)
 
 
 def _modifies_physics(settings, place, values):
@@ -29,6 +39,7 @@ def _modifies_physics(settings, place, values):
 
 MECHANISM = Mechanism(
     name="pulley-eccentricity",
+    text=__doc__,
     places=("drive-pulley", "load-pulley"),
     parameters=(
         Parameter("e", "1", 0.01, 0.08, 0.03, "eccentricity over the radius"),
@@ -44,15 +55,7 @@ MECHANISM = Mechanism(
             screening_grid=(0.125, 0.375, 0.625, 0.875),
         ),
     ),
-    summary="a pulley's radius changes with its angle",
-    equation=(
-        "The cables leave at the radius R (1 + e sin(theta + psi)). The cable travel is the integral of this radius "
-        "over the angle."
-    ),
-    signature="The error repeats with the angle, independent of speed and tension.",
     mistaken_for=("load-stiffening",),
-    separated_by="strokes that start at other angles of the pulley",
-    source="Litvin and Fuentes, Gear Geometry and Applied Theory, 2nd edition, Cambridge University Press, 2004",
     depends_on_time=False,
     settings={"drive_eccentricity": (0.0, 0.0), "load_eccentricity": (0.0, 0.0)},
     modifies_physics=_modifies_physics,

@@ -1,9 +1,22 @@
-"""Friction in a pulley's bearing."""
+"""A friction torque in a pulley's bearing.
+
+Equation: A torque friction_torque sgn(omega) opposes the pulley's motion. After a reversal it builds up over the
+angle presliding by Dahl's law: a few mrad in ball bearings, more where a seal or a wound cable yields.
+
+Signature: At the drive tau_in is off by a square wave in phase with the speed, and all other channels fit. At the
+load (T2 - T4) R steps at each reversal, and the load's own torque does not.
+
+Separated by: error against speed and load: a gain's error grows with the torque, a bearing's has the sign of the
+speed and one magnitude.
+
+Source: Agrawal, Peine and Yao 2010, Section VI: friction effects at the two pulleys; with the law of Dahl, AIAA
+Journal 14(12), 1675-1682, 1976, doi:10.2514/3.61511.
+"""
 
 import numpy as np
 
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import PAPER, Mechanism, Parameter, side
+from ccmodel.mechanisms.contract import Mechanism, Parameter, side
 from ccmodel.mechanisms.presliding import dahl
 
 # Angle over which a bearing's friction builds up unless a model states it.
@@ -28,6 +41,7 @@ def _modifies_physics(settings, place, values):
 
 MECHANISM = Mechanism(
     name="pulley-friction",
+    text=__doc__,
     places=("drive-pulley", "load-pulley"),
     parameters=(
         Parameter("friction_torque", "N m", 0.5e-3, 50e-3, 5e-3, "friction torque of the bearing"),
@@ -43,24 +57,7 @@ MECHANISM = Mechanism(
             default=PRESLIDING_RAD,
         ),
     ),
-    summary="a friction torque in a pulley's bearing",
-    equation=(
-        "A torque friction_torque sgn(omega) opposes the pulley's motion. After a reversal it builds up over the angle "
-        "presliding by Dahl's law: a few mrad in ball bearings, more where a seal or a wound cable yields."
-    ),
-    signature=(
-        "At the drive tau_in is off by a square wave in phase with the speed, and all other channels fit. At the load "
-        "(T2 - T4) R steps at each reversal, and the load's own torque does not."
-    ),
     mistaken_for=("torque-scale", "constant-drag"),
-    separated_by=(
-        "error against speed and load: a gain's error grows with the torque, a bearing's has the sign of the speed and "
-        "one magnitude"
-    ),
-    source=(
-        f"{PAPER}, Section VI: friction effects at "
-        "the two pulleys; with the law of Dahl, AIAA Journal 14(12), 1675-1682, 1976, doi:10.2514/3.61511"
-    ),
     depends_on_time=False,
     settings={
         "drive_friction_Nm": 0.0,

@@ -1,9 +1,22 @@
-"""Relaxation: a stretched cable and its conduit slowly lose part of their tension."""
+"""Tension decays at rest and over cycles.
+
+Equation: Standard linear solid: the tension is T = T_e - r q with the elastic tension T_e and dq/dt = (T_e - q) /
+tau. The cable is fresh (q = 0) when a run starts, so its initial tension decays as well. Between samples T_e is
+taken as linear in time, for which q is exact.
+
+Signature: Tension decays at rest and over cycles while the angles stay. The paper measured 10.5 % with 30 s on its
+rig and neglected it.
+
+Separated by: both ends and both cables at rest: they relax together, a load cell drifts alone.
+
+Source: Agrawal, Peine and Yao 2010, Sections V and VI; with the standard linear solid of Lakes, Viscoelastic
+Materials, Cambridge University Press, 2009.
+"""
 
 import numpy as np
 
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import PAPER, Mechanism, Parameter
+from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
 @kernel
@@ -29,27 +42,13 @@ def _modifies_physics(settings, place, values):
 
 MECHANISM = Mechanism(
     name="relaxation",
+    text=__doc__,
     places=("cable",),
     parameters=(
         Parameter("r", "1", 0.01, 0.2, 0.05, "share of the tension that is lost"),
         Parameter("tau", "s", 5.0, 100.0, 30.0, "time constant", neutral=30.0),
     ),
-    summary="tension decays at rest and over cycles",
-    equation=(
-        "Standard linear solid: the tension is T = T_e - r q with the elastic tension T_e and dq/dt = (T_e - q) / tau. "
-        "The cable is fresh (q = 0) when a run starts, so its initial tension decays as well. Between samples T_e is "
-        "taken as linear in time, for which q is exact."
-    ),
-    signature=(
-        "Tension decays at rest and over cycles while the angles stay. The paper measured 10.5 % with 30 s on its rig "
-        "and neglected it."
-    ),
     mistaken_for=("load-cell-drift",),
-    separated_by="both ends and both cables at rest: they relax together, a load cell drifts alone",
-    source=(
-        f"{PAPER}, Sections V and VI; with the "
-        "standard linear solid of Lakes, Viscoelastic Materials, Cambridge University Press, 2009"
-    ),
     depends_on_time=True,
     settings={"relaxing_share": 0.0, "relaxing_time_s": 30.0},
     modifies_physics=_modifies_physics,

@@ -1,4 +1,15 @@
-"""Running-in: friction that changes as cable and liner wear into each other or warm up."""
+"""Friction coefficient changes through a recording.
+
+Equation: The friction coefficient is mu (1 + change (1 - exp(-t / tau - per_m w))), with t the time and w the
+drive's cable travel since the start of the recording: warming goes with t, wear with w.
+
+Signature: Loops drift through a recording while the sensors' zeros stay.
+
+Separated by: holds, through which relaxation continues, and a return to the start condition.
+
+Source: Blau, On the nature of running-in, Tribology International 38(11-12), 1007-1012, 2005,
+doi:10.1016/j.triboint.2005.07.020.
+"""
 
 import numpy as np
 
@@ -19,24 +30,14 @@ def _modifies_physics(settings, place, values):
 
 MECHANISM = Mechanism(
     name="running-in",
+    text=__doc__,
     places=("conduit",),
     parameters=(
         Parameter("change", "1", 0.05, 0.3, 0.1, "final relative change of friction", signed=True),
         Parameter("tau", "s", 2.0, 1000.0, 10.0, "time constant", neutral=10.0, screening_grid=(0.13, 0.31, 0.5)),
         Parameter("per_m", "1/m", 1.0, 200.0, 1.0, "rate per cable travel", screening_grid=(0.0, 0.6), default=0.0),
     ),
-    summary="friction coefficient changes through a recording",
-    equation=(
-        "The friction coefficient is mu (1 + change (1 - exp(-t / tau - per_m w))), with t the time and w the drive's "
-        "cable travel since the start of the recording: warming goes with t, wear with w."
-    ),
-    signature="Loops drift through a recording while the sensors' zeros stay.",
     mistaken_for=("relaxation",),
-    separated_by="holds, through which relaxation continues, and a return to the start condition",
-    source=(
-        "Blau, On the nature of running-in, Tribology International 38(11-12), 1007-1012, 2005, "
-        "doi:10.1016/j.triboint.2005.07.020"
-    ),
     depends_on_time=True,
     # Factor of mu at times (s) and cable travels (m), all of shape (samples,).
     settings={"friction_history": None},

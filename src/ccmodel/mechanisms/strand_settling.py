@@ -1,4 +1,14 @@
-"""Strand settling: a cable whose stiffness falls at low tension, until its strands bed in."""
+"""Cable stiffness falls at low tension.
+
+Equation: At strain u' the tension is T = EA (u' - u_s (1 - exp(-u' / u_s))) with u_s = T_scale / EA: the stiffness
+is zero in a slack cable and reaches EA a few T_scale above it.
+
+Signature: The transmission is soft near slack and stiff elsewhere.
+
+Separated by: a sweep at low pretension: settling depends on the cable's own tension, backlash on the load's torque.
+
+Source: Feyrer, Wire Ropes: Tension, Endurance, Reliability, 2nd edition, Springer, 2015, on the rope modulus.
+"""
 
 import numpy as np
 
@@ -30,19 +40,10 @@ def _modifies_physics(settings, place, values):
 
 MECHANISM = Mechanism(
     name="strand-settling",
+    text=__doc__,
     places=("cable",),
     parameters=(Parameter("T_scale", "N", 0.5, 10.0, 2.0, "tension scale of the settling"),),
-    summary="cable stiffness falls at low tension",
-    equation=(
-        "At strain u' the tension is T = EA (u' - u_s (1 - exp(-u' / u_s))) with u_s = T_scale / EA: the stiffness is "
-        "zero in a slack cable and reaches EA a few T_scale above it."
-    ),
-    signature="The transmission is soft near slack and stiff elsewhere.",
     mistaken_for=("backlash", "slack"),
-    separated_by=(
-        "a sweep at low pretension: settling depends on the cable's own tension, backlash on the load's torque"
-    ),
-    source="Feyrer, Wire Ropes: Tension, Endurance, Reliability, 2nd edition, Springer, 2015, on the rope modulus",
     depends_on_time=False,
     nearly_neutral=NearlyNeutral({"T_scale": 1e-2}, 1e-8),
     settings={"settling_N": 0.0},

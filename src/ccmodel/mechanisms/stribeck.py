@@ -1,4 +1,18 @@
-"""Stribeck friction: higher at rest than in motion."""
+"""Friction is higher at rest than in motion.
+
+Equation: The friction coefficient is mu (1 + a r) with the state r of the contact: r = 1 after a rest, and dr/ds =
+(exp(-(v / vs)^delta) - r) / 20 um over the sliding distance s, with v the sliding speed. Steady sliding gives mu (1
++ a exp(-(v / vs)^delta)): a Gaussian for delta = 2, the default, and an exponential for delta = 1.
+
+Signature: Friction peaks at break-away, and the loss falls with speed.
+
+Separated by: a speed sweep.
+
+Source: Armstrong-Helouvry, Dupont and Canudas de Wit, A survey of models, analysis tools and compensation methods
+for the control of machines with friction, Automatica 30(7), 1083-1138, 1994, doi:10.1016/0005-1098(94)90209-7;
+renewal over a sliding distance: Dieterich, Modeling of rock friction 1, Journal of Geophysical Research 84(B5),
+2161-2168, 1979, doi:10.1029/JB084iB05p02161.
+"""
 
 from ccmodel.elementary import quick_exp, quick_log
 from ccmodel.kernel import kernel
@@ -31,6 +45,7 @@ def _modifies_physics(settings, place, values):
 
 MECHANISM = Mechanism(
     name="stribeck",
+    text=__doc__,
     places=("conduit",),
     parameters=(
         Parameter("a", "1", 0.05, 0.6, 0.2, "relative excess of friction at rest"),
@@ -39,22 +54,7 @@ MECHANISM = Mechanism(
             "delta", "1", 0.5, 2.5, 1.5, "exponent of the speed", neutral=2.0, screening_grid=(0.7,), default=2.0
         ),
     ),
-    summary="friction is higher at rest than in motion",
-    equation=(
-        "The friction coefficient is mu (1 + a r) with the state r of the contact: r = 1 after a rest, and "
-        "dr/ds = (exp(-(v / vs)^delta) - r) / 20 um over the sliding distance s, with v the sliding speed. Steady "
-        "sliding gives mu (1 + a exp(-(v / vs)^delta)): a Gaussian for delta = 2, the default, and an exponential for "
-        "delta = 1."
-    ),
-    signature="Friction peaks at break-away, and the loss falls with speed.",
     mistaken_for=("presliding", "viscous-friction"),
-    separated_by="a speed sweep",
-    source=(
-        "Armstrong-Helouvry, Dupont and Canudas de Wit, A survey of models, analysis tools and compensation methods "
-        "for the control of machines with friction, Automatica 30(7), 1083-1138, 1994, "
-        "doi:10.1016/0005-1098(94)90209-7; renewal over a sliding distance: Dieterich, Modeling of rock friction 1, "
-        "Journal of Geophysical Research 84(B5), 2161-2168, 1979, doi:10.1029/JB084iB05p02161"
-    ),
     depends_on_time=True,
     settings={"stribeck_rise": 0.0, "stribeck_speed": 1e-3, "stribeck_exponent": 2.0},
     modifies_physics=_modifies_physics,

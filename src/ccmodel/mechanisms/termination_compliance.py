@@ -1,6 +1,17 @@
-"""Compliance of a termination: free cable, crimps and anchors between pulley and conduit."""
+"""A compliance in series at a cable's end.
 
-from ccmodel.mechanisms.contract import PAPER, Mechanism, NearlyNeutral, Parameter, side
+Equation: Each cable stretches by compliance times its tension at one end, in series and without friction.
+
+Signature: The apparent stiffness lies below the one measured on the cable. The paper measured 13.88 kN/m and fitted
+7.5 to 7.75 kN/m, with 0.4 m of free cable and two terminations in none of its equations.
+
+Separated by: two conduit lengths; partial motion, in which a termination yields before the friction front has
+advanced.
+
+Source: Agrawal, Peine and Yao 2010, Section V: measured and fitted stiffness.
+"""
+
+from ccmodel.mechanisms.contract import Mechanism, NearlyNeutral, Parameter, side
 
 
 def _modifies_physics(settings, place, values):
@@ -13,19 +24,10 @@ def _modifies_physics(settings, place, values):
 # 4 to 200 % of a cable's own: 1 / 13.88 kN/m is 72 um/N.
 MECHANISM = Mechanism(
     name="termination-compliance",
+    text=__doc__,
     places=("drive-end", "load-end"),
     parameters=(Parameter("compliance", "m/N", 3e-6, 150e-6, 20e-6, "compliance of one end of each cable"),),
-    summary="a compliance in series at a cable's end",
-    equation="Each cable stretches by compliance times its tension at one end, in series and without friction.",
-    signature=(
-        "The apparent stiffness lies below the one measured on the cable. The paper measured 13.88 kN/m and fitted 7.5 "
-        "to 7.75 kN/m, with 0.4 m of free cable and two terminations in none of its equations."
-    ),
     mistaken_for=("K",),
-    separated_by=(
-        "two conduit lengths; partial motion, in which a termination yields before the friction front has advanced"
-    ),
-    source=(f"{PAPER}, Section V: measured and fitted stiffness"),
     depends_on_time=False,
     nearly_neutral=NearlyNeutral({"compliance": 1e-12}, 1e-7),
     settings={"drive_end_compliance": 0.0, "load_end_compliance": 0.0},

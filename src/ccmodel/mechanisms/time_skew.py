@@ -1,4 +1,16 @@
-"""Clocks of the two sides that disagree."""
+"""One side's clock is late.
+
+Equation: The channels of one side read at time t what they would have read at t - delay. The model runs on the
+drive's clock, whose angle is its input, so a late drive side is simulated as an early load side.
+
+Signature: Loops open or close with frequency, in every pair of channels with one on each side.
+
+Separated by: a chirp: a delay's error grows with the first power of frequency and is the same in all channels of a
+side.
+
+Source: Mills, Internet time synchronization: the network time protocol, IEEE Transactions on Communications 39(10),
+1482-1493, 1991, doi:10.1109/26.103043, on clock offset.
+"""
 
 import numpy as np
 
@@ -16,22 +28,10 @@ def _modifies_observation(sensing, place, values):
 
 MECHANISM = Mechanism(
     name="time-skew",
+    text=__doc__,
     places=("drive-sensor", "load-sensor"),
     parameters=(Parameter("delay", "s", 2e-3, 50e-3, 10e-3, "delay of one side's channels"),),
-    summary="one side's clock is late",
-    equation=(
-        "The channels of one side read at time t what they would have read at t - delay. The model runs on the drive's "
-        "clock, whose angle is its input, so a late drive side is simulated as an early load side."
-    ),
-    signature="Loops open or close with frequency, in every pair of channels with one on each side.",
     mistaken_for=("viscous-friction", "load-inertia"),
-    separated_by=(
-        "a chirp: a delay's error grows with the first power of frequency and is the same in all channels of a side"
-    ),
-    source=(
-        "Mills, Internet time synchronization: the network time protocol, IEEE Transactions on Communications 39(10), "
-        "1482-1493, 1991, doi:10.1109/26.103043, on clock offset"
-    ),
     depends_on_time=True,
     modifies_observation=_modifies_observation,
 )

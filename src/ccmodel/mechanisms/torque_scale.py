@@ -1,4 +1,13 @@
-"""A torque sensor, or a motor's torque constant, with a wrong gain."""
+"""A torque's gain is off.
+
+Equation: The channel reads (1 + gain) tau.
+
+Signature: The error is proportional to the torque and zero where the torque is.
+
+Separated by: sign of the speed, on which a gain's error does not depend.
+
+Source: Isermann, Fault-Diagnosis Systems, Springer, 2006, doi:10.1007/3-540-30368-5, on sensor gain faults.
+"""
 
 from ccmodel.mechanisms.contract import Mechanism, Parameter, sensor_torque
 
@@ -10,14 +19,10 @@ def _modifies_observation(sensing, place, values):
 
 MECHANISM = Mechanism(
     name="torque-scale",
+    text=__doc__,
     places=("drive-sensor", "load-sensor"),
     parameters=(Parameter("gain", "1", 0.02, 0.1, 0.05, "error of the gain", signed=True),),
-    summary="a torque's gain is off",
-    equation="The channel reads (1 + gain) tau.",
-    signature="The error is proportional to the torque and zero where the torque is.",
     mistaken_for=("pulley-friction",),
-    separated_by="sign of the speed, on which a gain's error does not depend",
-    source="Isermann, Fault-Diagnosis Systems, Springer, 2006, doi:10.1007/3-540-30368-5, on sensor gain faults",
     depends_on_time=False,
     modifies_observation=_modifies_observation,
 )

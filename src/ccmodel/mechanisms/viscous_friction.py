@@ -1,4 +1,14 @@
-"""Viscous friction: a film of lubricant under shear."""
+"""Drag in proportion to sliding speed.
+
+Equation: Friction per length is mu T dphi/dx + c v, with v the sliding speed.
+
+Signature: Loops widen with speed and not with tension; at low speed the effect vanishes.
+
+Separated by: three speeds: with Stribeck friction loops narrow with speed.
+
+Source: Olsson, Astrom, Canudas de Wit, Gafvert and Lischinsky, Friction models and friction compensation, European
+Journal of Control 4(3), 176-195, 1998, doi:10.1016/S0947-3580(98)70113-X.
+"""
 
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
@@ -9,18 +19,11 @@ def _modifies_physics(settings, place, values):
 
 MECHANISM = Mechanism(
     name="viscous-friction",
+    text=__doc__,
     places=("conduit",),
     # From a negligible film to half of Coulomb friction: 15 mN to 3 N over a metre of conduit at 3 mm/s.
     parameters=(Parameter("c", "N s/m^2", 5.0, 1000.0, 50.0, "drag per sliding speed and length"),),
-    summary="drag in proportion to sliding speed",
-    equation="Friction per length is mu T dphi/dx + c v, with v the sliding speed.",
-    signature="Loops widen with speed and not with tension; at low speed the effect vanishes.",
     mistaken_for=("stribeck", "time-skew"),
-    separated_by="three speeds: with Stribeck friction loops narrow with speed",
-    source=(
-        "Olsson, Astrom, Canudas de Wit, Gafvert and Lischinsky, Friction models and friction compensation, European "
-        "Journal of Control 4(3), 176-195, 1998, doi:10.1016/S0947-3580(98)70113-X"
-    ),
     depends_on_time=True,
     settings={"viscous": 0.0},
     modifies_physics=_modifies_physics,

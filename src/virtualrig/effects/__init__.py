@@ -46,7 +46,7 @@ SideSensors = create_model(
 class _Whole(Strict):
     @property
     def are_in_the_motion(self) -> bool:
-        """Whether any effect is present besides faults of sensors, which leave the motion as it is."""
+        """Whether any effect is present other than faults of sensors, which do not change the motion."""
         return self != Effects(drive_sensors=self.drive_sensors, load_sensors=self.load_sensors)
 
 
@@ -110,7 +110,7 @@ def _then(first, second):
 def cached(function):
     """Compile `function`, cached on disk until its own file or a twin's changes.
 
-    numba looks at the time stamp of a function's own file alone, so the name under which it caches tells of the others.
+    numba checks the time stamp of the function's own file only, so its cached name carries a digest of the others.
     """
     digest = hashlib.sha256()
     for file in sorted(Path(__file__).parent.glob("*.py")):

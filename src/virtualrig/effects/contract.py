@@ -6,7 +6,7 @@
    of the sensors of each side.
 3. A law of friction is a compiled function, ``slow_friction`` or ``friction``. A fault of sensors is ``read``. What
    needs a state of its own stands in the time loop (`virtualrig.effect_dynamics`); ``numbers`` gives it the values.
-4. ``places`` to ``also`` say what the proof draws, and ``seed`` how a drawn size enters the rig and an answer.
+4. ``places`` to ``also`` are what the proof draws; ``seed`` turns a drawn size into the rig's settings and an answer.
 """
 
 from collections.abc import Callable, Mapping
