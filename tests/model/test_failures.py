@@ -62,7 +62,7 @@ def effect(place="conduit", **values):
         (lambda: replace(PAIR, friction_coefficient=np.inf), "friction_coefficient must be finite"),
         (lambda: SpringLoad(-1.0), "finite and not negative"),
         (lambda: TorqueLoad([0.0, np.nan]), "torque_Nm is not finite at sample 1: leave"),
-        (lambda: TorqueLoad([0.0], -1.0), "a spring beside a load is finite and not negative; got -1"),
+        (lambda: TorqueLoad([0.0], -1.0), "in parallel with a measured load is finite and not negative; got -1"),
         (lambda: AngleLoad([]), "at least one"),
         (lambda: InitialTension.uniform(PATH, -1.0), "positive along the whole cable"),
         (lambda: InitialTension.uniform(PATH, np.nan), "finite"),

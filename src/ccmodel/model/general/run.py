@@ -119,8 +119,8 @@ def simulate(
     solved = march(
         physics, piece, node, slide, mean, state, time_s, theta_in, drive, friction_factor, series, steps, out, counts
     )
-    if isinstance(load, TorqueLoad) and load.beside_Nm_per_rad:
-        out[5, :solved] = series[:solved]  # the sensor does not feel the spring beside it
+    if isinstance(load, TorqueLoad) and load.parallel_Nm_per_rad:
+        out[5, :solved] = series[:solved]  # the sensor does not feel the spring in parallel
     return _response(transmission, active, settings, time_s[:solved], theta_in[:solved], out, counts)
 
 
@@ -224,7 +224,7 @@ def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tu
 
 def _physics(transmission: Transmission, load: Load, settings: Settings, elements: int) -> rows.Physics:
     K_e = load.stiffness_Nm_per_rad if isinstance(load, SpringLoad) else 0.0
-    K_e = load.beside_Nm_per_rad if isinstance(load, TorqueLoad) else K_e
+    K_e = load.parallel_Nm_per_rad if isinstance(load, TorqueLoad) else K_e
     return rows.Physics(
         has_settling=settings.settling_N > 0,
         has_relaxation=settings.relaxing_share != 0,
