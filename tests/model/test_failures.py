@@ -47,7 +47,7 @@ def effect(place="conduit", **values):
 
 
 @pytest.mark.parametrize(
-    ("attempt", "says"),
+    ("attempt", "message"),
     [
         (lambda: ConduitPath([], []), "at least one of each"),
         (lambda: ConduitPath([0.0], [1.0]), "positive length; got 0.0 m: leave out"),
@@ -87,8 +87,8 @@ def effect(place="conduit", **values):
         (lambda: as_model(pretension_N=-3.0), "positive along the whole cable"),
     ],
 )
-def test_what_cannot_be_run_is_refused_by_name(attempt, says):
-    with pytest.raises(ModelError, match=says):
+def test_what_cannot_be_run_is_refused_by_name(attempt, message):
+    with pytest.raises(ModelError, match=message):
         attempt()
 
 
