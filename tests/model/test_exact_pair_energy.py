@@ -95,7 +95,7 @@ def energies(history, begin, end, pretension):
     return work, (WEIGHTS * lost).sum()
 
 
-# Far enough that every stroke passes everything that the one before has stored: a corner passed in between is no phase's edge.
+# Far enough that every stroke passes all corners that the one before has stored: none of them is the edge of a phase.
 @pytest.mark.parametrize(("pretension", "reach"), [(30.0, 2.5), (10.0, 1.0), (3.0, 1.0)])
 def test_work_of_a_whole_motion_is_stored_or_lost_to_friction(pretension, reach):
     history, work, lost = [0.0], 0.0, 0.0
