@@ -121,16 +121,14 @@ def simulate(
     )
     if isinstance(load, TorqueLoad) and load.parallel_Nm_per_rad:
         out[5, :solved] = series[:solved]  # the sensor does not feel the spring in parallel
-    return _response(transmission, active, settings, time_s[:solved], theta_in[:solved], out, counts)
+    if settings.drive_friction_Nm != 0.0:
+        out[6, :solved] += settings.drive_friction_Nm * bearing(theta_in[:solved], settings.drive_presliding_rad)
+    return _response(transmission, active, time_s[:solved], theta_in[:solved], out, counts)
 
 
-def _response(transmission, active, settings, time_s, theta_in, out, counts) -> GeneralResponse:
+def _response(transmission, active, time_s, theta_in, out, counts) -> GeneralResponse:
     """Outputs of the march up to the last sample of `time_s`, and what the sensors read of them."""
     T1, T2, T3, T4, theta_out, tau_out, tau_in = out[:, : time_s.size]
-    if settings.drive_friction_Nm != 0.0:
-        friction = bearing(theta_in, settings.drive_presliding_rad)
-        friction *= settings.drive_friction_Nm
-        tau_in += friction
     channels = {
         "theta_in_rad": theta_in,
         "theta_out_rad": theta_out,
