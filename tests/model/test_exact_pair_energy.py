@@ -26,7 +26,7 @@ def run(theta, pretension, **kw):
 
 
 def regimes(history, target, pretension):
-    """Drive angles at which a phase begins on the way from the last of `history` to `target`, both ends included."""
+    """Drive angles at which a phase begins between the last of `history` and `target`, both ends included."""
     edges = [history[-1]]
 
     def kind(theta):
@@ -68,7 +68,7 @@ def friction_power(T_drive, T_load, moving, sigma, drive_rate, load_rate):
         return friction(T_drive, sigma, M, lambda m: load_rate + (drive_rate - load_rate) * sliding(sigma, m, M))
     lost = friction(T_drive, sigma, from_drive, lambda m: drive_rate * sliding(sigma, m, from_drive))
     if from_load < M and load_rate != 0.0:
-        # what the drive releases is pulled at the load, and the other way round
+        # what the drive releases is pulled at the load, and vice versa
         lost += friction(T_load, -sigma, M - from_load, lambda m: load_rate * sliding(-sigma, m, M - from_load))
     return lost
 
@@ -78,7 +78,7 @@ def energies(history, begin, end, pretension):
     theta = begin + (end - begin) * NODES**2  # takes a front's square-root start away
     response = run([*history, begin, *theta, end], pretension)
     part = slice(len(history) + 1, -1)
-    way = np.sign(end - begin)
+    direction = np.sign(end - begin)
     load = np.polynomial.Legendre.fit(NODES, RADIUS * response.theta_out_rad[part], NODES.size - 12, domain=[0, 1])
     drive_rate, load_rate = 2 * (end - begin) * RADIUS * NODES, load.deriv()(NODES)
     lost = np.zeros(NODES.size)
@@ -89,13 +89,13 @@ def energies(history, begin, end, pretension):
             (-1, response.T3_N, response.T4_N, response.moving_B_m),
         ):
             lost[i] += friction_power(
-                near[at], far[at], moving[at], sign * way, sign * drive_rate[i], sign * load_rate[i]
+                near[at], far[at], moving[at], sign * direction, sign * drive_rate[i], sign * load_rate[i]
             )
     work = (WEIGHTS * (response.T1_N - response.T3_N)[part] * drive_rate).sum()
     return work, (WEIGHTS * lost).sum()
 
 
-# Far enough that every stroke passes all that the one before has left: a corner passed on the way is no phase's edge.
+# Far enough that every stroke passes all corners that the one before has stored: none of them is the edge of a phase.
 @pytest.mark.parametrize(("pretension", "reach"), [(30.0, 2.5), (10.0, 1.0), (3.0, 1.0)])
 def test_work_of_a_whole_motion_is_stored_or_lost_to_friction(pretension, reach):
     history, work, lost = [0.0], 0.0, 0.0

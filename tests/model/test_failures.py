@@ -47,7 +47,7 @@ def effect(place="conduit", **values):
 
 
 @pytest.mark.parametrize(
-    ("attempt", "says"),
+    ("attempt", "message"),
     [
         (lambda: ConduitPath([], []), "at least one of each"),
         (lambda: ConduitPath([0.0], [1.0]), "positive length; got 0.0 m: leave out"),
@@ -62,7 +62,7 @@ def effect(place="conduit", **values):
         (lambda: replace(PAIR, friction_coefficient=np.inf), "friction_coefficient must be finite"),
         (lambda: SpringLoad(-1.0), "finite and not negative"),
         (lambda: TorqueLoad([0.0, np.nan]), "torque_Nm is not finite at sample 1: leave"),
-        (lambda: TorqueLoad([0.0], -1.0), "a spring beside a load is finite and not negative; got -1"),
+        (lambda: TorqueLoad([0.0], -1.0), "in parallel with a measured load is finite and not negative; got -1"),
         (lambda: AngleLoad([]), "at least one"),
         (lambda: InitialTension.uniform(PATH, -1.0), "positive along the whole cable"),
         (lambda: InitialTension.uniform(PATH, np.nan), "finite"),
@@ -87,8 +87,8 @@ def effect(place="conduit", **values):
         (lambda: as_model(pretension_N=-3.0), "positive along the whole cable"),
     ],
 )
-def test_what_cannot_be_run_is_refused_by_name(attempt, says):
-    with pytest.raises(ModelError, match=says):
+def test_what_cannot_be_run_is_refused_by_name(attempt, message):
+    with pytest.raises(ModelError, match=message):
         attempt()
 
 

@@ -227,12 +227,12 @@ def test_a_load_that_turns_against_the_drive_keeps_its_torque():
     mu=st.floats(0.0, 0.4),
     T=st.floats(0.2, 20),
     bends=st.lists(st.floats(0, 3), min_size=1, max_size=4),
-    turns=st.lists(st.floats(-0.8, 0.8), min_size=2, max_size=8),
+    reversals=st.lists(st.floats(-0.8, 0.8), min_size=2, max_size=8),
     noise=st.floats(0, 0.01),
 )
-def test_friction_and_balance_hold_for_any_path_and_motion(mu, T, bends, turns, noise):
+def test_friction_and_balance_hold_for_any_path_and_motion(mu, T, bends, reversals, noise):
     path = ConduitPath(np.full(len(bends), L / len(bends)), bends)
-    theta = np.concatenate([np.linspace(a, b, 40) for a, b in zip([0.0, *turns[:-1]], turns, strict=True)])
+    theta = np.concatenate([np.linspace(a, b, 40) for a, b in zip([0.0, *reversals[:-1]], reversals, strict=True)])
     theta += noise * np.random.default_rng(0).normal(size=theta.size)
     r = run(theta, path=path, T=T, mu=mu)
     assert np.abs((r.T2_N - r.T4_N) * R - K_E * r.theta_out_rad).max() < 1e-6

@@ -72,7 +72,7 @@ FAULTS = [
 @pytest.mark.parametrize("place", ["drive-sensor", "load-sensor"])
 @pytest.mark.parametrize(("name", "values"), FAULTS)
 def test_tensions_at_rest_are_the_true_ones_whatever_is_wrong_with_a_load_cell(name, values, place):
-    """What a model with a faulty sensor says of a rig is what the same model, told the rest's readings, says again."""
+    """A model with a faulty sensor, given its own readings at rest, reproduces its own recording."""
     pull = recording(theta_in_rad=lambda t: 0.4 * np.sin(2 * np.pi * np.clip(t - 0.3, 0, None)))
     rig = Parameters(
         7750.0, 1.2, 0.156, 0.006, 0.006, load_stiffness_Nm_per_rad=0.05, pretension_N=7.0,

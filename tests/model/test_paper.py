@@ -181,11 +181,11 @@ def test_bad_input_is_refused_by_name():
     mu=st.floats(0.02, 0.4),
     T=st.floats(0.2, 20),
     bends=st.lists(st.floats(0, 3), min_size=1, max_size=4),
-    turns=st.lists(st.floats(-0.6, 0.6), min_size=2, max_size=6),
+    reversals=st.lists(st.floats(-0.6, 0.6), min_size=2, max_size=6),
 )
-def test_friction_and_balance_hold_for_any_path_and_motion(mu, T, bends, turns):
+def test_friction_and_balance_hold_for_any_path_and_motion(mu, T, bends, reversals):
     path = ConduitPath(np.full(len(bends), 0.3), bends)
-    theta = np.concatenate([np.linspace(a, b, 40) for a, b in zip([0.0, *turns[:-1]], turns, strict=True)])
+    theta = np.concatenate([np.linspace(a, b, 40) for a, b in zip([0.0, *reversals[:-1]], reversals, strict=True)])
     r = run(theta, path=path, T=T, mu=mu)
     # Where moving parts meet within a segment the imbalance jumps by what the discretisation leaves.
     assert np.abs(r.tau_out_Nm - K_E * r.theta_out_rad).max() < 1e-7

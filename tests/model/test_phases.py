@@ -102,7 +102,7 @@ def slope_of(phase, response, i):
     if phase == "III":
         follows = (RELEASED_LOAD + PULLED_LOAD) / (K + RELEASED_LOAD + PULLED_LOAD)
         return K * follows / ((RELEASED_DRIVE + PULLED_DRIVE) * (1 - follows))
-    # A's fronts have run through these mu phi from either end; each end gives way by itself
+    # A's fronts have run through these mu phi from either end; each end yields by itself
     first = STUDY.instants[1]
     released = 0.5 * np.log(response.T1_N[first] / response.T1_N[i])
     pulled = 0.5 * np.log(response.T2_N[i] / response.T2_N[first])

@@ -1,4 +1,4 @@
-"""A model as a file: parameters and what acts besides the paper's physics, as JSON."""
+"""A model as a file: parameters and mechanisms, as JSON."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -13,7 +13,7 @@ from ccmodel.typed import InputError, TypedModel
 FORMAT = 1
 
 
-class _Acting(TypedModel):
+class _ActiveEntry(TypedModel):
     name: str
     place: str
     values: dict[str, float]
@@ -22,18 +22,18 @@ class _Acting(TypedModel):
 class _ModelFile(TypedModel):
     format: int = Field(ge=FORMAT, le=FORMAT)
     parameters: dict[str, float | None]
-    mechanisms: list[_Acting] = Field(default_factory=list)
+    mechanisms: list[_ActiveEntry] = Field(default_factory=list)
     provenance: dict = Field(default_factory=dict)
 
 
 def model_as_dict(parameters: Parameters, provenance: dict) -> dict:
-    """Plain data for a model file; what belongs to single recordings, or to the solver, is not in it."""
+    """Content of a model file: the parameters without the solver's refinement."""
     numbers = asdict(parameters)
-    acting = numbers.pop("mechanisms")
+    active = numbers.pop("mechanisms")
     del numbers["refinement"]
     in_file = {name: former for former, name in FORMER_NAMES.items()}
     numbers = {in_file.get(name, name): value for name, value in numbers.items()}
-    return {"format": FORMAT, "parameters": numbers, "mechanisms": acting, "provenance": provenance}
+    return {"format": FORMAT, "parameters": numbers, "mechanisms": active, "provenance": provenance}
 
 
 def read_model(path: Path) -> Parameters:
@@ -42,7 +42,7 @@ def read_model(path: Path) -> Parameters:
     Raises
     ------
     InputError
-        With one line on what is wrong with the file.
+        With one line on the file's fault.
     """
     try:
         stated = _ModelFile.model_validate_json(Path(path).read_text(encoding="utf-8"))
@@ -52,9 +52,9 @@ def read_model(path: Path) -> Parameters:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"])) or "the file"
         raise InputError(f"{path}: {where}: {first['msg']}; a model file is what a diagnosis or a fit wrote") from None
-    for acting in stated.mechanisms:
-        if acting.name not in registry.names():
-            raise InputError(f"{path}: no mechanism is called {acting.name!r}; there are {', '.join(registry.names())}")
+    for active in stated.mechanisms:
+        if active.name not in registry.names():
+            raise InputError(f"{path}: no mechanism is called {active.name!r}; there are {', '.join(registry.names())}")
     mechanisms = tuple(
         Active(m.name, m.place, registry.get(m.name).default | dict(m.values)) for m in stated.mechanisms
     )

@@ -47,16 +47,18 @@ class TorqueLoad:
     ----------
     torque_Nm : ndarray, shape (n,)
         tau_out, the torque of the cables on the load.
-    beside_Nm_per_rad : float
+    parallel_Nm_per_rad : float
         A spring at the load pulley that the torque sensor does not feel, without torque at the start of a run; >= 0.
     """
 
     torque_Nm: NDArray
-    beside_Nm_per_rad: float = 0.0
+    parallel_Nm_per_rad: float = 0.0
 
     def __post_init__(self):
-        if not 0 <= self.beside_Nm_per_rad < inf:
-            raise ModelError(f"a spring beside a load is finite and not negative; got {self.beside_Nm_per_rad}")
+        if not 0 <= self.parallel_Nm_per_rad < inf:
+            raise ModelError(
+                f"a spring in parallel with a measured load is finite and not negative; got {self.parallel_Nm_per_rad}"
+            )
         object.__setattr__(self, "torque_Nm", series(self.torque_Nm, "torque_Nm"))
 
 

@@ -258,9 +258,9 @@ def _imbalance(theta, cables, step, load, lines):
     K_e, R_o, theta_start = load
     E, P, h = lines
     n = h.size
-    turn = R_o * (theta - theta_start)
-    _move_cable(T[0], u[0], a[0], u_load[0] - turn, fronts[0], E, P, h, T_new[0], u_new[0])
-    _move_cable(T[1], u[1], a[1], u_load[1] + turn, fronts[1], E, P, h, T_new[1], u_new[1])
+    rotation = R_o * (theta - theta_start)
+    _move_cable(T[0], u[0], a[0], u_load[0] - rotation, fronts[0], E, P, h, T_new[0], u_new[0])
+    _move_cable(T[1], u[1], a[1], u_load[1] + rotation, fronts[1], E, P, h, T_new[1], u_new[1])
     return (T_new[0, n] - T_new[1, n]) * R_o - K_e * theta
 
 
@@ -314,8 +314,8 @@ def _march(theta_in, K_e, R_i, R_o, T_A0, T_B0, h, E, P):
     u_load = u[:, n].copy()
     theta_start = (T[0, n] - T[1, n]) * R_o / K_e if K_e > 0 else 0.0
     theta = theta_start
-    smallest_turn = 1e-6 * max(u_load.max(), 1e-6) / R_o
-    turn = smallest_turn
+    smallest_rotation = 1e-6 * max(u_load.max(), 1e-6) / R_o
+    rotation = smallest_rotation
     out_T, out_theta = np.empty((4, samples)), np.empty(samples)
     a = np.empty(2)
     for j in range(samples):
@@ -323,10 +323,10 @@ def _march(theta_in, K_e, R_i, R_o, T_A0, T_B0, h, E, P):
         a[1] = -a[0]
         fronts = (_drive_front(T[0], u[0], a[0], E, P, h), _drive_front(T[1], u[1], a[1], E, P, h))
         load = (K_e, R_o, theta_start)
-        balanced, found = _balance(theta, turn, cables, (a, fronts, u_load), load, lines)
+        balanced, found = _balance(theta, rotation, cables, (a, fronts, u_load), load, lines)
         if not found:
             return out_T, out_theta, j
-        turn = max(abs(balanced - theta), smallest_turn)
+        rotation = max(abs(balanced - theta), smallest_rotation)
         theta = balanced
         T[:], u[:] = cables[2], cables[3]
         out_T[0, j], out_T[1, j], out_T[2, j], out_T[3, j] = T[0, 0], T[0, n], T[1, 0], T[1, n]

@@ -1,4 +1,4 @@
-"""The numbers that a run of the model needs besides the recording it is compared with."""
+"""Parameters of the model: everything that a run needs beyond the recording it is compared with."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -9,48 +9,48 @@ from ccmodel.model.general.run import Active
 
 @dataclass(frozen=True)
 class Parameters:
-    """Parameters of the paper's model for one batch, as estimated beforehand or as fitted.
+    """Parameters of the model for one batch, as estimated beforehand or as fitted.
 
     Attributes
     ----------
     stiffness_N_per_m : float
         Stiffness k of cable and conduit together over `reference_length_m`.
     reference_length_m : float
-        The length that `stiffness_N_per_m` was measured on, m; their product is the axial rigidity K of (5).
+        Length that `stiffness_N_per_m` was measured on, m; their product is the axial rigidity K of the paper's (5).
     friction_coefficient : float
-        mu.
+        mu between cable and conduit.
     drive_radius_m, load_radius_m : float
         Pulley radii.
     load_stiffness_Nm_per_rad : float or None
-        K_e of the spring load; None where the load is what was measured at the load pulley.
+        K_e of the spring load; None where the load is a measurement.
     spring_beside_load_Nm_per_rad : float
-        Where the load is a measured torque: a spring at the load pulley that the torque's sensor does not feel.
+        Stiffness of a spring in parallel with a measured load torque, which the torque sensor does not feel.
     pretension_N : float or None
-        Initial tension, the same all along both cables; None takes from each recording what its rest shows.
+        Initial tension, uniform along the cables; None takes the tension observed at each recording's rest.
     pretension_share : float
-        Initial tension over what each recording was aimed at, where no rest shows it.
+        Initial tension over each recording's nominal pretension, where no rest shows it.
     tau_in_zero_Nm, tau_out_zero_Nm : float
-        What the torque sensors read without a torque.
+        Readings of the torque sensors without a torque.
     theta_out_zero_rad : float
-        Angle of the load that its encoder shows as none: where in its count it rests.
+        Angle of the load at its encoder's zero: the encoder's sub-count offset at rest.
     drive_encoder_offset : float
-        Where in its count the drive first rests, in standard deviations of what its motion says of that.
+        Sub-count offset of the drive's encoder at the first rest, in standard deviations of its estimate from the
+        motion.
     load_gap_position : float
-        Where in its gap the load first rests, -1 to 1, as far as the torque there does not tell.
+        Position of the load in its gap at the first rest, -1 to 1, where the torque does not show it.
     F_drive_zero_N, F_load_zero_N : float
-        What the load cells read without a tension.
+        Readings of the load cells without a tension.
     extra_bend_rad : float
-        Bend beyond what the path states, spread evenly along it: slings, fittings, a conduit that is not laid straight.
+        Bend beyond that of the stated path, even along it: slings, fittings, a conduit that is not laid straight.
     friction_scale, pretension_scale : float
-        Friction and initial tension of one recording over what they are in the population, and over what its rest
-        shows.
+        Friction of one recording over that of all, and initial tension over that observed at its rest.
     tension_curvature_A, tension_curvature_B : float
-        How each cable's initial tension bends between the ends that its rest shows, of what friction can hold, -1 to
-        1 (`ccmodel.model.initial.InitialTension.between_ends`).
+        Curvature of each cable's initial tension between its ends, over the largest that friction can hold, -1 to 1
+        (`ccmodel.model.initial.InitialTension.between_ends`).
     mechanisms : tuple of Active
-        What acts besides the paper's physics.
+        Effects beyond the paper's physics.
     refinement : int
-        By how much the general solver's grid and steps are finer than usual, to see what they cost.
+        Factor by which the general solver's grid and steps are finer than usual, to measure their error.
     """
 
     stiffness_N_per_m: float
@@ -84,7 +84,7 @@ class Parameters:
 
     @classmethod
     def estimated(cls, rig) -> "Parameters":
-        """The beforehand estimates that a batch file states (`ccmodel.rig.batch.Rig`)."""
+        """Estimates made beforehand, as a batch file states them (`ccmodel.rig.batch.Rig`)."""
         return cls(
             stiffness_N_per_m=rig.cable.stiffness_N_per_m,
             reference_length_m=rig.cable.length_m,
@@ -95,30 +95,30 @@ class Parameters:
         )
 
     def with_values(self, values: Mapping[str, float]) -> "Parameters":
-        """The same with some of them replaced.
+        """The same parameters with some values replaced.
 
         Parameters
         ----------
         values : mapping of str to float
-            By the names of the attributes, and for a number of a mechanism by `mechanism_key`.
+            By attribute name, for a mechanism's parameter by `mechanism_key`.
 
         Raises
         ------
         ValueError
-            If no active mechanism has such a number.
+            If no active mechanism has such a parameter.
         """
         own = {name: value for name, value in values.items() if mechanism_parameter(name) is None}
-        acting = {(m.name, m.place): dict(m.values) for m in self.mechanisms}
+        active = {(m.name, m.place): dict(m.values) for m in self.mechanisms}
         for key in values.keys() - own.keys():
             name, place, parameter = mechanism_parameter(key)
-            if parameter not in acting.get((name, place), {}):
+            if parameter not in active.get((name, place), {}):
                 raise ValueError(f"{key}: the model has no {parameter} of {name} at {place}")
-            acting[name, place][parameter] = values[key]
-        mechanisms = tuple(Active(name, place, numbers) for (name, place), numbers in acting.items())
+            active[name, place][parameter] = values[key]
+        mechanisms = tuple(Active(name, place, numbers) for (name, place), numbers in active.items())
         return replace(self, **own, mechanisms=mechanisms)
 
     def value_of(self, name: str) -> float:
-        """One of them, by the names that `with_values` takes."""
+        """Value of one parameter, by its name as in `with_values`."""
         if (parts := mechanism_parameter(name)) is None:
             return getattr(self, name)
         mechanism, place, parameter = parts
@@ -126,17 +126,17 @@ class Parameters:
 
 
 def mechanism_key(mechanism: str, place: str, parameter: str) -> str:
-    """The name under which a mechanism's number stands among the parameters."""
+    """Name of a mechanism's parameter among the model's."""
     return f"{mechanism}/{place}/{parameter}"
 
 
 def mechanism_parameter(key: str) -> tuple[str, str, str] | None:
-    """Mechanism, place and parameter of a name that `mechanism_key` made; None for any other."""
+    """Mechanism, place and parameter of a name made by `mechanism_key`; None for any other name."""
     parts = key.split("/")
     return tuple(parts) if len(parts) == 3 else None
 
 
-# Names that model files keep, and configuration files may still have, for what is called otherwise here.
+# Names in model files, and in older configuration files, of parameters that have another name here.
 FORMER_NAMES = {
     "drive_place": "drive_encoder_offset",
     "load_place": "load_gap_position",
@@ -144,7 +144,8 @@ FORMER_NAMES = {
     "profile_bow_B": "tension_curvature_B",
 }
 
-# What each recording has of its own, and what all share; lengths and the drive radius only scale what is among these.
+# Parameters that a fit may free for each recording, and for all together. Lengths and the drive radius are not among
+# them: they only scale others.
 OWN = (
     "friction_scale",
     "pretension_scale",

@@ -62,7 +62,7 @@ def is_slack(state, c):
 def reverse(path, state, c, sigma):
     """Prepare cable `c` for a pull (`sigma` +1) or a release (-1) at the drive, and the opposite at the load.
 
-    What slid the other way until now leaves corners in the stored profile.
+    A part that slid in the other direction until now leaves corners in the stored profile.
     """
     kind = state.kind
     continues = kind[c, SIGMA] == sigma if kind[c, MODE] == FRONTS else kind[c, LINE] == -sigma

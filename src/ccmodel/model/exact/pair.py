@@ -10,8 +10,10 @@ from ccmodel.model.exact.profile import CableProfile
 from ccmodel.model.exact.simulation import Simulation
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import FixedLoad, SpringLoad, series
-from ccmodel.model.response import PairResponse
+from ccmodel.model.response import PairResponse, Status
 from ccmodel.model.transmission import Transmission
+
+__all__ = ["ExactResponse", "Status", "simulate_pair"]
 
 
 @dataclass(frozen=True, kw_only=True)

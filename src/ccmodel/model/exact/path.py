@@ -13,9 +13,8 @@ STRAIGHT = 1e-15
 
 
 # Rows of `PathTables.table`, each seen from one end. m at the nodes. Of the bend after a node: dx / (EA dm), the arc
-# length at its start, dx / dm. Of the straight piece at a node: length / EA. The integral of exp(-sigma m) dx / EA up
-# to a node, its straight piece included, for sigma = -1 and +1.
-NODE, PER_M, X_START, X_PER_M, LUMP, PASSED = range(6)
+# length at its start, dx / dm. Of the straight piece at a node: length / EA.
+NODE, PER_M, X_START, X_PER_M, LUMP = range(5)
 
 
 class PathTables(NamedTuple):
@@ -25,11 +24,13 @@ class PathTables(NamedTuple):
 
     Attributes
     ----------
-    table : ndarray, shape (2, 7, n + 1)
+    table : ndarray, shape (2, 5, n + 1)
         First axis: from the drive end inward, from the load end inward; second axis: the rows above. The values of a
         bend stand at the node before it.
     ratio : tuple of two floats
         exp(-total), exp(+total): T_load / T_drive of a line of slope -1, +1.
+    line_compliance : tuple of two floats
+        Elongation per drive-end tension on a line of slope -1, +1: the integral of exp(slope m) dx / EA, m/N.
     total : float
         m of the whole path.
     length : float
@@ -38,6 +39,7 @@ class PathTables(NamedTuple):
 
     table: NDArray
     ratio: tuple[float, float]
+    line_compliance: tuple[float, float]
     total: float
     length: float
 
@@ -61,21 +63,21 @@ def tabulate(path: ConduitPath, friction_coefficient: float, axial_rigidity_N: f
     lump = np.array(straight) / axial_rigidity_N
     total = float(node[-1])
     x_end = x_start + x_per_m * np.diff(node)
-    table = np.zeros((2, PASSED + 2, node.size))
+    table = np.zeros((2, LUMP + 1, node.size))
     _fill(table[0], node, bend, x_start, x_per_m, lump)
     _fill(table[1], total - node[::-1], bend[::-1], x - x_end[::-1], x_per_m[::-1], lump[::-1])
-    return PathTables(table, (math.exp(-total), math.exp(total)), total, float(x))
+    compliance = tuple(_line_compliance(node, bend, lump, slope) for slope in (-1, 1))
+    return PathTables(table, (math.exp(-total), math.exp(total)), compliance, total, float(x))
 
 
 def _fill(table, node, bend, x_start, x_per_m, lump):
+    """Write the rows of one end."""
     table[NODE], table[LUMP] = node, lump
     for row, values in ((PER_M, bend), (X_START, x_start), (X_PER_M, x_per_m)):
         table[row, :-1] = values
-    for row, sigma in ((PASSED, -1), (PASSED + 1, 1)):
-        table[row] = _passed(node, bend, lump, sigma)
 
 
-def _passed(node, bend, lump, sigma):
-    """Integral of exp(-sigma m) dx / EA from the end to each node, its lump included."""
-    step = bend * np.exp(-sigma * node[:-1]) * sigma * -np.expm1(-sigma * np.diff(node))
-    return np.concatenate([[0.0], np.cumsum(step)]) + np.cumsum(lump * np.exp(-sigma * node))
+def _line_compliance(node, bend, lump, slope) -> float:
+    """Integral of exp(slope m) dx / EA over the path, m/N."""
+    bends = bend * np.exp(slope * node[:-1]) * slope * np.expm1(slope * np.diff(node))
+    return float(bends.sum() + (lump * np.exp(slope * node)).sum())

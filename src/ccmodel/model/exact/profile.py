@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ccmodel.geometry import ConduitPath
 from ccmodel.model.exact.front import position
-from ccmodel.model.exact.path import LUMP, NODE, PASSED, PER_M, X_PER_M, X_START, PathTables
+from ccmodel.model.exact.path import LUMP, NODE, PER_M, X_PER_M, X_START, PathTables
 from ccmodel.model.exact.run import MARGIN
 from ccmodel.model.exact.state import (
     C_M,
@@ -90,8 +90,7 @@ def _store(state: State, tables: PathTables, c: int, m: NDArray, tension: NDArra
     state.kind[c, [LO, FIRST]], state.kind[c, [HI, LAST]] = low, low + m.size - 1
     state.value[c, T_DRIVE], state.value[c, T_LOAD] = tension[0], tension[-1]
     state.value[c, E0] = _elongation(tables, m, tension, slope)
-    # On a line of slope +1 the compliance per drive-end tension is that of sigma = -1.
-    state.value[c, STIFFNESS : STIFFNESS + 2] = 1.0 / tables.table[0, [PASSED + 1, PASSED], -1]
+    state.value[c, STIFFNESS : STIFFNESS + 2] = 1.0 / np.array(tables.line_compliance)
     if tables.total == 0.0 or tension[0] == 0.0:
         state.kind[c, MODE] = WHOLE
         state.kind[c, LINE] = -1

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ccmodel.geometry import ConduitPath
 from ccmodel.mechanisms.kink import Kink
 
-# How much of the cells the bend attracts; the rest is spread by length, for what acts per length.
+# Share of the cells spread by bend; the rest is spread by length, for effects per length.
 BEND_WEIGHT = 0.8
 
 
@@ -22,7 +22,7 @@ class Grid:
     boundary_m, boundary_rad : ndarray, shape (n + 1,)
         Arc length and bend angle at the cells' boundaries; a kink is a cell without length.
     held_rad : ndarray, shape (n + 1,)
-        The bend angle with so much of each kink as holds tension at rest.
+        The bend angle with the share of each kink that holds tension at rest.
     """
 
     boundary_m: NDArray
@@ -51,15 +51,15 @@ class Grid:
 def make_grid(path: ConduitPath, elements: int, kinks: tuple[Kink, ...] = ()) -> Grid:
     """About `elements` cells, finer towards both ends, none across a corner of the path or a kink.
 
-    A front that runs in from an end by X needs a pull of the order X^2, so the tension at that end rises as a square
-    root. Straight lines between the nodes' values of it are off by (cell)^2 / X: cells that grow as the square root
-    of the distance from the end keep that error even, and of second order at the end as well.
+    A slip front at distance X from an end needs a pull of the order X^2, so the tension at that end rises as a square
+    root. Linear interpolation between nodes is off by (cell)^2 / X. Cells that grow as the square root of the distance
+    from the end keep that error even, and of second order at the end as well.
 
     Parameters
     ----------
     path : ConduitPath
     elements : int
-        Cells wanted; a path of many pieces gets at least one a piece.
+        Number of cells; a path of many pieces gets at least one a piece.
     kinks : tuple of Kink
     """
     length, bend = path.length_m, path.bend_rad
@@ -75,7 +75,7 @@ def make_grid(path: ConduitPath, elements: int, kinks: tuple[Kink, ...] = ()) ->
 
     graded = (1 - np.cos(np.pi * np.arange(elements + 1) / elements)) / 2
     x = np.interp(graded[1:-1], coordinate(corners), corners)
-    # A boundary that all but meets a corner would make a cell of no use.
+    # A boundary close to a corner would make a cell that resolves nothing.
     keep = np.ones(x.size, dtype=bool)
     own = np.gradient(np.concatenate([[0.0], x, [length]]))[1:-1] if x.size else x
     for corner in corners[1:-1]:

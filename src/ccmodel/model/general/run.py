@@ -121,18 +121,16 @@ def simulate(
     solved = march(
         physics, piece, node, slide, mean, state, time_s, theta_in, drive, friction_factor, series, steps, out, counts
     )
-    if isinstance(load, TorqueLoad) and load.beside_Nm_per_rad:
-        out[5, :solved] = series[:solved]  # the sensor does not feel the spring beside it
-    return _response(transmission, active, settings, time_s[:solved], theta_in[:solved], out, counts)
+    if isinstance(load, TorqueLoad) and load.parallel_Nm_per_rad:
+        out[5, :solved] = series[:solved]  # the sensor does not feel the spring in parallel
+    if settings.drive_friction_Nm != 0.0:
+        out[6, :solved] += settings.drive_friction_Nm * bearing(theta_in[:solved], settings.drive_presliding_rad)
+    return _response(transmission, active, time_s[:solved], theta_in[:solved], out, counts)
 
 
-def _response(transmission, active, settings, time_s, theta_in, out, counts) -> GeneralResponse:
+def _response(transmission, active, time_s, theta_in, out, counts) -> GeneralResponse:
     """Outputs of the march up to the last sample of `time_s`, and what the sensors read of them."""
     T1, T2, T3, T4, theta_out, tau_out, tau_in = out[:, : time_s.size]
-    if settings.drive_friction_Nm != 0.0:
-        friction = bearing(theta_in, settings.drive_presliding_rad)
-        friction *= settings.drive_friction_Nm
-        tau_in += friction
     channels = {
         THETA_IN: theta_in,
         THETA_OUT: theta_out,
@@ -226,7 +224,7 @@ def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tu
 
 def _physics(transmission: Transmission, load: Load, settings: Settings, elements: int) -> rows.Physics:
     K_e = load.stiffness_Nm_per_rad if isinstance(load, SpringLoad) else 0.0
-    K_e = load.beside_Nm_per_rad if isinstance(load, TorqueLoad) else K_e
+    K_e = load.parallel_Nm_per_rad if isinstance(load, TorqueLoad) else K_e
     values = {name: getattr(settings, name) for name in registry.march_settings()}
     values = {n: tuple(map(float, v)) if isinstance(v, tuple) else float(v) for n, v in values.items()}
     return rows.Physics(
