@@ -6,7 +6,7 @@ CORES ?= 2
 # The former name of REGRESSORS.
 REGRESSORS ?= $(RIVALS)
 
-.PHONY: help results real data test bench table-one coverage proof proof-full proof-real lint lock clean
+.PHONY: help results real data test bench diagnosis-settings table-one coverage proof proof-full proof-real lint lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -48,6 +48,9 @@ bench: $(VENV)/.ready  ## measure speed and accuracy: results/bench.json, docs/f
 
 coverage: $(VENV)/.ready  ## count how often the fits' 90 % intervals hold the truth: docs/coverage.md
 	$(BIN)/python benchmarks/interval_coverage.py
+
+diagnosis-settings: $(VENV)/.ready  ## compute again the figures behind the diagnosis's settings: results/diagnosis-settings.csv
+	$(BIN)/python -m benchmarks.diagnosis_settings --out results/diagnosis-settings.csv
 
 table-one: $(VENV)/.ready  ## ask which left-out effect errs as the paper's Table I does: results/table-one, docs/figures/table-one.png
 	$(BIN)/ccmodel table-one config/table-one.yaml --out results/table-one --figure docs/figures/table-one.png \
