@@ -272,11 +272,11 @@ def _renew(p, rested, w, dt):
 
 
 @njit(error_model="numpy")
-def _set_elastic(p, elastic, x, stretch, stiffness, settling, share, gives):
-    """Tension (N) of one cable's segments without dampers; `x` are the slides, `gives` the conduit's shortening."""
+def _set_elastic(p, elastic, x, stretch, stiffness, settling, share, shortening):
+    """Tension (N) of one cable's segments without dampers; `x` are the slides, `shortening` is the conduit's."""
     n1 = elastic.size
     for i in range(n1):
-        e = stretch[i] + (x[i] - x[i + 1]) - share[i] * gives
+        e = stretch[i] + (x[i] - x[i + 1]) - share[i] * shortening
         elastic[i] = stiffness[i] * max(e, 0.0)
     if p.has_settling:
         for i in range(n1):
@@ -327,13 +327,13 @@ def _run(
     tension = start_tension.copy()
     elastic = start_tension.copy()
     base = np.empty(nodes + 1)
-    lost = np.zeros((relaxing.size, 2, nodes + 1))
+    relaxed = np.zeros((relaxing.size, 2, nodes + 1))
     bristle = bristles[0].copy()
     strength = np.empty((2, nodes))
     hold = np.empty(nodes)
     rested = np.ones((2, nodes))
     start_mean = np.zeros(2)
-    gives = np.zeros(2)
+    shortening = np.zeros(2)
     for c in range(2):
         start_mean[c] = (share * start_tension[c]).sum()
     theta_rest = theta_out
@@ -417,10 +417,10 @@ def _run(
                 w[0] = side * drive_rate
                 x[nodes + 1] = side * load_travel
                 w[nodes + 1] = side * load_radius * omega_out
-                _set_elastic(p, elastic[c], x, stretch[c], stiffness[c], settling[c], share, gives[c])
+                _set_elastic(p, elastic[c], x, stretch[c], stiffness[c], settling[c], share, shortening[c])
                 base[:] = elastic[c]
                 for k in range(relaxing.size):
-                    q = lost[k, c]
+                    q = relaxed[k, c]
                     rate = dt / relaxing_time[k]
                     for i in range(nodes + 1):
                         q[i] += rate * (elastic[c, i] - q[i])
@@ -433,5 +433,7 @@ def _run(
                     mean = 0.0
                     for i in range(nodes + 1):
                         mean += share[i] * T[i]
-                    gives[c] += dt / CONDUIT_LAG_S * (p.conduit_compliance * (mean - start_mean[c]) - gives[c])
+                    shortening[c] += (
+                        dt / CONDUIT_LAG_S * (p.conduit_compliance * (mean - start_mean[c]) - shortening[c])
+                    )
     return out
