@@ -8,12 +8,8 @@ from ccmodel.report.page import write_report
 with logged(snakemake.log[0], snakemake.threads):
     write_report(
         Path(snakemake.output.page),
+        dict(snakemake.input.items()),
+        snakemake.params.studies,
         Path(snakemake.params.raw),
         snakemake.params.unusable,
-        snakemake.input.summaries,
-        snakemake.input.fits,
-        snakemake.input.simulations,
-        Path(snakemake.input.errors),
-        [Path(f) for f in snakemake.input.diagnoses],
-        snakemake.params.studies,
     )

@@ -1,6 +1,6 @@
 """The page of a run: errors, the parts of the studies, fits, and the recordings that were left out."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,30 +19,30 @@ PAPER_TABLE_I = dict(zip(TABLE_ONE, (3.7, 19.4, 3.7, 12.8, 4.1, 9.9, 5.5), stric
 
 
 def write_report(
-    page_file: Path, raw: Path, unusable: Sequence[str], summary_files: Sequence[Path], fit_files: Sequence[Path],
-    simulation_files: Sequence[Path], errors_file: Path, diagnosis_files: Sequence[Path], studies: Sequence[dict],
-) -> None:  # fmt: skip
+    page_file: Path, inputs: Mapping[str, Sequence[str]], studies: Sequence[dict], raw: Path, unusable: Sequence[str]
+) -> None:
     """Write the page, and next to it the messages on what was left out (left-out.json).
 
     Parameters
     ----------
-    page_file, raw : Path
-        The page, in the folder of all results; the folder of the batches, with an importer's findings.json if any.
-    unusable : sequence of str
-        Messages on folders that cannot be a batch.
-    summary_files, fit_files, simulation_files, diagnosis_files : sequence of Path
-        JSON files of ingested batches, fits, simulations and diagnoses.
-    errors_file : Path
-        The table of errors (Parquet).
+    page_file : Path
+        The page, in the folder of all results.
+    inputs : mapping of str to sequence of str
+        JSON files: ``summaries`` of the ingested batches, ``fits``, ``simulations``, ``diagnoses``; and ``errors``, the
+        table of errors (Parquet).
     studies : sequence of dict
         ``kind``, ``name``, ``heading``, ``settings``, ``parameters`` of each, and its JSON file, if any: ``summary``.
+    raw : Path
+        Folder of the batches, with an importer's findings.json if any.
+    unusable : sequence of str
+        Messages on folders that cannot be a batch.
     """
-    batches, fits, simulations = ([read_json(f) for f in fs] for fs in (summary_files, fit_files, simulation_files))
+    batches, fits, simulations = ([read_json(f) for f in inputs[k]] for k in ("summaries", "fits", "simulations"))
     messages = _messages(raw, unusable, batches, fits, simulations)
     write_json(page_file.parent / LEFT_OUT, messages)
-    diagnoses = [{"kind": "diagnosis", "heading": "Diagnoses", "summary": f} for f in diagnosis_files]
+    diagnoses = [{"kind": "diagnosis", "heading": "Diagnoses", "summary": f} for f in inputs["diagnoses"]]
     parts = [p | {"summary": read_json(p["summary"])} if "summary" in p else p for p in (*diagnoses, *studies)]
-    write_page(page_file, parts, batches, pd.read_parquet(errors_file), fits, messages)
+    write_page(page_file, parts, batches, pd.read_parquet(inputs["errors"]), fits, messages)
 
 
 def _messages(
