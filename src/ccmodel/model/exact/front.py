@@ -6,37 +6,9 @@ A front leaves a sliding line behind and sweeps the stored profile segment by se
 from math import exp, expm1, log1p
 
 from ccmodel.kernel import kernel, small_kernel
+from ccmodel.model.exact import state as rows
 from ccmodel.model.exact.path import LUMP, NODE, PER_M
 from ccmodel.model.exact.segment import displacement_gain, solve_segment, tension_gain
-from ccmodel.model.exact.state import (
-    BEND,
-    C_M,
-    C_SLOPE,
-    C_T,
-    D_START,
-    DE,
-    DRIVE,
-    EE,
-    FIRST,
-    HI,
-    LAST,
-    LO,
-    LOAD,
-    ME,
-    OPEN,
-    PAIR,
-    PE,
-    PIECE,
-    R_STOP,
-    SIGMA,
-    SLOPE,
-    STOP,
-    T_DRIVE,
-    TE,
-    D,
-    P,
-    R,
-)
 
 # Two lines whose tensions differ by less than this share are one.
 ROUNDING = 1e-15
@@ -47,18 +19,18 @@ def start_front(path, state, c, end, sigma):
     """Start a front at an end of cable `c`, from the present tension and displacement of that end."""
     sign = 1.0 - 2.0 * c
     front = state.front
-    tension = state.value[c, T_DRIVE + end]
-    front[2 * c + end, ME] = 0.0
-    front[2 * c + end, TE] = tension
-    front[2 * c + end, PE] = tension
-    front[2 * c + end, P] = tension
-    front[2 * c + end, EE] = path.table[end, LUMP, 0]
-    displacement = sign * state.value[PAIR, DRIVE] if end == 0 else -sign * state.value[PAIR, LOAD]
-    front[2 * c + end, DE] = displacement
-    front[2 * c + end, D] = displacement
-    front[2 * c + end, D_START] = displacement
-    state.kind[c, SIGMA + 3 * end] = sigma
-    state.kind[c, PIECE + 3 * end] = 0
+    tension = state.value[c, rows.T_DRIVE + end]
+    front[2 * c + end, rows.ME] = 0.0
+    front[2 * c + end, rows.TE] = tension
+    front[2 * c + end, rows.PE] = tension
+    front[2 * c + end, rows.P] = tension
+    front[2 * c + end, rows.EE] = path.table[end, LUMP, 0]
+    displacement = sign * state.value[rows.PAIR, rows.DRIVE] if end == 0 else -sign * state.value[rows.PAIR, rows.LOAD]
+    front[2 * c + end, rows.DE] = displacement
+    front[2 * c + end, rows.D] = displacement
+    front[2 * c + end, rows.D_START] = displacement
+    state.kind[c, rows.SIGMA + 3 * end] = sigma
+    state.kind[c, rows.PIECE + 3 * end] = 0
     aim(path, state, c, end)
 
 
@@ -66,34 +38,36 @@ def start_front(path, state, c, end, sigma):
 def aim(path, state, c, end):
     """Set up the segment ahead of a front; segments that already have the sliding line's slope are passed at once."""
     front, kind = state.front, state.kind
-    sigma = kind[c, SIGMA + 3 * end]
-    front[2 * c + end, R] = 0.0
+    sigma = kind[c, rows.SIGMA + 3 * end]
+    front[2 * c + end, rows.R] = 0.0
     while True:
-        lo, hi, piece = state.kind[c, LO], state.kind[c, HI], kind[c, PIECE + 3 * end]
-        at_end = lo >= state.kind[c, LAST] if end == 0 else hi <= state.kind[c, FIRST]
+        lo, hi, piece = state.kind[c, rows.LO], state.kind[c, rows.HI], kind[c, rows.PIECE + 3 * end]
+        at_end = lo >= state.kind[c, rows.LAST] if end == 0 else hi <= state.kind[c, rows.FIRST]
         if at_end or piece >= (path.table.shape[2] - 1):
-            kind[c, OPEN + 3 * end] = 0
-            front[2 * c + end, R_STOP] = 0.0
+            kind[c, rows.OPEN + 3 * end] = 0
+            front[2 * c + end, rows.R_STOP] = 0.0
             return
         if end == 0:
-            slope, corner = state.corner[C_SLOPE, c, lo], state.corner[C_M, c, lo + 1]
+            slope, corner = state.corner[rows.C_SLOPE, c, lo], state.corner[rows.C_M, c, lo + 1]
         else:
-            slope, corner = -state.corner[C_SLOPE, c, hi - 1], path.total - state.corner[C_M, c, hi - 1]
+            slope, corner = -state.corner[rows.C_SLOPE, c, hi - 1], path.total - state.corner[rows.C_M, c, hi - 1]
         node = path.table[end, NODE, piece + 1]
         stop = min(corner, node)
-        dm = stop - front[2 * c + end, ME]
+        dm = stop - front[2 * c + end, rows.ME]
         if dm > 0.0:
             r = expm1(sigma * dm)
             if slope != -sigma:
-                front[2 * c + end, STOP] = stop
-                front[2 * c + end, SLOPE] = sigma * slope
-                front[2 * c + end, BEND] = path.table[end, PER_M, piece]
-                front[2 * c + end, R_STOP] = r
-                kind[c, OPEN + 3 * end] = 1
+                front[2 * c + end, rows.STOP] = stop
+                front[2 * c + end, rows.SLOPE] = sigma * slope
+                front[2 * c + end, rows.BEND] = path.table[end, PER_M, piece]
+                front[2 * c + end, rows.R_STOP] = r
+                kind[c, rows.OPEN + 3 * end] = 1
                 return
-            front[2 * c + end, TE] /= 1.0 + r
-            front[2 * c + end, EE] = front[2 * c + end, EE] * (1.0 + r) + abs(r) * path.table[end, PER_M, piece]
-            front[2 * c + end, ME] = stop
+            front[2 * c + end, rows.TE] /= 1.0 + r
+            front[2 * c + end, rows.EE] = (
+                front[2 * c + end, rows.EE] * (1.0 + r) + abs(r) * path.table[end, PER_M, piece]
+            )
+            front[2 * c + end, rows.ME] = stop
         _pass_corner(path, state, c, end, corner <= stop, node <= stop)
 
 
@@ -102,14 +76,14 @@ def _pass_corner(path, state, c, end, corner, node):
     """Pass a corner of the stored profile, a node of the path, or both."""
     if corner:
         if end == 0:
-            state.kind[c, LO] += 1
-            state.front[2 * c + end, TE] = state.corner[C_T, c, state.kind[c, LO]]
+            state.kind[c, rows.LO] += 1
+            state.front[2 * c + end, rows.TE] = state.corner[rows.C_T, c, state.kind[c, rows.LO]]
         else:
-            state.kind[c, HI] -= 1
-            state.front[2 * c + end, TE] = state.corner[C_T, c, state.kind[c, HI]]
+            state.kind[c, rows.HI] -= 1
+            state.front[2 * c + end, rows.TE] = state.corner[rows.C_T, c, state.kind[c, rows.HI]]
     if node:
-        state.kind[c, PIECE + 3 * end] += 1
-        state.front[2 * c + end, EE] += path.table[end, LUMP, state.kind[c, PIECE + 3 * end]]
+        state.kind[c, rows.PIECE + 3 * end] += 1
+        state.front[2 * c + end, rows.EE] += path.table[end, LUMP, state.kind[c, rows.PIECE + 3 * end]]
 
 
 @small_kernel
@@ -119,44 +93,46 @@ def walk(path, state, c, end, weight_P, weight_d, target):
     It stops where the stored profile ends, with no segment ahead (OPEN = 0).
     """
     front, kind = state.front, state.kind
-    sigma = kind[c, SIGMA + 3 * end]
-    while kind[c, OPEN + 3 * end] == 1:
-        residual = target - weight_P * front[2 * c + end, PE] - weight_d * front[2 * c + end, DE]
+    sigma = kind[c, rows.SIGMA + 3 * end]
+    while kind[c, rows.OPEN + 3 * end] == 1:
+        residual = target - weight_P * front[2 * c + end, rows.PE] - weight_d * front[2 * c + end, rows.DE]
         if sigma * residual <= 0.0:
             r = 0.0
         else:
-            r = front[2 * c + end, R_STOP]
-            whole = weight_P * front[2 * c + end, PE] * tension_gain(front[2 * c + end, SLOPE], r)
+            r = front[2 * c + end, rows.R_STOP]
+            whole = weight_P * front[2 * c + end, rows.PE] * tension_gain(front[2 * c + end, rows.SLOPE], r)
             whole += weight_d * displacement_gain(front, c, end, sigma, r)
             if sigma * residual < sigma * whole:
                 r = solve_segment(front, c, end, sigma, weight_P, weight_d, residual)
             else:
                 _pass_segment(path, state, c, end, sigma, r)
                 continue
-        front[2 * c + end, R] = r
-        front[2 * c + end, P] = front[2 * c + end, PE] * (1.0 + tension_gain(front[2 * c + end, SLOPE], r))
-        front[2 * c + end, D] = front[2 * c + end, DE] + displacement_gain(front, c, end, sigma, r)
+        front[2 * c + end, rows.R] = r
+        front[2 * c + end, rows.P] = front[2 * c + end, rows.PE] * (
+            1.0 + tension_gain(front[2 * c + end, rows.SLOPE], r)
+        )
+        front[2 * c + end, rows.D] = front[2 * c + end, rows.DE] + displacement_gain(front, c, end, sigma, r)
         return
-    front[2 * c + end, P] = front[2 * c + end, PE]
-    front[2 * c + end, D] = front[2 * c + end, DE]
+    front[2 * c + end, rows.P] = front[2 * c + end, rows.PE]
+    front[2 * c + end, rows.D] = front[2 * c + end, rows.DE]
 
 
 @kernel
 def _pass_segment(path, state, c, end, sigma, r):
     """Take a front to the end of its segment and on into the next."""
     front = state.front
-    slope = front[2 * c + end, SLOPE]
-    front[2 * c + end, DE] += displacement_gain(front, c, end, sigma, r)
-    front[2 * c + end, PE] *= 1.0 + tension_gain(slope, r)
-    front[2 * c + end, TE] *= 1.0 + r if slope == 1.0 else exp(slope * log1p(r))
-    front[2 * c + end, EE] = front[2 * c + end, EE] * (1.0 + r) + abs(r) * front[2 * c + end, BEND]
-    stop = front[2 * c + end, STOP]
-    front[2 * c + end, ME] = stop
+    slope = front[2 * c + end, rows.SLOPE]
+    front[2 * c + end, rows.DE] += displacement_gain(front, c, end, sigma, r)
+    front[2 * c + end, rows.PE] *= 1.0 + tension_gain(slope, r)
+    front[2 * c + end, rows.TE] *= 1.0 + r if slope == 1.0 else exp(slope * log1p(r))
+    front[2 * c + end, rows.EE] = front[2 * c + end, rows.EE] * (1.0 + r) + abs(r) * front[2 * c + end, rows.BEND]
+    stop = front[2 * c + end, rows.STOP]
+    front[2 * c + end, rows.ME] = stop
     if end == 0:
-        corner = state.corner[C_M, c, state.kind[c, LO] + 1]
+        corner = state.corner[rows.C_M, c, state.kind[c, rows.LO] + 1]
     else:
-        corner = path.total - state.corner[C_M, c, state.kind[c, HI] - 1]
-    node = path.table[end, NODE, state.kind[c, PIECE + 3 * end] + 1]
+        corner = path.total - state.corner[rows.C_M, c, state.kind[c, rows.HI] - 1]
+    node = path.table[end, NODE, state.kind[c, rows.PIECE + 3 * end] + 1]
     _pass_corner(path, state, c, end, corner <= stop, node <= stop)
     aim(path, state, c, end)
 
@@ -164,25 +140,27 @@ def _pass_segment(path, state, c, end, sigma, r):
 @small_kernel
 def position(state, c, end):
     """Position of a front, m = mu phi counted from its end."""
-    return state.front[2 * c + end, ME] + state.kind[c, SIGMA + 3 * end] * log1p(state.front[2 * c + end, R])
+    return state.front[2 * c + end, rows.ME] + state.kind[c, rows.SIGMA + 3 * end] * log1p(
+        state.front[2 * c + end, rows.R]
+    )
 
 
 @kernel
 def end_compliance(state, c, end):
     """Displacement of an end per unit of its own tension while its front advances, m/N."""
     front = state.front
-    sigma = state.kind[c, SIGMA + 3 * end]
-    r = front[2 * c + end, R]
-    per_front_tension = front[2 * c + end, EE] * (1.0 + r) + abs(r) * front[2 * c + end, BEND]
+    sigma = state.kind[c, rows.SIGMA + 3 * end]
+    r = front[2 * c + end, rows.R]
+    per_front_tension = front[2 * c + end, rows.EE] * (1.0 + r) + abs(r) * front[2 * c + end, rows.BEND]
     return per_front_tension * exp(-sigma * position(state, c, end))
 
 
 @small_kernel
 def has_met(path, state, c):
     """Whether two fronts that slide in the same direction have met: their sliding lines are then one line."""
-    if state.kind[c, OPEN] == 0 or state.kind[c, OPEN + 3] == 0:
+    if state.kind[c, rows.OPEN] == 0 or state.kind[c, rows.OPEN + 3] == 0:
         return True
-    sigma = state.kind[c, SIGMA]
+    sigma = state.kind[c, rows.SIGMA]
     ratio = path.ratio[(1 - sigma) // 2]
-    load = state.front[2 * c + 1, P]
-    return sigma * (state.front[2 * c, P] * ratio - load) >= -ROUNDING * load
+    load = state.front[2 * c + 1, rows.P]
+    return sigma * (state.front[2 * c, rows.P] * ratio - load) >= -ROUNDING * load

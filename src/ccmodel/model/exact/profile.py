@@ -6,33 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.geometry import ConduitPath
+from ccmodel.model.exact import state as rows
 from ccmodel.model.exact.front import position
 from ccmodel.model.exact.path import LUMP, NODE, PER_M, X_PER_M, X_START, PathTables
 from ccmodel.model.exact.run import MARGIN
-from ccmodel.model.exact.state import (
-    C_M,
-    C_SLOPE,
-    C_T,
-    E0,
-    FIRST,
-    HI,
-    LAST,
-    LINE,
-    LO,
-    MODE,
-    OFFSET,
-    PAIR,
-    SIGMA,
-    SLOPE,
-    STIFFNESS,
-    T_DRIVE,
-    T_LOAD,
-    TE,
-    WHOLE,
-    R,
-    State,
-    blank_state,
-)
+from ccmodel.model.exact.state import State, blank_state
 from ccmodel.model.initial import InitialTension
 
 # Elongation of a cable that is not there: it hangs slack whatever the drive does, m.
@@ -73,10 +51,10 @@ def initial_state(
         if present[c]:
             _store(state, tables, c, m, tension, slope)
         else:
-            state.value[c, E0] = ABSENT_M
-            state.kind[c, MODE] = WHOLE
-            state.kind[c, LINE] = -1
-    state.value[PAIR, OFFSET] = state.value[0, T_LOAD] - state.value[1, T_LOAD]
+            state.value[c, rows.E0] = ABSENT_M
+            state.kind[c, rows.MODE] = rows.WHOLE
+            state.kind[c, rows.LINE] = -1
+    state.value[rows.PAIR, rows.OFFSET] = state.value[0, rows.T_LOAD] - state.value[1, rows.T_LOAD]
     return state
 
 
@@ -84,16 +62,16 @@ def _store(state: State, tables: PathTables, c: int, m: NDArray, tension: NDArra
     """Store an initial profile of cable `c` as corners."""
     low = (state.corner.shape[2] - m.size) // 2
     place = slice(low, low + m.size)
-    state.corner[C_M, c, place], state.corner[C_T, c, place] = m, tension
-    state.corner[C_M, c, low + m.size - 1] = tables.total
-    state.corner[C_SLOPE, c, low : low + m.size - 1] = slope
-    state.kind[c, [LO, FIRST]], state.kind[c, [HI, LAST]] = low, low + m.size - 1
-    state.value[c, T_DRIVE], state.value[c, T_LOAD] = tension[0], tension[-1]
-    state.value[c, E0] = _elongation(tables, m, tension, slope)
-    state.value[c, STIFFNESS : STIFFNESS + 2] = 1.0 / np.array(tables.line_compliance)
+    state.corner[rows.C_M, c, place], state.corner[rows.C_T, c, place] = m, tension
+    state.corner[rows.C_M, c, low + m.size - 1] = tables.total
+    state.corner[rows.C_SLOPE, c, low : low + m.size - 1] = slope
+    state.kind[c, [rows.LO, rows.FIRST]], state.kind[c, [rows.HI, rows.LAST]] = low, low + m.size - 1
+    state.value[c, rows.T_DRIVE], state.value[c, rows.T_LOAD] = tension[0], tension[-1]
+    state.value[c, rows.E0] = _elongation(tables, m, tension, slope)
+    state.value[c, rows.STIFFNESS : rows.STIFFNESS + 2] = 1.0 / np.array(tables.line_compliance)
     if tables.total == 0.0 or tension[0] == 0.0:
-        state.kind[c, MODE] = WHOLE
-        state.kind[c, LINE] = -1
+        state.kind[c, rows.MODE] = rows.WHOLE
+        state.kind[c, rows.LINE] = -1
 
 
 def _elongation(tables: PathTables, m: NDArray, tension: NDArray, slope: NDArray) -> float:
@@ -133,21 +111,21 @@ def cable_profile(
 
 def _corners(state: State, tables: PathTables, c: int) -> tuple[NDArray, NDArray]:
     """Corners of cable `c`, the fronts' sliding lines included: m from the drive end, and tension (N)."""
-    ends = state.value[c, T_DRIVE], state.value[c, T_LOAD]
+    ends = state.value[c, rows.T_DRIVE], state.value[c, rows.T_LOAD]
     kind = state.kind[c]
-    if kind[MODE] == WHOLE:
+    if kind[rows.MODE] == rows.WHOLE:
         return np.array([0.0, max(tables.total, 0.0)]), np.array(ends)
     points = []
     for end in range(2):
-        if state.kind[c, SIGMA + 3 * end]:
+        if state.kind[c, rows.SIGMA + 3 * end]:
             front = state.front[2 * c + end]
-            tension = front[TE] * np.exp(front[SLOPE] * np.log1p(front[R]))
+            tension = front[rows.TE] * np.exp(front[rows.SLOPE] * np.log1p(front[rows.R]))
             points.append((abs(end * tables.total - position(state, c, end)), tension))
     fronts = [p[0] for p in points]
-    low = fronts[0] if state.kind[c, SIGMA] else 0.0
-    high = fronts[-1] if state.kind[c, SIGMA + 3] else tables.total
-    for i in range(kind[LO], kind[HI] + 1):
-        if low < state.corner[C_M, c, i] < high:
-            points.append((state.corner[C_M, c, i], state.corner[C_T, c, i]))
+    low = fronts[0] if state.kind[c, rows.SIGMA] else 0.0
+    high = fronts[-1] if state.kind[c, rows.SIGMA + 3] else tables.total
+    for i in range(kind[rows.LO], kind[rows.HI] + 1):
+        if low < state.corner[rows.C_M, c, i] < high:
+            points.append((state.corner[rows.C_M, c, i], state.corner[rows.C_T, c, i]))
     points = [(0.0, ends[0]), *sorted(points), (tables.total, ends[1])]
     return np.array([p[0] for p in points]), np.array([p[1] for p in points])

@@ -3,26 +3,10 @@
 from math import inf
 
 from ccmodel.kernel import borrowed, kernel, small_kernel
+from ccmodel.model.exact import state as rows
 from ccmodel.model.exact.cable import is_slack
 from ccmodel.model.exact.front import position
 from ccmodel.model.exact.path import NODE, X_PER_M, X_START
-from ccmodel.model.exact.state import (
-    D_START,
-    DRIVE,
-    FIRST,
-    LAST,
-    LINE,
-    LOAD,
-    MODE,
-    OFFSET,
-    OPEN,
-    PAIR,
-    PIECE,
-    T_DRIVE,
-    T_LOAD,
-    WHOLE,
-    D,
-)
 from ccmodel.model.exact.step import excess, step
 
 # How `run` ends.
@@ -66,22 +50,22 @@ def run(path, state, trial, progress, drive, offset, stiffness, present, out, ph
     path, state, trial = borrowed(path), borrowed(state), borrowed(trial)
     for i in range(progress[0], drive[0].size):
         for c in range(2):
-            if state.kind[c, FIRST] < MARGIN or state.kind[c, LAST] > state.corner.shape[2] - MARGIN:
+            if state.kind[c, rows.FIRST] < MARGIN or state.kind[c, rows.LAST] > state.corner.shape[2] - MARGIN:
                 progress[0] = i
                 return CORNERS_FULL
         drive_now = drive[0][i] * drive[1]
-        move = drive_now - state.value[PAIR, DRIVE]
+        move = drive_now - state.value[rows.PAIR, rows.DRIVE]
         if move != 0.0:
             direction = 1 if move > 0.0 else -1
             if direction == -progress[1]:
                 progress[2] = _any_slack(state, present)
             progress[1] = direction
             step(path, state, trial, direction, drive_now, offset, stiffness)
-        out[0, i] = state.value[0, T_DRIVE]
-        out[1, i] = state.value[0, T_LOAD]
-        out[2, i] = state.value[1, T_DRIVE]
-        out[3, i] = state.value[1, T_LOAD]
-        out[4, i] = state.value[PAIR, LOAD]
+        out[0, i] = state.value[0, rows.T_DRIVE]
+        out[1, i] = state.value[0, rows.T_LOAD]
+        out[2, i] = state.value[1, rows.T_DRIVE]
+        out[3, i] = state.value[1, rows.T_LOAD]
+        out[4, i] = state.value[rows.PAIR, rows.LOAD]
         for c in range(2):
             out[5 + 2 * c, i], out[6 + 2 * c, i] = _moving(path, state, c)
         phase[i] = _phase(state, present, progress)
@@ -95,10 +79,10 @@ def run(path, state, trial, progress, drive, offset, stiffness, present, out, ph
 @kernel
 def settle(path, state, trial, offset, stiffness):
     """Let a load that does not hold the initial tensions find its balance while the drive rests."""
-    if offset == state.value[PAIR, OFFSET]:
+    if offset == state.value[rows.PAIR, rows.OFFSET]:
         return
-    direction = 1 if offset < state.value[PAIR, OFFSET] else -1
-    step(path, state, trial, direction, state.value[PAIR, DRIVE], offset, stiffness)
+    direction = 1 if offset < state.value[rows.PAIR, rows.OFFSET] else -1
+    step(path, state, trial, direction, state.value[rows.PAIR, rows.DRIVE], offset, stiffness)
 
 
 @small_kernel
@@ -117,7 +101,11 @@ def _phase(state, present, progress):
     progress[2] = 0
     reached = 0
     for c in range(2):
-        if present[c] and state.kind[c, MODE] == WHOLE and state.kind[c, LINE] == (2 * c - 1) * progress[1]:
+        if (
+            present[c]
+            and state.kind[c, rows.MODE] == rows.WHOLE
+            and state.kind[c, rows.LINE] == (2 * c - 1) * progress[1]
+        ):
             reached += 1
     return reached
 
@@ -125,7 +113,7 @@ def _phase(state, present, progress):
 @small_kernel
 def _moving(path, state, c):
     """Arc lengths up to which and from which on a cable has slid since the last reversal, m."""
-    if state.kind[c, MODE] == WHOLE:
+    if state.kind[c, rows.MODE] == rows.WHOLE:
         return path.length, 0.0
     return _reach(path, state, c, 0), path.length - _reach(path, state, c, 1)
 
@@ -133,10 +121,10 @@ def _moving(path, state, c):
 @small_kernel
 def _reach(path, state, c, end):
     """Arc length between an end and its front, m."""
-    if state.front[2 * c + end, D] == state.front[2 * c + end, D_START]:
+    if state.front[2 * c + end, rows.D] == state.front[2 * c + end, rows.D_START]:
         return 0.0
-    if state.kind[c, OPEN + 3 * end] == 0:
+    if state.kind[c, rows.OPEN + 3 * end] == 0:
         return path.length
-    piece = state.kind[c, PIECE + 3 * end]
+    piece = state.kind[c, rows.PIECE + 3 * end]
     inward = position(state, c, end) - path.table[end, NODE, piece]
     return path.table[end, X_START, piece] + inward * path.table[end, X_PER_M, piece]

@@ -8,24 +8,10 @@ whose left side falls with Q: linear where a cable slides as a whole, a quadrati
 from math import inf
 
 from ccmodel.kernel import kernel, small_kernel
+from ccmodel.model.exact import state as rows
 from ccmodel.model.exact.cable import line_stiffness, pull_line, reverse, slide_whole
 from ccmodel.model.exact.front import end_compliance, has_met, walk
-from ccmodel.model.exact.state import (
-    DRIVE,
-    E0,
-    FRONTS,
-    LOAD,
-    MODE,
-    OFFSET,
-    PAIR,
-    SIGMA,
-    T_DRIVE,
-    T_LOAD,
-    D,
-    P,
-    copy_fronts,
-    copy_state,
-)
+from ccmodel.model.exact.state import copy_fronts, copy_state
 
 
 @kernel
@@ -37,14 +23,14 @@ def step(path, state, trial, direction, drive, offset, stiffness):
     """
     reverse(path, state, 0, direction)
     reverse(path, state, 1, -direction)
-    state.value[PAIR, DRIVE] = drive
+    state.value[rows.PAIR, rows.DRIVE] = drive
     cables_with_fronts = 0
     last_with_fronts = -1
     for c in range(2):
         sign = 1 - 2 * c
-        if state.kind[c, MODE] == FRONTS:
+        if state.kind[c, rows.MODE] == rows.FRONTS:
             walk(path, state, c, 0, 0.0, 1.0, sign * drive)
-            state.value[c, T_DRIVE] = state.front[2 * c, P]
+            state.value[c, rows.T_DRIVE] = state.front[2 * c, rows.P]
             if has_met(path, state, c):
                 slide_whole(path, state, c, -sign * direction)
             else:
@@ -52,8 +38,8 @@ def step(path, state, trial, direction, drive, offset, stiffness):
                 last_with_fronts = c
         else:
             pull_line(path, state, c)
-    changed = offset != state.value[PAIR, OFFSET]
-    state.value[PAIR, OFFSET] = offset
+    changed = offset != state.value[rows.PAIR, rows.OFFSET]
+    state.value[rows.PAIR, rows.OFFSET] = offset
     if stiffness == inf or (cables_with_fronts == 2 and not changed):
         return
     if direction * excess(state, offset, stiffness) <= 0.0:
@@ -68,14 +54,19 @@ def step(path, state, trial, direction, drive, offset, stiffness):
         _balance_one_front(path, state, trial, last_with_fronts, offset, stiffness)
         if not has_met(path, state, last_with_fronts):
             return
-        slide_whole(path, state, last_with_fronts, state.kind[last_with_fronts, SIGMA + 3])
+        slide_whole(path, state, last_with_fronts, state.kind[last_with_fronts, rows.SIGMA + 3])
     _balance_lines(path, state, offset, stiffness)
 
 
 @small_kernel
 def excess(state, offset, stiffness):
     """Force out of balance at the rim of the load pulley, T2 - T4 - offset - stiffness Q, N."""
-    return state.value[0, T_LOAD] - state.value[1, T_LOAD] - offset - stiffness * state.value[PAIR, LOAD]
+    return (
+        state.value[0, rows.T_LOAD]
+        - state.value[1, rows.T_LOAD]
+        - offset
+        - stiffness * state.value[rows.PAIR, rows.LOAD]
+    )
 
 
 @small_kernel
@@ -83,9 +74,11 @@ def _balance_lines(path, state, offset, stiffness):
     """Balance the load where both cables slide as a whole, taut or slack."""
     k_A = line_stiffness(path, state, 0)[1]
     k_B = line_stiffness(path, state, 1)[1]
-    e_A = state.value[0, E0] + state.value[PAIR, DRIVE]
-    e_B = state.value[1, E0] - state.value[PAIR, DRIVE]
-    state.value[PAIR, LOAD] = _balanced_load(k_A, e_A, k_B, e_B, offset, stiffness, state.value[PAIR, LOAD])
+    e_A = state.value[0, rows.E0] + state.value[rows.PAIR, rows.DRIVE]
+    e_B = state.value[1, rows.E0] - state.value[rows.PAIR, rows.DRIVE]
+    state.value[rows.PAIR, rows.LOAD] = _balanced_load(
+        k_A, e_A, k_B, e_B, offset, stiffness, state.value[rows.PAIR, rows.LOAD]
+    )
     pull_line(path, state, 0)
     pull_line(path, state, 1)
 
@@ -110,17 +103,17 @@ def _balance_one_front(path, state, trial, c, offset, stiffness):
     other = 1 - c
     sign = 1 - 2 * c
     k = line_stiffness(path, state, other)[1]
-    stretch = state.value[other, E0] - sign * state.value[PAIR, DRIVE]
+    stretch = state.value[other, rows.E0] - sign * state.value[rows.PAIR, rows.DRIVE]
     if k > 0.0:
         copy_fronts(state, trial, c)
         walk(path, state, c, 1, 1.0, k + stiffness, k * stretch + sign * offset)
-        if stretch - state.front[2 * c + 1, D] < 0.0:
+        if stretch - state.front[2 * c + 1, rows.D] < 0.0:
             copy_fronts(trial, state, c)
             k = 0.0
     if k == 0.0:
         walk(path, state, c, 1, 1.0, stiffness, sign * offset)
-    state.value[PAIR, LOAD] = -sign * state.front[2 * c + 1, D]
-    state.value[c, T_LOAD] = state.front[2 * c + 1, P]
+    state.value[rows.PAIR, rows.LOAD] = -sign * state.front[2 * c + 1, rows.D]
+    state.value[c, rows.T_LOAD] = state.front[2 * c + 1, rows.P]
     pull_line(path, state, other)
 
 
@@ -134,18 +127,18 @@ def _balance_both_fronts(path, state, trial, direction, offset, stiffness):
     pulled = (1 + direction) // 2
     let_in = 1 - pulled
     copy_state(state, trial)
-    start = state.value[let_in, T_LOAD]
-    low = state.value[pulled, T_LOAD]
-    high = start - direction * (offset + stiffness * state.value[PAIR, LOAD])
+    start = state.value[let_in, rows.T_LOAD]
+    low = state.value[pulled, rows.T_LOAD]
+    high = start - direction * (offset + stiffness * state.value[rows.PAIR, rows.LOAD])
     tension = 0.5 * (low + high)
     for attempt in range(300):
         copy_fronts(trial, state, 0)
         copy_fronts(trial, state, 1)
         walk(path, state, pulled, 1, 1.0, 0.0, tension)
-        load = (2 * pulled - 1) * state.front[2 * pulled + 1, D]
+        load = (2 * pulled - 1) * state.front[2 * pulled + 1, rows.D]
         wanted = tension + direction * (offset + stiffness * load)
         walk(path, state, let_in, 1, 1.0, 0.0, min(start, wanted))
-        mismatch = direction * (load - (2 * let_in - 1) * state.front[2 * let_in + 1, D])
+        mismatch = direction * (load - (2 * let_in - 1) * state.front[2 * let_in + 1, rows.D])
         if mismatch > 0.0:
             high = tension
         else:
@@ -161,9 +154,9 @@ def _balance_both_fronts(path, state, trial, direction, offset, stiffness):
         if abs(proposed - tension) <= 2e-16 * abs(tension):
             break
         tension = proposed
-    state.value[PAIR, LOAD] = load
-    state.value[0, T_LOAD] = state.front[0 + 1, P]
-    state.value[1, T_LOAD] = state.front[2 + 1, P]
+    state.value[rows.PAIR, rows.LOAD] = load
+    state.value[0, rows.T_LOAD] = state.front[0 + 1, rows.P]
+    state.value[1, rows.T_LOAD] = state.front[2 + 1, rows.P]
 
 
 @kernel
@@ -172,10 +165,10 @@ def _first_to_slide_whole(path, state, trial, direction):
     copy_state(state, trial)
     travel = [0.0, 0.0]
     for c in range(2):
-        sigma = state.kind[c, SIGMA]
-        before = state.front[2 * c + 1, D]
-        walk(path, state, c, 1, 1.0, 0.0, state.front[2 * c, P] * path.ratio[(1 - sigma) // 2])
-        travel[c] = abs(state.front[2 * c + 1, D] - before)
+        sigma = state.kind[c, rows.SIGMA]
+        before = state.front[2 * c + 1, rows.D]
+        walk(path, state, c, 1, 1.0, 0.0, state.front[2 * c, rows.P] * path.ratio[(1 - sigma) // 2])
+        travel[c] = abs(state.front[2 * c + 1, rows.D] - before)
     copy_state(trial, state)
     first = 0 if travel[0] <= travel[1] else 1
     slide_whole(path, state, first, (2 * first - 1) * direction)

@@ -8,35 +8,8 @@ cable B. Displacements count towards the drive end. A step solves the equations 
 from ccmodel.kernel import borrowed, kernel
 from ccmodel.mechanisms.pulley_eccentricity import winding
 from ccmodel.mechanisms.relaxation import lag_weights
+from ccmodel.model.general import layout as rows
 from ccmodel.model.general.equations import renew_contacts, set_grip
-from ccmodel.model.general.layout import (
-    ANGLE,
-    BEARING,
-    BEARING_NEXT,
-    BEFORE,
-    BRISTLE,
-    BRISTLE_NEXT,
-    DT,
-    ELASTIC,
-    LAST,
-    LOST_TENSION,
-    MEAN,
-    MEAN_BEFORE,
-    MEAN_LAST,
-    MEAN_NEXT,
-    NOW,
-    OMEGA,
-    OMEGA_BEFORE,
-    OMEGA_NEXT,
-    PRESCRIBED_ANGLE,
-    PULL,
-    RESTED,
-    ROTATION,
-    SHARE,
-    STRETCH,
-    TENSION,
-    TORQUE,
-)
 from ccmodel.model.general.newton import copy_slides, solve_step
 
 # Coulomb friction has no bristle; this one is a ten-millionth of the stretch of any cable worth pulling.
@@ -62,31 +35,32 @@ def _accept(ph, piece, node, slide, mean, load, rotation, dt):
     weights = lag_weights(dt / ph.relaxing_time_s) if ph.has_relaxation and dt > 0.0 else (1.0, 0.0, 0.0)
     soft = ph.conduit_compliance > 0.0
     for c in range(2):
-        d = slide[NOW, c]
+        d = slide[rows.NOW, c]
         for i in range(n + 1):
-            piece[STRETCH, c, i] += d[i] - d[i + 1]
+            piece[rows.STRETCH, c, i] += d[i] - d[i + 1]
         if soft:
-            mean[MEAN_BEFORE, c], mean[MEAN_LAST, c] = mean[MEAN_LAST, c], mean[MEAN_NEXT, c] - mean[MEAN, c]
-            gives = ph.conduit_compliance * mean[MEAN_LAST, c]
-            mean[MEAN, c] = mean[MEAN_NEXT, c]
+            mean[rows.MEAN_BEFORE, c] = mean[rows.MEAN_LAST, c]
+            mean[rows.MEAN_LAST, c] = mean[rows.MEAN_NEXT, c] - mean[rows.MEAN, c]
+            gives = ph.conduit_compliance * mean[rows.MEAN_LAST, c]
+            mean[rows.MEAN, c] = mean[rows.MEAN_NEXT, c]
             for i in range(n + 1):
-                piece[STRETCH, c, i] -= gives * piece[SHARE, c, i]
+                piece[rows.STRETCH, c, i] -= gives * piece[rows.SHARE, c, i]
         if ph.has_relaxation:
             for i in range(n + 1):
-                elastic = max(piece[PULL, c, i], 0.0)
-                lost = weights[0] * piece[LOST_TENSION, c, i] + weights[1] * piece[ELASTIC, c, i]
-                piece[LOST_TENSION, c, i] = lost + weights[2] * elastic
-                piece[ELASTIC, c, i] = elastic
+                elastic = max(piece[rows.PULL, c, i], 0.0)
+                lost = weights[0] * piece[rows.LOST_TENSION, c, i] + weights[1] * piece[rows.ELASTIC, c, i]
+                piece[rows.LOST_TENSION, c, i] = lost + weights[2] * elastic
+                piece[rows.ELASTIC, c, i] = elastic
         for i in range(n):
-            node[BRISTLE, c, i] = node[BRISTLE_NEXT, c, i]
+            node[rows.BRISTLE, c, i] = node[rows.BRISTLE_NEXT, c, i]
     if ph.stribeck_rise > 0.0 and dt > 0.0:
         for c in range(2):
-            renew_contacts(ph, node, slide, c, dt, RESTED)
+            renew_contacts(ph, node, slide, c, dt, rows.RESTED)
     if dt > 0.0:
-        load[ROTATION], load[DT] = rotation, dt
-        load[OMEGA_BEFORE], load[OMEGA] = load[OMEGA], load[OMEGA_NEXT]
-    load[ANGLE] += rotation
-    load[BEARING] = load[BEARING_NEXT]
+        load[rows.ROTATION], load[rows.DT] = rotation, dt
+        load[rows.OMEGA_BEFORE], load[rows.OMEGA] = load[rows.OMEGA], load[rows.OMEGA_NEXT]
+    load[rows.ANGLE] += rotation
+    load[rows.BEARING] = load[rows.BEARING_NEXT]
 
 
 @kernel(error_model="numpy")
@@ -122,10 +96,10 @@ def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, friction_
     piece, node, slide, mean, load = borrowed((piece, node, slide, mean, load))
     m, n = time_s.size, node.shape[2]
     last_rotation, before_rotation, last_pull, before_pull, last_dt = 0.0, 0.0, 0.0, 0.0, 0.0
-    node[RESTED] = 1.0
+    node[rows.RESTED] = 1.0
     set_grip(ph, node, slide, friction_factor[0], 0.0)
     fixed_grip = ph.stribeck_rise == 0.0 and friction_factor.size == 1
-    prescribed = ph.kind == PRESCRIBED_ANGLE
+    prescribed = ph.kind == rows.PRESCRIBED_ANGLE
     wound_before = winding(theta_in[0], drive[1], drive[2])[0]
     for j in range(m):
         wound, radius_factor, _ = winding(theta_in[j], drive[1], drive[2])
@@ -144,21 +118,22 @@ def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, friction_
             if is_whole and abs(expected - step_pull) <= 0.05 * abs(step_pull):
                 for c in range(2):
                     for i in range(n + 2):
-                        slide[NOW, c, i] = 2 * slide[LAST, c, i] - slide[BEFORE, c, i]
-                    mean[MEAN_NEXT, c] = mean[MEAN, c] + 2 * mean[MEAN_LAST, c] - mean[MEAN_BEFORE, c]
+                        slide[rows.NOW, c, i] = 2 * slide[rows.LAST, c, i] - slide[rows.BEFORE, c, i]
+                    change = 2 * mean[rows.MEAN_LAST, c] - mean[rows.MEAN_BEFORE, c]
+                    mean[rows.MEAN_NEXT, c] = mean[rows.MEAN, c] + change
                 rotation = 2 * last_rotation - before_rotation
             else:
                 ratio = step_pull / last_pull if last_pull * pull > 0.0 else 0.0
                 ratio = min(ratio, 4.0)
                 for c in range(2):
                     for i in range(n + 2):
-                        slide[NOW, c, i] = ratio * slide[LAST, c, i]
-                    mean[MEAN_NEXT, c] = mean[MEAN, c] + ratio * mean[MEAN_LAST, c]
+                        slide[rows.NOW, c, i] = ratio * slide[rows.LAST, c, i]
+                    mean[rows.MEAN_NEXT, c] = mean[rows.MEAN, c] + ratio * mean[rows.MEAN_LAST, c]
                 rotation = ratio * last_rotation
-            slide[NOW, 0, 0], slide[NOW, 1, 0] = step_pull, -step_pull
+            slide[rows.NOW, 0, 0], slide[rows.NOW, 1, 0] = step_pull, -step_pull
             value = prescribed_value - (1.0 - done - part) * rise
             if prescribed:
-                rotation = value - load[ANGLE]
+                rotation = value - load[rows.ANGLE]
             torque = 0.0 if prescribed else value
             solved = False
             for iteration in range(GRIP_ITERATIONS):
@@ -181,22 +156,22 @@ def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, friction_
                     bristle *= 10.0
                     part = whole
                 continue
-            copy_slides(slide, BEFORE, LAST)
-            copy_slides(slide, LAST, NOW)
+            copy_slides(slide, rows.BEFORE, rows.LAST)
+            copy_slides(slide, rows.LAST, rows.NOW)
             before_rotation, last_rotation = last_rotation, rotation
             before_pull, last_pull, last_dt = last_pull, step_pull, step_dt
             _accept(ph, piece, node, slide, mean, load, rotation, step_dt)
             counts[1] += 1
             done += part
             part = min(2.0 * part, whole)
-        out[0, j], out[1, j] = max(piece[TENSION, 0, 0], 0.0), max(piece[TENSION, 0, n], 0.0)
-        out[2, j], out[3, j] = max(piece[TENSION, 1, 0], 0.0), max(piece[TENSION, 1, n], 0.0)
-        out[4, j] = load[ANGLE]
-        bearing = ph.load_friction_Nm * load[BEARING]
+        out[0, j], out[1, j] = max(piece[rows.TENSION, 0, 0], 0.0), max(piece[rows.TENSION, 0, n], 0.0)
+        out[2, j], out[3, j] = max(piece[rows.TENSION, 1, 0], 0.0), max(piece[rows.TENSION, 1, n], 0.0)
+        out[4, j] = load[rows.ANGLE]
+        bearing = ph.load_friction_Nm * load[rows.BEARING]
         if prescribed:
-            R = ph.radius * winding(load[ANGLE], ph.load_eccentricity[0], ph.load_eccentricity[1])[1]
+            R = ph.radius * winding(load[rows.ANGLE], ph.load_eccentricity[0], ph.load_eccentricity[1])[1]
             out[5, j] = R * (out[1, j] - out[3, j]) - bearing
         else:
-            out[5, j] = load[TORQUE]
+            out[5, j] = load[rows.TORQUE]
         out[6, j] = drive[0] * radius_factor * (out[0, j] - out[2, j])
     return m

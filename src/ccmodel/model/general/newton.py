@@ -8,33 +8,8 @@ import numpy as np
 
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.relaxation import lag_weights
+from ccmodel.model.general import layout as rows
 from ccmodel.model.general.equations import imbalance
-from ccmodel.model.general.layout import (
-    ALPHA,
-    BETA,
-    BRISTLE,
-    BY_END,
-    END_BY_END,
-    END_FIXED,
-    ETA,
-    EXCESS,
-    FAR,
-    FAST,
-    FIXED,
-    GAMMA,
-    GIVES,
-    IMPEDANCE,
-    MEAN_EXCESS,
-    MEAN_NEXT,
-    MEAN_SAVED,
-    MEAN_STEP,
-    NEAR,
-    NOW,
-    SAVED,
-    SHARE,
-    STEP,
-    TANGENT,
-)
 
 # Out of balance by no more than this share of the highest tension.
 TOLERANCE = 1e-8
@@ -47,7 +22,7 @@ PATIENCE = 12
 SMALLEST_SHARE = 1.0 / 128
 
 
-@kernel(error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=rows.FAST)
 def solve(piece, node, slide, G, slope, R, free):
     """Newton's step of the slides into `STEP`; returns that of the load pulley's rotation.
 
@@ -57,26 +32,27 @@ def solve(piece, node, slide, G, slope, R, free):
     n = node.shape[2]
     alpha_A, alpha_B, gamma_A, gamma_B = 0.0, 0.0, 1.0, 1.0
     for i in range(n):
-        pA, pB = node[NEAR, 0, i], node[NEAR, 1, i]
-        fA, fB = pA * gamma_A + node[GIVES, 0, i], pB * gamma_B + node[GIVES, 1, i]
-        iA, iB = 1.0 / (fA + node[FAR, 0, i]), 1.0 / (fB + node[FAR, 1, i])
-        alpha_A, alpha_B = (node[EXCESS, 0, i] + pA * alpha_A) * iA, (node[EXCESS, 1, i] + pB * alpha_B) * iB
+        pA, pB = node[rows.NEAR, 0, i], node[rows.NEAR, 1, i]
+        fA, fB = pA * gamma_A + node[rows.GIVES, 0, i], pB * gamma_B + node[rows.GIVES, 1, i]
+        iA, iB = 1.0 / (fA + node[rows.FAR, 0, i]), 1.0 / (fB + node[rows.FAR, 1, i])
+        alpha_A, alpha_B = (node[rows.EXCESS, 0, i] + pA * alpha_A) * iA, (node[rows.EXCESS, 1, i] + pB * alpha_B) * iB
         gamma_A, gamma_B = fA * iA, fB * iB
-        node[ALPHA, 0, i], node[ALPHA, 1, i] = alpha_A, alpha_B
-        node[BETA, 0, i], node[BETA, 1, i] = node[FAR, 0, i] * iA, node[FAR, 1, i] * iB
-    KA, KB = piece[TANGENT, 0, n], piece[TANGENT, 1, n]
+        node[rows.ALPHA, 0, i], node[rows.ALPHA, 1, i] = alpha_A, alpha_B
+        node[rows.BETA, 0, i], node[rows.BETA, 1, i] = node[rows.FAR, 0, i] * iA, node[rows.FAR, 1, i] * iB
+    KA, KB = piece[rows.TANGENT, 0, n], piece[rows.TANGENT, 1, n]
     rotation = 0.0
     if free:
         rotation = (G + R * (KA * alpha_A - KB * alpha_B)) / (R * R * (KA * gamma_A + KB * gamma_B) + slope)
     dA, dB = R * rotation, -R * rotation
-    slide[STEP, 0, n + 1], slide[STEP, 1, n + 1] = dA, dB
+    slide[rows.STEP, 0, n + 1], slide[rows.STEP, 1, n + 1] = dA, dB
     for i in range(n - 1, -1, -1):
-        dA, dB = node[ALPHA, 0, i] + node[BETA, 0, i] * dA, node[ALPHA, 1, i] + node[BETA, 1, i] * dB
-        slide[STEP, 0, i + 1], slide[STEP, 1, i + 1] = dA, dB
+        dA = node[rows.ALPHA, 0, i] + node[rows.BETA, 0, i] * dA
+        dB = node[rows.ALPHA, 1, i] + node[rows.BETA, 1, i] * dB
+        slide[rows.STEP, 0, i + 1], slide[rows.STEP, 1, i + 1] = dA, dB
     return rotation
 
 
-@kernel(error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=rows.FAST)
 def solve_with_conduits(ph, piece, node, slide, mean, G, slope, R, free):
     """The same with the cables' mean tensions unknown, for compliant conduits; their steps go into `MEAN_STEP`.
 
@@ -90,50 +66,51 @@ def solve_with_conduits(ph, piece, node, slide, mean, G, slope, R, free):
         for c in range(2):
             a, g, h = 0.0, 1.0, 0.0
             if i > 0:
-                a, g, h = node[ALPHA, c, i - 1], node[GAMMA, c, i - 1], node[ETA, c, i - 1]
-            p, q = node[NEAR, c, i], node[FAR, c, i]
-            f = p * g + node[GIVES, c, i]
+                a, g, h = node[rows.ALPHA, c, i - 1], node[rows.GAMMA, c, i - 1], node[rows.ETA, c, i - 1]
+            p, q = node[rows.NEAR, c, i], node[rows.FAR, c, i]
+            f = p * g + node[rows.GIVES, c, i]
             inverse = 1.0 / (f + q)
-            node[ALPHA, c, i] = (node[EXCESS, c, i] + p * a) * inverse
-            node[BETA, c, i] = q * inverse
-            node[ETA, c, i] = (C * (q * piece[SHARE, c, i + 1] - p * piece[SHARE, c, i]) + p * h) * inverse
-            node[GAMMA, c, i] = f * inverse
+            node[rows.ALPHA, c, i] = (node[rows.EXCESS, c, i] + p * a) * inverse
+            node[rows.BETA, c, i] = q * inverse
+            share = q * piece[rows.SHARE, c, i + 1] - p * piece[rows.SHARE, c, i]
+            node[rows.ETA, c, i] = (C * share + p * h) * inverse
+            node[rows.GAMMA, c, i] = f * inverse
     for c in range(2):
-        a, g, h = node[ALPHA, c, n - 1], node[GAMMA, c, n - 1], node[ETA, c, n - 1]
+        a, g, h = node[rows.ALPHA, c, n - 1], node[rows.GAMMA, c, n - 1], node[rows.ETA, c, n - 1]
         # From the load end back: sums of share x K x (stretch of the piece) for the three terms.
         A, B, H = 0.0, 1.0, 0.0
         sum_A, sum_B, sum_H, stiff = 0.0, 0.0, 0.0, 0.0
         for i in range(n, -1, -1):
             if i > 0:
-                A1 = node[ALPHA, c, i - 1] + node[BETA, c, i - 1] * A
-                B1 = node[BETA, c, i - 1] * B
-                H1 = node[ETA, c, i - 1] + node[BETA, c, i - 1] * H
+                A1 = node[rows.ALPHA, c, i - 1] + node[rows.BETA, c, i - 1] * A
+                B1 = node[rows.BETA, c, i - 1] * B
+                H1 = node[rows.ETA, c, i - 1] + node[rows.BETA, c, i - 1] * H
             else:
                 A1, B1, H1 = 0.0, 0.0, 0.0
-            weight = piece[SHARE, c, i] * piece[TANGENT, c, i]
+            weight = piece[rows.SHARE, c, i] * piece[rows.TANGENT, c, i]
             sum_A += weight * (A1 - A)
             sum_B += weight * (B1 - B)
             sum_H += weight * (H1 - H)
-            stiff += weight * piece[SHARE, c, i]
+            stiff += weight * piece[rows.SHARE, c, i]
             A, B, H = A1, B1, H1
         scale = 1.0 / (1.0 + C * stiff - sum_H)
-        mean[FIXED, c], mean[BY_END, c] = (mean[MEAN_EXCESS, c] + sum_A) * scale, sum_B * scale
-        K = piece[TANGENT, c, n]
-        own = h - C * piece[SHARE, c, n]
-        mean[END_FIXED, c] = K * (a + own * mean[FIXED, c])
-        mean[END_BY_END, c] = K * (-g + own * mean[BY_END, c])
+        mean[rows.FIXED, c], mean[rows.BY_END, c] = (mean[rows.MEAN_EXCESS, c] + sum_A) * scale, sum_B * scale
+        K = piece[rows.TANGENT, c, n]
+        own = h - C * piece[rows.SHARE, c, n]
+        mean[rows.END_FIXED, c] = K * (a + own * mean[rows.FIXED, c])
+        mean[rows.END_BY_END, c] = K * (-g + own * mean[rows.BY_END, c])
     rotation = 0.0
     if free:
-        rotation = (G + R * (mean[END_FIXED, 0] - mean[END_FIXED, 1])) / (
-            slope - R * R * (mean[END_BY_END, 0] + mean[END_BY_END, 1])
+        rotation = (G + R * (mean[rows.END_FIXED, 0] - mean[rows.END_FIXED, 1])) / (
+            slope - R * R * (mean[rows.END_BY_END, 0] + mean[rows.END_BY_END, 1])
         )
     for c in range(2):
         d = R * rotation if c == 0 else -R * rotation
-        mean[MEAN_STEP, c] = mean[FIXED, c] + mean[BY_END, c] * d
-        slide[STEP, c, n + 1] = d
+        mean[rows.MEAN_STEP, c] = mean[rows.FIXED, c] + mean[rows.BY_END, c] * d
+        slide[rows.STEP, c, n + 1] = d
         for i in range(n - 1, -1, -1):
-            d = node[ALPHA, c, i] + node[ETA, c, i] * mean[MEAN_STEP, c] + node[BETA, c, i] * d
-            slide[STEP, c, i + 1] = d
+            d = node[rows.ALPHA, c, i] + node[rows.ETA, c, i] * mean[rows.MEAN_STEP, c] + node[rows.BETA, c, i] * d
+            slide[rows.STEP, c, i + 1] = d
     return rotation
 
 
@@ -148,19 +125,19 @@ def _move(ph, node, slide, share, bristle):
     inverse = 1.0 / bristle
     for c in range(2):
         for i in range(1, n + 1):
-            old = slide[NOW, c, i]
-            new = old + share * slide[STEP, c, i]
+            old = slide[rows.NOW, c, i]
+            new = old + share * slide[rows.STEP, c, i]
             if ph.presliding:
                 if old * new < 0.0:
                     new = 0.0
             else:
-                xi = node[BRISTLE, c, i - 1]
+                xi = node[rows.BRISTLE, c, i - 1]
                 before, after = xi + old * inverse, xi + new * inverse
                 if before > 1.0 and after < -1.0:
                     new = (EDGE - xi) * bristle
                 elif before < -1.0 and after > 1.0:
                     new = (-EDGE - xi) * bristle
-            slide[NOW, c, i] = new
+            slide[rows.NOW, c, i] = new
 
 
 @kernel
@@ -180,7 +157,7 @@ def copy_means(mean, to, source):
 @kernel(error_model="numpy")
 def solve_step(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle, counts):
     """Solve a step, starting from the slides in `NOW` and a rotation of the load; (converged, rotation of the load)."""
-    free = ph.kind == IMPEDANCE
+    free = ph.kind == rows.IMPEDANCE
     weights = lag_weights(dt / ph.relaxing_time_s) if ph.has_relaxation and dt > 0.0 else (1.0, 0.0, 0.0)
     soft = ph.conduit_compliance > 0.0
     # With compliant conduits all nodes reverse at once, and full steps overshoot far.
@@ -198,20 +175,20 @@ def solve_step(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle
             return False, rotation
         if iteration == patience and error > best:
             # Full steps do not converge: go back to the best point and accept only steps that reduce the error.
-            copy_slides(slide, NOW, SAVED)
-            copy_means(mean, MEAN_NEXT, MEAN_SAVED)
+            copy_slides(slide, rows.NOW, rows.SAVED)
+            copy_means(mean, rows.MEAN_NEXT, rows.MEAN_SAVED)
             rotation, best = saved_rotation, np.inf
             continue
         if iteration > patience and error > best and share > SMALLEST_SHARE:
             share *= 0.5
-            copy_slides(slide, NOW, SAVED)
-            copy_means(mean, MEAN_NEXT, MEAN_SAVED)
+            copy_slides(slide, rows.NOW, rows.SAVED)
+            copy_means(mean, rows.MEAN_NEXT, rows.MEAN_SAVED)
             rotation = saved_rotation
         else:
             if error < best or iteration > patience:
                 best = error
-                copy_slides(slide, SAVED, NOW)
-                copy_means(mean, MEAN_SAVED, MEAN_NEXT)
+                copy_slides(slide, rows.SAVED, rows.NOW)
+                copy_means(mean, rows.MEAN_SAVED, rows.MEAN_NEXT)
                 saved_rotation = rotation
             share = 1.0
             if soft:
@@ -222,10 +199,10 @@ def solve_step(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle
         rotation += share * step_rotation
         if soft:
             for c in range(2):
-                mean[MEAN_NEXT, c] += share * mean[MEAN_STEP, c]
+                mean[rows.MEAN_NEXT, c] += share * mean[rows.MEAN_STEP, c]
     # A node or two may alternate between sliding and sticking; the two states then differ by next to nothing.
-    copy_slides(slide, NOW, SAVED)
-    copy_means(mean, MEAN_NEXT, MEAN_SAVED)
+    copy_slides(slide, rows.NOW, rows.SAVED)
+    copy_means(mean, rows.MEAN_NEXT, rows.MEAN_SAVED)
     rotation = saved_rotation
     error, limit, G, slope, R = imbalance(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle, weights)
     accepted = error <= (LOOSE_TOLERANCE * limit) ** 2
