@@ -106,6 +106,7 @@ def diagnose(
 ) -> None:
     """Decide whether the calibrated model explains a batch; if not, locate and name the physics left out."""
     from ccmodel.studies.diagnosis.run import diagnose as run
+    from ccmodel.studies.diagnosis.run import options_of
     from ccmodel.studies.diagnosis.settings import Diagnosing
 
     forced = [[one.strip() for one in stated.split(",")] for stated in candidate]
@@ -117,7 +118,7 @@ def diagnose(
         first = next(e for e in error.errors() if e["type"] not in ("float_type", "dict_type"))
         option = "--tolerance" if first["loc"] else "--candidate"
         raise InputError(f"{option}: {first['msg'].removeprefix('Value error, ')}") from None
-    diagnosis = run(batch, out, settings, without, _progress, baseline, freeze)
+    diagnosis = run(batch, out, options_of(settings, without, freeze), baseline, _progress)
     typer.echo(diagnosis["headline"])
     if strict and diagnosis["verdict"] != "agrees":
         raise typer.Exit(1)

@@ -5,7 +5,14 @@ import pytest
 
 from ccmodel.diagnose.candidate import CandidateFit
 from ccmodel.diagnose.comparison import Comparison
-from ccmodel.diagnose.experiment import _motions, _planned, _separation, experiments, proposed, recordings_wanted
+from ccmodel.diagnose.experiment import (
+    experiments,
+    motions,
+    planned_observations,
+    proposed,
+    recordings_wanted,
+    separation,
+)
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.diagnose.settings import EXPERIMENT_RATE_HZ
 from ccmodel.diagnose.verdict import Judgement
@@ -43,7 +50,7 @@ def test_it_is_within_what_the_rig_has_done():
 
 @pytest.mark.parametrize("fastest", [0.5, 3.0])
 def test_no_motion_is_faster_than_the_rig(fastest):
-    for text, theta in _motions(0.6, fastest):
+    for text, theta in motions(0.6, fastest):
         assert np.abs(np.diff(theta)).max() * EXPERIMENT_RATE_HZ < fastest * 1.05, text
         assert theta[0] == 0.0
 
@@ -80,7 +87,7 @@ def test_a_difference_that_a_refit_takes_up_tells_nothing_separation(known_to, a
     ]
     template = recordings[0].observations
     experiment = experiments(recordings)[0]
-    planned = [_planned(experiment, rival, template, PARAMETERS) for rival in rivals]
-    as_fitted, refitted = _separation(planned), _separation(planned, rivals)
+    planned = [planned_observations(experiment, rival, template, PARAMETERS) for rival in rivals]
+    as_fitted, refitted = separation(planned), separation(planned, rivals)
     assert as_fitted > 0.5
     assert (refitted > 0.5 * as_fitted) == apart

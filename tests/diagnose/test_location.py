@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ccmodel.diagnose.comparison import Comparison
-from ccmodel.diagnose.location import _prominent, location
+from ccmodel.diagnose.location import location, prominent
 from ccmodel.diagnose.verdict import Judgement
 from ccmodel.diagnose.whitening import whiten
 from ccmodel.model.general.run import Active
@@ -74,5 +74,5 @@ def only(observations, channel):
 def test_noise_makes_no_channel_prominent():
     """The angle is off by twice its noise; a channel at 1.15 times its noise is not named with it."""
     square = {"theta_out": 2.1**2, "tau_in": 1.15**2, "tau_out": 1.3**2, "F_drive": 0.9**2}
-    assert _prominent(square, 0.35) == ["theta_out", "tau_out"]
-    assert _prominent({"theta_out": 0.9, "tau_in": 0.8}, 0.35) == ["theta_out"]
+    assert prominent(square, 0.35) == ["theta_out", "tau_out"]
+    assert prominent({"theta_out": 0.9, "tau_in": 0.8}, 0.35) == ["theta_out"]

@@ -11,7 +11,7 @@ from ccmodel.cli import diagnose
 from ccmodel.config import Config, load_config
 from ccmodel.diagnose import candidate
 from ccmodel.diagnose.calibration import calibration
-from ccmodel.diagnose.candidate import _best, _starts, fit
+from ccmodel.diagnose.candidate import best_start, fit, starting_points
 from ccmodel.diagnose.hypothesis import Hypothesis
 from ccmodel.diagnose.observations import first_cycles
 from ccmodel.diagnose.selection import Selection
@@ -146,10 +146,10 @@ def test_the_configuration_for_the_public_recordings_says_how_they_would_be_diag
 
 def test_a_fit_starts_from_a_slack_cable_too_where_the_initial_tension_is_not_observed():
     free = {"friction_coefficient": Free(2.0, 0.0, 5.0), "pretension_share": Free(10.0, 3.0, 50.0)}
-    taut, slack = _starts(Problem([], free))
+    taut, slack = starting_points(Problem([], free))
     assert taut == pytest.approx([2.0, 10.0])
     assert slack == pytest.approx([2.0, 2.0])
-    assert len(_starts(Problem([], {"friction_coefficient": Free(2.0)}))) == 1
+    assert len(starting_points(Problem([], {"friction_coefficient": Free(2.0)}))) == 1
 
 
 def test_the_better_start_is_taken_and_one_that_cannot_be_run_only_if_none_can(monkeypatch):
@@ -159,6 +159,6 @@ def test_the_better_start_is_taken_and_one_that_cannot_be_run_only_if_none_can(m
         return Solution(x, abs(x - 3.0), [], None, "", 1)
 
     monkeypatch.setattr(candidate, "minimise", minimise)
-    assert _best(None, [-1.0, 7.0, 2.0]).x == 2.0
+    assert best_start(None, [-1.0, 7.0, 2.0]).x == 2.0
     with pytest.raises(ModelError):
-        _best(None, [-1.0])
+        best_start(None, [-1.0])

@@ -9,7 +9,8 @@ from scipy.stats import binom
 
 from ccmodel.inference import intervals
 from ccmodel.inference.fit import fit
-from ccmodel.inference.intervals import REACH, bootstrap, covariance, profile
+from ccmodel.inference.interval_checks import bootstrap, profile
+from ccmodel.inference.intervals import REACH, covariance
 from ccmodel.inference.least_squares import information_and_gradient, solve
 from ccmodel.inference.problem import Block, Free, Problem
 from drawn_batches import CONDITIONS, SPREAD, draw, problem_of

@@ -127,23 +127,24 @@ def fit(
 def _search(problem: Problem, hypothesis: Hypothesis) -> Solution:
     low, high = problem.bounds
     inside = 1e-9 * (high - low)
-    starts = [np.clip(x, low + inside, high - inside) for x in _starts(problem)]
+    starts = [np.clip(x, low + inside, high - inside) for x in starting_points(problem)]
     if len(starts) > 1:
-        starts = [_best(problem, starts).x]
+        starts = [best_start(problem, starts).x]
     solution = minimise(problem, starts[0], SEARCH)
     for name in hypothesis.continuation:
         solution = continued(lambda x: minimise(problem, x, SEARCH), solution, problem.names.index(name), low)
     return solution
 
 
-def _starts(problem: Problem) -> list[NDArray]:
+def starting_points(problem: Problem) -> list[NDArray]:
+    """The problem's start; where the initial tension is not observed, also a start with a slack cable."""
     if "pretension_share" not in problem.names:
         return [problem.start]
     is_pretension = np.array(problem.names) == "pretension_share"
     return [np.where(is_pretension, share * problem.start, problem.start) for share in settings.PRETENSION_STARTS]
 
 
-def _best(problem: Problem, starts: Sequence[NDArray]) -> Solution:
+def best_start(problem: Problem, starts: Sequence[NDArray]) -> Solution:
     """The best of short searches; a start at which the model cannot be run counts only if it can at none."""
     found, failure = [], None
     for x in starts:

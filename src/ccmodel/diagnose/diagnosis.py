@@ -36,6 +36,9 @@ class Options:
         Candidates of one or two mechanisms, each as "name at place", that are fitted whatever their screening score.
     without : collection of str
         Mechanisms that are not considered, to see the verdict when the true mechanism is unknown.
+    freeze : bool
+        Whether a baseline keeps its values, except for sensor zeros that are not observed at rest. The question is
+        then what has changed since it was fitted.
     """
 
     tolerance: Tolerance = 0.0
@@ -43,6 +46,7 @@ class Options:
     cycles: int | None = None
     forced_candidates: Sequence[Sequence[str]] = ()
     without: Collection[str] = ()
+    freeze: bool = False
 
 
 @dataclass(frozen=True)
@@ -75,7 +79,6 @@ def diagnose(
     estimates: Parameters,
     options: Options = Options(),
     baseline: Parameters | None = None,
-    freeze: bool = False,
     not_judged: Sequence[Mapping[str, str]] = (),
     progress: Progress = silent,
 ) -> Diagnosis:
@@ -90,9 +93,6 @@ def diagnose(
     options : Options
     baseline : Parameters, optional
         A model fitted earlier, in place of the paper's. Its mechanisms are fitted again with everything else.
-    freeze : bool
-        Whether the baseline keeps its values, except for sensor zeros that are not observed at rest. The question is
-        then what has changed since it was fitted.
     not_judged : sequence of {"what", "why"}
         What could not be judged, as far as is known already.
     progress : callable
@@ -105,12 +105,12 @@ def diagnose(
     """
     observations, missing = observations_of(recordings, estimates, options.tolerance, options.step_s, options.cycles)
     not_judged = [*map(dict, not_judged), *missing]
-    if freeze:
+    if options.freeze:
         why = "frozen at the baseline's values, as requested"
         not_judged.append({"what": "stiffness, friction and everything else that a calibration would fit", "why": why})
     question_name = "the baseline" if baseline else "the paper's model"
     progress(f"calibrating {question_name} on {len(observations)} recordings")
-    question = model_in_question(observations, estimates, baseline, freeze)
+    question = model_in_question(observations, estimates, baseline, options.freeze)
     at_estimates = [o.with_parameters(question.estimates) for o in observations]
     whitened = each(at_estimates, lambda i, o: whiten(o, question.model))
     base = fit(whitened, question.hypothesis, question.free, question.start)

@@ -56,10 +56,10 @@ def proposed(judgement: Judgement, estimates: Parameters) -> dict | None:
         return None
     template = max(judgement.whitened, key=lambda w: w.observations.given.recording.pretension_N).observations
     every = experiments(judgement.whitened)
-    planned = [[_planned(e, c, template, estimates) for c in rivals] for e in every]
-    as_fitted = np.array(each(planned, lambda i, of_rivals: _separation(of_rivals)))
+    planned = [[planned_observations(e, c, template, estimates) for c in rivals] for e in every]
+    as_fitted = np.array(each(planned, lambda i, of_rivals: separation(of_rivals)))
     leading = [int(k) for k in np.argsort(-as_fitted, kind="stable")[: settings.REFITTED] if as_fitted[k] > 0]
-    refitted = each(leading, lambda i, k: _separation(planned[k], rivals))
+    refitted = each(leading, lambda i, k: separation(planned[k], rivals))
     if max(refitted, default=0.0) <= 0:
         return None
     best = int(np.argmax(refitted))
@@ -71,9 +71,9 @@ def proposed(judgement: Judgement, estimates: Parameters) -> dict | None:
     return {"text": text, "separates": names}
 
 
-def recordings_wanted(separation: float, channels: int) -> int:
-    """Number of recordings that give odds of `WANTED_ODDS`, of a separation in units of the noise."""
-    return int(np.ceil(2 * np.log(settings.WANTED_ODDS) / (IN_DIAGNOSIS * channels * separation**2)))
+def recordings_wanted(apart: float, channels: int) -> int:
+    """Number of recordings that give odds of `WANTED_ODDS` for a separation `apart` in units of the noise."""
+    return int(np.ceil(2 * np.log(settings.WANTED_ODDS) / (IN_DIAGNOSIS * channels * apart**2)))
 
 
 def experiments(whitened: Sequence[Whitened]) -> list[Experiment]:
@@ -91,12 +91,12 @@ def experiments(whitened: Sequence[Whitened]) -> list[Experiment]:
             at += f", bend {bend:.2g} rad" if len(bends) > 1 else ""
             found += [
                 Experiment(f"{text}, {at}", theta, pretension, like)
-                for text, theta in _motions(size * amplitude, fastest)
+                for text, theta in motions(size * amplitude, fastest)
             ]
     return found
 
 
-def _motions(a: float, fastest: float) -> Iterator[tuple[str, NDArray]]:
+def motions(a: float, fastest: float) -> Iterator[tuple[str, NDArray]]:
     """Text and drive angles (rad) of motions with an amplitude (rad), no faster than a speed (rad/s)."""
     start = np.clip(np.arange(0, settings.EXPERIMENT_S, 1 / settings.EXPERIMENT_RATE_HZ) - 0.4, 0, None)
     highest_Hz = fastest / (2 * np.pi * a)
@@ -119,7 +119,7 @@ def _steps(amplitude: float, start: NDArray, hold_s: float, move_s: float) -> ND
     return levels[k % 4] + (levels[(k + 1) % 4] - levels[k % 4]) * smooth
 
 
-def _planned(
+def planned_observations(
     experiment: Experiment, candidate: CandidateFit, template: Observations, estimates: Parameters
 ) -> Observations:
     """An experiment as a candidate predicts it, in units of the noise of the rig's recordings."""
@@ -136,7 +136,7 @@ def _planned(
     )
 
 
-def _separation(planned: Sequence[Observations], refitted: Sequence[CandidateFit] | None = None) -> float:
+def separation(planned: Sequence[Observations], refitted: Sequence[CandidateFit] | None = None) -> float:
     """Smallest rms difference between two candidates' predictions over the noise; 0 if one cannot be run.
 
     With the candidates `refitted` the part is removed that a refit of either would absorb.

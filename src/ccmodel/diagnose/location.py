@@ -39,17 +39,17 @@ def location(judgement: Judgement) -> dict:
     places = hypothesis.places or judgement.single_fault_places or _places(judgement)
     table = mismatch(judgement.whitened, judgement.calibrated)
     square = {c: float(np.nanmean(np.square(list(phases.values())))) for c, phases in table.items()}
-    channels = _prominent(square, settings.NAMED_CHANNEL)
+    channels = prominent(square, settings.NAMED_CHANNEL)
     squares = {p: np.array([table[c][p] ** 2 for c in channels]) for p in PHASES}
     by_phase = {p: float(np.nanmean(s)) for p, s in squares.items() if np.isfinite(s).any()}
-    phases = sorted(_prominent(by_phase, settings.NAMED_PHASE), key=PHASES.index)
+    phases = sorted(prominent(by_phase, settings.NAMED_PHASE), key=PHASES.index)
     verb = "is" if len(channels) == 1 else "are"
     where = (" and " if hypothesis.acting else " or ").join(TEXT[place] for place in places)
     text = f"The mismatch sits {where}: {', '.join(channels)} {verb} off most, {' and '.join(phases)}."
     return {"place": places[0], "channels": channels, "phases": phases, "text": text}
 
 
-def _prominent(square: dict[str, float], share: float) -> list[str]:
+def prominent(square: dict[str, float], share: float) -> list[str]:
     """Names whose mean squares exceed the noise floor by at least a share of the worst one's, the worst first."""
     beyond = {name: max(value - 1.0, 0.0) for name, value in square.items()}
     worst = max(beyond.values())

@@ -33,10 +33,10 @@ def report(batch: str, judgement: Judgement, estimates: Parameters, not_judged: 
         "is_held": base.hypothesis.is_frozen,
         "location": location.location(judgement),
         "mechanisms": [
-            _mechanism(best, k, _name_probability(name, judgement.confidence), shift)
+            mechanism_of(best, k, _name_probability(name, judgement.confidence), shift)
             for k, (name, _) in enumerate(named)
         ],
-        "alternatives": _alternatives(judgement, dict(named)),
+        "alternatives": alternatives_of(judgement, dict(named)),
         "likeliest": [{"name": n, "place": p} for n, p in best.hypothesis.acting if judgement.verdict == "undecided"],
         "nearest": _nearest(judgement),
         "fit": {
@@ -54,7 +54,7 @@ def _nearest(judgement: Judgement) -> dict | None:
     """The nearest candidate of an unexplained batch, and its leave-one-out mean square; otherwise None."""
     if judgement.verdict != "unexplained" or (nearest := judgement.nearest) is None:
         return None
-    acting = [_mechanism(nearest, k, 0.0) for k in range(len(nearest.hypothesis.acting))]
+    acting = [mechanism_of(nearest, k, 0.0) for k in range(len(nearest.hypothesis.acting))]
     return {
         "mechanisms": [{key: value for key, value in m.items() if key != "confidence"} for m in acting],
         "mean_square": nearest.mean_square,
@@ -62,7 +62,7 @@ def _nearest(judgement: Judgement) -> dict | None:
     }
 
 
-def _alternatives(judgement: Judgement, named: Mapping[str, str]) -> list[dict]:
+def alternatives_of(judgement: Judgement, named: Mapping[str, str]) -> list[dict]:
     """Every other mechanism with a probability worth mentioning, at its most likely place."""
     if judgement.verdict in ("agrees", "unexplained"):
         return []
@@ -94,7 +94,7 @@ def _discretisation(judgement: Judgement) -> tuple[NDArray | None, NotJudged]:
         return None, [{"what": "discretisation error of the values", "why": str(error)}]
 
 
-def _mechanism(candidate: CandidateFit, k: int, confidence: float, shift: NDArray | None = None) -> dict:
+def mechanism_of(candidate: CandidateFit, k: int, confidence: float, shift: NDArray | None = None) -> dict:
     """A mechanism's values, corrected for the discretisation error, with intervals that contain the correction.
 
     The model file keeps the values as fitted, which are the best on the solver that runs them.

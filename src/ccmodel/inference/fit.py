@@ -8,15 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.failure import ModelError
+from ccmodel.inference.interval_checks import bootstrap, profile
 from ccmodel.inference.intervals import (
     Interval,
     Scatter,
     Undetermined,
-    bootstrap,
     covariance,
     intervals,
     own_intervals,
-    profile,
     scatter,
     undetermined,
 )

@@ -1,4 +1,4 @@
-"""Uncertainty of fitted values: intervals, undetermined combinations, and two checks without linear theory.
+"""Uncertainty of fitted values by linear theory: intervals, and combinations that recordings do not determine.
 
 Own unknowns of a recording (its friction, its zeros) have a prior about the population's value. Their scatter from
 recording to recording governs the intervals: thirty thousand samples of one run are not thirty thousand experiments.
@@ -14,10 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
-from scipy.optimize import root_scalar
 from scipy.stats import chi2, norm, t
 
-from ccmodel.inference.least_squares import Solution, information_and_gradient, solve
+from ccmodel.inference.least_squares import Solution, information_and_gradient
 from ccmodel.inference.problem import Block, Problem
 from ccmodel.repeats import condition_of, pooled_scatter
 
@@ -34,8 +33,6 @@ UNLIKELY_SCATTER = 0.01
 ROUNDING = 1e-12
 # Component of an unknown in an undetermined direction from which it is named with it.
 INVOLVED = 0.1
-# A profile is followed so many standard deviations of linear theory, and its end is found to so many of them.
-PROFILE_REACH, PROFILE_TOLERANCE = 5.0, 1e-3
 
 
 @dataclass(frozen=True)
@@ -103,7 +100,7 @@ def covariance(problem: Problem, solution: Solution) -> NDArray:
     priors' scatter, the uncertain drive motion, rounding, and the autocorrelated rest of the residuals.
     """
     information, _ = information_and_gradient(problem, solution.x, solution.blocks)
-    alone, values, vectors = _directions(information)
+    alone, values, vectors = scaled_eigen(information)
     known = values > ROUNDING
     inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(alone, alone)
     noise = np.diag((problem.prior_precision * scatter_scale(problem, solution)) ** 2)
@@ -245,7 +242,7 @@ def undetermined(problem: Problem, solution: Solution) -> list[Undetermined]:
     """
     names, n = list(problem.shared), len(problem.shared)
     information = sum((i for i, _ in shared_parts(problem, solution)), np.diag(problem.prior_precision[:n] ** 2))
-    alone, values, vectors = _directions(information)
+    alone, values, vectors = scaled_eigen(information)
     low, high = (b[:n] for b in problem.bounds)
     extent = np.where(np.isfinite(high - low), high - low, 2 * problem.sizes[:n])
     sd = np.abs(vectors) / alone[:, None] / np.sqrt(np.maximum(values, np.finfo(float).tiny))
@@ -273,7 +270,7 @@ def _known_instead(names: list[str], direction: NDArray, values: NDArray) -> str
     return f"{together}; known is {names[0]} {sign} {abs(weight):.4g} x {names[1]} = {known:.5g}"
 
 
-def _directions(information: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+def scaled_eigen(information: NDArray) -> tuple[NDArray, NDArray, NDArray]:
     """Square root of the information's diagonal, and eigenvalues and eigenvectors of the information scaled by it."""
     alone = np.sqrt(np.diag(information))
     # An unknown on which no recording depends is a direction of its own, with an eigenvalue of zero.
@@ -293,63 +290,3 @@ def shared_parts(problem: Problem, solution: Solution) -> list[tuple[NDArray, ND
         out = H[:n, n:] @ np.linalg.pinv(H[n:, n:], rcond=1e-14, hermitian=True)
         found.append((H[:n, :n] - out @ H[n:, :n], g[:n] - out @ g[n:]))
     return found
-
-
-def bootstrap(problem: Problem, solution: Solution, draws: int = 500, seed: int = 1) -> dict[str, float]:
-    """Standard deviation of each shared unknown over bootstrap samples of the recordings.
-
-    One Newton step from the optimum stands for each refit. A check of `intervals` that uses no prior scatter; it needs
-    at least half a dozen recordings.
-    """
-    parts = shared_parts(problem, solution)
-    random = np.random.default_rng(seed)
-    steps = []
-    for _ in range(draws):
-        drawn = [parts[i] for i in random.integers(len(parts), size=len(parts))]
-        information, score = (sum(each) for each in zip(*drawn, strict=True))
-        alone, values, vectors = _directions(information)
-        known = values > ROUNDING
-        steps.append(-(vectors[:, known] / values[known]) @ (vectors[:, known].T @ (score / alone)) / alone)
-    return dict(zip(problem.shared, np.std(steps, axis=0, ddof=1).tolist(), strict=True))
-
-
-def profile(problem: Problem, solution: Solution, name: str, variance: NDArray) -> Interval:
-    """The interval of a shared unknown from its profile likelihood: all others are refitted at each of its values.
-
-    The cost itself neglects the autocorrelation of residuals. Its rise is therefore measured in units of the rise that
-    linear theory predicts for one standard deviation from `covariance`: the profile adds the cost's curvature.
-
-    Parameters
-    ----------
-    problem : Problem
-    solution : Solution
-    name : str
-    variance : ndarray, shape (unknowns,)
-        From `covariance`.
-    """
-    k = problem.names.index(name)
-    sd = float(np.sqrt(variance[k]))
-    information, _ = information_and_gradient(problem, solution.x, solution.blocks)
-    plain = float(np.linalg.pinv(information, rcond=1e-14, hermitian=True)[k, k])
-    unit = sd**2 / plain
-    low, high = (_profile_end(problem, solution, k, side * sd, unit) for side in (-1, 1))
-    return Interval(low, high, sd)
-
-
-def _profile_end(problem: Problem, solution: Solution, k: int, sd: float, unit: float) -> float:
-    """Value at which the root of the cost's rise reaches the interval's; the bound, if it is lower there.
-
-    `sd` has the sign of the side.
-    """
-    bound = problem.bounds[int(sd > 0)][k]
-    most = min(PROFILE_REACH, (bound - solution.x[k]) / sd)
-
-    def excess(reach: float) -> float:
-        start = solution.x.copy()
-        start[k] += reach * sd
-        cost = solve(problem, start, fixed=[k]).cost if reach else solution.cost
-        return float(np.sqrt(max(cost - solution.cost, 0.0) / unit)) - REACH
-
-    if most <= 0 or excess(most) < 0:
-        return float(solution.x[k] + max(most, 0.0) * sd)
-    return float(solution.x[k] + sd * root_scalar(excess, bracket=(0.0, most), xtol=PROFILE_TOLERANCE).root)

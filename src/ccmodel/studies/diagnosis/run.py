@@ -26,11 +26,9 @@ NEAREST = "nearest.json"
 def diagnose(
     batch: Path,
     out: Path,
-    settings: Diagnosing | None = None,
-    without: Sequence[str] = (),
-    report: Callable[[str], None] = lambda text: None,
+    options: Options = Options(),  # noqa: B008
     baseline: Path | None = None,
-    freeze: bool = False,
+    report: Callable[[str], None] = lambda text: None,
 ) -> dict:
     """Diagnose a batch folder and write the files of its diagnosis.
 
@@ -38,15 +36,11 @@ def diagnose(
     ----------
     batch, out : Path
         Batch folder; folder of the files.
-    settings : Diagnosing, optional
-    without : sequence of str
-        Mechanisms that are no candidates.
-    report : callable
-        Gets a line on each stage.
+    options : Options
     baseline : Path, optional
         Model file to start from, instead of the batch's own estimates.
-    freeze : bool
-        Whether the baseline keeps all its values.
+    report : callable
+        Gets a line on each stage.
 
     Returns
     -------
@@ -56,10 +50,10 @@ def diagnose(
     Raises
     ------
     InputError
-        If the batch or the model file cannot be used, or a name in `without` is no mechanism.
+        If the batch or the model file cannot be used, or an excluded name is no mechanism.
     """
     try:
-        for name in without:
+        for name in options.without:
             registry.get(name)
     except registry.UnknownMechanismError as error:
         raise InputError(f"--without: {error}") from None
@@ -70,12 +64,11 @@ def diagnose(
     not_judged = _refused(map(asdict, ingested.findings))
     inputs = provenance.of_inputs(provenance.files_in(batch), batch)
     known = read_model(baseline) if baseline else None
-    if freeze and known is None:
+    if options.freeze and known is None:
         raise InputError("--freeze: there is no model to hold; name one with --baseline")
     try:
         estimates = Parameters.estimated(ingested.batch.rig)
-        options = _options(settings, without)
-        found = run(ingested.recordings, estimates, options, known, freeze, not_judged, report)
+        found = run(ingested.recordings, estimates, options, known, not_judged, report)
     except (ModelError, ValueError) as error:
         raise InputError(f"{batch}: {error}") from None
     content = _write(found, inputs, out)
@@ -92,7 +85,7 @@ def diagnose_recordings(recordings_file: Path, out: Path, settings: Diagnosing |
         if estimates is None or not recordings:
             raise ModelError("no recording that can be used")
         not_judged = _refused(read_json(recordings_file.with_suffix(".json"))["findings"])
-        found = run(recordings, estimates, _options(settings), not_judged=not_judged)
+        found = run(recordings, estimates, options_of(settings or Diagnosing()), not_judged=not_judged)
     except (ModelError, ValueError) as error:
         name, reason = recordings_file.stem, str(error)
         out.mkdir(parents=True, exist_ok=True)
@@ -109,8 +102,9 @@ def _refused(findings: Iterable[Mapping]) -> list[dict[str, str]]:
     return [{"what": Path(f["file"]).name, "why": f["text"]} for f in findings if f["severity"] == "refused"]
 
 
-def _options(settings: Diagnosing | None, without: Sequence[str] = ()) -> Options:
-    return Options(**(settings or Diagnosing()).model_dump(exclude_none=True), without=without)
+def options_of(settings: Diagnosing, without: Sequence[str] = (), freeze: bool = False) -> Options:
+    """Options of a diagnosis from the configuration's."""
+    return Options(**settings.model_dump(exclude_none=True), without=without, freeze=freeze)
 
 
 def _no_model(reason: str) -> dict:
