@@ -12,8 +12,8 @@ from proof.score import CALIBRATION_ERROR, COVERAGE_RATE, DIAGNOSED
 
 TITLES = {
     "proof-noticing.png": "Detection and identification of single effects, by the error of the recalibrated model",
-    "proof-detection.png": "Every case of one effect at its size; a logistic curve where there are four or more",
-    "proof-reliability.png": "Stated confidence and the rate at which it was right; numbers are claims",
+    "proof-detection.png": "Every case of a single effect at its size; a logistic curve for four or more cases",
+    "proof-reliability.png": "Share of reported mechanisms that are true, by stated confidence; numbers of mechanisms",
     "proof-kept-back.png": "Errors on held-out recordings over the noise floor, in the worst channel",
     "proof-confusion.png": "Confusion matrix of clean cases and of cases with one effect, of all kinds and protocols",
 }
@@ -21,16 +21,16 @@ TITLES = {
 
 @dataclass(frozen=True)
 class Source:
-    """Where a page and its figures stand, and what made the results.
+    """Where a page and its figures are written, and the source of the results that they show.
 
     Attributes
     ----------
     page, figures : Path
-        The page's file, and the folder of its figures.
+        File of the page and folder of its figures; the page links to the figures by relative paths.
     command : str
         The command that made the results.
     selection : str
-        Which cases were run, in a sentence.
+        Which cases were run, as a sentence of the page.
     """
 
     page: Path
@@ -93,7 +93,7 @@ The held-out recordings are simulated after the diagnosis has ended.
 - **Noise floor**: the error of a model with the true physics, from sensor noise, sensor zeros, encoder resolution and
   1 % run-to-run variation of friction.
 - **Visible**: the recalibrated model's error on held-out recordings is at least 3 sqrt(2) noise floors in some channel,
-  which is three times the difference of two repeats.
+  which is three standard deviations of the difference of two repeats.
 - **No candidate**: the effect is unlisted, that is, no mechanism models it, or its mechanism is removed from the
   candidates.
 - **Located**: the reported place is the true one. Places that no recording distinguishes count as equal: cable and
@@ -120,6 +120,7 @@ def table(head, rows) -> str:
 
 
 def _pictures(figures: list[str], source: Source) -> str:
+    """Every figure below its title."""
     folder = Path(os.path.relpath(source.figures, source.page.parent))
     return "\n\n".join(f"{TITLES[name]}:\n\n![{TITLES[name]}]({folder / name})" for name in figures)
 
@@ -136,7 +137,11 @@ def _percent(target: float | None) -> str:
 
 
 def met_rate(r: dict) -> str:
-    """Whether a rate meets its target: a coverage includes it in its interval, any other rate reaches it."""
+    """Whether a rate meets its target, as text; empty without a target.
+
+    A target is the least value of a rate. The coverage of intervals is different: too high is wrong too, so the target
+    has to lie within its 95 % interval.
+    """
     if r["target"] is None:
         return ""
     if r["what"] == COVERAGE_RATE:
@@ -157,11 +162,12 @@ def _statistic_row(s: dict) -> list[str]:
 
 
 def _is_reached(s: dict) -> bool:
-    """Whether a statistic meets its target: a calibration error is at most the target, a share at least."""
+    """Whether a statistic meets its target: an upper limit for the calibration error, a lower limit for all others."""
     return s["value"] <= s["target"] if s["what"] == CALIBRATION_ERROR else s["value"] >= s["target"]
 
 
 def _missed_targets(scored: dict) -> str:
+    """A sentence that names the rates and statistics whose targets are missed, open ones included."""
     missed = [r["what"] for r in scored["rates"] if r["rate"] is not None and "no" in met_rate(r)]
     missed += [
         s["what"]
@@ -170,7 +176,7 @@ def _missed_targets(scored: dict) -> str:
     ]
     if not missed:
         return "Every target with cases is met."
-    return f"Targets missed: {'; '.join(missed)}. The visible cases behind it are among the misses below."
+    return f"Targets missed: {'; '.join(missed)}. The table of misses below includes the visible cases among them."
 
 
 def _methods(rows: list[dict]) -> str:
@@ -216,6 +222,7 @@ _MISS_HEAD = ["case", "protocol", "true effects", "size", "error before, in nois
 
 def _miss_row(m: dict) -> list[str]:
     reported = "; ".join(m["identified"]) or (", ".join(m["alternatives"]) if m["verdict"] == "undecided" else "")
+    # One line without the column separator of Markdown; the end of a failure's output holds the error message.
     failure = " ".join(m["failure"].split()).replace("|", "/")[-160:]
     return [
         f"{m['case']} ({m['kind']})",

@@ -174,7 +174,7 @@ def uphill(monkeypatch):
 
 
 def test_a_stalled_search_is_refused_with_its_reason(problem, uphill, monkeypatch):
-    monkeypatch.setattr("ccmodel.inference.least_squares.UNKNOWNS_DIRECT", 0)
+    monkeypatch.setattr("ccmodel.inference.least_squares.SIMPLEX_UNKNOWNS", 0)
     said = fit(problem)
     assert not said.succeeded
     assert said.message.startswith("stalled")

@@ -15,8 +15,8 @@ from ccmodel.model.parameters import Parameters
 
 
 @dataclass(frozen=True)
-class InQuestion:
-    """The model whose agreement with the recordings is in question.
+class TestedModel:
+    """The model that is tested against the recordings.
 
     Attributes
     ----------
@@ -41,15 +41,15 @@ class InQuestion:
         return self.hypothesis.of(self.estimates).with_values(self.start)
 
 
-def model_in_question(
+def tested_model(
     observations: Sequence[Observations], estimates: Parameters, baseline: Parameters | None, freeze: bool
-) -> InQuestion:
+) -> TestedModel:
     """The paper's model with a first fit, or a baseline with its own values; a frozen baseline keeps them."""
     free = calibration(estimates, observations)
     estimates = estimates.with_values({name: one.start for name, one in free.items()})
     if baseline is None:
         at_estimates = [o.with_parameters(estimates) for o in observations]
-        return InQuestion(PAPER, estimates, free, _first_fit(at_estimates, free))
+        return TestedModel(PAPER, estimates, free, _first_fit(at_estimates, free))
     hypothesis = Hypothesis(baseline=tuple((m.name, m.place) for m in baseline.mechanisms))
     pretension_N = float(np.mean([o.given.recording.pretension_N for o in observations]))
     start = _values_of(baseline, free, hypothesis, pretension_N)
@@ -58,7 +58,7 @@ def model_in_question(
         # The zero of a sensor may change without any change of the rig.
         free = {name: one for name, one in free.items() if name in ZERO_OF.values()}
         hypothesis = replace(hypothesis, is_frozen=True)
-    return InQuestion(hypothesis, estimates, free, start)
+    return TestedModel(hypothesis, estimates, free, start)
 
 
 def calibration(estimates: Parameters, observations: Sequence[Observations]) -> dict[str, Free]:

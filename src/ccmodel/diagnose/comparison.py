@@ -1,11 +1,12 @@
 """Comparison of candidate models: posterior probabilities, adequacy, and the probability of misspecification.
 
 The log posterior of a candidate is -BIC/2 plus a log prior. The BIC is computed from leave-one-out mean squares, with
-an effective sample size instead of the number of samples. These mean squares are held out already, so that the BIC's
-penalty on the number of unknowns comes on top of cross-validation.
+an effective sample size instead of the number of samples. Leave-one-out mean squares already penalise superfluous
+unknowns; the BIC penalises them a second time.
 
-This posterior assumes a closed world: one of the candidates is correct. The probability that none is, and that the best
-candidate only imitates the missing physics, is worked out from its mean square and multiplies every probability.
+The posterior assumes a closed world: one of the candidates is correct. In fact the missing physics may be outside the
+list of mechanisms, and the best candidate may only imitate it. `Comparison.well_specified` is the probability that this
+is not so. The confidence in a candidate is the product of both probabilities.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,11 +33,12 @@ class Comparison:
     base : CandidateFit
         The calibrated model.
     candidates : list of CandidateFit
-        Its extensions, by leave-one-out mean square; implausible ones last.
+        The calibrated model with one mechanism or two, by ascending leave-one-out mean square; those with a strength
+        outside its plausible range last.
     lack_of_fit : mapping of Hypothesis to LackOfFit
-        Of the calibrated model and the leading candidates.
+        Of the calibrated model, the candidates with the lowest mean squares and the most probable one.
     screened : int
-        Number of hypotheses from which the candidates were chosen.
+        Number of hypotheses that were screened, among which the prior probability is shared.
     """
 
     whitened: Sequence[Whitened]
@@ -49,10 +51,10 @@ class Comparison:
     def of(
         cls, whitened: Sequence[Whitened], base: CandidateFit, candidates: Sequence[CandidateFit], screened: int = 0
     ) -> "Comparison":
-        """Candidates in their order, with the lack of fit of the leading and the most probable."""
+        """Order the candidates, and compute the lack of fit of those that may be named."""
         ordered = sorted(candidates, key=lambda c: (not c.is_plausible, c.mean_square))
-        likely = np.argsort(posterior(whitened, base, ordered, screened))[-1:]
-        contenders = {c.hypothesis: c for c in [base, *ordered[: settings.CONTENDERS], *(ordered[k] for k in likely)]}
+        most_probable = [ordered[k] for k in np.argsort(posterior(whitened, base, ordered, screened))[-1:]]
+        contenders = {c.hypothesis: c for c in [base, *ordered[: settings.CONTENDERS], *most_probable]}
         lacks = {hypothesis: lack_of_fit(whitened, c) for hypothesis, c in contenders.items()}
         return cls(whitened, base, ordered, lacks, screened)
 
@@ -63,34 +65,41 @@ class Comparison:
 
     @property
     def most_probable(self) -> CandidateFit:
-        """The candidate with the highest posterior; the calibrated model without candidates."""
+        """The candidate with the highest posterior probability; the calibrated model if there are no candidates."""
         return self.candidates[int(np.argmax(self.posterior))] if self.candidates else self.base
 
     @property
     def excess(self) -> float:
-        """Mean square of the calibrated model above the noise."""
+        """Mean square of the calibrated model minus 1, that of noise; at least 0."""
         return max(self.base.mean_square - 1.0, 0.0)
 
     def is_adequate(self, candidate: CandidateFit) -> bool:
-        """Whether a candidate leaves no more than noise and model-form error, without predictable residuals."""
+        """Whether the mean square and the lack of fit of a candidate are as low as the true physics could leave them.
+
+        The limits allow for noise and for the model-form error of the added mechanisms, a share of the excess. The
+        calibrated model, to which none is added, gets no such allowance.
+        """
         lack = self.lack_of_fit.get(candidate.hypothesis)
         form = candidate.hypothesis.model_form_error
         if lack is None or not candidate.is_plausible:
             return False
         if candidate is self.base and candidate.mean_square > settings.ADEQUATE:
             return False
-        most = settings.ADEQUATE_PAIR if candidate.hypothesis.is_pair else settings.ADEQUATE
-        most += max(settings.ADEQUATE_SHARE / _imitations(candidate), form) * self.excess
-        return candidate.mean_square <= most and lack.lower_bound <= settings.ADEQUATE_LACK_OF_FIT + form * self.excess
+        limit = settings.ADEQUATE_PAIR if candidate.hypothesis.is_pair else settings.ADEQUATE
+        limit += max(settings.ADEQUATE_SHARE / _imitations(candidate), form) * self.excess
+        return candidate.mean_square <= limit and lack.lower_bound <= settings.ADEQUATE_LACK_OF_FIT + form * self.excess
 
     @property
     def has_adequate(self) -> bool:
-        """Whether the best candidate is adequate."""
+        """Whether the candidate with the lowest mean square is adequate."""
         return bool(self.candidates) and self.is_adequate(self.candidates[0])
 
     @property
     def is_sufficient(self) -> bool:
-        """Whether there is no candidate to improve on, or the best leaves no room for another mechanism."""
+        """Whether no second mechanism is needed: the best candidate is adequate and close to the noise.
+
+        Also true without candidates, since a second mechanism is only added to a first.
+        """
         if not self.has_adequate:
             return not self.candidates
         best = self.candidates[0]
@@ -98,16 +107,20 @@ class Comparison:
 
     @property
     def well_specified(self) -> float:
-        """Probability that the most probable candidate is correct and no imitation, as far as it could be tested."""
+        """Probability that the most probable candidate is correct and no imitation, times `_discount`."""
         if not self.candidates:
-            return self._tested
-        return self._tested * well_specified(self.most_probable, self.base)
+            return self._discount
+        return self._discount * well_specified(self.most_probable, self.base)
 
     @property
-    def _tested(self) -> float:
-        """Confidence discount: below one where adequacy is not tested against held-out noise."""
-        untested = len(self.whitened) == 1 or "pretension_share" in self.base.free
-        share = 1.0 if untested else np.mean([w.observations.tolerance_share for w in self.whitened])
+    def _discount(self) -> float:
+        """Factor on the confidence, below 1 where the test of adequacy is weak.
+
+        The test is weak for a single recording, which leaves none to hold out; for an initial tension that is not
+        observed and therefore fitted; and as far as a tolerance takes the place of measured noise.
+        """
+        is_weak = len(self.whitened) == 1 or "pretension_share" in self.base.free
+        share = 1.0 if is_weak else np.mean([w.observations.tolerance_share for w in self.whitened])
         return float(settings.UNTESTED**share)
 
 
@@ -116,9 +129,14 @@ def posterior(
 ) -> list[float]:
     """Posterior probability of each candidate, -BIC/2 plus a log prior; the remainder is the calibrated model's.
 
-    With effective sample size N, leave-one-out mean square m, smallest of all max(1, m_min) and p further unknowns, the
-    BIC is N m / max(1, m_min) + p ln N. The calibrated model has the prior `PRIOR_AGREES`, and all screened hypotheses
-    share the rest equally, since the best of many is good by chance. An implausible candidate has probability zero.
+    The BIC is N m / max(1, m_min) + p ln N, with
+
+    - N the effective sample size,
+    - m the candidate's leave-one-out mean square, and m_min the lowest of all candidates and the calibrated model,
+    - p the number of unknowns that the candidate has in addition to the calibrated model's.
+
+    The calibrated model has the prior `PRIOR_AGREES`. All screened hypotheses share the rest equally, whether or not
+    they were fitted: the best of many is good by chance. An implausible candidate has probability zero.
     """
     if not candidates:
         return []
@@ -126,34 +144,38 @@ def posterior(
     mean_squares = np.array([base.mean_square, *(c.mean_square for c in candidates)])
     unknowns = np.array([0, *(len(c.values) - len(base.values) for c in candidates)])
     bic = samples * mean_squares / max(1.0, mean_squares.min()) + unknowns * np.log(samples)
-    each = (1 - settings.PRIOR_AGREES) / max(screened, len(candidates))
-    log = -bic / 2 + np.log([settings.PRIOR_AGREES, *[each] * len(candidates)])
-    log[1:][[not c.is_plausible for c in candidates]] = -np.inf
-    weight = np.exp(log - log.max())
+    prior_of_each = (1 - settings.PRIOR_AGREES) / max(screened, len(candidates))
+    log_posterior = -bic / 2 + np.log([settings.PRIOR_AGREES, *[prior_of_each] * len(candidates)])
+    log_posterior[1:][[not c.is_plausible for c in candidates]] = -np.inf
+    weight = np.exp(log_posterior - log_posterior.max())
     return (weight / weight.sum())[1:].tolist()
 
 
 def well_specified(candidate: CandidateFit, base: CandidateFit) -> float:
-    """Probability that the missing physics is a mechanism of the registry, given a candidate's mean square.
+    """Probability that a candidate is the missing physics and no imitation of it, given the candidate's mean square.
 
-    By Bayes' rule from two densities of the mean square. A correct candidate comes to the noise, with a half-normal
-    model-form error in every second case. An imitation comes to any share of the calibrated model's excess with the
-    same density, and the best of several imitations to the lowest of as many shares.
+    Bayes' rule with the prior `PRIOR_MISSPECIFIED` and two densities of the mean square above `CORRECT_LEVEL`:
+
+    - of a correct candidate: normal about zero. In every second case a half-normal model-form error is added, because
+      the real effect does not follow the mechanism's equation exactly;
+    - of an imitation: uniform from zero to the excess of the calibrated model. A pair is taken for the best of several
+      imitations, with the density of the smallest of as many uniform variables.
     """
     excess = max(base.mean_square - settings.CORRECT_LEVEL, settings.CORRECT_SPREAD)
-    over = candidate.mean_square - settings.CORRECT_LEVEL
+    above = candidate.mean_square - settings.CORRECT_LEVEL
     form = max(settings.FORM_SHARE, candidate.hypothesis.model_form_error) * excess
     width = np.hypot(settings.CORRECT_SPREAD, form)
-    exact = norm.pdf(over, scale=settings.CORRECT_SPREAD)
-    # A half-normal form error convolved with the normal scatter of correct models.
-    simplified = 2 * norm.pdf(over, scale=width) * norm.cdf(over * form / (settings.CORRECT_SPREAD * width))
+    exact = norm.pdf(above, scale=settings.CORRECT_SPREAD)
+    # The half-normal form error convolved with the normal scatter of correct models.
+    simplified = 2 * norm.pdf(above, scale=width) * norm.cdf(above * form / (settings.CORRECT_SPREAD * width))
     n = _imitations(candidate)
-    share = float(np.clip(over / excess, 0.0, 1.0))
-    imitation = norm.cdf(over / settings.CORRECT_SPREAD) * n * (1 - share) ** (n - 1) / excess
+    share = float(np.clip(above / excess, 0.0, 1.0))
+    # The uniform density begins at zero with the scatter of correct models instead of a step.
+    imitation = norm.cdf(above / settings.CORRECT_SPREAD) * n * (1 - share) ** (n - 1) / excess
     correct = (1 - settings.PRIOR_MISSPECIFIED) * (exact + simplified) / 2
     return float(correct / (correct + settings.PRIOR_MISSPECIFIED * imitation))
 
 
 def _imitations(candidate: CandidateFit) -> int:
-    """Number of independent imitations of which a candidate may be the best: a pair's partners, otherwise one."""
+    """Number of imitations of which a candidate may be the best: for a pair the partners that were fitted, else one."""
     return settings.PARTNERS if candidate.hypothesis.is_pair else 1

@@ -1,4 +1,7 @@
-"""The whole diagnosis, stage by stage: a batch's recordings in, a judgement and its report out."""
+"""The whole diagnosis, stage by stage, from a batch's recordings to a verdict and its report.
+
+docs/diagnosis.md describes the stages and why they decide as they do.
+"""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -6,7 +9,7 @@ from dataclasses import dataclass
 from threadpoolctl import threadpool_limits
 
 from ccmodel.diagnose import settings
-from ccmodel.diagnose.calibration import model_in_question
+from ccmodel.diagnose.calibration import tested_model
 from ccmodel.diagnose.candidate import CandidateFit, fit
 from ccmodel.diagnose.hypothesis import single_mechanisms, stated_hypothesis
 from ccmodel.diagnose.observations import observations_of
@@ -22,7 +25,7 @@ from ccmodel.recording import Recording
 
 @dataclass(frozen=True)
 class Options:
-    """What a diagnosis compares, and what it fits.
+    """Options of a diagnosis: which samples are compared, and which candidate models are fitted.
 
     Attributes
     ----------
@@ -31,14 +34,14 @@ class Options:
     step_s : float
         Least time between compared samples, s.
     cycles : int, optional
-        Compared cycles of a sine after its start-up transient; None: all.
+        Number of cycles of a sine that are compared, counted from the end of its start-up transient; None: all.
     forced_candidates : sequence of sequence of str
         Candidates of one or two mechanisms, each as "name at place", that are fitted whatever their screening score.
     without : collection of str
-        Mechanisms that are not considered, to see the verdict when the true mechanism is unknown.
+        Mechanisms that are excluded from the candidates. The proof excludes the true one to imitate unknown physics.
     freeze : bool
-        Whether a baseline keeps its values, except for sensor zeros that are not observed at rest. The question is
-        then what has changed since it was fitted.
+        Whether a baseline keeps its values, except for sensor zeros that are not observed at rest. The diagnosis then
+        finds what has changed on the rig since the baseline was fitted.
     """
 
     tolerance: Tolerance = 0.0
@@ -51,15 +54,16 @@ class Options:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """A diagnosis.
+    """Result of a diagnosis.
 
     Attributes
     ----------
     report : dict
         The content of diagnosis.json.
     judgement : Judgement
+        The verdict with the fitted candidates and their probabilities.
     estimates : Parameters
-        Values of everything that is not fitted.
+        Values of the parameters that are not fitted; the fitted ones are replaced by `model`.
     """
 
     report: dict
@@ -67,7 +71,7 @@ class Diagnosis:
     estimates: Parameters
 
     def model(self, candidate: CandidateFit) -> Parameters:
-        """A candidate's fitted model, for any recording."""
+        """A candidate's fitted model, which can simulate any recording of the rig."""
         return candidate.model(self.estimates)
 
 
@@ -89,14 +93,15 @@ def diagnose(
     recordings : sequence of Recording
         Of one batch.
     estimates : Parameters
-        The batch's own.
+        Estimates that `batch.yaml` states. They are the start of the calibration and the values of what is not fitted.
     options : Options
     baseline : Parameters, optional
-        A model fitted earlier, in place of the paper's. Its mechanisms are fitted again with everything else.
+        A model fitted earlier, which is tested instead of the paper's. Its parameters, and those of its mechanisms, are
+        fitted again, unless the options freeze it.
     not_judged : sequence of {"what", "why"}
-        What could not be judged, as far as is known already.
+        What is left out already, such as refused recordings, with the reason; the report lists it.
     progress : callable
-        Takes a line for each step of the work.
+        Called with one line of text for each step of the work.
 
     Raises
     ------
@@ -108,15 +113,18 @@ def diagnose(
     if options.freeze:
         why = "frozen at the baseline's values, as requested"
         not_judged.append({"what": "stiffness, friction and everything else that a calibration would fit", "why": why})
-    question_name = "the baseline" if baseline else "the paper's model"
-    progress(f"calibrating {question_name} on {len(observations)} recordings")
-    question = model_in_question(observations, estimates, baseline, options.freeze)
-    at_estimates = [o.with_parameters(question.estimates) for o in observations]
-    whitened = each(at_estimates, lambda i, o: whiten(o, question.model))
-    base = fit(whitened, question.hypothesis, question.free, question.start)
-    mechanisms = single_mechanisms(options.without, question.hypothesis)
+    tested_name = "the baseline" if baseline else "the paper's model"
+    progress(f"calibrating {tested_name} on {len(observations)} recordings")
+    # Two fits: a first one gives the model about which the errors are linearised and whitened, and the fit of the
+    # whitened errors is the calibrated model, to which every candidate is compared.
+    tested = tested_model(observations, estimates, baseline, options.freeze)
+    at_estimates = [o.with_parameters(tested.estimates) for o in observations]
+    whitened = each(at_estimates, lambda i, o: whiten(o, tested.model))
+    calibrated = fit(whitened, tested.hypothesis, tested.free, tested.start)
+    mechanisms = single_mechanisms(options.without, tested.hypothesis)
     forced = [stated_hypothesis(stated) for stated in options.forced_candidates]
-    selection = Selection(question.free, mechanisms, forced, progress)
-    judgement = judge(*selection.run(whitened, base))
-    found = report(recordings[0].batch, judgement, question.estimates, not_judged)
-    return Diagnosis(found, judgement, question.estimates)
+    selection = Selection(tested.free, mechanisms, forced, progress)
+    comparison, scores = selection.run(whitened, calibrated)
+    judgement = judge(comparison, scores)
+    content = report(recordings[0].batch, judgement, tested.estimates, not_judged)
+    return Diagnosis(content, judgement, tested.estimates)

@@ -1,4 +1,4 @@
-"""Candidate models: the model in question, with one mechanism at one of its places, or with two of them."""
+"""Candidate models: the tested model, with one mechanism at one of its places, or with two of them."""
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -16,14 +16,14 @@ from ccmodel.model.parameters import Parameters, mechanism_key
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """Mechanisms that act in addition to the model in question.
+    """Mechanisms that act in addition to the tested model.
 
     Attributes
     ----------
     acting : tuple of (str, str)
-        Mechanism and place of each; empty for the model in question itself.
+        Mechanism and place of each; empty for the tested model itself.
     baseline : tuple of (str, str)
-        Mechanisms of the baseline model; empty where the paper's model is in question.
+        Mechanisms of the baseline model; empty where the paper's model is tested.
     is_frozen : bool
         Whether the baseline's parameters keep their values; otherwise they are fitted with the others. A mechanism of
         a frozen baseline among `acting` means that its parameters have changed.

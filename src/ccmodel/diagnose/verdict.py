@@ -1,4 +1,4 @@
-"""The verdict from a comparison of candidate models."""
+"""The verdict, decided from the comparison of candidate models."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -26,13 +26,13 @@ class Judgement:
         The most probable candidate if the verdict is explained or undecided, otherwise the calibrated model.
     comparison : Comparison
     candidates : list of CandidateFit
-        Of the comparison, the most probable first.
+        Those of the comparison, by descending probability.
     probability : list of float
-        Closed-world posterior probability of each of these.
+        Closed-world posterior probability of each of `candidates`.
     well_specified : float
-        Probability that the most probable candidate is correct and no imitation.
+        Probability that the most probable candidate is correct and no imitation (`Comparison.well_specified`).
     scores : list of Score
-        Of the screening.
+        Screening scores of all mechanisms.
     single_fault_places : sequence of str
         Places where a single fault of unknown kind would explain the recordings as well as the most probable pair.
     """
@@ -63,7 +63,7 @@ class Judgement:
 
     @property
     def confidence(self) -> dict[Hypothesis, float]:
-        """Probability of each candidate, misspecification taken into account."""
+        """Probability of each candidate: its closed-world probability times `well_specified`."""
         pairs = zip(self.candidates, self.probability, strict=True)
         return {c.hypothesis: self.well_specified * p for c, p in pairs}
 
@@ -73,42 +73,49 @@ class Judgement:
         return min(self.candidates, key=lambda c: (not c.is_plausible, c.mean_square), default=None)
 
 
-def judge(found: Comparison, scores: list[Score]) -> Judgement:
-    """Come to a verdict.
+def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
+    """Decide the verdict.
 
-    - ``agrees``: the calibrated model is adequate, and no candidate improves on it enough to be named.
-    - ``unexplained``: neither it nor the most probable candidate is adequate; or the candidate is a pair where a single
-      fault of unknown kind would do; or it is most likely an imitation.
-    - ``explained``: the most probable candidate is adequate and its names are sure enough.
+    - ``agrees``: the calibrated model is adequate, and no candidate is a large enough improvement.
+    - ``unexplained``: the calibrated model is inadequate, and no candidate improves on it or is more probable; or the
+      most probable candidate is inadequate; or that candidate is a pair, while a single fault that no candidate
+      describes would suffice; or it is almost certainly an imitation.
+    - ``explained``: the most probable candidate is adequate, and its mechanisms have enough probability.
     - ``undecided``: otherwise.
     """
-    likely, probability = found.most_probable, found.posterior
+    most_probable, probability = comparison.most_probable, comparison.posterior
     order = np.argsort(-np.array(probability), kind="stable")
     unexplained = Judgement(
-        "unexplained", found.base, found, [found.candidates[k] for k in order], [probability[k] for k in order],
-        found.well_specified, scores,
+        "unexplained", comparison.base, comparison, [comparison.candidates[k] for k in order],
+        [probability[k] for k in order], comparison.well_specified, scores,
     )  # fmt: skip
-    # A mechanism that removes the lack of fit of an inadequate model counts, however small its gain.
-    agrees = found.is_adequate(found.base)
+    agrees = comparison.is_adequate(comparison.base)
+    # An inadequate model may fail by its lack of fit alone. A mechanism that removes it may gain little mean square.
     least = settings.WORTH_NAMING if agrees else 0.0
-    if not improves(likely, found.base, least) or 1.0 - sum(probability) > 0.5:
+    probability_of_base = 1.0 - sum(probability)
+    if not improves(most_probable, comparison.base, least) or probability_of_base > 0.5:
         return replace(unexplained, verdict="agrees") if agrees else unexplained
-    if not found.is_adequate(likely):
+    if not comparison.is_adequate(most_probable):
         return unexplained
-    elsewhere = single_fault_places(found, likely.hypothesis)
-    if elsewhere and not any(_is_at(c, elsewhere) and found.is_adequate(c) for c in found.candidates):
-        return replace(unexplained, single_fault_places=elsewhere)
-    if found.well_specified * max(probability) <= settings.RIVAL:
+    places = single_fault_places(comparison, most_probable.hypothesis)
+    # If an adequate candidate describes that single fault, the verdict is undecided, otherwise unexplained.
+    if places and not any(_is_at(c, places) and comparison.is_adequate(c) for c in comparison.candidates):
+        return replace(unexplained, single_fault_places=places)
+    if comparison.well_specified * max(probability) <= settings.RIVAL:
         return unexplained
-    # Candidates with the same mechanism at different places add up to the probability of its name.
-    names = likely.hypothesis.names
-    named = sum(p for c, p in zip(found.candidates, probability, strict=True) if c.hypothesis.names == names)
-    is_sure = found.well_specified * named >= settings.SURE and not elsewhere
-    return replace(unexplained, verdict="explained" if is_sure else "undecided", best=likely)
+    # Candidates with the same mechanisms at other places count towards the probability of the mechanisms.
+    names = most_probable.hypothesis.names
+    of_names = sum(p for c, p in zip(comparison.candidates, probability, strict=True) if c.hypothesis.names == names)
+    is_sure = comparison.well_specified * of_names >= settings.SURE and not places
+    return replace(unexplained, verdict="explained" if is_sure else "undecided", best=most_probable)
 
 
 def improves(candidate: CandidateFit, base: CandidateFit, least: float) -> bool:
-    """Whether a candidate lowers the mean square by more than a share `least`, and not at some recordings' expense."""
+    """Whether a candidate lowers the mean square by more than a share `least`, and not at some recordings' expense.
+
+    Where the mean square rises, it may rise by less than `UNSTEADY` times its decrease in the other recordings. An
+    effect that is present on the rig raises it in none.
+    """
     gain = base.by_recording - candidate.by_recording
     better, worse = gain.clip(0.0).mean(), -gain.clip(None, 0.0).mean()
     return bool(better - worse > least * max(1.0, base.mean_square) and worse < settings.UNSTEADY * better)
@@ -119,27 +126,32 @@ def _is_at(candidate: CandidateFit, places: Sequence[str]) -> bool:
     return not candidate.hypothesis.is_pair and set(candidate.hypothesis.places) <= set(places)
 
 
-def single_fault_places(found: Comparison, hypothesis: Hypothesis) -> list[str]:
+def single_fault_places(comparison: Comparison, hypothesis: Hypothesis) -> list[str]:
     """Places where a single fault of unknown kind would explain the recordings as well as a pair does.
 
-    Two mechanisms that together imitate a single fault are the less probable explanation: an eccentric encoder disc is
-    imitated by an eccentric pulley and a torque gain. If both mechanisms are faults of that part, the pair stands.
+    The places are those of every part without which the calibrated model fits (`isolate`), the best first. A single
+    fault is more probable than two mechanisms that together imitate it: an eccentric encoder disc, for instance, is
+    imitated by an eccentric pulley and a torque gain. If both mechanisms of the pair act at one of these parts, fault
+    isolation cannot tell the pair from a single fault, and the list is empty.
     """
     if not hypothesis.is_pair:
         return []
-    acting = set(hypothesis.places)
+    pair_places = set(hypothesis.places)
     isolated = sorted(
-        (left, at) for left, at in isolate(found.whitened, found.base) if left <= settings.SUFFICIENT - 1.0
+        (excess, places)
+        for excess, places in isolate(comparison.whitened, comparison.base)
+        if excess <= settings.SUFFICIENT - 1.0
     )
-    if any(acting <= set(at) for _, at in isolated):
+    if any(pair_places <= set(places) for _, places in isolated):
         return []
-    return list(dict.fromkeys(place for _, at in isolated for place in at))
+    return list(dict.fromkeys(place for _, places in isolated for place in places))
 
 
 def nested_choice(judgement: Judgement) -> list[CandidateFit]:
-    """By recording, the candidate that would be chosen without it, so that the choice is held out as well.
+    """By recording, the model with the lowest mean square on all other recordings (nested cross-validation).
 
-    Of a single recording it is the best candidate.
+    The error of a recording that is reported as held out must not have influenced the choice of the model either. The
+    choice is the verdict's model throughout if that is the calibrated model, or if there is a single recording.
     """
     count = len(judgement.whitened)
     if judgement.best is judgement.calibrated or count == 1:

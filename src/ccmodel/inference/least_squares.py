@@ -1,12 +1,14 @@
-"""Minimising the cost of a fit by scipy's trust region within bounds.
+"""Minimisation of a fit's cost within bounds, by scipy's trust-region method.
 
-Of a fit's tens of thousands of rows only their products with one another matter, and a recording's own unknowns affect
-no other recording. Scipy is therefore given a square root of the matrix of these products, with one row more than
-there are unknowns: it has the same cost, gradient and Gauss-Newton Hessian. Unknowns are measured from their start in
-their sizes, so that no unit of measurement affects the search.
+A fit has tens of thousands of residuals r with the Jacobian J, but the method depends on them through the products
+J'J, J'r and r'r alone. These are summed recording by recording. Scipy receives the square root of the matrix
+[J'J, J'r; r'J, r'r]: one row more than there are unknowns, with the same cost, gradient and Gauss-Newton Hessian.
 
-A cost that is too rough for derivatives, as with measured load torques, is searched without them in the end, if few
-values are unknown.
+The variables of the search are dimensionless: the distance of each unknown from its start, over its size
+(`ccmodel.inference.jacobian.size_of`). Units of measurement therefore do not affect the search.
+
+Some costs are too rough for derivatives, for instance where the model is driven by a measured load torque. A fit of few
+unknowns that stalls there is completed by a search without derivatives.
 """
 
 from collections.abc import Sequence
@@ -20,21 +22,24 @@ from ccmodel.failure import ModelError
 from ccmodel.inference.jacobian import STEP
 from ccmodel.inference.problem import Block, Problem
 
-# The model has corners (`ccmodel.inference.jacobian`), and so has the cost: its minimum may lie on one, where the
-# gradient means little. When no step helps, the predicted reduction of the cost decides, in squares of a standard
-# deviation: below a tenth the corner is the optimum, within a third of a standard deviation. Above, or after too many
-# evaluations, differences are taken once more over a larger step.
-BROAD = 1e-3
-EXCUSED = 0.1
-# Relative excess of the curvature along each unknown: unknowns that recordings do not determine stay where they are,
-# since their gradient is rounding.
+# The model has corners (`ccmodel.inference.jacobian`), and so has the cost. At a minimum on a corner the gradient is
+# not zero, and the search ends because no step reduces the cost. The linearised model then predicts a further
+# reduction. Up to this value, where 1 stands for one standard deviation of the unknowns, the corner counts as the
+# minimum: it is within sqrt(0.1), a third of a standard deviation.
+CORNER_REDUCTION = 0.1
+# Step of the differences in the second search, after one that stalled or took too many evaluations, as a share of the
+# unknowns' sizes: a larger step averages over corners.
+LARGE_DIFFERENCE = 1e-3
+# Relative increase of the Hessian's diagonal. An unknown that the recordings do not determine has a gradient of
+# rounding errors alone; the increase keeps it where it is.
 DAMPING = 1e-9
-# Search without derivatives: distance of its first points and its final tolerance, in sizes.
-AROUND, DOWN_TO = 1e-2, 1e-4
-MOST_DIRECT, UNKNOWNS_DIRECT = 1000, 8
-# The search stays inside its bounds. So near one, in sizes, the bound is meant.
+# Search without derivatives: edge of the first simplex and final tolerance, in sizes; most evaluations; most unknowns
+# for which it is used.
+SIMPLEX_EDGE, SIMPLEX_TOLERANCE = 1e-2, 1e-4
+SIMPLEX_EVALUATIONS, SIMPLEX_UNKNOWNS = 1000, 8
+# An unknown within this distance of a bound, in sizes, is put on the bound: scipy's iterates stay strictly inside.
 ON_BOUND = 1e-6
-STUCK = 3  # scipy's status where no step longer than the shortest reduces the cost
+NO_STEP_HELPS = 3  # scipy's status where no step longer than the shortest reduces the cost
 CONVERGED = "converged: the error no longer falls"
 ON_CORNER = "converged: the least error lies on a corner of it, within a third of a standard deviation"
 DIRECT = "converged: by direct search, the error being too rough for its slopes"
@@ -44,20 +49,20 @@ STALLED = "stalled: no step lessens the error although its slope says that one s
 
 @dataclass(frozen=True)
 class Search:
-    """How a minimum is searched.
+    """Settings of a search.
 
     Attributes
     ----------
     tolerance : float
-        The search has converged when a step reduces the cost by less than this share. With the default the optimum is
-        known to a thousandth of a standard deviation.
+        The search has converged when a step reduces the cost by less than this share. The default leaves the unknowns
+        within a thousandth of a standard deviation of the minimum.
     shortest : float
-        Steps shorter than this, relative to the distance from the start in sizes, end the search.
+        The search ends at a step shorter than this share of the distance from the start; lengths in sizes.
     difference : float
-        Step of the derivatives, as a share of the unknowns' sizes.
+        Step of the finite differences, as a share of the unknowns' sizes.
     most_evaluations : int
     retreats : bool
-        Whether a point at which the model cannot be run shortens the step. Otherwise the search fails there.
+        At a point where the model cannot be run: True shortens the step, False raises the model's error.
     """
 
     tolerance: float = 1e-10
@@ -76,9 +81,9 @@ class Solution:
     x : ndarray, shape (unknowns,)
     cost : float
     blocks : list of Block
-        Every recording about `x`.
+        By recording, errors and derivatives at `x`.
     active : ndarray of int, shape (unknowns,)
-        -1 or 1 where an unknown is on its lower or upper bound.
+        -1 where an unknown is on its lower bound, 1 on its upper bound, else 0.
     message : str
     evaluations : int
     """
@@ -97,7 +102,10 @@ class Solution:
 
 
 def solve(problem: Problem, start: NDArray, how: Search = Search(), fixed: Sequence[int] = ()) -> Solution:
-    """The nearest minimum within the bounds, with a larger difference step or none where derivatives mislead.
+    """Find the local minimum near the start, within the bounds.
+
+    A search that does not converge is continued with larger finite differences, and, if it then stalls and there are
+    few unknowns, without derivatives.
 
     Parameters
     ----------
@@ -115,20 +123,20 @@ def solve(problem: Problem, start: NDArray, how: Search = Search(), fixed: Seque
     solution = minimise(problem, start, how, fixed)
     if solution.converged:
         return solution
-    broad = replace(how, difference=BROAD)
-    again = minimise(problem, solution.x, broad, fixed, origin=start)
-    again = replace(again, evaluations=solution.evaluations + again.evaluations)
-    if again.message == STALLED and problem.start.size - len(fixed) <= UNKNOWNS_DIRECT:
-        return _searched_directly(problem, again, _Reduced(problem, start, broad, fixed))
-    return again
+    how = replace(how, difference=LARGE_DIFFERENCE)
+    second = minimise(problem, solution.x, how, fixed, origin=start)
+    second = replace(second, evaluations=solution.evaluations + second.evaluations)
+    if second.message == STALLED and problem.start.size - len(fixed) <= SIMPLEX_UNKNOWNS:
+        return _without_derivatives(problem, second, _Reduced(problem, start, how, fixed))
+    return second
 
 
 def minimise(
     problem: Problem, start: NDArray, how: Search, fixed: Sequence[int] = (), origin: NDArray | None = None
 ) -> Solution:
-    """One search by the trust region; parameters and errors as for `solve`.
+    """One search by the trust-region method; parameters and errors as for `solve`.
 
-    `origin` is the point from which unknowns are measured, if not the start.
+    `origin` is the zero point of the search's dimensionless variables; the default is the start.
     """
     reduced = _Reduced(problem, start if origin is None else origin, how, fixed)
     y = (start - reduced.origin)[reduced.movable] / reduced.sizes
@@ -141,13 +149,13 @@ def minimise(
     return _solution(problem, reduced, found.x, _message(found, reduced), found.nfev)
 
 
-def _searched_directly(problem: Problem, stalled: Solution, reduced: "_Reduced") -> Solution:
-    """Nelder and Mead's simplex from where the derivatives have led."""
+def _without_derivatives(problem: Problem, stalled: Solution, reduced: "_Reduced") -> Solution:
+    """Continue a stalled search by the simplex method of Nelder and Mead."""
     y = (stalled.x - reduced.origin)[reduced.movable] / reduced.sizes
     low, high = reduced.bounds
-    step = np.where(y + AROUND <= high, AROUND, -AROUND)
+    step = np.where(y + SIMPLEX_EDGE <= high, SIMPLEX_EDGE, -SIMPLEX_EDGE)
     simplex = np.clip(np.vstack([y, y + np.diag(step)]), low, high)
-    options = {"initial_simplex": simplex, "xatol": DOWN_TO, "fatol": np.inf, "maxfev": MOST_DIRECT}
+    options = {"initial_simplex": simplex, "xatol": SIMPLEX_TOLERANCE, "fatol": np.inf, "maxfev": SIMPLEX_EVALUATIONS}
     found = optimize.minimize(
         reduced.cost, y, method="Nelder-Mead", bounds=list(zip(low, high, strict=True)), options=options
     )
@@ -156,18 +164,21 @@ def _searched_directly(problem: Problem, stalled: Solution, reduced: "_Reduced")
 
 
 def _message(found: optimize.OptimizeResult, reduced: "_Reduced") -> str:
-    if found.status != STUCK:
+    """Whether the search has converged, from scipy's result and the reduction of the cost that is still predicted."""
+    if found.status != NO_STEP_HELPS:
         return CONVERGED if found.success else STOPPED
+    # Scipy's cost is half the sum of squares.
     linear = optimize.lsq_linear(found.jac, found.jac @ found.x - found.fun, reduced.bounds)
     predicted = 2 * (found.cost - linear.cost)
     if predicted <= reduced.how.tolerance * 2 * found.cost:
         return CONVERGED
-    limit = EXCUSED * 2 * found.cost / reduced.problem.effective_sample_size
+    # The cost of a correct model is the effective sample size: the limit grows with the cost per sample.
+    limit = CORNER_REDUCTION * 2 * found.cost / reduced.problem.effective_sample_size
     return ON_CORNER if predicted <= limit else STALLED
 
 
 def _solution(problem: Problem, reduced: "_Reduced", y: NDArray, message: str, evaluations: int) -> Solution:
-    """The search ends short of a bound: unknowns near one are put on it."""
+    """The solution at a point of the search, with unknowns next to a bound put on the bound."""
     x = reduced.place(y)
     low, high = problem.bounds
     near = ON_BOUND * problem.sizes
@@ -179,7 +190,7 @@ def _solution(problem: Problem, reduced: "_Reduced", y: NDArray, message: str, e
 
 
 def information_and_gradient(problem: Problem, x: NDArray, blocks: Sequence[Block]) -> tuple[NDArray, NDArray]:
-    """Normal matrix of all unknowns, and the gradient of half the cost."""
+    """Gauss-Newton Hessian and gradient of half the cost, priors included, by all unknowns."""
     information = np.diag(problem.prior_precision**2)
     gradient = problem.prior_errors(x) * problem.prior_precision
     for block in blocks:
@@ -189,24 +200,28 @@ def information_and_gradient(problem: Problem, x: NDArray, blocks: Sequence[Bloc
 
 
 class _Reduced:
-    """The cost in few rows, as a function of the movable unknowns' distances from an origin, in their sizes."""
+    """The cost as the sum of squares of few rows, a function of the search's dimensionless variables.
+
+    The variables are the distances of the unknowns that are not fixed from `origin`, over their sizes. The rows and the
+    derivatives belong to `point`, the last point at which the cost fell.
+    """
 
     def __init__(self, problem: Problem, origin: NDArray, how: Search, fixed: Sequence[int]):
         self.problem, self.origin, self.how = problem, np.array(origin, float), how
         self.movable = np.setdiff1d(np.arange(problem.start.size), fixed)
         self.sizes = problem.sizes[self.movable]
         self.bounds = tuple((b - self.origin)[self.movable] / self.sizes for b in problem.bounds)
-        self.least = np.inf  # the lowest cost so far
-        self.at, self.blocks, self.rows = None, [], np.empty((0, 0))
+        self.lowest_cost = np.inf
+        self.point, self.blocks, self.rows = None, [], np.empty((0, 0))
 
     def place(self, y: NDArray) -> NDArray:
-        """All unknowns in their units."""
+        """All unknowns, in their own units, at a point of the search."""
         x = self.origin.copy()
         x[self.movable] += y * self.sizes
         return x
 
     def cost(self, y: NDArray) -> float:
-        """Infinite where the model cannot be run."""
+        """The cost, infinite where the model cannot be run."""
         try:
             return self.problem.cost(self.place(y))
         except (ModelError, ValueError):
@@ -215,13 +230,14 @@ class _Reduced:
     def residuals(self, y: NDArray) -> NDArray:
         """Rows whose sum of squares is the cost; infinite where the model cannot be run and the search retreats.
 
-        A point that does not reduce the cost is not accepted and needs no derivatives: only its norm matters.
+        Scipy rejects a point that does not reduce the cost and uses nothing but the norm of its rows. Derivatives are
+        therefore not computed there, and the norm stands in the first row.
         """
         try:
             x = self.place(y)
             errors = self.problem.errors(x)
             norm = np.sqrt(self.problem.cost(x, errors))
-            if norm * norm >= self.least:
+            if norm * norm >= self.lowest_cost:
                 return np.r_[norm, np.zeros(len(self.rows) - 1)]
             self._move_to(x, errors)
         except (ModelError, ValueError):
@@ -229,21 +245,24 @@ class _Reduced:
                 raise
             return np.full(len(self.rows), np.inf)
         rows = np.ascontiguousarray(self.rows[:, -1])
-        self.least = float(rows @ rows)
+        self.lowest_cost = float(rows @ rows)
         return rows
 
     def jacobian(self, y: NDArray) -> NDArray:
-        """Derivatives of `residuals`, up to a rotation that both share."""
+        """Derivatives of `residuals` by the variables of the search.
+
+        Scipy asks for them only at a point that it has accepted, whose rows are stored.
+        """
         return self.rows[:, self.movable] * self.sizes
 
     def blocks_at(self, x: NDArray) -> list[Block]:
-        """Every recording about a point."""
-        if not np.array_equal(x, self.at):
+        """By recording, errors and derivatives at a point."""
+        if not np.array_equal(x, self.point):
             self.blocks = self.problem.blocks(x, self.how.difference)
         return self.blocks
 
     def _move_to(self, x: NDArray, errors: Sequence[NDArray]) -> None:
-        """Work out derivatives by all unknowns, and the errors: a square root of all their products."""
+        """Compute the derivatives at a point, and the rows: a square root of the matrix [J'J, J'r; r'J, r'r]."""
         blocks = self.problem.blocks(x, self.how.difference, errors)
         information, gradient = information_and_gradient(self.problem, x, blocks)
         cost = self.problem.cost(x, errors)
@@ -251,9 +270,9 @@ class _Reduced:
         products = np.block([[information, gradient[:, None]], [gradient, cost]])
         if not np.isfinite(products).all():
             raise ModelError("the errors are not finite")
-        # Scaled to a unit diagonal, so that rounding takes the same share of small and large ones.
+        # A unit diagonal keeps the relative rounding error of the eigenvalues alike for large and small entries.
         scale = np.sqrt(np.diag(products))
         scale = np.where(scale > 0, scale, 1.0)
         value, vector = np.linalg.eigh(products / np.outer(scale, scale))
-        self.at, self.blocks = x, blocks
+        self.point, self.blocks = x, blocks
         self.rows = np.sqrt(np.maximum(value, 0.0))[:, None] * vector.T * scale

@@ -1,4 +1,4 @@
-"""Ingest: the folder of a batch to its recordings and the findings."""
+"""Ingest: the folder of a batch is read into recordings, and into findings for everything that is wrong with it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,14 +22,14 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Ingested:
-    """A batch.
+    """A batch that was read.
 
     Attributes
     ----------
     recordings : list of Recording
-        The usable ones, in the order of `batch.yaml`.
+        Those that can be used, in the order of `batch.yaml`.
     findings : list of Finding
-        All faults; a recording that is refused has exactly one.
+        Warnings and refusals. A refused recording has one finding, a refusal; a used one may have several warnings.
     batch : Batch or None
         Content of `batch.yaml`: radii, spring, estimates of the cable. None if the batch is refused as a whole.
     """
@@ -47,7 +47,7 @@ def ingest_batch(folder: Path, limits: Limits = LIMITS) -> Ingested:
     folder : Path
         Folder with `batch.yaml` and the logs, anywhere on disk; it is not changed.
     limits : Limits
-        Limits of the faults of a log.
+        Thresholds from which a property of a log is a fault.
 
     Returns
     -------
@@ -55,27 +55,30 @@ def ingest_batch(folder: Path, limits: Limits = LIMITS) -> Ingested:
         Recordings, findings and the content of `batch.yaml`. Bad data never raise: they are findings.
     """
     folder = Path(folder)
-    name, described = folder.resolve().name, str(folder / "batch.yaml")
-    batch, refused = _attempt(name, described, load_batch, folder)
+    # The findings name the batch by its folder: its batch.yaml may be unreadable.
+    name, batch_file = folder.resolve().name, str(folder / "batch.yaml")
+    batch, refusals = _attempt(name, batch_file, load_batch, folder)
     if batch is None:
-        return Ingested([], refused)
+        return Ingested([], refusals)
     files = [str(folder / entry.file) for entry in batch.recordings]
     logs = [_attempt(name, file, read_log, Path(file), limits) for file in files]
+    # All logs are read before any is checked: a column is judged by how many logs of the batch have it.
     columns = ColumnChecks(batch.rig, [log[0] if log else None for log, _ in logs])
-    findings = [_finding(name, described, "warning", defect) for defect in columns.warnings]
+    findings = [_finding(name, batch_file, "warning", defect) for defect in columns.warnings]
     recordings = []
-    for entry, file, (log, refused) in zip(batch.recordings, files, logs, strict=True):
+    for entry, file, (log, refusals) in zip(batch.recordings, files, logs, strict=True):
         if log is not None:
-            built, refused = _attempt(name, file, _recording, batch, entry, file, log, columns, limits)
-            if built is not None:
-                recordings.append(built[0])
-                findings += built[1]
-        findings += refused
+            used, refusals = _attempt(name, file, _recording, batch, entry, file, log, columns, limits)
+            if used is not None:
+                recording, warnings = used
+                recordings.append(recording)
+                findings += warnings
+        findings += refusals
     return Ingested(recordings, findings, batch)
 
 
 def _attempt(batch: str, file: str, step: Callable[..., T], *args) -> tuple[T | None, list[Finding]]:
-    """Result of a step, or None with the findings that refuse the file."""
+    """Result of a step and no findings, or None and the findings that refuse the file."""
     try:
         return step(*args), []
     except InputError as error:
@@ -100,19 +103,23 @@ def _recording(
     columns: ColumnChecks,
     limits: Limits,
 ) -> tuple[Recording, list[Finding]]:
-    """The recording of a log that could be read, and its warnings."""
-    rare_columns = columns.check(log[0])
-    table, faulty_sensors = check_sensors(log[0], batch.rig, limits)
-    last = table["time_s"].iloc[-1]
-    if entry.settled_s >= last:
-        text = f"ends at {last:g} s, before settled_s {entry.settled_s:g} s of batch.yaml: no samples left"
+    """The recording of a log that could be read, and its warnings.
+
+    `log` is the table of samples and the defects that reading it has found.
+    """
+    table, reading_defects = log
+    rare_columns = columns.check(table)
+    table, faulty_sensors = check_sensors(table, batch.rig, limits)
+    end = table["time_s"].iloc[-1]
+    if entry.settled_s >= end:
+        text = f"ends at {end:g} s, before settled_s {entry.settled_s:g} s of batch.yaml: no samples left"
         raise LogError(None, None, text)
     calibrated = calibrate(table, batch.rig, limits)
     unconverted = [
         Defect(None, column, f"not used: batch.yaml lacks {key}, which converts it")
         for column, key in calibrated.missing.items()
     ]
-    defects = [*log[1], *rare_columns, *faulty_sensors, *unconverted]
+    defects = [*reading_defects, *rare_columns, *faulty_sensors, *unconverted]
     findings = [_finding(batch.batch, file, "warning", defect) for defect in defects]
     recording = Recording(
         batch=batch.batch,

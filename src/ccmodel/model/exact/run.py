@@ -16,7 +16,7 @@ MARGIN = 64
 
 
 @kernel
-def run(path, state, trial, progress, drive, offset, stiffness, present, out, phase, balance):
+def run(path, state, saved, progress, drive, offset, stiffness, present, out, phase, balance):
     """Simulate from sample progress[0] on; stops early where the list of corners needs more room.
 
     Parameters
@@ -24,8 +24,8 @@ def run(path, state, trial, progress, drive, offset, stiffness, present, out, ph
     path : PathTables
     state : State
         Before the first sample; carried on.
-    trial : State
-        Room for a state to return to.
+    saved : State
+        Scratch space for a copy of the state.
     progress : ndarray of int, shape (3,)
         Next sample, direction of the last stroke, whether a cable has stayed slack through a reversal; carried on.
     drive : tuple of ndarray, shape (n,), and float
@@ -47,7 +47,7 @@ def run(path, state, trial, progress, drive, offset, stiffness, present, out, ph
     int
         DONE or CORNERS_FULL.
     """
-    path, state, trial = borrowed(path), borrowed(state), borrowed(trial)
+    path, state, saved = borrowed(path), borrowed(state), borrowed(saved)
     for i in range(progress[0], drive[0].size):
         for c in range(2):
             if state.kind[c, rows.FIRST] < MARGIN or state.kind[c, rows.LAST] > state.corner.shape[2] - MARGIN:
@@ -60,7 +60,7 @@ def run(path, state, trial, progress, drive, offset, stiffness, present, out, ph
             if direction == -progress[1]:
                 progress[2] = _any_slack(state, present)
             progress[1] = direction
-            step(path, state, trial, direction, drive_now, offset, stiffness)
+            step(path, state, saved, direction, drive_now, offset, stiffness)
         out[0, i] = state.value[0, rows.T_DRIVE]
         out[1, i] = state.value[0, rows.T_LOAD]
         out[2, i] = state.value[1, rows.T_DRIVE]
@@ -77,12 +77,12 @@ def run(path, state, trial, progress, drive, offset, stiffness, present, out, ph
 
 
 @kernel
-def settle(path, state, trial, offset, stiffness):
+def settle(path, state, saved, offset, stiffness):
     """Let a load that does not hold the initial tensions find its balance while the drive rests."""
     if offset == state.value[rows.PAIR, rows.OFFSET]:
         return
     direction = 1 if offset < state.value[rows.PAIR, rows.OFFSET] else -1
-    step(path, state, trial, direction, state.value[rows.PAIR, rows.DRIVE], offset, stiffness)
+    step(path, state, saved, direction, state.value[rows.PAIR, rows.DRIVE], offset, stiffness)
 
 
 @small_kernel

@@ -61,19 +61,19 @@ class Simulation:
         stops = [*sorted({int(i) for i in record_at}), n - 1]
         if stops[0] < 0 or stops[-1] >= n or max(stops) > n - 1:
             raise ModelError(f"record_profiles_at names samples from 0 to {n - 1}")
-        trial = _trial(self._state)
-        kernels.settle(self._tables, self._state, trial, offset, stiffness)
+        saved = _scratch(self._state)
+        kernels.settle(self._tables, self._state, saved, offset, stiffness)
         for stop in stops:
             drive = theta_in[: stop + 1], radius_m
             while (
                 kernels.run(
-                    self._tables, self._state, trial, progress, drive, offset, stiffness, self._present, self.out,
+                    self._tables, self._state, saved, progress, drive, offset, stiffness, self._present, self.out,
                     self.phase, balance,
                 )
                 == kernels.CORNERS_FULL
             ):  # fmt: skip
                 self._state = _with_room(self._state)
-                trial = _trial(self._state)
+                saved = _scratch(self._state)
             if stop in record_at:
                 self.profiles[stop] = tuple(
                     cable_profile(self._state, self._tables, self._path, self._friction, c)
@@ -83,8 +83,8 @@ class Simulation:
         self.status = Status.OK if balanced else Status.UNBALANCED
 
 
-def _trial(state: State) -> State:
-    """Room for a state to return to; it shares what a step never changes."""
+def _scratch(state: State) -> State:
+    """Scratch space for a copy of the state; the corners are shared, since moving the pulleys does not change them."""
     return state._replace(front=state.front.copy(), value=state.value.copy(), kind=state.kind.copy())
 
 

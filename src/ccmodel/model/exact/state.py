@@ -1,8 +1,13 @@
 """State of both cables between samples: the stored tension profile as corners, and the slip fronts at either end.
 
+Positions along a cable are given as m = mu phi, friction coefficient times bend angle, and tensions as ln T over m.
+Where a cable slides, ln T is a straight line of slope -1 or +1 (the capstan equation): the sliding line. Where it
+sticks, it keeps the profile that it had before: the stored profile, a polygon of corners. A slip front is the boundary
+between the two.
+
 All kernels work on a `State`. Cable A is row 0, cable B row 1; end 0 is the drive end, end 1 the load end. A cable is
 in one of two modes: slip fronts run in from its ends (`FRONTS`), or it slides over its whole length, or hangs slack
-(`WHOLE`).
+(`WHOLE`). Sigma is +1 for a front of a cable that is pulled at that end, -1 for one that is released there.
 """
 
 from typing import NamedTuple
@@ -16,30 +21,58 @@ FRONTS, WHOLE = 0, 1
 
 # Rows of `State.corner`: position m, tension (N), and d ln T / dm from this corner to the next.
 C_M, C_T, C_SLOPE = range(3)
-# Fields of `State.front`. At the entry into the current segment: position, tension at the front, tension at the end,
-# compliance, displacement of the end. Of the segment: where it ends, slope of the stored profile relative to the
-# sliding line, compliance per m of its bend, r at its end. Now: r, tension and displacement of the end. Last: the
-# displacement of the end when the front started.
-ME, TE, PE, EE, DE, STOP, SLOPE, BEND, R_STOP, R, P, D, D_START = range(13)
-# Fields of `State.value`, rows 0 and 1: elongation with both pulleys at angle zero (m), tension at the drive end and at
-# the load end (N), and from `STIFFNESS` on the drive-end tension per elongation on a sliding line of slope -1 and +1
-# (N/m; zero for a cable that is not there).
-E0, T_DRIVE, T_LOAD, STIFFNESS = range(4)
-# Row 2 of `State.value`: displacement of the rims of the drive and of the load pulley (m), constant part of the load's
-# law (N).
+# Columns of `State.front`. A front crosses the stored profile segment by segment (`ccmodel.model.exact.segment`); a
+# segment ends at the next corner or at the next change of the conduit's curvature. m counts from the front's own end.
+(
+    # On entry into the segment:
+    ME,  # position m of the front
+    TE,  # tension at the front, N
+    PE,  # tension at the end, N
+    EE,  # compliance of the sliding part per unit of tension at the front, m/N
+    DE,  # displacement of the end, m
+    # Of the segment:
+    STOP,  # m at its far end
+    SLOPE,  # sigma times the slope of its stored profile, seen from this end
+    BEND,  # its compliance per m, m/N
+    R_STOP,  # r at its far end
+    # Now:
+    R,  # r = expm1(sigma dm), with dm the distance of the front from the entry
+    P,  # tension at the end, N
+    D,  # displacement of the end, m
+    # When the front started:
+    D_START,  # displacement of the end, m
+) = range(13)
+# Columns of `State.value` in rows 0 and 1, the cables.
+(
+    E0,  # elongation with both pulleys at angle zero, m
+    T_DRIVE,  # tension at the drive end, N
+    T_LOAD,  # tension at the load end, N
+    # First of two: drive-end tension per elongation on a sliding line of slope -1, then +1, N/m; zero without a cable.
+    STIFFNESS,
+) = range(4)
+# Row of `State.value` for both cables together, and its columns: displacement of the rims of the drive pulley and of
+# the load pulley (m), constant part of the load's law (N).
 PAIR = 2
 DRIVE, LOAD, OFFSET = range(3)
-# Fields of `State.kind`: the corners last passed by the front at the drive end and at the load end; first and last
-# corner of the list (a front does not see what the other front has passed); mode; slope of the sliding line of a whole
-# cable; then, for the front at the drive end (for the one at the load end 3 further on), sigma (0: no front), the bend
-# that it is in, and whether a segment lies ahead of it.
-LO, HI, FIRST, LAST, MODE, LINE, SIGMA, PIECE, OPEN = range(9)
+# Columns of `State.kind`.
+(
+    LO,  # corner that the front at the drive end has passed last
+    HI,  # corner that the front at the load end has passed last
+    FIRST,  # first corner of the list, and
+    LAST,  # last one: the limits of the list for either front, whatever the other front has passed
+    MODE,  # FRONTS or WHOLE
+    LINE,  # slope of the sliding line, in the mode WHOLE
+    # Of the front at the drive end; add 3 for the front at the load end:
+    SIGMA,  # +1, -1, or 0 without a front
+    PIECE,  # bend of the path in which the front stands
+    OPEN,  # 1 if a segment lies ahead of the front, else 0
+) = range(9)
 
 FRONT_FIELDS, VALUE_FIELDS, KIND_FIELDS = 13, 5, 12
 
 
 class State(NamedTuple):
-    """Everything that the history of a run leaves behind; the arrays are written in place, their fields named above.
+    """All that the next sample depends on. Kernels write into the arrays; the constants above name rows and columns.
 
     Attributes
     ----------
@@ -65,7 +98,11 @@ def blank_state(capacity: int) -> State:
 
 @kernel
 def copy_state(state, to):
-    """Copy what a step may change from `state` into `to`: all but the corners, which a step only passes."""
+    """Copy what moving the pulleys may change from `state` into `to`.
+
+    Corners are not copied: fronts that advance pass them by their indices `LO` and `HI`, and only a reversal writes
+    corners.
+    """
     for i in range(4):
         for j in range(FRONT_FIELDS):
             to.front[i, j] = state.front[i, j]
@@ -79,7 +116,7 @@ def copy_state(state, to):
 
 @small_kernel
 def copy_fronts(state, to, c):
-    """Copy what walking the fronts of cable `c` may change from `state` into `to`."""
+    """Copy what advancing the fronts of cable `c` may change from `state` into `to`."""
     for i in range(FRONT_FIELDS):
         to.front[2 * c, i] = state.front[2 * c, i]
         to.front[2 * c + 1, i] = state.front[2 * c + 1, i]

@@ -1,8 +1,15 @@
-"""One step of the drive. A cable slides in one direction only, so the result does not depend on the path in between.
+"""One step of the drive, from one sample to the next.
 
-The load follows the drive or rests. The cable that is pulled at the drive is let in at the load; the one that is
-released at the drive is pulled there. The load's displacement Q = R_o theta_out solves T2 - T4 = offset + stiffness Q,
-whose left side falls with Q: linear where a cable slides as a whole, a quadratic a segment where it has fronts.
+During a step the drive moves in one direction, and so does every sliding part of a cable. The result therefore depends
+on the end of the step alone, and not on how the drive moved between the samples.
+
+The load follows the drive or rests. The cable that the drive pulls is released at the load; the cable that the drive
+releases is pulled at the load. The displacement of the load pulley's rim, Q = R_o theta_out, solves the balance
+
+    T2 - T4 = offset + stiffness Q.
+
+Its left side falls as Q rises: linearly in Q for cables that slide over their whole length, and by a quadratic equation
+for each segment that a slip front crosses.
 """
 
 from math import inf
@@ -15,11 +22,11 @@ from ccmodel.model.exact.state import copy_fronts, copy_state
 
 
 @kernel
-def step(path, state, trial, direction, drive, offset, stiffness):
+def step(path, state, saved, direction, drive, offset, stiffness):
     """Move the drive's rim to `drive` (m) and the constant part of the load's law to `offset` (N).
 
     `direction` is +1 where the drive pulls cable A, -1 where it pulls B. A load that the cables do not move on in that
-    direction stays where it is, as does one of infinite stiffness. `trial` has room for a state to return to.
+    direction stays where it is, as does one of infinite stiffness. `saved` is scratch space for a copy of the state.
     """
     reverse(path, state, 0, direction)
     reverse(path, state, 1, -direction)
@@ -40,18 +47,21 @@ def step(path, state, trial, direction, drive, offset, stiffness):
             pull_line(path, state, c)
     changed = offset != state.value[rows.PAIR, rows.OFFSET]
     state.value[rows.PAIR, rows.OFFSET] = offset
+    # On neither cable has the front from the drive met the one from the load: the load-end tensions are unchanged.
     if stiffness == inf or (cables_with_fronts == 2 and not changed):
         return
+    # The load rests as long as it is not pushed in the drive's direction.
     if direction * excess(state, offset, stiffness) <= 0.0:
         return
     if cables_with_fronts == 2:
-        _balance_both_fronts(path, state, trial, direction, offset, stiffness)
+        _balance_both_fronts(path, state, saved, direction, offset, stiffness)
         if not (has_met(path, state, 0) or has_met(path, state, 1)):
             return
-        copy_state(trial, state)
-        last_with_fronts = _first_to_slide_whole(path, state, trial, direction)
+        # The balance ignored that fronts meet: it is solved again with the cable whose fronts meet first sliding whole.
+        copy_state(saved, state)
+        last_with_fronts = _first_to_slide_whole(path, state, saved, direction)
     if cables_with_fronts > 0:
-        _balance_one_front(path, state, trial, last_with_fronts, offset, stiffness)
+        _balance_one_front(path, state, saved, last_with_fronts, offset, stiffness)
         if not has_met(path, state, last_with_fronts):
             return
         slide_whole(path, state, last_with_fronts, state.kind[last_with_fronts, rows.SIGMA + 3])
@@ -98,17 +108,22 @@ def _balanced_load(k_A, e_A, k_B, e_B, offset, stiffness, load):
 
 
 @kernel
-def _balance_one_front(path, state, trial, c, offset, stiffness):
-    """Balance the load where cable `c` has fronts and the other slides as a whole, taut or slack."""
+def _balance_one_front(path, state, saved, c, offset, stiffness):
+    """Balance the load where cable `c` has fronts and the other slides as a whole, taut or slack.
+
+    With P the load-end tension of cable `c`, d = -sign Q the displacement of that end, and k (stretch - d) the load-end
+    tension of the other cable, the balance is P + (k + stiffness) d = k stretch + sign offset. A taut other cable is
+    assumed first; if it comes out slack, the balance is solved again without it (k = 0).
+    """
     other = 1 - c
     sign = 1 - 2 * c
     k = line_stiffness(path, state, other)[1]
     stretch = state.value[other, rows.E0] - sign * state.value[rows.PAIR, rows.DRIVE]
     if k > 0.0:
-        copy_fronts(state, trial, c)
+        copy_fronts(state, saved, c)
         walk(path, state, c, 1, 1.0, k + stiffness, k * stretch + sign * offset)
         if stretch - state.front[2 * c + 1, rows.D] < 0.0:
-            copy_fronts(trial, state, c)
+            copy_fronts(saved, state, c)
             k = 0.0
     if k == 0.0:
         walk(path, state, c, 1, 1.0, stiffness, sign * offset)
@@ -118,27 +133,28 @@ def _balance_one_front(path, state, trial, c, offset, stiffness):
 
 
 @kernel
-def _balance_both_fronts(path, state, trial, direction, offset, stiffness):
-    """Balance the load between the fronts of both cables, the load moving in `direction`, as if no fronts could meet.
+def _balance_both_fronts(path, state, saved, direction, offset, stiffness):
+    """Balance the load, moving in `direction`, between cables that both have fronts; whether these meet is ignored.
 
-    The unknown is the load-end tension of the cable that is pulled there: displacements are smooth in that tension,
-    while it starts as a square root of them. The state before the step stays in `trial`.
+    The unknown of the Newton iteration is the load-end tension of the cable that is pulled at the load, not the load's
+    displacement: the displacement is a smooth function of the tension, while the tension rises as the square root of
+    the displacement where a front starts. The state before the step is left in `saved`.
     """
     pulled = (1 + direction) // 2
-    let_in = 1 - pulled
-    copy_state(state, trial)
-    start = state.value[let_in, rows.T_LOAD]
+    released = 1 - pulled
+    copy_state(state, saved)
+    start = state.value[released, rows.T_LOAD]
     low = state.value[pulled, rows.T_LOAD]
     high = start - direction * (offset + stiffness * state.value[rows.PAIR, rows.LOAD])
     tension = 0.5 * (low + high)
     for attempt in range(300):
-        copy_fronts(trial, state, 0)
-        copy_fronts(trial, state, 1)
+        copy_fronts(saved, state, 0)
+        copy_fronts(saved, state, 1)
         walk(path, state, pulled, 1, 1.0, 0.0, tension)
         load = (2 * pulled - 1) * state.front[2 * pulled + 1, rows.D]
         wanted = tension + direction * (offset + stiffness * load)
-        walk(path, state, let_in, 1, 1.0, 0.0, min(start, wanted))
-        mismatch = direction * (load - (2 * let_in - 1) * state.front[2 * let_in + 1, rows.D])
+        walk(path, state, released, 1, 1.0, 0.0, min(start, wanted))
+        mismatch = direction * (load - (2 * released - 1) * state.front[2 * released + 1, rows.D])
         if mismatch > 0.0:
             high = tension
         else:
@@ -146,10 +162,10 @@ def _balance_both_fronts(path, state, trial, direction, offset, stiffness):
         compliance = end_compliance(state, pulled, 1)
         slope = compliance
         if wanted < start:
-            slope += (1.0 + stiffness * compliance) * end_compliance(state, let_in, 1)
+            slope += (1.0 + stiffness * compliance) * end_compliance(state, released, 1)
         proposed = tension - mismatch / slope if slope > 0.0 else low
         if attempt % 3 == 2 or not (low < proposed < high):
-            # Newton's steps creep where a front has no segment ahead or hardly moves.
+            # Every third step is a bisection: Newton's steps creep where a front has no segment ahead or hardly moves.
             proposed = 0.5 * (low + high)
         if abs(proposed - tension) <= 2e-16 * abs(tension):
             break
@@ -160,16 +176,20 @@ def _balance_both_fronts(path, state, trial, direction, offset, stiffness):
 
 
 @kernel
-def _first_to_slide_whole(path, state, trial, direction):
-    """Let the cable whose fronts meet first, by displacement of the load, slide as a whole; returns the other one."""
-    copy_state(state, trial)
+def _first_to_slide_whole(path, state, saved, direction):
+    """Let the cable whose fronts meet first slide as a whole; returns the other cable.
+
+    For each cable the load moves until the load-end tension is the drive-end tension times the capstan ratio, where
+    fronts meet. The cable that takes the smaller displacement of the load is the first.
+    """
+    copy_state(state, saved)
     travel = [0.0, 0.0]
     for c in range(2):
         sigma = state.kind[c, rows.SIGMA]
         before = state.front[2 * c + 1, rows.D]
         walk(path, state, c, 1, 1.0, 0.0, state.front[2 * c, rows.P] * path.ratio[(1 - sigma) // 2])
         travel[c] = abs(state.front[2 * c + 1, rows.D] - before)
-    copy_state(trial, state)
+    copy_state(saved, state)
     first = 0 if travel[0] <= travel[1] else 1
     slide_whole(path, state, first, (2 * first - 1) * direction)
     return 1 - first

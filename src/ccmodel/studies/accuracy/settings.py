@@ -1,4 +1,4 @@
-"""Settings of the model's accuracy: bias, scatter and comparison errors."""
+"""Settings of the study of the model's accuracy: bias, scatter and comparison errors."""
 
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
@@ -9,7 +9,7 @@ from ccmodel.studies.settings import StudySettings
 
 
 class Accuracy(StudySettings):
-    """How near the model is to the recordings, by the measures that other fields report."""
+    """Accuracy of the model against recordings, by the measures of NIST SP 1018-3 and ASME V&V 20."""
 
     kind: ClassVar = "accuracy"
     heading: ClassVar = "Accuracy"
@@ -17,9 +17,11 @@ class Accuracy(StudySettings):
     figures: ClassVar = ("{name}", "{name}-ratio")
 
     parameters: str | None = Field(None, description="parameter set of the model; absent: the first fit's")
-    coverage: float = Field(0.9, gt=0, lt=1, description="probability that an interval holds")
-    coverage_factor: float = Field(2.0, gt=0, description="standard uncertainties that an error may have")
+    coverage: float = Field(0.9, gt=0, lt=1, description="coverage probability of the intervals of the bias factor")
+    coverage_factor: float = Field(
+        2.0, gt=0, description="a comparison error up to this many validation uncertainties u_val is not resolved"
+    )
 
     def needs(self, config, studies: Mapping, batches: Sequence[str]) -> list[tuple[str, str, str]]:
-        """Label, parameter set and batch of every run: all batches."""
+        """Label, parameter set and batch of every run: one run of each batch, with an empty label."""
         return [("", config.parameters_of(self), batch) for batch in batches]

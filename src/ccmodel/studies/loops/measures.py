@@ -1,8 +1,8 @@
 """Quantities of the loops of one cycle: backlash, slopes, slack, lost work; the same for recordings and models.
 
 The two reversals of the drive divide a cycle into two branches. At the start of a branch the load rests (the flat part
-of the loop), then it follows. While one cable is slack, the other one transmits the torque alone, and the loop is less
-steep.
+of the loop), then it follows the drive. While one cable is slack, the other one transmits the torque alone, and the
+loop is less steep. The glossary (docs/glossary.md) defines phases IVa and IVb.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,12 +35,14 @@ class Cycle:
     ----------
     channels : dict of str to ndarray, shape (n,)
     slack : ndarray of bool, shape (2, n), or None
-        Whether cable A and B are slack: the tension at both ends is below the threshold at most of the samples around.
-        The mean tension around a sample would end every slack too early. None where a tension was not recorded.
+        Whether cable A and cable B are slack: both end tensions are below the threshold at more than half of the
+        samples within the smoothing window. A smoothed tension is not used: it rises above the threshold before the
+        cable is taut. None if a tension was not recorded.
     branches : tuple of ndarray of int
-        Samples of each branch in the order of time, from one reversal of the drive to the next. One branch consists of
-        the end and the beginning of the cycle.
+        Sample numbers of each branch, from one reversal of the drive to the next. The second branch runs over the end
+        of the cycle and continues at its beginning.
     how : Measuring
+        Settings of the measurement.
     """
 
     channels: dict[str, NDArray]
@@ -87,15 +89,16 @@ class Cycle:
         return self.slack
 
     def follows(self, branch: NDArray) -> NDArray:
-        """Whether the load has moved since the reversal, in torque, at each sample of a branch."""
+        """Whether the load torque has left its value at the reversal, at each sample of a branch."""
         y = self[TAU_OUT]
         return np.abs(y[branch] - y[branch[0]]) > self.how.moved_share * float(np.ptp(y))
 
 
 def _slack(recording: Recording, how: Measuring, size: int) -> NDArray | None:
+    """Attribute `slack` of a cycle, over the whole recording; `size` is the number of samples in the window."""
     if not all(c in recording for c in TENSIONS):
         return None
-    below = [np.maximum(recording[near], recording[far]) < how.slack_below_N for near, far in CABLES.values()]
+    below = [np.maximum(recording[drive], recording[load]) < how.slack_below_N for drive, load in CABLES.values()]
     return uniform_filter1d(np.array(below, dtype=float), size, axis=1) > 0.5
 
 
@@ -118,16 +121,18 @@ def slope(cycle: Cycle, loop: tuple[str, str] = TORQUE_LOOP) -> float:
 def deadband(cycle: Cycle, loop: tuple[str, str] = TORQUE_LOOP) -> float:
     """Change of x after a reversal of the drive until y follows, mean of the two branches.
 
-    Encoder steps and noise conceal the first small motion of y. The corner is therefore the point at which the line
-    through the next part of the branch has the value that y had at the reversal.
+    Encoder steps and noise conceal the first small motion of y. The end of the deadband is therefore extrapolated: a
+    line is fitted to the part of the branch in which y has moved by one to three times `moved_share` of its range, and
+    the deadband ends where this line has the value that y had at the reversal.
     """
     x, y = cycle[loop[0]], cycle[loop[1]]
     span, low = float(np.ptp(y)), cycle.how.moved_share
+    high = 3 * low
     found = []
     for branch in cycle.branches:
         moved = np.abs(y[branch] - y[branch[0]]) / span if span > 0 else np.zeros(branch.size)
-        until = int(np.argmax(moved > 3 * low)) if (moved > 3 * low).any() else branch.size
-        following = branch[:until][moved[:until] >= low]
+        end = int(np.argmax(moved > high)) if (moved > high).any() else branch.size
+        following = branch[:end][moved[:end] >= low]
         corner, _ = _line(y[following], x[following], y[branch[0]], cycle.how)
         found.append(abs(corner - x[branch[0]]))
     return float(np.mean(found))
@@ -139,26 +144,27 @@ def slack_share(cycle: Cycle) -> float:
 
 
 def slack_through_reversal_share(cycle: Cycle) -> float:
-    """Share of the cycle at which a cable is slack since before the reversal and the load follows: phase IVb."""
+    """Share of the cycle in phase IVb: the load follows while a cable is slack that was slack at the last reversal."""
     count = 0
     for branch in cycle.branches:
-        still = np.logical_and.accumulate(cycle.slack_cables[:, branch], axis=1).any(axis=0)
-        count += int((still & cycle.follows(branch)).sum())
+        since_reversal = np.logical_and.accumulate(cycle.slack_cables[:, branch], axis=1).any(axis=0)
+        count += int((since_reversal & cycle.follows(branch)).sum())
     return count / cycle[TAU_OUT].size
 
 
 def slack_before_reversal_share(cycle: Cycle) -> float:
-    """Share of the cycle at which a cable is slack until the drive reverses: phase IVa."""
+    """Share of the cycle in phase IVa: the load follows while a cable is slack that stays slack until the reversal."""
     return sum(_slack_until_reversal(cycle, branch).size for branch in cycle.branches) / cycle[TAU_OUT].size
 
 
 def slack_slope(cycle: Cycle) -> float:
-    """Gradient of tau_out over tau_in while one cable is slack and the drive goes on, mean of the two branches."""
+    """Gradient of tau_out over tau_in in phase IVa (`slack_before_reversal_share`), mean of the two branches."""
     tau_in, tau_out = (cycle[c] for c in TORQUE_LOOP)
     found = []
     for branch in cycle.branches:
         part = _slack_until_reversal(cycle, branch)
-        # Smoothing rounds off the reversal, and a cable counts as slack a little too early: only the outer half counts.
+        # The line is fitted to the second half of the phase, less a smoothing window at its end: a cable counts as
+        # slack a little too early, and smoothing rounds off the reversal.
         part = part[: -max(1, round(cycle.how.smoothing_share * tau_in.size))]
         distance = np.abs(tau_in[part] - tau_in[part[0]]) if part.size else np.zeros(1)
         if not distance.max() > cycle.how.moved_share * np.ptp(tau_in):
@@ -169,14 +175,15 @@ def slack_slope(cycle: Cycle) -> float:
 
 
 def work_lost(cycle: Cycle) -> float:
-    """Work of the drive over a closed cycle, J."""
+    """Work of the drive over one cycle, the area of the loop of tau_in over theta_in, J."""
+    # The first sample is repeated at the end to close the loop.
     tau, theta = (np.append(cycle[c], cycle[c][0]) for c in (TAU_IN, THETA_IN))
     return float(abs(np.trapezoid(tau, theta)))
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity of a cycle.
+    """A quantity of a cycle, with its name, unit and computation.
 
     Attributes
     ----------
@@ -187,7 +194,7 @@ class Quantity:
         From SI units to `unit`.
     of_cycle : callable
     channels : tuple of str
-        Channels from which it is computed, for its uncertainty.
+        Channels from which it is computed; the study of the accuracy propagates their uncertainty.
     """
 
     text: str
@@ -208,6 +215,7 @@ def _peak(channel: str) -> Quantity:
     return Quantity(text, c.plot_unit or c.unit, c.scale, of_cycle, (channel,))
 
 
+# By the name that config.yaml and the tables use.
 QUANTITIES = {
     **{TABLE[c].short_name: _peak(c) for c in (*MEASURED, *TENSIONS)},
     "width": Quantity("width of the torque loop", "mN·m", 1e3, width, TORQUE_LOOP),
@@ -240,7 +248,7 @@ def measure(recording: Recording, names: Sequence[str], how: Measuring) -> tuple
     -------
     values : dict of str to float
     gaps : dict of str to str
-        Each name is in one of the two.
+        Reasons. Every name is a key of `values` or of `gaps`.
     """
     try:
         cycle = Cycle.of(recording, how)
@@ -265,7 +273,7 @@ def _middle_lines(cycle: Cycle, loop: tuple[str, str]) -> list[tuple[float, floa
 
 
 def _line(u: NDArray, v: NDArray, at: float, how: Measuring) -> tuple[float, float]:
-    """Value at `at`, and gradient, of the straight line through v over u."""
+    """Value at u = `at`, and gradient dv / du, of the straight line fitted to v over u."""
     if u.size < how.fewest_samples or not np.ptp(u) > 0:
         raise NotMeasurableError(f"{u.size} samples for a line that takes {how.fewest_samples} different ones")
     gradient, value = np.polyfit(u - at, v, 1)

@@ -1,4 +1,8 @@
-"""The study from its settings to its tables and figure: single effects, finer near the best ones, and pairs."""
+"""The study of Table I, from its settings to its tables and its figure.
+
+It runs every single effect on a coarse grid of strengths, then on a finer grid near the best strengths, and then pairs
+of the best effects. A case is one condition (rig, motion, load) with one effect or two.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,7 +33,7 @@ class Outcome:
     failed : DataFrame
         All cases that failed.
     left_out : int
-        Number of conditions beyond the ranges of the paper's sensors.
+        Number of conditions that were not run, since they exceed the ranges of the paper's sensors.
     """
 
     singles: pd.DataFrame
@@ -40,39 +44,45 @@ class Outcome:
 
 def run_study(study: TableOne, cores: int = 1, report: Report = lambda text: None) -> Outcome:
     """Run all cases; the tables do not depend on the number of processes."""
-    stated, usable = conditions(study.not_stated), usable_conditions(study, study.not_stated)
-    groups = single_cases(study, usable)
-    coarse = _run(study, groups, cores, report, "effects")
-    cases = [case for group in groups for case in group]
-    around = [_around(study, cases[i]) for i in _best_rows(scored(coarse, study))]
-    singles = pd.concat([coarse, _run(study, around, cores, report, "effects, finer")], ignore_index=True)
-    cases += [case for group in around for case in group]
-    found = scored(singles, study)
-    paired = pair_cases(study, usable_conditions(study, study.pairs.not_stated), _leading(study, found, cases))
-    pairs = _run(study, paired, cores, report, "pairs")
+    every, usable = conditions(study.not_stated), usable_conditions(study, study.not_stated)
+    coarse_cases = single_cases(study, usable)
+    coarse = _run(study, coarse_cases, cores, report, "effects")
+    # `cases[i]` belongs to row i of the table; `scored` keeps the rows' numbers.
+    cases = [case for group in coarse_cases for case in group]
+    finer_cases = [_finer_cases(study, cases[i]) for i in _best_rows(scored(coarse, study))]
+    singles = pd.concat([coarse, _run(study, finer_cases, cores, report, "effects, finer")], ignore_index=True)
+    cases += [case for group in finer_cases for case in group]
+    scored_singles = scored(singles, study)
+    leading = _leading(study, scored_singles, cases)
+    cases_of_pairs = pair_cases(study, usable_conditions(study, study.pairs.not_stated), leading)
+    pairs = _run(study, cases_of_pairs, cores, report, "pairs")
+    scored_pairs = scored(pairs, study) if len(pairs) else scored_singles.iloc[:0]
     failed = pd.concat([singles, pairs], ignore_index=True)
     failed = failed[failed["failed"] != ""]
-    ran = scored(pairs, study) if len(pairs) else found.iloc[:0]
-    return Outcome(found, ran, failed, len({c.without_fit for c in stated} - {c.without_fit for c in usable}))
+    # Conditions that differ in the fit alone share one motion of the rig and count once.
+    left_out = {c.without_fit for c in every} - {c.without_fit for c in usable}
+    return Outcome(scored_singles, scored_pairs, failed, len(left_out))
 
 
 def _run(study: TableOne, groups: Sequence[Sequence[Case]], cores: int, report: Report, stage: str) -> pd.DataFrame:
+    """Run groups of cases, with the stage's name in front of each line of progress."""
     report(f"{stage}: {sum(map(len, groups))} cases")
     return run(study, groups, cores, lambda text: report(f"{stage}: {text}"))
 
 
 def _best_rows(found: pd.DataFrame) -> list[int]:
-    """Cases at which an effect is nearest by some ranking, in the order of the cases."""
+    """Row numbers of the cases at which an effect comes nearest to Table I by any of the rankings, ascending."""
     return sorted({int(i) for column, *_ in RANKINGS for i in nearest(found, column).index})
 
 
-def _around(study: TableOne, case: Case) -> list[Case]:
+def _finer_cases(study: TableOne, case: Case) -> list[Case]:
+    """The case of one effect at further strengths, between the neighbours of its strength on the coarse grid."""
     condition, (effect,) = case
     return [(condition, (e,)) for e in finer(effect, study.grid)]
 
 
 def _leading(study: TableOne, found: pd.DataFrame, cases: Sequence[Case]) -> list[Effect]:
-    """The nearest effects by each ranking, at the values at which they are nearest; each once."""
+    """The best effects of every ranking, each at the values of its nearest case; no effect twice at one place."""
     leading: dict[tuple, Effect] = {}
     for column, *_ in RANKINGS:
         for i in nearest(found, column).index[: study.pairs.singles]:
