@@ -75,10 +75,10 @@ Made by `{command}` on {date.today().isoformat()}:
 - **Fit**: three parameters of the batch and eight of each recording, from starting values with errors of 20 %.
 - **Seeds**: from {FIRST_SEED} on unless the command says otherwise. No choice about the intervals was made with them.
 
-The nominal coverage is 90 %. "Limits" is the range of "covered" within which a binomial test at the {100 * LEVEL:.0f} % level accepts
-90 %. "Mean" and "sd" are those of the error over its stated standard deviation; for calibrated intervals they are 0 and
-1. "Recording's own" parameters have one value for each recording. Those of one batch are correlated, so that their
-limits are somewhat too narrow.
+The nominal coverage is 90 %. "Limits" is the range of "covered" that a binomial test accepts as 90 %, at the
+{100 * LEVEL:.0f} % level. "Mean" and "sd" are those of the error over its stated standard deviation, 0 and 1 for
+calibrated intervals. "Recording's own" parameters have one value for each recording. Those of one batch are correlated,
+so that their limits are somewhat too narrow.
 
 | parameter | intervals | covered | coverage | limits | mean | sd | interval is |
 |---|---|---|---|---|---|---|---|
