@@ -49,8 +49,9 @@ Each mechanism acts alone, with the same equation and parameters in two solvers 
   masses together;
 - the general solver: implicit, without inertia, 32 elements, one sample per millisecond.
 
-The transmission is a half loop of 1.2 m with 7.3 N of pretension. The drive is a sine of 0.7 rad at 1 Hz. A row states
-where it differs. Effects of sensors are not part of the dynamics and are not in the table.
+The transmission is a half loop of 1.2 m with 7.3 N of pretension. The drive is a sine of 0.7 rad at 1 Hz. The column
+"parameters" states other values where a row has them. Effects of sensors are not part of the dynamics and are not in
+the table.
 
 | column | meaning |
 |---|---|

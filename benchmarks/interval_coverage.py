@@ -72,12 +72,13 @@ Made by `{command}` on {date.today().isoformat()}:
 - **Recording**: friction (1 %), pretension (1 %), a tension profile in each cable (5 to 40 % of what friction can
   hold), sensor zeros (uniform within the paper's accuracy) and white noise (0.1 mN m, 0.05 N) are drawn for each
   recording. Both angles are quantised (0.18 deg).
-- **Fit**: from starting values with errors of 20 %, three parameters of the batch and eight of each recording's own.
+- **Fit**: three parameters of the batch and eight of each recording, from starting values with errors of 20 %.
 - **Seeds**: from {FIRST_SEED} on unless the command says otherwise. No choice about the intervals was made with them.
 
-The nominal coverage is 90 %. "Limits" are those of the count in a binomial test at the {100 * LEVEL:.0f} % level.
-"Mean" and "sd" are those of the error over its stated standard deviation; for calibrated intervals they are 0 and 1.
-The recordings' own parameters in a batch are correlated, so that their limits are somewhat too narrow.
+The nominal coverage is 90 %. "Limits" is the range of "covered" that a binomial test accepts as 90 %, at the
+{100 * LEVEL:.0f} % level. "Mean" and "sd" are those of the error over its stated standard deviation, 0 and 1 for
+calibrated intervals. "Recording's own" parameters have one value for each recording. Those of one batch are correlated,
+so that their limits are somewhat too narrow.
 
 | parameter | intervals | covered | coverage | limits | mean | sd | interval is |
 |---|---|---|---|---|---|---|---|

@@ -90,12 +90,15 @@ none to two concealed effects with size and place, the protocol, sensor noise an
 cannot read files, import modules, start programs or open connections outside that folder, and no answer is on disk.
 The held-out recordings are simulated after the diagnosis has ended.
 
+- **Kinds**: a clean case has no effect. A single or a pair has one or two effects whose mechanisms are candidates. In a
+  removed case the mechanism of the one effect is removed from the candidates. An unlisted effect has no mechanism. A
+  poor case has a single effect, recorded with little variation.
+- **Recalibrated model**: the paper's model as the diagnosis fits it to the batch (`calibrated.json`).
 - **Noise floor**: the error of a model with the true physics, from sensor noise, sensor zeros, encoder resolution and
   1 % run-to-run variation of friction.
 - **Visible**: the recalibrated model's error on held-out recordings is at least 3 sqrt(2) noise floors in some channel,
   which is three standard deviations of the difference of two repeats.
-- **No candidate**: the effect is unlisted, that is, no mechanism models it, or its mechanism is removed from the
-  candidates.
+- **No candidate**: unlisted and removed cases.
 - **Located**: the reported place is the true one. Places that no recording distinguishes count as equal: cable and
   conduit, a pulley and its cable end, the load and its pulley.
 - **Open** in the column "met": the 95 % interval includes the target, so that more cases are needed to decide.
@@ -176,7 +179,8 @@ def _missed_targets(scored: dict) -> str:
     ]
     if not missed:
         return "Every target with cases is met."
-    return f"Targets missed: {'; '.join(missed)}. The table of misses below includes the visible cases among them."
+    return f"""Targets missed: {"; ".join(missed)}. Their cases are among the misses below; `agrees` for an effect
+that is not visible is no miss, except in a pair."""
 
 
 def _methods(rows: list[dict]) -> str:

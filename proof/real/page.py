@@ -44,7 +44,7 @@ The test recordings without a fault: {_control(control)}
 
 ## Seeded faults
 
-- **Changed**: standard deviation of the change over the channel's peak to peak.
+- **Changed**: standard deviation of the change that the fault makes in a channel, over the channel's peak to peak.
 - **Mean square**: residual mean square of the frozen baseline on the faulty recordings, over the square of the
   tolerance.
 - **Right**: the mechanism is identified or among the alternatives, at its place, or an equivalent that no recording
@@ -55,8 +55,9 @@ The test recordings without a fault: {_control(control)}
 
 ## Mechanisms removed from the baseline
 
-The test recordings without a fault, with one mechanism removed from the baseline. If it is among the candidates, right
-is to identify it with its value. If it is not, right is `unexplained` or `undecided` at its place.
+The test recordings without a fault, with one mechanism removed from the baseline. If this mechanism is a candidate, a
+diagnosis is right that identifies it with its value. Otherwise a diagnosis is right if it is `unexplained` or
+`undecided` at the place of the mechanism.
 
 {_rows(_REMOVED_HEAD, removed)}
 
@@ -72,17 +73,17 @@ def _method(plan: RealPlan, baseline: Path) -> str:
 have the digest {tolerance["diagnosis"]}.
 
 - **Recordings**: `{plan.batch}` of MRDLab/mis-tool-characterization, a da Vinci grasper ([the
-  instrument](real-instrument.md)). They are measured, and in no commit.
+  instrument](real-instrument.md)). They are measured and not part of the repository.
 - **Faults**: one at a time, computed on the raw counts and seeded in all test recordings alike. Fault and size are
   drawn from a seed ([ranges and sources](../proof/real/plan.yaml)).
 - **Isolation**: the diagnosis runs in a process that can reach only a copy of the batch and the baseline. No answer is
-  on disk, and names reveal nothing.
+  on disk, and no file name reveals the fault.
 - **Baseline**: identified from {len(plan.training)} training recordings ({_ids(plan.training)}) with a tolerance of
   {100 * plan.tolerance:g} % of peak to peak. The verdict was `{first["verdict"]}`{_nearest_words(first)}:
   {_mechanisms(model)}. Its cross-validated mean square is {_nearest_mean_square(first):.2f} times the square of the
   tolerance.
-- **Tolerance**: {100 * tolerance["tolerance"]:g} % of peak to peak, the first of a sequence with which the frozen
-  baseline agrees with the training recordings: {_sequence(tolerance)}.
+- **Tolerance**: {100 * tolerance["tolerance"]:g} % of peak to peak, the first of a rising sequence at which the
+  diagnosis of the training recordings with the frozen baseline is `agrees`: {_sequence(tolerance)}.
 - **Test**: the other {len(plan.test)} recordings ({_ids(plan.test)}), diagnosed with the frozen baseline (`--freeze`):
   only the zeros of the two torques are fitted.
 """

@@ -48,23 +48,23 @@ class Experiment:
 def proposed(judgement: Judgement, estimates: Parameters) -> dict | None:
     """The experiment that best separates the leading candidates; None without two that can be run."""
     pairs = zip(judgement.candidates, judgement.probability, strict=True)
-    rivals = [c for c, p in pairs if p > settings.RIVAL]
-    if len(rivals) < 2:
-        rivals = [judgement.calibrated, *judgement.candidates]
-    rivals = rivals[: settings.SEPARATED]
-    if len(rivals) < 2:
+    candidates = [c for c, p in pairs if p > settings.RIVAL]
+    if len(candidates) < 2:
+        candidates = [judgement.calibrated, *judgement.candidates]
+    candidates = candidates[: settings.SEPARATED]
+    if len(candidates) < 2:
         return None
     template = max(judgement.whitened, key=lambda w: w.observations.given.recording.pretension_N).observations
     every = experiments(judgement.whitened)
-    planned = [[planned_observations(e, c, template, estimates) for c in rivals] for e in every]
-    as_fitted = np.array(each(planned, lambda i, of_rivals: separation(of_rivals)))
+    planned = [[planned_observations(e, c, template, estimates) for c in candidates] for e in every]
+    as_fitted = np.array(each(planned, lambda i, of_candidates: separation(of_candidates)))
     leading = [int(k) for k in np.argsort(-as_fitted, kind="stable")[: settings.REFITTED] if as_fitted[k] > 0]
-    refitted = each(leading, lambda i, k: separation(planned[k], rivals))
+    refitted = each(leading, lambda i, k: separation(planned[k], candidates))
     if max(refitted, default=0.0) <= 0:
         return None
     best = int(np.argmax(refitted))
-    names = list(dict.fromkeys(name for c in rivals for name, _ in c.hypothesis.acting))
-    differ = f"there the rivals differ by {refitted[best]:.2g} times the noise, fitted to it as well"
+    names = list(dict.fromkeys(name for c in candidates for name, _ in c.hypothesis.acting))
+    differ = f"there the candidates differ by {refitted[best]:.2g} times the noise, fitted to it as well"
     wanted = recordings_wanted(refitted[best], len(template.channels))
     tells = "one such recording tells" if wanted == 1 else f"it takes {wanted} such recordings to tell"
     text = f"{every[leading[best]].text}: {differ}, more than in any other tried; {tells}."

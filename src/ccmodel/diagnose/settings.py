@@ -32,8 +32,8 @@ FIRST_FIT_EVALUATIONS, FIRST_FIT_TOLERANCE = 20, 1e-4
 
 # --- Whitening: the covariance of the errors
 
-# Standard deviation of the friction coefficient from run to run, over its mean. Stated: rigs of the paper's kind repeat
-# to about 1 % (docs/rig-log-format.md).
+# Standard deviation of the friction coefficient from run to run, over its mean. Stated: recordings of one
+# condition repeat to about 1 % in friction (docs/rig-log-format.md).
 FRICTION_SPREAD = 0.01
 # Standard deviation of the load's position in its gap: uniform from -1 to 1.
 GAP_SPREAD = 1 / np.sqrt(3)

@@ -2,11 +2,12 @@
 
 Equation: Cable B has ratio times the friction coefficient mu and K_ratio times the axial rigidity EA of cable A.
 
-Signature: The residual is odd in the direction of motion: one cable's stroke fits and the other's does not.
+Signature: The residual changes with the direction of motion: the strokes that one cable pulls fit, those of the
+other do not.
 
 Separated by: exchange of the cables: the residual moves with them.
 
-Source: Agrawal, Peine and Yao 2010: (1) to (5), with parameters of each cable's own.
+Source: Agrawal, Peine and Yao 2010: (1) to (5), with separate parameters for each cable.
 """
 
 from ccmodel.mechanisms.contract import Mechanism, Parameter

@@ -5,8 +5,8 @@ length.
 
 Signature: The apparent stiffness is low, independent of how far the friction front has advanced.
 
-Separated by: partial motion against full slip: the cable's compliance acts up to the friction front, a termination's
-at its end, a conduit's with the mean tension.
+Separated by: partial motion compared with full slip: the compliance of a cable acts up to the friction front, that
+of a termination with the tension at its end, that of a conduit with the mean tension.
 
 Source: Agrawal, Peine and Yao 2010, Section VI: changes in the path of the conduit due to lateral forces.
 """

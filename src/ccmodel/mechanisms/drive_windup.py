@@ -1,11 +1,11 @@
 """Torsional compliance and backlash of the drive train.
 
-Equation: Between the motor at angle phi and the pulley at theta act a torsional compliance and a lost_motion: while
-the pulley moves, phi = theta + compliance tau + lost_motion sgn(dtheta/dt) / 2. At a reversal the pulley's own
-friction holds it and theta does not determine the torque. The motor passes its reversal smoothly, so phi is taken as
-the cubic through its values before and after, and the torque follows from it. The law changes the torque only where
-the pulley stands at its reversals. With coarse encoder counts every pulley seems to, so a diagnosis considers it
-only as a forced candidate.
+Equation: The drive train connects the motor at angle phi with the pulley at theta. It has a torsional compliance
+and a lost_motion: while the pulley moves, phi = theta + compliance tau + lost_motion sgn(dtheta/dt) / 2. At a
+reversal the pulley's own friction holds it and theta does not determine the torque. The motor passes its reversal
+smoothly, so phi is taken as the cubic through its values before and after, and the torque follows from it. The law
+changes the torque only where the pulley stands still at its reversals. With coarse encoder counts every pulley
+seems to stand still there, so a diagnosis considers this mechanism only as a forced candidate.
 
 Signature: At a reversal the torque falls before the pulley moves, the earlier the slower the motion.
 

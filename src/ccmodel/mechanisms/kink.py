@@ -1,9 +1,9 @@
 """Extra bend at one place of the conduits.
 
 Equation: The bend angle phi(x) jumps by beta at x = s L, in both conduits, which run side by side. At rest the
-tension changes there by hold times the change that friction makes over as much bend elsewhere: hold = 1 for conduits
-that had their kink when the cables were tensioned, hold = 0 for conduits that were bent afterwards. A rest does not
-show hold; the travel of the friction front before it passes does.
+tension changes at the kink by hold times its change over an equal bend elsewhere: hold = 1 for conduits that had
+their kink when the cables were tensioned, hold = 0 for conduits that were bent afterwards. The tensions at the ends
+do not show hold at rest; the travel until the friction front passes the kink does.
 
 Signature: The friction front stalls part-way, and the loss in full slip exceeds mu times the measured bend.
 

@@ -10,8 +10,8 @@ def _scale(sensing, place, values):
 
     Equation: The cell reads (1 + gain) F.
 
-    Signature: One sum disagrees with all other channels, among them the torque on the same side. The model errs only
-    in the tensions derived from that sum, in proportion to it.
+    Signature: One force sum disagrees with all other channels, also with the torque on the same side. The model
+    errs only in this sum and the two tensions derived from it, in proportion to it.
 
     Separated by: two pretensions.
 
@@ -26,8 +26,8 @@ def _offset(sensing, place, values):
 
     Equation: The cell reads F + offset.
 
-    Signature: One sum disagrees with all other channels, among them the torque on the same side. The model errs only
-    in the tensions derived from that sum, by a constant.
+    Signature: One force sum disagrees with all other channels, also with the torque on the same side. The model
+    errs only in this sum and the two tensions derived from it, by a constant.
 
     Separated by: two pretensions; the rest at the start.
 
@@ -43,8 +43,8 @@ def _drift(sensing, place, values):
 
     Equation: The cell reads F + rate (t - t_0), with t_0 the start of the recording.
 
-    Signature: One sum disagrees with all other channels, among them the torque on the same side. The model errs only
-    in the tensions derived from that sum, by an error that grows with time.
+    Signature: One force sum disagrees with all other channels, also with the torque on the same side. The model
+    errs only in this sum and the two tensions derived from it, by an error that grows with time.
 
     Separated by: rest at start and end; the other side's cell.
 
@@ -60,8 +60,8 @@ def _crosstalk(sensing, place, values):
 
     Equation: The cell reads F + crosstalk tau / R, with tau the torque on the same side.
 
-    Signature: One sum disagrees with all other channels, among them the torque on the same side. The model errs only
-    in the tensions derived from that sum, by an error that follows the torque.
+    Signature: One force sum disagrees with all other channels, also with the torque on the same side. The model
+    errs only in this sum and the two tensions derived from it, by an error that follows the torque.
 
     Separated by: strokes to both sides.
 

@@ -3,8 +3,7 @@
 Equation: The friction coefficient is mu (T / T_ref)^n with T_ref = 5 N and n between 0 and about -1/3, the exponent
 of a Hertzian contact. Below about 0.1 N the factor levels off.
 
-Signature: ln(T1 / T2) in full slip changes with tension, while with Coulomb friction the conduit's shape alone sets
-it.
+Signature: ln(T1 / T2) in full slip changes with tension. With Coulomb friction it depends on the bend alone.
 
 Separated by: three pretensions: a drag leaves a loss at zero tension, a power law does not.
 

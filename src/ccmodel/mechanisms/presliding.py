@@ -6,8 +6,8 @@ form.
 
 Signature: Corners at reversals, sharp in the paper's model, are rounded over a few z0 of sliding.
 
-Separated by: nested reversals of small amplitude: with bristles the tension creeps from one to the next, with a
-termination the small loops close.
+Separated by: nested reversals of small amplitude: with bristles the tension creeps from one small loop to the next,
+with a compliant termination the small loops close.
 
 Source: Dahl, Solid friction damping of mechanical vibrations, AIAA Journal 14(12), 1675-1682, 1976,
 doi:10.2514/3.61511.

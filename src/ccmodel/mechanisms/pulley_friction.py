@@ -6,8 +6,8 @@ angle presliding by Dahl's law: a few mrad in ball bearings, more where a seal o
 Signature: At the drive tau_in is off by a square wave in phase with the speed, and all other channels fit. At the
 load (T2 - T4) R steps at each reversal, and the load's own torque does not.
 
-Separated by: error against speed and load: a gain's error grows with the torque, a bearing's has the sign of the
-speed and one magnitude.
+Separated by: error against speed and load: the error of a gain grows with the torque, that of a bearing has a
+constant magnitude and the sign of the speed.
 
 Source: Agrawal, Peine and Yao 2010, Section VI: friction effects at the two pulleys; with the law of Dahl, AIAA
 Journal 14(12), 1675-1682, 1976, doi:10.2514/3.61511.

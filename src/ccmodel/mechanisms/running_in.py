@@ -5,7 +5,8 @@ drive's cable travel since the start of the recording: warming goes with t, wear
 
 Signature: Loops drift through a recording while the sensors' zeros stay.
 
-Separated by: holds, through which relaxation continues, and a return to the start condition.
+Separated by: holds, during which relaxation continues and running-in by wear does not; and a return to the first
+condition.
 
 Source: Blau, On the nature of running-in, Tribology International 38(11-12), 1007-1012, 2005,
 doi:10.1016/j.triboint.2005.07.020.

@@ -3,7 +3,7 @@
 Equation: Each cable stretches by compliance times its tension at one end, in series and without friction.
 
 Signature: The apparent stiffness lies below the one measured on the cable. The paper measured 13.88 kN/m and fitted
-7.5 to 7.75 kN/m, with 0.4 m of free cable and two terminations in none of its equations.
+7.5 to 7.75 kN/m, while none of its equations contains the 0.4 m of free cable and the two terminations.
 
 Separated by: two conduit lengths; partial motion, in which a termination yields before the friction front has
 advanced.

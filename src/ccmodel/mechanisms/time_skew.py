@@ -3,7 +3,8 @@
 Equation: The channels of one side read at time t what they would have read at t - delay. The model runs on the
 drive's clock, whose angle is its input, so a late drive side is simulated as an early load side.
 
-Signature: Loops open or close with frequency, in every pair of channels with one on each side.
+Signature: Loops of a drive channel over a load channel widen or narrow with frequency, whichever channels are
+taken.
 
 Separated by: a chirp: a delay's error grows with the first power of frequency and is the same in all channels of a
 side.

@@ -4,7 +4,7 @@ Equation: The channel reads (1 + gain) tau.
 
 Signature: The error is proportional to the torque and zero where the torque is.
 
-Separated by: sign of the speed, on which a gain's error does not depend.
+Separated by: strokes in both directions at equal torque: the error of a gain does not depend on the direction.
 
 Source: Isermann, Fault-Diagnosis Systems, Springer, 2006, doi:10.1007/3-540-30368-5, on sensor gain faults.
 """

@@ -46,10 +46,13 @@ class Measuring(TypedModel):
         0.1, gt=0, lt=0.5, description="width and slope: half the band about the middle, as a share of peak to peak"
     )
     moved_share: float = Field(
-        0.1, gt=0, lt=0.33, description="the load follows when it has gone this share of its peak to peak since a turn"
+        0.1,
+        gt=0,
+        lt=0.33,
+        description="the load follows when it has gone this share of its peak to peak since a reversal",
     )
     closed_share: float = Field(
         0.05, gt=0, lt=1, description="a cycle ends where it began, to this share of the drive's peak to peak"
     )
     slack_below_N: float = Field(0.1, gt=0, description="a cable with less tension than this at both ends is slack, N")
-    fewest_samples: int = Field(10, ge=3, description="samples that a line takes at least")
+    fewest_samples: int = Field(10, ge=3, description="samples that a line needs at least")
