@@ -49,7 +49,7 @@ class Measuring(TypedModel):
         0.1,
         gt=0,
         lt=0.33,
-        description="the load follows when it has gone this share of its peak to peak since a reversal",
+        description="the load follows once it has moved by this share of its peak to peak since a reversal",
     )
     closed_share: float = Field(
         0.05, gt=0, lt=1, description="a cycle ends where it began, to this share of the drive's peak to peak"
