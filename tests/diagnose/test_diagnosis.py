@@ -165,7 +165,15 @@ def _more(change, table, share):
     return changed
 
 
-def test_nothing_can_be_held_without_a_model(clean, tmp_path):
+@pytest.mark.parametrize(("former", "present"), cli._FormerOptions.renamed.items())
+def test_an_option_under_its_former_name_is_taken_and_the_present_one_is_said(former, present):
+    value = [] if former == "--hold" else ["x"]
+    found = run("diagnose", "no-such-batch", "--out", "nowhere", former, *value)
+    assert f"{former} is now called {present}" in found.stderr
+    assert "No such option" not in found.stderr
+
+
+def test_freezing_needs_a_baseline(clean, tmp_path):
     found = run("diagnose", clean[0], "--out", tmp_path / "out", "--freeze")
     assert isinstance(found.exception, InputError)
     assert "--baseline" in str(found.exception)

@@ -1,0 +1,48 @@
+"""Model files: a model comes back as it was written, and keys keep the names that the format gave them."""
+
+import json
+from dataclasses import fields
+
+import pytest
+
+from ccmodel.model.files import model_as_dict, read_model
+from ccmodel.model.general.run import Active
+from ccmodel.model.parameters import Parameters
+from ccmodel.typed import InputError
+
+FORMAT_KEYS = {"drive_place": 0.3, "load_place": -0.5, "profile_bow_A": 0.1, "profile_bow_B": -0.2}
+MODEL = Parameters(
+    9000.0,
+    1.2,
+    0.15,
+    0.006,
+    0.006,
+    drive_encoder_offset=0.3,
+    load_gap_position=-0.5,
+    tension_curvature_A=0.1,
+    tension_curvature_B=-0.2,
+    mechanisms=(Active("backlash", "load-pulley", {"half_gap": 0.02}),),
+)
+
+
+def write(path, model=MODEL, **changed):
+    content = model_as_dict(model, {})
+    path.write_text(json.dumps(content | {"parameters": content["parameters"] | changed}))
+    return path
+
+
+def test_a_model_comes_back_as_it_was_written(tmp_path):
+    assert read_model(write(tmp_path / "model.json")) == MODEL
+
+
+def test_keys_of_the_format_stay(tmp_path):
+    """Files of before have these keys, and programs of others read them."""
+    written = json.loads(write(tmp_path / "model.json").read_text())["parameters"]
+    assert {key: written[key] for key in FORMAT_KEYS} == FORMAT_KEYS
+    names = {f.name for f in fields(Parameters)} - {"mechanisms", "refinement"}
+    assert len(written) == len(names)
+
+
+def test_an_unknown_key_is_refused_by_name(tmp_path):
+    with pytest.raises(InputError, match="stifness"):
+        read_model(write(tmp_path / "model.json", stifness=1.0))
