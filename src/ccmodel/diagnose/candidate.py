@@ -20,7 +20,13 @@ from ccmodel.inference.problem import Free, Problem
 from ccmodel.model.parameters import Parameters
 
 SEARCH = Search(
-    settings.FIT_TOLERANCE, settings.FIT_TOLERANCE, settings.FIT_DIFFERENCE, settings.FIT_EVALUATIONS, retreats=False
+    tolerance=settings.FIT_TOLERANCE,
+    shortest=settings.FIT_TOLERANCE,
+    gradient=settings.FIT_TOLERANCE,
+    difference=settings.FIT_DIFFERENCE,
+    most_evaluations=settings.FIT_EVALUATIONS,
+    retreats=False,
+    own_units=True,
 )
 
 

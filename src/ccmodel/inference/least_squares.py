@@ -63,6 +63,12 @@ class Search:
     most_evaluations : int
     retreats : bool
         At a point where the model cannot be run: True shortens the step, False raises the model's error.
+    gradient : float or None
+        The search ends where no component of the gradient exceeds this; None: no such limit.
+    own_units : bool
+        Whether scipy searches in the unknowns' own units, with their sizes as scales, and not in dimensionless
+        variables. Near bounds its steps differ between the two. A cost with several minima, as with measured load
+        torques, is then searched to another one.
     """
 
     tolerance: float = 1e-10
@@ -70,6 +76,8 @@ class Search:
     difference: float = STEP
     most_evaluations: int = 100
     retreats: bool = True
+    gradient: float | None = None
+    own_units: bool = False
 
 
 @dataclass(frozen=True)
@@ -139,19 +147,19 @@ def minimise(
     `origin` is the zero point of the search's dimensionless variables; the default is the start.
     """
     reduced = _Reduced(problem, start if origin is None else origin, how, fixed)
-    y = (start - reduced.origin)[reduced.movable] / reduced.sizes
+    y = reduced.variables(start)
     if not y.size:
         return _solution(problem, reduced, y, CONVERGED, 1)
     found = optimize.least_squares(
-        reduced.residuals, y, reduced.jacobian, reduced.bounds, ftol=how.tolerance, xtol=how.shortest, gtol=None,
-        max_nfev=how.most_evaluations,
+        reduced.residuals, y, reduced.jacobian, reduced.bounds, ftol=how.tolerance, xtol=how.shortest,
+        gtol=how.gradient, x_scale=reduced.sizes / reduced.units, max_nfev=how.most_evaluations,
     )  # fmt: skip
     return _solution(problem, reduced, found.x, _message(found, reduced), found.nfev)
 
 
 def _without_derivatives(problem: Problem, stalled: Solution, reduced: "_Reduced") -> Solution:
     """Continue a stalled search by the simplex method of Nelder and Mead."""
-    y = (stalled.x - reduced.origin)[reduced.movable] / reduced.sizes
+    y = reduced.variables(stalled.x)
     low, high = reduced.bounds
     step = np.where(y + SIMPLEX_EDGE <= high, SIMPLEX_EDGE, -SIMPLEX_EDGE)
     simplex = np.clip(np.vstack([y, y + np.diag(step)]), low, high)
@@ -200,24 +208,31 @@ def information_and_gradient(problem: Problem, x: NDArray, blocks: Sequence[Bloc
 
 
 class _Reduced:
-    """The cost as the sum of squares of few rows, a function of the search's dimensionless variables.
+    """The cost as the sum of squares of few rows, a function of the search's variables.
 
-    The variables are the distances of the unknowns that are not fixed from `origin`, over their sizes. The rows and the
-    derivatives belong to `point`, the last point at which the cost fell.
+    The variables are the distances of the unknowns that are not fixed from `origin`, over their sizes; or, in own
+    units, these unknowns themselves. The rows and the derivatives belong to `point`, the last point at which the cost
+    fell.
     """
 
     def __init__(self, problem: Problem, origin: NDArray, how: Search, fixed: Sequence[int]):
         self.problem, self.origin, self.how = problem, np.array(origin, float), how
         self.movable = np.setdiff1d(np.arange(problem.start.size), fixed)
-        self.sizes = problem.sizes[self.movable]
-        self.bounds = tuple((b - self.origin)[self.movable] / self.sizes for b in problem.bounds)
+        self.sizes = self.units = problem.sizes[self.movable]
+        if how.own_units:
+            self.origin[self.movable], self.units = 0.0, np.ones(self.movable.size)
+        self.bounds = tuple(map(self.variables, problem.bounds))
         self.lowest_cost = np.inf
         self.point, self.blocks, self.rows = None, [], np.empty((0, 0))
+
+    def variables(self, x: NDArray) -> NDArray:
+        """The search's variables at a point given by all unknowns."""
+        return (x - self.origin)[self.movable] / self.units
 
     def place(self, y: NDArray) -> NDArray:
         """All unknowns, in their own units, at a point of the search."""
         x = self.origin.copy()
-        x[self.movable] += y * self.sizes
+        x[self.movable] += y * self.units
         return x
 
     def cost(self, y: NDArray) -> float:
@@ -253,7 +268,7 @@ class _Reduced:
 
         Scipy asks for them only at a point that it has accepted, whose rows are stored.
         """
-        return self.rows[:, self.movable] * self.sizes
+        return self.rows[:, self.movable] * self.units
 
     def blocks_at(self, x: NDArray) -> list[Block]:
         """By recording, errors and derivatives at a point."""
