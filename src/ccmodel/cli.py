@@ -79,10 +79,7 @@ def left_out(results: Folder) -> None:
     messages = left_out_of(results)
     for line in messages["warnings"]:
         _print_finding(line, "warning")
-    for line in messages["left_out"]:
-        _print_finding(line, "refused")
-    if messages["left_out"]:
-        raise typer.Exit(1)
+    _exit_if_refused(messages["left_out"])
 
 
 @app.command()
@@ -157,10 +154,7 @@ def predict(
         typer.echo("root mean square error over the last cycle, % of peak to peak")
         by_channel = errors.pivot(index="recording", columns="channel", values="nrmse_percent")
         typer.echo(by_channel[errors["channel"].unique()].to_string(float_format="%.2f"))
-    for line in messages:
-        _print_finding(line, "refused")
-    if messages:
-        raise typer.Exit(1)
+    _exit_if_refused(messages)
 
 
 @app.command()
@@ -231,6 +225,14 @@ def _print_finding(line: str, severity: str) -> None:
     style, word = {"warning": ("yellow", "warning"), "refused": ("red", "left out")}[severity]
     _err.print(f"[{style}]{word}[/]: ", end="")
     _err.print(line, markup=False)
+
+
+def _exit_if_refused(lines: list[str]) -> None:
+    """Print a line on each input that was left out; exit with 1 if there is one."""
+    for line in lines:
+        _print_finding(line, "refused")
+    if lines:
+        raise typer.Exit(1)
 
 
 def main() -> None:

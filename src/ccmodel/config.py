@@ -45,10 +45,9 @@ class Config(TypedModel):
                 raise ValueError(f"'{name}' names {means}; call the fit something else")
         if taken := self.studies.keys() & self.judgements.keys():
             raise ValueError(f"studies.{min(taken)}: that is the name of another study; call it something else")
-        for name, study in self.studies.items():
-            study.check(f"study '{name}'", self)
-        for name, study in self.judgements.items():
-            study.check(name, self)
+        named = {f"study '{name}'": study for name, study in self.studies.items()}
+        for where, study in (named | self.judgements).items():
+            study.check(where, self)
         return self
 
     @property
@@ -106,26 +105,22 @@ def expand_studies(config: Config, batches: list[str]) -> dict[str, Study]:
     InputError
         If a study, a fit or the list of diagnoses names a batch that is not there.
     """
-    diagnosed = config.diagnosed(batches)
-    named = {
-        f"{kind}.{name}": entry.batches for kind in ("studies", "fits") for name, entry in getattr(config, kind).items()
-    }
-    for where, stated in (named | {"diagnose": diagnosed}).items():
-        for batch in [] if stated == EACH else stated:
+    stated = {f"studies.{name}": study.batches for name, study in config.studies.items()}
+    stated |= {f"fits.{name}": fit.batches for name, fit in config.fits.items()}
+    for where, named in (stated | {"diagnose": config.diagnose}).items():
+        for batch in [] if named == EACH else named:
             if batch not in batches:
                 raise InputError(
-                    f"{where}: there is no batch '{batch}' in {config.raw}; there are " + ", ".join(batches)
+                    f"{where}: there is no batch '{batch}' in {config.raw}; there are {', '.join(batches)}"
                 )
-    expanded = {}
+    diagnosed, expanded = config.diagnosed(batches), {}
     for name, study in config.studies.items():
         wanted = batches if study.batches == EACH else study.batches
         if study.parameters == EXTENDED and (missing := [b for b in wanted if b not in diagnosed]):
             raise InputError(f"studies.{name}: '{EXTENDED}' parameters of {', '.join(missing)}, which no one diagnoses")
         title = study.title or name
+        copies = {name: {"title": title}}
         if study.batches == EACH:
-            for batch in batches:
-                update = {"batches": [batch], "title": f"{title}, {batch}"}
-                expanded[f"{name}-{batch}"] = study.model_copy(update=update)
-        else:
-            expanded[name] = study.model_copy(update={"title": title})
+            copies = {f"{name}-{batch}": {"batches": [batch], "title": f"{title}, {batch}"} for batch in batches}
+        expanded |= {figure: study.model_copy(update=update) for figure, update in copies.items()}
     return expanded

@@ -10,20 +10,11 @@ from ccmodel.channels import CHANNELS, THETA_IN, unit_of
 from ccmodel.model.run import PRESCRIBED
 from ccmodel.recording import Recording
 
-COLUMNS = {
-    "batch": str,
-    "recording": str,
-    "origin": str,
-    "parameters": str,
-    "channel": str,
-    "unit": str,
-    "rmse": float,
-    "peak_to_peak": float,
-    "nrmse_percent": float,
-    "window_from_s": float,
-    "window_to_s": float,
-    "samples": int,
-}
+COLUMNS = (
+    dict.fromkeys(("batch", "recording", "origin", "parameters", "channel", "unit"), str)
+    | dict.fromkeys(("rmse", "peak_to_peak", "nrmse_percent", "window_from_s", "window_to_s"), float)
+    | {"samples": int}
+)
 
 
 def last_cycle(recording: Recording) -> slice:
@@ -38,9 +29,7 @@ def last_cycle(recording: Recording) -> slice:
     first = judged[0]
     theta = recording[THETA_IN][first:]
     high, low = theta.max(), theta.min()
-    if high == low:
-        return slice(first, recording.time_s.size)
-    crossings = _upward_crossings((theta - low) / (high - low))
+    crossings = [] if high == low else _upward_crossings((theta - low) / (high - low))
     if len(crossings) < 2:
         return slice(first, recording.time_s.size)
     return slice(first + crossings[-2], first + crossings[-1] + 1)

@@ -8,7 +8,7 @@ import pytest
 from builders import recording
 from ccmodel.errors import COLUMNS, error_table, last_cycle
 from ccmodel.model.run import PRESCRIBED
-from ccmodel.studies.variables import label_of, labelled, origins_of, value_of
+from ccmodel.studies.variables import by_label, label_of, origins_of, value_of
 
 
 def test_error_is_rms_in_units_and_over_peak_to_peak():
@@ -59,14 +59,15 @@ def test_without_a_cycle_all_that_is_judged_is_the_window():
 
 def test_repeats_of_a_condition_share_a_label_in_the_order_of_values():
     recordings = [recording(pretension_N=p, id=f"r{i}") for i, p in enumerate([7.0, 0.7, 7.0, 3.5])]
-    labels = [(label, r.id) for label, r in labelled(recordings, "pretension")]
+    groups = by_label([(r, None) for r in recordings], "pretension")
+    labels = [(label, r.id) for label, pairs in groups.items() for r, _ in pairs]
     assert labels == [("0.7 N", "r1"), ("3.5 N", "r3"), ("7 N", "r0"), ("7 N", "r2")]
 
 
 def test_measured_and_simulated_recordings_in_one_study_are_told_apart():
     simulated = recording()
     measured = simulated.with_channels(simulated.channels, simulated.derived_from, "rig")
-    labels = [label for label, _ in labelled([simulated, measured], "pretension")]
+    labels = list(by_label([(simulated, None), (measured, None)], "pretension"))
     assert labels == ["7 N, recording (virtual rig, simulated)", "7 N, recording (measured)"]
     assert origins_of([simulated, measured]) == "recording (measured) and recording (virtual rig, simulated)"
 

@@ -101,7 +101,7 @@ def write_page(
         loader=PackageLoader("ccmodel", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
-    environment.filters |= {"interval": interval, "about": about, "number": number}
+    environment.filters |= {shown.__name__: shown for shown in (interval, about, number, two_decimals, symbol_of)}
     channels = [c for c in CHANNELS if c in set(errors["channel"])]
     sections: dict[str, list[dict]] = {}
     for part in parts:
@@ -113,13 +113,13 @@ def write_page(
         recordings=sum(len(b["recordings"]) for b in batches),
         batches=batches,
         sections=sections,
-        symbols=[symbol_of(c) for c in channels],
+        channels=channels,
         summary=_summary(errors, channels),
         # The row of Table I is for rigs that record its channels; an instrument without load cells does not.
         paper=[PAPER_TABLE_I.get(c) for c in channels] if set(PAPER_TABLE_I) <= set(channels) else None,
         simulated_only=set(errors["origin"]) == {"virtual-rig"},
         notes={b["batch"]["batch"]: b["batch"]["note"] for b in batches if b["batch"] and b["batch"].get("note")},
-        rows=_rows(errors),
+        rows=errors.to_dict("records"),
         fits=fits,
         **messages,
     )
@@ -141,34 +141,15 @@ def _headline(errors: pd.DataFrame) -> list[str]:
 
 def _summary(errors: pd.DataFrame, channels: list[str]) -> list[dict]:
     """A row for each batch and parameter set: normalised error of each channel, mean over the recordings, %."""
-    if errors.empty:
-        return []
-    table = errors.pivot_table("nrmse_percent", ["batch", "parameters"], "channel", aggfunc="mean", observed=True)
-    groups = errors.groupby(["batch", "parameters"])
-    counts, origins = groups["recording"].nunique(), groups["origin"].first()
-    return [
-        {
-            "batch": batch,
-            "parameters": parameters,
-            "origin": ORIGIN[origins[batch, parameters]],
-            "count": int(counts[batch, parameters]),
-            "values": [_or_none(row.get(c, np.nan)) for c in channels],
-        }
-        for (batch, parameters), row in table.iterrows()
-    ]
+    groups = ["batch", "parameters"]
+    table = errors.pivot_table("nrmse_percent", groups, "channel").reindex(columns=channels)
+    counted = errors.groupby(groups).agg(origin=("origin", "first"), count=("recording", "nunique"))
+    return table.join(counted).reset_index().to_dict("records")
 
 
-def _rows(errors: pd.DataFrame) -> list[dict]:
-    return [
-        row
-        | {"origin": ORIGIN[row["origin"]], "symbol": symbol_of(row["channel"])}
-        | {"nrmse_percent": _or_none(row["nrmse_percent"])}
-        for row in errors.to_dict("records")
-    ]
-
-
-def _or_none(value: float) -> float | None:
-    return None if np.isnan(value) else float(value)
+def two_decimals(value: float) -> str:
+    """A number with two decimals; a dash for NaN."""
+    return "–" if np.isnan(value) else f"{value:.2f}"
 
 
 def number(value: float | None) -> str:
@@ -178,14 +159,14 @@ def number(value: float | None) -> str:
 
 def interval(of: dict) -> str:
     """Ends of an interval, rounded to a tenth of its standard deviation."""
-    if of["sd"] is None or of["low"] is None or of["high"] is None:
+    if None in of.values():
         return "not determined"
     return f"{_rounded(of['low'], of['sd'])} to {_rounded(of['high'], of['sd'])}"
 
 
 def about(of: dict) -> str:
     """Middle of an interval and half its width."""
-    if of["sd"] is None or of["low"] is None or of["high"] is None:
+    if None in of.values():
         return "not determined"
     reach = (of["high"] - of["low"]) / 2
     return f"{_rounded((of['high'] + of['low']) / 2, of['sd'])} ± {reach:.1g}"

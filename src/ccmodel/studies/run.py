@@ -45,11 +45,6 @@ class Run:
         """Parameters that the model ran with."""
         return fitted(self.recordings, self.fit)
 
-    @property
-    def files(self) -> list[Path]:
-        """The files that exist for it."""
-        return [file for file in (self.recordings, self.simulated, self.fit) if file is not None]
-
 
 def runs_of(
     labels: Sequence[str], recordings: Sequence[str], simulated: Sequence[str], fits: Sequence[str]
@@ -99,8 +94,8 @@ def run_study(
     for file, table in zip(tables[:-1], outcome.tables, strict=True):
         write_table(file, table)
     if tables:
-        inputs = provenance.of_inputs(sorted({file for run in runs for file in run.files}))
-        write_json(tables[-1], outcome.summary | {"provenance": inputs})
+        inputs = {file for run in runs for file in (run.recordings, run.simulated, run.fit) if file is not None}
+        write_json(tables[-1], outcome.summary | {"provenance": provenance.of_inputs(sorted(inputs))})
     for files, figure in zip(figures, outcome.figures, strict=True):
         for file in files:
             save_figure(figure, Path(file))

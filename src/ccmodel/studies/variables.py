@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+import pandas as pd
 
 from ccmodel.recording import ORIGIN, Recording
 from ccmodel.steps.files import Pair
@@ -57,31 +58,21 @@ def label_of(value: float | str, variable: str) -> str:
     }[variable]
 
 
-def labelled(recordings: Iterable[Recording], variable: str) -> list[tuple[str, Recording]]:
-    """Recordings with their labels, in the order of the variable's values; repeats share a label.
+def by_label(pairs: Sequence[Pair], variable: str) -> dict[str, list[Pair]]:
+    """Pairs by the label of their recording, in the order of the variable's values; repeats share a label.
 
     If measured and simulated recordings are in one study, every label names the origin.
     """
-    ordered = sorted(recordings, key=lambda r: _sort_key(value_of(r, variable)))
-    mixed = len({r.origin for r in ordered}) > 1
-    suffix = {r.origin: f", {ORIGIN[r.origin]}" if mixed else "" for r in ordered}
-    return [(label_of(value_of(r, variable), variable) + suffix[r.origin], r) for r in ordered]
-
-
-def by_label(pairs: Sequence[Pair], variable: str) -> dict[str, list[Pair]]:
-    """Pairs by the label of their recording, in the order of the variable's values."""
-    pair_of = {id(recorded): (recorded, simulated) for recorded, simulated in pairs}
+    mixed = len({recorded.origin for recorded, _ in pairs}) > 1
+    values = [value_of(recorded, variable) for recorded, _ in pairs]
     groups: dict[str, list[Pair]] = {}
-    for label, recorded in labelled((r for r, _ in pairs), variable):
-        groups.setdefault(label, []).append(pair_of[id(recorded)])
+    # Values that are not stated (NaN) come last.
+    for i in pd.Series(values, dtype=object).sort_values(kind="stable").index:
+        origin = f", {ORIGIN[pairs[i][0].origin]}" if mixed else ""
+        groups.setdefault(label_of(values[i], variable) + origin, []).append(pairs[i])
     return groups
 
 
 def origins_of(recordings: Iterable[Recording]) -> str:
     """Origins of recordings, as figures and pages name them."""
     return " and ".join(ORIGIN[origin] for origin in sorted({r.origin for r in recordings}))
-
-
-def _sort_key(value: float | str) -> tuple:
-    """Values in their order, those not stated last."""
-    return (value,) if isinstance(value, str) else (np.isnan(value), value)

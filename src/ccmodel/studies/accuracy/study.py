@@ -42,12 +42,12 @@ SETTINGS = Accuracy
 
 JUDGED = (*map(short_name, (*MEASURED, *TENSIONS)), "width", "backlash", "lost_motion", "work_lost")
 FEWEST = 3  # pairs for a standard deviation
-BY_RECORDING = {
-    "batch": str, "recording": str, "origin": str, "quantity": str, "unit": str, "recorded": float, "modelled": float,
-    "E": float, "u_num": float, "u_input": float, "u_sensor": float, "u_repeat": float, "u_D": float, "u_val": float,
-    "within": bool, "fitted": bool,
-    "inputs_left_out": str,
-}  # fmt: skip
+BY_RECORDING = (
+    dict.fromkeys(("batch", "recording", "origin", "quantity", "unit"), str)
+    | dict.fromkeys(("recorded", "modelled", "E"), float)
+    | dict.fromkeys(("u_num", "u_input", "u_sensor", "u_repeat", "u_D", "u_val"), float)
+    | {"within": bool, "fitted": bool, "inputs_left_out": str}
+)
 
 
 @dataclass(frozen=True)
@@ -106,10 +106,8 @@ def bias_and_scatter(
     sigma_M = np.sqrt(variance - used**2)
     centre = mean + (sigma_M**2 - used**2) / 2
     reach = t.ppf(0.5 + coverage / 2, M.size - 1) * np.sqrt(variance / M.size)
-    delta, low, high = np.exp([centre, centre - reach, centre + reach])
-    return BiasAndScatter(
-        float(delta), float(low), float(high), float(sigma_M), float(used), bool(sigma_E > limit), M.size
-    )
+    interval = np.exp([centre, centre - reach, centre + reach]).tolist()
+    return BiasAndScatter(*interval, float(sigma_M), float(used), bool(sigma_E > limit), M.size)
 
 
 @dataclass(frozen=True)
@@ -162,24 +160,16 @@ def sensor_uncertainty(quantity: Quantity, recording: Recording) -> float | None
     sqrt(12). A quantity is the difference of two independent readings. The uncertainty of a loop's width is that of x,
     and that of y divided by the loop's mean gradient. Averaging over samples is not credited.
     """
-    sds = [_channel_sd(recording, c) for c in quantity.channels]
-    if any(sd is None for sd in sds):
+    known = {**recording.accuracy} | {c: step / np.sqrt(12) for c, step in recording.encoder_step_rad.items()}
+    if not known.keys() >= set(quantity.channels):
         return None
-    first = sds[0]
+    sd, *second = (known[c] for c in quantity.channels)
     if quantity is QUANTITIES["work_lost"]:
-        sd = first * np.ptp(recording[THETA_IN])
-    elif len(sds) == 2:
+        sd *= np.ptp(recording[THETA_IN])
+    elif second:
         x, y = quantity.channels
-        sd = np.hypot(first, sds[1] * np.ptp(recording[x]) / np.ptp(recording[y]))
-    else:
-        sd = first
+        sd = np.hypot(sd, second[0] * np.ptp(recording[x]) / np.ptp(recording[y]))
     return float(quantity.factor * np.sqrt(2) * sd)
-
-
-def _channel_sd(recording: Recording, channel: str) -> float | None:
-    if channel in recording.encoder_step_rad:
-        return recording.encoder_step_rad[channel] / np.sqrt(12)
-    return recording.accuracy.get(channel)
 
 
 def comparison_table(cases: Sequence[Case], settings: Accuracy, how: Measuring) -> pd.DataFrame:
@@ -192,18 +182,14 @@ def comparison_table(cases: Sequence[Case], settings: Accuracy, how: Measuring) 
     table = pd.DataFrame(rows, columns=[*BY_RECORDING, "condition"])
     for _, group in table.groupby(["origin", "quantity"]):
         # Repeats scatter relative to the model, which knows the initial tension of each repeat.
-        ratios = [np.log(c["recorded"] / c["modelled"]) for _, c in _positive(group).groupby("condition")]
-        scatter, _ = pooled_scatter([r.to_list() for r in ratios], relative=False)
+        positive = group[(group["recorded"] > 0) & (group["modelled"] > 0)]
+        ratios = np.log(positive["recorded"] / positive["modelled"]).groupby(positive["condition"])
+        scatter, _ = pooled_scatter(ratios.apply(list), relative=False)
         table.loc[group.index, "u_repeat"] = scatter * group["recorded"].abs()
     table["u_D"] = np.hypot(table["u_sensor"].astype(float), table["u_repeat"].astype(float))
-    squares = sum(table[u].astype(float) ** 2 for u in ("u_num", "u_input", "u_D"))
-    table["u_val"] = np.sqrt(squares)
+    table["u_val"] = np.sqrt(sum(table[u].astype(float) ** 2 for u in ("u_num", "u_input", "u_D")))
     table["within"] = table["E"].abs() <= settings.coverage_factor * table["u_val"]
     return table[list(BY_RECORDING)].astype(BY_RECORDING)
-
-
-def _positive(table: pd.DataFrame) -> pd.DataFrame:
-    return table[(table["recorded"] > 0) & (table["modelled"] > 0)]
 
 
 def _rows(case: Case, how: Measuring) -> list[dict]:

@@ -102,15 +102,7 @@ def _load_panel(ax: Axes, rows: Sequence[Row]) -> None:
     slack.grid(False)
     slack.spines["right"].set_visible(True)
     for i, (side, quantity) in enumerate(((ax, "lost_motion"), (slack, "slack_share"))):
-        mine = [row for row in rows if row.quantity == quantity]
-        side.plot(
-            [row.at for row in mine],
-            [row.model for row in mine],
-            color=COLOURS[i],
-            marker=MARKERS[i],
-            ls=LINES[i],
-            ms=4.5,
-        )
+        _plot_model(side, [row for row in rows if row.quantity == quantity], i)
         q = QUANTITIES[quantity]
         side.set_ylabel(f"{q.text} ({q.unit})", color=COLOURS[i])
         side.set(xscale="log")
@@ -118,11 +110,16 @@ def _load_panel(ax: Axes, rows: Sequence[Row]) -> None:
     ax.set_xlabel("stiffness of the load's spring (N·m/rad)")
 
 
+def _plot_model(ax: Axes, rows: Sequence[Row], number: int, **style) -> None:
+    """The model's values over the study's variable, in the style of the curve's number."""
+    style |= {"color": COLOURS[number], "marker": MARKERS[number % 4], "ls": LINES[number % 4], "ms": 4.5}
+    ax.plot([row.at for row in rows], [row.model for row in rows], **style)
+
+
 def _sections_panel(ax: Axes, rows: Sequence[Row]) -> None:
     for i, bend in enumerate(dict.fromkeys(row.condition.split(",")[0] for row in rows)):
-        mine = [row for row in rows if row.condition.split(",")[0] == bend]
-        style = {"color": COLOURS[i], "marker": MARKERS[i % 4], "ls": LINES[i % 4], "ms": 4.5}
-        ax.loglog([row.at for row in mine], [row.model for row in mine], label=f"{bend} of bend", **style)
+        _plot_model(ax, [row for row in rows if row.condition.split(",")[0] == bend], i, label=f"{bend} of bend")
+    ax.set(xscale="log", yscale="log")
     ax.set(xlabel="sections of each cable", ylabel="rms error, worst channel\n(% of peak to peak)")
     ticks = sorted({int(row.at) for row in rows})
     ax.set_xticks(ticks, [str(t) for t in ticks])
@@ -131,19 +128,15 @@ def _sections_panel(ax: Axes, rows: Sequence[Row]) -> None:
 
 
 def _torque_panel(ax: Axes, loops: Mapping[str, Recording]) -> None:
-    for (place, run), style in zip(loops.items(), _placement_styles(), strict=False):
-        plot_channels(ax, run, TAU_IN, TAU_OUT, last_cycle(run), label=f"loop {place}", **style)
+    for (place, run), color, ls in zip(loops.items(), COLOURS, LINES, strict=False):
+        plot_channels(ax, run, TAU_IN, TAU_OUT, last_cycle(run), label=f"loop {place}", color=color, ls=ls, lw=1.1)
     name_axes(ax, TAU_IN, TAU_OUT)
     ax.legend(loc="upper left", fontsize=8)
 
 
 def _motion_panel(ax: Axes, loops: Mapping[str, Recording]) -> None:
     """Lag of the load angle behind the drive angle."""
-    for run, style in zip(loops.values(), _placement_styles(), strict=False):
+    for run, color, ls in zip(loops.values(), COLOURS, LINES, strict=False):
         cycle = run[last_cycle(run)]
-        ax.plot(cycle[THETA_IN], cycle[THETA_IN] - cycle[THETA_OUT], **style)
+        ax.plot(cycle[THETA_IN], cycle[THETA_IN] - cycle[THETA_OUT], color=color, ls=ls, lw=1.1)
     ax.set(xlabel=TABLE[THETA_IN].axis, ylabel=r"$\theta_{in} - \theta_{out}$ (rad)")
-
-
-def _placement_styles() -> list[dict]:
-    return [{"color": color, "ls": ls, "lw": 1.1} for color, ls in zip(COLOURS, LINES, strict=False)]

@@ -82,10 +82,9 @@ def _placement(parameters: Parameters, claims: Claims, how: Measuring) -> Claim:
         lost, width, slope = (three_digits(values.get(q)) for q in ("lost_motion", "width", "slope"))
         parts.append(f"{place}: lost motion {lost} rad, width {width} mN·m, slope {slope}")
     sentence = (
-        f"One loop of {np.degrees(study.bend_rad):.0f}° and {label_of(study.loop_radius_m, 'radius')} radius "
-        + "; ".join(parts)
-        + ". With the bend, and so the capstan loss, the same, what moves is the stretch of the straight cable before"
-        " and behind the loop."
+        f"One loop of {np.degrees(study.bend_rad):.0f}° and {label_of(study.loop_radius_m, 'radius')} radius"
+        f" {'; '.join(parts)}. With the bend, and so the capstan loss, the same, what moves is the stretch of the"
+        " straight cable before and behind the loop."
     )
     says = "where the loop lies does not change the capstan effect, but the stretch and with it the transmission"
     return Claim("loop-placement", "VI", says, verdict, sentence, rows)
@@ -97,13 +96,10 @@ def _sections(parameters: Parameters, claims: Claims) -> Claim:
     for bend in study.sections_bend_rad:
         path, name = model_runs.even(study, bend), label_of(bend, "bend")
         exact = model_runs.run(parameters, path, study)
-        errors = {
-            n: model_runs.error_percent(model_runs.run(parameters, path, study, sections=n), exact)
-            for n in study.sections
-        }
-        rows += [
-            Row("sections_error", "%", f"{name}, {n} sections", n, MODEL_ALONE, model=e) for n, e in errors.items()
-        ]
+        errors = {}
+        for n in study.sections:
+            errors[n] = model_runs.error_percent(model_runs.run(parameters, path, study, sections=n), exact)
+            rows.append(Row("sections_error", "%", f"{name}, {n} sections", n, MODEL_ALONE, model=errors[n]))
         needed = model_runs.sections_needed(errors, study.sections_error_percent)
         fewest = f"more than {max(errors)}" if needed is None else str(needed)
         own = f"; the paper's {PAPER_SECTIONS} leave {errors[PAPER_SECTIONS]:.2g} %" if PAPER_SECTIONS in errors else ""

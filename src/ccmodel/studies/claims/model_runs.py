@@ -1,6 +1,7 @@
 """Runs of the model alone, over conditions that no recording varies: load, place of the loop, sections."""
 
 from collections.abc import Mapping
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,12 +101,8 @@ def error_percent(simulated: Recording, exact_run: Recording) -> float:
 
 def sections_needed(errors: Mapping[int, float], limit_percent: float) -> int | None:
     """Fewest sections from which on every error is within the limit; None if the most sections have a larger error."""
-    needed = None
-    for sections in sorted(errors, reverse=True):
-        if errors[sections] > limit_percent:
-            break
-        needed = sections
-    return needed
+    largest_first = sorted(errors, reverse=True)
+    return min(takewhile(lambda sections: errors[sections] <= limit_percent, largest_first), default=None)
 
 
 def loop_placements(parameters: Parameters, study: ModelStudies) -> dict[str, Recording]:

@@ -7,7 +7,7 @@ certainly small. Otherwise it is not determined.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, starmap
 
 import numpy as np
 
@@ -67,10 +67,11 @@ def recorded_claims(
     pairs: Mapping[str, Sequence[Pair]], parameters: Parameters | None, claims: Claims, how: Measuring
 ) -> list[Claim]:
     """Claims on recordings, in the order of the paper; the parameters are as for `claims_of`."""
-    found = [_trend(trend, pairs[trend.variable], claims, how) for trend in _TRENDS]
-    found.append(_phases(pairs["pretension"], claims, how))
-    found.append(_radius(pairs["radius"], parameters, claims, how))
-    return found
+    return [
+        *(_trend(trend, pairs[trend.variable], claims, how) for trend in _TRENDS),
+        _phases(pairs["pretension"], claims, how),
+        _radius(pairs["radius"], parameters, claims, how),
+    ]
 
 
 def _series(pairs: Sequence[Pair], variable: str, quantity: str, claims: Claims, how: Measuring) -> _Series:
@@ -108,8 +109,7 @@ def _numbers(recordings: Sequence[Recording], quantity: str, how: Measuring) -> 
 
 
 def _trend(trend: _Trend, pairs: Sequence[Pair], claims: Claims, how: Measuring) -> Claim:
-    quantities = trend.quantities + trend.shown
-    series = {q: _series(pairs, trend.variable, q, claims, how) for q in quantities}
+    series = {q: _series(pairs, trend.variable, q, claims, how) for q in trend.quantities + trend.shown}
     verdicts = [_has_sign(series[q], trend.sign, claims) for q in trend.quantities]
     return Claim(trend.name, trend.section, trend.says, _joint(verdicts), *_sentence_and_rows(series))
 
@@ -119,13 +119,11 @@ def _has_sign(series: _Series, sign: int, claims: Claims) -> str:
     if not series.is_repeated:
         return Verdict.OPEN
     means = series.estimates
-    if all(sign * s.value > s.reach(claims.coverage) for s in (difference(a, b) for a, b in pairwise(means))):
+    if all(sign * s.value > s.reach(claims.coverage) for s in starmap(difference, pairwise(means))):
         return Verdict.YES
     whole = difference(means[0], means[-1])
-    mean = float(np.mean([m.value for m in means]))
-    if sign * whole.value + whole.reach(claims.coverage) < 0.01 * claims.small_percent * abs(mean):
-        return Verdict.NO
-    return Verdict.OPEN
+    small = 0.01 * claims.small_percent * abs(np.mean([m.value for m in means]))
+    return Verdict.NO if sign * whole.value + whole.reach(claims.coverage) < small else Verdict.OPEN
 
 
 def _joint(verdicts: Sequence[str]) -> str:

@@ -28,6 +28,8 @@ def judge(claims: Claims, runs: Sequence[Run], measuring: Measuring) -> Outcome:
     """
     pairs = {variable: [p for run in runs if run.label == variable for p in run.pairs] for variable in claims.studies}
     parameters = next((run.fitted.parameters for run in runs if run.fitted.parameters is not None), None)
+    if parameters is not None and parameters.load_stiffness_Nm_per_rad is None:
+        parameters = None
     found = claims_of(pairs, parameters, claims, measuring)
     table = pd.DataFrame([{"claim": c.name} | _stated(c) | asdict(row) for c in found for row in c.rows])
     stated = [{"name": c.name} | _stated(c) | {"sentence": c.sentence} for c in found]
@@ -45,12 +47,10 @@ def claims_of(
     pairs : mapping of str to sequence of (Recording, Recording or None)
         Recordings with their simulations, by the variable of their study: "bend", "pretension", "radius".
     parameters : Parameters or None
-        Parameters of the model alone; None if no batch states them.
+        Parameters of the model alone, with the stiffness of a load; None if no batch states them.
     claims : Claims
     how : Measuring
     """
-    if parameters is not None and parameters.load_stiffness_Nm_per_rad is None:
-        parameters = None
     return recorded_claims(pairs, parameters, claims, how) + model_claims(parameters, claims, how)
 
 
@@ -59,7 +59,7 @@ def _stated(claim: Claim) -> dict[str, str]:
 
 
 def _loops(parameters: Parameters | None, claims: Claims) -> dict[str, Recording]:
-    if parameters is None or parameters.load_stiffness_Nm_per_rad is None:
+    if parameters is None:
         return {}
     try:
         return model_runs.loop_placements(parameters, claims.model)

@@ -95,19 +95,16 @@ def _candidates(found: Diagnosis) -> list[dict]:
     """Baseline and the candidates with the smallest mean squares, a row each."""
     j = found.judgement
     ranked = sorted(zip(j.candidates, j.probability, strict=True), key=lambda item: item[0].mean_square)
-    rows = []
-    for fit, p in [(j.calibrated, None), *ranked[:CANDIDATES]]:
-        lack = j.lack_of_fit.get(fit.hypothesis)
-        rows.append(
-            {
-                "candidate": str(fit.hypothesis),
-                "mean_square": fit.mean_square,
-                "lack_of_fit": None if lack is None else max(lack.mean, 0.0),
-                "probability": p,
-                "why": _why(fit, found),
-            }
-        )
-    return rows
+    return [
+        {
+            "candidate": str(fit.hypothesis),
+            "mean_square": fit.mean_square,
+            "lack_of_fit": max(lack.mean, 0.0) if (lack := j.lack_of_fit.get(fit.hypothesis)) else None,
+            "probability": p,
+            "why": _why(fit, found),
+        }
+        for fit, p in [(j.calibrated, None), *ranked[:CANDIDATES]]
+    ]
 
 
 def _why(fit: CandidateFit, found: Diagnosis) -> str:

@@ -34,10 +34,10 @@ class Cycle:
     Attributes
     ----------
     channels : dict of str to ndarray, shape (n,)
-    slack : ndarray of bool, shape (2, n), or None
+    slack : ndarray of bool, shape (2, n)
         Whether cable A and cable B are slack: both end tensions are below the threshold at more than half of the
         samples within the smoothing window. A smoothed tension is not used: it rises above the threshold before the
-        cable is taut. None if a tension was not recorded.
+        cable is taut. Shape (0, n) if a tension was not recorded.
     branches : tuple of ndarray of int
         Sample numbers of each branch, from one reversal of the drive to the next. The second branch runs over the end
         of the cycle and continues at its beginning.
@@ -46,7 +46,7 @@ class Cycle:
     """
 
     channels: dict[str, NDArray]
-    slack: NDArray | None
+    slack: NDArray
     branches: tuple[NDArray, NDArray]
     how: Measuring
 
@@ -72,8 +72,7 @@ class Cycle:
         up, down = int(theta.argmax()), int(theta.argmin())
         if not up < down:
             raise NotMeasurableError("the drive does not go up and down once in its cycle")
-        slack = _slack(recording, how, size)
-        slack = None if slack is None else slack[:, window]
+        slack = _slack(recording, how, size)[:, window]
         return cls(channels, slack, (np.arange(up, down + 1), np.r_[down:n, 0 : up + 1]), how)
 
     def __getitem__(self, channel: str) -> NDArray:
@@ -84,7 +83,7 @@ class Cycle:
     @property
     def slack_cables(self) -> NDArray:
         """`slack`; raises where it is unknown."""
-        if self.slack is None:
+        if not self.slack.size:
             raise NotMeasurableError("a tension was not recorded")
         return self.slack
 
@@ -94,10 +93,10 @@ class Cycle:
         return np.abs(y[branch] - y[branch[0]]) > self.how.moved_share * float(np.ptp(y))
 
 
-def _slack(recording: Recording, how: Measuring, size: int) -> NDArray | None:
+def _slack(recording: Recording, how: Measuring, size: int) -> NDArray:
     """Attribute `slack` of a cycle, over the whole recording; `size` is the number of samples in the window."""
     if not all(c in recording for c in TENSIONS):
-        return None
+        return np.empty((0, recording.time_s.size), dtype=bool)
     below = [np.maximum(recording[drive], recording[load]) < how.slack_below_N for drive, load in CABLES.values()]
     return uniform_filter1d(np.array(below, dtype=float), size, axis=1) > 0.5
 
@@ -107,15 +106,15 @@ def peak_to_peak(cycle: Cycle, channel: str) -> float:
     return float(np.ptp(cycle[channel]))
 
 
-def width(cycle: Cycle, loop: tuple[str, str] = TORQUE_LOOP) -> float:
-    """Distance along x between the two branches in the middle of y's range."""
-    (first, _), (second, _) = _middle_lines(cycle, loop)
+def width(cycle: Cycle) -> float:
+    """Distance along tau_in between the two branches in the middle of the range of tau_out."""
+    (first, _), (second, _) = _middle_lines(cycle)
     return abs(first - second)
 
 
-def slope(cycle: Cycle, loop: tuple[str, str] = TORQUE_LOOP) -> float:
-    """Gradient dy / dx in the middle of y's range, mean of the two branches."""
-    return float(np.mean([1 / gradient for _, gradient in _middle_lines(cycle, loop)]))
+def slope(cycle: Cycle) -> float:
+    """Gradient of tau_out over tau_in in the middle of the range of tau_out, mean of the two branches."""
+    return float(np.mean([1 / gradient for _, gradient in _middle_lines(cycle)]))
 
 
 def deadband(cycle: Cycle, loop: tuple[str, str] = TORQUE_LOOP) -> float:
@@ -264,9 +263,9 @@ def measure(recording: Recording, names: Sequence[str], how: Measuring) -> tuple
     return values, gaps
 
 
-def _middle_lines(cycle: Cycle, loop: tuple[str, str]) -> list[tuple[float, float]]:
-    """For each branch, x in the middle of y's range, and dx / dy there."""
-    x, y = cycle[loop[0]], cycle[loop[1]]
+def _middle_lines(cycle: Cycle) -> list[tuple[float, float]]:
+    """For each branch, tau_in in the middle of the range of tau_out, and d tau_in / d tau_out there."""
+    x, y = (cycle[c] for c in TORQUE_LOOP)
     middle, span = float(y.max() + y.min()) / 2, float(np.ptp(y))
     near = [b[np.abs(y[b] - middle) <= cycle.how.middle_share * span] for b in cycle.branches]
     return [_line(y[part], x[part], middle, cycle.how) for part in near]

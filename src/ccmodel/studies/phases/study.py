@@ -160,17 +160,13 @@ def _over_time(ax: Axes, study: PhaseStudy, values: dict, names: tuple[str, ...]
 def _mark_instants(ax: Axes, study: PhaseStudy, curve: NDArray) -> None:
     """A dot at every instant and its number outside the loop; instants at the same point share one text."""
     scaled = _scaled(curve)
-    groups: list[list[int]] = []
+    groups: dict[int, list[int]] = {}
     for instant, sample in study.instants.items():
         ax.plot(*curve[:, sample], "o", color="black", markersize=4)
-        near = (g for g in groups if np.hypot(*(scaled[:, study.instants[g[0]]] - scaled[:, sample])) < 0.01)
-        group = next(near, None)
-        if group is None:
-            groups.append([instant])
-        else:
-            group.append(instant)
-    for group in groups:
-        _label_sample(ax, curve, study.instants[group[0]], ", ".join(map(str, sorted(group))))
+        near = (other for other in groups if np.hypot(*(scaled[:, other] - scaled[:, sample])) < 0.01)
+        groups.setdefault(next(near, sample), []).append(instant)
+    for sample, group in groups.items():
+        _label_sample(ax, curve, sample, ", ".join(map(str, sorted(group))))
 
 
 def _scaled(curve: NDArray) -> NDArray:
@@ -195,8 +191,7 @@ def _spells(study: PhaseStudy) -> list[tuple[int, int]]:
     """First and last sample of each phase of the cycle; neighbours share a sample."""
     start = study.first_reversal
     changes = start + 1 + np.flatnonzero(np.diff(study.phase[start + 1 :]))
-    edges = [start, *changes.tolist(), study.phase.size - 1]
-    return list(pairwise(edges))
+    return list(pairwise([start, *changes.tolist(), study.phase.size - 1]))
 
 
 def _halfway_along(curve: NDArray, first: int, last: int) -> int:

@@ -3,8 +3,9 @@
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
+from dataclasses import asdict
 from functools import partial
-from itertools import combinations, product
+from itertools import combinations, groupby, product
 
 import pandas as pd
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from ccmodel.studies.table_one.refit import NORMS, refit
 from ccmodel.studies.table_one.rigs import Condition, conditions, recorded, within_ranges
 from ccmodel.studies.table_one.settings import NotStated, TableOne
 
-CONDITION = ("rig", "load_stiffness_Nm_per_rad", "amplitude_rad", "frequency_Hz", "fit_over")
+CONDITION = tuple(Condition.__annotations__)
 Case = tuple[Condition, tuple[Effect, ...]]
 Report = Callable[[str], None]
 
@@ -69,38 +70,35 @@ def _under(usable: Sequence[Condition], acting: Sequence[tuple[Effect, ...]]) ->
 
 def _rows(study: TableOne, cases: Sequence[Case]) -> list[dict]:
     """Rows of cases; a rig with several fits in succession is simulated once."""
-    rows, before, rig_data = [], None, None
-    for condition, effects in cases:
-        if (condition.without_fit, effects) != before:
-            before, rig_data = (condition.without_fit, effects), _rig_data(study, condition, effects)
-        rows.append(_row(study, condition, effects, rig_data))
+    rows = []
+    for (condition, effects), group in groupby(cases, key=lambda case: (case[0].without_fit, case[1])):
+        fits = [fit for fit, _ in group]
+        try:
+            rig_data = recorded(study.rig, condition, effects)
+        except (ModelError, ValueError) as error:
+            rows += [_stated(fit, effects) | {"failed": str(error)} for fit in fits]
+        else:
+            rows += [_stated(fit, effects) | _fitted(study, fit, rig_data) for fit in fits]
     return rows
 
 
-def _rig_data(study: TableOne, condition: Condition, effects: tuple[Effect, ...]) -> NDArray | str:
-    """The rig's recording, or the reason why it cannot be simulated."""
-    try:
-        return recorded(study.rig, condition, effects)
-    except (ModelError, ValueError) as error:
-        return str(error)
-
-
-def _row(study: TableOne, condition: Condition, effects: tuple[Effect, ...], rig_data: NDArray | str) -> dict:
-    row = {
+def _stated(condition: Condition, effects: tuple[Effect, ...]) -> dict:
+    return {
         "effect": " + ".join(f"{e.name} at {e.place}" for e in effects),
         "numbers": "; ".join(" ".join(f"{k}={v:.6g}" for k, v in e.values.items()) for e in effects),
         "plausible": all(e.plausible for e in effects),
-        **{name: getattr(condition, name) for name in CONDITION},
+        **asdict(condition),
         "failed": "",
     }
-    if isinstance(rig_data, str):
-        return row | {"failed": rig_data}
+
+
+def _fitted(study: TableOne, condition: Condition, rig_data: NDArray) -> dict:
+    """Errors after the fit and norms, or the reason why the fit failed."""
     try:
         found = refit(study.rig, condition, rig_data)
     except (ModelError, ValueError) as error:
-        return row | {"failed": str(error)}
-    row |= {"stiffness_ratio": found.stiffness_ratio, "friction_ratio": found.friction_ratio}
-    row |= {f"rmse_{c}": v for c, v in zip(TABLE_ONE, found.rmse.tolist(), strict=True)}
-    for name, norm in NORMS.items():
-        row |= {f"{name}_{c}": v for c, v in zip(TABLE_ONE, norm(rig_data).tolist(), strict=True)}
+        return {"failed": str(error)}
+    row = {"stiffness_ratio": found.stiffness_ratio, "friction_ratio": found.friction_ratio}
+    for name, values in {"rmse": found.rmse, **{name: norm(rig_data) for name, norm in NORMS.items()}}.items():
+        row |= {f"{name}_{c}": v for c, v in zip(TABLE_ONE, values.tolist(), strict=True)}
     return row

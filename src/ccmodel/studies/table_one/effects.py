@@ -36,10 +36,6 @@ class Effect:
     values: Mapping[str, float]
     plausible: bool
 
-    def __str__(self) -> str:
-        numbers = " ".join(f"{k}={v:.4g}" for k, v in self.values.items())
-        return f"{self.name} at {self.place}, {numbers}"
-
     @property
     def is_set_up(self) -> bool:
         """Whether it is an error of the set-up."""

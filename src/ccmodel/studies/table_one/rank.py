@@ -112,8 +112,7 @@ def torque_allowed(pattern: Mapping[str, float], sizes: Mapping[str, float], rad
         Norms of T1_N, T3_N and tau_in_Nm, in the channels' units.
     radius_m : float
     """
-    force = sum(pattern[c] * sizes[c] for c in (T1, T3))
-    return force * radius_m / sizes[TAU_IN]
+    return sum(pattern[c] * sizes[c] for c in (T1, T3)) * radius_m / sizes[TAU_IN]
 
 
 def room_for_torque(table: pd.DataFrame, study: TableOne) -> dict[str, dict[str, float]]:

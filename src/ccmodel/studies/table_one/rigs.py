@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import product, starmap
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +44,7 @@ class Condition:
 def conditions(open_: NotStated) -> list[Condition]:
     """Every combination."""
     choices = (open_.rigs, open_.load_stiffness_Nm_per_rad, open_.amplitude_rad, open_.frequency_Hz, open_.fit_over)
-    return [Condition(*choice) for choice in product(*choices)]
+    return list(starmap(Condition, product(*choices)))
 
 
 def within_ranges(rig: Rig, condition: Condition) -> bool:
