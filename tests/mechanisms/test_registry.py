@@ -72,7 +72,7 @@ def test_two_mechanisms_of_one_name_are_refused(monkeypatch):
 
 
 def test_two_mechanisms_with_one_setting_are_refused(monkeypatch):
-    odd = replace(mechanisms.get("kink"), settings={"half_gap": 0.0})
+    odd = replace(mechanisms.get("kink"), structures={"half_gap": 0.0})
     found = declared_with(monkeypatch, odd)
     monkeypatch.setattr(mechanisms, "_registry", lambda: found)
     with pytest.raises(ValueError, match="kink declares settings of another mechanism: half_gap"):

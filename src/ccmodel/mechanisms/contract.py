@@ -4,8 +4,9 @@
    finds it by listing the folder.
 2. Its docstring (a relative's: that of its function) is its ``text``: a title and the paragraphs of `PARAGRAPHS`. The
    command line, ``docs/mechanisms.md`` and the report are made from it and from the fields.
-3. ``modifies_physics`` writes into the solver's `Settings` before a run; ``settings`` declares what it writes, at the
-   neutral values. ``modifies_observation`` changes what the sensors read after a run. A mechanism has one of the two.
+3. A mechanism modifies either the physics or the observation. Before a run, its parameters are written into the
+   solver's `Settings` as ``settings`` declares; a setting that is no number stands in ``structures`` and is written by
+   ``modifies_physics``. After a run, ``modifies_observation`` changes what the sensors read.
 4. A model without the mechanism and a model with it at its neutral values give the same numbers, bit for bit. Where
    the equation excludes its neutral value (a bristle length of zero), ``nearly_neutral`` says how close to the paper's
    model it comes near that value.
@@ -15,6 +16,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any
 
 from numpy.typing import NDArray
@@ -73,6 +75,8 @@ class Parameter:
         Whether a fit reaches the least cost only by continuation: from a high value of this one, step by step down.
     default : float or None
         Value in a model that omits it; None if a model must give it.
+    above, below : float
+        Physical limits, both excluded.
     """
 
     name: str
@@ -88,6 +92,8 @@ class Parameter:
     screening_grid: tuple[float, ...] = ()
     continuation: bool = False
     default: float | None = None
+    above: float = -inf
+    below: float = inf
 
     def at(self, share: float) -> float:
         """Value at a share of the range, on the parameter's scale."""
@@ -172,10 +178,13 @@ class Mechanism:
         Share of the mechanism's effect on recordings (mean square) that this simple form may miss on a rig.
     by_name_only : bool
         Whether a diagnosis considers it only as a forced candidate.
-    settings : mapping of str to object
-        The solver's settings that it writes, at their neutral values. Numbers and tuples of numbers reach the march.
+    settings : mapping of str to str
+        The solver's settings that take a parameter's value, and the parameter's name; "{side}" in a setting stands for
+        the side of the place. They reach the march.
+    structures : mapping of str to object
+        The solver's settings that are no numbers, at their neutral values.
     modifies_physics : callable or None
-        ``modifies_physics(settings, place, values)`` writes into `Settings`.
+        ``modifies_physics(settings, values)`` writes the structures.
     modifies_observation : callable or None
         ``modifies_observation(sensing, place, values)`` returns the channels that change.
     """
@@ -189,15 +198,16 @@ class Mechanism:
     nearly_neutral: NearlyNeutral | None = None
     model_form_error: float = 0.001
     by_name_only: bool = False
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    modifies_physics: Callable[[Settings, str, Mapping[str, float]], None] | None = None
+    settings: Mapping[str, str] = field(default_factory=dict)
+    structures: Mapping[str, Any] = field(default_factory=dict)
+    modifies_physics: Callable[[Settings, Mapping[str, float]], None] | None = None
     modifies_observation: Callable[[Sensing, str, Mapping[str, float]], dict[str, NDArray]] | None = None
 
     def __post_init__(self):
         unknown = set(self.places) - set(PLACES)
         if unknown or not self.places:
             raise ValueError(f"{self.name}: places are {', '.join(PLACES)}; got {', '.join(self.places) or 'none'}")
-        if (self.modifies_physics is None) == (self.modifies_observation is None):
+        if bool(self.neutral_settings) == (self.modifies_observation is not None):
             raise ValueError(f"{self.name}: a mechanism modifies either the physics or the observation")
         if missing := set(PARAGRAPHS) - self._paragraphs.keys():
             raise ValueError(f"{self.name}: its text has no paragraph {', '.join(sorted(missing))}")
@@ -248,6 +258,23 @@ class Mechanism:
     def neutral(self) -> dict[str, float]:
         """Parameter values at which it has no effect."""
         return {p.name: p.neutral for p in self.parameters}
+
+    @property
+    def neutral_settings(self) -> dict[str, Any]:
+        """The solver's settings that it writes, at their neutral values."""
+        by_side = (self._values_of_settings(place, self.neutral) for place in self.places)
+        return dict(self.structures) | {name: value for values in by_side for name, value in values.items()}
+
+    def write(self, settings: Settings, place: str, values: Mapping[str, float]) -> None:
+        """Write the parameters' values into the solver's settings."""
+        for name, value in self._values_of_settings(place, values).items():
+            setattr(settings, name, value)
+        if self.modifies_physics is not None:
+            self.modifies_physics(settings, values)
+
+    def _values_of_settings(self, place: str, values: Mapping[str, float]) -> dict[str, float]:
+        """Values of the solver's settings that are numbers, by name."""
+        return {name.format(side=side(place)): values[parameter] for name, parameter in self.settings.items()}
 
     @property
     def default(self) -> dict[str, float]:

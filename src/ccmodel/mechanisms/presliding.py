@@ -26,10 +26,6 @@ def dahl(xi, slide, z0):
     return direction + (xi - direction) * decay, (1.0 - direction * xi) * decay / z0
 
 
-def _modifies_physics(settings, place, values):
-    settings.bristle_m = values["z0"]
-
-
 MECHANISM = Mechanism(
     name="presliding",
     text=__doc__,
@@ -41,6 +37,5 @@ MECHANISM = Mechanism(
     # One bristle stands for asperities of many lengths; elastic-slip elements with lengths from 1 to 12 miss this
     # share (Iwan, Journal of Applied Mechanics 33(4), 893-900, 1966, doi:10.1115/1.3625199).
     model_form_error=0.08,
-    settings={"bristle_m": 0.0},
-    modifies_physics=_modifies_physics,
+    settings={"bristle_m": "z0"},
 )

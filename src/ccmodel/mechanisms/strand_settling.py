@@ -34,10 +34,6 @@ def stretch_at(tension, settled, stiffness):
     return stretch
 
 
-def _modifies_physics(settings, place, values):
-    settings.settling_N = values["T_scale"]
-
-
 MECHANISM = Mechanism(
     name="strand-settling",
     text=__doc__,
@@ -46,6 +42,5 @@ MECHANISM = Mechanism(
     mistaken_for=("backlash", "slack"),
     depends_on_time=False,
     nearly_neutral=NearlyNeutral({"T_scale": 1e-2}, 1e-8),
-    settings={"settling_N": 0.0},
-    modifies_physics=_modifies_physics,
+    settings={"settling_N": "T_scale"},
 )

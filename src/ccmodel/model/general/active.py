@@ -66,8 +66,12 @@ def _check(a: Active, known: Mechanism) -> None:
     if not np.isfinite(list(a.values.values())).all():
         raise ModelError(f"{a.name} has a parameter that is not finite: {dict(a.values)}")
     for p in known.parameters:
-        if p.low > 0 and not p.signed and a.values.get(p.name, p.default) < 0:
+        value = a.values.get(p.name, p.default)
+        if not p.above < value < p.below:
+            limit = f"above {p.above:g}" if value <= p.above else f"below {p.below:g}"
+            raise ModelError(f"{a.name} has {p.name} = {value:g} ({p.meaning}), which must be {limit}")
+        if p.low > 0 and not p.signed and value < 0:
             raise ModelError(
-                f"{a.name} has {p.name} = {a.values[p.name]:g} {p.unit}, which must not be negative; "
+                f"{a.name} has {p.name} = {value:g} {p.unit}, which must not be negative; "
                 f"plausible is {p.low:g} to {p.high:g}"
             )

@@ -169,7 +169,7 @@ def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, friction_
         out[4, j] = load[rows.ANGLE]
         bearing = ph.load_friction_Nm * load[rows.BEARING]
         if prescribed:
-            R = ph.radius * winding(load[rows.ANGLE], ph.load_eccentricity[0], ph.load_eccentricity[1])[1]
+            R = ph.radius * winding(load[rows.ANGLE], ph.load_eccentricity, ph.load_eccentricity_rad)[1]
             out[5, j] = R * (out[1, j] - out[3, j]) - bearing
         else:
             out[5, j] = load[rows.TORQUE]

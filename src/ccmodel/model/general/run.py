@@ -115,7 +115,8 @@ def simulate(
     mean[rows.MEAN] = (piece[rows.SHARE] * T).sum(axis=1)
     state[rows.ANGLE] = load_angle(physics, T, load, series)
     slide = np.zeros((rows.SLIDE_ROWS, 2, node.shape[2] + 2))
-    drive = tuple(map(float, (transmission.drive_radius_m, *settings.drive_eccentricity)))
+    eccentricity = settings.drive_eccentricity, settings.drive_eccentricity_rad
+    drive = tuple(map(float, (transmission.drive_radius_m, *eccentricity)))
     out, counts = np.empty((7, time_s.size)), np.zeros(3, dtype=np.int64)
     steps *= _steps(physics, transmission, time_s)
     solved = march(
@@ -161,12 +162,10 @@ def settings_of(mechanisms: Mapping[str, Mapping] | Sequence[Active]) -> Setting
     """What mechanisms, given as to `simulate`, tell the solver."""
     settings = registry.neutral_settings()
     for a in active_of(mechanisms):
-        mechanism = registry.get(a.name)
-        if mechanism.modifies_physics is not None:
-            try:
-                mechanism.modifies_physics(settings, a.place, a.values)
-            except ValueError as e:
-                raise ModelError(str(e)) from None
+        try:
+            registry.get(a.name).write(settings, a.place, a.values)
+        except ValueError as e:
+            raise ModelError(str(e)) from None
     return settings
 
 
@@ -225,8 +224,7 @@ def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tu
 def _physics(transmission: Transmission, load: Load, settings: Settings, elements: int) -> rows.Physics:
     K_e = load.stiffness_Nm_per_rad if isinstance(load, SpringLoad) else 0.0
     K_e = load.parallel_Nm_per_rad if isinstance(load, TorqueLoad) else K_e
-    values = {name: getattr(settings, name) for name in registry.march_settings()}
-    values = {n: tuple(map(float, v)) if isinstance(v, tuple) else float(v) for n, v in values.items()}
+    values = {name: float(getattr(settings, name)) for name in registry.march_settings()}
     return rows.Physics(
         has_settling=settings.settling_N > 0,
         has_relaxation=settings.relaxing_share != 0,
