@@ -17,7 +17,15 @@ from general_runs import OUTPUTS, rms, run, sine
 READ = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N")
 PAGE = Path(__file__).parents[2] / "docs" / "mechanisms.md"
 EVERYWHERE = [(name, place) for name in mechanisms.names() for place in mechanisms.get(name).places]
-NEARLY_NEUTRAL = [one for one in EVERYWHERE if mechanisms.get(one[0]).nearly_neutral]
+# Where the equation excludes the neutral value: a parameter, a value near its neutral one, and the largest root mean
+# square difference of a channel from the paper's model there, as a share of peak to peak. A kink of no bend still puts
+# a node at its place, which is another grid.
+NEARLY_NEUTRAL = {
+    "kink": ("beta", 1e-6, 1e-6),
+    "presliding": ("z0", 1e-10, 1e-6),
+    "strand-settling": ("T_scale", 1e-2, 1e-8),
+    "termination-compliance": ("compliance", 1e-12, 1e-7),
+}
 DOI = re.compile(r"doi:10\.\d{4,}/\S+")
 
 
@@ -126,12 +134,11 @@ def test_at_its_neutral_value_it_leaves_no_trace(base, name, place):
         assert (r.read[channel] == base.read[channel]).all(), channel
 
 
-@pytest.mark.parametrize(("name", "place"), NEARLY_NEUTRAL)
+@pytest.mark.parametrize(("name", "place"), [one for one in EVERYWHERE if one[0] in NEARLY_NEUTRAL])
 def test_near_its_neutral_value_it_tends_to_the_papers_model(base, name, place):
-    mechanism = mechanisms.get(name)
-    near, error = mechanism.nearly_neutral.values, mechanism.nearly_neutral.error
-    further = {key: 100 * value for key, value in near.items()}
-    errors = [deviation(run(sine(), [Active(name, place, mechanism.neutral | v)]), base) for v in (near, further)]
+    parameter, near, error = NEARLY_NEUTRAL[name]
+    values = [mechanisms.get(name).neutral | {parameter: value} for value in (near, 100 * near)]
+    errors = [deviation(run(sine(), [Active(name, place, v)]), base) for v in values]
     assert errors[0] <= min(error, errors[1] / 10)
 
 

@@ -8,8 +8,8 @@
    solver's `Settings` as ``settings`` declares; a setting that is no number stands in ``structures`` and is written by
    ``modifies_physics``. After a run, ``modifies_observation`` changes what the sensors read.
 4. A model without the mechanism and a model with it at its neutral values give the same numbers, bit for bit. Where
-   the equation excludes its neutral value (a bristle length of zero), ``nearly_neutral`` says how close to the paper's
-   model it comes near that value.
+   the equation excludes its neutral value (a bristle length of zero), the tests of the registry state how close to the
+   paper's model it comes near that value.
 5. An equation that the march needs at every step stands in the mechanism's file as a compiled function
    (`ccmodel.kernel`), which `ccmodel.model.general.equations` imports.
 """
@@ -20,8 +20,6 @@ from math import inf
 from typing import Any
 
 from numpy.typing import NDArray
-
-from ccmodel.channels import SUM_AT, TORQUE_AT
 
 PLACES = (
     "drive-pulley",
@@ -138,22 +136,6 @@ class Sensing:
     load_radius_m: float
 
 
-@dataclass(frozen=True)
-class NearlyNeutral:
-    """How close the model comes to the paper's near a neutral value that the equation itself excludes.
-
-    Attributes
-    ----------
-    values : mapping of str to float
-        Parameters that differ from their neutral values, and the values near these.
-    error : float
-        Bound on the root mean square difference of any channel from the paper's model, as a share of peak to peak.
-    """
-
-    values: Mapping[str, float]
-    error: float
-
-
 @dataclass(frozen=True, kw_only=True)
 class Mechanism:
     """An effect that the paper's model leaves out.
@@ -172,8 +154,6 @@ class Mechanism:
         Look-alikes: other mechanisms, or `PAPER_LOOK_ALIKES`.
     depends_on_time : bool
         Whether its effect depends on the rate of the motion, not only on its path.
-    nearly_neutral : NearlyNeutral or None
-        None where the model at the neutral values is the paper's, bit for bit, and depends smoothly on them.
     model_form_error : float
         Share of the mechanism's effect on recordings (mean square) that this simple form may miss on a rig.
     by_name_only : bool
@@ -195,7 +175,6 @@ class Mechanism:
     parameters: tuple[Parameter, ...]
     mistaken_for: tuple[str, ...]
     depends_on_time: bool
-    nearly_neutral: NearlyNeutral | None = None
     model_form_error: float = 0.001
     by_name_only: bool = False
     settings: Mapping[str, str] = field(default_factory=dict)
@@ -290,13 +269,3 @@ class Mechanism:
 def side(place: str) -> str:
     """'drive' or 'load', the end of the transmission that a place belongs to."""
     return place.split("-")[0]
-
-
-def sensor_torque(place: str) -> str:
-    """Name of the torque channel on the side of a sensor place."""
-    return TORQUE_AT[side(place)]
-
-
-def sensor_sum(place: str) -> str:
-    """Name of the load cell's channel on the side of a sensor place."""
-    return SUM_AT[side(place)]

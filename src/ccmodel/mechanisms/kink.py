@@ -14,7 +14,7 @@ Source: Agrawal, Peine and Yao 2010, Section VI: kinks introduced inadvertently.
 
 from typing import NamedTuple
 
-from ccmodel.mechanisms.contract import Mechanism, NearlyNeutral, Parameter
+from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
 class Kink(NamedTuple):
@@ -55,8 +55,6 @@ MECHANISM = Mechanism(
     ),
     mistaken_for=("mu", "termination-compliance"),
     depends_on_time=False,
-    # A kink of no bend still puts a node at its place, which is another grid: not the same bits.
-    nearly_neutral=NearlyNeutral({"beta": 1e-6}, 1e-6),
     structures={"kinks": ()},
     modifies_physics=_modifies_physics,
 )

@@ -11,7 +11,7 @@ advanced.
 Source: Agrawal, Peine and Yao 2010, Section V: measured and fitted stiffness.
 """
 
-from ccmodel.mechanisms.contract import Mechanism, NearlyNeutral, Parameter
+from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 # 4 to 200 % of a cable's own: 1 / 13.88 kN/m is 72 um/N.
 MECHANISM = Mechanism(
@@ -21,6 +21,5 @@ MECHANISM = Mechanism(
     parameters=(Parameter("compliance", "m/N", 3e-6, 150e-6, 20e-6, "compliance of one end of each cable"),),
     mistaken_for=("K",),
     depends_on_time=False,
-    nearly_neutral=NearlyNeutral({"compliance": 1e-12}, 1e-7),
     settings={"{side}_end_compliance": "compliance"},
 )
