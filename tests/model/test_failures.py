@@ -27,7 +27,7 @@ def by_exact(drive=DRIVE, load=SPRING, one=PAIR, initial=INITIAL):
 
 
 def by_general(drive=DRIVE, load=SPRING, one=PAIR, initial=INITIAL, **mechanisms):
-    acting = {name.replace("_", "-"): entry for name, entry in mechanisms.items()}
+    acting = [general.Active(name.replace("_", "-"), *entry) for name, entry in mechanisms.items()]
     return general.simulate(one, load, np.arange(len(drive)) * 0.01, drive, initial, acting)
 
 
@@ -43,7 +43,7 @@ def with_gap(values, at=3, gap=np.nan):
 
 
 def effect(place="conduit", **values):
-    return {"place": place, "values": values}
+    return place, values
 
 
 @pytest.mark.parametrize(

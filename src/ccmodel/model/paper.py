@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from ccmodel.failure import ModelError
 from ccmodel.kernel import kernel
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import SpringLoad, series
+from ccmodel.model.load import SpringLoad, one_row
 from ccmodel.model.response import PairResponse, Status
 from ccmodel.model.transmission import Transmission
 
@@ -63,7 +63,7 @@ def simulate_pair(
     ModelError
         If an input is not finite or of the wrong shape, or a step finds no balance at the load.
     """
-    theta_in = series(theta_in, "theta_in")
+    theta_in = one_row(theta_in, "theta_in")
     if sections < 1:
         raise ModelError(f"each cable needs at least one section; got {sections}")
     path = transmission.path

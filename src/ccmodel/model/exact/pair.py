@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ccmodel.model.exact.profile import CableProfile
 from ccmodel.model.exact.simulation import Simulation
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import FixedLoad, SpringLoad, series
+from ccmodel.model.load import FixedLoad, SpringLoad, one_row
 from ccmodel.model.response import PairResponse, Status
 from ccmodel.model.transmission import Transmission
 
@@ -72,7 +72,7 @@ def simulate_pair(
     ModelError
         If an input is not finite, or friction cannot hold the initial tension.
     """
-    theta_in = series(theta_in_rad, "theta_in_rad")
+    theta_in = one_row(theta_in_rad, "theta_in_rad")
     if not isinstance(load, SpringLoad | FixedLoad):
         kind = type(load).__name__
         raise TypeError(f"the exact solver takes a SpringLoad or a FixedLoad; got {kind}: use ccmodel.model.general")
