@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from ccmodel import mechanisms
 from ccmodel.cli import app
 from ccmodel.mechanisms import catalogue
+from ccmodel.mechanisms.contract import PARAGRAPHS
 from ccmodel.model.general import Active
 from general_runs import OUTPUTS, rms, run, sine
 
@@ -42,12 +43,13 @@ def deviation(response, base):
 @pytest.mark.parametrize("name", mechanisms.names())
 def test_contract(name):
     mechanism = mechanisms.get(name)
-    for text in ("summary", "equation", "signature", "separated_by"):
-        assert getattr(mechanism, text), text
+    assert mechanism.summary
+    assert all(mechanism.paragraphs[name] for name in PARAGRAPHS)
     assert mechanism.mistaken_for
     assert name not in mechanism.mistaken_for
-    assert re.search(r"\b(19|20)\d\d\b", mechanism.source)
-    assert "doi" not in mechanism.source.lower() or DOI.search(mechanism.source)
+    source = mechanism.paragraphs["Source"]
+    assert re.search(r"\b(19|20)\d\d\b", source)
+    assert "doi" not in source.lower() or DOI.search(source)
     for p in mechanism.parameters:
         assert p.low < p.high, p.name
         assert p.low <= p.start <= p.high, p.name
@@ -101,7 +103,7 @@ def test_the_documentation_is_up_to_date():
 def test_the_command_line_shows_the_whole_entry(name):
     shown = CliRunner().invoke(app, ["mechanisms", name]).output
     mechanism = mechanisms.get(name)
-    facts = (mechanism.summary, mechanism.equation, mechanism.source, *mechanism.mistaken_for)
+    facts = (mechanism.summary, *mechanism.paragraphs.values(), *mechanism.mistaken_for)
     assert all(text in shown for text in (*facts, *(p.meaning for p in mechanism.parameters)))
 
 

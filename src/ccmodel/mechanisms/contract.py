@@ -188,13 +188,13 @@ class Mechanism:
             raise ValueError(f"{self.name}: places are {', '.join(PLACES)}; got {', '.join(self.places) or 'none'}")
         if bool(self.neutral_settings) == (self.modifies_observation is not None):
             raise ValueError(f"{self.name}: a mechanism modifies either the physics or the observation")
-        if missing := set(PARAGRAPHS) - self._paragraphs.keys():
+        if missing := set(PARAGRAPHS) - self.paragraphs.keys():
             raise ValueError(f"{self.name}: its text has no paragraph {', '.join(sorted(missing))}")
 
     @property
-    def _paragraphs(self) -> dict[str, str]:
-        """The text's paragraphs by name, each on one line and without a last full stop."""
-        lines = (" ".join(paragraph.split()) for paragraph in self.text.split("\n\n")[1:])
+    def paragraphs(self) -> dict[str, str]:
+        """The text's paragraphs by name, each on one line and without a last full stop; the paper's title in full."""
+        lines = (" ".join(paragraph.split()).replace(PAPER_SHORT, PAPER) for paragraph in self.text.split("\n\n")[1:])
         return {name: text.removesuffix(".") for name, _, text in (line.partition(": ") for line in lines)}
 
     @property
@@ -204,24 +204,9 @@ class Mechanism:
         return title[0].lower() + title[1:]
 
     @property
-    def equation(self) -> str:
-        """Its law."""
-        return self._paragraphs["Equation"] + "."
-
-    @property
-    def signature(self) -> str:
-        """What it does to a recording."""
-        return self._paragraphs["Signature"] + "."
-
-    @property
     def separated_by(self) -> str:
         """The experiment that separates it from its look-alikes, as it stands in a sentence."""
-        return self._paragraphs["Separated by"]
-
-    @property
-    def source(self) -> str:
-        """Where its equation is from, or where the effect is named."""
-        return self._paragraphs["Source"].replace(PAPER_SHORT, PAPER)
+        return self.paragraphs["Separated by"]
 
     @property
     def strengths(self) -> tuple[Parameter, ...]:

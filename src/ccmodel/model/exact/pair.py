@@ -7,6 +7,7 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.channels import T1, T2, T3, T4, TENSIONS
 from ccmodel.failure import ModelError
 from ccmodel.model.exact import run as kernels
 from ccmodel.model.exact.path import tabulate
@@ -106,18 +107,15 @@ def simulate_pair(
         if stop in record_profiles_at:
             profiles[stop] = tuple(cable_profile(state, tables, transmission, c) for c in np.flatnonzero(present))
 
-    T1, T2, T3, T4, theta_out = out[:5]
+    tensions, theta_out = dict(zip(TENSIONS, out[:4], strict=True)), out[4]
     if stiffness > 0:
         theta_out += offset / stiffness
     theta_out /= R_o
     return ExactResponse(
-        T1_N=T1,
-        T2_N=T2,
-        T3_N=T3,
-        T4_N=T4,
+        **tensions,
         theta_out_rad=theta_out,
-        tau_in_Nm=_torque(T1, T3, R_i),
-        tau_out_Nm=_torque(T2, T4, R_o),
+        tau_in_Nm=_torque(tensions[T1], tensions[T3], R_i),
+        tau_out_Nm=_torque(tensions[T2], tensions[T4], R_o),
         phase=phase,
         moving_A_m=out[5:7].T,
         moving_B_m=out[7:9].T,
