@@ -27,7 +27,7 @@ def by_exact(drive=DRIVE, load=SPRING, one=PAIR, initial=INITIAL):
 
 
 def by_general(drive=DRIVE, load=SPRING, one=PAIR, initial=INITIAL, **mechanisms):
-    acting = {name.replace("_", "-"): entry for name, entry in mechanisms.items()}
+    acting = [general.Active(name.replace("_", "-"), *entry) for name, entry in mechanisms.items()]
     return general.simulate(one, load, np.arange(len(drive)) * 0.01, drive, initial, acting)
 
 
@@ -43,7 +43,7 @@ def with_gap(values, at=3, gap=np.nan):
 
 
 def effect(place="conduit", **values):
-    return {"place": place, "values": values}
+    return place, values
 
 
 @pytest.mark.parametrize(
@@ -73,13 +73,19 @@ def effect(place="conduit", **values):
         (lambda: by_general(load=TorqueLoad(np.zeros(1))), "1 samples, the drive angle 50"),
         (lambda: by_exact(one=replace(PAIR, friction_coefficient=200.0)), "check the unit of the bend angles"),
         (lambda: by_general(one=replace(PAIR, friction_coefficient=200.0)), "check the unit of the bend angles"),
-        (lambda: by_general(relaxation=effect("cable", r=1.2, tau=5.0)), "share r of its tension below 1"),
-        (lambda: by_general(relaxation=effect("cable", r=0.1, tau=0.0)), "time constant above zero"),
-        (lambda: by_general(running_in=effect(change=-1.5, tau=5.0)), "above -1"),
-        (lambda: by_general(pulley_eccentricity=effect("load-pulley", e=1.5, psi=0.0)), "e is below 1"),
+        (
+            lambda: by_general(relaxation=effect("cable", r=1.2, tau=5.0)),
+            "r = 1.2 .share of the tension that is lost., which must be below 1",
+        ),
+        (
+            lambda: by_general(relaxation=effect("cable", r=0.1, tau=0.0)),
+            "tau = 0 .time constant., which must be above 0",
+        ),
+        (lambda: by_general(running_in=effect(change=-1.5, tau=5.0)), "change = -1.5 .*must be above -1"),
+        (lambda: by_general(pulley_eccentricity=effect("load-pulley", e=1.5, psi=0.0)), "e = 1.5 .*must be below 1"),
         (lambda: by_general(cable_asymmetry=effect("cable", ratio=-1.0, K_ratio=1.0)), "must not be negative"),
-        (lambda: by_general(cable_asymmetry=effect("cable", ratio=1.0, K_ratio=0.0)), "K_ratio is above zero"),
-        (lambda: by_general(stribeck=effect(a=0.2, vs=0.0)), "vs, is above zero"),
+        (lambda: by_general(cable_asymmetry=effect("cable", ratio=1.0, K_ratio=0.0)), "K_ratio = 0 .*must be above 0"),
+        (lambda: by_general(stribeck=effect(a=0.2, vs=0.0)), "vs = 0 .Stribeck speed., which must be above 0"),
         (lambda: by_general(presliding=effect(z0=np.nan)), "not finite"),
         (lambda: by_general(kink=effect(beta=1.0, s=1.5)), "share of the length"),
         (lambda: as_model(stiffness_N_per_m=-1.0), "axial_rigidity_N must be positive"),

@@ -51,9 +51,9 @@ def _declared() -> Iterator[Mechanism]:
 def _neutral() -> dict[str, Any]:
     neutral: dict[str, Any] = {}
     for mechanism in _registry().values():
-        if taken := neutral.keys() & mechanism.settings.keys():
+        if taken := neutral.keys() & mechanism.neutral_settings.keys():
             raise ValueError(f"{mechanism.name} declares settings of another mechanism: {', '.join(sorted(taken))}")
-        neutral |= mechanism.settings
+        neutral |= mechanism.neutral_settings
     return neutral
 
 
@@ -63,10 +63,8 @@ def neutral_settings() -> Settings:
 
 
 def march_settings() -> tuple[str, ...]:
-    """Names of the settings that the compiled march takes: numbers, and tuples of numbers."""
-    return tuple(
-        name for name, value in _neutral().items() if isinstance(value, float) or (isinstance(value, tuple) and value)
-    )
+    """Names of the settings that the compiled march takes: the numbers."""
+    return tuple(name for name, value in _neutral().items() if isinstance(value, float))
 
 
 def names() -> tuple[str, ...]:

@@ -26,10 +26,6 @@ def dead_zone(theta, half_gap):
     return 0.0, 0.0
 
 
-def _modifies_physics(settings, place, values):
-    settings.half_gap = values["half_gap"]
-
-
 MECHANISM = Mechanism(
     name="backlash",
     text=__doc__,
@@ -37,6 +33,5 @@ MECHANISM = Mechanism(
     parameters=(Parameter("half_gap", "rad", 3.5e-3, 70e-3, 15e-3, "half of the dead zone"),),
     mistaken_for=("strand-settling", "slack"),
     depends_on_time=False,
-    settings={"half_gap": 0.0},
-    modifies_physics=_modifies_physics,
+    settings={"half_gap": "half_gap"},
 )

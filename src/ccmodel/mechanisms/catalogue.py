@@ -51,14 +51,15 @@ def _section(mechanism: Mechanism) -> str:
 
 
 def _facts(mechanism: Mechanism) -> list[tuple[str, str]]:
+    text = mechanism.paragraphs
     return [
         ("Places", ", ".join(mechanism.places)),
-        ("Equation", mechanism.equation),
-        ("Signature", mechanism.signature),
+        ("Equation", f"{text['Equation']}."),
+        ("Signature", f"{text['Signature']}."),
         ("Mistaken for", ", ".join(mechanism.mistaken_for)),
         ("Separated by", mechanism.separated_by),
         ("Depends on the rate of the motion", "yes" if mechanism.depends_on_time else "no"),
-        ("Source", mechanism.source),
+        ("Source", text["Source"]),
     ]
 
 

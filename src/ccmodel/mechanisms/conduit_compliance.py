@@ -13,11 +13,6 @@ Source: Agrawal, Peine and Yao 2010, Section VI: changes in the path of the cond
 
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
-
-def _modifies_physics(settings, place, values):
-    settings.conduit_compliance = values["compliance"]
-
-
 MECHANISM = Mechanism(
     name="conduit-compliance",
     text=__doc__,
@@ -25,6 +20,5 @@ MECHANISM = Mechanism(
     parameters=(Parameter("compliance", "m/N", 3e-6, 80e-6, 20e-6, "shortening of the path per mean tension"),),
     mistaken_for=("K", "termination-compliance"),
     depends_on_time=False,
-    settings={"conduit_compliance": 0.0},
-    modifies_physics=_modifies_physics,
+    settings={"conduit_compliance": "compliance"},
 )

@@ -12,11 +12,6 @@ molecular to the macroscopic scale, Journal of Physical Chemistry B 108(11), 341
 
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
-
-def _modifies_physics(settings, place, values):
-    settings.drag_N = values["f0"]
-
-
 MECHANISM = Mechanism(
     name="constant-drag",
     text=__doc__,
@@ -24,6 +19,5 @@ MECHANISM = Mechanism(
     parameters=(Parameter("f0", "N", 0.1, 5.0, 0.5, "drag of one whole cable"),),
     mistaken_for=("load-dependent-friction", "pulley-friction"),
     depends_on_time=False,
-    settings={"drag_N": 0.0},
-    modifies_physics=_modifies_physics,
+    settings={"drag_N": "f0"},
 )

@@ -4,22 +4,22 @@
    finds it by listing the folder.
 2. Its docstring (a relative's: that of its function) is its ``text``: a title and the paragraphs of `PARAGRAPHS`. The
    command line, ``docs/mechanisms.md`` and the report are made from it and from the fields.
-3. ``modifies_physics`` writes into the solver's `Settings` before a run; ``settings`` declares what it writes, at the
-   neutral values. ``modifies_observation`` changes what the sensors read after a run. A mechanism has one of the two.
+3. A mechanism modifies either the physics or the observation. Before a run, its parameters are written into the
+   solver's `Settings` as ``settings`` declares; a setting that is no number stands in ``structures`` and is written by
+   ``modifies_physics``. After a run, ``modifies_observation`` changes what the sensors read.
 4. A model without the mechanism and a model with it at its neutral values give the same numbers, bit for bit. Where
-   the equation excludes its neutral value (a bristle length of zero), ``nearly_neutral`` says how close to the paper's
-   model it comes near that value.
+   the equation excludes its neutral value (a bristle length of zero), the tests of the registry state how close to the
+   paper's model it comes near that value.
 5. An equation that the march needs at every step stands in the mechanism's file as a compiled function
    (`ccmodel.kernel`), which `ccmodel.model.general.equations` imports.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any
 
 from numpy.typing import NDArray
-
-from ccmodel.channels import SUM_AT, TORQUE_AT
 
 PLACES = (
     "drive-pulley",
@@ -73,6 +73,8 @@ class Parameter:
         Whether a fit reaches the least cost only by continuation: from a high value of this one, step by step down.
     default : float or None
         Value in a model that omits it; None if a model must give it.
+    above, below : float
+        Physical limits, both excluded.
     """
 
     name: str
@@ -88,6 +90,8 @@ class Parameter:
     screening_grid: tuple[float, ...] = ()
     continuation: bool = False
     default: float | None = None
+    above: float = -inf
+    below: float = inf
 
     def at(self, share: float) -> float:
         """Value at a share of the range, on the parameter's scale."""
@@ -132,22 +136,6 @@ class Sensing:
     load_radius_m: float
 
 
-@dataclass(frozen=True)
-class NearlyNeutral:
-    """How close the model comes to the paper's near a neutral value that the equation itself excludes.
-
-    Attributes
-    ----------
-    values : mapping of str to float
-        Parameters that differ from their neutral values, and the values near these.
-    error : float
-        Bound on the root mean square difference of any channel from the paper's model, as a share of peak to peak.
-    """
-
-    values: Mapping[str, float]
-    error: float
-
-
 @dataclass(frozen=True, kw_only=True)
 class Mechanism:
     """An effect that the paper's model leaves out.
@@ -166,16 +154,17 @@ class Mechanism:
         Look-alikes: other mechanisms, or `PAPER_LOOK_ALIKES`.
     depends_on_time : bool
         Whether its effect depends on the rate of the motion, not only on its path.
-    nearly_neutral : NearlyNeutral or None
-        None where the model at the neutral values is the paper's, bit for bit, and depends smoothly on them.
     model_form_error : float
         Share of the mechanism's effect on recordings (mean square) that this simple form may miss on a rig.
     by_name_only : bool
         Whether a diagnosis considers it only as a forced candidate.
-    settings : mapping of str to object
-        The solver's settings that it writes, at their neutral values. Numbers and tuples of numbers reach the march.
+    settings : mapping of str to str
+        The solver's settings that take a parameter's value, and the parameter's name; "{side}" in a setting stands for
+        the side of the place. They reach the march.
+    structures : mapping of str to object
+        The solver's settings that are no numbers, at their neutral values.
     modifies_physics : callable or None
-        ``modifies_physics(settings, place, values)`` writes into `Settings`.
+        ``modifies_physics(settings, values)`` writes the structures.
     modifies_observation : callable or None
         ``modifies_observation(sensing, place, values)`` returns the channels that change.
     """
@@ -186,26 +175,26 @@ class Mechanism:
     parameters: tuple[Parameter, ...]
     mistaken_for: tuple[str, ...]
     depends_on_time: bool
-    nearly_neutral: NearlyNeutral | None = None
     model_form_error: float = 0.001
     by_name_only: bool = False
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    modifies_physics: Callable[[Settings, str, Mapping[str, float]], None] | None = None
+    settings: Mapping[str, str] = field(default_factory=dict)
+    structures: Mapping[str, Any] = field(default_factory=dict)
+    modifies_physics: Callable[[Settings, Mapping[str, float]], None] | None = None
     modifies_observation: Callable[[Sensing, str, Mapping[str, float]], dict[str, NDArray]] | None = None
 
     def __post_init__(self):
         unknown = set(self.places) - set(PLACES)
         if unknown or not self.places:
             raise ValueError(f"{self.name}: places are {', '.join(PLACES)}; got {', '.join(self.places) or 'none'}")
-        if (self.modifies_physics is None) == (self.modifies_observation is None):
+        if bool(self.neutral_settings) == (self.modifies_observation is not None):
             raise ValueError(f"{self.name}: a mechanism modifies either the physics or the observation")
-        if missing := set(PARAGRAPHS) - self._paragraphs.keys():
+        if missing := set(PARAGRAPHS) - self.paragraphs.keys():
             raise ValueError(f"{self.name}: its text has no paragraph {', '.join(sorted(missing))}")
 
     @property
-    def _paragraphs(self) -> dict[str, str]:
-        """The text's paragraphs by name, each on one line and without a last full stop."""
-        lines = (" ".join(paragraph.split()) for paragraph in self.text.split("\n\n")[1:])
+    def paragraphs(self) -> dict[str, str]:
+        """The text's paragraphs by name, each on one line and without a last full stop; the paper's title in full."""
+        lines = (" ".join(paragraph.split()).replace(PAPER_SHORT, PAPER) for paragraph in self.text.split("\n\n")[1:])
         return {name: text.removesuffix(".") for name, _, text in (line.partition(": ") for line in lines)}
 
     @property
@@ -215,24 +204,9 @@ class Mechanism:
         return title[0].lower() + title[1:]
 
     @property
-    def equation(self) -> str:
-        """Its law."""
-        return self._paragraphs["Equation"] + "."
-
-    @property
-    def signature(self) -> str:
-        """What it does to a recording."""
-        return self._paragraphs["Signature"] + "."
-
-    @property
     def separated_by(self) -> str:
         """The experiment that separates it from its look-alikes, as it stands in a sentence."""
-        return self._paragraphs["Separated by"]
-
-    @property
-    def source(self) -> str:
-        """Where its equation is from, or where the effect is named."""
-        return self._paragraphs["Source"].replace(PAPER_SHORT, PAPER)
+        return self.paragraphs["Separated by"]
 
     @property
     def strengths(self) -> tuple[Parameter, ...]:
@@ -250,6 +224,23 @@ class Mechanism:
         return {p.name: p.neutral for p in self.parameters}
 
     @property
+    def neutral_settings(self) -> dict[str, Any]:
+        """The solver's settings that it writes, at their neutral values."""
+        by_side = (self._values_of_settings(place, self.neutral) for place in self.places)
+        return dict(self.structures) | {name: value for values in by_side for name, value in values.items()}
+
+    def write(self, settings: Settings, place: str, values: Mapping[str, float]) -> None:
+        """Write the parameters' values into the solver's settings."""
+        for name, value in self._values_of_settings(place, values).items():
+            setattr(settings, name, value)
+        if self.modifies_physics is not None:
+            self.modifies_physics(settings, values)
+
+    def _values_of_settings(self, place: str, values: Mapping[str, float]) -> dict[str, float]:
+        """Values of the solver's settings that are numbers, by name."""
+        return {name.format(side=side(place)): values[parameter] for name, parameter in self.settings.items()}
+
+    @property
     def default(self) -> dict[str, float]:
         """Values of the parameters that a model may omit."""
         return {p.name: p.default for p in self.parameters if p.default is not None}
@@ -263,13 +254,3 @@ class Mechanism:
 def side(place: str) -> str:
     """'drive' or 'load', the end of the transmission that a place belongs to."""
     return place.split("-")[0]
-
-
-def sensor_torque(place: str) -> str:
-    """Name of the torque channel on the side of a sensor place."""
-    return TORQUE_AT[side(place)]
-
-
-def sensor_sum(place: str) -> str:
-    """Name of the load cell's channel on the side of a sensor place."""
-    return SUM_AT[side(place)]

@@ -14,7 +14,7 @@ Source: Agrawal, Peine and Yao 2010, Section VI: kinks introduced inadvertently.
 
 from typing import NamedTuple
 
-from ccmodel.mechanisms.contract import Mechanism, NearlyNeutral, Parameter
+from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
 class Kink(NamedTuple):
@@ -25,11 +25,9 @@ class Kink(NamedTuple):
     hold: float = 1.0
 
 
-def _modifies_physics(settings, place, values):
+def _modifies_physics(settings, values):
     if not 0 < values["s"] < 1:
         raise ValueError(f"a kink's s is a share of the length between 0 and 1; got {values['s']}")
-    if values["beta"] < 0:
-        raise ValueError(f"a kink's bend is not negative; got beta = {values['beta']} rad")
     if not 0 <= values["hold"] <= 1:
         raise ValueError(f"what a kink holds at rest is a share between 0 and 1; got hold = {values['hold']}")
     settings.kinks += (Kink(values["s"], values["beta"], values["hold"]),)
@@ -57,8 +55,6 @@ MECHANISM = Mechanism(
     ),
     mistaken_for=("mu", "termination-compliance"),
     depends_on_time=False,
-    # A kink of no bend still puts a node at its place, which is another grid: not the same bits.
-    nearly_neutral=NearlyNeutral({"beta": 1e-6}, 1e-6),
-    settings={"kinks": ()},
+    structures={"kinks": ()},
     modifies_physics=_modifies_physics,
 )

@@ -1,11 +1,10 @@
 """Faults of a load cell, which measures the sum F of the two tensions on one side: gain, offset, drift, crosstalk."""
 
-from ccmodel.mechanisms.contract import Mechanism, Parameter, sensor_sum, sensor_torque, side
+from ccmodel.channels import SUM_AT, TORQUE_AT
+from ccmodel.mechanisms.contract import Mechanism, Parameter, side
 
-_PLACES = ("drive-sensor", "load-sensor")
 
-
-def _scale(sensing, place, values):
+def _scale(force, gain, sensing, end):
     """A load cell's gain is off.
 
     Equation: The cell reads (1 + gain) F.
@@ -17,11 +16,10 @@ def _scale(sensing, place, values):
 
     Source: JCGM 200:2012, International vocabulary of metrology, 2012, doi:10.59161/JCGM200-2012, 4.12 (sensitivity).
     """
-    channel = sensor_sum(place)
-    return {channel: sensing.channels[channel] * (1 + values["gain"])}
+    return force * (1 + gain)
 
 
-def _offset(sensing, place, values):
+def _offset(force, offset, sensing, end):
     """A load cell's zero is off.
 
     Equation: The cell reads F + offset.
@@ -34,11 +32,10 @@ def _offset(sensing, place, values):
     Source: JCGM 200:2012, International vocabulary of metrology, 2012, doi:10.59161/JCGM200-2012, 4.20 (instrumental
     bias).
     """
-    channel = sensor_sum(place)
-    return {channel: sensing.channels[channel] + values["offset"]}
+    return force + offset
 
 
-def _drift(sensing, place, values):
+def _drift(force, rate, sensing, end):
     """A load cell's zero drifts with time.
 
     Equation: The cell reads F + rate (t - t_0), with t_0 the start of the recording.
@@ -51,11 +48,10 @@ def _drift(sensing, place, values):
     Source: JCGM 200:2012, International vocabulary of metrology, 2012, doi:10.59161/JCGM200-2012, 4.21 (instrumental
     drift).
     """
-    channel = sensor_sum(place)
-    return {channel: sensing.channels[channel] + values["rate"] * (sensing.time_s - sensing.time_s[0])}
+    return force + rate * (sensing.time_s - sensing.time_s[0])
 
 
-def _crosstalk(sensing, place, values):
+def _crosstalk(force, crosstalk, sensing, end):
     """A load cell responds to the torque.
 
     Equation: The cell reads F + crosstalk tau / R, with tau the torque on the same side.
@@ -67,47 +63,36 @@ def _crosstalk(sensing, place, values):
 
     Source: JCGM 200:2012, International vocabulary of metrology, 2012, doi:10.59161/JCGM200-2012, 4.13 (selectivity).
     """
-    channel = sensor_sum(place)
-    radius = sensing.drive_radius_m if side(place) == "drive" else sensing.load_radius_m
-    force = sensing.channels[sensor_torque(place)] / radius
-    return {channel: sensing.channels[channel] + values["crosstalk"] * force}
+    radius = sensing.drive_radius_m if end == "drive" else sensing.load_radius_m
+    return force + crosstalk * (sensing.channels[TORQUE_AT[end]] / radius)
 
+
+def _fault(name, reading, parameter, mistaken_for, depends_on_time=False):
+    """Mechanism of one fault: `reading` gives the cell's values from the sum of tensions and the fault's parameter."""
+
+    def modifies_observation(sensing, place, values):
+        end = side(place)
+        return {SUM_AT[end]: reading(sensing.channels[SUM_AT[end]], values[parameter.name], sensing, end)}
+
+    return Mechanism(
+        name=name,
+        text=reading.__doc__,
+        places=("drive-sensor", "load-sensor"),
+        parameters=(parameter,),
+        mistaken_for=mistaken_for,
+        depends_on_time=depends_on_time,
+        modifies_observation=modifies_observation,
+    )
+
+
+_GAIN = Parameter("gain", "1", 0.02, 0.1, 0.05, "error of the gain", signed=True)
+_OFFSET = Parameter("offset", "N", 0.2, 3.0, 0.5, "error of the zero", signed=True)
+_RATE = Parameter("rate", "N/s", 0.02, 0.2, 0.05, "rate of the drift", signed=True)
+_CROSSTALK = Parameter("crosstalk", "1", 0.02, 0.1, 0.05, "share of tau / R in the sum", signed=True)
 
 MECHANISMS = (
-    Mechanism(
-        name="load-cell-scale",
-        text=_scale.__doc__,
-        places=_PLACES,
-        parameters=(Parameter("gain", "1", 0.02, 0.1, 0.05, "error of the gain", signed=True),),
-        mistaken_for=("load-cell-offset", "cable-asymmetry"),
-        depends_on_time=False,
-        modifies_observation=_scale,
-    ),
-    Mechanism(
-        name="load-cell-offset",
-        text=_offset.__doc__,
-        places=_PLACES,
-        parameters=(Parameter("offset", "N", 0.2, 3.0, 0.5, "error of the zero", signed=True),),
-        mistaken_for=("load-cell-scale",),
-        depends_on_time=False,
-        modifies_observation=_offset,
-    ),
-    Mechanism(
-        name="load-cell-drift",
-        text=_drift.__doc__,
-        places=_PLACES,
-        parameters=(Parameter("rate", "N/s", 0.02, 0.2, 0.05, "rate of the drift", signed=True),),
-        mistaken_for=("relaxation", "load-cell-offset"),
-        depends_on_time=True,
-        modifies_observation=_drift,
-    ),
-    Mechanism(
-        name="load-cell-crosstalk",
-        text=_crosstalk.__doc__,
-        places=_PLACES,
-        parameters=(Parameter("crosstalk", "1", 0.02, 0.1, 0.05, "share of tau / R in the sum", signed=True),),
-        mistaken_for=("load-cell-scale",),
-        depends_on_time=False,
-        modifies_observation=_crosstalk,
-    ),
+    _fault("load-cell-scale", _scale, _GAIN, ("load-cell-offset", "cable-asymmetry")),
+    _fault("load-cell-offset", _offset, _OFFSET, ("load-cell-scale",)),
+    _fault("load-cell-drift", _drift, _RATE, ("relaxation", "load-cell-offset"), depends_on_time=True),
+    _fault("load-cell-crosstalk", _crosstalk, _CROSSTALK, ("load-cell-scale",)),
 )

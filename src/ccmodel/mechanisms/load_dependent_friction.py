@@ -28,10 +28,6 @@ def power_of_tension(tension, n):
     return factor, n * factor * tension / square
 
 
-def _modifies_physics(settings, place, values):
-    settings.tension_exponent = values["n"]
-
-
 MECHANISM = Mechanism(
     name="load-dependent-friction",
     text=__doc__,
@@ -39,6 +35,5 @@ MECHANISM = Mechanism(
     parameters=(Parameter("n", "1", -0.35, -0.05, -0.15, "exponent of the tension", scale="linear"),),
     mistaken_for=("constant-drag",),
     depends_on_time=False,
-    settings={"tension_exponent": 0.0},
-    modifies_physics=_modifies_physics,
+    settings={"tension_exponent": "n"},
 )

@@ -24,10 +24,6 @@ def load_damping(settings: Settings, stiffness: float) -> float:
     return 2 * settings.damping_ratio * sqrt(settings.inertia * stiffness)
 
 
-def _modifies_physics(settings, place, values):
-    settings.inertia, settings.damping_ratio = values["J"], values["zeta"]
-
-
 MECHANISM = Mechanism(
     name="load-inertia",
     text=__doc__,
@@ -38,6 +34,5 @@ MECHANISM = Mechanism(
     ),
     mistaken_for=("time-skew",),
     depends_on_time=True,
-    settings={"inertia": 0.0, "damping_ratio": 0.0},
-    modifies_physics=_modifies_physics,
+    settings={"inertia": "J", "damping_ratio": "zeta"},
 )

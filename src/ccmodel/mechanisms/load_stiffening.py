@@ -12,11 +12,6 @@ doi:10.1002/9780470977859.
 
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
-
-def _modifies_physics(settings, place, values):
-    settings.cubic_stiffness = values["K3"]
-
-
 MECHANISM = Mechanism(
     name="load-stiffening",
     text=__doc__,
@@ -24,6 +19,5 @@ MECHANISM = Mechanism(
     parameters=(Parameter("K3", "N m/rad^3", 1e-3, 1.0, 0.03, "cubic stiffness", signed=True),),
     mistaken_for=("backlash",),
     depends_on_time=False,
-    settings={"cubic_stiffness": 0.0},
-    modifies_physics=_modifies_physics,
+    settings={"cubic_stiffness": "K3"},
 )

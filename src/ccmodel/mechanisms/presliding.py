@@ -15,7 +15,7 @@ doi:10.2514/3.61511.
 
 from ccmodel.elementary import quick_exp
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import Mechanism, NearlyNeutral, Parameter
+from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
 @kernel(inline="always")
@@ -26,10 +26,6 @@ def dahl(xi, slide, z0):
     return direction + (xi - direction) * decay, (1.0 - direction * xi) * decay / z0
 
 
-def _modifies_physics(settings, place, values):
-    settings.bristle_m = values["z0"]
-
-
 MECHANISM = Mechanism(
     name="presliding",
     text=__doc__,
@@ -37,10 +33,8 @@ MECHANISM = Mechanism(
     parameters=(Parameter("z0", "m", 5e-6, 200e-6, 50e-6, "presliding length of the bristle"),),
     mistaken_for=("termination-compliance",),
     depends_on_time=False,
-    nearly_neutral=NearlyNeutral({"z0": 1e-10}, 1e-6),
     # One bristle stands for asperities of many lengths; elastic-slip elements with lengths from 1 to 12 miss this
     # share (Iwan, Journal of Applied Mechanics 33(4), 893-900, 1966, doi:10.1115/1.3625199).
     model_form_error=0.08,
-    settings={"bristle_m": 0.0},
-    modifies_physics=_modifies_physics,
+    settings={"bristle_m": "z0"},
 )

@@ -13,7 +13,7 @@ Source: Litvin and Fuentes, Gear Geometry and Applied Theory, 2nd edition, Cambr
 import numpy as np
 
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import Mechanism, Parameter, side
+from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
 @kernel
@@ -28,21 +28,12 @@ def winding_change(theta, rotation, e, psi):
     return rotation + 2.0 * e * np.sin(theta + psi + 0.5 * rotation) * np.sin(0.5 * rotation)
 
 
-def _modifies_physics(settings, place, values):
-    if not abs(values["e"]) < 1:
-        raise ValueError(f"a pulley turns about a point within it, so e is below 1; got {values['e']}")
-    if side(place) == "drive":
-        settings.drive_eccentricity = (values["e"], values["psi"])
-    else:
-        settings.load_eccentricity = (values["e"], values["psi"])
-
-
 MECHANISM = Mechanism(
     name="pulley-eccentricity",
     text=__doc__,
     places=("drive-pulley", "load-pulley"),
     parameters=(
-        Parameter("e", "1", 0.01, 0.08, 0.03, "eccentricity over the radius"),
+        Parameter("e", "1", 0.01, 0.08, 0.03, "eccentricity over the radius", below=1.0),
         # Two values of psi half a turn apart would not do: one that is off by a right angle has no gradient in e.
         Parameter(
             "psi",
@@ -57,6 +48,5 @@ MECHANISM = Mechanism(
     ),
     mistaken_for=("load-stiffening",),
     depends_on_time=False,
-    settings={"drive_eccentricity": (0.0, 0.0), "load_eccentricity": (0.0, 0.0)},
-    modifies_physics=_modifies_physics,
+    settings={"{side}_eccentricity": "e", "{side}_eccentricity_rad": "psi"},
 )

@@ -16,7 +16,7 @@ Journal 14(12), 1675-1682, 1976, doi:10.2514/3.61511.
 import numpy as np
 
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import Mechanism, Parameter, side
+from ccmodel.mechanisms.contract import Mechanism, Parameter
 from ccmodel.mechanisms.presliding import dahl
 
 # Angle over which a bearing's friction builds up unless a model states it.
@@ -30,13 +30,6 @@ def bearing(theta, presliding_rad):
     for j in range(1, theta.size):
         share[j] = dahl(share[j - 1], theta[j] - theta[j - 1], presliding_rad)[0]
     return share
-
-
-def _modifies_physics(settings, place, values):
-    if side(place) == "drive":
-        settings.drive_friction_Nm, settings.drive_presliding_rad = values["friction_torque"], values["presliding"]
-    else:
-        settings.load_friction_Nm, settings.load_presliding_rad = values["friction_torque"], values["presliding"]
 
 
 MECHANISM = Mechanism(
@@ -59,11 +52,5 @@ MECHANISM = Mechanism(
     ),
     mistaken_for=("torque-scale", "constant-drag"),
     depends_on_time=False,
-    settings={
-        "drive_friction_Nm": 0.0,
-        "drive_presliding_rad": PRESLIDING_RAD,
-        "load_friction_Nm": 0.0,
-        "load_presliding_rad": PRESLIDING_RAD,
-    },
-    modifies_physics=_modifies_physics,
+    settings={"{side}_friction_Nm": "friction_torque", "{side}_presliding_rad": "presliding"},
 )

@@ -31,25 +31,15 @@ def lag_weights(step_over_tau):
     return decay, mean - decay, 1.0 - mean
 
 
-def _modifies_physics(settings, place, values):
-    if not values["r"] < 1:
-        raise ValueError(f"a cable relaxes by a share r of its tension below 1; got {values['r']}")
-    if not values["tau"] > 0:
-        raise ValueError(f"a cable relaxes with a time constant above zero; got tau = {values['tau']} s")
-    settings.relaxing_share = values["r"]
-    settings.relaxing_time_s = values["tau"]
-
-
 MECHANISM = Mechanism(
     name="relaxation",
     text=__doc__,
     places=("cable",),
     parameters=(
-        Parameter("r", "1", 0.01, 0.2, 0.05, "share of the tension that is lost"),
-        Parameter("tau", "s", 5.0, 100.0, 30.0, "time constant", neutral=30.0),
+        Parameter("r", "1", 0.01, 0.2, 0.05, "share of the tension that is lost", below=1.0),
+        Parameter("tau", "s", 5.0, 100.0, 30.0, "time constant", neutral=30.0, above=0.0),
     ),
     mistaken_for=("load-cell-drift",),
     depends_on_time=True,
-    settings={"relaxing_share": 0.0, "relaxing_time_s": 30.0},
-    modifies_physics=_modifies_physics,
+    settings={"relaxing_share": "r", "relaxing_time_s": "tau"},
 )

@@ -17,12 +17,7 @@ import numpy as np
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
-def _modifies_physics(settings, place, values):
-    if not values["change"] > -1:
-        raise ValueError(f"running in leaves some friction, so its change is above -1; got {values['change']}")
-    if not values["tau"] > 0:
-        raise ValueError(f"running in takes some time; got tau = {values['tau']} s")
-
+def _modifies_physics(settings, values):
     def history(time_s, travel_m):
         return 1 + values["change"] * -np.expm1(-(time_s - time_s[0]) / values["tau"] - values["per_m"] * travel_m)
 
@@ -34,13 +29,15 @@ MECHANISM = Mechanism(
     text=__doc__,
     places=("conduit",),
     parameters=(
-        Parameter("change", "1", 0.05, 0.3, 0.1, "final relative change of friction", signed=True),
-        Parameter("tau", "s", 2.0, 1000.0, 10.0, "time constant", neutral=10.0, screening_grid=(0.13, 0.31, 0.5)),
+        Parameter("change", "1", 0.05, 0.3, 0.1, "final relative change of friction", signed=True, above=-1.0),
+        Parameter(
+            "tau", "s", 2.0, 1000.0, 10.0, "time constant", neutral=10.0, screening_grid=(0.13, 0.31, 0.5), above=0.0
+        ),
         Parameter("per_m", "1/m", 1.0, 200.0, 1.0, "rate per cable travel", screening_grid=(0.0, 0.6), default=0.0),
     ),
     mistaken_for=("relaxation",),
     depends_on_time=True,
     # Factor of mu at times (s) and cable travels (m), all of shape (samples,).
-    settings={"friction_history": None},
+    structures={"friction_history": None},
     modifies_physics=_modifies_physics,
 )

@@ -14,7 +14,7 @@ import numpy as np
 
 from ccmodel.elementary import quick_exp
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import Mechanism, NearlyNeutral, Parameter
+from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
 @kernel(inline="always")
@@ -34,10 +34,6 @@ def stretch_at(tension, settled, stiffness):
     return stretch
 
 
-def _modifies_physics(settings, place, values):
-    settings.settling_N = values["T_scale"]
-
-
 MECHANISM = Mechanism(
     name="strand-settling",
     text=__doc__,
@@ -45,7 +41,5 @@ MECHANISM = Mechanism(
     parameters=(Parameter("T_scale", "N", 0.5, 10.0, 2.0, "tension scale of the settling"),),
     mistaken_for=("backlash", "slack"),
     depends_on_time=False,
-    nearly_neutral=NearlyNeutral({"T_scale": 1e-2}, 1e-8),
-    settings={"settling_N": 0.0},
-    modifies_physics=_modifies_physics,
+    settings={"settling_N": "T_scale"},
 )

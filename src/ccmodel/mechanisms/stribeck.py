@@ -36,26 +36,18 @@ def renewed(rested, slide, dt, vs, delta):
     return rested * decay + (1.0 - decay) * quick_exp(-ratio)
 
 
-def _modifies_physics(settings, place, values):
-    if not values["vs"] > 0:
-        raise ValueError(f"the speed at which friction has fallen, vs, is above zero; got {values['vs']} m/s")
-    settings.stribeck_rise = values["a"]
-    settings.stribeck_speed, settings.stribeck_exponent = values["vs"], values["delta"]
-
-
 MECHANISM = Mechanism(
     name="stribeck",
     text=__doc__,
     places=("conduit",),
     parameters=(
         Parameter("a", "1", 0.05, 0.6, 0.2, "relative excess of friction at rest"),
-        Parameter("vs", "m/s", 1e-4, 1e-2, 2e-3, "Stribeck speed", neutral=1e-3),
+        Parameter("vs", "m/s", 1e-4, 1e-2, 2e-3, "Stribeck speed", neutral=1e-3, above=0.0),
         Parameter(
             "delta", "1", 0.5, 2.5, 1.5, "exponent of the speed", neutral=2.0, screening_grid=(0.7,), default=2.0
         ),
     ),
     mistaken_for=("presliding", "viscous-friction"),
     depends_on_time=True,
-    settings={"stribeck_rise": 0.0, "stribeck_speed": 1e-3, "stribeck_exponent": 2.0},
-    modifies_physics=_modifies_physics,
+    settings={"stribeck_rise": "a", "stribeck_speed": "vs", "stribeck_exponent": "delta"},
 )

@@ -11,15 +11,7 @@ advanced.
 Source: Agrawal, Peine and Yao 2010, Section V: measured and fitted stiffness.
 """
 
-from ccmodel.mechanisms.contract import Mechanism, NearlyNeutral, Parameter, side
-
-
-def _modifies_physics(settings, place, values):
-    if side(place) == "drive":
-        settings.drive_end_compliance = values["compliance"]
-    else:
-        settings.load_end_compliance = values["compliance"]
-
+from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 # 4 to 200 % of a cable's own: 1 / 13.88 kN/m is 72 um/N.
 MECHANISM = Mechanism(
@@ -29,7 +21,5 @@ MECHANISM = Mechanism(
     parameters=(Parameter("compliance", "m/N", 3e-6, 150e-6, 20e-6, "compliance of one end of each cable"),),
     mistaken_for=("K",),
     depends_on_time=False,
-    nearly_neutral=NearlyNeutral({"compliance": 1e-12}, 1e-7),
-    settings={"drive_end_compliance": 0.0, "load_end_compliance": 0.0},
-    modifies_physics=_modifies_physics,
+    settings={"{side}_end_compliance": "compliance"},
 )

@@ -12,11 +12,6 @@ Journal of Control 4(3), 176-195, 1998, doi:10.1016/S0947-3580(98)70113-X.
 
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
-
-def _modifies_physics(settings, place, values):
-    settings.viscous = values["c"]
-
-
 MECHANISM = Mechanism(
     name="viscous-friction",
     text=__doc__,
@@ -25,6 +20,5 @@ MECHANISM = Mechanism(
     parameters=(Parameter("c", "N s/m^2", 5.0, 1000.0, 50.0, "drag per sliding speed and length"),),
     mistaken_for=("stribeck", "time-skew"),
     depends_on_time=True,
-    settings={"viscous": 0.0},
-    modifies_physics=_modifies_physics,
+    settings={"viscous": "c"},
 )

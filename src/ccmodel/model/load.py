@@ -59,7 +59,7 @@ class TorqueLoad:
             raise ModelError(
                 f"a spring in parallel with a measured load is finite and not negative; got {self.parallel_Nm_per_rad}"
             )
-        object.__setattr__(self, "torque_Nm", series(self.torque_Nm, "torque_Nm"))
+        object.__setattr__(self, "torque_Nm", one_row(self.torque_Nm, "torque_Nm"))
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class AngleLoad:
     angle_rad: NDArray
 
     def __post_init__(self):
-        object.__setattr__(self, "angle_rad", series(self.angle_rad, "angle_rad"))
+        object.__setattr__(self, "angle_rad", one_row(self.angle_rad, "angle_rad"))
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class FixedLoad:
 Load = SpringLoad | TorqueLoad | AngleLoad | FixedLoad
 
 
-def series(values, name: str) -> NDArray:
+def one_row(values, name: str) -> NDArray:
     """`values` as a contiguous array of one finite number a sample; `ModelError` where they are not."""
     values = np.ascontiguousarray(values, dtype=float)
     if values.ndim != 1 or values.size == 0:

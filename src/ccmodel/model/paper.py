@@ -25,10 +25,11 @@ The load pulley couples the cables: its motion is what balances (T2 - T4) R_o ag
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.channels import TENSIONS
 from ccmodel.failure import ModelError
 from ccmodel.kernel import kernel
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import SpringLoad, series
+from ccmodel.model.load import SpringLoad, one_row
 from ccmodel.model.response import PairResponse, Status
 from ccmodel.model.transmission import Transmission
 
@@ -63,7 +64,7 @@ def simulate_pair(
     ModelError
         If an input is not finite or of the wrong shape, or a step finds no balance at the load.
     """
-    theta_in = series(theta_in, "theta_in")
+    theta_in = one_row(theta_in, "theta_in")
     if sections < 1:
         raise ModelError(f"each cable needs at least one section; got {sections}")
     path = transmission.path
@@ -89,15 +90,11 @@ def simulate_pair(
             "check the pulley radii and the stiffness"
         )
     R_i, R_o = transmission.drive_radius_m, transmission.load_radius_m
-    T1, T2, T3, T4 = T
     return PairResponse(
-        T1_N=T1,
-        T2_N=T2,
-        T3_N=T3,
-        T4_N=T4,
+        **dict(zip(TENSIONS, T, strict=True)),
         theta_out_rad=theta_out,
-        tau_in_Nm=(T1 - T3) * R_i,
-        tau_out_Nm=(T2 - T4) * R_o,
+        tau_in_Nm=(T[0] - T[2]) * R_i,
+        tau_out_Nm=(T[1] - T[3]) * R_o,
         status=Status.OK,
         reached=theta_in.size,
     )

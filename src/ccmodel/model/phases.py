@@ -44,11 +44,6 @@ class PhaseStudy:
         """Sample of the drive's first reversal, at which the cycle begins."""
         return (self.time_s.size - 1) // 5
 
-    @property
-    def cycle(self) -> slice:
-        """Samples of the cycle; the first and the last are the same state."""
-        return slice(self.first_reversal, None)
-
 
 def simulate_phases(
     transmission: Transmission,

@@ -5,6 +5,7 @@ from enum import Enum
 
 from numpy.typing import NDArray
 
+from ccmodel.channels import F_DRIVE, F_LOAD, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
 from ccmodel.failure import ModelError
 
 
@@ -48,6 +49,17 @@ class PairResponse:
     tau_out_Nm: NDArray
     status: Status
     reached: int
+
+    def channels(self, theta_in_rad: NDArray) -> dict[str, NDArray]:
+        """What sensors without faults measure, by channel: angles, torques and sums of tensions."""
+        return {
+            THETA_IN: theta_in_rad,
+            THETA_OUT: self.theta_out_rad,
+            TAU_IN: self.tau_in_Nm,
+            TAU_OUT: self.tau_out_Nm,
+            F_DRIVE: self.T1_N + self.T3_N,
+            F_LOAD: self.T2_N + self.T4_N,
+        }
 
     def complete(self):
         """The response itself, if every sample was solved in balance.

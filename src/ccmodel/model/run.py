@@ -101,35 +101,28 @@ def _readings(
             transmission, load, time_s, given.theta_in, initial, parameters.mechanisms, finer * general.ELEMENTS, finer
         )
         return response.complete().read
-    response = exact.simulate_pair(transmission, load, given.theta_in, initial).complete()
-    return {
-        THETA_IN: given.theta_in,
-        THETA_OUT: response.theta_out_rad,
-        TAU_IN: response.tau_in_Nm,
-        TAU_OUT: response.tau_out_Nm,
-        F_DRIVE: response.T1_N + response.T3_N,
-        F_LOAD: response.T2_N + response.T4_N,
-    }
+    response = exact.simulate_pair(transmission, load, given.theta_in, initial)
+    return response.complete().channels(given.theta_in)
 
 
 def _channels(read: Mapping[str, NDArray], recording: Recording, parameters: Parameters) -> dict[str, NDArray]:
     """Channels of a recording from readings: zeros added, tensions derived as in a recording."""
-    tau_in, tau_out, F_drive, F_load = (read[c] + getattr(parameters, zero) for c, zero in ZERO_OF.items())
-    drive, load = tau_in / parameters.drive_radius_m, tau_out / parameters.load_radius_m
-    channels = {
-        THETA_IN: read[THETA_IN],
-        THETA_OUT: _zeroed(read[THETA_OUT], recording) + parameters.theta_out_zero_rad,
-        TAU_IN: tau_in,
-        TAU_OUT: tau_out,
-        F_DRIVE: F_drive,
-        F_LOAD: F_load,
-    }
+    theta_out = _zeroed(read[THETA_OUT], recording) + parameters.theta_out_zero_rad
+    sensed = {c: read[c] + getattr(parameters, zero) for c, zero in ZERO_OF.items()}
+    return {THETA_IN: read[THETA_IN], THETA_OUT: theta_out, **sensed, **_tensions(sensed, recording, parameters)}
+
+
+def _tensions(sensed: Mapping, recording: Recording, parameters: Parameters) -> dict[str, NDArray | float]:
+    """Tensions at the cables' ends from torques and sums; a single cable's from one sensor at each end."""
+    radii = {"drive": parameters.drive_radius_m, "load": parameters.load_radius_m}
+    total = {end: sensed[SUM_AT[end]] for end in radii}
+    difference = {end: sensed[TORQUE_AT[end]] / radius for end, radius in radii.items()}
     if recording.far_end:
-        near = drive if _by_torque_alone("drive", recording) else F_drive
-        far = load if _by_torque_alone("load", recording) else F_load
-        return channels | dict(zip(CABLES["A"], (near, far), strict=True))
-    tensions = (F_drive + drive, F_load + load, F_drive - drive, F_load - load)
-    return channels | {name: twice / 2 for name, twice in zip(TENSIONS, tensions, strict=True)}
+        near_and_far = (difference[end] if _by_torque_alone(end, recording) else total[end] for end in radii)
+        return dict(zip(CABLES["A"], near_and_far, strict=True))
+    of_A = [(total[end] + difference[end]) / 2 for end in radii]
+    of_B = [(total[end] - difference[end]) / 2 for end in radii]
+    return dict(zip(TENSIONS, of_A + of_B, strict=True))
 
 
 def _by_torque_alone(end: str, recording: Recording) -> bool:
@@ -145,16 +138,9 @@ def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension
         return InitialTension.uniform(path, scale * parameters.pretension_N)
     if not given.initial_tension_observed:
         return InitialTension.uniform(path, scale * parameters.pretension_share * given.recording.pretension_N)
-    true = _true_at_rest(given, parameters)
-    F_drive, F_load = true[F_DRIVE], true[F_LOAD]
-    drive, load = true[TAU_IN] / parameters.drive_radius_m, true[TAU_OUT] / parameters.load_radius_m
-    if given.recording.far_end:
-        T1 = drive if _by_torque_alone("drive", given.recording) else F_drive
-        T2 = load if _by_torque_alone("load", given.recording) else F_load
-        A = B = scale * T1, scale * T2
-    else:
-        A = scale * (F_drive + drive) / 2, scale * (F_load + load) / 2
-        B = scale * (F_drive - drive) / 2, scale * (F_load - load) / 2
+    tensions = _tensions(_true_at_rest(given, parameters), given.recording, parameters)
+    A = tuple(scale * tensions[end] for end in CABLES["A"])
+    B = A if given.recording.far_end else tuple(scale * tensions[end] for end in CABLES["B"])
     curvatures = parameters.tension_curvature_A, parameters.tension_curvature_B
     kinks_rad = sum(kink.hold * kink.bend_rad for kink in general.settings_of(parameters.mechanisms).kinks)
     return InitialTension.between_ends(path, parameters.friction, A, B, curvatures, kinks_rad)

@@ -39,18 +39,13 @@ class Transmission:
         for name in ("axial_rigidity_N", "drive_radius_m", "load_radius_m"):
             if not 0 < getattr(self, name) < inf:
                 raise ModelError(f"{name} must be positive and finite; got {getattr(self, name)}: check its unit")
-        check_friction(self.friction_coefficient, self.path)
-
-
-def check_friction(friction_coefficient: float, path: ConduitPath) -> None:
-    """Raise `ModelError` for a coefficient that no cable in `path` can have."""
-    if not 0 <= friction_coefficient < inf:
-        raise ModelError(
-            f"friction_coefficient must be finite and not negative; got {friction_coefficient}: in a fit, give it a"
-            " lower bound of 0"
-        )
-    if friction_coefficient * path.bend_rad > MAX_FRICTION_ANGLE:
-        raise ModelError(
-            f"mu phi = {friction_coefficient * path.bend_rad:.4g} is beyond {MAX_FRICTION_ANGLE}: the capstan factor"
-            " exp(mu phi) is out of range; check the unit of the bend angles"
-        )
+        mu = self.friction_coefficient
+        if not 0 <= mu < inf:
+            raise ModelError(
+                f"friction_coefficient must be finite and not negative; got {mu}: in a fit, give it a lower bound of 0"
+            )
+        if mu * self.path.bend_rad > MAX_FRICTION_ANGLE:
+            raise ModelError(
+                f"mu phi = {mu * self.path.bend_rad:.4g} is beyond {MAX_FRICTION_ANGLE}: the capstan factor exp(mu phi)"
+                " is out of range; check the unit of the bend angles"
+            )

@@ -4,16 +4,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 
+import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.model.exact.profile import CableProfile
-from ccmodel.model.exact.simulation import Simulation
+from ccmodel.channels import T1, T2, T3, T4, TENSIONS
+from ccmodel.failure import ModelError
+from ccmodel.model.exact import run as kernels
+from ccmodel.model.exact.path import tabulate
+from ccmodel.model.exact.profile import CableProfile, cable_profile, initial_state
+from ccmodel.model.exact.state import T_LOAD
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import FixedLoad, SpringLoad, series
+from ccmodel.model.load import FixedLoad, SpringLoad, one_row
 from ccmodel.model.response import PairResponse, Status
 from ccmodel.model.transmission import Transmission
 
-__all__ = ["ExactResponse", "Status", "simulate_pair"]
+__all__ = ["PHASES", "ExactResponse", "Status", "simulate_pair"]
+
+PHASES = ("I", "II", "III", "IVa", "IVb")
+# A load that balances to less than this share of the highest tension is balanced.
+BALANCE_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,33 +81,47 @@ def simulate_pair(
     ModelError
         If an input is not finite, or friction cannot hold the initial tension.
     """
-    theta_in = series(theta_in_rad, "theta_in_rad")
+    theta_in = one_row(theta_in_rad, "theta_in_rad")
     if not isinstance(load, SpringLoad | FixedLoad):
         kind = type(load).__name__
         raise TypeError(f"the exact solver takes a SpringLoad or a FixedLoad; got {kind}: use ccmodel.model.general")
+    stops = sorted({*map(int, record_profiles_at), theta_in.size - 1})
+    if stops[0] < 0 or stops[-1] >= theta_in.size:
+        raise ModelError(f"record_profiles_at names samples from 0 to {theta_in.size - 1}")
     R_i, R_o = transmission.drive_radius_m, transmission.load_radius_m
     stiffness = inf if isinstance(load, FixedLoad) else load.stiffness_Nm_per_rad / R_o**2
-    simulation = Simulation(transmission, initial)
-    offset = simulation.held_N if stiffness > 0 else 0.0
-    simulation.run(theta_in, R_i, offset, stiffness, record_profiles_at)
-    T1, T2, T3, T4, theta_out = simulation.out[:5]
+    tables = tabulate(transmission.path, transmission.friction_coefficient, transmission.axial_rigidity_N)
+    present = np.array([True, not transmission.is_single_cable])
+    state = initial_state(tables, transmission, initial, present, theta_in.size)
+    # A spring rests where it holds the cables' force on the load.
+    offset = float(state.value[0, T_LOAD] - state.value[1, T_LOAD]) if stiffness > 0 else 0.0
+
+    # Moving the pulleys does not change the corners, so the copy shares them.
+    saved = state._replace(front=state.front.copy(), value=state.value.copy(), kind=state.kind.copy())
+    out, phase = np.empty((9, theta_in.size)), np.empty(theta_in.size, dtype=np.int8)
+    progress, balance, profiles = np.zeros(3, dtype=np.int64), np.zeros(2), {}
+    kernels.settle(tables, state, saved, offset, stiffness)
+    for stop in stops:
+        drive = theta_in[: stop + 1], R_i
+        kernels.run(tables, state, saved, progress, drive, offset, stiffness, present, out, phase, balance)
+        if stop in record_profiles_at:
+            profiles[stop] = tuple(cable_profile(state, tables, transmission, c) for c in np.flatnonzero(present))
+
+    tensions, theta_out = dict(zip(TENSIONS, out[:4], strict=True)), out[4]
     if stiffness > 0:
         theta_out += offset / stiffness
     theta_out /= R_o
     return ExactResponse(
-        T1_N=T1,
-        T2_N=T2,
-        T3_N=T3,
-        T4_N=T4,
+        **tensions,
         theta_out_rad=theta_out,
-        tau_in_Nm=_torque(T1, T3, R_i),
-        tau_out_Nm=_torque(T2, T4, R_o),
-        phase=simulation.phase,
-        moving_A_m=simulation.out[5:7].T,
-        moving_B_m=simulation.out[7:9].T,
-        status=simulation.status,
+        tau_in_Nm=_torque(tensions[T1], tensions[T3], R_i),
+        tau_out_Nm=_torque(tensions[T2], tensions[T4], R_o),
+        phase=phase,
+        moving_A_m=out[5:7].T,
+        moving_B_m=out[7:9].T,
+        status=Status.OK if balance[0] <= BALANCE_TOLERANCE * max(balance[1], 1e-9) else Status.UNBALANCED,
         reached=theta_in.size,
-        profiles=simulation.profiles,
+        profiles=profiles,
     )
 
 

@@ -5,13 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.geometry import ConduitPath
 from ccmodel.model.exact import state as rows
 from ccmodel.model.exact.front import position
 from ccmodel.model.exact.path import LUMP, NODE, PER_M, X_PER_M, X_START, PathTables
-from ccmodel.model.exact.run import MARGIN
 from ccmodel.model.exact.state import State, blank_state
 from ccmodel.model.initial import InitialTension
+from ccmodel.model.transmission import Transmission
 
 # Elongation of a cable that is not there: it hangs slack whatever the drive does, m.
 ABSENT_M = -1e30
@@ -36,17 +35,20 @@ class CableProfile:
 
 
 def initial_state(
-    tables: PathTables, path: ConduitPath, friction_coefficient: float, initial: InitialTension, present: NDArray
+    tables: PathTables, transmission: Transmission, initial: InitialTension, present: NDArray, samples: int
 ) -> State:
-    """State at rest under an initial tension; a cable that is not `present` (shape (2,)) has no stiffness.
+    """State at rest under an initial tension, with room for the corners of so many samples.
+
+    A cable that is not `present` (shape (2,)) has no stiffness.
 
     Raises
     ------
     ModelError
         If friction cannot hold the initial tension.
     """
-    m, slope_A, slope_B = initial.log_slopes(path, friction_coefficient)
-    state = blank_state(4 * MARGIN + 2 * m.size)
+    m, slope_A, slope_B = initial.log_slopes(transmission.path, transmission.friction_coefficient)
+    # A reversal adds a corner at either end of a cable, and so may the load as it settles before the first sample.
+    state = blank_state(2 * (samples + 2) + m.size)
     for c, (tension, slope) in enumerate(((initial.tension_A_N, slope_A), (initial.tension_B_N, slope_B))):
         if present[c]:
             _store(state, tables, c, m, tension, slope)
@@ -91,10 +93,9 @@ def _elongation(tables: PathTables, m: NDArray, tension: NDArray, slope: NDArray
     return total + float((tables.table[0, LUMP] * values).sum())
 
 
-def cable_profile(
-    state: State, tables: PathTables, path: ConduitPath, friction_coefficient: float, c: int
-) -> CableProfile:
+def cable_profile(state: State, tables: PathTables, transmission: Transmission, c: int) -> CableProfile:
     """Profile of cable `c` (0: A, 1: B) in a state."""
+    path, friction_coefficient = transmission.path, transmission.friction_coefficient
     m, tension = _corners(state, tables, c)
     x_piece = np.concatenate([[0.0], np.cumsum(path.piece_length_m)])
     m_piece = friction_coefficient * np.concatenate([[0.0], np.cumsum(path.piece_bend_rad)])

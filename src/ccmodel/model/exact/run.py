@@ -9,15 +9,10 @@ from ccmodel.model.exact.front import position
 from ccmodel.model.exact.path import NODE, X_PER_M, X_START
 from ccmodel.model.exact.step import excess, step
 
-# How `run` ends.
-DONE, CORNERS_FULL = range(2)
-# Room that one sample may need at either end of a list of corners.
-MARGIN = 64
-
 
 @kernel
 def run(path, state, saved, progress, drive, offset, stiffness, present, out, phase, balance):
-    """Simulate from sample progress[0] on; stops early where the list of corners needs more room.
+    """Simulate from sample progress[0] on.
 
     Parameters
     ----------
@@ -41,18 +36,9 @@ def run(path, state, saved, progress, drive, offset, stiffness, present, out, ph
         0 to 2 for phases I to III, 3 for IVa, 4 for IVb.
     balance : ndarray, shape (2,)
         Largest force out of balance at the load, and highest tension at a cable's end, N; carried on.
-
-    Returns
-    -------
-    int
-        DONE or CORNERS_FULL.
     """
     path, state, saved = borrowed(path), borrowed(state), borrowed(saved)
     for i in range(progress[0], drive[0].size):
-        for c in range(2):
-            if state.kind[c, rows.FIRST] < MARGIN or state.kind[c, rows.LAST] > state.corner.shape[2] - MARGIN:
-                progress[0] = i
-                return CORNERS_FULL
         drive_now = drive[0][i] * drive[1]
         move = drive_now - state.value[rows.PAIR, rows.DRIVE]
         if move != 0.0:
@@ -73,7 +59,6 @@ def run(path, state, saved, progress, drive, offset, stiffness, present, out, ph
             balance[0] = max(balance[0], abs(excess(state, offset, stiffness)))
             balance[1] = max(balance[1], out[0, i], out[1, i], out[2, i], out[3, i])
     progress[0] = drive[0].size
-    return DONE
 
 
 @kernel

@@ -96,24 +96,6 @@ def blank_state(capacity: int) -> State:
     return State(np.zeros((3, 2, capacity)), front, value, np.zeros((2, KIND_FIELDS), dtype=np.int64))
 
 
-@kernel
-def copy_state(state, to):
-    """Copy what moving the pulleys may change from `state` into `to`.
-
-    Corners are not copied: fronts that advance pass them by their indices `LO` and `HI`, and only a reversal writes
-    corners.
-    """
-    for i in range(4):
-        for j in range(FRONT_FIELDS):
-            to.front[i, j] = state.front[i, j]
-    for i in range(3):
-        for j in range(VALUE_FIELDS):
-            to.value[i, j] = state.value[i, j]
-    for i in range(2):
-        for j in range(KIND_FIELDS):
-            to.kind[i, j] = state.kind[i, j]
-
-
 @small_kernel
 def copy_fronts(state, to, c):
     """Copy what advancing the fronts of cable `c` may change from `state` into `to`."""
@@ -122,6 +104,20 @@ def copy_fronts(state, to, c):
         to.front[2 * c + 1, i] = state.front[2 * c + 1, i]
     for i in range(KIND_FIELDS):
         to.kind[c, i] = state.kind[c, i]
+
+
+@kernel
+def copy_state(state, to):
+    """Copy what moving the pulleys may change from `state` into `to`.
+
+    Corners are not copied: fronts that advance pass them by their indices `LO` and `HI`, and only a reversal writes
+    corners.
+    """
+    copy_fronts(state, to, 0)
+    copy_fronts(state, to, 1)
+    for i in range(3):
+        for j in range(VALUE_FIELDS):
+            to.value[i, j] = state.value[i, j]
 
 
 @small_kernel

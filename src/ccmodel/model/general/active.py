@@ -29,7 +29,7 @@ class Active:
     values: Mapping[str, float]
 
 
-def active_of(mechanisms: Mapping[str, Mapping] | Sequence[Active]) -> list[Active]:
+def active_of(mechanisms: Sequence[Active]) -> list[Active]:
     """Mechanisms as given to `ccmodel.model.general.simulate`, checked, with a value for every parameter.
 
     Raises
@@ -39,20 +39,12 @@ def active_of(mechanisms: Mapping[str, Mapping] | Sequence[Active]) -> list[Acti
     ccmodel.mechanisms.UnknownMechanismError
         If a mechanism's name is not known.
     """
-    if isinstance(mechanisms, Mapping):
-        mechanisms = [_from_entry(name, entry) for name, entry in mechanisms.items()]
     found = []
     for a in mechanisms:
         known = registry.get(a.name)
         _check(a, known)
         found.append(replace(a, values=known.default | dict(a.values)))
     return found
-
-
-def _from_entry(name: str, entry: Mapping) -> Active:
-    known = registry.get(name)
-    place = entry.get("place", known.places[0] if len(known.places) == 1 else None)
-    return Active(name, place, entry.get("values", known.start))
 
 
 def _check(a: Active, known: Mechanism) -> None:
@@ -66,8 +58,12 @@ def _check(a: Active, known: Mechanism) -> None:
     if not np.isfinite(list(a.values.values())).all():
         raise ModelError(f"{a.name} has a parameter that is not finite: {dict(a.values)}")
     for p in known.parameters:
-        if p.low > 0 and not p.signed and a.values.get(p.name, p.default) < 0:
+        value = a.values.get(p.name, p.default)
+        if not p.above < value < p.below:
+            limit = f"above {p.above:g}" if value <= p.above else f"below {p.below:g}"
+            raise ModelError(f"{a.name} has {p.name} = {value:g} ({p.meaning}), which must be {limit}")
+        if p.low > 0 and not p.signed and value < 0:
             raise ModelError(
-                f"{a.name} has {p.name} = {a.values[p.name]:g} {p.unit}, which must not be negative; "
+                f"{a.name} has {p.name} = {value:g} {p.unit}, which must not be negative; "
                 f"plausible is {p.low:g} to {p.high:g}"
             )

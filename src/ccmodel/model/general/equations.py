@@ -143,7 +143,7 @@ def _load(ph, piece, load, rotation, torque, dt):
     """Torque out of balance at the load pulley (N m), its derivative by angle without the cables, and the radius."""
     n = piece.shape[2] - 1
     theta = load[rows.ANGLE] + rotation
-    _, radius_factor, radius_slope = winding(theta, ph.load_eccentricity[0], ph.load_eccentricity[1])
+    _, radius_factor, radius_slope = winding(theta, ph.load_eccentricity, ph.load_eccentricity_rad)
     R = ph.radius * radius_factor
     z, inside = dead_zone(theta, ph.half_gap)
     tau = torque + ph.stiffness_load * z + ph.cubic_stiffness * z**3
@@ -169,7 +169,7 @@ def _load(ph, piece, load, rotation, torque, dt):
 def imbalance(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle, weights):
     """Imbalance of the whole chain: sum of squares (N^2), highest tension (N), and the terms of `_load`."""
     n = node.shape[2]
-    pulled = ph.radius * winding_change(load[rows.ANGLE], rotation, ph.load_eccentricity[0], ph.load_eccentricity[1])
+    pulled = ph.radius * winding_change(load[rows.ANGLE], rotation, ph.load_eccentricity, ph.load_eccentricity_rad)
     slide[rows.NOW, 0, n + 1], slide[rows.NOW, 1, n + 1] = pulled, -pulled
     _tensions(ph, piece, slide, mean, weights)
     error = _nodes(ph, piece, node, slide, dt, bristle)

@@ -64,7 +64,7 @@ def _accept(ph, piece, node, slide, mean, load, rotation, dt):
 
 
 @kernel(error_model="numpy")
-def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, friction_factor, series, steps, out, counts):
+def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, friction_factor, series, steps, out):
     """Step through the samples.
 
     Parameters
@@ -85,8 +85,6 @@ def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, friction_
     out : ndarray, shape (7, m)
         Filled with T1, T2, T3, T4 (N), load angle (rad), the load's torque and that of the cables on the drive
         pulley (N m).
-    counts : ndarray of int, shape (3,)
-        Newton iterations, substeps, and steps accepted at the loose tolerance, added up.
 
     Returns
     -------
@@ -116,20 +114,16 @@ def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, friction_
             expected = 2 * last_pull - before_pull
             is_whole = abs(part - whole) <= ROUNDING and abs(last_dt - step_dt) <= ROUNDING * dt
             if is_whole and abs(expected - step_pull) <= 0.05 * abs(step_pull):
-                for c in range(2):
-                    for i in range(n + 2):
-                        slide[rows.NOW, c, i] = 2 * slide[rows.LAST, c, i] - slide[rows.BEFORE, c, i]
-                    change = 2 * mean[rows.MEAN_LAST, c] - mean[rows.MEAN_BEFORE, c]
-                    mean[rows.MEAN_NEXT, c] = mean[rows.MEAN, c] + change
-                rotation = 2 * last_rotation - before_rotation
+                by_last, by_before = 2.0, -1.0
             else:
                 ratio = step_pull / last_pull if last_pull * pull > 0.0 else 0.0
-                ratio = min(ratio, 4.0)
-                for c in range(2):
-                    for i in range(n + 2):
-                        slide[rows.NOW, c, i] = ratio * slide[rows.LAST, c, i]
-                    mean[rows.MEAN_NEXT, c] = mean[rows.MEAN, c] + ratio * mean[rows.MEAN_LAST, c]
-                rotation = ratio * last_rotation
+                by_last, by_before = min(ratio, 4.0), 0.0
+            for c in range(2):
+                for i in range(n + 2):
+                    slide[rows.NOW, c, i] = by_last * slide[rows.LAST, c, i] + by_before * slide[rows.BEFORE, c, i]
+                change = by_last * mean[rows.MEAN_LAST, c] + by_before * mean[rows.MEAN_BEFORE, c]
+                mean[rows.MEAN_NEXT, c] = mean[rows.MEAN, c] + change
+            rotation = by_last * last_rotation + by_before * before_rotation
             slide[rows.NOW, 0, 0], slide[rows.NOW, 1, 0] = step_pull, -step_pull
             value = prescribed_value - (1.0 - done - part) * rise
             if prescribed:
@@ -142,9 +136,7 @@ def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, friction_
                     change = set_grip(ph, node, slide, friction_factor[min(j, friction_factor.size - 1)], step_dt)
                     if iteration > 0 and change < GRIP_TOLERANCE:
                         break
-                solved, rotation = solve_step(
-                    ph, piece, node, slide, mean, load, rotation, torque, step_dt, bristle, counts
-                )
+                solved, rotation = solve_step(ph, piece, node, slide, mean, load, rotation, torque, step_dt, bristle)
                 if not solved or ph.stribeck_rise == 0.0:
                     break
             if not solved:
@@ -161,7 +153,6 @@ def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, friction_
             before_rotation, last_rotation = last_rotation, rotation
             before_pull, last_pull, last_dt = last_pull, step_pull, step_dt
             _accept(ph, piece, node, slide, mean, load, rotation, step_dt)
-            counts[1] += 1
             done += part
             part = min(2.0 * part, whole)
         out[0, j], out[1, j] = max(piece[rows.TENSION, 0, 0], 0.0), max(piece[rows.TENSION, 0, n], 0.0)
@@ -169,7 +160,7 @@ def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, friction_
         out[4, j] = load[rows.ANGLE]
         bearing = ph.load_friction_Nm * load[rows.BEARING]
         if prescribed:
-            R = ph.radius * winding(load[rows.ANGLE], ph.load_eccentricity[0], ph.load_eccentricity[1])[1]
+            R = ph.radius * winding(load[rows.ANGLE], ph.load_eccentricity, ph.load_eccentricity_rad)[1]
             out[5, j] = R * (out[1, j] - out[3, j]) - bearing
         else:
             out[5, j] = load[rows.TORQUE]

@@ -155,7 +155,7 @@ def copy_means(mean, to, source):
 
 
 @kernel(error_model="numpy")
-def solve_step(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle, counts):
+def solve_step(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle):
     """Solve a step, starting from the slides in `NOW` and a rotation of the load; (converged, rotation of the load)."""
     free = ph.kind == rows.IMPEDANCE
     weights = lag_weights(dt / ph.relaxing_time_s) if ph.has_relaxation and dt > 0.0 else (1.0, 0.0, 0.0)
@@ -168,7 +168,6 @@ def solve_step(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle
         error, limit, G, slope, R = imbalance(
             ph, piece, node, slide, mean, load, rotation, torque, dt, bristle, weights
         )
-        counts[0] += 1
         if error <= (TOLERANCE * limit) ** 2:
             return True, rotation
         if not np.isfinite(error):
@@ -205,7 +204,4 @@ def solve_step(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle
     copy_means(mean, rows.MEAN_NEXT, rows.MEAN_SAVED)
     rotation = saved_rotation
     error, limit, G, slope, R = imbalance(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle, weights)
-    accepted = error <= (LOOSE_TOLERANCE * limit) ** 2
-    if accepted:
-        counts[2] += 1
-    return accepted, rotation
+    return error <= (LOOSE_TOLERANCE * limit) ** 2, rotation

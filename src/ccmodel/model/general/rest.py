@@ -48,11 +48,11 @@ def load_angle(physics: rows.Physics, T: NDArray, load: Load, series: NDArray) -
     K, K3 = physics.stiffness_load, physics.cubic_stiffness
     if isinstance(load, TorqueLoad | FixedLoad) or (K == 0 and K3 == 0):
         return 0.0
-    theta = 0.0
+    theta, force = 0.0, T[0, -1] - T[1, -1]
     for _ in range(50):
-        torque = physics.radius * winding(theta, *physics.load_eccentricity)[1] * (T[0, -1] - T[1, -1])
+        torque = physics.radius * winding(theta, physics.load_eccentricity, physics.load_eccentricity_rad)[1] * force
         theta = _angle_at_rest(K, K3, physics.half_gap, torque, load)
-        if physics.load_eccentricity[0] == 0:
+        if physics.load_eccentricity == 0:
             break
     return float(theta)
 

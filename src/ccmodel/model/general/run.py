@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
-from ccmodel.channels import F_DRIVE, F_LOAD, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
+from ccmodel.channels import TAU_IN, TAU_OUT, TENSIONS, THETA_OUT
 from ccmodel.failure import ModelError
 from ccmodel.mechanisms.contract import Settings
 from ccmodel.mechanisms.load_inertia import load_damping
@@ -19,11 +19,13 @@ from ccmodel.model.general.march import COULOMB_BRISTLE_M, SOFT_CONDUIT_BRISTLE_
 from ccmodel.model.general.rest import initial_state, load_angle, remove_cable_B
 from ccmodel.model.general.sensors import read_by_sensors
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad
+from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad, one_row
 from ccmodel.model.response import PairResponse, Status
 from ccmodel.model.transmission import Transmission
 
 ELEMENTS = 32
+# Outputs of the march, row by row.
+OUTPUTS = (*TENSIONS, THETA_OUT, TAU_OUT, TAU_IN)
 # A step covers no more than this phase of a load that rings, up to so many steps a sample.
 RINGING_STEP_RAD, MOST_STEPS = 0.15, 16
 
@@ -37,17 +39,10 @@ class GeneralResponse(PairResponse):
     time_s : ndarray, shape (n,)
     read : mapping of str to ndarray
         Readings of the sensors: theta_in_rad, theta_out_rad, tau_in_Nm, tau_out_Nm, F_drive_N, F_load_N.
-    newton_iterations, substeps : int
-        Work done.
-    loose_steps : int
-        Steps accepted although out of balance by up to 1e-5 of the highest tension.
     """
 
     time_s: NDArray
     read: Mapping[str, NDArray]
-    newton_iterations: int
-    substeps: int
-    loose_steps: int
 
 
 def simulate(
@@ -56,7 +51,7 @@ def simulate(
     time_s: NDArray,
     theta_in: NDArray,
     initial: InitialTension,
-    mechanisms: Mapping[str, Mapping] | Sequence[Active] = (),
+    mechanisms: Sequence[Active] = (),
     elements: int = ELEMENTS,
     steps: int = 1,
 ) -> GeneralResponse:
@@ -71,9 +66,8 @@ def simulate(
     theta_in : ndarray, shape (n,)
         Drive angle at each sample, rad; the first is the angle at which `initial` holds. Linear in between.
     initial : InitialTension
-    mechanisms : sequence of Active, or mapping of name to {"place": ..., "values": {...}}
-        Effects beyond the paper's physics. A mapping may leave out the place of a mechanism that has only one, and the
-        values, which then are the mechanism's starting values.
+    mechanisms : sequence of Active
+        Effects beyond the paper's physics.
     elements : int
         Cells of each cable.
     steps : int
@@ -91,7 +85,7 @@ def simulate(
     ccmodel.mechanisms.UnknownMechanismError
         If a mechanism's name is not known.
     """
-    time_s, theta_in = (np.ascontiguousarray(a, dtype=float) for a in (time_s, theta_in))
+    time_s, theta_in = one_row(time_s, "time_s"), one_row(theta_in, "theta_in")
     active = active_of(mechanisms)
     settings = settings_of(active)
     series = _series(load)
@@ -115,83 +109,57 @@ def simulate(
     mean[rows.MEAN] = (piece[rows.SHARE] * T).sum(axis=1)
     state[rows.ANGLE] = load_angle(physics, T, load, series)
     slide = np.zeros((rows.SLIDE_ROWS, 2, node.shape[2] + 2))
-    drive = tuple(map(float, (transmission.drive_radius_m, *settings.drive_eccentricity)))
-    out, counts = np.empty((7, time_s.size)), np.zeros(3, dtype=np.int64)
+    eccentricity = settings.drive_eccentricity, settings.drive_eccentricity_rad
+    drive = tuple(map(float, (transmission.drive_radius_m, *eccentricity)))
+    out = np.empty((len(OUTPUTS), time_s.size))
     steps *= _steps(physics, transmission, time_s)
     solved = march(
-        physics, piece, node, slide, mean, state, time_s, theta_in, drive, friction_factor, series, steps, out, counts
+        physics, piece, node, slide, mean, state, time_s, theta_in, drive, friction_factor, series, steps, out
     )
     if isinstance(load, TorqueLoad) and load.parallel_Nm_per_rad:
         out[5, :solved] = series[:solved]  # the sensor does not feel the spring in parallel
     if settings.drive_friction_Nm != 0.0:
         out[6, :solved] += settings.drive_friction_Nm * bearing(theta_in[:solved], settings.drive_presliding_rad)
-    return _response(transmission, active, time_s[:solved], theta_in[:solved], out, counts)
+    return _response(transmission, active, time_s[:solved], theta_in[:solved], out)
 
 
-def _response(transmission, active, time_s, theta_in, out, counts) -> GeneralResponse:
+def _response(transmission, active, time_s, theta_in, out) -> GeneralResponse:
     """Outputs of the march up to the last sample of `time_s`, and what the sensors read of them."""
-    T1, T2, T3, T4, theta_out, tau_out, tau_in = out[:, : time_s.size]
-    channels = {
-        THETA_IN: theta_in,
-        THETA_OUT: theta_out,
-        TAU_IN: tau_in,
-        TAU_OUT: tau_out,
-        F_DRIVE: T1 + T3,
-        F_LOAD: T2 + T4,
-    }
-    return GeneralResponse(
-        T1_N=T1,
-        T2_N=T2,
-        T3_N=T3,
-        T4_N=T4,
-        theta_out_rad=theta_out,
-        tau_in_Nm=tau_in,
-        tau_out_Nm=tau_out,
+    response = PairResponse(
+        **dict(zip(OUTPUTS, out[:, : time_s.size], strict=True)),
         status=Status.OK if time_s.size == out.shape[1] else Status.NO_CONVERGENCE,
         reached=time_s.size,
-        time_s=time_s,
-        read=read_by_sensors(active, time_s, channels, (transmission.drive_radius_m, transmission.load_radius_m)),
-        newton_iterations=int(counts[0]),
-        substeps=int(counts[1]),
-        loose_steps=int(counts[2]),
     )
+    radii = transmission.drive_radius_m, transmission.load_radius_m
+    read = read_by_sensors(active, time_s, response.channels(theta_in), radii)
+    return GeneralResponse(**vars(response), time_s=time_s, read=read)
 
 
-def settings_of(mechanisms: Mapping[str, Mapping] | Sequence[Active]) -> Settings:
-    """What mechanisms, given as to `simulate`, tell the solver."""
+def settings_of(mechanisms: Sequence[Active]) -> Settings:
+    """What mechanisms tell the solver."""
     settings = registry.neutral_settings()
     for a in active_of(mechanisms):
-        mechanism = registry.get(a.name)
-        if mechanism.modifies_physics is not None:
-            try:
-                mechanism.modifies_physics(settings, a.place, a.values)
-            except ValueError as e:
-                raise ModelError(str(e)) from None
+        try:
+            registry.get(a.name).write(settings, a.place, a.values)
+        except ValueError as e:
+            raise ModelError(str(e)) from None
     return settings
 
 
 def _series(load: Load) -> NDArray | None:
     if isinstance(load, TorqueLoad):
-        return np.ascontiguousarray(load.torque_Nm, dtype=float)
+        return load.torque_Nm
     if isinstance(load, AngleLoad):
-        return np.ascontiguousarray(load.angle_rad, dtype=float)
+        return load.angle_rad
     return None
 
 
 def _check(time_s, theta_in, series, elements):
     if elements < 1:
         raise ModelError(f"each cable needs at least one element; got {elements}")
-    if theta_in.ndim != 1 or theta_in.size == 0:
-        raise ModelError(f"theta_in is one row of samples, at least one; got an array of shape {theta_in.shape}")
-    given = {"time_s": time_s, "theta_in": theta_in}
-    if series is not None:
-        given["the load's series"] = series
-    for name, values in given.items():
-        if values.shape != theta_in.shape:
+    for name, values in {"time_s": time_s, "the load's series": series}.items():
+        if values is not None and values.size != theta_in.size:
             raise ModelError(f"{name} has {values.size} samples, the drive angle {theta_in.size}")
-        bad = np.flatnonzero(~np.isfinite(values))
-        if bad.size:
-            raise ModelError(f"{name} is not finite at sample {bad[0]}")
     late = np.flatnonzero(np.diff(time_s) <= 0)
     if late.size:
         raise ModelError(f"time_s must increase; it does not at sample {late[0] + 1}")
@@ -225,8 +193,7 @@ def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tu
 def _physics(transmission: Transmission, load: Load, settings: Settings, elements: int) -> rows.Physics:
     K_e = load.stiffness_Nm_per_rad if isinstance(load, SpringLoad) else 0.0
     K_e = load.parallel_Nm_per_rad if isinstance(load, TorqueLoad) else K_e
-    values = {name: getattr(settings, name) for name in registry.march_settings()}
-    values = {n: tuple(map(float, v)) if isinstance(v, tuple) else float(v) for n, v in values.items()}
+    values = {name: float(getattr(settings, name)) for name in registry.march_settings()}
     return rows.Physics(
         has_settling=settings.settling_N > 0,
         has_relaxation=settings.relaxing_share != 0,
