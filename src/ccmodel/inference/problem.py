@@ -36,6 +36,11 @@ class Free:
     high: float = np.inf
     spread: float | None = None
 
+    @classmethod
+    def within(cls, start: float, low: float, high: float) -> "Free":
+        """An unknown whose start is put within its bounds."""
+        return cls(float(np.clip(start, low, high)), low, high)
+
 
 @dataclass(frozen=True)
 class Block:
