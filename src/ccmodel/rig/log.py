@@ -109,7 +109,8 @@ def _check_time(time: pd.Series, warnings: list[Defect]) -> None:
         at = int(np.flatnonzero(step <= 0)[0]) + 1
         now, before = time.iloc[at], time.iloc[at - 1]
         raise LogError(int(time.index[at]), "time_s", f"time must increase, found {now:g} s after {before:g} s")
-    usual = _usual_step(time)
+    # Over four rows: a clock of whole ms that alternates 1 and 2 ms has no step of 1.5 ms.
+    usual = float((time.diff(4) / time.index.to_series().diff(4)).median())
     # A step over dropped rows is longer without being a gap; these rows have a warning already.
     rows = np.diff(time.index)
     excess = step - usual * rows
@@ -129,13 +130,6 @@ def _check_time(time: pd.Series, warnings: list[Defect]) -> None:
     first = int(time.index[np.flatnonzero(gaps)[0] + 1])
     text += ": they came late, few or none are lost" if uneven else ": samples were dropped"
     warnings.append(Defect(first, "time_s", text))
-
-
-def _usual_step(time: pd.Series) -> float:
-    """Median step, taken over four rows: a clock of whole ms that alternates 1 and 2 ms has no step of 1.5 ms."""
-    over = 4
-    times, rows = time.to_numpy(), time.index.to_numpy()
-    return float(np.median((times[over:] - times[:-over]) / (rows[over:] - rows[:-over])))
 
 
 def _gap_text(count: int, longest: float, usual: float, uneven: bool) -> str:
