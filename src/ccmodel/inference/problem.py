@@ -144,12 +144,8 @@ class Problem:
         """By recording, weighted errors over the noise."""
         return self._each(lambda i: self._weighted(x, i))
 
-    def residuals(self, x: NDArray) -> NDArray:
-        """All weighted errors and prior errors, whose sum of squares is the cost; shape (rows,)."""
-        return np.concatenate([*(e.ravel() for e in self.errors(x)), self.prior_errors(x)])
-
     def cost(self, x: NDArray, errors: Sequence[NDArray] | None = None) -> float:
-        """Sum of squares of `residuals`; `errors` are ``self.errors(x)``, where these are known."""
+        """Sum of squares of weighted errors and prior errors; `errors` are ``self.errors(x)``, where known."""
         errors = self.errors(x) if errors is None else errors
         return sum(float((e**2).sum()) for e in errors) + float((self.prior_errors(x) ** 2).sum())
 
