@@ -104,13 +104,9 @@ class Recording:
 
     def with_channels(self, channels: Mapping[str, NDArray], derived_from: Mapping[str, str], origin: str):
         """The same run with other channels: those of a model, or some of the measured ones."""
-        return replace(
-            self,
-            channels=dict(channels),
-            derived_from=dict(derived_from),
-            origin=origin,
-            accuracy=self.accuracy if origin == self.origin else {},
-        )
+        channels, derived_from = dict(channels), dict(derived_from)
+        accuracy = self.accuracy if origin == self.origin else {}
+        return replace(self, channels=channels, derived_from=derived_from, origin=origin, accuracy=accuracy)
 
 
 def stride(recording: Recording, step_s: float | None) -> int:
@@ -131,17 +127,18 @@ def read_recordings(path: Path) -> list[Recording]:
         return [_from_dataset(name, node.to_dataset()) for name, node in tree.children.items()]
 
 
-_SCALARS = ("batch", "origin", "pretension_N", "rest_s", "settled_s")
+_SCALARS = {"batch": str, "origin": str, "pretension_N": float, "rest_s": float, "settled_s": float}
+# Numbers of each channel of a sensor.
+_OF_SENSORS = ("accuracy", "encoder_step_rad")
 
 
 def _to_dataset(recording: Recording) -> xr.Dataset:
     variables = {}
     for name, values in recording.channels.items():
         attributes = {"units": unit_of(name), "derived_from": recording.derived_from.get(name, "")}
-        if name in recording.accuracy:
-            attributes["accuracy"] = recording.accuracy[name]
-        if name in recording.encoder_step_rad:
-            attributes["encoder_step_rad"] = recording.encoder_step_rad[name]
+        for key in _OF_SENSORS:
+            if name in getattr(recording, key):
+                attributes[key] = getattr(recording, key)[name]
         variables[name] = ("time_s", values, attributes)
     variables["piece_length_m"] = ("piece", recording.path.piece_length_m, {"units": "m"})
     variables["piece_bend_rad"] = ("piece", recording.path.piece_bend_rad, {"units": "rad"})
@@ -155,22 +152,18 @@ def _to_dataset(recording: Recording) -> xr.Dataset:
 
 def _from_dataset(name: str, dataset: xr.Dataset) -> Recording:
     channels = {c: dataset[c].values for c in CHANNELS if c in dataset}
-    scalars = {s: dataset.attrs[s] for s in _SCALARS}
-    scalars |= {s: float(scalars[s]) for s in ("pretension_N", "rest_s", "settled_s")}
+    scalars = {name: kind(dataset.attrs[name]) for name, kind in _SCALARS.items()}
+    attributes = {c: dataset[c].attrs for c in channels}
+    of_sensors = {key: {c: float(a[key]) for c, a in attributes.items() if key in a} for key in _OF_SENSORS}
     return Recording(
         id=name,
         time_s=dataset["time_s"].values,
         channels=channels,
-        derived_from={c: dataset[c].attrs["derived_from"] for c in channels},
-        accuracy=_numbers(dataset, channels, "accuracy"),
+        derived_from={c: a["derived_from"] for c, a in attributes.items()},
         path=ConduitPath(dataset["piece_length_m"].values, dataset["piece_bend_rad"].values),
-        encoder_step_rad=_numbers(dataset, channels, "encoder_step_rad"),
         excitation=json.loads(dataset.attrs["excitation"]),
         warnings=tuple(json.loads(dataset.attrs["warnings"])),
         far_end=dataset.attrs.get("far_end"),
         **scalars,
+        **of_sensors,
     )
-
-
-def _numbers(dataset: xr.Dataset, channels, attribute: str) -> dict[str, float]:
-    return {c: float(dataset[c].attrs[attribute]) for c in channels if attribute in dataset[c].attrs}

@@ -80,12 +80,9 @@ class Estimate:
 def estimates(groups: Sequence[Sequence[float]], relative: bool) -> list[Estimate]:
     """Mean of every condition, with its standard deviation from the pooled scatter."""
     sd, freedom = pooled_scatter(groups, relative)
-    found = []
-    for group in groups:
-        mean = float(np.mean(group))
-        own = sd * abs(mean) if relative else sd
-        found.append(Estimate(mean, own / np.sqrt(len(group)), freedom, len(group)))
-    return found
+    means = [float(np.mean(group)) for group in groups]
+    sds = [sd * abs(mean) if relative else sd for mean in means]
+    return [Estimate(m, s / np.sqrt(len(g)), freedom, len(g)) for m, s, g in zip(means, sds, groups, strict=True)]
 
 
 def difference(first: Estimate, second: Estimate) -> Estimate:

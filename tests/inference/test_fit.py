@@ -31,6 +31,11 @@ def found(problem):
     return fit(problem, starts=3, profiled=["stiffness_N_per_m", "friction_coefficient"])
 
 
+def dense_residuals(problem, x):
+    """All weighted errors and prior errors, whose sum of squares is the cost."""
+    return np.concatenate([*(e.ravel() for e in problem.errors(x)), problem.prior_errors(x)])
+
+
 def dense_jacobian(problem, x):
     """As `least_squares` wants it: all rows by all unknowns."""
     blocks = problem.blocks(x)
@@ -89,8 +94,8 @@ def test_all_rows_give_the_same(problem):
     ours = solve(problem, problem.start)
     assert ours.message.startswith("converged")
     theirs = least_squares(
-        problem.residuals, problem.start, jac=lambda x: dense_jacobian(problem, x), bounds=problem.bounds,
-        x_scale=problem.sizes, ftol=1e-15, xtol=1e-12, gtol=1e-15, max_nfev=30,
+        lambda x: dense_residuals(problem, x), problem.start, jac=lambda x: dense_jacobian(problem, x),
+        bounds=problem.bounds, x_scale=problem.sizes, ftol=1e-15, xtol=1e-12, gtol=1e-15, max_nfev=30,
     )  # fmt: skip
     shared = len(problem.shared)
     assert ours.x[:shared] == pytest.approx(theirs.x[:shared], rel=1e-6)

@@ -91,7 +91,7 @@ def _free(estimate: float, low: float, high: float) -> Free:
     """An unknown within bounds, which an estimate further out widens tenfold beyond itself."""
     if estimate > 0:
         low, high = min(low, estimate / 10), max(high, 10 * estimate)
-    return Free(float(np.clip(estimate, low, high)), low, high)
+    return Free.within(estimate, low, high)
 
 
 def _values_of(

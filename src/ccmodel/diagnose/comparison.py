@@ -10,7 +10,8 @@ is not so. The confidence in a candidate is the product of both probabilities.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.stats import norm
@@ -53,15 +54,35 @@ class Comparison:
     ) -> "Comparison":
         """Order the candidates, and compute the lack of fit of those that may be named."""
         ordered = sorted(candidates, key=lambda c: (not c.is_plausible, c.mean_square))
-        most_probable = [ordered[k] for k in np.argsort(posterior(whitened, base, ordered, screened))[-1:]]
-        contenders = {c.hypothesis: c for c in [base, *ordered[: settings.CONTENDERS], *most_probable]}
+        found = cls(whitened, base, ordered, {}, screened)
+        contenders = {c.hypothesis: c for c in [base, *ordered[: settings.CONTENDERS], found.most_probable]}
         lacks = {hypothesis: lack_of_fit(whitened, c) for hypothesis, c in contenders.items()}
-        return cls(whitened, base, ordered, lacks, screened)
+        return replace(found, lack_of_fit=lacks)
 
-    @property
+    @cached_property
     def posterior(self) -> list[float]:
-        """Closed-world posterior probability of each candidate; the remainder is the calibrated model's."""
-        return posterior(self.whitened, self.base, self.candidates, self.screened)
+        """Closed-world posterior probability of each candidate; the remainder is the calibrated model's.
+
+        It is -BIC/2 plus a log prior. The BIC is N m / max(1, m_min) + p ln N, with
+
+        - N the effective sample size,
+        - m the candidate's leave-one-out mean square, and m_min the lowest of all candidates and the calibrated model,
+        - p the number of unknowns that the candidate has in addition to the calibrated model's.
+
+        The calibrated model has the prior `PRIOR_AGREES`. All screened hypotheses share the rest equally, whether or
+        not they were fitted: the best of many is good by chance. An implausible candidate has probability zero.
+        """
+        every = [self.base, *self.candidates]
+        samples = in_comparison([w.observations for w in self.whitened])
+        mean_squares = np.array([c.mean_square for c in every])
+        unknowns = np.array([len(c.values) - len(self.base.values) for c in every])
+        bic = samples * mean_squares / max(1.0, mean_squares.min()) + unknowns * np.log(samples)
+        count = len(self.candidates)
+        prior_of_each = (1 - settings.PRIOR_AGREES) / max(self.screened, count, 1)
+        log_posterior = -bic / 2 + np.log([settings.PRIOR_AGREES, *[prior_of_each] * count])
+        log_posterior[1:][[not c.is_plausible for c in self.candidates]] = -np.inf
+        weight = np.exp(log_posterior - log_posterior.max())
+        return (weight / weight.sum())[1:].tolist()
 
     @property
     def most_probable(self) -> CandidateFit:
@@ -122,33 +143,6 @@ class Comparison:
         is_weak = len(self.whitened) == 1 or "pretension_share" in self.base.free
         share = 1.0 if is_weak else np.mean([w.observations.tolerance_share for w in self.whitened])
         return float(settings.UNTESTED**share)
-
-
-def posterior(
-    whitened: Sequence[Whitened], base: CandidateFit, candidates: Sequence[CandidateFit], screened: int
-) -> list[float]:
-    """Posterior probability of each candidate, -BIC/2 plus a log prior; the remainder is the calibrated model's.
-
-    The BIC is N m / max(1, m_min) + p ln N, with
-
-    - N the effective sample size,
-    - m the candidate's leave-one-out mean square, and m_min the lowest of all candidates and the calibrated model,
-    - p the number of unknowns that the candidate has in addition to the calibrated model's.
-
-    The calibrated model has the prior `PRIOR_AGREES`. All screened hypotheses share the rest equally, whether or not
-    they were fitted: the best of many is good by chance. An implausible candidate has probability zero.
-    """
-    if not candidates:
-        return []
-    samples = in_comparison([w.observations for w in whitened])
-    mean_squares = np.array([base.mean_square, *(c.mean_square for c in candidates)])
-    unknowns = np.array([0, *(len(c.values) - len(base.values) for c in candidates)])
-    bic = samples * mean_squares / max(1.0, mean_squares.min()) + unknowns * np.log(samples)
-    prior_of_each = (1 - settings.PRIOR_AGREES) / max(screened, len(candidates))
-    log_posterior = -bic / 2 + np.log([settings.PRIOR_AGREES, *[prior_of_each] * len(candidates)])
-    log_posterior[1:][[not c.is_plausible for c in candidates]] = -np.inf
-    weight = np.exp(log_posterior - log_posterior.max())
-    return (weight / weight.sum())[1:].tolist()
 
 
 def well_specified(candidate: CandidateFit, base: CandidateFit) -> float:

@@ -39,11 +39,6 @@ class Experiment:
     pretension_share: float
     like: Recording
 
-    def given(self) -> ModelInput:
-        """Input of a model run."""
-        time_s = np.arange(self.theta_in.size) / settings.EXPERIMENT_RATE_HZ
-        return ModelInput.prescribed(self.like, time_s, self.theta_in, self.like.pretension_N)
-
 
 def proposed(judgement: Judgement, estimates: Parameters) -> dict | None:
     """The experiment that best separates the leading candidates; None without two that can be run."""
@@ -124,9 +119,10 @@ def planned_observations(
 ) -> Observations:
     """An experiment as a candidate predicts it, in units of the noise of the rig's recordings."""
     shape = len(template.channels), experiment.theta_in.size
-    model = candidate.model(estimates)
+    time_s = np.arange(shape[1]) / settings.EXPERIMENT_RATE_HZ
+    model, like = candidate.model(estimates), experiment.like
     return Observations(
-        given=experiment.given(),
+        given=ModelInput.prescribed(like, time_s, experiment.theta_in, like.pretension_N),
         parameters=replace(model, pretension_scale=model.pretension_scale * experiment.pretension_share),
         channels=template.channels,
         judged=np.ones(shape[1], bool),

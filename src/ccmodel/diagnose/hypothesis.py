@@ -4,8 +4,6 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 
-import numpy as np
-
 from ccmodel import mechanisms as registry
 from ccmodel.diagnose import settings
 from ccmodel.inference.problem import Free
@@ -74,11 +72,8 @@ class Hypothesis:
 
     def free(self, start: Mapping[str, float]) -> dict[str, Free]:
         """The mechanisms' parameters as unknowns, from `start`."""
-        found = {}
-        for key, parameter, is_strength in self._unknowns():
-            low, high = _bounds(parameter, is_strength)
-            found[key] = Free(float(np.clip(start[key], low, high)), low, high)
-        return found
+        unknowns = self._unknowns()
+        return {key: Free.within(start[key], *_bounds(parameter, strength)) for key, parameter, strength in unknowns}
 
     @property
     def continuation(self) -> list[str]:

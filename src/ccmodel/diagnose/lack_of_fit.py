@@ -68,11 +68,8 @@ def lack_of_fit(whitened: Sequence[Whitened], candidate: CandidateFit) -> LackOf
 def _reductions(features, residuals, gram, cross, penalty: float) -> NDArray:
     """By recording, the reduction of its mean square by a ridge regression on the others."""
     G, b = sum(gram) + penalty * np.eye(len(gram[0])), sum(cross)
-    found = []
-    for F, e, own, own_cross in zip(features, residuals, gram, cross, strict=True):
-        predicted = F @ np.linalg.solve(G - own, b - own_cross)
-        found.append(np.mean(e**2) - np.mean((e - predicted) ** 2))
-    return np.array(found)
+    predicted = [F @ np.linalg.solve(G - own, b - c) for F, own, c in zip(features, gram, cross, strict=True)]
+    return np.array([np.mean(e**2) - np.mean((e - p) ** 2) for e, p in zip(residuals, predicted, strict=True)])
 
 
 def _features(inputs: Sequence[NDArray]) -> list[NDArray]:
@@ -85,11 +82,8 @@ def _features(inputs: Sequence[NDArray]) -> list[NDArray]:
     used = random.random(shape) < settings.INPUTS_PER_FEATURE / every.shape[1]
     directions = used * random.standard_normal(shape) / random.choice(settings.LENGTH_SCALES, settings.FEATURES)
     shift = random.uniform(0, 2 * np.pi, settings.FEATURES)
-    found = []
-    for quantities in inputs:
-        x = (quantities - mean) / scale
-        found.append(np.column_stack([np.ones(len(x)), x, np.sqrt(2) * np.cos(x @ directions + shift)]))
-    return found
+    standardised = [(quantities - mean) / scale for quantities in inputs]
+    return [np.column_stack([np.ones(len(x)), x, np.sqrt(2) * np.cos(x @ directions + shift)]) for x in standardised]
 
 
 def _inputs(w: Whitened, candidate: CandidateFit) -> NDArray:

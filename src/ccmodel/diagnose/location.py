@@ -1,5 +1,6 @@
 """Location of the mismatch: its place in the transmission, its channels and its phases of the motion."""
 
+from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -72,16 +73,15 @@ def _places(judgement: Judgement) -> list[str]:
 
 def mismatch(whitened: Sequence[Whitened], candidate: CandidateFit) -> dict[str, dict[str, float]]:
     """Root mean square of the held-out errors over the noise floor, by channel and phase of the motion."""
-    collected: dict[str, dict[str, list]] = {}
+    collected = defaultdict(lambda: {p: [] for p in PHASES})
     for i, w in enumerate(whitened):
         o = w.observations.with_parameters(candidate.held_out(i, w))
         floor = np.array([w.noise_floor[c] for c in o.channels])[:, None]
         errors = o.errors({}) * o.sigma / floor
         phase = phases_of(o.given)[o.judged]
         for c, channel in enumerate(o.channels):
-            by_phase = collected.setdefault(short_name(channel), {p: [] for p in PHASES})
             for k, p in enumerate(PHASES):
-                by_phase[p].append(errors[c][phase == k])
+                collected[short_name(channel)][p].append(errors[c][phase == k])
     return {
         channel: {p: _rms(np.concatenate(values)) for p, values in by_phase.items()}
         for channel, by_phase in collected.items()

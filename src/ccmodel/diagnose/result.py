@@ -40,7 +40,7 @@ def report(batch: str, judgement: Judgement, estimates: Parameters, not_judged: 
         "likeliest": [{"name": n, "place": p} for n, p in best.hypothesis.acting if judgement.verdict == "undecided"],
         "nearest": _nearest(judgement),
         "fit": {
-            "held_out": [w.id for w in whitened] if len(whitened) > 1 else [],
+            "held_out": [w.observations.id for w in whitened] if len(whitened) > 1 else [],
             "calibrated": base.values,
             "mean_square": {"calibrated": base.mean_square, "extended": best.mean_square},
             "error": held_out_errors(judgement),
@@ -152,7 +152,7 @@ def contradicting_recording(judgement: Judgement) -> NotJudged:
         f" {float(base.by_recording[worst]):.3g} in this one: check its bend, pretension and wiring against the batch"
         " file"
     )
-    return [{"what": whitened[worst].id, "why": why}]
+    return [{"what": whitened[worst].observations.id, "why": why}]
 
 
 def _at_bounds(candidate: CandidateFit) -> NotJudged:

@@ -4,7 +4,7 @@ One run of the model with a mechanism at each of a few values gives the directio
 part of that direction which a recalibration would absorb is projected out; the rest is compared with the residuals.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,7 +40,9 @@ class Score:
 
 def screen(whitened: Sequence[Whitened], base: CandidateFit, hypotheses: Sequence[Hypothesis]) -> list[Score]:
     """Score tests of mechanisms against a fitted model that they extend, the largest gain first."""
-    test = _Test.of(whitened, base)
+    absorbed, _ = np.linalg.qr(_stacked(whitened, base.jacobian))
+    residuals = _stacked(whitened, base.residuals)
+    test = _Test(whitened, base, absorbed, residuals - absorbed @ (absorbed.T @ residuals))
     return sorted((test.score(h) for h in hypotheses), key=lambda s: -s.gain)
 
 
@@ -61,17 +63,15 @@ class _Test:
     absorbed: NDArray
     residuals: NDArray
 
-    @classmethod
-    def of(cls, whitened: Sequence[Whitened], base: CandidateFit) -> "_Test":
-        absorbed, _ = np.linalg.qr(_stacked(whitened, base.jacobian))
-        r = _stacked(whitened, base.residuals)
-        return cls(whitened, base, absorbed, r - absorbed @ (absorbed.T @ r))
-
     def score(self, hypothesis: Hypothesis) -> Score:
         """The best over the values at which the mechanism is screened."""
         own = self._baseline_values(hypothesis)
+        if own is None:
+            screened = hypothesis.screening_values()
+        else:
+            screened = (own | {key: (1 + settings.SCREENED_CHANGE) * value} for key, value in own.items())
         best = Score(hypothesis, 0.0, {})
-        for values in hypothesis.screening_values() if own is None else changes(own):
+        for values in screened:
             found = self._at(hypothesis, values, own)
             if found is not None and found.gain > best.gain:
                 best = found
@@ -111,12 +111,6 @@ class _Test:
 def _stacked(whitened: Sequence[Whitened], by_recording: Sequence[NDArray]) -> NDArray:
     """Rows of all recordings, each with its weight."""
     return np.concatenate([rows / np.sqrt(w.measured.size) for w, rows in zip(whitened, by_recording, strict=True)])
-
-
-def changes(own: Mapping[str, float]) -> Iterator[dict[str, float]]:
-    """Values of a baseline's mechanism, one of them changed at a time."""
-    for key, value in own.items():
-        yield own | {key: (1 + settings.SCREENED_CHANGE) * value}
 
 
 def changed(own: Mapping[str, float], values: Mapping[str, float], strength: float) -> dict[str, float]:

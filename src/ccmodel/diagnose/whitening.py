@@ -52,16 +52,6 @@ class Whitened:
     noise_floor: Mapping[str, float]
 
     @property
-    def name(self) -> str:
-        """Batch and recording."""
-        return self.observations.name
-
-    @property
-    def id(self) -> str:
-        """The recording's name within its batch."""
-        return self.observations.id
-
-    @property
     def measured(self) -> NDArray:
         """Values of the observations, shape (channels, samples)."""
         return self.observations.measured

@@ -10,7 +10,6 @@ posterior is too, and the sweeps converge.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ccmodel.kernel import kernel
 
@@ -18,8 +17,6 @@ from ccmodel.kernel import kernel
 EDGE_SD = 0.02
 # Share of the correction of a site that a sweep applies. The full correction oscillates where many intervals agree.
 DAMPING = 0.7
-# Precision of a site before the first sweep, 1/counts^2: that of a uniform distribution over one count.
-UNIFORM_PRECISION = 12.0
 
 
 @kernel
@@ -238,9 +235,3 @@ def fit_basis(basis, prior, low, high, sweeps):
             precision[i] += DAMPING * (new - precision[i])
             shift[i] += DAMPING * (new_shift - shift[i])
     return log_evidence, mean[0], covariance[0, 0]
-
-
-def initial_sites(low: NDArray, high: NDArray, observed: NDArray) -> tuple[NDArray, NDArray]:
-    """Precision and shift of all sites before the first sweep."""
-    precision = np.where(observed, UNIFORM_PRECISION, 0.0)
-    return precision, np.where(observed, UNIFORM_PRECISION * (low + high) / 2, 0.0)

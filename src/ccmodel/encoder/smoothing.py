@@ -42,6 +42,8 @@ COMPARING, CONVERGING, FINAL = 10, 10, 5
 DRAWS = 8
 # Offset of the first rest within its count in each draw, in standard deviations.
 OFFSET_SCORES = (-1.0) ** np.arange(DRAWS)
+# Precision, 1/counts^2, of a site before the first sweep: that of a uniform distribution over one count.
+UNIFORM_PRECISION = 12.0
 # Precision, 1/counts^2, that holds a rest at its estimated level. Its variance is added to the posterior afterwards.
 LEVEL_PRECISION = 1e6
 # Precision, 1/counts^2, that makes neighbouring samples of a rest equal; an interval has 12.
@@ -174,9 +176,10 @@ class _Fit:
 
     def __init__(self, data: _Observations, prior: Prior, window: float):
         self.data, self.prior, self.window = data, prior, window
-        self.sites = ep.initial_sites(data.low, data.high, data.observed)
-        for site, value in zip(self.sites, (LEVEL_PRECISION, LEVEL_PRECISION * data.level), strict=True):
-            site[data.rest] = value
+        # Precision and mean of each site before the first sweep; precision times mean is its shift.
+        precision, mean = np.where(data.observed, UNIFORM_PRECISION, 0.0), (data.low + data.high) / 2
+        precision[data.rest], mean[data.rest] = LEVEL_PRECISION, data.level
+        self.sites = precision, precision * mean
         order = len(prior.stencil) - 1
         coupled = np.convolve(data.coupling > 0, np.ones(order), "valid")[: data.low.size - order]
         self.free = coupled < order

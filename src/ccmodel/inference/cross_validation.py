@@ -54,7 +54,8 @@ def leave_one_out(problem: Problem, solution: Solution) -> LeaveOneOut:
     values = [
         np.clip(solution.x + V @ block.score, low, high) for V, block in zip(without, solution.blocks, strict=True)
     ]
-    joint = [block.errors / np.sqrt(problem.weight(o)) for block, o in _pairs(problem, solution)]
+    blocks_of = zip(solution.blocks, problem.observations, strict=True)
+    joint = [block.errors / np.sqrt(problem.weight(o)) for block, o in blocks_of]
     residuals = each(problem.observations, lambda i, _: _errors_if_any(problem, values[i], i))
     for i, (out, own) in enumerate(zip(residuals, joint, strict=True)):
         if out is None or np.mean(out**2) > CHECKED_FROM * np.mean(own**2):
@@ -66,10 +67,6 @@ def leave_one_out(problem: Problem, solution: Solution) -> LeaveOneOut:
         return LeaveOneOut(values, residuals, inverse, np.full(solution.x.size, np.inf))
     covariance, degrees = jackknife(np.array(values) - solution.x, information, inverse, without)
     return LeaveOneOut(values, residuals, covariance, degrees)
-
-
-def _pairs(problem: Problem, solution: Solution):
-    return zip(solution.blocks, problem.observations, strict=True)
 
 
 def _errors_if_any(problem: Problem, x: NDArray, i: int) -> NDArray | None:

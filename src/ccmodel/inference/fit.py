@@ -1,5 +1,6 @@
 """A fit with its uncertainties, as plain data."""
 
+import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from math import inf, isfinite
@@ -84,15 +85,7 @@ class FitResult:
 
     def as_dict(self) -> dict:
         """Plain data for a JSON file, with None for infinite numbers, which JSON does not have."""
-        return _finite(asdict(self))
-
-
-def _finite(data):
-    if isinstance(data, dict):
-        return {key: _finite(value) for key, value in data.items()}
-    if isinstance(data, list):
-        return [_finite(value) for value in data]
-    return None if isinstance(data, float) and not isfinite(data) else data
+        return json.loads(json.dumps(asdict(self)), parse_constant=lambda infinite: None)
 
 
 def fit(problem: Problem, starts: int = 1, profiled: Sequence[str] = ()) -> FitResult:
@@ -164,7 +157,7 @@ def _result(problem: Problem, found: Solution, warnings: list[str], profiled: Se
         values=dict(zip(problem.shared, found.x.tolist(), strict=False)),
         intervals=known,
         profiles=profiles,
-        own=_own(problem, found.x) if problem.own else {},
+        own={o.name: problem.own_values_of(found.x, i) for i, o in enumerate(problem.observations) if problem.own},
         own_intervals=own_intervals(problem, found, spread) if problem.own else {},
         scatter=scattered,
         resampled=resampled,
@@ -175,11 +168,6 @@ def _result(problem: Problem, found: Solution, warnings: list[str], profiled: Se
         evaluations=found.evaluations,
         recordings=[e.name for e in problem.observations],
     )
-
-
-def _own(problem: Problem, x: NDArray) -> dict[str, dict[str, float]]:
-    values = (problem.values_of(x, i) for i in range(len(problem.observations)))
-    return {e.name: {n: v[n] for n in problem.own} for e, v in zip(problem.observations, values, strict=True)}
 
 
 def _profiles(

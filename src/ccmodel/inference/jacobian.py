@@ -57,11 +57,7 @@ def jacobian(run: Callable[[NDArray], NDArray], x: NDArray, steps: NDArray, base
         If the model cannot be run a step aside.
     """
     columns = []
-    for aside in np.diag(steps):
-        step = aside.sum()
-        columns.append((run(x + aside) - base) / step if base is not None else _central(run, x, aside, step))
+    for step, aside in zip(steps, np.diag(steps), strict=True):
+        difference = (run(x + aside) - run(x - aside)) / 2 if base is None else run(x + aside) - base
+        columns.append(difference / step)
     return np.stack(columns, axis=-1) if columns else np.empty((*np.shape(base), 0))
-
-
-def _central(run: Callable, x: NDArray, aside: NDArray, step: float) -> NDArray:
-    return (run(x + aside) - run(x - aside)) / (2 * step)

@@ -135,7 +135,7 @@ def solve(problem: Problem, start: NDArray, how: Search = Search(), fixed: Seque
     second = minimise(problem, solution.x, how, fixed, origin=start)
     second = replace(second, evaluations=solution.evaluations + second.evaluations)
     if second.message == STALLED and problem.start.size - len(fixed) <= SIMPLEX_UNKNOWNS:
-        return _without_derivatives(problem, second, _Reduced(problem, start, how, fixed))
+        return _without_derivatives(second, _Reduced(problem, start, how, fixed))
     return second
 
 
@@ -149,15 +149,15 @@ def minimise(
     reduced = _Reduced(problem, start if origin is None else origin, how, fixed)
     y = reduced.variables(start)
     if not y.size:
-        return _solution(problem, reduced, y, CONVERGED, 1)
+        return _solution(reduced, y, CONVERGED, 1)
     found = optimize.least_squares(
         reduced.residuals, y, reduced.jacobian, reduced.bounds, ftol=how.tolerance, xtol=how.shortest,
         gtol=how.gradient, x_scale=reduced.sizes / reduced.units, max_nfev=how.most_evaluations,
     )  # fmt: skip
-    return _solution(problem, reduced, found.x, _message(found, reduced), found.nfev)
+    return _solution(reduced, found.x, _message(found, reduced), found.nfev)
 
 
-def _without_derivatives(problem: Problem, stalled: Solution, reduced: "_Reduced") -> Solution:
+def _without_derivatives(stalled: Solution, reduced: "_Reduced") -> Solution:
     """Continue a stalled search by the simplex method of Nelder and Mead."""
     y = reduced.variables(stalled.x)
     low, high = reduced.bounds
@@ -168,7 +168,7 @@ def _without_derivatives(problem: Problem, stalled: Solution, reduced: "_Reduced
         reduced.cost, y, method="Nelder-Mead", bounds=list(zip(low, high, strict=True)), options=options
     )
     message = DIRECT if found.success else STOPPED
-    return _solution(problem, reduced, found.x, message, stalled.evaluations + found.nfev)
+    return _solution(reduced, found.x, message, stalled.evaluations + found.nfev)
 
 
 def _message(found: optimize.OptimizeResult, reduced: "_Reduced") -> str:
@@ -185,9 +185,9 @@ def _message(found: optimize.OptimizeResult, reduced: "_Reduced") -> str:
     return ON_CORNER if predicted <= limit else STALLED
 
 
-def _solution(problem: Problem, reduced: "_Reduced", y: NDArray, message: str, evaluations: int) -> Solution:
+def _solution(reduced: "_Reduced", y: NDArray, message: str, evaluations: int) -> Solution:
     """The solution at a point of the search, with unknowns next to a bound put on the bound."""
-    x = reduced.place(y)
+    x, problem = reduced.place(y), reduced.problem
     low, high = problem.bounds
     near = ON_BOUND * problem.sizes
     active = np.where(x <= low + near, -1, np.where(x >= high - near, 1, 0))

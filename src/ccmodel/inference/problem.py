@@ -36,6 +36,11 @@ class Free:
     high: float = np.inf
     spread: float | None = None
 
+    @classmethod
+    def within(cls, start: float, low: float, high: float) -> "Free":
+        """An unknown whose start is put within its bounds."""
+        return cls(float(np.clip(start, low, high)), low, high)
+
 
 @dataclass(frozen=True)
 class Block:
@@ -93,30 +98,29 @@ class Problem:
         return [*self.shared, *(f"{name}@{o.name}" for o in self.observations for name in self.own)]
 
     @cached_property
-    def free(self) -> list[Free]:
-        """Start, bounds and prior of each of `names`."""
-        return [*self.shared.values(), *(f for _ in self.observations for f in self.own.values())]
+    def unknowns(self) -> list[tuple[str, Free]]:
+        """Parameter of each of `names`, with its start, bounds and prior."""
+        return [*self.shared.items(), *(one for _ in self.observations for one in self.own.items())]
 
     @cached_property
     def sizes(self) -> NDArray:
         """The unit of each unknown's steps, shape (unknowns,)."""
-        plain = [*self.shared, *(name for _ in self.observations for name in self.own)]
-        return np.array([f.spread or size_of(n, f.start) for n, f in zip(plain, self.free, strict=True)])
+        return np.array([free.spread or size_of(name, free.start) for name, free in self.unknowns])
 
     @cached_property
     def start(self) -> NDArray:
         """Starting values, shape (unknowns,)."""
-        return np.array([f.start for f in self.free], dtype=float)
+        return np.array([f.start for _, f in self.unknowns], dtype=float)
 
     @cached_property
     def bounds(self) -> tuple[NDArray, NDArray]:
         """Lowest and highest values, each of shape (unknowns,)."""
-        return tuple(np.array([getattr(f, end) for f in self.free], dtype=float) for end in ("low", "high"))
+        return tuple(np.array([getattr(f, end) for _, f in self.unknowns], dtype=float) for end in ("low", "high"))
 
     @cached_property
     def prior_precision(self) -> NDArray:
         """Reciprocal standard deviation of each unknown's prior, 0 without one; shape (unknowns,)."""
-        return np.array([0.0 if f.spread is None else 1 / f.spread for f in self.free])
+        return np.array([0.0 if f.spread is None else 1 / f.spread for _, f in self.unknowns])
 
     def prior_errors(self, x: NDArray) -> NDArray:
         """Distance of each unknown from its prior's mean over the prior's standard deviation; shape (unknowns,)."""
@@ -129,19 +133,19 @@ class Problem:
 
     def values_of(self, x: NDArray, i: int) -> dict[str, float]:
         """Parameters of one recording, by name."""
-        shared, own = x[: len(self.shared)].tolist(), x[self.own_columns(i)].tolist()
-        return dict(zip(self.shared, shared, strict=True)) | dict(zip(self.own, own, strict=True))
+        shared = x[: len(self.shared)].tolist()
+        return dict(zip(self.shared, shared, strict=True)) | self.own_values_of(x, i)
+
+    def own_values_of(self, x: NDArray, i: int) -> dict[str, float]:
+        """One recording's own unknowns, by name."""
+        return dict(zip(self.own, x[self.own_columns(i)].tolist(), strict=True))
 
     def errors(self, x: NDArray) -> list[NDArray]:
         """By recording, weighted errors over the noise."""
         return self._each(lambda i: self._weighted(x, i))
 
-    def residuals(self, x: NDArray) -> NDArray:
-        """All weighted errors and prior errors, whose sum of squares is the cost; shape (rows,)."""
-        return np.concatenate([*(e.ravel() for e in self.errors(x)), self.prior_errors(x)])
-
     def cost(self, x: NDArray, errors: Sequence[NDArray] | None = None) -> float:
-        """Sum of squares of `residuals`; `errors` are ``self.errors(x)``, where these are known."""
+        """Sum of squares of weighted errors and prior errors; `errors` are ``self.errors(x)``, where known."""
         errors = self.errors(x) if errors is None else errors
         return sum(float((e**2).sum()) for e in errors) + float((self.prior_errors(x) ** 2).sum())
 

@@ -6,7 +6,7 @@ All keys that were added later are optional, so a file written before them keeps
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from ccmodel.channels import ANGLE_AT, SUM_AT, TENSIONS_AT, TORQUE_AT
 from ccmodel.geometry import ConduitPath
@@ -38,6 +38,9 @@ def _checked_name(name: str) -> str:
     if not valid_name(name):
         raise ValueError(NAMES)
     return name
+
+
+Name = Annotated[str, AfterValidator(_checked_name)]
 
 
 class LoadCell(TypedModel):
@@ -169,15 +172,13 @@ class Piece(TypedModel):
 class RecordingEntry(TypedModel):
     """One recording: its log and its conditions. Samples before `settled_s` are a start-up transient."""
 
-    id: str
+    id: Name
     file: str
     pretension_N: Positive
     conduit: Annotated[tuple[Piece, ...], Field(min_length=1)]
     excitation: dict[str, Any] = Field(default_factory=dict)
     settled_s: NotNegative = 0.0
     note: Any = None
-
-    _safe_id = field_validator("id")(_checked_name)
 
     @field_validator("file")
     @classmethod
@@ -198,13 +199,11 @@ class Batch(TypedModel):
     """A whole `batch.yaml`."""
 
     format: Literal[1]
-    batch: str
+    batch: Name
     origin: Literal["rig", "virtual-rig"]
     note: Any = None
     rig: Rig
     recordings: Annotated[tuple[RecordingEntry, ...], Field(min_length=1)]
-
-    _safe_name = field_validator("batch")(_checked_name)
 
     @field_validator("recordings")
     @classmethod

@@ -5,13 +5,14 @@ load.
 """
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ccmodel.rig.batch import Accuracy, End, Rig
-from ccmodel.rig.limits import LIMITS, Limits
+from ccmodel.rig import limits
+from ccmodel.rig.batch import Accuracy, End, LoadCell, Rig, TorqueSensor
 
 
 @dataclass
@@ -46,7 +47,7 @@ class Calibrated:
         self.channels[channel], self.derived_from[channel], self.accuracy[channel] = values, formula, accuracy
 
 
-def calibrate(table: pd.DataFrame, rig: Rig, limits: Limits = LIMITS) -> Calibrated:
+def calibrate(table: pd.DataFrame, rig: Rig) -> Calibrated:
     """Convert the raw columns of one log to SI channels.
 
     Parameters
@@ -55,8 +56,6 @@ def calibrate(table: pd.DataFrame, rig: Rig, limits: Limits = LIMITS) -> Calibra
         Raw columns, with at least `time_s` and `drive_encoder_counts`.
     rig : Rig
         Constants of the rig.
-    limits : Limits
-        Limits of a rest.
 
     Returns
     -------
@@ -64,79 +63,72 @@ def calibrate(table: pd.DataFrame, rig: Rig, limits: Limits = LIMITS) -> Calibra
         Channels with formula and accuracy.
     """
     time = table["time_s"].to_numpy()
-    resting = _resting_samples(table, limits)
+    resting = _resting_samples(table)
     result = Calibrated(float(time[resting - 1]) if resting else 0.0)
     for end in rig.ends:
-        _angle(result, table, end, resting, rig.accuracy)
-        _torque(result, table, end, rig.accuracy)
-        _force(result, table, end, rig.accuracy)
+        _add_sensors(result, table, end, resting, rig.accuracy)
         (_single_tension if rig.far_end else _tensions)(result, end)
     return result
 
 
-def _resting_samples(table: pd.DataFrame, limits: Limits) -> int:
+def _resting_samples(table: pd.DataFrame) -> int:
     """Number of samples at the start during which drive and load only dither; 0 if the rig begins in motion."""
     time = table["time_s"].to_numpy()
     columns = [c for c in ("drive_encoder_counts", "load_encoder_counts") if c in table]
-    resting = min(_still_samples(table[c].to_numpy(), limits) for c in columns)
-    return resting if time[resting - 1] - time[0] >= limits.shortest_rest_s else 0
+    resting = min(_still_samples(table[c].to_numpy()) for c in columns)
+    return resting if time[resting - 1] - time[0] >= limits.SHORTEST_REST_S else 0
 
 
-def _still_samples(counts: NDArray, limits: Limits) -> int:
+def _still_samples(counts: NDArray) -> int:
     spread = np.maximum.accumulate(counts) - np.minimum.accumulate(counts)
-    still = int(np.argmax(spread > limits.still_counts)) if spread[-1] > limits.still_counts else counts.size
+    still = int(np.argmax(spread > limits.STILL_COUNTS)) if spread[-1] > limits.STILL_COUNTS else counts.size
     # The first count of the motion looks like dither, so the rest ends at the last sample of its most frequent count.
     values, frequency = np.unique(counts[:still], return_counts=True)
     return int(np.flatnonzero(counts[:still] == values[np.argmax(frequency)])[-1]) + 1
 
 
-def _angle(result: Calibrated, table: pd.DataFrame, end: End, resting: int, accuracy: Accuracy) -> None:
-    column, side = f"{end.name}_encoder_counts", end.side
-    if column not in table:
-        return
-    if side.encoder_counts_per_rev is None:
-        result.missing[column] = f"rig.{end.name}.encoder_counts_per_rev"
-        return
-    counts = table[column].to_numpy()
-    zero = counts[:resting].mean() if resting else counts[0]
-    where = "the mean at rest" if resting else "the first sample"
-    step = 2 * np.pi / side.encoder_counts_per_rev
-    formula = f"{_minus(side.encoder_sign)}({column} - {zero:g}, {where}) * 2 pi / {side.encoder_counts_per_rev:g}"
-    values = side.encoder_sign * (counts - zero) * step
-    result.add(end.angle, values, formula, side.encoder_accuracy_rad or accuracy.encoder_rad)
-    result.encoder_step_rad[end.angle] = step
+def _add_sensors(result: Calibrated, table: pd.DataFrame, end: End, resting: int, accuracy: Accuracy) -> None:
+    """Add the channels of the sensors at one end; a torque sensor is used rather than a current."""
+    side = end.side
+    angle, angle_accuracy = partial(_angle, resting), side.encoder_accuracy_rad or accuracy.encoder_rad
+    # Column of the log, key of its constants, calibration; sign, name and accuracy of the channel.
+    sensors = (
+        ("encoder_counts", "encoder_counts_per_rev", angle, side.encoder_sign, end.angle, angle_accuracy),
+        ("torque_counts", "torque_sensor", _sensor_torque, side.torque_sign, end.torque, accuracy.torque_Nm),
+        ("current_A", "torque_constant_Nm_per_A", _motor_torque, side.torque_sign, end.torque, accuracy.torque_Nm),
+        ("load_cell_V", "load_cell", _force, 1, end.force, accuracy.load_cell_N),
+    )
+    for suffix, key, calibration, sign, channel, accuracy_of_channel in sensors:
+        column, constants = f"{end.name}_{suffix}", getattr(side, key)
+        if column not in table or channel in result.channels:
+            continue
+        if constants is None:
+            result.missing[column] = f"rig.{end.name}.{key}"
+            continue
+        values, formula = calibration(table[column].to_numpy(), column, constants)
+        result.add(channel, sign * values, f"{'-' if sign < 0 else ''}{formula}", accuracy_of_channel)
+    if end.angle in result.channels:
+        result.encoder_step_rad[end.angle] = 2 * np.pi / side.encoder_counts_per_rev
 
 
-def _torque(result: Calibrated, table: pd.DataFrame, end: End, accuracy: Accuracy) -> None:
-    counts, current = f"{end.name}_torque_counts", f"{end.name}_current_A"
-    sensor, constant = end.side.torque_sensor, end.side.torque_constant_Nm_per_A
-    if counts in table and sensor is None:
-        result.missing[counts] = f"rig.{end.name}.torque_sensor"
-    if counts in table and sensor is not None:
-        torque = (table[counts].to_numpy() - sensor.zero_counts) * sensor.Nm_per_count
-        formula = f"({counts} - {sensor.zero_counts:g}) * {sensor.Nm_per_count:g} Nm/count"
-    elif current in table and constant is None:
-        result.missing[current] = f"rig.{end.name}.torque_constant_Nm_per_A"
-        return
-    elif current in table:
-        torque = table[current].to_numpy() * constant
-        formula = f"{current} * {constant:g} Nm/A"
-    else:
-        return
-    sign = end.side.torque_sign
-    result.add(end.torque, sign * torque, _minus(sign) + formula, accuracy.torque_Nm)
+def _angle(resting: int, counts: NDArray, column: str, counts_per_rev: float) -> tuple[NDArray, str]:
+    zero, where = (counts[:resting].mean(), "the mean at rest") if resting else (counts[0], "the first sample")
+    formula = f"({column} - {zero:g}, {where}) * 2 pi / {counts_per_rev:g}"
+    return (counts - zero) * (2 * np.pi / counts_per_rev), formula
 
 
-def _force(result: Calibrated, table: pd.DataFrame, end: End, accuracy: Accuracy) -> None:
-    column, cell = f"{end.name}_load_cell_V", end.side.load_cell
-    if column not in table:
-        return
-    if cell is None:
-        result.missing[column] = f"rig.{end.name}.load_cell"
-        return
-    values = (table[column].to_numpy() - cell.zero_V) / cell.sensitivity_V_per_N
+def _sensor_torque(counts: NDArray, column: str, sensor: TorqueSensor) -> tuple[NDArray, str]:
+    formula = f"({column} - {sensor.zero_counts:g}) * {sensor.Nm_per_count:g} Nm/count"
+    return (counts - sensor.zero_counts) * sensor.Nm_per_count, formula
+
+
+def _motor_torque(current: NDArray, column: str, constant: float) -> tuple[NDArray, str]:
+    return current * constant, f"{column} * {constant:g} Nm/A"
+
+
+def _force(volts: NDArray, column: str, cell: LoadCell) -> tuple[NDArray, str]:
     formula = f"({column} - {cell.zero_V:g} V) / {cell.sensitivity_V_per_N:g} V/N"
-    result.add(end.force, values, formula, accuracy.load_cell_N)
+    return (volts - cell.zero_V) / cell.sensitivity_V_per_N, formula
 
 
 def _tensions(result: Calibrated, end: End) -> None:
@@ -160,7 +152,3 @@ def _single_tension(result: Calibrated, end: End) -> None:
     elif torque in result.channels:
         formula = f"{torque} / {radius:g} m"
         result.add(name, result.channels[torque] / radius, formula, result.accuracy[torque] / radius)
-
-
-def _minus(sign: int) -> str:
-    return "-" if sign < 0 else ""

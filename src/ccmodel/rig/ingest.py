@@ -12,7 +12,6 @@ from ccmodel.rig.batch import Batch, RecordingEntry, load_batch
 from ccmodel.rig.calibration import calibrate
 from ccmodel.rig.column_checks import ColumnChecks
 from ccmodel.rig.findings import Defect, Finding, LogError
-from ccmodel.rig.limits import LIMITS, Limits
 from ccmodel.rig.log import read_log
 from ccmodel.rig.sensor_checks import check_sensors
 from ccmodel.typed import InputError
@@ -39,15 +38,13 @@ class Ingested:
     batch: Batch | None = None
 
 
-def ingest_batch(folder: Path, limits: Limits = LIMITS) -> Ingested:
+def ingest_batch(folder: Path) -> Ingested:
     """Read a batch of rig logs.
 
     Parameters
     ----------
     folder : Path
         Folder with `batch.yaml` and the logs, anywhere on disk; it is not changed.
-    limits : Limits
-        Thresholds from which a property of a log is a fault.
 
     Returns
     -------
@@ -61,14 +58,14 @@ def ingest_batch(folder: Path, limits: Limits = LIMITS) -> Ingested:
     if batch is None:
         return Ingested([], refusals)
     files = [str(folder / entry.file) for entry in batch.recordings]
-    logs = [_attempt(name, file, read_log, Path(file), limits) for file in files]
+    logs = [_attempt(name, file, read_log, Path(file)) for file in files]
     # All logs are read before any is checked: a column is judged by how many logs of the batch have it.
     columns = ColumnChecks(batch.rig, [log[0] if log else None for log, _ in logs])
     findings = [_finding(name, batch_file, "warning", defect) for defect in columns.warnings]
     recordings = []
     for entry, file, (log, refusals) in zip(batch.recordings, files, logs, strict=True):
         if log is not None:
-            used, refusals = _attempt(name, file, _recording, batch, entry, file, log, columns, limits)
+            used, refusals = _attempt(name, file, _recording, batch, entry, file, log, columns)
             if used is not None:
                 recording, warnings = used
                 recordings.append(recording)
@@ -101,7 +98,6 @@ def _recording(
     file: str,
     log: tuple[pd.DataFrame, list[Defect]],
     columns: ColumnChecks,
-    limits: Limits,
 ) -> tuple[Recording, list[Finding]]:
     """The recording of a log that could be read, and its warnings.
 
@@ -109,12 +105,12 @@ def _recording(
     """
     table, reading_defects = log
     rare_columns = columns.check(table)
-    table, faulty_sensors = check_sensors(table, batch.rig, limits)
+    table, faulty_sensors = check_sensors(table, batch.rig)
     end = table["time_s"].iloc[-1]
     if entry.settled_s >= end:
         text = f"ends at {end:g} s, before settled_s {entry.settled_s:g} s of batch.yaml: no samples left"
         raise LogError(None, None, text)
-    calibrated = calibrate(table, batch.rig, limits)
+    calibrated = calibrate(table, batch.rig)
     unconverted = [
         Defect(None, column, f"not used: batch.yaml lacks {key}, which converts it")
         for column, key in calibrated.missing.items()

@@ -10,10 +10,9 @@ import numpy as np
 import pandas as pd
 from scipy.ndimage import find_objects, label
 
-from ccmodel.rig import readers
+from ccmodel.rig import limits, readers
 from ccmodel.rig.batch import COLUMNS, REQUIRED_COLUMNS
 from ccmodel.rig.findings import Defect, LogError
-from ccmodel.rig.limits import LIMITS, Limits
 from ccmodel.typed import nearest
 
 # Similarity from which an unknown column is a misspelling of a known one. Below it, the rig logs more than the format
@@ -21,15 +20,13 @@ from ccmodel.typed import nearest
 MISSPELT = 0.85
 
 
-def read_log(path: Path, limits: Limits = LIMITS) -> tuple[pd.DataFrame, list[Defect]]:
+def read_log(path: Path) -> tuple[pd.DataFrame, list[Defect]]:
     """Read and check a log.
 
     Parameters
     ----------
     path : Path
         The log.
-    limits : Limits
-        Limits of its faults.
 
     Returns
     -------
@@ -46,10 +43,10 @@ def read_log(path: Path, limits: Limits = LIMITS) -> tuple[pd.DataFrame, list[De
     raw = readers.read(Path(path))
     warnings = _check_header(list(raw.columns))
     table = _numbers(raw[[name for name in raw.columns if name in COLUMNS]])
-    table = _drop_repeated(_drop_bad(table, limits, warnings), warnings)
-    if len(table) < limits.fewest_samples:
+    table = _drop_repeated(_drop_bad(table, warnings), warnings)
+    if len(table) < limits.FEWEST_SAMPLES:
         raise LogError(None, None, f"has {len(table)} samples only: too few for a recording; record it again")
-    _check_time(table["time_s"], limits, warnings)
+    _check_time(table["time_s"], warnings)
     return table, warnings
 
 
@@ -80,7 +77,7 @@ def _numbers(raw: pd.DataFrame) -> pd.DataFrame:
     return raw.astype(float)
 
 
-def _drop_bad(table: pd.DataFrame, limits: Limits, warnings: list[Defect]) -> pd.DataFrame:
+def _drop_bad(table: pd.DataFrame, warnings: list[Defect]) -> pd.DataFrame:
     """Drop the few rows in which a cell is empty or not finite."""
     bad = ~np.isfinite(table.to_numpy())
     for column, is_bad in zip(table.columns, bad.T, strict=True):
@@ -90,7 +87,7 @@ def _drop_bad(table: pd.DataFrame, limits: Limits, warnings: list[Defect]) -> pd
         if is_bad.all():
             raise LogError(None, column, "has no numbers: leave the column out if the rig has no such sensor")
         run = length(longest_run(is_bad))
-        if run > limits.bad_cells_in_a_row or is_bad.mean() > limits.bad_cells_fraction:
+        if run > limits.BAD_CELLS_IN_A_ROW or is_bad.mean() > limits.BAD_CELLS_FRACTION:
             raise LogError(row, column, f"{is_bad.sum()} cells have no number, {run} of them in a row")
         many = f"{is_bad.sum()} cells have no number: their rows are" if is_bad.sum() > 1 else "no number: row"
         warnings.append(Defect(row, column, f"{many} dropped"))
@@ -106,39 +103,33 @@ def _drop_repeated(table: pd.DataFrame, warnings: list[Defect]) -> pd.DataFrame:
     return table[~repeated]
 
 
-def _check_time(time: pd.Series, limits: Limits, warnings: list[Defect]) -> None:
+def _check_time(time: pd.Series, warnings: list[Defect]) -> None:
     step = np.diff(time.to_numpy())
     if (step <= 0).any():
         at = int(np.flatnonzero(step <= 0)[0]) + 1
         now, before = time.iloc[at], time.iloc[at - 1]
         raise LogError(int(time.index[at]), "time_s", f"time must increase, found {now:g} s after {before:g} s")
-    usual = _usual_step(time)
+    # Over four rows: a clock of whole ms that alternates 1 and 2 ms has no step of 1.5 ms.
+    usual = float((time.diff(4) / time.index.to_series().diff(4)).median())
     # A step over dropped rows is longer without being a gap; these rows have a warning already.
     rows = np.diff(time.index)
     excess = step - usual * rows
-    slack = (limits.gap_steps - 1) * usual
+    slack = (limits.GAP_STEPS - 1) * usual
     gaps = excess > slack * rows
     if not gaps.any():
         return
     # A late sample is followed by a step that is shorter by the same time; a lost sample is not.
     caught_up = -excess[(excess < -slack) & (rows == 1)].sum()
     lost = max(excess[gaps].sum() - caught_up, 0.0)
-    uneven = lost < limits.uneven_fraction * excess[gaps].sum()
+    uneven = lost < limits.UNEVEN_FRACTION * excess[gaps].sum()
     worst = np.flatnonzero(gaps)[np.argmax(excess[gaps])]
     text = _gap_text(gaps.sum(), step[worst], usual, uneven)
-    if step[worst] > limits.gap_s or lost > limits.gap_fraction * (time.iloc[-1] - time.iloc[0]):
+    if step[worst] > limits.GAP_S or lost > limits.GAP_FRACTION * (time.iloc[-1] - time.iloc[0]):
         text += f" ({lost:.3g} s lost in all): too long to be bridged, record it again"
         raise LogError(int(time.index[worst + 1]), "time_s", text)
     first = int(time.index[np.flatnonzero(gaps)[0] + 1])
     text += ": they came late, few or none are lost" if uneven else ": samples were dropped"
     warnings.append(Defect(first, "time_s", text))
-
-
-def _usual_step(time: pd.Series) -> float:
-    """Median step, taken over four rows: a clock of whole ms that alternates 1 and 2 ms has no step of 1.5 ms."""
-    over = 4
-    times, rows = time.to_numpy(), time.index.to_numpy()
-    return float(np.median((times[over:] - times[:-over]) / (rows[over:] - rows[:-over])))
 
 
 def _gap_text(count: int, longest: float, usual: float, uneven: bool) -> str:

@@ -7,15 +7,15 @@ only removes its channel.
 import numpy as np
 import pandas as pd
 
+from ccmodel.rig import limits
 from ccmodel.rig.batch import Rig
 from ccmodel.rig.findings import Defect, LogError
-from ccmodel.rig.limits import LIMITS, Limits
 from ccmodel.rig.log import length, longest_run, runs
 
 DRIVE, LOAD = "drive_encoder_counts", "load_encoder_counts"
 
 
-def check_sensors(table: pd.DataFrame, rig: Rig, limits: Limits = LIMITS) -> tuple[pd.DataFrame, list[Defect]]:
+def check_sensors(table: pd.DataFrame, rig: Rig) -> tuple[pd.DataFrame, list[Defect]]:
     """Find faulty sensors.
 
     Parameters
@@ -24,8 +24,6 @@ def check_sensors(table: pd.DataFrame, rig: Rig, limits: Limits = LIMITS) -> tup
         Raw columns of a log; the index is the row in the file.
     rig : Rig
         The rig that wrote it.
-    limits : Limits
-        Limits of the faults.
 
     Returns
     -------
@@ -39,55 +37,55 @@ def check_sensors(table: pd.DataFrame, rig: Rig, limits: Limits = LIMITS) -> tup
     LogError
         If the drive encoder is faulty.
     """
-    _check_drive(table, rig, limits)
+    _check_drive(table, rig)
     warnings, dead = [], []
     for column in table.columns.drop(["time_s", DRIVE]):
-        if fault := _dead(table, column, rig, limits):
+        if fault := _dead(table, column, rig):
             warnings.append(fault._replace(text=f"{fault.text}: column not used"))
             dead.append(column)
         elif column == LOAD:
-            warnings += _load_stands(table, limits)
+            warnings += _load_stands(table)
         else:
             # A sensor at the end of its range repeats one value: it is clipped and not frozen.
-            warnings += _saturated(table[column], rig.ranges.get(column), limits) or _frozen(table, column, limits)
+            warnings += _saturated(table[column], rig.ranges.get(column)) or _frozen(table, column)
     return table.drop(columns=dead), warnings
 
 
-def _check_drive(table: pd.DataFrame, rig: Rig, limits: Limits) -> None:
+def _check_drive(table: pd.DataFrame, rig: Rig) -> None:
     counts = table[DRIVE]
-    if np.ptp(counts) <= limits.still_counts:
+    if np.ptp(counts) <= limits.STILL_COUNTS:
         text = "stands still throughout: encoder stuck or drive switched off, the model has no input"
         raise LogError(None, DRIVE, text)
-    if jump := _jump(table, DRIVE, rig.drive.encoder_counts_per_rev, limits):
+    if jump := _jump(table, DRIVE, rig.drive.encoder_counts_per_rev):
         raise LogError(*jump)
     # The load cannot move by itself: if it moves, the drive moves too.
     still = longest_run(np.diff(counts.to_numpy(), prepend=np.nan) == 0)
     if LOAD in table and length(still):
-        creep = max(limits.other_end_counts, limits.other_end_fraction * np.ptp(table[LOAD]))
+        creep = max(limits.OTHER_END_COUNTS, limits.OTHER_END_FRACTION * np.ptp(table[LOAD]))
         if np.ptp(table[LOAD].iloc[still]) > creep:
             first, last = table.index[still][[0, -1]]
             text = f"stands still up to row {last} while the load moves: encoder stuck"
             raise LogError(int(first), DRIVE, text)
 
 
-def _dead(table: pd.DataFrame, column: str, rig: Rig, limits: Limits) -> Defect | None:
+def _dead(table: pd.DataFrame, column: str, rig: Rig) -> Defect | None:
     values = table[column]
     if column == LOAD:
-        if np.ptp(values) <= limits.still_counts:
+        if np.ptp(values) <= limits.STILL_COUNTS:
             text = "stands still throughout while the drive moves: encoder stuck or load locked"
             return Defect(None, column, text)
         counts_per_rev = rig.load.encoder_counts_per_rev
-        return _jump(table, column, counts_per_rev, limits) if counts_per_rev else None
+        return _jump(table, column, counts_per_rev) if counts_per_rev else None
     if np.ptp(values) == 0:
         return Defect(None, column, f"is {values.iloc[0]:g} throughout: a sensor that is dead or was never connected")
     return None
 
 
-def _jump(table: pd.DataFrame, column: str, counts_per_rev: float, limits: Limits) -> Defect | None:
+def _jump(table: pd.DataFrame, column: str, counts_per_rev: float) -> Defect | None:
     """The first change of an encoder that is too fast for a pulley."""
     step = np.diff(table[column].to_numpy())
     speed = np.abs(step) * (2 * np.pi / counts_per_rev) / np.diff(table["time_s"].to_numpy())
-    jumps = np.flatnonzero((speed > limits.fastest_rad_per_s) & (np.abs(step) > limits.lost_counts))
+    jumps = np.flatnonzero((speed > limits.FASTEST_RAD_PER_S) & (np.abs(step) > limits.LOST_COUNTS))
     if jumps.size == 0:
         return None
     more = f" (and {jumps.size - 1} more such jumps)" if jumps.size > 1 else ""
@@ -95,26 +93,26 @@ def _jump(table: pd.DataFrame, column: str, counts_per_rev: float, limits: Limit
     return Defect(int(table.index[jumps[0] + 1]), column, text)
 
 
-def _load_stands(table: pd.DataFrame, limits: Limits) -> list[Defect]:
+def _load_stands(table: pd.DataFrame) -> list[Defect]:
     """A load encoder that stops for a while: a loose plug or real lost motion, so its column stays."""
     drive = table[DRIVE].to_numpy()
-    for still in _standstills(table, LOAD, limits):
-        if np.ptp(drive[still]) >= limits.whole_travel_fraction * np.ptp(drive):
+    for still in _standstills(table, LOAD):
+        if np.ptp(drive[still]) >= limits.WHOLE_TRAVEL_FRACTION * np.ptp(drive):
             first, last = table.index[still][[0, -1]]
             text = f"stands still up to row {last} while the drive runs through its whole range"
             return [Defect(int(first), LOAD, f"{text}: loose plug or lost motion")]
     return []
 
 
-def _frozen(table: pd.DataFrame, column: str, limits: Limits) -> list[Defect]:
+def _frozen(table: pd.DataFrame, column: str) -> list[Defect]:
     """A noisy sensor that keeps one value for a while: a loose plug, or a converter that hung."""
-    still = _standstills(table, column, limits)
+    still = _standstills(table, column)
     drive = table[DRIVE].to_numpy()
-    frozen = [part for part in still if np.ptp(drive[part]) > limits.still_counts]
+    frozen = [part for part in still if np.ptp(drive[part]) > limits.STILL_COUNTS]
     repeats = np.diff(table[column].to_numpy(), prepend=np.nan) == 0
     for part in still:
         repeats[part] = False
-    if not frozen or repeats.mean() >= limits.frozen_noise_fraction:
+    if not frozen or repeats.mean() >= limits.FROZEN_NOISE_FRACTION:
         return []
     first, last = table.index[frozen[0]][[0, -1]]
     more = f" (and {len(frozen) - 1} more times)" if len(frozen) > 1 else ""
@@ -123,7 +121,7 @@ def _frozen(table: pd.DataFrame, column: str, limits: Limits) -> list[Defect]:
     return [Defect(int(first), column, text)]
 
 
-def _standstills(table: pd.DataFrame, column: str, limits: Limits) -> list[slice]:
+def _standstills(table: pd.DataFrame, column: str) -> list[slice]:
     """Parts of a log in which a column keeps one value for long."""
     time = table["time_s"].to_numpy()
     # The sample before a run of repeats has the same value.
@@ -131,11 +129,11 @@ def _standstills(table: pd.DataFrame, column: str, limits: Limits) -> list[slice
     return [
         part
         for part in parts
-        if length(part) > limits.frozen_samples + 1 and time[part.stop - 1] - time[part.start] > limits.frozen_s
+        if length(part) > limits.FROZEN_SAMPLES + 1 and time[part.stop - 1] - time[part.start] > limits.FROZEN_S
     ]
 
 
-def _saturated(values: pd.Series, sensor_range: tuple[float, float] | None, limits: Limits) -> list[Defect]:
+def _saturated(values: pd.Series, sensor_range: tuple[float, float] | None) -> list[Defect]:
     numbers = values.to_numpy()
     if sensor_range:
         ends = [numbers <= sensor_range[0], numbers >= sensor_range[1]]
@@ -145,13 +143,13 @@ def _saturated(values: pd.Series, sensor_range: tuple[float, float] | None, limi
         inside = ~(ends[0] | ends[1])
         repeats = np.mean((np.diff(numbers) == 0)[inside[1:]]) if inside[1:].any() else 1.0
         # A channel without noise dwells at its extremes by nature.
-        if repeats >= limits.flat_noise_fraction:
+        if repeats >= limits.FLAT_NOISE_FRACTION:
             return []
         what = "flat at its extreme value"
     found = []
     for end in ends:
         run = longest_run(end)
-        if length(run) >= limits.flat_samples:
+        if length(run) >= limits.FLAT_SAMPLES:
             text = f"{what} in {end.sum()} samples, {length(run)} in a row from here: saturated"
             found.append(Defect(int(values.index[run.start]), values.name, text))
     return found
