@@ -10,8 +10,8 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 import typer
-from typer.core import TyperGroup
 
+from ccmodel.cli import FormerOptions
 from proof import conceal
 from proof.archive import pack, unpack
 from proof.build import build as build_case
@@ -19,19 +19,13 @@ from proof.cases import Case, draw
 from proof.plan import read_plan
 
 
-class _FormerNames(TyperGroup):
-    """Accepts options under their former names, and reports the present ones."""
+class _FormerOptions(FormerOptions):
+    """Former names of the proof's options."""
 
     renamed: ClassVar = {"--rivals": "--regressors", "--of": "--selection"}
 
-    def parse_args(self, ctx, args):
-        """Replace former names before parsing."""
-        for former in self.renamed.keys() & set(args):
-            typer.echo(f"{former} is now called {self.renamed[former]}", err=True)
-        return super().parse_args(ctx, [self.renamed.get(argument, argument) for argument in args])
 
-
-app = typer.Typer(cls=_FormerNames, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+app = typer.Typer(cls=_FormerOptions, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
 Seed = Annotated[int, typer.Option(min=0, help="Seed of the first case; the others follow.")]
 Count = Annotated[int, typer.Option(min=1, help="Number of cases.")]

@@ -13,8 +13,8 @@ from typer.core import TyperGroup
 from ccmodel.typed import InputError
 
 
-class _FormerOptions(TyperGroup):
-    """Accepts former names of options, with a message on the current name."""
+class FormerOptions(TyperGroup):
+    """Accepts former names of options, with a message on the current name; other command lines state their own."""
 
     renamed: ClassVar = {
         "--allowance": "--tolerance",
@@ -35,7 +35,7 @@ class _FormerOptions(TyperGroup):
 
 
 app = typer.Typer(
-    cls=_FormerOptions, help=__doc__, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False
+    cls=FormerOptions, help=__doc__, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False
 )
 _err = Console(stderr=True, soft_wrap=True, highlight=False)
 

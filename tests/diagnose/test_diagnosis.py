@@ -165,7 +165,7 @@ def _more(change, table, share):
     return changed
 
 
-@pytest.mark.parametrize(("former", "present"), cli._FormerOptions.renamed.items())
+@pytest.mark.parametrize(("former", "present"), cli.FormerOptions.renamed.items())
 def test_an_option_under_its_former_name_is_taken_and_the_present_one_is_said(former, present):
     value = [] if former == "--hold" else ["x"]
     found = run("diagnose", "no-such-batch", "--out", "nowhere", former, *value)

@@ -251,10 +251,11 @@ class _Reduced:
         try:
             x = self.place(y)
             errors = self.problem.errors(x)
-            norm = np.sqrt(self.problem.cost(x, errors))
+            cost = self.problem.cost(x, errors)
+            norm = np.sqrt(cost)
             if norm * norm >= self.lowest_cost:
                 return np.r_[norm, np.zeros(len(self.rows) - 1)]
-            self._move_to(x, errors)
+            self._move_to(x, errors, cost)
         except (ModelError, ValueError):
             if not (self.how.retreats and len(self.rows)):
                 raise
@@ -276,11 +277,10 @@ class _Reduced:
             self.blocks = self.problem.blocks(x, self.how.difference)
         return self.blocks
 
-    def _move_to(self, x: NDArray, errors: Sequence[NDArray]) -> None:
+    def _move_to(self, x: NDArray, errors: Sequence[NDArray], cost: float) -> None:
         """Compute the derivatives at a point, and the rows: a square root of the matrix [J'J, J'r; r'J, r'r]."""
         blocks = self.problem.blocks(x, self.how.difference, errors)
         information, gradient = information_and_gradient(self.problem, x, blocks)
-        cost = self.problem.cost(x, errors)
         information[np.diag_indices_from(information)] *= 1 + DAMPING
         products = np.block([[information, gradient[:, None]], [gradient, cost]])
         if not np.isfinite(products).all():

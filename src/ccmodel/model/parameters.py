@@ -28,7 +28,7 @@ class Parameters:
     pretension_N : float or None
         Initial tension, uniform along the cables; None takes the tension observed at each recording's rest.
     pretension_share : float
-        Initial tension over each recording's nominal pretension, where no rest shows it.
+        Initial tension over each recording's nominal pretension, if it is not observed at rest.
     tau_in_zero_Nm, tau_out_zero_Nm : float
         Readings of the torque sensors without a torque.
     theta_out_zero_rad : float
