@@ -21,7 +21,7 @@ SHIPPED = ROOT / "data/raw/da-vinci"
 # Folder of the whole public data set, as for `make real DATA=path`.
 SHARED = ROOT.parent / "shared/real/mis-tool-characterization/data"
 DATA = os.environ.get("MIS_TOOL_DATA") or (str(SHARED) if SHARED.is_dir() else None)
-WHY_NO_DATA = "MIS_TOOL_DATA does not name the mis-tool-characterization data (as DATA does for `make real`)"
+WHY_NO_DATA = f"no mis-tool-characterization data: MIS_TOOL_DATA does not name them, and {SHARED} is not there"
 HEADER = "%Data taken by somebody\n%Freq_Hz=0.99\n%Back-end Time [ms], Back-end CUI Encoder [counts]\n"
 
 
