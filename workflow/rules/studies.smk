@@ -10,6 +10,7 @@ for name, study in STUDIES.items():
             recordings=[recordings_of(batch) for _, _, batch in needs],
             simulated=[simulated_of(p, batch) for _, p, batch in needs],
             fits=sorted(set(fits) - {""}),
+            files=study.files,
         output:
             tables=tables(name),
             svg=figures(name, "svg"),

@@ -19,6 +19,11 @@ class StudySettings(TypedModel):
     # Figures in results/figures, each as PNG and SVG.
     figures: ClassVar[tuple[str, ...]] = ("{name}",)
 
+    @property
+    def files(self) -> list[str]:
+        """Files that the study reads, apart from those of its runs."""
+        return []
+
     def check(self, where: str, config) -> None:
         """Refuse settings that do not fit the rest of the configuration.
 
