@@ -97,6 +97,11 @@ class Change:
         """Change of the error, % of the accepted one."""
         return 100 * (self.now / self.accepted - 1)
 
+    @property
+    def times(self) -> str:
+        """The change in words: a share, or a factor where it is large."""
+        return f"{self.percent:+.1f} %" if self.percent < 900 else f"{self.now / self.accepted:.0f} times"
+
     def __str__(self) -> str:
         basis = "same recordings" if self.same_recordings else "recorded again"
         reach = "no interval, too few repeats"
@@ -104,7 +109,7 @@ class Change:
             reach = f"interval {self.low:.3g} to {self.high:.3g} %"
         place = f"batch {self.batch}, {symbol_of(self.channel)} with {self.parameters} parameters"
         error = f"error {self.accepted:.3g} % -> {self.now:.3g} % of peak to peak"
-        return f"{place}: {error} ({self.percent:+.1f} %; {reach}, {basis})"
+        return f"{place}: {error} ({self.times}; {reach}, {basis})"
 
 
 @dataclass(frozen=True)
@@ -148,7 +153,7 @@ class Comparison:
 
     def as_dict(self) -> dict:
         """Plain data, for the page."""
-        changes = [asdict(c) | {"percent": c.percent} for c in self.changes]
+        changes = [asdict(c) | {"times": c.times} for c in self.changes]
         return asdict(self) | {"changes": changes, "losses": self.losses, "not_compared": self.not_compared}
 
 
