@@ -27,7 +27,7 @@ rule tabulate_errors:
 rule write_report:
     input:
         errors=f"{RESULTS}/tables/errors.parquet",
-        fits=sorted({fit_of(p, batch) for p in CONFIG.fits for batch in BATCHES}),
+        fits=sorted({fit_of(p, batch) for p, batch in runs() if p in CONFIG.fits}),
         summaries=[f"{RESULTS}/recordings/{batch}.json" for batch in BATCHES],
         simulations=[
             simulated_of(p, batch).removesuffix(".nc") + ".json" for p, batch in runs()
@@ -60,8 +60,8 @@ rule write_report:
                 "name": name,
                 "heading": study.heading,
                 "settings": study.model_dump(mode="json"),
-                "parameters": (
-                    CONFIG.parameters_of(study) if hasattr(study, "parameters") else ""
+                "parameters": " and ".join(
+                    sorted({p for _, p, _ in study.needs(CONFIG, LOOPS, BATCHES)})
                 ),
             }
             | ({"summary": tables(name)[-1]} if study.tables else {})

@@ -16,11 +16,8 @@ from ccmodel.recording import read_recordings
 from ccmodel.rig.ingest import ingest_batch
 from ccmodel.steps.files import estimates_of, read_json, write_json
 from ccmodel.studies.diagnosis.page import headline, write_diagnosis
-from ccmodel.studies.diagnosis.settings import Diagnosing
+from ccmodel.studies.diagnosis.settings import MODEL_FILES, Diagnosing
 from ccmodel.typed import InputError
-
-MODELS = ("calibrated.json", "model.json")
-NEAREST = "nearest.json"
 
 
 def diagnose(
@@ -73,7 +70,7 @@ def diagnose(
         raise InputError(f"{batch}: {error}") from None
     content = _write(found, inputs, out)
     if not content["nearest"]:
-        (out / NEAREST).unlink()
+        (out / MODEL_FILES["nearest"]).unlink()
     return content
 
 
@@ -90,8 +87,8 @@ def diagnose_recordings(recordings_file: Path, out: Path, settings: Diagnosing |
         name, reason = recordings_file.stem, str(error)
         out.mkdir(parents=True, exist_ok=True)
         write_json(out / "diagnosis.json", {"batch": name, "verdict": None, "why": reason})
-        for model in (*MODELS, NEAREST):
-            write_json(out / model, _no_model(reason))
+        for file in MODEL_FILES.values():
+            write_json(out / file, _no_model(reason))
         (out / "report.html").write_text(f"<p>{name}: not diagnosed: {html.escape(reason)}</p>\n")
         return
     _write(found, inputs, out)
@@ -116,11 +113,12 @@ def _write(found: Diagnosis, inputs: dict, out: Path) -> dict:
     out.mkdir(parents=True, exist_ok=True)
     content = found.report | {"headline": headline(found.report), "provenance": inputs}
     write_json(out / "diagnosis.json", content)
-    for name, fit in zip(MODELS, (found.judgement.calibrated, found.judgement.best), strict=True):
-        write_json(out / name, model_as_dict(found.model(fit), inputs))
+    judged = found.judgement
+    models = {"calibrated": judged.calibrated, "extended": judged.best}
     if found.report["nearest"]:
-        write_json(out / NEAREST, model_as_dict(found.model(found.judgement.nearest), inputs))
-    else:
-        write_json(out / NEAREST, _no_model(f"verdict '{found.report['verdict']}': the diagnosis has no nearest model"))
+        models["nearest"] = judged.nearest
+    for name, file in MODEL_FILES.items():
+        without = _no_model(f"verdict '{judged.verdict}': the diagnosis has no {name} model")
+        write_json(out / file, model_as_dict(found.model(models[name]), inputs) if name in models else without)
     write_diagnosis(out / "report.html", found)
     return content
