@@ -11,14 +11,14 @@ for name, study in STUDIES.items():
             simulated=[simulated_of(p, batch) for _, p, batch in needs],
             fits=sorted(set(fits) - {""}),
         output:
-            tables=tables(name),
+            csv=[in_report(f, "table", "Tables", study=name) for f in csv_tables(name)],
+            summary=tables(name)[-1:],
+            png=[
+                in_report(f, "study", "Studies", study=name)
+                for f in figures(name, "png")
+            ],
             svg=figures(name, "svg"),
-            png=report(
-                figures(name, "png"),
-                caption="../report/study.rst",
-                category="Studies",
-                labels={"study": name},
-            ),
+            pdf=figures(name, "pdf"),
         log:
             f"{RESULTS}/logs/studies/{name}.log",
         benchmark:
@@ -31,6 +31,7 @@ for name, study in STUDIES.items():
             runtime=60,
         params:
             kind=study.kind,
+            caption=study.caption(),
             settings=study.model_dump_json(),
             measuring=CONFIG.measuring.model_dump_json(),
             labels=[label for label, _, _ in needs],
