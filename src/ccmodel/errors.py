@@ -46,6 +46,13 @@ def _upward_crossings(share: NDArray) -> list[int]:
     return crossings
 
 
+def is_compared(recorded: Recording, simulated: Recording | None, channel: str) -> bool:
+    """Whether a channel has an error: it was recorded and simulated, and was not given to the model."""
+    return (
+        simulated is not None and channel in recorded and simulated.derived_from.get(channel) not in (PRESCRIBED, None)
+    )
+
+
 def error_table(pairs: Iterable[tuple[Recording, Recording | None]], parameters: str) -> pd.DataFrame:
     """Mean and root mean square error of each channel over the last cycle, simulated minus recorded.
 
@@ -71,7 +78,7 @@ def error_table(pairs: Iterable[tuple[Recording, Recording | None]], parameters:
             continue
         window = last_cycle(recorded)
         for channel in CHANNELS:
-            if channel not in recorded or simulated.derived_from.get(channel) in (PRESCRIBED, None):
+            if not is_compared(recorded, simulated, channel):
                 continue
             measured = recorded[channel][window]
             error = simulated[channel][window] - measured
