@@ -32,6 +32,7 @@ from ccmodel.model.parameters import Parameters
 from ccmodel.rig.ingest import ingest_batch
 from ccmodel.steps.fit import fit_parameters
 from ccmodel.steps.ingest import ingest
+from ccmodel.steps.settings import Fit
 from ccmodel.steps.simulate import simulate, simulate_recording
 from ccmodel.studies.settings import EACH
 from virtualrig.campaign import as_yaml, compress, describe, log_name, prepare, recording_generator, run
@@ -45,18 +46,15 @@ PAGE = Path("docs/accuracy.md")
 BEGIN, END = "<!-- made by `make accuracy-gate` -->", "<!-- end -->"
 
 
-def run_pipeline(raw: Path, batches: list[str], results: Path) -> Batches:
+def run_pipeline(raw: Path, batches: list[str], fits: Mapping[str, Fit], results: Path) -> Batches:
     """Recordings, fits and simulations of some batches, and their accuracy."""
-    config = load_config(CONFIG)
     for folder in ("recordings", "fits"):
         (results / folder).mkdir(parents=True, exist_ok=True)
     recordings = {batch: results / f"recordings/{batch}.nc" for batch in batches}
     for batch, file in recordings.items():
         ingest(raw / batch, file, file.with_suffix(".json"))
     runs = [Simulated("virtual rig", ESTIMATED, file, Path()) for file in recordings.values()]
-    for name, fit in config.fits.items():
-        if fit.batches == EACH or not set(fit.batches) <= set(batches):
-            continue
+    for name, fit in fits.items():
         fit_file = results / f"fits/{name}.json"
         fit_parameters(name, fit, [recordings[batch] for batch in fit.batches], fit_file)
         runs += [Simulated("virtual rig", name, file, Path(), fit_file) for file in recordings.values()]
@@ -133,9 +131,9 @@ def record_again(campaign: Campaign, truth: Mapping, noise_seed: int, raw: Path)
 
 def one_run(given) -> tuple[str, Comparison]:
     """Name and outcome of one run, by the name of its fault or control and its folder of raw recordings."""
-    name, fault, raw, batches, accepted, limits = given
+    name, fault, raw, batches, fits, accepted, limits = given
     with TemporaryDirectory() as scratch, (FAULTS | CONTROLS)[fault]():
-        return name, compare(accepted, run_pipeline(raw, batches, Path(scratch)), limits)
+        return name, compare(accepted, run_pipeline(raw, batches, fits, Path(scratch)), limits)
 
 
 def lines(title: str, outcomes: list[tuple[str, Comparison]]) -> list[str]:
@@ -173,9 +171,10 @@ def main() -> None:
     started = time.monotonic()
     config, campaign = load_config(CONFIG), read_campaign(CAMPAIGN)
     batches, limits, raw = sorted(campaign.batches), config.baseline.limits, Path(config.raw)
+    fits = {name: fit for name, fit in config.fits.items() if fit.batches != EACH and set(fit.batches) <= set(batches)}
     with TemporaryDirectory() as folder, ProcessPoolExecutor(stated.cores, mp_context=get_context("spawn")) as pool:
         scratch = Path(folder)
-        accepted = run_pipeline(raw, batches, scratch / "accepted")
+        accepted = run_pipeline(raw, batches, fits, scratch / "accepted")
         truth = simulated_campaign(campaign, batches, campaign.seed, pool)
         for k in range(stated.seeds):
             record_again(campaign, truth, 1 + k, scratch / f"noise-{k}")
@@ -189,7 +188,7 @@ def main() -> None:
             "same": [(name, name, raw) for name in (*CONTROLS, *FAULTS)],
             "both": [(name, name, again) for name in FAULTS],
         }
-        tasks = [(*job, batches, accepted, limits) for of in jobs.values() for job in of]
+        tasks = [(*job, batches, fits, accepted, limits) for of in jobs.values() for job in of]
         outcomes = iter(pool.map(one_run, tasks))
         found = {kind: [next(outcomes) for _ in of] for kind, of in jobs.items()}
     passed = {kind: sum(not f.losses for _, f in found[kind]) for kind in ("noise", "anew")}
@@ -198,7 +197,7 @@ def main() -> None:
     section = [
         f"Made on {datetime.now(UTC):%Y-%m-%d} in {(time.monotonic() - started) / 60:.0f} minutes: {len(batches)}"
         f" batches of the virtual rig, {compared} comparisons in each run, parameters"
-        f" {' and '.join([ESTIMATED, *config.fits])}.",
+        f" {' and '.join([ESTIMATED, *fits])}.",
         "",
         f"**Other noise.** Recorded again with other sensor noise, zeros and encoder positions: **{passed['noise']} of"
         f" {stated.seeds}** runs without a loss. The error nearest to the end of its interval came"

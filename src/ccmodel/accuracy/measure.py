@@ -95,6 +95,7 @@ class BatchAccuracy(TypedModel):
     """Accuracy of all parameter sets on a batch."""
 
     rig: str
+    origin: str = Field(description="origin of the recordings, as in batch.yaml")
     digest: str = Field(description="digest of the batch's raw files")
     verdict: str | None = Field(None, description="verdict of its diagnosis and what it names; None: not diagnosed")
     recordings: dict[str, Window] = Field(description="what is compared of each recording: from s, to s, samples")
@@ -121,12 +122,13 @@ def measure(runs: Iterable[Simulated], with_fits: bool = True) -> Batches:
 
 
 def _batch(runs: Sequence[Simulated], with_fits: bool) -> BatchAccuracy:
-    recordings, sets = {}, {}
+    recordings, sets, origin = {}, {}, ""
     for run in runs:
         pairs = read_pairs(run.recordings, run.simulated)
         table = error_table(pairs, run.parameters).dropna(subset="nrmse_percent")
         if table.empty:
             continue
+        origin = table["origin"].iloc[0]
         recordings = recordings or {recorded.id: [0.0, 0.0, 0.0] for recorded, _ in pairs}
         for row in table.itertuples():
             recordings[row.recording] = [round(row.window_from_s, 4), round(row.window_to_s, 4), float(row.samples)]
@@ -140,11 +142,14 @@ def _batch(runs: Sequence[Simulated], with_fits: bool) -> BatchAccuracy:
             },
         )
     verdicts = [verdict for run in runs if (verdict := _verdict(run.fit)) is not None]
-    first = runs[0]
     return BatchAccuracy(
-        rig=first.rig, digest=_digest(first.recordings), verdict=next(iter(verdicts), None), recordings=recordings,
+        rig=runs[0].rig,
+        origin=origin,
+        digest=_digest(runs[0].recordings),
+        verdict=next(iter(verdicts), None),
+        recordings=recordings,
         sets=sets,
-    )  # fmt: skip
+    )
 
 
 def _channel(rows: pd.DataFrame, recordings: Sequence[str], fit_sd: float) -> ChannelAccuracy:

@@ -96,13 +96,16 @@ def run_study(
         The files of each figure in the order of the settings, one for each of its formats.
     """
     study = import_module(f"ccmodel.studies.{kind}.study")
-    outcome = study.judge(study.SETTINGS.model_validate_json(settings), runs, Measuring.model_validate_json(measuring))
+    stated = study.SETTINGS.model_validate_json(settings)
+    outcome = study.judge(stated, runs, Measuring.model_validate_json(measuring))
     for file, table in zip(tables[:-1], outcome.tables, strict=True):
         write_table(file, table)
     if tables:
         inputs = {file for run in runs for file in (run.recordings, run.simulated, run.fit) if file is not None}
+        inputs |= set(map(Path, stated.files))
         write_json(tables[-1], outcome.summary | {"provenance": provenance.of_inputs(sorted(inputs))})
-    stamp = provenance.stamp(study.__name__, settings, measuring, [run.content for run in runs])
+    read = [Path(file).read_text() for file in stated.files]
+    stamp = provenance.stamp(study.__name__, settings, measuring, [run.content for run in runs], *read)
     for files, figure in zip(figures, outcome.figures, strict=True):
         stamp_figure(figure, stamp)
         save_figure(figure, *files)

@@ -1,5 +1,7 @@
 """Error of the model over the project's commits: a panel for each batch, a line for each parameter set."""
 
+from collections.abc import Mapping
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
@@ -7,18 +9,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from ccmodel.report.figures import COLOURS, LINES, MARKERS, STYLE, empty_figure, legend_below
+from ccmodel.report.figures import COLOURS, LINES, MARKERS, STYLE, empty_figure, legend_below, title_figure
 
 COLUMNS = 3
 
 
-def history_figure(history: pd.DataFrame, present: pd.DataFrame) -> Figure:
+def history_figure(history: pd.DataFrame, present: pd.DataFrame, origins: Mapping[str, str]) -> Figure:
     """Median normalised error over the channels of each batch, at every commit and, as the last point, in this run.
 
     Parameters
     ----------
     history, present : DataFrame
         With the columns of `ccmodel.accuracy.history.COLUMNS`.
+    origins : mapping of str to str
+        Origin of each batch, as figures name it.
     """
     table = pd.concat([history, present], ignore_index=True)
     batches, commits = sorted(set(present["batch"])), list(dict.fromkeys(table["commit"]))
@@ -35,13 +39,13 @@ def history_figure(history: pd.DataFrame, present: pd.DataFrame) -> Figure:
             ax.set_axis_off()
         for k, (ax, batch) in enumerate(zip(axes.flat, batches, strict=False)):
             _panel(ax, table[table["batch"] == batch], commits, sets)
-            ax.set_title(batch, loc="left")
+            ax.set_title(f"{batch}: {origins[batch]}", loc="left", fontsize=9)
             if k % columns == 0:
                 ax.set_ylabel("error, % of peak to peak")
             # The axes are shared: names of commits stand below the last panel of each column.
             ax.tick_params(labelbottom=k + columns >= len(batches))
         legend_below(figure, axes)
-        figure.suptitle("Error of the model over commits: median of the channels (line), all channels (band)")
+        title_figure(figure, "Error of the model over commits: median of the channels (line), all channels (band)")
     return figure
 
 

@@ -20,6 +20,7 @@ class AgainstBaseline(StudySettings, Limits):
     heading: ClassVar = "Against the baseline"
     tables: ClassVar = ("{name}",)
     figures: ClassVar = ("accuracy-history",)
+    shows: ClassVar = "Error of the model on each batch, over the project's commits; at the right, this run."
 
     file: str = Field("config/accuracy-baseline.json", description="accepted accuracy, written by 'accuracy accept'")
     history: str = Field("config/accuracy-history.csv", description="accuracy of past commits")
@@ -39,17 +40,11 @@ class AgainstBaseline(StudySettings, Limits):
         return [
             (_rig_of(config, batch), parameters, batch)
             for batch in batches
-            for parameters in _sets_of(config, batch)
+            for parameters in config.sets_of(batch)
             if parameters not in NOT_ACCEPTED
         ]
 
 
 def _rig_of(config, batch: str) -> str:
-    rigs = getattr(config, "rigs", {})
-    return next((name for name, of in rigs.items() if batch in of), batch if rigs else "all")
-
-
-def _sets_of(config, batch: str) -> list[str]:
-    if hasattr(config, "sets_of"):
-        return config.sets_of(batch)
-    return [p for p in config.parameter_sets if p != "extended" or batch in config.diagnosed([batch])]
+    """Name of a batch's rig: the one that lists it, or its own; without rigs, all batches are one."""
+    return next((name for name, of in config.rigs.items() if batch in of), batch if config.rigs else "all")

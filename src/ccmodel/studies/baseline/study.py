@@ -12,6 +12,7 @@ from ccmodel.accuracy.comparison import GAINED, Change, Comparison, compare
 from ccmodel.accuracy.gate import summary
 from ccmodel.accuracy.history import read_history, rows_of
 from ccmodel.accuracy.measure import Simulated, measure
+from ccmodel.recording import ORIGIN
 from ccmodel.studies.baseline.figure import history_figure
 from ccmodel.studies.baseline.settings import AgainstBaseline
 from ccmodel.studies.loops.settings import Measuring
@@ -45,7 +46,8 @@ def judge(settings: AgainstBaseline, runs: Sequence[Run], measuring: Measuring) 
     }
     columns = [field.name for field in fields(Change)]
     table = pd.DataFrame([vars(change) for change in found.changes], columns=columns)
-    return Outcome([history_figure(history, present)], [table], content)
+    origins = {name: ORIGIN[batch.origin] for name, batch in batches.items()}
+    return Outcome([history_figure(history, present, origins)], [table], content)
 
 
 def simulated_of(runs: Sequence[Run]) -> list[Simulated]:
