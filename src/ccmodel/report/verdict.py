@@ -35,7 +35,7 @@ def sentence(diagnosis: Mapping) -> str:
         return f"The {model} agrees with the recordings within their noise; they show {nothing}."
     if verdict == "explained":
         claims = [f"{claim(m)}, confidence {m['confidence']:.2f}" for m in diagnosis["mechanisms"]]
-        return f"{'This has changed: ' if held else ''}{_capital('; and '.join(claims))}."
+        return _capital(f"{'this has changed: ' if held else ''}{'; and '.join(claims)}.")
     if verdict == "undecided":
         return _undecided(diagnosis, missing)
     place = place_in_words(diagnosis["location"]["place"])
@@ -117,7 +117,7 @@ def quantity(value: float, low: float, high: float, unit: str) -> tuple[str, str
     """
     factor, printed = _scale(value, unit)
     value, low, high = factor * value, factor * low, factor * high
-    reach = (high - low) / 2
+    reach = float(f"{(high - low) / 2:.3g}")  # without the rounding of binary numbers
     digits = min(-_exponent(reach), 3 - _exponent(value)) if reach > 0 else 2 - _exponent(value)
     digits = max(digits, 0)
     return f"{value:.{digits}f}{printed}", f"{low:.{digits}f} to {high:.{digits}f}{printed}"

@@ -8,10 +8,10 @@ from ccmodel.report.verdict import NOT_ACCEPTED, SYMBOL, joined, nearest_sentenc
 
 # Of the verdicts, in the order of the summary.
 MEANS = {
-    "explained": "explained: the missing physics is named",
-    "undecided": "undecided: the recordings do not tell the candidates apart",
-    "unexplained": "unexplained: no listed mechanism accounts for it",
-    "agrees": "agrees: no missing physics",
+    "explained": "missing physics named",
+    "undecided": "candidates not told apart",
+    "unexplained": "no listed mechanism fits",
+    "agrees": "",
 }
 # An error that is so many times the noise floor, in any channel, asks for a sentence under `agrees`.
 CONSPICUOUS = 1.5
@@ -96,11 +96,11 @@ def mechanisms_named(diagnoses: Sequence[Mapping]) -> list[str]:
 
 
 def after_is(diagnosis: Mapping) -> str:
-    """What the error after is that of; empty where it is no other model's."""
+    """The model whose error stands after that of the calibrated model; empty where there is none."""
     verdict, nearest = diagnosis["verdict"], diagnosis.get("nearest")
     if verdict == "unexplained":
-        return f"nearest model, {NOT_ACCEPTED}" if nearest and nearest.get("error") else ""
-    return {"explained": "extended model", "undecided": "most probable model"}.get(verdict, "")
+        return f"nearest ({NOT_ACCEPTED})" if nearest and nearest.get("error") else ""
+    return {"explained": "extended", "undecided": "most probable"}.get(verdict, "")
 
 
 def _rows(error: Mapping[str, Mapping], nearest: Mapping[str, Mapping] | None) -> list[dict]:
@@ -126,10 +126,10 @@ def caution(diagnosis: Mapping) -> str | None:
     above = [SYMBOL[c] for c, e in error.items() if e["before"] > CONSPICUOUS * e["noise"]]
     if diagnosis["verdict"] != "agrees" or not above:
         return None
+    square = diagnosis["fit"]["mean_square"]["calibrated"]
     return (
-        f"The error of {joined(above)} exceeds its noise floor. Over all channels and recordings the mean square of the"
-        f" whitened residuals is {diagnosis['fit']['mean_square']['calibrated']:.2g} (1 is noise), the differences"
-        " between runs that the noise floor leaves out being accounted for, and no candidate lowers it enough."
+        f"{joined(above)}: above the noise floor by differences between runs, which the verdict takes into account"
+        f" (mean square of the whitened residuals {square:.2g}; 1 is noise)."
     )
 
 
@@ -139,7 +139,11 @@ def overview(made: Sequence[Mapping]) -> list[str]:
     if not judged:
         return ["No batch has been diagnosed."] if made else []
     differing = [card for card in judged if card["verdict"] != "agrees"]
-    counts = [f"{n} {verdict}" for verdict in MEANS if (n := sum(c["verdict"] == verdict for c in judged))]
+    counts = [
+        f"{n} {verdict}{f' ({means})' if means else ''}"
+        for verdict, means in MEANS.items()
+        if (n := sum(c["verdict"] == verdict for c in judged))
+    ]
     of = "1 batch" if len(judged) == 1 else f"{len(judged)} batches"
     verb = "differs" if len(differing) == 1 else "differ"
     sentences = [
@@ -155,10 +159,10 @@ def overview(made: Sequence[Mapping]) -> list[str]:
 
 
 def _fall(of: Sequence[Mapping], model: str) -> str:
-    """How far the error of the worst channel falls: of one batch, or the median of several."""
-    before, after = (median(c["worst"][key] for c in of) for key in ("before", "after"))
-    over = f"batch {of[0]['batch']}" if len(of) == 1 else f"{len(of)} batches, median"
+    """How far the largest error of any channel falls: of one batch, or the median of several."""
+    before, after = (median(max(row[key] for row in card["rows"]) for card in of) for key in ("before", "after"))
+    over = f"batch {of[0]['batch']}" if len(of) == 1 else f"median of {len(of)} batches"
     return (
-        f"With the {model}, the worst channel's error on held-out recordings falls from {before:.1f} to {after:.1f}"
-        f" times the noise floor ({over})."
+        f"With the {model}, the largest held-out error of any channel falls from {before:.1f} to {after:.1f} times the"
+        f" noise floor ({over})."
     )

@@ -118,4 +118,4 @@ def _fall(diagnosis: Mapping) -> str:
     model = after_is(diagnosis)
     if not model:
         return f"{SYMBOL[worst]}: {before:.1f} times the noise"
-    return f"{SYMBOL[worst]}: {before:.1f} to {after:.1f} times the noise ({model})"
+    return f"{SYMBOL[worst]}: {before:.1f} to {after:.1f} times the noise (model: {model})"

@@ -65,7 +65,12 @@
   const styleOf = set => STYLES[set] ?? OTHER_STYLES[models().filter(m => !STYLES[m]).indexOf(set) % OTHER_STYLES.length];
   const scaled = (values, channel) => Array.from(values, v => v * settings.channels[channel].scale);
   const axisTitle = channel => `${settings.channels[channel].symbol} (${settings.channels[channel].unit})`;
-  const text = value => (Number.isFinite(value) ? Number(value.toPrecision(4)).toString() : "–");
+  // Four digits of the largest value of the channel, so that the digits stay in place under a moving pointer.
+  const text = (value, channel) => {
+    if (!Number.isFinite(value)) return "–";
+    const largest = run.sets[RECORDED][channel].reduce((most, v) => Math.max(most, Math.abs(v)), 0) * settings.channels[channel].scale;
+    return value.toFixed(Math.max(0, Math.min(6, 3 - Math.floor(Math.log10(largest || 1)))));
+  };
 
   const panels = () => settings.panels.filter(channel =>
     run.sets[RECORDED][channel] && (element("viewer-tensions").checked || !settings.tensions.includes(channel)));
@@ -79,16 +84,19 @@
   const lineOf = set => ({ ...styleOf(set), width: 1.5 });
   const base = { mode: "lines", type: "scatter", hoverinfo: "none", showlegend: false };
 
+  // Height of a panel, and distance from one to the next, as shares of a figure with so many rows.
+  const rowsOf = (count, gap = 0.16) => [(1 - gap) / (count - gap), 1 / (count - gap)];
+
   // Time series on the left and residuals on the right; on a narrow screen, residuals below their channel.
   const seriesFigure = width => {
     const narrow = width < NARROW;
     const channels = panels();
     const count = channels.length * (narrow ? 2 : 1);
-    const gap = 0.22 / count;
+    const [height, step] = rowsOf(count);
     const time = Array.from(run.time);
     const data = [];
     const layout = {
-      ...layoutBase(), height: count * ROW_HEIGHT + 60, hovermode: "x", hoverdistance: -1, spikedistance: -1,
+      ...layoutBase(), height: count * ROW_HEIGHT + 40, hovermode: "x", hoverdistance: -1, spikedistance: -1,
       xaxis: timeAxis(narrow ? [0, 1] : [0, 0.47], "y"),
     };
     if (!narrow) layout.xaxis2 = { ...timeAxis([0.55, 1], "y2"), matches: "x" };
@@ -97,9 +105,9 @@
       const names = [2 * k + 1, 2 * k + 2].map(n => (n === 1 ? "" : n));
       const columns = narrow ? ["x", "x"] : ["x", "x2"];
       names.forEach((name, side) => {
-        const top = 1 - rows[side] / count;
+        const top = 1 - rows[side] * step;
         layout[`yaxis${name}`] = {
-          domain: [top - 1 / count + gap, top], anchor: columns[side], automargin: true, zeroline: side === 1,
+          domain: [Math.max(0, top - height), top], anchor: columns[side], automargin: true, zeroline: side === 1,
           zerolinecolor: "#666", gridcolor: "#e6e6e6", nticks: 5,
           title: { text: (side ? "Δ " : "") + axisTitle(channel), font: { size: 11 }, standoff: 4 },
         };
@@ -152,10 +160,11 @@
     loops.forEach(([x, y], k) => {
       const name = k === 0 ? "" : k + 1;
       const [row, column] = [Math.floor(k / columns), k % columns];
-      const [wide, high] = [1 / columns, 1 / rows];
+      const wide = 1 / columns;
+      const [height, step] = rowsOf(rows, 0.2);
       const title = channel => ({ text: axisTitle(channel), font: { size: 11 }, standoff: 4 });
       layout[`xaxis${name}`] = { domain: [column * wide + (column ? 0.06 : 0), (column + 1) * wide - 0.02], anchor: `y${name}`, title: title(x), gridcolor: "#e6e6e6", zeroline: false };
-      layout[`yaxis${name}`] = { domain: [1 - (row + 1) * high + 0.16 / rows, 1 - row * high], anchor: `x${name}`, title: title(y), gridcolor: "#e6e6e6", zeroline: false };
+      layout[`yaxis${name}`] = { domain: [Math.max(0, 1 - row * step - height), 1 - row * step], anchor: `x${name}`, title: title(y), gridcolor: "#e6e6e6", zeroline: false };
       const axes = { xaxis: `x${name}`, yaxis: `y${name}`, customdata: keep };
       data.push({ ...base, ...axes, name: RECORDED, x: picked(RECORDED, x), y: picked(RECORDED, y), line: recordedLine });
       for (const set of shown()) {
@@ -263,7 +272,7 @@
     head.replaceChildren(header);
     body.replaceChildren(...[settings.input, ...panels()].filter(c => run.sets[RECORDED][c]).map(channel => {
       const row = document.createElement("tr");
-      const value = set => text((run.sets[set][channel]?.[at] ?? NaN) * settings.channels[channel].scale);
+      const value = set => text((run.sets[set][channel]?.[at] ?? NaN) * settings.channels[channel].scale, channel);
       row.append(cell("th", settings.channels[channel].symbol, { scope: "row", className: "t" }), cell("td", value(RECORDED)),
         ...shown().map(set => cell("td", value(set))), cell("td", settings.channels[channel].unit, { className: "t" }));
       return row;
@@ -308,8 +317,8 @@
     run = unpacked(await inflated(`viewer-run-${number}`));
     // The batch's own estimates and fits are of interest once a diagnosis has calibrated the model; until then they are all there is.
     hidden ??= new Set(run.sets.calibrated ? models().filter(set => !["calibrated", "extended", "nearest"].includes(set)) : ["estimated"]);
-    at = 0;
-    Object.assign(element("viewer-time"), { max: run.count - 1, value: 0 });
+    at = run.count >> 1;
+    Object.assign(element("viewer-time"), { max: run.count - 1, value: at });
     listModels();
     listPhases();
     await draw();
@@ -337,6 +346,15 @@
     matchMedia(`(max-width: ${NARROW}px)`).addEventListener("change", draw);
     await chooseRun(chooser.value);
   };
+
+  // A link of a card chooses the first recording of its batch.
+  document.addEventListener("click", event => {
+    const link = event.target.closest("a[data-batch]");
+    const group = link && [...element("viewer-run").children].find(one => one.dataset.batch === link.dataset.batch);
+    if (!group) return;
+    element("viewer-run").value = group.children[0].value;
+    element("viewer-run").dispatchEvent(new Event("change"));
+  });
 
   new IntersectionObserver((entries, observer) => {
     if (!entries.some(entry => entry.isIntersecting)) return;

@@ -4,6 +4,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
 from pathlib import Path
 
 import pandas as pd
@@ -161,8 +162,9 @@ def write_page(file: Path, content: Content) -> None:
     )  # fmt: skip
     environment.filters |= FILTERS
     environment.globals["asset"] = asset
+    verdicts = _verdicts(content)
     text = environment.get_template("report/page/page.html.j2").render(
-        **_verdicts(content), **_viewer(content), **_errors(content),
+        **verdicts, **_viewer(content, [card["batch"] for card in verdicts["cards"]]), **_errors(content),
         sections=_sections(content.studies), fits=content.fits, left_out=content.left_out, warnings=content.warnings,
         notes={_batch_of(b): b["batch"]["note"] for b in content.batches if b["batch"] and b["batch"].get("note")},
     )  # fmt: skip
@@ -203,12 +205,16 @@ def _section_of(report: str) -> str:
     return re.sub(r"<(/?)h([12])\b", lambda m: f"<{m[1]}h{int(m[2]) + 2}", main)
 
 
-def _viewer(content: Content) -> dict:
-    """Variables of the viewer's template."""
+def _viewer(content: Content, batches: Sequence[str]) -> dict:
+    """Variables of the viewer's template; `batches` is the order of the cards."""
+    order = {batch: k for k, batch in enumerate(batches)}
+    runs = sorted(content.runs, key=lambda run: order.get(run["batch"], len(order)))
+    runs = [run | {"number": k} for k, run in enumerate(runs)]
     return {
-        "viewer_runs": [run | {"number": k} for k, run in enumerate(content.runs)],
+        "viewer_runs": runs,
+        "viewer_batches": {batch: list(of) for batch, of in groupby(runs, key=lambda run: run["batch"])},
         "viewer_settings": as_json(viewer.settings()),
-        "viewer_library": viewer.library() if content.runs else "",
+        "viewer_library": viewer.library() if runs else "",
         "most_samples": viewer.MOST_SAMPLES,
     }
 
