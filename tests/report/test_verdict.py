@@ -67,7 +67,8 @@ def test_a_quantity_has_the_digits_that_its_interval_leaves(given, shown):
 def test_each_verdict_has_its_sentence():
     assert "confidence 0.97" in sentence(diagnosis("b", "explained"))
     assert "may be backlash at the load pulley (0.50)" in sentence(diagnosis("b", "undecided"))
-    assert sentence(diagnosis("b", "unexplained")).endswith("at the load pulley, and no listed mechanism explains it.")
+    unexplained = "Something is missing at the load pulley, and no listed mechanism explains it."
+    assert sentence(diagnosis("b", "unexplained")) == unexplained
     assert "no missing physics" in sentence(diagnosis("b", "agrees"))
     assert sentence(diagnosis("b", None)) == "Not diagnosed: no recording that can be used."
 
@@ -75,7 +76,12 @@ def test_each_verdict_has_its_sentence():
 def test_against_a_model_given_a_verdict_is_a_change():
     assert sentence(diagnosis("b", "explained", is_held=True)).startswith("This has changed: the load follows")
     assert "no change" in sentence(diagnosis("b", "agrees", is_held=True))
-    assert "has changed since" in sentence(diagnosis("b", "unexplained", is_held=True))
+    assert "Something has changed at the load pulley" in sentence(diagnosis("b", "unexplained", is_held=True))
+
+
+def test_all_possible_places_of_a_mismatch_are_said():
+    location = {"place": "load", "places": ["load", "load-pulley"], "channels": [], "phases": [], "text": ""}
+    assert "missing at the load or the load pulley, and" in sentence(diagnosis("b", "unexplained", location=location))
 
 
 def test_two_mechanisms_are_both_said_with_their_confidence():

@@ -29,7 +29,7 @@ def sentence(diagnosis: Mapping) -> str:
     if verdict is None:
         return f"Not diagnosed: {diagnosis['why']}."
     held = diagnosis["is_held"]
-    missing = "has changed since the model given was fitted" if held else "is missing in the model"
+    missing = "has changed" if held else "is missing"
     if verdict == "agrees":
         model, nothing = ("model given", "no change") if held else ("calibrated model", "no missing physics")
         return f"The {model} agrees with the recordings within their noise; they show {nothing}."
@@ -38,8 +38,15 @@ def sentence(diagnosis: Mapping) -> str:
         return _capital(f"{'this has changed: ' if held else ''}{'; and '.join(claims)}.")
     if verdict == "undecided":
         return _undecided(diagnosis, missing)
-    place = place_in_words(diagnosis["location"]["place"])
-    return f"Something {missing} at the {place}, and no listed mechanism explains it."
+    places = " or ".join(f"the {place_in_words(place)}" for place in possible_places(diagnosis))
+    return f"Something {missing} at {places}, and no listed mechanism explains it."
+
+
+def possible_places(diagnosis: Mapping) -> list[str]:
+    """Places of a mismatch: those of the mechanisms that are named or most likely, otherwise all that are possible."""
+    acting = [m["place"] for m in diagnosis["mechanisms"] or diagnosis["likeliest"]]
+    location = diagnosis["location"]
+    return list(dict.fromkeys(p for p in acting or location.get("places") or [location["place"]] if p))
 
 
 def _undecided(diagnosis: Mapping, missing: str) -> str:

@@ -4,7 +4,15 @@ from collections.abc import Mapping, Sequence
 from statistics import median
 
 from ccmodel.recording import ORIGIN
-from ccmodel.report.verdict import NOT_ACCEPTED, SYMBOL, joined, nearest_sentence, place_in_words, sentence
+from ccmodel.report.verdict import (
+    NOT_ACCEPTED,
+    SYMBOL,
+    joined,
+    nearest_sentence,
+    place_in_words,
+    possible_places,
+    sentence,
+)
 
 # Of the verdicts, in the order of the summary.
 MEANS = {
@@ -60,8 +68,8 @@ def _card(summary: Mapping, diagnoses: Mapping[str, Mapping]) -> dict:
         "nearest": nearest_sentence(diagnosis),
         "mechanisms": _mechanisms(diagnosis),
         "next": (diagnosis.get("next_experiment") or {}).get("text"),
-        "places": _places(diagnosis),
-        "place_text": joined([place_in_words(p) for p in _places(diagnosis)]),
+        "places": possible_places(diagnosis),
+        "place_text": joined([place_in_words(p) for p in possible_places(diagnosis)]),
         "rows": rows,
         "worst": rows[0],
         "longest": max(1.0, *(max(r["before"], r["after"] or 0.0) for r in rows)),
@@ -74,13 +82,6 @@ def _card(summary: Mapping, diagnoses: Mapping[str, Mapping]) -> dict:
 
 def _name(summary: Mapping) -> str:
     return summary["batch"]["batch"] if summary["batch"] else summary["folder"].rpartition("/")[2]
-
-
-def _places(diagnosis: Mapping) -> list[str]:
-    """Places that are lit: those of the mechanisms that are named or most likely, otherwise that of the mismatch."""
-    acting = diagnosis["mechanisms"] or diagnosis["likeliest"]
-    places = [m["place"] for m in acting] or [diagnosis["location"]["place"]]
-    return list(dict.fromkeys(p for p in places if p))
 
 
 def _mechanisms(diagnosis: Mapping) -> list[str]:

@@ -22,7 +22,15 @@ from ccmodel.mechanisms import catalogue
 from ccmodel.recording import ORIGIN
 from ccmodel.report.embedding import asset
 from ccmodel.report.figures import COLOURS, STYLE, legend_below
-from ccmodel.report.verdict import SYMBOL, headline, nearest_sentence, place_in_words, worst_channel
+from ccmodel.report.verdict import (
+    NOT_ACCEPTED,
+    SYMBOL,
+    headline,
+    nearest_sentence,
+    place_in_words,
+    possible_places,
+    worst_channel,
+)
 
 LOOPS = 3
 CANDIDATES = 8
@@ -58,7 +66,7 @@ def write_diagnosis(file: Path, found: Diagnosis, page: str | None = None) -> No
             page=page,
             headline=headline(report),
             nearest=nearest_sentence(report),
-            places=_lit(report),
+            places=possible_places(report),
             in_words=place_in_words,
             origin=ORIGIN[recording.origin],
             single_cable=recording.far_end is not None,
@@ -90,12 +98,6 @@ def _template(name: str) -> jinja2.Template:
     )
     environment.globals["asset"] = asset
     return environment.get_template(f"studies/diagnosis/{name}")
-
-
-def _lit(report: Mapping) -> list[str]:
-    """Places that are lit in the drawing of the rig."""
-    acting = report["mechanisms"] or report["likeliest"]
-    return [m["place"] for m in acting] or [p for p in [report["location"]["place"]] if p]
 
 
 def _map_in_words(errors: Mapping[str, Mapping[str, float]]) -> str:
@@ -204,6 +206,8 @@ def _loops(found: Diagnosis) -> Figure:
         models = [(j.calibrated, COLOURS[0], "--", _baseline(found.report))]
         if chosen[i] is not j.calibrated:
             models.append((chosen[i], COLOURS[1], "-", WITH_FOUND))
+        if found.report["nearest"]:
+            models.append((j.nearest, COLOURS[3], "-.", f"nearest model, {NOT_ACCEPTED}"))
         for fit, colour, line, label in models:
             model = observed.with_parameters(fit.held_out(i, w))
             ax.plot(theta, scale * model.modelled({})[c], color=colour, lw=1.0, ls=line, label=label)
