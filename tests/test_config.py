@@ -75,8 +75,81 @@ def test_a_study_of_what_no_diagnosis_finds_is_refused():
     with pytest.raises(ValueError, match=r"asks for parameters .extended.; there are estimated \["):
         Config.model_validate({"studies": study})
     config = Config.model_validate({"diagnose": ["a"], "studies": study})
-    with pytest.raises(InputError, match="studies.s: 'extended' parameters of b, which no one diagnoses"):
+    with pytest.raises(InputError, match=r"studies.s: there are no 'extended' parameters of b: not diagnosed"):
         expand_studies(config, ["a", "b"])
+
+
+BATCHES = ["a", "b", "c", "alone"]
+TWO_RIGS = {
+    "rigs": {"one": ["a", "b"], "two": ["c"]},
+    "fits": {
+        "fitted": {"batches": ["a"], "free": {"friction_coefficient": {"bounds": [0.01, 1]}}},
+        "apart": {"batches": "each", "free": {"friction_coefficient": {"bounds": [0.01, 1]}}},
+    },
+    "diagnose": ["c"],
+}
+
+
+def two_rigs(**changes):
+    return Config.model_validate(TWO_RIGS | changes, strict=False)
+
+
+def test_a_fit_is_used_for_the_batches_of_its_rig_only():
+    config = two_rigs()
+    of_diagnosis = ["calibrated", "extended", "nearest"]
+    assert {batch: config.sets_of(batch) for batch in BATCHES} == {
+        "a": ["estimated", "fitted", "apart"],
+        "b": ["estimated", "fitted", "apart"],
+        "c": ["estimated", "apart", *of_diagnosis],
+        "alone": ["estimated", "apart"],
+    }
+    assert two_rigs(rigs={}).sets_of("alone") == ["estimated", "fitted", "apart"]
+    assert config.parameter_sets == ["estimated", "fitted", "apart", *of_diagnosis]
+
+
+def test_a_study_takes_the_first_fit_of_the_rig_or_else_the_calibrated_model():
+    fits = {"fitted": TWO_RIGS["fits"]["fitted"]}
+    config = two_rigs(fits=fits, studies={"all": {"batches": BATCHES}}, accuracy={})
+    taken = [("", "fitted", "a"), ("", "fitted", "b"), ("", "calibrated", "c"), ("", "estimated", "alone")]
+    assert config.studies["all"].needs(config, config.studies, BATCHES) == taken
+    assert config.accuracy.needs(config, config.studies, BATCHES) == taken
+    of_rig = two_rigs(accuracy={"parameters": "fitted"})
+    assert of_rig.accuracy.needs(of_rig, {}, BATCHES) == taken[:2], "batches without the set are left out"
+
+
+@pytest.mark.parametrize(
+    "changes, text",
+    [
+        ({"rigs": {"one": ["a", "b"], "two": ["b"]}}, "rigs: batch 'b' is listed twice"),
+        ({"rigs": {"one": ["a", "d"]}}, "rigs.one: there is no batch 'd' in data/raw; there are a, b, c, alone"),
+        ({"diagnosing_by_batch": {"b": {"cycles": 2}}}, "diagnosing_by_batch: 'b' is not diagnosed"),
+        ({"diagnose": ["d"], "diagnosing_by_batch": {"d": {}}}, "diagnose: there is no batch 'd'"),
+        ({"diagnose": "each", "diagnosing_by_batch": {"d": {}}}, "diagnosing_by_batch: there is no batch 'd'"),
+        ({"fits": {"f": TWO_RIGS["fits"]["fitted"] | {"batches": ["a", "c"]}}}, "fits.f: a, c are not of one rig"),
+        (
+            {"studies": {"s": {"batches": ["a", "c"], "parameters": "fitted"}}},
+            "studies.s: there are no 'fitted' parameters of c: of another rig",
+        ),
+        *(
+            ({"fits": {name: TWO_RIGS["fits"]["fitted"]}}, f"fits.{name}: '{name}' names .*call the fit something else")
+            for name in ("estimated", "calibrated", "extended", "nearest")
+        ),
+    ],
+)
+def test_rigs_and_names_that_do_not_fit_are_refused(changes, text):
+    with pytest.raises((ValueError, InputError), match=text):
+        expand_studies(two_rigs(**changes), BATCHES)
+
+
+def test_a_batch_has_the_settings_of_all_but_for_its_own():
+    config = two_rigs(
+        diagnose="each",
+        diagnosing={"tolerance": 0.02, "cycles": 2},
+        diagnosing_by_batch={"c": {"tolerance": {"tau_in_Nm": 0.1}, "step_s": 0.04}},
+    )
+    assert config.diagnosing_of("a") == config.diagnosing
+    own = config.diagnosing_of("c")
+    assert (own.tolerance, own.step_s, own.cycles) == ({"tau_in_Nm": 0.1}, 0.04, 2)
 
 
 def test_a_study_cannot_have_the_name_of_a_judgement():

@@ -73,7 +73,7 @@ def _method(plan: RealPlan, baseline: Path) -> str:
 have the digest {tolerance["diagnosis"]}.
 
 - **Recordings**: `{plan.batch}` of MRDLab/mis-tool-characterization, a da Vinci grasper ([the
-  instrument](real-instrument.md)). They are measured and not part of the repository.
+  instrument](real-instrument.md)). They are measured.
 - **Faults**: one at a time, computed on the raw counts and seeded in all test recordings alike. Fault and size are
   drawn from a seed ([ranges and sources](../proof/real/plan.yaml)).
 - **Isolation**: the diagnosis runs in a process that can reach only a copy of the batch and the baseline. No answer is

@@ -60,11 +60,14 @@ def check(batch: Folder) -> None:
 def import_mis_tool(
     source: Folder,
     out: Annotated[Path, typer.Option(help="Folder for the batches, one for each tool and angle.")],
+    batch: Annotated[
+        str | None, typer.Option(help="Convert one folder of trials to the batch of this name, and keep all others.")
+    ] = None,
 ) -> None:
     """Convert the public da Vinci instrument recordings in SOURCE to batches."""
     from ccmodel.rig import mis_tool
 
-    imported = mis_tool.import_mis_tool(source, out)
+    imported = mis_tool.import_batch(source, out / batch) if batch else mis_tool.import_mis_tool(source, out)
     for batch in imported.batches:
         typer.echo(str(batch))
     for finding in imported.findings:

@@ -10,14 +10,13 @@ from ccmodel.rig.batch import valid_name
 from ccmodel.steps.settings import Fit
 from ccmodel.studies.accuracy.settings import Accuracy
 from ccmodel.studies.claims.settings import Claims
-from ccmodel.studies.diagnosis.settings import Diagnosing
+from ccmodel.studies.diagnosis.settings import MODEL_FILES, Diagnosing
 from ccmodel.studies.loops.settings import Measuring, Study
 from ccmodel.studies.phases.settings import PhaseExample
 from ccmodel.studies.settings import EACH, StudySettings
 from ccmodel.typed import InputError, TypedModel, load_yaml_model
 
 ESTIMATED = "estimated"
-EXTENDED = "extended"
 
 
 class Config(TypedModel):
@@ -27,10 +26,21 @@ class Config(TypedModel):
 
     raw: str = Field("data/raw", description="folder with a folder a batch")
     results: str = Field("results", description="folder for all that the run makes")
+    rigs: dict[str, list[str]] = Field(
+        default_factory=dict,
+        description="batches of one rig, by its name: fits of these are used for these only; a batch that is not listed"
+        " is a rig of its own; absent: all batches are one rig",
+    )
     diagnose: list[str] | Literal["each"] = Field(
         default_factory=list, description="batches to diagnose: what differs from the model, and why; or 'each'"
     )
     diagnosing: Diagnosing = Field(default_factory=Diagnosing, description="how finely these are looked at")
+    diagnosing_by_batch: dict[str, Diagnosing] = Field(
+        default_factory=dict, description="settings of a batch that differ from 'diagnosing'"
+    )
+    concealed: str | None = Field(
+        None, description="file with what simulated rigs have, which the page alone reads, after all verdicts"
+    )
     fits: dict[str, Fit] = Field(default_factory=dict, description="parameter sets fitted to recordings")
     studies: dict[str, Study] = Field(default_factory=dict, description="figures")
     measuring: Measuring = Field(default_factory=Measuring, description="how loops are measured")
@@ -40,9 +50,20 @@ class Config(TypedModel):
 
     @model_validator(mode="after")
     def _names_known(self):
-        for name, means in ((ESTIMATED, "the batches' own estimates"), (EXTENDED, "the models of the diagnoses")):
-            if name in self.fits:
-                raise ValueError(f"'{name}' names {means}; call the fit something else")
+        means = {ESTIMATED: "the batches' own estimates"} | dict.fromkeys(MODEL_FILES, "models of the diagnoses")
+        for name in self.fits:
+            if name in means:
+                raise ValueError(f"fits.{name}: '{name}' names {means[name]}; call the fit something else")
+        listed = [batch for batches in self.rigs.values() for batch in batches]
+        for batch in listed:
+            if listed.count(batch) > 1:
+                raise ValueError(f"rigs: batch '{batch}' is listed twice; a batch belongs to one rig")
+        for name, fit in self.fits.items():
+            if fit.batches != EACH and not all(self.same_rig(fit.batches[0], batch) for batch in fit.batches):
+                raise ValueError(f"fits.{name}: {', '.join(fit.batches)} are not of one rig (see 'rigs')")
+        for batch in self.diagnosing_by_batch:
+            if not self.diagnosed([batch]):
+                raise ValueError(f"diagnosing_by_batch: '{batch}' is not diagnosed; name it in 'diagnose'")
         if taken := self.studies.keys() & self.judgements.keys():
             raise ValueError(f"studies.{min(taken)}: that is the name of another study; call it something else")
         named = {f"study '{name}'": study for name, study in self.studies.items()}
@@ -58,16 +79,34 @@ class Config(TypedModel):
 
     @property
     def parameter_sets(self) -> list[str]:
-        """The batches' own estimates, the fits, and, where batches are diagnosed, the models of their diagnoses."""
-        return [ESTIMATED, *self.fits, *([EXTENDED] if self.diagnose else [])]
+        """All parameter sets; not every batch has each (`sets_of`)."""
+        return [ESTIMATED, *self.fits, *(MODEL_FILES if self.diagnose else [])]
 
-    def parameters_of(self, study: StudySettings) -> str:
-        """Name of the parameter set that a study is made with: its own or, without one, the first fit's."""
-        return study.parameters or self.parameter_sets[min(1, len(self.fits))]
+    def sets_of(self, batch: str) -> list[str]:
+        """Parameter sets of a batch: its own estimates, the fits of its rig and the models of its diagnosis."""
+        fits = [n for n, f in self.fits.items() if f.batches == EACH or any(self.same_rig(batch, b) for b in f.batches)]
+        return [ESTIMATED, *fits, *(MODEL_FILES if self.diagnosed([batch]) else [])]
+
+    def parameters_of(self, study: StudySettings, batch: str) -> str:
+        """Name of the parameter set that a study takes for a batch.
+
+        The study's own; without one, the first fit of the batch's rig, or the calibrated model of its diagnosis, or its
+        estimates.
+        """
+        return study.parameters or self.sets_of(batch)[:2][-1]
+
+    def same_rig(self, one: str, other: str) -> bool:
+        """Whether two batches were recorded on the same rig."""
+        return not self.rigs or one == other or any({one, other} <= set(batches) for batches in self.rigs.values())
 
     def diagnosed(self, batches: list[str]) -> list[str]:
-        """Batches that are diagnosed, out of all."""
-        return batches if self.diagnose == EACH else self.diagnose
+        """Batches that are diagnosed, out of these."""
+        return [batch for batch in batches if self.diagnose == EACH or batch in self.diagnose]
+
+    def diagnosing_of(self, batch: str) -> Diagnosing:
+        """Settings of a batch's diagnosis."""
+        own = self.diagnosing_by_batch.get(batch, Diagnosing())
+        return self.diagnosing.model_copy(update={name: getattr(own, name) for name in own.model_fields_set})
 
 
 def load_config(path: Path) -> Config:
@@ -103,21 +142,27 @@ def expand_studies(config: Config, batches: list[str]) -> dict[str, Study]:
     Raises
     ------
     InputError
-        If a study, a fit or the list of diagnoses names a batch that is not there.
+        If a study or another section names a batch that is not there, or a study a parameter set that one of its
+        batches does not have.
     """
     stated = {f"studies.{name}": study.batches for name, study in config.studies.items()}
     stated |= {f"fits.{name}": fit.batches for name, fit in config.fits.items()}
-    for where, named in (stated | {"diagnose": config.diagnose}).items():
+    stated |= {f"rigs.{name}": named for name, named in config.rigs.items()}
+    stated |= {"diagnose": config.diagnose, "diagnosing_by_batch": list(config.diagnosing_by_batch)}
+    for where, named in stated.items():
         for batch in [] if named == EACH else named:
             if batch not in batches:
                 raise InputError(
                     f"{where}: there is no batch '{batch}' in {config.raw}; there are {', '.join(batches)}"
                 )
-    diagnosed, expanded = config.diagnosed(batches), {}
+    expanded = {}
     for name, study in config.studies.items():
         wanted = batches if study.batches == EACH else study.batches
-        if study.parameters == EXTENDED and (missing := [b for b in wanted if b not in diagnosed]):
-            raise InputError(f"studies.{name}: '{EXTENDED}' parameters of {', '.join(missing)}, which no one diagnoses")
+        if missing := [batch for batch in wanted if config.parameters_of(study, batch) not in config.sets_of(batch)]:
+            why = "not diagnosed" if study.parameters in MODEL_FILES else "of another rig than the fit's"
+            raise InputError(
+                f"studies.{name}: there are no '{study.parameters}' parameters of {', '.join(missing)}: {why}"
+            )
         title = study.title or name
         copies = {name: {"title": title}}
         if study.batches == EACH:

@@ -127,9 +127,40 @@ def test_what_a_diagnosis_found_is_one_more_set_of_parameters(copy):
     nearest = json.loads((results / "diagnoses/tiny/nearest.json").read_text())
     assert nearest == {"succeeded": False, "message": "verdict 'agrees': the diagnosis has no nearest model"}
     errors = pd.read_parquet(results / "tables/errors.parquet")
-    assert set(errors["parameters"]) == {"estimated", "fitted", "extended"}
+    assert set(errors["parameters"]) == {"estimated", "fitted", "calibrated", "extended"}
     by_set = errors[errors["channel"] == "tau_in_Nm"].groupby("parameters", observed=True)["rmse"].mean()
-    assert by_set["extended"] < 0.2 * by_set["estimated"]
+    assert by_set["extended"] == by_set["calibrated"] < 0.2 * by_set["estimated"]
+    assert read_recordings(results / "simulated/nearest/tiny.nc") == []
+    assert json.loads((results / "simulated/nearest/tiny.json").read_text()) == {"failures": []}
+
+
+def planned(folder: Path) -> set[str]:
+    """Messages of the jobs that would run for a batch."""
+    lines = snakemake(folder, "--dry-run").stdout.splitlines()
+    return {line.split(": ", 1)[1] for line in lines if line.startswith("Job ") and " batch " in line}
+
+
+def test_a_rig_has_its_own_fits_and_a_batch_its_own_settings(copy):
+    write_batch(copy / "data/raw/other", pretensions=(5.0,))
+    config = yaml.safe_load((copy / "config.yaml").read_text())
+    config |= {"rigs": {"one": ["tiny"], "two": ["other"]}, "diagnose": "each"}
+    config["diagnosing_by_batch"] = {"other": {"tolerance": 0.02, "step_s": 0.1}}
+    (copy / "config.yaml").write_text(yaml.safe_dump(config))
+    sets = ("estimated", "calibrated", "extended", "nearest")
+    simulated = {f"Running the model on batch other with parameters '{name}'" for name in sets}
+    of_other = {message for message in planned(copy) if "batch other" in message}
+    assert of_other == {"Reading batch other", "Diagnosing batch other"} | simulated, "and no fit of the other rig"
+    assert snakemake(copy).returncode == 0
+    config["diagnosing_by_batch"]["other"]["step_s"] = 0.2
+    (copy / "config.yaml").write_text(yaml.safe_dump(config))
+    again = planned(copy)
+    assert "Diagnosing batch other" in again
+    assert not [message for message in again if "batch tiny" in message]
+    errors = pd.read_parquet(copy / "results/tables/errors.parquet")
+    assert {b: set(t["parameters"]) - {"nearest"} for b, t in errors.groupby("batch")} == {
+        "tiny": {"estimated", "fitted", "calibrated", "extended"},
+        "other": {"estimated", "calibrated", "extended"},
+    }
 
 
 def test_the_papers_simulated_figures_stand_under_a_heading_of_their_own(finished):

@@ -1,3 +1,4 @@
+import gzip
 import json
 import lzma
 import os
@@ -5,17 +6,22 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 
 from ccmodel.rig.ingest import ingest_batch
-from ccmodel.rig.mis_tool import import_mis_tool
+from ccmodel.rig.mis_tool import import_batch, import_mis_tool
 from ccmodel.typed import InputError
 
 NM_PER_COUNT = 3.9811e-5  # stated by the data set
 EXCERPT = Path(__file__).parent / "data/Tool_4_Maryland_L_Pitch_1/113.TXT.xz"
+ROOT = Path(__file__).parents[2]
+SHIPPED = ROOT / "data/raw/da-vinci"
 # Folder of the whole public data set, as for `make real DATA=path`.
-DATA = os.environ.get("MIS_TOOL_DATA")
+SHARED = ROOT.parent / "shared/real/mis-tool-characterization/data"
+DATA = os.environ.get("MIS_TOOL_DATA") or (str(SHARED) if SHARED.is_dir() else None)
+WHY_NO_DATA = f"no mis-tool-characterization data: MIS_TOOL_DATA does not name them, and {SHARED} is not there"
 HEADER = "%Data taken by somebody\n%Freq_Hz=0.99\n%Back-end Time [ms], Back-end CUI Encoder [counts]\n"
 
 
@@ -177,6 +183,83 @@ def test_an_import_replaces_nothing_else(tmp_path):
         import_mis_tool(tmp_path / "tool", tmp_path / "tool/00.TXT")
 
 
+def test_one_folder_becomes_a_batch_beside_others(tmp_path):
+    write(tmp_path / "raw/mine", "batch.yaml", "format: 1\n")
+    write(tmp_path / "Tool 9", "00.TXT", text(trial()))
+    out = tmp_path / "raw/da-vinci"
+    (batch,) = import_batch(tmp_path / "Tool 9", out).batches
+    assert batch == out and ingest_batch(out).findings == [], "licence and source are no logs"
+    assert ingest_batch(out).batch.batch == "da-vinci"
+    assert sorted(p.name for p in out.iterdir()) == ["LICENSE", "SOURCE.md", "batch.yaml", "trial-00.csv.gz"]
+    assert "folder `Tool 9` of" in (out / "SOURCE.md").read_text()
+    write(tmp_path / "Tool 9", "01.TXT", text(trial(seed=1)))
+    import_batch(tmp_path / "Tool 9", out)
+    assert len(ingest_batch(out).recordings) == 2
+    assert sorted(p.name for p in out.parent.iterdir()) == ["da-vinci", "mine"]
+
+
+def test_one_batch_is_made_of_one_folder_and_replaces_nothing_else(tmp_path):
+    write(tmp_path / "raw/mine", "batch.yaml", "format: 1\n")
+    write(tmp_path / "set/tool", "00.TXT", text(trial()))
+    for source, name, said in (
+        (tmp_path / "set/tool", "mine", "mine: would be replaced, but is from no import"),
+        (tmp_path / "set", "new", "has trials in tool; a batch is made of one folder"),
+        (tmp_path / "set/tool", "a batch", "a batch's name is letters"),
+        (tmp_path / "raw", "new", "no trial found"),
+    ):
+        with pytest.raises(InputError, match=said):
+            import_batch(source, tmp_path / "raw" / name)
+    assert [p.name for p in (tmp_path / "raw").iterdir()] == ["mine"]
+
+
+def test_no_sample_and_no_count_of_a_trial_is_lost(tmp_path):
+    """The diagnosis reconstructs the motion from the times of the encoder's counts: they stay as they were recorded."""
+    samples = trial(seconds=8.0)
+    write(tmp_path / "tool", "00.TXT", text(samples))
+    (batch,) = import_mis_tool(tmp_path / "tool", tmp_path / "raw").batches
+    log = pd.read_csv(batch / "trial-00.csv.gz")
+    columns = ["time_s", "drive_encoder_counts", "drive_torque_counts", "load_encoder_counts", "load_torque_counts"]
+    assert log[columns].to_numpy() == pytest.approx(samples[:, [0, 1, 2, 4, 5]], abs=1e-9)
+
+
+def test_the_shipped_recordings_have_licence_and_source():
+    licence, source = (SHIPPED / name for name in ("LICENSE", "SOURCE.md"))
+    for said in (
+        "Open Database License (ODbL) 1.0",
+        "https://opendatacommons.org/licenses/odbl/1-0/",
+        "Database Contents License (DbCL) 1.0",
+        "under the same licence",
+    ):
+        assert said in licence.read_text()
+    for said in ("10.1109/LRA.2018.2849862", "MRDLab/mis-tool-characterization", "Tool_4_Maryland_L_2", "changed"):
+        assert said in source.read_text()
+    assert sum(f.stat().st_size for f in SHIPPED.iterdir()) < 4e6
+
+
+def test_the_shipped_recordings_are_measured_and_without_a_finding():
+    ingested = ingest_batch(SHIPPED)
+    assert ingested.findings == []
+    conditions = {(round(r.excitation["frequency_Hz"], 1), r.excitation["load_level"]) for r in ingested.recordings}
+    assert conditions == {(f, level) for f in (0.1, 0.2, 0.3, 0.4, 0.5) for level in (0.1, 0.2, 0.3, 0.4)}
+    for recording in ingested.recordings:
+        assert recording.origin == "rig"
+        assert recording.time_s[-1] > 19 and np.median(np.diff(recording.time_s)) == pytest.approx(1e-3)
+        assert set(recording.channels) == {"theta_in_rad", "theta_out_rad", "tau_in_Nm", "tau_out_Nm"}
+
+
+@pytest.mark.skipif(DATA is None, reason=WHY_NO_DATA)
+def test_the_shipped_recordings_are_those_of_the_data_set(tmp_path):
+    (trial_file,) = Path(DATA).rglob("Tool_4_Maryland_L_2/00.TXT")
+    import_batch(trial_file.parent, tmp_path / "da-vinci")
+    assert sorted(p.name for p in (tmp_path / "da-vinci").iterdir()) == sorted(p.name for p in SHIPPED.iterdir())
+    for file in SHIPPED.iterdir():
+        made = tmp_path / "da-vinci" / file.name
+        if file.suffix == ".gz":  # not the compressed bytes: they depend on the version of zlib
+            assert gzip.decompress(made.read_bytes()) == gzip.decompress(file.read_bytes()), file.name
+        else:
+            assert made.read_bytes() == file.read_bytes(), file.name
+
+
 def test_signs_in_doubt_are_findings(tmp_path):
     samples = trial()
     samples[:, 5] = np.random.default_rng(0).normal(0, 10, len(samples)).round()
@@ -226,9 +309,7 @@ def test_a_real_trial(tmp_path):
     check_real_trial(tmp_path / "tool", tmp_path / "raw", 0.5, 0.8)
 
 
-@pytest.mark.skipif(
-    DATA is None, reason="MIS_TOOL_DATA does not name the mis-tool-characterization data (as DATA does for `make real`)"
-)
+@pytest.mark.skipif(DATA is None, reason=WHY_NO_DATA)
 @pytest.mark.parametrize(
     ("folder", "name", "frequency", "level"),
     [

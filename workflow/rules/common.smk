@@ -7,12 +7,12 @@ from snakemake.exceptions import WorkflowError
 from ccmodel.config import (
     EACH,
     ESTIMATED,
-    EXTENDED,
     batches_in,
     expand_studies,
     load_config,
 )
 from ccmodel.provenance import files_in, source_digest
+from ccmodel.studies.diagnosis.settings import MODEL_FILES
 from ccmodel.typed import InputError
 
 try:
@@ -45,22 +45,22 @@ def simulated_of(parameters, batch):
 
 
 def fit_of(parameters, batch):
-    """File with the parameters of a batch: its own fit, the shared one, or the model of its diagnosis; "" for its estimates."""
+    """File with the parameters of a batch: its own fit, its rig's, or a model of its diagnosis; "" for its estimates."""
     if parameters == ESTIMATED:
         return ""
-    if parameters == EXTENDED:
-        return f"{RESULTS}/diagnoses/{batch}/model.json"
+    if parameters in MODEL_FILES:
+        return f"{RESULTS}/diagnoses/{batch}/{MODEL_FILES[parameters]}"
     scope = batch if CONFIG.fits[parameters].batches == EACH else "shared"
     return f"{RESULTS}/fits/{parameters}/{scope}.json"
 
 
 def runs():
     """Every parameter set and batch that are simulated."""
-    diagnosed = CONFIG.diagnosed(BATCHES)
     return [
-        (p, b)
-        for p in CONFIG.parameter_sets
-        for b in (diagnosed if p == EXTENDED else BATCHES)
+        (parameters, batch)
+        for parameters in CONFIG.parameter_sets
+        for batch in BATCHES
+        if parameters in CONFIG.sets_of(batch)
     ]
 
 

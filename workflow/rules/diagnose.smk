@@ -18,7 +18,9 @@ rule diagnose:
         mem_mb=2000,
         runtime=240,
     params:
-        settings=CONFIG.diagnosing.model_dump_json(),
+        settings=lambda wildcards: CONFIG.diagnosing_of(
+            wildcards.batch
+        ).model_dump_json(),
         sources=source_digest("ccmodel.studies.diagnosis.run"),
     message:
         "Diagnosing batch {wildcards.batch}"

@@ -27,7 +27,7 @@ rule tabulate_errors:
 rule write_report:
     input:
         errors=f"{RESULTS}/tables/errors.parquet",
-        fits=sorted({fit_of(p, batch) for p in CONFIG.fits for batch in BATCHES}),
+        fits=sorted({fit_of(p, batch) for p, batch in runs() if p in CONFIG.fits}),
         summaries=[f"{RESULTS}/recordings/{batch}.json" for batch in BATCHES],
         simulations=[
             simulated_of(p, batch).removesuffix(".nc") + ".json" for p, batch in runs()
@@ -43,7 +43,7 @@ rule write_report:
             for batch in CONFIG.diagnosed(BATCHES)
         ],
         # Read here alone, after all verdicts.
-        concealed=getattr(CONFIG, "concealed", None) or [],
+        concealed=CONFIG.concealed or [],
         figures=[figure for name in STUDIES for figure in figures(name, "png")],
         tables=[table for name in STUDIES for table in tables(name)],
     output:
@@ -69,8 +69,8 @@ rule write_report:
                 "name": name,
                 "heading": study.heading,
                 "settings": study.model_dump(mode="json"),
-                "parameters": (
-                    CONFIG.parameters_of(study) if hasattr(study, "parameters") else ""
+                "parameters": " and ".join(
+                    sorted({p for _, p, _ in study.needs(CONFIG, LOOPS, BATCHES)})
                 ),
             }
             | ({"summary": tables(name)[-1]} if study.tables else {})

@@ -1,7 +1,8 @@
 """Files that the steps exchange: recordings of a batch, its summary, fits and simulations."""
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from math import inf
 from pathlib import Path
 
 import pandas as pd
@@ -41,7 +42,7 @@ class Fitted:
     parameters : Parameters or None
         None for a refused batch, a failed fit or a batch that could not be diagnosed.
     sds : dict of str to float
-        Standard deviations of the fitted parameters, where they are known.
+        Standard deviations of the fitted parameters; infinite for those of a diagnosis, which states none.
     recordings : list of str
         Names (batch/id) of the recordings that they were fitted to.
     """
@@ -58,7 +59,10 @@ def fitted(recordings_file: Path, fit_file: Path | None) -> Fitted:
         return Fitted(estimates)
     result = read_json(fit_file)
     if "parameters" in result:
-        return Fitted(read_model(fit_file), recordings=[f"{r.batch}/{r.id}" for r in read_recordings(recordings_file)])
+        model = read_model(fit_file)
+        names = [f.name for f in fields(model) if getattr(model, f.name) != getattr(estimates, f.name)]
+        sds = dict.fromkeys([name for name in names if name != "mechanisms"], inf)
+        return Fitted(model, sds, [f"{r.batch}/{r.id}" for r in read_recordings(recordings_file)])
     if not result["succeeded"]:
         return Fitted(None)
     sds = {name: interval["sd"] for name, interval in result.get("intervals", {}).items()}

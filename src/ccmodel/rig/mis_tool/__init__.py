@@ -6,9 +6,9 @@ doi 10.1109/LRA.2018.2849862; data under the Open Database License 1.0.
 
 Every folder of trials becomes a batch. The spindle is the drive pulley, the jaw the load pulley; angle and torque were
 measured at both, nothing between them. `trial` reads a file, `signs` derives the signs of the sensors, `description`
-writes `batch.yaml` and the logs, `importing` converts the whole data set.
+writes `batch.yaml`, the logs, licence and source, `importing` converts the whole data set or one folder of it.
 """
 
-from ccmodel.rig.mis_tool.importing import Imported, import_mis_tool
+from ccmodel.rig.mis_tool.importing import Imported, import_batch, import_mis_tool
 
-__all__ = ["Imported", "import_mis_tool"]
+__all__ = ["Imported", "import_batch", "import_mis_tool"]

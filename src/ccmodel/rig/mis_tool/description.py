@@ -1,8 +1,9 @@
-"""`batch.yaml` and the logs of an imported instrument."""
+"""The files of an imported instrument: `batch.yaml`, the logs, licence and source."""
 
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from string import Template
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +14,14 @@ from ccmodel.rig.mis_tool.trial import SETTLED_S, Trial
 
 # The constants of all instruments, with their sources.
 INSTRUMENT = Path(__file__).with_name("instrument.yaml")
+# Notice of the licence, and citation with what the import changes: beside every batch that is derived of the data set.
+LICENSE, SOURCE = (Path(__file__).with_name(name) for name in ("LICENSE", "SOURCE.md"))
 PRETENSION_N, CONDUIT = 10.0, {"length_m": 0.5, "bend_rad": 6.2832}
 LOGGED = ["time_s", "drive_encoder_counts", "load_encoder_counts", "drive_torque_counts", "load_torque_counts"]
 
 
 def write_batch(folder: Path, trials: Mapping[str, Trial], signs: Mapping[str, Mapping]) -> None:
-    """Write a new folder with the logs of trials, by recording id, and their `batch.yaml`."""
+    """Write a new folder with the logs of trials, by recording id, their `batch.yaml`, licence and source."""
     folder.mkdir()
     yaml = YAML()
     yaml.width = 120
@@ -30,11 +33,14 @@ def write_batch(folder: Path, trials: Mapping[str, Trial], signs: Mapping[str, M
         _write_log(folder / f"{name}.csv.gz", trial)
         described["recordings"].append(_recording(name, trial))
     yaml.dump(described, folder / "batch.yaml")
+    source = next(iter(trials.values())).file.resolve().parent.name
+    (folder / SOURCE.name).write_text(Template(SOURCE.read_text("utf-8")).substitute(folder=source), "utf-8")
+    (folder / LICENSE.name).write_text(LICENSE.read_text("utf-8"), "utf-8")
 
 
 def _write_log(path: Path, trial: Trial) -> None:
-    # Without a time stamp, so that a trial always gives the same file; at the fastest compression.
-    compression = {"method": "gzip", "compresslevel": 1, "mtime": 0}
+    # Without a time stamp, so that a trial always gives the same file.
+    compression = {"method": "gzip", "compresslevel": 9, "mtime": 0}
     table = trial.samples[LOGGED].round({"time_s": 6}).convert_dtypes()
     table.to_csv(path, index=False, compression=compression)
 

@@ -1,11 +1,14 @@
-"""Conversion of the data set: every folder of trials to the folder of a batch."""
+"""Conversion of the data set, or of one of its folders: a folder of trials becomes the folder of a batch."""
 
 import json
 import re
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from ccmodel.rig.batch import valid_name
 from ccmodel.rig.findings import Finding, LogError
 from ccmodel.rig.mis_tool.description import write_batch
 from ccmodel.rig.mis_tool.signs import sensor_signs
@@ -53,55 +56,111 @@ def import_mis_tool(source: Path, out: Path) -> Imported:
     InputError
         If `source` is not a folder or has no trial, or `out` has other files than those of an import.
     """
-    source, out = Path(source), Path(out).resolve()
-    if not source.is_dir():
-        raise InputError(f"{source}: there is no such folder; give the mis-tool-characterization data set's folder")
-    _check_replaceable(out)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    # In the parent of `out`, since a folder can only be renamed within a file system.
-    with tempfile.TemporaryDirectory(prefix=".import-", dir=out.parent) as work:
-        fresh = Path(work) / "fresh"
-        fresh.mkdir()
-        names, findings = _import_into(fresh, source)
-        if out.exists():
-            out.rename(Path(work) / "earlier")
-        fresh.rename(out)
-    return Imported([out / name for name in names], findings)
-
-
-def _check_replaceable(out: Path) -> None:
-    """Refuse a folder that has other files than those of an earlier import."""
+    out = Path(out).resolve()
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is no folder; give a new or empty one")
     for entry in sorted(out.iterdir()) if out.exists() else []:
-        description = entry / "batch.yaml"
-        imported = description.is_file() and DOI in description.read_text(encoding="utf-8", errors="replace")
-        if not imported and entry.name != FINDINGS:
+        if not _is_imported(entry) and entry.name != FINDINGS:
             raise InputError(
                 f"{out}: would be replaced, but {entry.name} is from no import; give a new or empty folder"
             )
+    files = _text_files(source)
+    with _replacing(out) as fresh:
+        fresh.mkdir()
+        names, findings = _import_into(fresh, files)
+        if not names:
+            raise _no_trial(source, files)
+        (fresh / FINDINGS).write_text(json.dumps([asdict(f) for f in findings], indent=1) + "\n", encoding="utf-8")
+    return Imported([out / name for name in names], findings)
 
 
-def _import_into(out: Path, source: Path) -> tuple[list[str], list[Finding]]:
-    """Write the batches and the findings; return the names of the batches and the findings."""
-    files = sorted(f for f in source.rglob("*") if f.suffix.lower() == ".txt" and f.is_file())
+def import_batch(source: Path, out: Path) -> Imported:
+    """Convert one folder of trials to the batch folder `out`; what else is beside it stays.
+
+    Parameters
+    ----------
+    source : Path
+        One folder of trials of the data set.
+    out : Path
+        Folder of the batch. The result of an earlier import is replaced, and only if this import succeeds.
+
+    Returns
+    -------
+    Imported
+        The batch's folder, and the findings.
+
+    Raises
+    ------
+    InputError
+        If `source` is not a folder, has no trial or has folders of trials in it, or `out` is no imported batch.
+    """
+    out = Path(out).resolve()
+    if not valid_name(out.name):
+        raise InputError(f"{out.name}: a batch's name is letters, digits and -_.+=,@ only")
+    if out.exists() and not _is_imported(out):
+        raise InputError(f"{out}: would be replaced, but is from no import; choose another name for the batch")
+    files = _text_files(source)
+    if inner := {f.parent for f in files} - {Path(source)}:
+        raise InputError(f"{source}: has trials in {min(inner).name}; a batch is made of one folder of trials, name it")
+    with _replacing(out) as fresh:
+        findings = _import_folder(files, fresh, out.name)
+        if not fresh.exists():
+            raise _no_trial(source, files)
+    return Imported([out], findings)
+
+
+def _is_imported(folder: Path) -> bool:
+    """Whether a folder is a batch that an import wrote."""
+    description = folder / "batch.yaml"
+    return description.is_file() and DOI in description.read_text(encoding="utf-8", errors="replace")
+
+
+@contextmanager
+def _replacing(out: Path) -> Iterator[Path]:
+    """A place for a new folder, which takes the place of `out` at the end if nothing was raised."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    # In the parent of `out`, since a folder can only be renamed within a file system.
+    with tempfile.TemporaryDirectory(prefix=".import-", dir=out.parent) as work:
+        fresh = Path(work) / out.name
+        yield fresh
+        if out.exists():
+            out.rename(Path(work) / f"earlier-{out.name}")
+        fresh.rename(out)
+
+
+def _text_files(source: Path) -> list[Path]:
+    """All .TXT files below a folder."""
+    if not Path(source).is_dir():
+        raise InputError(f"{source}: there is no such folder; give the mis-tool-characterization data set's folder")
+    return sorted(f for f in Path(source).rglob("*") if f.suffix.lower() == ".txt" and f.is_file())
+
+
+def _no_trial(source: Path, files: list[Path]) -> InputError:
+    return InputError(
+        f"{source}: no trial found in {len(files)} .TXT files below it; a trial has {FEWEST_COLUMNS} columns of"
+        f" numbers or more and at least {FEWEST_ROWS} rows"
+    )
+
+
+def _import_into(out: Path, files: list[Path]) -> tuple[list[str], list[Finding]]:
+    """Write the batches; return their names and the findings."""
     names, findings, taken = [], [], set()
     for folder in sorted({f.parent for f in files}):
         name = _unique(_safe(folder.resolve().name), taken)
-        trials, found = _read_folder([f for f in files if f.parent == folder], name)
-        findings += found
-        if trials:
-            signs, doubts = sensor_signs(list(trials.values()))
-            findings += [Finding(name, str(folder), None, None, "warning", text) for text in doubts]
-            write_batch(out / name, trials, signs)
+        findings += _import_folder([f for f in files if f.parent == folder], out / name, name)
+        if (out / name).exists():
             names.append(name)
-    if not names:
-        raise InputError(
-            f"{source}: no trial found in {len(files)} .TXT files below it; a trial has {FEWEST_COLUMNS} columns of"
-            f" numbers or more and at least {FEWEST_ROWS} rows"
-        )
-    (out / FINDINGS).write_text(json.dumps([asdict(f) for f in findings], indent=1) + "\n", encoding="utf-8")
     return names, findings
+
+
+def _import_folder(files: list[Path], out: Path, batch: str) -> list[Finding]:
+    """Write the batch of one folder of trials, if it has any; return the findings."""
+    trials, findings = _read_folder(files, batch)
+    if trials:
+        signs, doubts = sensor_signs(list(trials.values()))
+        findings += [Finding(batch, str(files[0].parent), None, None, "warning", text) for text in doubts]
+        write_batch(out, trials, signs)
+    return findings
 
 
 def _read_folder(files: list[Path], batch: str) -> tuple[dict[str, Trial], list[Finding]]:

@@ -16,12 +16,13 @@ class Accuracy(StudySettings):
     tables: ClassVar = ("{name}", "{name}-by-recording")
     figures: ClassVar = ("{name}", "{name}-ratio")
 
-    parameters: str | None = Field(None, description="parameter set of the model; absent: the first fit's")
+    parameters: str | None = Field(None, description="parameter set of the model; absent: each batch's default")
     coverage: float = Field(0.9, gt=0, lt=1, description="coverage probability of the intervals of the bias factor")
     coverage_factor: float = Field(
         2.0, gt=0, description="a comparison error up to this many validation uncertainties u_val is not resolved"
     )
 
     def needs(self, config, studies: Mapping, batches: Sequence[str]) -> list[tuple[str, str, str]]:
-        """Label, parameter set and batch of every run: one run of each batch, with an empty label."""
-        return [("", config.parameters_of(self), batch) for batch in batches]
+        """Label, parameter set and batch of every run: one run of each batch with the set, with an empty label."""
+        named = [(config.parameters_of(self, batch), batch) for batch in batches]
+        return [("", parameters, batch) for parameters, batch in named if parameters in config.sets_of(batch)]

@@ -16,11 +16,9 @@ from ccmodel.report.verdict import headline
 from ccmodel.rig.ingest import ingest_batch
 from ccmodel.steps.files import estimates_of, read_json, write_json
 from ccmodel.studies.diagnosis.page import write_diagnosis, write_not_diagnosed
-from ccmodel.studies.diagnosis.settings import Diagnosing
+from ccmodel.studies.diagnosis.settings import MODEL_FILES, Diagnosing
 from ccmodel.typed import InputError
 
-MODELS = ("calibrated.json", "model.json")
-NEAREST = "nearest.json"
 # The page of a run of the pipeline, seen from the report of a diagnosis.
 PAGE_OF_RUN = "../../index.html"
 
@@ -75,7 +73,7 @@ def diagnose(
         raise InputError(f"{batch}: {error}") from None
     content = _write(found, inputs, out)
     if not content["nearest"]:
-        (out / NEAREST).unlink()
+        (out / MODEL_FILES["nearest"]).unlink()
     return content
 
 
@@ -92,8 +90,8 @@ def diagnose_recordings(recordings_file: Path, out: Path, settings: Diagnosing |
         name, reason = recordings_file.stem, str(error)
         out.mkdir(parents=True, exist_ok=True)
         write_json(out / "diagnosis.json", {"batch": name, "verdict": None, "why": reason})
-        for model in (*MODELS, NEAREST):
-            write_json(out / model, _no_model(reason))
+        for file in MODEL_FILES.values():
+            write_json(out / file, _no_model(reason))
         write_not_diagnosed(out / "report.html", name, reason, PAGE_OF_RUN)
         return
     _write(found, inputs, out, PAGE_OF_RUN)
@@ -118,11 +116,12 @@ def _write(found: Diagnosis, inputs: dict, out: Path, page: str | None = None) -
     out.mkdir(parents=True, exist_ok=True)
     content = found.report | {"headline": headline(found.report), "provenance": inputs}
     write_json(out / "diagnosis.json", content)
-    for name, fit in zip(MODELS, (found.judgement.calibrated, found.judgement.best), strict=True):
-        write_json(out / name, model_as_dict(found.model(fit), inputs))
+    judged = found.judgement
+    models = {"calibrated": judged.calibrated, "extended": judged.best}
     if found.report["nearest"]:
-        write_json(out / NEAREST, model_as_dict(found.model(found.judgement.nearest), inputs))
-    else:
-        write_json(out / NEAREST, _no_model(f"verdict '{found.report['verdict']}': the diagnosis has no nearest model"))
+        models["nearest"] = judged.nearest
+    for name, file in MODEL_FILES.items():
+        without = _no_model(f"verdict '{judged.verdict}': the diagnosis has no {name} model")
+        write_json(out / file, model_as_dict(found.model(models[name]), inputs) if name in models else without)
     write_diagnosis(out / "report.html", found, page)
     return content

@@ -6,6 +6,9 @@ from ccmodel import mechanisms
 from ccmodel.steps.settings import Tolerance
 from ccmodel.typed import TypedModel
 
+# Model file of each parameter set that a diagnosis gives; `nearest` is empty unless the verdict is unexplained.
+MODEL_FILES = {"calibrated": "calibrated.json", "extended": "model.json", "nearest": "nearest.json"}
+
 
 class Diagnosing(TypedModel):
     """How finely a diagnosis looks."""

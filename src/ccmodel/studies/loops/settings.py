@@ -21,7 +21,7 @@ class Study(StudySettings):
     batches: list[str] | Literal["each"] = Field(description="batches in the figure; 'each': one figure a batch")
     variable: Variable = Field("recording", description="what varies, and names the recordings in the legend")
     figure: Figure = Field("torque-loops", description="how it is drawn")
-    parameters: str | None = Field(None, description="parameter set of the model; absent: the first fit's")
+    parameters: str | None = Field(None, description="parameter set of the model; absent: each batch's default")
     rows: Variable | None = Field(None, description="a row of panels for each value of this")
     title: str = Field("", description="what the figure shows, in a few words")
 
@@ -33,7 +33,7 @@ class Study(StudySettings):
 
     def needs(self, config, studies: Mapping[str, "Study"], batches: Sequence[str]) -> list[tuple[str, str, str]]:
         """Label, parameter set and batch of every run in the figure."""
-        return [("", config.parameters_of(self), batch) for batch in self.batches]
+        return [("", config.parameters_of(self, batch), batch) for batch in self.batches]
 
 
 class Measuring(TypedModel):
