@@ -6,7 +6,7 @@ CORES ?= 2
 # The former name of REGRESSORS.
 REGRESSORS ?= $(RIVALS)
 
-.PHONY: help results real data test bench diagnosis-settings table-one coverage proof proof-full proof-real lint lock clean
+.PHONY: help results real data test bench accuracy-gate diagnosis-settings table-one coverage proof proof-full proof-real lint lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -20,16 +20,16 @@ $(VENV)/.ready: requirements.lock pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $@
 
-# A run that left something out says what, and has failed.
+# A run that left something out, or whose model is less accurate than accepted, says what, and has failed.
 define run_pipeline
 	@$(BIN)/snakemake --cores $(CORES) --configfile $(1) \
 	  || { echo "The run did not come to its end; the messages above say why" >&2; exit 1; }
 	@echo "The report is $(2)/index.html"
-	@$(BIN)/ccmodel left-out $(2)
+	@status=0; $(BIN)/ccmodel left-out $(2) || status=1; $(or $(3),true) || status=1; exit $$status
 endef
 
-results: $(VENV)/.ready  ## regenerate every figure, table and the report from data/raw
-	$(call run_pipeline,config/config.yaml,results)
+results: $(VENV)/.ready  ## regenerate every figure, table and the report from data/raw; compare with the accepted accuracy
+	$(call run_pipeline,config/config.yaml,results,$(BIN)/ccmodel accuracy check results)
 
 real: $(VENV)/.ready  ## run the pipeline on the public da Vinci recordings: make real DATA=path
 	@test -n "$(DATA)" || { echo "make real needs DATA=path of the mis-tool-characterization data" >&2; exit 2; }
@@ -45,6 +45,9 @@ test: $(VENV)/.ready  ## run the tests and the linters
 
 bench: $(VENV)/.ready  ## measure speed and accuracy: results/bench.json, docs/figures/work-precision.png
 	$(BIN)/python benchmarks/bench.py
+
+accuracy-gate: $(VENV)/.ready  ## count false alarms and catches of the comparison with the accepted accuracy: docs/accuracy.md
+	$(BIN)/python -m benchmarks.accuracy_gate --cores $(CORES)
 
 coverage: $(VENV)/.ready  ## count how often the fits' 90 % intervals hold the truth: docs/coverage.md
 	$(BIN)/python benchmarks/interval_coverage.py

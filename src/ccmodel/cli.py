@@ -85,6 +85,64 @@ def left_out(results: Folder) -> None:
     _exit_if_refused(messages["left_out"])
 
 
+accuracy = typer.Typer(help="Watch the model's accuracy: compare a run with what was accepted.", no_args_is_help=True)
+app.add_typer(accuracy, name="accuracy")
+Results = Annotated[Path, typer.Argument(help="Folder of the last run's results.")]
+
+
+@accuracy.command("check")
+def accuracy_check(results: Results = Path("results")) -> None:
+    """Compare the last run with the accepted accuracy.
+
+    Exits with 0 if everything was compared and nothing was lost, with 1 on a loss or something that could not be
+    compared, with 2 if there is no run or no baseline that can be read.
+    """
+    from ccmodel.accuracy.baseline import ACCEPT
+    from ccmodel.accuracy.comparison import GAINED
+    from ccmodel.accuracy.gate import check as run
+
+    found, summary = run(results)
+    for change in found.of(GAINED)[:3]:
+        typer.echo(f"gained: {change}")
+    for line in found.losses:
+        _err.print(f"lost: {line}", style="red", markup=False)
+    for line in found.not_compared:
+        _err.print(f"not compared: {line}", style="yellow", markup=False)
+    typer.echo(summary)
+    if found.losses or found.not_compared or found.of(GAINED):
+        typer.echo(f"if this accuracy is right, accept it: {ACCEPT}")
+    if found.losses or found.not_compared:
+        raise typer.Exit(1)
+
+
+@accuracy.command("accept")
+def accuracy_accept(
+    reason: Annotated[str, typer.Option(help="Why this accuracy is right, for the reader of the baseline.")],
+    results: Results = Path("results"),
+) -> None:
+    """Make the last run the accepted accuracy, and append it to the history."""
+    from ccmodel.accuracy.gate import accept as run
+
+    state = run(results, reason)
+    typer.echo(f"{state.baseline}: {len(state.batches)} batches; {state.history} has the run as its last. Commit both.")
+
+
+@accuracy.command("history")
+def accuracy_history(
+    rev: Annotated[
+        list[str], typer.Option(help="Commits A..B (along first parents, without A) or one commit; may be repeated.")
+    ] = [],  # noqa: B006
+    file: Annotated[Path, typer.Option(help="The history.")] = Path("config/accuracy-history.csv"),
+    cores: Annotated[int, typer.Option(min=1, help="Number of processes of a past run.")] = 2,
+) -> None:
+    """Print the accuracy of past commits; with --rev, run these commits first and add them."""
+    from ccmodel.accuracy.gate import fill_history
+    from ccmodel.accuracy.history import overview
+
+    fill_history(file, rev, cores, _progress)
+    typer.echo(overview(file))
+
+
 @app.command()
 def diagnose(
     batch: Folder,

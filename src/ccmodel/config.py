@@ -9,6 +9,7 @@ from ccmodel.model.parameters import FORMER_NAMES
 from ccmodel.rig.batch import valid_name
 from ccmodel.steps.settings import Fit
 from ccmodel.studies.accuracy.settings import Accuracy
+from ccmodel.studies.baseline.settings import AgainstBaseline
 from ccmodel.studies.claims.settings import Claims
 from ccmodel.studies.diagnosis.settings import MODEL_FILES, Diagnosing
 from ccmodel.studies.loops.settings import Measuring, Study
@@ -44,6 +45,9 @@ class Config(TypedModel):
     fits: dict[str, Fit] = Field(default_factory=dict, description="parameter sets fitted to recordings")
     studies: dict[str, Study] = Field(default_factory=dict, description="figures")
     measuring: Measuring = Field(default_factory=Measuring, description="how loops are measured")
+    baseline: AgainstBaseline | None = Field(
+        None, description="accuracy against the accepted one, and over past commits; absent: not compared"
+    )
     claims: Claims | None = Field(None, description="the paper's words in numbers; absent: not asked")
     accuracy: Accuracy | None = Field(None, description="bias, scatter and comparison errors; absent: not asked")
     phases: PhaseExample | None = Field(None, description="simulated example of the paper's Figs. 5 to 7; absent: none")

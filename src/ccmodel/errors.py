@@ -12,7 +12,7 @@ from ccmodel.recording import Recording
 
 COLUMNS = (
     dict.fromkeys(("batch", "recording", "origin", "parameters", "channel", "unit"), str)
-    | dict.fromkeys(("rmse", "peak_to_peak", "nrmse_percent", "window_from_s", "window_to_s"), float)
+    | dict.fromkeys(("bias", "rmse", "peak_to_peak", "nrmse_percent", "window_from_s", "window_to_s"), float)
     | {"samples": int}
 )
 
@@ -46,8 +46,15 @@ def _upward_crossings(share: NDArray) -> list[int]:
     return crossings
 
 
+def is_compared(recorded: Recording, simulated: Recording | None, channel: str) -> bool:
+    """Whether a channel has an error: it was recorded and simulated, and was not given to the model."""
+    return (
+        simulated is not None and channel in recorded and simulated.derived_from.get(channel) not in (PRESCRIBED, None)
+    )
+
+
 def error_table(pairs: Iterable[tuple[Recording, Recording | None]], parameters: str) -> pd.DataFrame:
-    """Root mean square error of each channel over the last cycle.
+    """Mean and root mean square error of each channel over the last cycle, simulated minus recorded.
 
     The normalised error is over the recording's peak to peak in that cycle; the paper's Table I does not state its
     divisor.
@@ -62,8 +69,8 @@ def error_table(pairs: Iterable[tuple[Recording, Recording | None]], parameters:
     Returns
     -------
     DataFrame
-        A row for each recording and channel, with the columns of `COLUMNS`: `rmse` and `peak_to_peak` in `unit`.
-        Channels that were not recorded, or that were given to the model, have no row.
+        A row for each recording and channel, with the columns of `COLUMNS`: `bias` (the mean error), `rmse` and
+        `peak_to_peak` in `unit`. Channels that were not recorded, or that were given to the model, have no row.
     """
     rows = []
     for recorded, simulated in pairs:
@@ -71,12 +78,13 @@ def error_table(pairs: Iterable[tuple[Recording, Recording | None]], parameters:
             continue
         window = last_cycle(recorded)
         for channel in CHANNELS:
-            if channel not in recorded or simulated.derived_from.get(channel) in (PRESCRIBED, None):
+            if not is_compared(recorded, simulated, channel):
                 continue
             measured = recorded[channel][window]
-            rmse = float(np.sqrt(np.mean((simulated[channel][window] - measured) ** 2)))
+            error = simulated[channel][window] - measured
+            rmse = float(np.sqrt(np.mean(error**2)))
             span = float(np.ptp(measured))
             what = (recorded.batch, recorded.id, recorded.origin, parameters, channel, unit_of(channel))
-            error = (rmse, span, 100 * rmse / span if span > 0 else np.nan)
-            rows.append((*what, *error, *recorded.time_s[window][[0, -1]], measured.size))
+            errors = (float(np.mean(error)), rmse, span, 100 * rmse / span if span > 0 else np.nan)
+            rows.append((*what, *errors, *recorded.time_s[window][[0, -1]], measured.size))
     return pd.DataFrame(rows, columns=list(COLUMNS)).astype(COLUMNS)

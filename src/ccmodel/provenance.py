@@ -2,10 +2,14 @@
 
 import ast
 import hashlib
+import json
 import os
 from collections.abc import Iterable
+from dataclasses import fields, is_dataclass
 from functools import cache
 from pathlib import Path
+
+import numpy as np
 
 import ccmodel
 
@@ -24,6 +28,25 @@ def of_inputs(paths: Iterable[Path], folder: Path = Path()) -> dict:
     """Version of the package and digests of the input files of a result, by path relative to `folder`."""
     digests = {os.path.relpath(p, folder): hashlib.sha256(Path(p).read_bytes()).hexdigest() for p in paths}
     return {"ccmodel_version": ccmodel.__version__, "sha256": digests}
+
+
+def stamp(module: str, *inputs) -> str:
+    """A line on a figure: version, and short digests of its inputs (`content_digest`) and of its module's sources."""
+    return f"ccmodel {ccmodel.__version__}, inputs {content_digest(*inputs)[:8]}, sources {source_digest(module)[:8]}"
+
+
+def content_digest(*values) -> str:
+    """Digest of values, of plain data, arrays and dataclasses, whatever files they were read from."""
+    return hashlib.sha256(json.dumps(values, sort_keys=True, default=_plain).encode()).hexdigest()
+
+
+def _plain(value):
+    """An array or a dataclass as plain data, for a digest."""
+    if isinstance(value, np.ndarray):
+        return [value.dtype.str, value.shape, hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()]
+    if is_dataclass(value):
+        return {field.name: getattr(value, field.name) for field in fields(value)}
+    raise TypeError(f"no digest of a {type(value).__name__}")
 
 
 @cache

@@ -127,6 +127,12 @@ def read_recordings(path: Path) -> list[Recording]:
         return [_from_dataset(name, node.to_dataset()) for name, node in tree.children.items()]
 
 
+def read_provenance(path: Path) -> dict:
+    """Versions and hashes that `write_recordings` put on a file."""
+    with xr.open_datatree(path, engine="netcdf4") as tree:
+        return json.loads(tree.attrs["provenance"])
+
+
 _SCALARS = {"batch": str, "origin": str, "pretension_N": float, "rest_s": float, "settled_s": float}
 # Numbers of each channel of a sensor.
 _OF_SENSORS = ("accuracy", "encoder_step_rad")

@@ -71,10 +71,24 @@ def figures(name, ending):
     ]
 
 
-def tables(name):
-    """The CSV files of a study and the JSON file that its part of the page shows."""
-    csv = [
+def csv_tables(name):
+    return [
         f"{RESULTS}/tables/{stem.format(name=name)}.csv"
         for stem in STUDIES[name].tables
     ]
+
+
+def tables(name):
+    """The CSV files of a study and the JSON file that its part of the page shows."""
+    csv = csv_tables(name)
     return csv + ([f"{RESULTS}/tables/{name}.json"] if csv else [])
+
+
+def in_report(file, caption, category, **labels):
+    """Mark a file for `snakemake --report`, labelled with its name and with what else is given."""
+    return report(
+        file,
+        caption=f"../report/{caption}.rst",
+        category=category,
+        labels=labels | {"file": Path(file).name},
+    )

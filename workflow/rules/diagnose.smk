@@ -3,7 +3,12 @@ rule diagnose:
         recordings=lambda wildcards: recordings_of(wildcards.batch),
     output:
         f"{RESULTS}/diagnoses/{{batch}}/diagnosis.json",
-        f"{RESULTS}/diagnoses/{{batch}}/report.html",
+        in_report(
+            f"{RESULTS}/diagnoses/{{batch}}/report.html",
+            "diagnosis",
+            "Diagnoses",
+            batch="{batch}",
+        ),
         f"{RESULTS}/diagnoses/{{batch}}/calibrated.json",
         f"{RESULTS}/diagnoses/{{batch}}/model.json",
         f"{RESULTS}/diagnoses/{{batch}}/nearest.json",

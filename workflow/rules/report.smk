@@ -3,7 +3,7 @@ rule tabulate_errors:
         recordings=[recordings_of(batch) for _, batch in runs()],
         simulated=[simulated_of(parameters, batch) for parameters, batch in runs()],
     output:
-        csv=f"{RESULTS}/tables/errors.csv",
+        csv=in_report(f"{RESULTS}/tables/errors.csv", "errors", "Tables"),
         parquet=f"{RESULTS}/tables/errors.parquet",
     log:
         f"{RESULTS}/logs/tabulate_errors.log",
@@ -47,7 +47,7 @@ rule write_report:
         figures=[figure for name in STUDIES for figure in figures(name, "png")],
         tables=[table for name in STUDIES for table in tables(name)],
     output:
-        page=f"{RESULTS}/index.html",
+        page=in_report(f"{RESULTS}/index.html", "page", "Page"),
         left_out=f"{RESULTS}/left-out.json",
     log:
         f"{RESULTS}/logs/write_report.log",

@@ -10,15 +10,16 @@ for name, study in STUDIES.items():
             recordings=[recordings_of(batch) for _, _, batch in needs],
             simulated=[simulated_of(p, batch) for _, p, batch in needs],
             fits=sorted(set(fits) - {""}),
+            files=study.files,
         output:
-            tables=tables(name),
+            csv=[in_report(f, "table", "Tables", study=name) for f in csv_tables(name)],
+            summary=tables(name)[-1:],
+            png=[
+                in_report(f, "study", "Studies", study=name)
+                for f in figures(name, "png")
+            ],
             svg=figures(name, "svg"),
-            png=report(
-                figures(name, "png"),
-                caption="../report/study.rst",
-                category="Studies",
-                labels={"study": name},
-            ),
+            pdf=figures(name, "pdf"),
         log:
             f"{RESULTS}/logs/studies/{name}.log",
         benchmark:
@@ -31,6 +32,7 @@ for name, study in STUDIES.items():
             runtime=60,
         params:
             kind=study.kind,
+            caption=study.caption(),
             settings=study.model_dump_json(),
             measuring=CONFIG.measuring.model_dump_json(),
             labels=[label for label, _, _ in needs],

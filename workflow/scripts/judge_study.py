@@ -1,4 +1,4 @@
-"""Recordings, simulations and fits of a study -> its tables (CSV, JSON) and figures (PNG and SVG)."""
+"""Recordings, simulations and fits of a study -> its tables (CSV, JSON) and figures (PNG, SVG and PDF)."""
 
 from ccmodel.jobs import logged
 from ccmodel.studies.run import run_study, runs_of
@@ -10,6 +10,6 @@ with logged(snakemake.log[0], snakemake.threads):
         params.settings,
         params.measuring,
         runs_of(params.labels, given.recordings, given.simulated, params.fits),
-        made.tables,
-        list(zip(made.png, made.svg, strict=True)),
+        [*made.csv, *made.summary],
+        list(zip(made.png, made.svg, made.pdf, strict=True)),
     )

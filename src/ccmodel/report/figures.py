@@ -1,6 +1,7 @@
-"""The style of all figures, and the parts that several have: loops, axes, legends."""
+"""The style of all figures, the parts that several have (loops, axes, titles, legends), and their files."""
 
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import matplotlib
@@ -17,6 +18,11 @@ from ccmodel.channels import CABLES, TABLE, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
 # The palette of Okabe and Ito without its yellow, which is too faint on white; readable with any colour vision.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 LINES = ("-", "--", "-.", ":")
+# Endings of a figure's files.
+FORMATS = ("png", "svg", "pdf")
+# Without what would make the files of two equal runs differ: dates, and random names of an SVG's parts.
+_METADATA = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+_FILES = {"svg.fonttype": "none", "svg.hashsalt": "ccmodel", "pdf.fonttype": 42}
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 # Panels of the paper's Figs. 5, 8 and 9: channel on the x axis, channel on the y axis.
 TRANSMISSION = (*CABLES.values(), (TAU_IN, TAU_OUT), (THETA_IN, THETA_OUT))
@@ -29,6 +35,8 @@ STYLE = {
     "grid.linewidth": 0.6,
     "legend.frameon": False,
     "figure.constrained_layout.use": True,
+    # A vector file of noise is a fifth smaller; a third of a point is not seen.
+    "path.simplify_threshold": 0.33,
 }
 
 
@@ -62,17 +70,58 @@ def empty_figure(text: str) -> Figure:
     return figure
 
 
+def title_figure(figure: Figure, *lines: str) -> None:
+    """Title of a figure; every line is wrapped at the figure's width."""
+    characters = int(12 * figure.get_figwidth())
+    figure.suptitle("\n".join(textwrap.fill(line, characters) for line in lines if line), fontsize="medium")
+
+
 def legend_below(figure: Figure, axes: NDArray, columns: int | None = None) -> None:
     """One legend for all panels below them, each label once; without `columns`, as many as its longest label allows."""
     handles = {}
     for ax in axes.flat:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
+    legend_of(figure, handles, columns)
+
+
+def legend_of(figure: Figure, handles: Mapping, columns: int | None = None) -> None:
+    """A legend below all panels from handles by their labels."""
     columns = columns or max(1, min(4, 100 // (6 + max(map(len, handles), default=1))))
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns)
 
 
-def save_figure(figure: Figure, file: Path) -> None:
-    """Write a figure as PNG or SVG; equal figures give equal files, and text in an SVG stays text."""
-    with plt.rc_context({"svg.fonttype": "none", "svg.hashsalt": "ccmodel"}):
-        figure.savefig(file, dpi=150, metadata={"Date": None} if file.suffix == ".svg" else None)
+def legend_above(ax: Axes) -> None:
+    """A panel's own legend above it, where no data are; nothing without labels."""
+    if ax.get_legend_handles_labels()[0]:
+        style = {"fontsize": 8, "handletextpad": 0.4, "columnspacing": 1.2, "borderaxespad": 0.2}
+        ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=4, **style)
+
+
+def stamp_figure(figure: Figure, text: str) -> None:
+    """Write a line in the lower right corner, below everything else: what the figure was made with and from."""
+    share = 0.16 / figure.get_figheight()
+    room = (0, share, 1, 1 - share)
+    figure.get_layout_engine().set(rect=room)
+    _lay_out(figure)
+    # The layout leaves room for a legend outside the panels only as long as the legend has no place of its own.
+    for legend in figure.legends:
+        legend.set_bbox_to_anchor(room, figure.transFigure)
+    figure.text(0.995, 0.2 * share, text, ha="right", va="bottom", fontsize=6, color="#767676")
+
+
+def save_figure(figure: Figure, *files: Path) -> None:
+    """Write a figure to files whose endings are among `FORMATS`.
+
+    Equal figures give equal files: panels are laid out once, and no file holds a date. Text stays text.
+    """
+    with plt.rc_context(_FILES):
+        _lay_out(figure)
+        for file in map(Path, files):
+            figure.savefig(file, dpi=150, metadata=_METADATA.get(file.suffix))
+
+
+def _lay_out(figure: Figure) -> None:
+    """Lay out the panels once, and the same for every format."""
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")

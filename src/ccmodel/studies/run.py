@@ -11,8 +11,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from ccmodel import provenance
-from ccmodel.report.figures import save_figure
-from ccmodel.steps.files import Fitted, Pair, fitted, read_pairs, write_json, write_table
+from ccmodel.report.figures import save_figure, stamp_figure
+from ccmodel.steps.files import Fitted, Pair, fitted, read_json, read_pairs, write_json, write_table
 from ccmodel.studies.loops.settings import Measuring
 
 
@@ -35,7 +35,7 @@ class Run:
     simulated: Path
     fit: Path | None = None
 
-    @property
+    @cached_property
     def pairs(self) -> list[Pair]:
         """Every recording with its simulation."""
         return read_pairs(self.recordings, self.simulated)
@@ -44,6 +44,12 @@ class Run:
     def fitted(self) -> Fitted:
         """Parameters that the model ran with."""
         return fitted(self.recordings, self.fit)
+
+    @property
+    def content(self) -> list:
+        """What the files hold, without where they came from: the inputs of a figure, for its digest."""
+        fit = read_json(self.fit) if self.fit else {}
+        return [self.label, self.pairs, {key: value for key, value in fit.items() if key != "provenance"}]
 
 
 def runs_of(
@@ -87,16 +93,20 @@ def run_study(
     tables : sequence of Path
         The CSV files in the order of the settings, then the JSON file; empty for a study without tables.
     figures : sequence of sequence of Path
-        The files of each figure in the order of the settings, PNG and SVG.
+        The files of each figure in the order of the settings, one for each of its formats.
     """
     study = import_module(f"ccmodel.studies.{kind}.study")
-    outcome = study.judge(study.SETTINGS.model_validate_json(settings), runs, Measuring.model_validate_json(measuring))
+    stated = study.SETTINGS.model_validate_json(settings)
+    outcome = study.judge(stated, runs, Measuring.model_validate_json(measuring))
     for file, table in zip(tables[:-1], outcome.tables, strict=True):
         write_table(file, table)
     if tables:
         inputs = {file for run in runs for file in (run.recordings, run.simulated, run.fit) if file is not None}
+        inputs |= set(map(Path, stated.files))
         write_json(tables[-1], outcome.summary | {"provenance": provenance.of_inputs(sorted(inputs))})
+    read = [Path(file).read_text() for file in stated.files]
+    stamp = provenance.stamp(study.__name__, settings, measuring, [run.content for run in runs], *read)
     for files, figure in zip(figures, outcome.figures, strict=True):
-        for file in files:
-            save_figure(figure, Path(file))
+        stamp_figure(figure, stamp)
+        save_figure(figure, *files)
         plt.close(figure)

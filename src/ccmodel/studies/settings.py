@@ -16,8 +16,15 @@ class StudySettings(TypedModel):
     heading: ClassVar[str]
     # CSV files in results/tables; a study with tables also has a JSON file there, which its part of the page shows.
     tables: ClassVar[tuple[str, ...]] = ()
-    # Figures in results/figures, each as PNG and SVG.
+    # Figures in results/figures, each in every format (`ccmodel.report.figures.FORMATS`), and what they show: a plain
+    # sentence or two for their caption.
     figures: ClassVar[tuple[str, ...]] = ("{name}",)
+    shows: ClassVar[str] = ""
+
+    @property
+    def files(self) -> list[str]:
+        """Files that the study reads, apart from those of its runs."""
+        return []
 
     def check(self, where: str, config) -> None:
         """Refuse settings that do not fit the rest of the configuration.
@@ -35,6 +42,10 @@ class StudySettings(TypedModel):
         wanted = getattr(self, "parameters", None)
         if wanted is not None and wanted not in config.parameter_sets:
             raise ValueError(f"{where} asks for parameters '{wanted}'; there are {', '.join(config.parameter_sets)}")
+
+    def caption(self) -> str:
+        """What the study is, and what its figures show."""
+        return f"{self.heading}. {self.shows}".strip()
 
     def needs(self, config, studies: Mapping, batches: Sequence[str]) -> list[tuple[str, str, str]]:
         """Label, parameter set and batch of every run that the study looks at.

@@ -76,3 +76,22 @@ def by_label(pairs: Sequence[Pair], variable: str) -> dict[str, list[Pair]]:
 def origins_of(recordings: Iterable[Recording]) -> str:
     """Origins of recordings, as figures and pages name them."""
     return " and ".join(ORIGIN[origin] for origin in sorted({r.origin for r in recordings}))
+
+
+def batches_by_origin(recordings: Iterable[tuple[str, str]]) -> str:
+    """Which batches were measured and which simulated, for the title of a figure.
+
+    Parameters
+    ----------
+    recordings : iterable of (str, str)
+        Batch and origin of each recording.
+    """
+    batches: dict[str, set[str]] = {}
+    for batch, origin in recordings:
+        batches.setdefault(origin, set()).add(batch)
+    return "; ".join(f"{ORIGIN[origin]}: {', '.join(sorted(batches[origin]))}" for origin in sorted(batches))
+
+
+def batches_of(pairs: Iterable[Pair]) -> str:
+    """The same of recordings with their simulations."""
+    return batches_by_origin((recorded.batch, recorded.origin) for recorded, _ in pairs)

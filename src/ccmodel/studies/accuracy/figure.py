@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ccmodel.recording import ORIGIN
-from ccmodel.report.figures import COLOURS, MARKERS, STYLE, empty_figure, legend_below
+from ccmodel.report.figures import COLOURS, MARKERS, STYLE, empty_figure, legend_below, title_figure
+from ccmodel.studies.variables import batches_by_origin
 
 COLUMNS = 4
 # All but the colour of the model's bias.
@@ -43,15 +44,17 @@ def _panels(table: pd.DataFrame, lines: Sequence[dict], panel, title: str) -> Fi
         for ax in axes.flat[len(lines) :]:
             ax.set_axis_off()
         batches = sorted(set(table["batch"]))
+        mixed = len(set(table["origin"])) > 1
         for ax, line in zip(axes.flat, lines, strict=False):
             mine = table[(table["quantity"] == line["quantity"]) & (table["origin"] == line["origin"])]
             panel(ax, mine, line, batches)
             text = line["text"][0].upper() + line["text"][1:]
-            ax.set_title(text.replace(" (its flat part)", ""), fontsize=9, loc="left")
+            origin = f"\n{ORIGIN[line['origin']]}" if mixed else ""
+            ax.set_title(text.replace(" (its flat part)", "") + origin, fontsize=9, loc="left")
             ax.set_xlabel(f"recorded ({line['unit']})")
         legend_below(figure, axes, columns=4)
-        origins = " and ".join(sorted({ORIGIN[line["origin"]] for line in lines}))
-        figure.suptitle(f"{title}: model and {origins}, last cycle of each")
+        origins = batches_by_origin(zip(table["batch"], table["origin"], strict=True))
+        title_figure(figure, f"{title}, last cycle of each recording", origins)
     return figure
 
 

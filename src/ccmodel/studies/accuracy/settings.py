@@ -15,6 +15,10 @@ class Accuracy(StudySettings):
     heading: ClassVar = "Accuracy"
     tables: ClassVar = ("{name}", "{name}-by-recording")
     figures: ClassVar = ("{name}", "{name}-ratio")
+    shows: ClassVar = (
+        "Simulated over recorded quantities of the last cycle of each recording, and their ratio, with the model's bias"
+        " and scatter and the stated uncertainty of the recordings."
+    )
 
     parameters: str | None = Field(None, description="parameter set of the model; absent: each batch's default")
     coverage: float = Field(0.9, gt=0, lt=1, description="coverage probability of the intervals of the bias factor")

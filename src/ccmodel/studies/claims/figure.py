@@ -6,18 +6,32 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from ccmodel.channels import TABLE, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
 from ccmodel.errors import last_cycle
 from ccmodel.recording import Recording
-from ccmodel.report.figures import COLOURS, LINES, MARKERS, STYLE, letter_panels, name_axes, plot_channels, say_in_panel
+from ccmodel.report.figures import (
+    COLOURS,
+    LINES,
+    MARKERS,
+    STYLE,
+    legend_above,
+    legend_below,
+    legend_of,
+    letter_panels,
+    name_axes,
+    plot_channels,
+    say_in_panel,
+    title_figure,
+)
 from ccmodel.studies.claims.claim import Claim, Row
 from ccmodel.studies.loops.measures import QUANTITIES
 
 # Panels: claim, quantities, y axis, x axis.
 PANELS = (
     ("backlash-and-bend", ("backlash", "width"), "drive torque (mN·m)", "number of half-loops"),
-    ("slope-and-bend", ("slope", "slack_slope"), "slope of the torque loop", "number of half-loops"),
+    ("slope-and-bend", ("slope", "slack_slope"), "slope of the torque loop (–)", "number of half-loops"),
     ("slack-and-bend", ("slack_share",), "share of the cycle (%)", "number of half-loops"),
     ("backlash-and-pretension", ("backlash", "width"), "drive torque (mN·m)", "pretension"),
     ("phases-and-pretension", ("IVa_share", "IVb_share"), "share of the cycle (%)", "pretension"),
@@ -32,17 +46,24 @@ SHORT = {
     "IVa_share": "phase IVa",
     "IVb_share": "phase IVb",
 }
+MODELLED = {"ls": "", "marker": "_", "ms": 16, "mew": 1.2, "color": "black"}
+POINT = {"ls": "", "marker": "o", "ms": 4.5, "color": "0.5"}
 
 
-def recordings_figure(claims: Sequence[Claim]) -> Figure:
-    """Means over recordings with their intervals, and the model, a panel for each claim."""
+def recordings_figure(claims: Sequence[Claim], origins: str) -> Figure:
+    """Means over recordings with their intervals, and the model, a panel for each claim.
+
+    Parameters
+    ----------
+    claims : sequence of Claim
+    origins : str
+        Which batches were measured and which simulated; empty without recordings.
+    """
     rows_of = {claim.name: claim.rows for claim in claims}
-    sources = set()
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(2, 3, figsize=(12, 7.2))
         for ax, (name, quantities, ylabel, xlabel) in zip(axes.flat, PANELS, strict=True):
             rows = [row for row in rows_of[name] if np.isfinite(row.at)]
-            sources |= {row.source for row in rows}
             ticks = list(dict.fromkeys(row.condition for row in rows))
             for i, quantity in enumerate(quantities):
                 shift = 0.16 * (2 * i - 1) if len(quantities) > 1 else 0.0
@@ -51,12 +72,16 @@ def recordings_figure(claims: Sequence[Claim]) -> Figure:
                 _with_intervals(ax, at, [row for row in rows if row.quantity == quantity], style)
             ax.set_xticks(range(len(ticks)), ticks)
             ax.set(xlim=(-0.5, max(len(ticks), 1) - 0.5), xlabel=xlabel, ylabel=ylabel)
-            ax.set_ylim(bottom=-0.03 * ax.get_ylim()[1])
-            if ax.get_legend_handles_labels()[0]:
-                ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, fontsize=8, handletextpad=0.3)
+            top = 1.03 * ax.get_ylim()[1]
+            ax.set_ylim(-0.03 * top, top)
+            legend_above(ax)
         letter_panels(axes.flat)
-        origins = " and ".join(sorted(sources)) or "no recording"
-        figure.suptitle(f"Points: {origins}; bars: interval of the mean over repeats; black: the model of them")
+        handles = {
+            "mean over recordings, with its interval where they were repeated": Line2D([], [], **POINT),
+            "model of the same recordings": Line2D([], [], **MODELLED),
+        }
+        legend_of(figure, handles, columns=2)
+        title_figure(figure, "The paper's statements: recordings and model", origins or "no recording")
     return figure
 
 
@@ -69,7 +94,7 @@ def _with_intervals(ax: Axes, at: Mapping[str, float], rows: Sequence[Row], styl
         ax.errorbar(x, y, np.transpose(reach), ms=4.5, capsize=3, **style)
     modelled = [row for row in rows if row.model is not None]
     x, y = [at[row.condition] for row in modelled], [row.model for row in modelled]
-    ax.plot(x, y, ls="", marker="_", ms=16, mew=1.2, color="black")
+    ax.plot(x, y, **MODELLED)
 
 
 def model_figure(claims: Sequence[Claim], loops: Mapping[str, Recording]) -> Figure:
@@ -92,7 +117,13 @@ def model_figure(claims: Sequence[Claim], loops: Mapping[str, Recording]) -> Fig
             (_motion_panel, axes[1, 1], loops),
         ):
             panel(ax, data) if data else say_in_panel(ax, "the model could not be run")
-        figure.suptitle("Model alone: load, sections of the paper's discretisation, place of the loop")
+        # The places of the loop, which (c) and (d) share; (b) has a legend of its own.
+        legend_below(figure, axes[1])
+        title_figure(
+            figure,
+            "Model alone: load, sections of the paper's discretisation, place of the loop",
+            "simulated (no recording)",
+        )
     return figure
 
 
@@ -124,14 +155,13 @@ def _sections_panel(ax: Axes, rows: Sequence[Row]) -> None:
     ticks = sorted({int(row.at) for row in rows})
     ax.set_xticks(ticks, [str(t) for t in ticks])
     ax.minorticks_off()
-    ax.legend()
+    legend_above(ax)
 
 
 def _torque_panel(ax: Axes, loops: Mapping[str, Recording]) -> None:
     for (place, run), color, ls in zip(loops.items(), COLOURS, LINES, strict=False):
         plot_channels(ax, run, TAU_IN, TAU_OUT, last_cycle(run), label=f"loop {place}", color=color, ls=ls, lw=1.1)
     name_axes(ax, TAU_IN, TAU_OUT)
-    ax.legend(loc="upper left", fontsize=8)
 
 
 def _motion_panel(ax: Axes, loops: Mapping[str, Recording]) -> None:
@@ -139,4 +169,4 @@ def _motion_panel(ax: Axes, loops: Mapping[str, Recording]) -> None:
     for run, color, ls in zip(loops.values(), COLOURS, LINES, strict=False):
         cycle = run[last_cycle(run)]
         ax.plot(cycle[THETA_IN], cycle[THETA_IN] - cycle[THETA_OUT], color=color, ls=ls, lw=1.1)
-    ax.set(xlabel=TABLE[THETA_IN].axis, ylabel=r"$\theta_{in} - \theta_{out}$ (rad)")
+    ax.set(xlabel=TABLE[THETA_IN].axis, ylabel=r"lag $\theta_{in} - \theta_{out}$ (rad)")

@@ -32,6 +32,10 @@ class Claims(StudySettings):
     heading: ClassVar = "The paper in numbers"
     tables: ClassVar = ("{name}",)
     figures: ClassVar = ("{name}", "{name}-model")
+    shows: ClassVar = (
+        "Quantities of the paper's statements over bend, pretension and radius: means over the recordings with their"
+        " intervals, and the model of the same recordings. The second figure shows the model alone (simulated)."
+    )
 
     bend: str = Field(description="study in which the number of loops varies")
     pretension: str = Field(description="study in which the pretension varies")

@@ -17,6 +17,7 @@ from ccmodel.studies.claims.recordings import recorded_claims
 from ccmodel.studies.claims.settings import Claims
 from ccmodel.studies.loops.settings import Measuring
 from ccmodel.studies.run import Outcome, Run
+from ccmodel.studies.variables import batches_of
 
 SETTINGS = Claims
 
@@ -33,7 +34,8 @@ def judge(claims: Claims, runs: Sequence[Run], measuring: Measuring) -> Outcome:
     found = claims_of(pairs, parameters, claims, measuring)
     table = pd.DataFrame([{"claim": c.name} | _stated(c) | asdict(row) for c in found for row in c.rows])
     stated = [{"name": c.name} | _stated(c) | {"sentence": c.sentence} for c in found]
-    figures = [recordings_figure(found), model_figure(found, _loops(parameters, claims))]
+    origins = batches_of([pair for group in pairs.values() for pair in group])
+    figures = [recordings_figure(found, origins), model_figure(found, _loops(parameters, claims))]
     return Outcome(figures, [table], {"coverage": claims.coverage, "claims": stated})
 
 

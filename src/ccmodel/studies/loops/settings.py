@@ -17,6 +17,10 @@ class Study(StudySettings):
 
     kind: ClassVar = "loops"
     heading: ClassVar = "Figures"
+    shows: ClassVar = (
+        "Loops of the last whole cycle of each recording (wide, pale) and of the model of it (thin), and the residuals,"
+        " model minus recording, over the time of the loop. Without a cycle, the whole motion is drawn."
+    )
 
     batches: list[str] | Literal["each"] = Field(description="batches in the figure; 'each': one figure a batch")
     variable: Variable = Field("recording", description="what varies, and names the recordings in the legend")
@@ -30,6 +34,10 @@ class Study(StudySettings):
         if self.rows is not None and self.figure not in ("torque-loops", "drive-loops"):
             raise ValueError(f"figure '{self.figure}' has no rows; leave 'rows' out")
         return self
+
+    def caption(self) -> str:
+        """Title of the study, its batches, and what its figure shows."""
+        return f"{self.title}: {', '.join(self.batches)}. {self.shows}"
 
     def needs(self, config, studies: Mapping[str, "Study"], batches: Sequence[str]) -> list[tuple[str, str, str]]:
         """Label, parameter set and batch of every run in the figure."""

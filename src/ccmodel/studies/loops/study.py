@@ -1,141 +1,224 @@
-"""Figures of loops: recordings and the model of them."""
+"""Figures of loops: recordings, the model of them, and what is between the two."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
-from itertools import cycle
 
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from scipy.ndimage import uniform_filter1d
 
 from ccmodel.channels import TABLE, TAU_IN, TAU_OUT, THETA_IN
-from ccmodel.errors import last_cycle
+from ccmodel.errors import is_compared, last_cycle
 from ccmodel.model.run import PRESCRIBED
-from ccmodel.recording import ORIGIN, Recording
+from ccmodel.recording import ORIGIN
 from ccmodel.report import figures
-from ccmodel.report.figures import COLOURS, name_axes
+from ccmodel.report.figures import COLOURS, LINES, name_axes
 from ccmodel.steps.files import Pair
 from ccmodel.studies.loops.settings import Measuring, Study
 from ccmodel.studies.run import Outcome, Run
-from ccmodel.studies.variables import by_label, origins_of
+from ccmodel.studies.variables import batches_of, by_label
 
 SETTINGS = Study
+
+DIFFERENCE = "Δ: model − recording; pale: samples, line: moving mean"
+# With more conditions than this in a panel, each has a panel of its own.
+CONDITIONS_IN_A_PANEL = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """Lines of one condition: the recording wide and pale, the model above it thin, so that both are seen."""
+
+    recording: Mapping
+    model: Mapping
+
+
+ALONE = Look({"color": COLOURS[4], "linewidth": 3.5}, {"color": "black", "linewidth": 0.9})
+IN_LEGEND = Look({"color": "0.75", "linewidth": 4.0}, {"color": "0.2", "linewidth": 1.1})
 
 
 def judge(study: Study, runs: Sequence[Run], measuring: Measuring | None = None) -> Outcome:
     """Draw the study's figure."""
-    return Outcome([draw([pair for run in runs for pair in run.pairs], study)])
+    return Outcome([draw([pair for run in runs for pair in run.pairs], study, measuring or Measuring())])
 
 
-def draw(pairs: Sequence[Pair], study: Study) -> Figure:
+def draw(pairs: Sequence[Pair], study: Study, measuring: Measuring) -> Figure:
     """Draw a study as its settings ask; a study without a usable recording has a figure that says so."""
     if not pairs:
         return figures.empty_figure(f"{study.title}: no usable recording (see what was left out)")
     with plt.rc_context(figures.STYLE):
-        return _DRAW[study.figure](pairs, study)
+        return _DRAW[study.figure](pairs, study, measuring.smoothing_share)
 
 
-def transmission_figure(pairs: Sequence[Pair], study: Study) -> Figure:
-    """The paper's Figs. 8 and 9: loops of the tensions, torques and angles of one run, recording and model.
+def transmission_figure(pairs: Sequence[Pair], study: Study, smoothing_share: float) -> Figure:
+    """The paper's Figs. 8 and 9: loops of the tensions, torques and angles of one run, with the residuals of each.
 
     Only the first pair is drawn. A panel whose channels were not recorded is missing.
     """
-    recorded, simulated = pairs[0]
+    recorded, _ = pair = pairs[0]
     panels = [(x, y) for x, y in figures.TRANSMISSION if x in recorded and y in recorded]
-    figure, axes = plt.subplots(2, 2, figsize=(9, 7.4))
-    for ax in axes.flat[len(panels) :]:
-        ax.set_axis_off()
-    for ax, (x, y) in zip(axes.flat, panels, strict=False):
-        _loop(ax, recorded, x, y, color=COLOURS[4], linewidth=2.4, label=ORIGIN[recorded.origin])
-        if simulated is not None:
-            _loop(ax, simulated, x, y, color="black", label=_model_title([pairs[0]]))
-        name_axes(ax, x, y)
-    figures.letter_panels(axes.flat[: len(panels)])
-    figures.legend_below(figure, axes)
-    figure.suptitle(f"{study.title}: {recorded.batch}/{recorded.id}")
+    figure, cells = _grid(len(panels), 1, columns=2, shared=False)
+    for (x, y), (loop, (strip,)) in zip(panels, cells, strict=True):
+        _loops(loop, {ALONE: [pair]}, x, y)
+        for i, channel in enumerate(c for c in (x, y) if is_compared(*pair, c)):
+            style = {"color": COLOURS[i], "linestyle": LINES[i], "linewidth": 1.1, "label": f"Δ {TABLE[channel].tex}"}
+            _residuals(strip, {Look({}, style): [pair]}, channel, smoothing_share)
+        _finish_strip(strip, f"Δ ({_unit(y)})")
+        figures.legend_above(strip)
+    figures.letter_panels([loop for loop, _ in cells])
+    _title_and_legend(figure, [pair], study, f"{recorded.batch}/{recorded.id}", {})
     return figure
 
 
-def loops_figure(pairs: Sequence[Pair], study: Study, x: str = TAU_IN, y: str = TAU_OUT) -> Figure:
-    """Loops of channel `y` over channel `x`, recordings on the left and the model on the right.
+def loops_figure(
+    pairs: Sequence[Pair],
+    study: Study,
+    smoothing_share: float,
+    x: str = TAU_IN,
+    y: str = TAU_OUT,
+    apart: bool = False,
+) -> Figure:
+    """Loops of channel `y` over channel `x`, and the residuals of both over time.
 
-    With the two torques, the paper's Figs. 10 and 11. Each value of `study.rows` has a row of panels.
+    With the two torques, the paper's Figs. 10 to 12. Each value of `study.rows` has a panel, or each condition where
+    they are wanted `apart` or are too many for one.
     """
     rows = by_label(pairs, study.rows) if study.rows else {"": pairs}
     conditions = by_label(pairs, study.variable)
-    size = (9, 0.8 + 3.4 * len(rows))
-    figure, axes = plt.subplots(len(rows), 2, figsize=size, sharex=True, sharey=True, squeeze=False)
-    for (row_label, row_pairs), (left, right) in zip(rows.items(), axes, strict=True):
-        in_row = {id(recorded) for recorded, _ in row_pairs}
-        for (label, group), style in zip(conditions.items(), _styles(), strict=False):
-            for recorded, simulated in (pair for pair in group if id(pair[0]) in in_row):
-                _loop(left, recorded, x, y, label=label, **style)
-                _loop(right, simulated, x, y, label=label, **style)
-        left.set_title(_joined(row_label, origins_of(r for r, _ in row_pairs)), loc="left")
-        right.set_title(_joined(row_label, _model_title(row_pairs)), loc="left")
-        for ax in (left, right):
-            _finish(ax, x, y)
-            ax.label_outer()
-    figures.legend_below(figure, axes)
-    figure.suptitle(study.title)
+    looks = dict(zip(conditions, map(_look, range(len(conditions))), strict=True))
+    panels = {row: _of_row(conditions, row_pairs) for row, row_pairs in rows.items()}
+    if apart or max(map(len, panels.values())) > CONDITIONS_IN_A_PANEL:
+        panels = {_joined(row, label): {"": group} for row, by in panels.items() for label, group in by.items()}
+        looks = {"": ALONE}
+    compared = [c for c in (x, y) if any(is_compared(*pair, c) for pair in pairs)]
+    # Without any simulation there is still a strip, which says so.
+    channels = compared or [c for c in (x, y) if c != THETA_IN]
+    figure, cells = _grid(len(panels), len(channels), columns=2 if len(panels) in (2, 4) else 3)
+    for (title, by), (loop, strips) in zip(panels.items(), cells, strict=True):
+        drawn = {looks[label]: group for label, group in by.items()}
+        _loops(loop, drawn, x, y)
+        loop.set_title(title, loc="left")
+        for strip, channel in zip(strips, channels, strict=True):
+            _residuals(strip, drawn, channel, smoothing_share)
+            _finish_strip(strip, f"Δ {TABLE[channel].tex} ({_unit(channel)})")
+    _title_and_legend(figure, pairs, study, "", {label: look for label, look in looks.items() if label})
     return figure
 
 
-def loops_apart_figure(pairs: Sequence[Pair], study: Study) -> Figure:
-    """The paper's Fig. 12: a panel for the recordings of each condition, and one for the model of all of them."""
-    x, y = TAU_IN, TAU_OUT
-    conditions = by_label(pairs, study.variable)
-    rows = -(-(len(conditions) + 1) // 2)
-    figure, axes = plt.subplots(rows, 2, figsize=(9, 0.8 + 3.2 * rows), sharex=True, sharey=True, squeeze=False)
-    for ax in axes.flat[len(conditions) + 1 :]:
-        ax.set_axis_off()
-    *apart, together = axes.flat[: len(conditions) + 1]
-    for ax, (label, group), style in zip(apart, conditions.items(), _styles(), strict=False):
-        for recorded, simulated in group:
-            _loop(ax, recorded, x, y, label=label, **style)
-            _loop(together, simulated, x, y, label=label, **style)
-        ax.set_title(f"{label}, {origins_of(r for r, _ in group)}", loc="left")
-    together.set_title(f"{_model_title(pairs)}, all of them", loc="left")
-    for ax in (*apart, together):
-        _finish(ax, x, y)
-        ax.tick_params(labelbottom=True)
-    figures.legend_below(figure, axes)
-    figure.suptitle(study.title)
-    return figure
-
-
-_DRAW = {
+_DRAW: dict[str, Callable[[Sequence[Pair], Study, float], Figure]] = {
     "transmission": transmission_figure,
     "torque-loops": loops_figure,
     "drive-loops": partial(loops_figure, x=THETA_IN, y=TAU_IN),
-    "torque-loops-apart": loops_apart_figure,
+    "torque-loops-apart": partial(loops_figure, apart=True),
 }
 
 
-def _styles() -> Iterator[dict]:
-    """Colour and dash of each condition; the dash changes when all colours are used."""
-    for linestyle in cycle(figures.LINES):
-        for color in COLOURS:
-            yield {"color": color, "linestyle": linestyle}
+def _look(number: int) -> Look:
+    """Lines of a condition by its number: a colour, and a dash for whoever does not see the colour."""
+    color = COLOURS[number % len(COLOURS)]
+    dash = LINES[(number + number // len(COLOURS)) % len(LINES)]
+    return Look({"color": color, "linewidth": 4.0, "alpha": 0.3}, {"color": color, "linewidth": 1.1, "linestyle": dash})
 
 
-def _model_title(pairs: Sequence[Pair]) -> str:
-    """Title of the model's panel, with a load torque that the model was given."""
-    given = any(s is not None and s.derived_from[TAU_OUT] == PRESCRIBED for _, s in pairs)
-    return f"{ORIGIN['model']}, given the recorded load torque" if given else ORIGIN["model"]
+def _of_row(conditions: Mapping[str, Sequence[Pair]], row: Sequence[Pair]) -> dict[str, list[Pair]]:
+    """Conditions with their pairs in a row; none without."""
+    ids = {id(recorded) for recorded, _ in row}
+    of_row = {label: [pair for pair in group if id(pair[0]) in ids] for label, group in conditions.items()}
+    return {label: group for label, group in of_row.items() if group}
 
 
-def _finish(ax: Axes, x: str, y: str) -> None:
-    """Label the axes; an empty panel says why it is empty."""
+def _grid(cells: int, strips: int, columns: int, shared: bool = True) -> tuple[Figure, list[tuple[Axes, list[Axes]]]]:
+    """A figure of cells, each a loop above strips of residuals; a single cell has them side by side.
+
+    `shared` loops have the same axes, and strips of the same channel the same y axis.
+    """
+    if cells == 1:
+        figure = plt.figure(figsize=(9, max(3.4, 1.9 * strips) + 0.9))
+        grid = figure.add_gridspec(strips, 2, width_ratios=(1.1, 1))
+        places = [(grid[:, 0], [grid[i, 1] for i in range(strips)])]
+    else:
+        rows, depth = -(-cells // columns), 1 + strips
+        figure = plt.figure(figsize=((4.5 if columns == 2 else 3.7) * columns, rows * (3 + 1.3 * strips) + 0.9))
+        grid = figure.add_gridspec(rows * depth, columns, height_ratios=[3, *[1.2] * strips] * rows)
+        corners = [(depth * (i // columns), i % columns) for i in range(cells)]
+        places = [(grid[r, c], [grid[r + 1 + i, c] for i in range(strips)]) for r, c in corners]
+    made = []
+    for loop, below in places:
+        first = made[0] if made and shared else (None, [None] * strips)
+        loop = figure.add_subplot(loop, sharex=first[0], sharey=first[0])
+        drawn = [figure.add_subplot(place, sharey=other) for place, other in zip(below, first[1], strict=True)]
+        for strip in drawn[:-1]:
+            strip.sharex(drawn[-1])
+            strip.tick_params(labelbottom=False)
+        drawn[-1].set_xlabel("time from the start of the loop (s)")
+        made.append((loop, drawn))
+    return figure, made
+
+
+def _loops(ax: Axes, drawn: Mapping[Look, Sequence[Pair]], x: str, y: str) -> None:
+    """Recordings below and the model of them above; an empty panel says why it is empty."""
+    for look, pairs in drawn.items():
+        for recorded, simulated in pairs:
+            window = last_cycle(recorded)
+            for run, style in ((recorded, look.recording | {"zorder": 2}), (simulated, look.model | {"zorder": 3})):
+                if run is not None and x in run and y in run:
+                    figures.plot_channels(ax, run, x, y, window, **style)
     name_axes(ax, x, y)
     if not ax.lines:
         figures.say_in_panel(ax, f"not recorded, or not simulated:\n{TABLE[x].axis} over {TABLE[y].axis}")
 
 
-def _loop(ax: Axes, recording: Recording | None, x: str, y: str, **style) -> None:
-    """The last cycle in one panel; nothing without a simulation or where a channel was not recorded."""
-    if recording is not None and x in recording and y in recording:
-        figures.plot_channels(ax, recording, x, y, last_cycle(recording), **({"linewidth": 1.0} | style))
+def _residuals(ax: Axes, drawn: Mapping[Look, Sequence[Pair]], channel: str, smoothing_share: float) -> None:
+    """Model minus recording over the time of the loop: every sample pale, and the moving mean above."""
+    for look, pairs in drawn.items():
+        for recorded, simulated in pairs:
+            if is_compared(recorded, simulated, channel):
+                window = last_cycle(recorded)
+                time = recorded.time_s[window] - recorded.time_s[window][0]
+                residual = (simulated[channel] - recorded[channel]) * TABLE[channel].scale
+                mean = uniform_filter1d(residual, max(1, round(smoothing_share * time.size)))
+                ax.plot(time, residual[window], color=look.model["color"], linewidth=0.6, alpha=0.4, zorder=2)
+                ax.plot(time, mean[window], **look.model, zorder=3)
+
+
+def _finish_strip(ax: Axes, ylabel: str) -> None:
+    """A line at zero; an empty strip says why it is empty."""
+    if ax.lines:
+        ax.axhline(0, color="0.4", linewidth=0.6, zorder=1)
+    else:
+        figures.say_in_panel(ax, "not simulated")
+    ax.set_ylabel(ylabel)
+
+
+def _unit(channel: str) -> str:
+    return TABLE[channel].plot_unit or TABLE[channel].unit
+
+
+def _title_and_legend(
+    figure: Figure, pairs: Sequence[Pair], study: Study, which: str, conditions: Mapping[str, Look]
+) -> None:
+    """Title with the origin of each batch, and a legend of what is wide and thin and of the conditions."""
+    # Without any simulation there is nothing to explain.
+    simulated = any(simulated is not None for _, simulated in pairs)
+    figures.title_figure(
+        figure, ": ".join(filter(None, (study.title, which))), batches_of(pairs), DIFFERENCE if simulated else ""
+    )
+    key = IN_LEGEND if conditions else ALONE
+    origins = " or ".join(sorted({ORIGIN[recorded.origin] for recorded, _ in pairs}))
+    handles = {origins: Line2D([], [], **key.recording), _model_title(pairs): Line2D([], [], **key.model)}
+    handles |= {
+        label: (Line2D([], [], **look.recording), Line2D([], [], **look.model)) for label, look in conditions.items()
+    }
+    figures.legend_of(figure, handles)
+
+
+def _model_title(pairs: Sequence[Pair]) -> str:
+    """The model in a legend, with a load torque that it was given."""
+    given = any(s is not None and s.derived_from[TAU_OUT] == PRESCRIBED for _, s in pairs)
+    return f"{ORIGIN['model']}, given the recorded load torque" if given else ORIGIN["model"]
 
 
 def _joined(*parts: str) -> str:

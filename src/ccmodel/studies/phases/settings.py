@@ -15,6 +15,10 @@ class PhaseExample(StudySettings):
 
     kind: ClassVar = "phases"
     heading: ClassVar = "Simulated phases"
+    shows: ClassVar = (
+        "Simulations with the exact solver, not recordings: response to a sine, torque loop with phases I to IV, and"
+        " tension along the cables, as in the paper's Figs. 5 to 7."
+    )
     figures: ClassVar = tuple(f"{{name}}/{figure}" for figure in FIGURES)
 
     conduit_length_m: Positive = Field(description="arc length of the conduits, m")

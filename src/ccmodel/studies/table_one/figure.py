@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ccmodel.channels import TABLE, TABLE_ONE
-from ccmodel.report.figures import COLOURS, STYLE
+from ccmodel.report.figures import COLOURS, STYLE, title_figure
 from ccmodel.studies.table_one.rank import flat_distance, target
 from ccmodel.studies.table_one.refit import NORMS
 from ccmodel.studies.table_one.settings import TableOne
@@ -32,8 +32,10 @@ def table_one_figure(ranked: pd.DataFrame, singles: pd.DataFrame, study: TableOn
         left, right = below.subplots(1, 2)
         _fitted(left, ranked, singles, study)
         _ranking(right, ranked, study)
-        figure.suptitle(
-            "Which left-out effect errs as the paper's Table I does? Bars: the paper's; all else is simulated"
+        title_figure(
+            figure,
+            "Which left-out effect errs as the paper's Table I does?",
+            "Bars and star: the paper's rig (measured); all else is simulated",
         )
     return figure
 
@@ -69,10 +71,10 @@ def _fitted(ax: Axes, ranked: pd.DataFrame, singles: pd.DataFrame, study: TableO
     friction_ratio = fitted.friction_coefficient / measured.friction_coefficient
     ax.plot(stiffness_ratio, friction_ratio, "k*", ms=14, label="paper: fitted over measured")
     ax.plot(1, 1, "k+", ms=10, label="nothing left out")
-    ax.set(xlim=(0.3, 1.15), xlabel="fitted stiffness over the rig's")
-    ax.set(ylim=(0.8, 1.35), ylabel="fitted friction over the rig's")
+    ax.set(xlim=(0.3, 1.15), xlabel="fitted stiffness over the rig's (–)")
+    ax.set(ylim=(0.8, 1.35), ylabel="fitted friction over the rig's (–)")
     ax.set_title("plain model fitted to rigs of the measured stiffness, no free cable", loc="left")
-    ax.legend(loc="upper left", fontsize=7)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=2, fontsize=7)
 
 
 def _ranking(ax: Axes, ranked: pd.DataFrame, study: TableOne) -> None:
@@ -87,11 +89,10 @@ def _ranking(ax: Axes, ranked: pd.DataFrame, study: TableOne) -> None:
     flat = flat_distance(target(study))
     ax.axvline(flat, color="black", lw=0.8, ls="--", label=f"the same error everywhere ({flat:.2f})")
     ax.set_yticks(at, [_short(e) for e in distances.index], fontsize=7)
-    ax.set(
-        xlim=(0, None), xlabel="distance to Table I: rms of ln (error / the paper's)", ylim=(-0.7, len(distances) - 0.3)
-    )
+    ax.set(xlim=(0, None), xlabel="distance to Table I: rms of ln (error / the paper's) (–)")
+    ax.set_ylim(-0.7, len(distances) - 0.3)
     ax.set_title("every effect at its nearest", loc="left")
-    ax.legend(loc="lower left", fontsize=7)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.4, -0.09), ncols=2, fontsize=7)
 
 
 def _short(effect: str) -> str:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pandas as pd
 
 from ccmodel import provenance
-from ccmodel.report.figures import save_figure
+from ccmodel.report.figures import FORMATS, save_figure, stamp_figure
 from ccmodel.steps.files import write_json, write_table
 from ccmodel.studies.table_one.cases import Case, Report, pair_cases, run, single_cases, usable_conditions
 from ccmodel.studies.table_one.effects import Effect, finer
@@ -94,7 +94,8 @@ def _leading(study: TableOne, found: pd.DataFrame, cases: Sequence[Case]) -> lis
 def table_one(settings: Path, out: Path, figure: Path, cores: int = 1, report: Report = lambda text: None) -> str:
     """Run the study and return a line on the number of cases.
 
-    Writes cases.csv, pairs.csv, failed.csv, ranking.csv and summary.json into `out`, and the figure.
+    Writes cases.csv, pairs.csv, failed.csv, ranking.csv, summary.json and table-one.png, .svg and .pdf into `out`, and
+    the figure once more where the caller wants it.
 
     Raises
     ------
@@ -118,7 +119,9 @@ def table_one(settings: Path, out: Path, figure: Path, cores: int = 1, report: R
     }
     write_json(out / "summary.json", summary)
     figure.parent.mkdir(parents=True, exist_ok=True)
-    save_figure(table_one_figure(ranked, found.singles, study), figure)
+    drawn = table_one_figure(ranked, found.singles, study)
+    stamp_figure(drawn, provenance.stamp(__name__, study.model_dump(mode="json")))
+    save_figure(drawn, figure, *(out / f"table-one.{ending}" for ending in FORMATS))
     return (
         f"{len(found.singles)} cases of one effect and {len(found.pairs)} of two; {len(found.failed)} could not be "
         f"run, {found.left_out} conditions are beyond the sensors' ranges: {out / 'ranking.csv'}, {figure}"

@@ -1,0 +1,111 @@
+"""What `ccmodel accuracy` does: compare the last run with the baseline, accept it, fill the history of past commits."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import TypeAdapter
+
+from ccmodel import __version__
+from ccmodel.accuracy.baseline import ACCEPT, make_baseline, read_baseline, write_baseline
+from ccmodel.accuracy.comparison import GAINED, Comparison, Limits, compare
+from ccmodel.accuracy.history import add_rows, commits_in, head, rows_of, run_commit
+from ccmodel.accuracy.measure import Batches
+from ccmodel.steps.files import read_json
+from ccmodel.typed import InputError
+
+# The study's file in a folder of results.
+STATE = "tables/baseline.json"
+
+
+@dataclass(frozen=True)
+class State:
+    """Accuracy of the last run into a folder of results, and what it is compared with.
+
+    Attributes
+    ----------
+    baseline, history : Path
+    limits : Limits
+    batches : dict of str to BatchAccuracy
+    """
+
+    baseline: Path
+    history: Path
+    limits: Limits
+    batches: Batches
+
+
+def state_of(results: Path) -> State:
+    """Accuracy of the last run.
+
+    Raises
+    ------
+    InputError
+        If no run has measured it there.
+    """
+    file = results / STATE
+    if not file.exists():
+        raise InputError(
+            f"{file}: not there: no run with the key 'baseline' in its configuration came to its end in {results}"
+        )
+    content = read_json(file)
+    settings = content["settings"]
+    limits = Limits(coverage=settings["coverage"], reproducibility=settings["reproducibility"])
+    batches = TypeAdapter(Batches).validate_python(content["measured"])
+    return State(Path(settings["file"]), Path(settings["history"]), limits, batches)
+
+
+def check(results: Path) -> tuple[Comparison, str]:
+    """Compare the last run with the baseline as it is now; and a sentence on the outcome.
+
+    Raises
+    ------
+    InputError
+        If there is no run, or no baseline that can be read.
+    """
+    state = state_of(results)
+    baseline = read_baseline(state.baseline)
+    found = compare(baseline.batches, state.batches, state.limits)
+    return found, summary(found, baseline.date, baseline.commit)
+
+
+def summary(found: Comparison, date: str, commit: str) -> str:
+    """A sentence on a comparison."""
+    counts = f"{len(found.losses)} lost, {len(found.of(GAINED))} gained, {len(found.not_compared)} not compared"
+    text = f"accuracy: {len(found.changes)} channels against the baseline of {date[:10]} ({commit}): {counts}"
+    if found.again:
+        text += f"; recorded again since then, so that only a larger loss is seen: {', '.join(found.again)}"
+    return text
+
+
+def accept(results: Path, reason: str) -> State:
+    """Make the last run the baseline, and append it to the history.
+
+    Raises
+    ------
+    InputError
+        Without a reason or a run.
+    """
+    if not reason.strip():
+        raise InputError(f"--reason: state why this accuracy is right, for example: {ACCEPT}")
+    state = state_of(results)
+    commit, date = head()
+    state.baseline.parent.mkdir(parents=True, exist_ok=True)
+    write_baseline(state.baseline, make_baseline(state.batches, state.limits, date, commit, reason.strip()))
+    add_rows(state.history, rows_of(state.batches, commit, date, __version__))
+    return state
+
+
+def fill_history(file: Path, revisions: Iterable[str], cores: int, report: Callable[[str], None]) -> None:
+    """Run past commits and add their accuracy to a history; a commit that cannot be run is a line.
+
+    Raises
+    ------
+    InputError
+        If git does not know a revision.
+    """
+    for commit in commits_in(revisions):
+        rows, line = run_commit(commit, cores)
+        report(line)
+        if len(rows):
+            add_rows(file, rows)

@@ -1,0 +1,69 @@
+"""Error of the model over the project's commits: a panel for each batch, a line for each parameter set."""
+
+from collections.abc import Mapping
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from ccmodel.report.figures import COLOURS, LINES, MARKERS, STYLE, empty_figure, legend_below, title_figure
+
+COLUMNS = 3
+
+
+def history_figure(history: pd.DataFrame, present: pd.DataFrame, origins: Mapping[str, str]) -> Figure:
+    """Median normalised error over the channels of each batch, at every commit and, as the last point, in this run.
+
+    Parameters
+    ----------
+    history, present : DataFrame
+        With the columns of `ccmodel.accuracy.history.COLUMNS`.
+    origins : mapping of str to str
+        Origin of each batch, as figures name it.
+    """
+    table = pd.concat([history, present], ignore_index=True)
+    batches, commits = sorted(set(present["batch"])), list(dict.fromkeys(table["commit"]))
+    if not batches:
+        return empty_figure("no recording that the model could be run on")
+    sets = list(dict.fromkeys(present["set"])) + sorted(set(table["set"]) - set(present["set"]))
+    columns = min(COLUMNS, len(batches))
+    rows = -(-len(batches) // columns)
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(
+            rows, columns, figsize=(4 * columns, 1.4 + 2.4 * rows), squeeze=False, sharey=True, sharex=True
+        )
+        for ax in axes.flat[len(batches) :]:
+            ax.set_axis_off()
+        for k, (ax, batch) in enumerate(zip(axes.flat, batches, strict=False)):
+            _panel(ax, table[table["batch"] == batch], commits, sets)
+            ax.set_title(f"{batch}: {origins[batch]}", loc="left", fontsize=9)
+            if k % columns == 0:
+                ax.set_ylabel("error, % of peak to peak")
+            # The axes are shared: names of commits stand below the last panel of each column.
+            ax.tick_params(labelbottom=k + columns >= len(batches))
+        legend_below(figure, axes)
+        title_figure(figure, "Error of the model over commits: median of the channels (line), all channels (band)")
+    return figure
+
+
+def _panel(ax: Axes, table: pd.DataFrame, commits: list[str], sets: list[str]) -> None:
+    at = {commit: k for k, commit in enumerate(commits)}
+    for k, name in enumerate(sets):
+        errors = table[table["set"] == name].groupby("commit")["error"]
+        found = pd.DataFrame({"middle": errors.median(), "low": errors.min(), "high": errors.max()})
+        if found.empty:
+            continue
+        found = found.reindex(commits)
+        x, colour = np.arange(len(commits)), COLOURS[k % len(COLOURS)]
+        ax.fill_between(x, found["low"], found["high"], color=colour, alpha=0.12, lw=0)
+        style = {"color": colour, "ls": LINES[k % len(LINES)], "marker": MARKERS[k % len(MARKERS)], "ms": 4}
+        ax.plot(x, found["middle"], lw=1.2, label=name, **style)
+    ax.axvline(at[commits[-1]], color="#999999", lw=0.8, ls=":")
+    ax.set_yscale("log")
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.yaxis.set_minor_formatter(NullFormatter())
+    ax.set_xlim(-0.5, len(commits) - 0.5)
+    ax.set_xticks(range(len(commits)), commits, rotation=90, fontsize=7)

@@ -1,0 +1,169 @@
+"""The comparison with an accepted accuracy: what is a loss, what is covered, what cannot be compared."""
+
+import numpy as np
+import pytest
+from scipy.stats import norm, t
+
+from ccmodel.accuracy.baseline import make_baseline, read_baseline, write_baseline
+from ccmodel.accuracy.comparison import GAINED, KEPT, LOST, UNKNOWN, Limits, compare
+from ccmodel.accuracy.measure import BatchAccuracy, ChannelAccuracy, SetAccuracy
+from ccmodel.typed import InputError
+
+LIMITS = Limits(coverage=0.99, reproducibility=0.01)
+REPEATED = ("c1-a", "c1-b", "c2-a", "c2-b")
+
+
+def batch(errors, names=REPEATED, digest="same", verdict=None, fit_sd=0.0, rig="rig", window=(6.0, 8.0, 1000.0)):
+    """A batch with one parameter set and one channel of these errors, without bias."""
+    channel = ChannelAccuracy(biases=[0.0] * len(errors), errors=list(errors), fit_sd=fit_sd)
+    return BatchAccuracy(
+        rig=rig,
+        origin="virtual-rig",
+        digest=digest,
+        verdict=verdict,
+        recordings={name: list(window) for name in names[: len(errors)]},
+        sets={"fitted": SetAccuracy(fitted_to=[], channels={"tau_in_Nm": channel})},
+    )
+
+
+def outcome(accepted, now):
+    (change,) = compare({"b": accepted}, {"b": now}, LIMITS).changes
+    return change.outcome
+
+
+def test_error_contains_bias_and_scatter():
+    channel = ChannelAccuracy(biases=[3.0, -1.0], errors=[5.0, 7.0])
+    assert channel.bias == pytest.approx(1.0)
+    assert channel.error == pytest.approx(np.sqrt(37))
+    assert channel.scatter == pytest.approx(6.0)
+
+
+def test_on_the_same_recordings_one_percent_decides():
+    before = batch([5.0, 5.2, 3.0, 3.1])
+    assert outcome(before, batch([5.04, 5.24, 3.02, 3.12])) == KEPT
+    assert outcome(before, batch([5.1, 5.3, 3.06, 3.16])) == LOST
+    assert outcome(before, batch([4.9, 5.1, 2.94, 3.04])) == GAINED
+
+
+def test_a_fit_may_end_elsewhere_within_its_uncertainty():
+    before, reach = batch([5.0] * 4, fit_sd=0.02), norm.isf(0.01) * 0.02 + np.log(1.01)
+    assert outcome(before, batch([5.0 * np.exp(0.99 * reach)] * 4)) == KEPT
+    assert outcome(before, batch([5.0 * np.exp(1.01 * reach)] * 4)) == LOST
+
+
+def test_recorded_again_the_scatter_of_repeats_decides():
+    before = batch([5.0, 5.5, 5.0, 5.5])
+    # Two differences of ln 1.1 between repeats, two degrees of freedom; the weights of the errors are nearly equal.
+    sd = np.log(1.1) / np.sqrt(2)
+    square = np.array([5.0, 5.5, 5.0, 5.5]) ** 2
+    reach = t.isf(0.01, 2) * sd * np.sqrt(2 * ((square / square.sum()) ** 2).sum()) + np.log(1.01)
+    for share, expected in ((0.99, KEPT), (1.01, LOST)):
+        factor = np.exp(share * reach)
+        assert outcome(before, batch([factor * e for e in (5.0, 5.5, 5.0, 5.5)], digest="other")) == expected
+
+
+def test_other_noise_is_covered_as_stated():
+    """Errors drawn anew a thousand times raise about one false alarm in a hundred runs of ten channels' batches."""
+    random, alarms, runs = np.random.default_rng(3), 0, 400
+    names = tuple(f"c{k}-{letter}" for k in range(6) for letter in "ab")
+
+    def drawn(digest):
+        return {f"b{k}": batch(np.exp(random.normal(0, 0.1, 12)), names, digest, rig=f"rig {k}") for k in range(10)}
+
+    for _ in range(runs):
+        alarms += bool(compare(drawn("before"), drawn("after"), Limits(coverage=0.9, reproducibility=0.0)).losses)
+    assert 0.03 * runs < alarms < 0.14 * runs
+
+
+def test_a_fit_of_other_recordings_makes_a_batch_one_that_was_recorded_again():
+    def run(digest):
+        fitted = batch([5.0] * 4)
+        fitted.sets["fitted"].fitted_to.append("half-loop")
+        return {"b": fitted, "half-loop": batch([4.0, 4.4], ("c-a", "c-b"), digest)}
+
+    assert all(c.same_recordings for c in compare(run("x"), run("x"), LIMITS).changes)
+    assert not any(c.same_recordings for c in compare(run("x"), run("y"), LIMITS).changes)
+
+
+def test_without_repeats_the_scatter_of_all_recordings_takes_their_place():
+    names = tuple(f"trial-0{k}" for k in range(8))
+    errors = [5.0, 6.0, 4.0, 5.5, 4.5, 5.0, 6.5, 4.2]
+    before = batch(errors, names)
+    assert outcome(before, batch([1.1 * e for e in errors], names, "other")) == KEPT
+    assert outcome(before, batch([3.0 * e for e in errors], names, "other")) == LOST
+
+
+def test_one_recording_made_again_cannot_be_judged_and_is_named():
+    found = compare({"b": batch([5.0])}, {"b": batch([5.0], digest="other")}, LIMITS)
+    assert found.changes[0].outcome == UNKNOWN
+    assert "too few repeats" in found.not_compared[0]
+    assert compare({"b": batch([5.0])}, {"b": batch([9.0])}, LIMITS).losses, "on the same recording it is judged"
+
+
+def test_less_data_is_a_loss_and_is_named():
+    before = batch([5.0] * 4)
+    earlier = batch([5.0] * 4, window=(4.0, 6.0, 1000.0))
+    assert "compared from 4 to 6 s, accepted from 6 to 8 s" in compare({"b": before}, {"b": earlier}, LIMITS).losses[0]
+    assert not compare({"b": before}, {"b": batch([5.0] * 4, window=(6.01, 8.01, 1001.0))}, LIMITS).losses
+    fewer = compare({"b": before}, {"b": batch([5.0] * 3)}, LIMITS).losses
+    assert fewer == ["batch b, recording c2-b: compared before, and not in this run"]
+    gone = compare({"b": before, "c": before}, {"b": before}, LIMITS).losses
+    assert gone == ["batch c: accepted with 4 recordings, and not compared in this run"]
+    silent = batch([5.0] * 4)
+    silent.sets["fitted"].channels["tau_in_Nm"].errors[1] = None
+    assert "not compared any more in c1-b" in compare({"b": before}, {"b": silent}, LIMITS).losses[0]
+    del silent.sets["fitted"]
+    assert "fitted parameters are not compared" in compare({"b": before}, {"b": silent}, LIMITS).losses[0]
+
+
+def test_a_batch_that_the_baseline_does_not_have_is_one_line():
+    found = compare({"b": batch([5.0] * 4)}, {"b": batch([5.0] * 4), "new": batch([1.0] * 4)}, LIMITS)
+    assert not found.losses
+    (line,) = found.not_compared
+    assert "batch new: the baseline does not have it" in line
+
+
+def test_a_verdict_that_determines_less_is_a_loss_on_the_same_recordings_only():
+    def run(before, after, digest="same"):
+        now = batch([5.0] * 4, verdict=after, digest=digest)
+        return compare({"b": batch([5.0] * 4, verdict=before)}, {"b": now}, LIMITS)
+
+    found = run("explained: kink at conduit", "undecided")
+    assert found.losses == ["batch b: verdict explained: kink at conduit -> undecided"]
+    assert not run("unexplained", "explained: kink at conduit").losses
+    assert run("unexplained", "explained: kink at conduit").verdicts
+    assert not run("agrees", "unexplained", digest="other").losses
+
+
+def test_a_written_baseline_is_read_again_and_states_its_intervals(tmp_path):
+    file, batches = tmp_path / "baseline.json", {"b": batch([5.0, 5.5, 5.0, 5.5])}
+    write_baseline(file, make_baseline(batches, LIMITS, "2026-01-01", "abc", "first"))
+    read = read_baseline(file)
+    assert not compare(read.batches, batches, LIMITS).losses
+    value, low, high = read.batches["b"].sets["fitted"].channels["tau_in_Nm"].accepted["error"]
+    assert low < value < high
+    assert outcome(batches["b"], batch([0.99 * high] * 4, digest="other")) == KEPT
+    assert sum("tau_in_Nm" in line for line in file.read_text().splitlines()) == 1, "a channel is one line"
+
+
+@pytest.mark.parametrize(
+    "text, says",
+    [
+        (None, "there is no baseline"),
+        ("{", "not a baseline"),
+        ("[]", "format None, and this version reads 1"),
+        ('{"format": 2}', "format 2, and this version reads 1"),
+        ('{"format": 1}', "Field required"),
+    ],
+)
+def test_a_baseline_that_cannot_be_read_is_one_line(tmp_path, text, says):
+    file = tmp_path / "baseline.json"
+    if text is not None:
+        file.write_text(text)
+    with pytest.raises(InputError) as error:
+        read_baseline(file)
+    message = str(error.value)
+    assert says in message
+    assert str(file) in message
+    assert "ccmodel accuracy accept" in message
+    assert "\n" not in message
