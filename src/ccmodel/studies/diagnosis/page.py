@@ -18,8 +18,9 @@ from ccmodel.diagnose.diagnosis import Diagnosis
 from ccmodel.diagnose.location import PHASES, mismatch
 from ccmodel.diagnose.settings import ADEQUATE_LACK_OF_FIT
 from ccmodel.diagnose.verdict import nested_choice
+from ccmodel.provenance import stamp
 from ccmodel.recording import ORIGIN
-from ccmodel.report.figures import COLOURS, STYLE, legend_below
+from ccmodel.report.figures import COLOURS, STYLE, legend_below, stamp_figure, title_figure
 
 LOOPS = 3
 CANDIDATES = 8
@@ -145,7 +146,8 @@ def _map(found: Diagnosis) -> Figure:
         for (row, column), value in np.ndenumerate(values):
             dark = value < np.sqrt(0.7 * highest)
             ax.text(column, row, f"{value:.1f}", ha="center", va="center", color="white" if dark else "black")
-    figure.suptitle("rms error on held-out recordings, in units of the noise", fontsize=9)
+    title_figure(figure, "rms error on held-out recordings, in units of the noise", _origin(found))
+    stamp_figure(figure, _stamp(found))
     return figure
 
 
@@ -165,7 +167,7 @@ def _loops(found: Diagnosis) -> Figure:
         observed = w.observations
         c = observed.channels.index(channel)
         theta = observed.given.theta_in[observed.judged]
-        ax.plot(theta, scale * observed.measured[c], color=FAINT, lw=2.2, label="recording")
+        ax.plot(theta, scale * observed.measured[c], color=FAINT, lw=2.2, label=_origin(found))
         models = [(j.calibrated, COLOURS[0], "--", _baseline(found.report))]
         if chosen[i] is not j.calibrated:
             models.append((chosen[i], COLOURS[1], "-", WITH_FOUND))
@@ -175,7 +177,8 @@ def _loops(found: Diagnosis) -> Figure:
         ax.set_title(observed.given.recording.id, fontsize=9)
         ax.set_xlabel(TABLE[THETA_IN].axis)
     axes[0][0].set_ylabel(TABLE[channel].axis)
-    legend_below(figure, axes[:, :1], columns=3)
+    legend_below(figure, axes[:, :1])
+    stamp_figure(figure, _stamp(found))
     return figure
 
 
@@ -183,6 +186,17 @@ def _worst_channel(report: dict) -> str:
     """Short name of the channel whose baseline error is largest over its noise."""
     error = report["fit"]["error"]
     return max(error, key=lambda c: error[c]["before"] / error[c]["noise"])
+
+
+def _origin(found: Diagnosis) -> str:
+    """Whether the recordings were measured, in words; a batch has one origin."""
+    return ORIGIN[found.judgement.whitened[0].observations.given.recording.origin]
+
+
+def _stamp(found: Diagnosis) -> str:
+    """The line in the corner of a figure; the report stands for the settings, which it follows from."""
+    recordings = [w.observations.given.recording for w in found.judgement.whitened]
+    return stamp("ccmodel.studies.diagnosis.run", recordings, found.report)
 
 
 def _encoded(figure: Figure) -> str:
