@@ -146,7 +146,7 @@ def _map(found: Diagnosis) -> Figure:
         for (row, column), value in np.ndenumerate(values):
             dark = value < np.sqrt(0.7 * highest)
             ax.text(column, row, f"{value:.1f}", ha="center", va="center", color="white" if dark else "black")
-    title_figure(figure, "rms error on held-out recordings, in units of the noise", _origin(found))
+    title_figure(figure, "held-out rms error, in units of the noise", _origin(found))
     stamp_figure(figure, _stamp(found))
     return figure
 
