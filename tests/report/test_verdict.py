@@ -90,6 +90,14 @@ def test_two_mechanisms_are_both_said_with_their_confidence():
     assert said.endswith("confidence 0.99.")
 
 
+def test_what_the_mechanisms_leave_is_said_where_the_noise_does_not_explain_it():
+    left = diagnosis("b", "explained")
+    error = {"before": 0.06, "after": 0.03, "noise": 0.01, "unit": "N*m"}
+    left = left | {"fit": left["fit"] | {"error": left["fit"]["error"] | {"tau_in": error}}}
+    assert sentence(left).endswith("still missing: an error of 3.0 times the noise remains in τ_in.")
+    assert "still missing" not in sentence(diagnosis("b", "explained"))
+
+
 def test_the_headline_says_how_far_the_error_fell():
     assert "of τ_out falls from 6.0 to 1.2 times the noise" in headline(diagnosis("b", "explained"))
     assert "falls" not in headline(diagnosis("b", "agrees"))

@@ -11,6 +11,8 @@ from ccmodel.mechanisms.contract import side
 # By the short names of diagnosis.json.
 SYMBOL = {channel.short_name: channel.symbol for channel in TABLE.values()}
 NOT_ACCEPTED = "not accepted"
+# Correct models leave held-out errors of up to 1.8 times the noise; a larger error after the mechanisms is stated.
+NOISE_LEFT = 2.0
 # A unit is printed with a prefix if the value is below a tenth of it; these units take none.
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 _WITHOUT_PREFIX = ("1", "1/m", "kg*m^2")
@@ -35,11 +37,21 @@ def sentence(diagnosis: Mapping) -> str:
         return f"The {model} agrees with the recordings within their noise; they show {nothing}."
     if verdict == "explained":
         claims = [f"{claim(m)}, confidence {m['confidence']:.2f}" for m in diagnosis["mechanisms"]]
-        return _capital(f"{'this has changed: ' if held else ''}{'; and '.join(claims)}.")
+        return _capital(f"{'this has changed: ' if held else ''}{'; and '.join(claims)}.{_left(diagnosis)}")
     if verdict == "undecided":
         return _undecided(diagnosis, missing)
     places = " or ".join(f"the {place_in_words(place)}" for place in possible_places(diagnosis))
     return f"Something {missing} at {places}, and no listed mechanism explains it."
+
+
+def _left(diagnosis: Mapping) -> str:
+    """A sentence on the error that the named mechanisms leave; empty if the noise explains it."""
+    error = diagnosis["fit"]["error"]
+    worst = max(error, key=lambda c: error[c]["after"] / error[c]["noise"])
+    ratio = error[worst]["after"] / error[worst]["noise"]
+    if ratio <= NOISE_LEFT:
+        return ""
+    return f" Something smaller is still missing: an error of {ratio:.1f} times the noise remains in {SYMBOL[worst]}."
 
 
 def possible_places(diagnosis: Mapping) -> list[str]:
