@@ -308,6 +308,23 @@ def test_a_misspelt_key_of_the_configuration_is_one_line(copy):
     assert "Traceback" not in run.stderr
 
 
+def test_a_fit_with_a_name_of_a_diagnosis_and_a_missing_file_are_one_line(copy):
+    config = copy / "config.yaml"
+    text = config.read_text()
+    for edited, said in (
+        (
+            text.replace("fitted:", "calibrated:", 1),
+            "'calibrated' names models of the diagnoses; call the fit",
+        ),
+        (text + "concealed: nowhere.json\n", "concealed: there is no file nowhere.json"),
+    ):
+        config.write_text(edited)
+        run = snakemake(copy)
+        assert run.returncode != 0
+        assert len([line for line in run.stderr.splitlines() if said in line]) == 1
+        assert "Traceback" not in run.stderr
+
+
 def test_the_workflow_is_lint_clean(copy):
     run = snakemake(copy, "--lint")
     assert "Congratulations" in run.stdout + run.stderr, run.stdout + run.stderr
