@@ -119,6 +119,7 @@ def test_what_a_diagnosis_found_is_one_more_set_of_parameters(copy):
     config = yaml.safe_load((copy / "config.yaml").read_text())
     config["diagnose"] = "each"
     config["studies"]["one-run"]["parameters"] = "extended"
+    config["accuracy"] = {"parameters": "calibrated"}
     (copy / "config.yaml").write_text(yaml.safe_dump(config))
     run = snakemake(copy)
     assert run.returncode == 0, run.stdout + run.stderr
@@ -131,6 +132,9 @@ def test_what_a_diagnosis_found_is_one_more_set_of_parameters(copy):
     by_set = errors[errors["channel"] == "tau_in_Nm"].groupby("parameters", observed=True)["rmse"].mean()
     assert by_set["extended"] == by_set["calibrated"] < 0.2 * by_set["estimated"]
     assert read_recordings(results / "simulated/nearest/tiny.nc") == []
+    by_recording = pd.read_csv(results / "tables/accuracy-by-recording.csv")
+    unknown = "a diagnosis states no standard deviations"
+    assert by_recording["inputs_left_out"].eq("friction_coefficient stiffness_N_per_m").all(), unknown
     assert json.loads((results / "simulated/nearest/tiny.json").read_text()) == {"failures": []}
 
 
