@@ -7,6 +7,7 @@ are then run on the same recordings and on recordings made again. Writes a secti
 """
 
 import argparse
+import sys
 import time
 import zlib
 from collections import Counter
@@ -17,6 +18,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from multiprocessing import get_context
 from pathlib import Path
+from shutil import rmtree
 from tempfile import TemporaryDirectory
 from unittest.mock import patch
 
@@ -37,7 +39,7 @@ from ccmodel.steps.simulate import simulate, simulate_recording
 from ccmodel.studies.settings import EACH
 from virtualrig.campaign import as_yaml, compress, describe, log_name, prepare, recording_generator, run
 from virtualrig.config import Campaign, read_campaign
-from virtualrig.sensors import log
+from virtualrig.sensors import SensorRangeError, log
 from virtualrig.trajectory import Trajectory
 
 CONFIG = Path("config/config.yaml")
@@ -129,11 +131,24 @@ def record_again(campaign: Campaign, truth: Mapping, noise_seed: int, raw: Path)
             (raw / batch / log_name(plan)).write_bytes(compress(columns))
 
 
+def record_anew(campaign: Campaign, batches: list[str], number: int, pool, raw: Path) -> None:
+    """Record with other run-to-run draws and other noise; draws beyond a sensor's range are made again."""
+    for attempt in range(10):
+        drawn = simulated_campaign(campaign, batches, campaign.seed + 1 + number + 1000 * attempt, pool)
+        try:
+            return record_again(campaign, drawn, 1001 + number, raw)
+        except SensorRangeError:
+            rmtree(raw)
+    raise SystemExit(f"{CAMPAIGN}: ten draws in a row are beyond a sensor's range; lower its strokes")
+
+
 def one_run(given) -> tuple[str, Comparison]:
     """Name and outcome of one run, by the name of its fault or control and its folder of raw recordings."""
     name, fault, raw, batches, fits, accepted, limits = given
     with TemporaryDirectory() as scratch, (FAULTS | CONTROLS)[fault]():
-        return name, compare(accepted, run_pipeline(raw, batches, fits, Path(scratch)), limits)
+        found = compare(accepted, run_pipeline(raw, batches, fits, Path(scratch)), limits)
+    print(f"{name}: {len(found.losses)} losses", file=sys.stderr)
+    return name, found
 
 
 def lines(title: str, outcomes: list[tuple[str, Comparison]]) -> list[str]:
@@ -179,8 +194,7 @@ def main() -> None:
         for k in range(stated.seeds):
             record_again(campaign, truth, 1 + k, scratch / f"noise-{k}")
         for k in range(stated.anew):
-            drawn = simulated_campaign(campaign, batches, campaign.seed + 1 + k, pool)
-            record_again(campaign, drawn, 1001 + k, scratch / f"anew-{k}")
+            record_anew(campaign, batches, k, pool, scratch / f"anew-{k}")
         again = scratch / "noise-0"
         jobs = {
             "noise": [(f"noise {k}", "nothing", scratch / f"noise-{k}") for k in range(stated.seeds)],
