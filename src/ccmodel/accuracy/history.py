@@ -112,7 +112,7 @@ def run_commit(commit: str, cores: int) -> tuple[pd.DataFrame, str]:
         if why:
             return rows_of({}, name, date, ""), f"{name}: skipped: {why}"
         try:
-            batches = measure(_simulated_in(folder / "results"), with_fits=False)
+            batches = measure(_simulated_in(folder / "results"), for_comparison=False)
         except Exception as error:  # a former format of the files, in any of the libraries that read them
             return rows_of({}, name, date, ""), f"{name}: skipped: its files cannot be read ({_one_line(error)})"
         return rows_of(batches, name, date, _version(folder)), f"{name}: {len(batches)} batches"
