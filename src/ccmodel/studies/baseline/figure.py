@@ -17,7 +17,7 @@ NAMED = 20
 
 
 def history_figure(history: pd.DataFrame, present: pd.DataFrame, origins: Mapping[str, str]) -> Figure:
-    """Median and largest normalised error over the channels of each batch, at every commit and, as the last point, in this run.
+    """Median and largest error over the channels of each batch, at every commit and, as the last point, in this run.
 
     Parameters
     ----------
