@@ -14,6 +14,8 @@ import numpy as np
 import ccmodel
 
 _ROOT = Path(ccmodel.__file__).parents[1]
+# Endings of templates, styles and scripts.
+PAGE_PARTS = (".j2", ".css", ".js")
 
 
 def files_in(folder: Path) -> list[Path]:
@@ -62,7 +64,7 @@ def source_digest(module: str, discovered: bool = True) -> str:
 
 
 def sources_of(module: str, discovered: bool = True) -> set[Path]:
-    """Source files of a module: its own, all of the package that it imports, and the templates in their folders.
+    """Source files of a module: its own, all of the package that it imports, and the parts of pages in their folders.
 
     Parameters
     ----------
@@ -78,7 +80,7 @@ def sources_of(module: str, discovered: bool = True) -> set[Path]:
         if name in seen or (file := _file_of(name)) is None:
             continue
         seen.add(name)
-        files |= {file, *file.parent.glob("*.j2")}
+        files |= {file, *(part for ending in PAGE_PARTS for part in file.parent.glob(f"*{ending}"))}
         waiting += [f"{name.rpartition('.')[0]}.__init__", *_imports(file)]
         if discovered and not name.endswith("__init__") and "iter_modules(__path__)" in file.read_text():
             waiting += [f"{name}.{found.stem}" for found in file.parent.glob("*.py")]

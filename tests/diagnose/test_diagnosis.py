@@ -20,9 +20,9 @@ from ccmodel.diagnose.result import alternatives_of, mechanism_of
 from ccmodel.failure import ModelError
 from ccmodel.inference import pool
 from ccmodel.model.files import read_model
+from ccmodel.report.verdict import headline
 from ccmodel.steps.ingest import ingest
 from ccmodel.studies.diagnosis import run as stage
-from ccmodel.studies.diagnosis.page import headline
 from ccmodel.typed import InputError
 
 RUBBING_NM = 4e-3
@@ -241,13 +241,23 @@ def test_alternatives_are_others_than_what_is_named_each_once():
 @pytest.mark.parametrize(
     ("alternatives", "likeliest", "sentence"),
     [
-        (["kink"], ["kink"], "it may be kink at conduit, but"),
-        (["kink", "stribeck"], ["kink"], "cannot tell kink at conduit or stribeck at conduit apart"),
-        (["kink", "stribeck"], ["kink", "stribeck"], "it may be kink at conduit and stribeck at conduit together, but"),
+        (["kink"], ["kink"], "it may be kink at the conduit (0.50), but"),
+        (
+            ["kink", "stribeck"],
+            ["kink"],
+            "cannot tell kink at the conduit (0.50) or stribeck at the conduit (0.50) apart",
+        ),
+        (
+            ["kink", "stribeck"],
+            ["kink", "stribeck"],
+            "it may be kink at the conduit and stribeck at the conduit together, but",
+        ),
     ],
 )
 def test_the_headline_separates_a_pair_from_alternatives(alternatives, likeliest, sentence):
-    claims = [[{"name": name, "place": "conduit"} for name in names] for names in (alternatives, likeliest)]
+    claims = [
+        [{"name": name, "place": "conduit", "confidence": 0.5} for name in names] for names in (alternatives, likeliest)
+    ]
     error = {"tau_in": {"before": 2.0, "after": 1.0, "noise": 1.0}}
     said = {"batch": "b", "verdict": "undecided", "is_held": False, "fit": {"error": error}}
     assert sentence in headline(said | {"alternatives": claims[0], "likeliest": claims[1]})

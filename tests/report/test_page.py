@@ -8,7 +8,9 @@ import pytest
 from ccmodel.errors import COLUMNS
 from ccmodel.inference.fit import FitResult
 from ccmodel.inference.intervals import Interval, Scatter, Undetermined
-from ccmodel.report.page import about, interval, write_page
+from ccmodel.report.page import write_page
+from ccmodel.report.page.formats import about, interval
+from ccmodel.report.page.writing import Content
 
 APART = "friction_coefficient and extra_bend_rad are not determined apart; known is mu + 0.05 x e = 0.16"
 FIT = FitResult(
@@ -32,7 +34,7 @@ def page(tmp_path):
     def write(result: FitResult) -> str:
         errors = pd.DataFrame([], columns=list(COLUMNS)).astype(COLUMNS)
         fits = [{"fit": "fitted", **result.as_dict()}]
-        write_page(tmp_path / "index.html", [], [], errors, fits, {"left_out": [], "warnings": []})
+        write_page(tmp_path / "index.html", Content(batches=[], errors=errors, fits=fits))
         return (tmp_path / "index.html").read_text()
 
     return write

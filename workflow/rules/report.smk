@@ -32,10 +32,18 @@ rule write_report:
         simulations=[
             simulated_of(p, batch).removesuffix(".nc") + ".json" for p, batch in runs()
         ],
+        recordings=[recordings_of(batch) for _, batch in runs()],
+        simulated=[simulated_of(parameters, batch) for parameters, batch in runs()],
         diagnoses=[
             f"{RESULTS}/diagnoses/{batch}/diagnosis.json"
             for batch in CONFIG.diagnosed(BATCHES)
         ],
+        reports=[
+            f"{RESULTS}/diagnoses/{batch}/report.html"
+            for batch in CONFIG.diagnosed(BATCHES)
+        ],
+        # Read here alone, after all verdicts.
+        concealed=CONFIG.concealed or [],
         figures=[figure for name in STUDIES for figure in figures(name, "png")],
         tables=[table for name in STUDIES for table in tables(name)],
     output:
@@ -53,6 +61,7 @@ rule write_report:
         runtime=10,
     params:
         raw=CONFIG.raw,
+        parameters=[parameters for parameters, _ in runs()],
         unusable=UNUSABLE,
         studies=[
             {

@@ -1,4 +1,4 @@
-"""Table of errors, fits, summaries of batches and studies -> the page (HTML) and what was left out (JSON)."""
+"""Recordings, simulations, diagnoses, studies, errors -> the page (HTML) and what was left out (JSON)."""
 
 from pathlib import Path
 
@@ -9,6 +9,7 @@ with logged(snakemake.log[0], snakemake.threads):
     write_report(
         Path(snakemake.output.page),
         dict(snakemake.input.items()),
+        snakemake.params.parameters,
         snakemake.params.studies,
         Path(snakemake.params.raw),
         snakemake.params.unusable,

@@ -33,9 +33,10 @@ TEXT = {
 
 
 def location(judgement: Judgement) -> dict:
-    """Place, channels and phases of the mismatch, and a sentence."""
+    """Most likely place of the mismatch and all possible ones, its channels and phases, and a sentence."""
     if judgement.verdict == "agrees":
-        return {"place": None, "channels": [], "phases": [], "text": "model and recordings agree within the noise"}
+        text = "model and recordings agree within the noise"
+        return {"place": None, "places": [], "channels": [], "phases": [], "text": text}
     hypothesis = judgement.best.hypothesis
     places = hypothesis.places or judgement.single_fault_places or _places(judgement)
     table = mismatch(judgement.whitened, judgement.calibrated)
@@ -47,7 +48,7 @@ def location(judgement: Judgement) -> dict:
     verb = "is" if len(channels) == 1 else "are"
     where = (" and " if hypothesis.acting else " or ").join(TEXT[place] for place in places)
     text = f"The mismatch sits {where}: {', '.join(channels)} {verb} off most, {' and '.join(phases)}."
-    return {"place": places[0], "channels": channels, "phases": phases, "text": text}
+    return {"place": places[0], "places": list(places), "channels": channels, "phases": phases, "text": text}
 
 
 def prominent(square: dict[str, float], share: float) -> list[str]:

@@ -1,6 +1,6 @@
 """A judgement as plain data, the content of diagnosis.json (docs/diagnosis.md)."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +43,7 @@ def report(batch: str, judgement: Judgement, estimates: Parameters, not_judged: 
             "held_out": [w.observations.id for w in whitened] if len(whitened) > 1 else [],
             "calibrated": base.values,
             "mean_square": {"calibrated": base.mean_square, "extended": best.mean_square},
-            "error": held_out_errors(judgement),
+            "error": held_out_errors(judgement, nested_choice(judgement)),
         },
         "next_experiment": experiment.proposed(judgement, estimates) if open_question else None,
         "not_judged": [*not_judged, *contradicting_recording(judgement), *_at_bounds(best), *failures],
@@ -51,13 +51,14 @@ def report(batch: str, judgement: Judgement, estimates: Parameters, not_judged: 
 
 
 def _nearest(judgement: Judgement) -> dict | None:
-    """The nearest candidate of an unexplained batch, and its leave-one-out mean square; otherwise None."""
+    """The nearest candidate of an unexplained batch, its leave-one-out mean square and errors; otherwise None."""
     if judgement.verdict != "unexplained" or (nearest := judgement.nearest) is None:
         return None
     acting = [mechanism_of(nearest, k, 0.0) for k in range(len(nearest.hypothesis.acting))]
     return {
         "mechanisms": [{key: value for key, value in m.items() if key != "confidence"} for m in acting],
         "mean_square": nearest.mean_square,
+        "error": held_out_errors(judgement, [nearest] * len(judgement.whitened)),
         "one_fault_at": list(judgement.single_fault_places),
     }
 
@@ -116,9 +117,11 @@ def mechanism_of(candidate: CandidateFit, k: int, confidence: float, shift: NDAr
     return {"name": name, "place": place, "confidence": round(confidence, 4), "parameters": parameters}
 
 
-def held_out_errors(judgement: Judgement) -> dict[str, dict]:
-    """Root mean square error on held-out recordings by channel, before and after, and the noise floor."""
-    chosen = nested_choice(judgement)
+def held_out_errors(judgement: Judgement, chosen: Sequence[CandidateFit]) -> dict[str, dict]:
+    """Root mean square error on held-out recordings by channel, and the noise floor.
+
+    "before" is the calibrated model, "after" the model that is `chosen` for each recording.
+    """
     squares: dict[str, list[tuple[float, float, float]]] = {}
     for i, w in enumerate(judgement.whitened):
         o = w.observations

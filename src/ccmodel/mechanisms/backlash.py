@@ -29,6 +29,7 @@ def dead_zone(theta, half_gap):
 MECHANISM = Mechanism(
     name="backlash",
     text=__doc__,
+    sentence="the load follows its pulley with a dead zone of ±{half_gap}",
     places=("load-pulley",),
     parameters=(Parameter("half_gap", "rad", 3.5e-3, 70e-3, 15e-3, "half of the dead zone"),),
     mistaken_for=("strand-settling", "slack"),

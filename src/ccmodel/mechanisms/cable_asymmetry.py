@@ -15,6 +15,7 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 MECHANISM = Mechanism(
     name="cable-asymmetry",
     text=__doc__,
+    sentence="cable B has {ratio} times the friction and {K_ratio} times the stiffness of cable A",
     places=("cable",),
     parameters=(
         Parameter("ratio", "1", 0.6, 1.4, 1.1, "friction coefficient, B over A", neutral=1.0, ratio=True),

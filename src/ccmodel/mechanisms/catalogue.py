@@ -34,6 +34,13 @@ def entry(name: str) -> str:
     return "\n".join(lines)
 
 
+def parts(name: str) -> dict:
+    """All that is known of a mechanism, in parts: name, summary, titled facts, rows of its parameters."""
+    mechanism = get(name)
+    rows = [(p.name, _range(p).removeprefix(f"{p.name} "), f"{p.meaning}{_notes(p)}") for p in mechanism.parameters]
+    return {"name": name, "summary": mechanism.summary, "facts": _facts(mechanism), "parameters": rows}
+
+
 def page() -> str:
     """The page of all mechanisms, Markdown."""
     return "\n".join([_PAGE, _table(rows()), *map(_section, map(get, names()))])

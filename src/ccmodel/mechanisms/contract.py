@@ -147,6 +147,9 @@ class Mechanism:
         A title, which is its summary, and paragraphs that begin with the names of `PARAGRAPHS`: its law in the
         parameters' symbols; what it does to a recording; the experiment that separates it from its look-alikes; author,
         title, journal, year and DOI of the equation or of where the effect is named.
+    sentence : str
+        What a report says where it is identified: ``{name}`` is the value of a parameter with its unit, ``{name:%}`` in
+        per cent, ``{side}`` the end of the place; of ``[high|low]`` the first is for a positive strength.
     places : tuple of str
         Where it can act, of `PLACES`.
     parameters : tuple of Parameter
@@ -171,6 +174,7 @@ class Mechanism:
 
     name: str
     text: str
+    sentence: str
     places: tuple[str, ...]
     parameters: tuple[Parameter, ...]
     mistaken_for: tuple[str, ...]

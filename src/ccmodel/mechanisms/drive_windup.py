@@ -95,6 +95,7 @@ def _modifies_observation(sensing, place, values):
 MECHANISM = Mechanism(
     name="drive-windup",
     text=__doc__,
+    sentence="the drive train has a backlash of {lost_motion} and winds up by {compliance}",
     places=("drive-pulley",),
     parameters=(
         Parameter("compliance", "rad/(N m)", 0.02, 2.0, 0.25, "torsional compliance of the train"),

@@ -36,6 +36,7 @@ def _modifies_physics(settings, values):
 MECHANISM = Mechanism(
     name="kink",
     text=__doc__,
+    sentence="the conduits have an extra bend of {beta} at one place",
     places=("conduit",),
     parameters=(
         Parameter("beta", "rad", 0.2, 1.5, 0.6, "angle of the bend"),

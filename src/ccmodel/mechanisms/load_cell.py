@@ -67,7 +67,7 @@ def _crosstalk(force, crosstalk, sensing, end):
     return force + crosstalk * (sensing.channels[TORQUE_AT[end]] / radius)
 
 
-def _fault(name, reading, parameter, mistaken_for, depends_on_time=False):
+def _fault(name, reading, parameter, mistaken_for, sentence, depends_on_time=False):
     """Mechanism of one fault: `reading` gives the cell's values from the sum of tensions and the fault's parameter."""
 
     def modifies_observation(sensing, place, values):
@@ -77,6 +77,7 @@ def _fault(name, reading, parameter, mistaken_for, depends_on_time=False):
     return Mechanism(
         name=name,
         text=reading.__doc__,
+        sentence=sentence,
         places=("drive-sensor", "load-sensor"),
         parameters=(parameter,),
         mistaken_for=mistaken_for,
@@ -91,8 +92,29 @@ _RATE = Parameter("rate", "N/s", 0.02, 0.2, 0.05, "rate of the drift", signed=Tr
 _CROSSTALK = Parameter("crosstalk", "1", 0.02, 0.1, 0.05, "share of tau / R in the sum", signed=True)
 
 MECHANISMS = (
-    _fault("load-cell-scale", _scale, _GAIN, ("load-cell-offset", "cable-asymmetry")),
-    _fault("load-cell-offset", _offset, _OFFSET, ("load-cell-scale",)),
-    _fault("load-cell-drift", _drift, _RATE, ("relaxation", "load-cell-offset"), depends_on_time=True),
-    _fault("load-cell-crosstalk", _crosstalk, _CROSSTALK, ("load-cell-scale",)),
+    _fault(
+        "load-cell-scale",
+        _scale,
+        _GAIN,
+        ("load-cell-offset", "cable-asymmetry"),
+        "the {side}'s load cell reads {gain:%} [high|low]",
+    ),
+    _fault(
+        "load-cell-offset", _offset, _OFFSET, ("load-cell-scale",), "the {side}'s load cell reads {offset} [high|low]"
+    ),
+    _fault(
+        "load-cell-drift",
+        _drift,
+        _RATE,
+        ("relaxation", "load-cell-offset"),
+        "the zero of the {side}'s load cell drifts [up|down] by {rate}",
+        depends_on_time=True,
+    ),
+    _fault(
+        "load-cell-crosstalk",
+        _crosstalk,
+        _CROSSTALK,
+        ("load-cell-scale",),
+        "the {side}'s load cell responds to {crosstalk:%} of the torque",
+    ),
 )

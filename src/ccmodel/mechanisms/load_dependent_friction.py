@@ -31,6 +31,7 @@ def power_of_tension(tension, n):
 MECHANISM = Mechanism(
     name="load-dependent-friction",
     text=__doc__,
+    sentence="the friction coefficient changes with tension to the power {n}",
     places=("conduit",),
     parameters=(Parameter("n", "1", -0.35, -0.05, -0.15, "exponent of the tension", scale="linear"),),
     mistaken_for=("constant-drag",),

@@ -27,6 +27,7 @@ def load_damping(settings: Settings, stiffness: float) -> float:
 MECHANISM = Mechanism(
     name="load-inertia",
     text=__doc__,
+    sentence="the load has a moment of inertia of {J}",
     places=("load",),
     parameters=(
         Parameter("J", "kg m^2", 1e-5, 1e-3, 1e-4, "moment of inertia", screening_grid=MASSES),

@@ -29,6 +29,7 @@ def dahl(xi, slide, z0):
 MECHANISM = Mechanism(
     name="presliding",
     text=__doc__,
+    sentence="friction builds up over {z0} of sliding",
     places=("conduit",),
     parameters=(Parameter("z0", "m", 5e-6, 200e-6, 50e-6, "presliding length of the bristle"),),
     mistaken_for=("termination-compliance",),

@@ -31,6 +31,7 @@ def winding_change(theta, rotation, e, psi):
 MECHANISM = Mechanism(
     name="pulley-eccentricity",
     text=__doc__,
+    sentence="the {side} pulley's radius changes by ±{e:%} over a turn",
     places=("drive-pulley", "load-pulley"),
     parameters=(
         Parameter("e", "1", 0.01, 0.08, 0.03, "eccentricity over the radius", below=1.0),

@@ -35,6 +35,7 @@ def bearing(theta, presliding_rad):
 MECHANISM = Mechanism(
     name="pulley-friction",
     text=__doc__,
+    sentence="the {side} pulley's bearing has a friction torque of {friction_torque}",
     places=("drive-pulley", "load-pulley"),
     parameters=(
         Parameter("friction_torque", "N m", 0.5e-3, 50e-3, 5e-3, "friction torque of the bearing"),

@@ -34,6 +34,7 @@ def lag_weights(step_over_tau):
 MECHANISM = Mechanism(
     name="relaxation",
     text=__doc__,
+    sentence="the cables lose {r:%} of their tension as time passes",
     places=("cable",),
     parameters=(
         Parameter("r", "1", 0.01, 0.2, 0.05, "share of the tension that is lost", below=1.0),

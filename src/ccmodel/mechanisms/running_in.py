@@ -27,6 +27,7 @@ def _modifies_physics(settings, values):
 MECHANISM = Mechanism(
     name="running-in",
     text=__doc__,
+    sentence="friction [rises|falls] by {change:%} through a recording",
     places=("conduit",),
     parameters=(
         Parameter("change", "1", 0.05, 0.3, 0.1, "final relative change of friction", signed=True, above=-1.0),

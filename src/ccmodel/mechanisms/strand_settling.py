@@ -37,6 +37,7 @@ def stretch_at(tension, settled, stiffness):
 MECHANISM = Mechanism(
     name="strand-settling",
     text=__doc__,
+    sentence="the cables soften where the tension is low, about {T_scale}",
     places=("cable",),
     parameters=(Parameter("T_scale", "N", 0.5, 10.0, 2.0, "tension scale of the settling"),),
     mistaken_for=("backlash", "slack"),

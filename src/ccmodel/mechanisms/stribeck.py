@@ -39,6 +39,7 @@ def renewed(rested, slide, dt, vs, delta):
 MECHANISM = Mechanism(
     name="stribeck",
     text=__doc__,
+    sentence="friction is {a:%} higher at rest than in motion",
     places=("conduit",),
     parameters=(
         Parameter("a", "1", 0.05, 0.6, 0.2, "relative excess of friction at rest"),

@@ -21,6 +21,7 @@ def _modifies_observation(sensing, place, values):
 MECHANISM = Mechanism(
     name="torque-scale",
     text=__doc__,
+    sentence="the {side}'s torque sensor reads {gain:%} [high|low]",
     places=("drive-sensor", "load-sensor"),
     parameters=(Parameter("gain", "1", 0.02, 0.1, 0.05, "error of the gain", signed=True),),
     mistaken_for=("pulley-friction",),

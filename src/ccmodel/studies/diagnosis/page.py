@@ -2,7 +2,7 @@
 
 import base64
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import jinja2
@@ -18,15 +18,26 @@ from ccmodel.diagnose.diagnosis import Diagnosis
 from ccmodel.diagnose.location import PHASES, mismatch
 from ccmodel.diagnose.settings import ADEQUATE_LACK_OF_FIT
 from ccmodel.diagnose.verdict import nested_choice
+from ccmodel.mechanisms import catalogue
 from ccmodel.recording import ORIGIN
+from ccmodel.report.embedding import asset
 from ccmodel.report.figures import COLOURS, STYLE, legend_below
+from ccmodel.report.verdict import (
+    NOT_ACCEPTED,
+    SYMBOL,
+    headline,
+    nearest_sentence,
+    place_in_words,
+    possible_places,
+    worst_channel,
+)
 
 LOOPS = 3
 CANDIDATES = 8
 FAINT = "#9a9a9a"
 WITH_FOUND = "with the mechanisms found"
-# By the short names of diagnosis.json.
-SYMBOL = {channel.short_name: channel.symbol for channel in TABLE.values()}
+# A cell of the map above this many times the noise floor is yellow to the eye, and asks for a sentence under `agrees`.
+CONSPICUOUS = 1.5
 
 
 def _baseline(report: dict) -> str:
@@ -34,61 +45,87 @@ def _baseline(report: dict) -> str:
     return "model given" if report["is_held"] else "calibrated model"
 
 
-def headline(report: dict) -> str:
-    """The result of a diagnosis in one sentence."""
-    batch, worst = report["batch"], _worst_channel(report)
-    e = report["fit"]["error"][worst]
-    fall = f"{e['before'] / e['noise']:.1f} to {e['after'] / e['noise']:.1f} times the noise in {SYMBOL[worst]}"
-    model, left_out, missing = _baseline(report), "was left out", "is missing"
-    if report["is_held"]:
-        left_out, missing = f"has changed since the {model} was fitted", "has changed"
-    if report["verdict"] == "agrees":
-        nothing = "no change" if report["is_held"] else "no missing physics"
-        return f"{batch}: the {model} agrees with the recordings; they show {nothing}."
-    if report["verdict"] == "explained":
-        names = (f"{registry.get(m['name']).summary} ({m['name']}, {m['place']})" for m in report["mechanisms"])
-        return f"{batch}: {' and '.join(names)} {left_out}; in the model, it lowers the held-out error from {fall}."
-    if report["verdict"] == "undecided":
-        names, together = _placed(report["alternatives"]), _placed(report["likeliest"])
-        if len(together) > 1:
-            names = [f"{' and '.join(together)} together", *(name for name in names if name not in together)]
-        if len(names) == 1:
-            return f"{batch}: something {missing}; it may be {names[0]}, but these recordings do not confirm it."
-        return f"{batch}: something {missing}, and these recordings cannot tell {' or '.join(names)} apart."
-    place = report["location"]["place"]
-    return f"{batch}: something {missing} at the {place}, and no known mechanism explains it."
+def write_diagnosis(file: Path, found: Diagnosis, page: str | None = None) -> None:
+    """Write the page with its figures inside.
 
-
-def _placed(claims: Sequence[dict]) -> list[str]:
-    return [f"{claim['name']} at {claim['place']}" for claim in claims]
-
-
-def write_diagnosis(file: Path, found: Diagnosis) -> None:
-    """Write the page with its figures inside."""
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("ccmodel.studies.diagnosis", "."),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    Parameters
+    ----------
+    file : Path
+    found : Diagnosis
+    page : str, optional
+        Address of the page of the run, relative to `file`.
+    """
     recording = found.judgement.whitened[0].observations.given.recording
+    report = found.report
+    nearest = report["nearest"] or {"mechanisms": []}
+    named = [*report["mechanisms"], *report["likeliest"], *report["alternatives"], *nearest["mechanisms"]]
+    errors = mismatch(found.judgement.whitened, found.judgement.calibrated)
     with plt.rc_context(STYLE):
-        text = environment.get_template("page.html.j2").render(
-            report=found.report,
-            headline=headline(found.report),
+        text = _template("page.html.j2").render(
+            report=report,
+            page=page,
+            headline=headline(report),
+            nearest=nearest_sentence(report),
+            places=possible_places(report),
+            in_words=place_in_words,
             origin=ORIGIN[recording.origin],
             single_cable=recording.far_end is not None,
             symbol=SYMBOL,
-            baseline=_baseline(found.report),
+            baseline=_baseline(report),
             has_found=found.judgement.best is not found.judgement.calibrated,
             candidates=_candidates(found),
             listed=found.judgement.well_specified,
+            mechanisms=[catalogue.parts(name) for name in sorted({m["name"] for m in named})],
             summaries={name: registry.get(name) for name in registry.names()},
             map=_encoded(_map(found)),
+            map_in_words=_map_in_words(errors),
+            caution=_caution(report, errors),
             loops=_encoded(_loops(found)),
             recordings=[w.observations.given.recording.id for w in found.judgement.whitened],
         )
     file.write_text(text, encoding="utf-8")
+
+
+def write_not_diagnosed(file: Path, batch: str, why: str, page: str | None = None) -> None:
+    """Write the page of a batch that could not be diagnosed."""
+    text = _template("not-diagnosed.html.j2").render(report={"batch": batch}, why=why, page=page)
+    file.write_text(text, encoding="utf-8")
+
+
+def _template(name: str) -> jinja2.Template:
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("ccmodel", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.globals["asset"] = asset
+    return environment.get_template(f"studies/diagnosis/{name}")
+
+
+def _map_in_words(errors: Mapping[str, Mapping[str, float]]) -> str:
+    """The map of errors for readers who do not see it."""
+    rows = (
+        f"{SYMBOL[channel]} " + ", ".join(f"{phase} {value:.1f}" for phase, value in phases.items())
+        for channel, phases in errors.items()
+    )
+    return "Residuals over the noise floor: " + "; ".join(rows)
+
+
+def _caution(report: Mapping, errors: Mapping[str, Mapping[str, float]]) -> str | None:
+    """Why a model agrees although some cells of the map are yellow; None where none is, or where it does not agree."""
+    high = [
+        f"{SYMBOL[channel]} {phase} ({value:.1f})"
+        for channel, phases in errors.items()
+        for phase, value in phases.items()
+        if value > CONSPICUOUS
+    ]
+    if report["verdict"] != "agrees" or not high:
+        return None
+    square = report["fit"]["mean_square"]["calibrated"]
+    return (
+        f"The verdict is 'agrees' although {', '.join(high)} exceed{'s' if len(high) == 1 else ''} the noise floor. The"
+        " floor is a mean over the whole motion, while differences between runs (friction, the drive's position between"
+        " two counts) concentrate in parts of it. The verdict counts what these differences do not account for: the"
+        f" mean square of the whitened residuals is {square:.2g} (1 is noise), and no candidate lowers it by enough."
+    )
 
 
 def _candidates(found: Diagnosis) -> list[dict]:
@@ -153,7 +190,7 @@ def _loops(found: Diagnosis) -> Figure:
     """Worst channel of the recordings with the largest errors: measured, baseline, and with the mechanisms found."""
     j = found.judgement
     chosen = nested_choice(j)
-    worst = _worst_channel(found.report)
+    worst = worst_channel(found.report["fit"]["error"])
     channels = j.whitened[int(np.argmax(j.calibrated.by_recording))].observations.channels
     channel = next((c for c in channels if short_name(c) == worst), channels[0])
     worst_first = np.argsort(j.calibrated.by_recording)[::-1]
@@ -169,6 +206,8 @@ def _loops(found: Diagnosis) -> Figure:
         models = [(j.calibrated, COLOURS[0], "--", _baseline(found.report))]
         if chosen[i] is not j.calibrated:
             models.append((chosen[i], COLOURS[1], "-", WITH_FOUND))
+        if found.report["nearest"]:
+            models.append((j.nearest, COLOURS[3], "-.", f"nearest model, {NOT_ACCEPTED}"))
         for fit, colour, line, label in models:
             model = observed.with_parameters(fit.held_out(i, w))
             ax.plot(theta, scale * model.modelled({})[c], color=colour, lw=1.0, ls=line, label=label)
@@ -177,12 +216,6 @@ def _loops(found: Diagnosis) -> Figure:
     axes[0][0].set_ylabel(TABLE[channel].axis)
     legend_below(figure, axes[:, :1], columns=3)
     return figure
-
-
-def _worst_channel(report: dict) -> str:
-    """Short name of the channel whose baseline error is largest over its noise."""
-    error = report["fit"]["error"]
-    return max(error, key=lambda c: error[c]["before"] / error[c]["noise"])
 
 
 def _encoded(figure: Figure) -> str:

@@ -1,6 +1,5 @@
 """A batch -> its diagnosis: diagnosis.json, a page, and the models that were compared."""
 
-import html
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -13,11 +12,15 @@ from ccmodel.failure import ModelError
 from ccmodel.model.files import model_as_dict, read_model
 from ccmodel.model.parameters import Parameters
 from ccmodel.recording import read_recordings
+from ccmodel.report.verdict import headline
 from ccmodel.rig.ingest import ingest_batch
 from ccmodel.steps.files import estimates_of, read_json, write_json
-from ccmodel.studies.diagnosis.page import headline, write_diagnosis
+from ccmodel.studies.diagnosis.page import write_diagnosis, write_not_diagnosed
 from ccmodel.studies.diagnosis.settings import MODEL_FILES, Diagnosing
 from ccmodel.typed import InputError
+
+# The page of a run of the pipeline, seen from the report of a diagnosis.
+PAGE_OF_RUN = "../../index.html"
 
 
 def diagnose(
@@ -89,9 +92,9 @@ def diagnose_recordings(recordings_file: Path, out: Path, settings: Diagnosing |
         write_json(out / "diagnosis.json", {"batch": name, "verdict": None, "why": reason})
         for file in MODEL_FILES.values():
             write_json(out / file, _no_model(reason))
-        (out / "report.html").write_text(f"<p>{name}: not diagnosed: {html.escape(reason)}</p>\n")
+        write_not_diagnosed(out / "report.html", name, reason, PAGE_OF_RUN)
         return
-    _write(found, inputs, out)
+    _write(found, inputs, out, PAGE_OF_RUN)
 
 
 def _refused(findings: Iterable[Mapping]) -> list[dict[str, str]]:
@@ -108,7 +111,7 @@ def _no_model(reason: str) -> dict:
     return {"succeeded": False, "message": reason}
 
 
-def _write(found: Diagnosis, inputs: dict, out: Path) -> dict:
+def _write(found: Diagnosis, inputs: dict, out: Path, page: str | None = None) -> dict:
     """Write diagnosis.json, the page and the models; without a nearest model, its file states why."""
     out.mkdir(parents=True, exist_ok=True)
     content = found.report | {"headline": headline(found.report), "provenance": inputs}
@@ -120,5 +123,5 @@ def _write(found: Diagnosis, inputs: dict, out: Path) -> dict:
     for name, file in MODEL_FILES.items():
         without = _no_model(f"verdict '{judged.verdict}': the diagnosis has no {name} model")
         write_json(out / file, model_as_dict(found.model(models[name]), inputs) if name in models else without)
-    write_diagnosis(out / "report.html", found)
+    write_diagnosis(out / "report.html", found, page)
     return content

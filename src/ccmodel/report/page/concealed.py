@@ -1,0 +1,121 @@
+"""What a simulated rig has, beside what the diagnoses said without knowing it."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from pydantic import Field
+
+from ccmodel.report.page.cards import after_is
+from ccmodel.report.verdict import SYMBOL, place_in_words, worst_channel
+from ccmodel.typed import TypedModel, load_yaml_model
+
+NAMED, ALTERNATIVE, NEAREST, NOT_NAMED = (
+    "named",
+    "alternative",
+    "in the nearest model, not accepted",
+    "not named",
+)
+
+
+class Effect(TypedModel):
+    """One effect of a rig; `name` and `place` are those of a mechanism, or None if no mechanism describes it."""
+
+    name: str | None = None
+    place: str | None = None
+    text: str
+    source: str = ""
+
+
+class Rig(TypedModel):
+    """A simulated rig: its batches and its effects."""
+
+    batches: list[str]
+    effects: list[Effect]
+
+
+class Concealed(TypedModel):
+    """Content of the file that the key ``concealed`` of the configuration names."""
+
+    format: int = Field(ge=1, le=1)
+    rigs: list[Rig]
+
+
+def read_concealed(file: Path) -> Concealed:
+    """Read and check the file of what the rigs have.
+
+    Raises
+    ------
+    InputError
+        With one line a problem: the file, the key, what to do.
+    """
+    return load_yaml_model(file, Concealed)
+
+
+def beside(concealed: Concealed, diagnoses: Sequence[Mapping]) -> list[dict]:
+    """For each rig its effects, what each diagnosis said of them, what it said besides, and what is left."""
+    of_batch = {d["batch"]: d for d in diagnoses}
+    tables = []
+    for rig in concealed.rigs:
+        said = [of_batch.get(batch) or {"batch": batch, "verdict": None} for batch in rig.batches]
+        effects = [
+            {
+                "text": e.text,
+                "name": e.name,
+                "place": place_in_words(e.place) if e.place else "–",
+                "source": e.source,
+                "said": [_said_of(e, d) for d in said],
+            }
+            for e in rig.effects
+        ]
+        tables.append(
+            {
+                "batches": rig.batches,
+                "effects": effects,
+                "besides": [_besides(rig, d) for d in said],
+                "verdicts": [d["verdict"] or "not diagnosed" for d in said],
+                "falls": [_fall(d) for d in said],
+            }
+        )
+    return tables
+
+
+def _said_of(effect: Effect, diagnosis: Mapping) -> str:
+    """What a diagnosis said of an effect."""
+    if not diagnosis["verdict"]:
+        return "–"
+    if effect.name is None:
+        return "no mechanism describes it"
+    kinds = (
+        (diagnosis["mechanisms"], NAMED),
+        (diagnosis["alternatives"], ALTERNATIVE),
+        ((diagnosis.get("nearest") or {}).get("mechanisms", []), NEAREST),
+    )
+    for listed, said in kinds:
+        places = [m["place"] for m in listed if m["name"] == effect.name]
+        if effect.place in places or (places and effect.place is None):
+            return said
+        if places:
+            return f"{said}, but at the {place_in_words(places[0])}"
+    return NOT_NAMED
+
+
+def _besides(rig: Rig, diagnosis: Mapping) -> str:
+    """Mechanisms that a diagnosis names and the rig does not have."""
+    there = {e.name for e in rig.effects}
+    named = [m["name"] for m in (diagnosis["mechanisms"] if diagnosis["verdict"] else []) if m["name"] not in there]
+    return ", ".join(named) or "–"
+
+
+def _fall(diagnosis: Mapping) -> str:
+    """How far the worst channel's held-out error fell, and what is left of it."""
+    if not diagnosis["verdict"]:
+        return "–"
+    error = diagnosis["fit"]["error"]
+    worst = worst_channel(error)
+    nearest = (diagnosis.get("nearest") or {}).get("error")
+    noise = error[worst]["noise"]
+    before, after = error[worst]["before"] / noise, (nearest or error)[worst]["after"] / noise
+    model = after_is(diagnosis)
+    if not model:
+        return f"{SYMBOL[worst]}: {before:.1f} times the noise"
+    return f"{SYMBOL[worst]}: {before:.1f} to {after:.1f} times the noise (model: {model})"

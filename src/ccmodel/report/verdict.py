@@ -1,0 +1,167 @@
+"""A verdict in words: sentences made from the content of diagnosis.json."""
+
+import re
+from collections.abc import Mapping, Sequence
+from math import floor, log10
+
+from ccmodel import mechanisms as registry
+from ccmodel.channels import TABLE
+from ccmodel.mechanisms.contract import side
+
+# By the short names of diagnosis.json.
+SYMBOL = {channel.short_name: channel.symbol for channel in TABLE.values()}
+NOT_ACCEPTED = "not accepted"
+# A unit is printed with a prefix if the value is below a tenth of it; these units take none.
+_PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+_WITHOUT_PREFIX = ("1", "1/m", "kg*m^2")
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def sentence(diagnosis: Mapping) -> str:
+    """The verdict of a batch in a sentence, without the batch's name.
+
+    Parameters
+    ----------
+    diagnosis : mapping
+        Content of diagnosis.json.
+    """
+    verdict = diagnosis["verdict"]
+    if verdict is None:
+        return f"Not diagnosed: {diagnosis['why']}."
+    held = diagnosis["is_held"]
+    missing = "has changed" if held else "is missing"
+    if verdict == "agrees":
+        model, nothing = ("model given", "no change") if held else ("calibrated model", "no missing physics")
+        return f"The {model} agrees with the recordings within their noise; they show {nothing}."
+    if verdict == "explained":
+        claims = [f"{claim(m)}, confidence {m['confidence']:.2f}" for m in diagnosis["mechanisms"]]
+        return _capital(f"{'this has changed: ' if held else ''}{'; and '.join(claims)}.")
+    if verdict == "undecided":
+        return _undecided(diagnosis, missing)
+    places = " or ".join(f"the {place_in_words(place)}" for place in possible_places(diagnosis))
+    return f"Something {missing} at {places}, and no listed mechanism explains it."
+
+
+def possible_places(diagnosis: Mapping) -> list[str]:
+    """Places of a mismatch: those of the mechanisms that are named or most likely, otherwise all that are possible."""
+    acting = [m["place"] for m in diagnosis["mechanisms"] or diagnosis["likeliest"]]
+    location = diagnosis["location"]
+    return list(dict.fromkeys(p for p in acting or location.get("places") or [location["place"]] if p))
+
+
+def _undecided(diagnosis: Mapping, missing: str) -> str:
+    together = [_placed(one) for one in diagnosis["likeliest"]]
+    names = [f"{_placed(one)} ({one['confidence']:.2f})" for one in diagnosis["alternatives"]]
+    if len(together) > 1:
+        pair = " and ".join(together)
+        others = [
+            name for name, one in zip(names, diagnosis["alternatives"], strict=True) if _placed(one) not in together
+        ]
+        names = [f"{pair} together", *others]
+    if len(names) == 1:
+        return f"Something {missing}; it may be {names[0]}, but these recordings do not confirm it."
+    return f"Something {missing}, and these recordings cannot tell {' or '.join(names)} apart."
+
+
+def headline(diagnosis: Mapping) -> str:
+    """The verdict in a line, with the batch's name and how far the held-out error fell."""
+    text = f"{diagnosis['batch']}: {sentence(diagnosis)}"
+    if diagnosis["verdict"] != "explained":
+        return text
+    worst = worst_channel(diagnosis["fit"]["error"])
+    e = diagnosis["fit"]["error"][worst]
+    before, after = e["before"] / e["noise"], e["after"] / e["noise"]
+    fall = f"falls from {before:.1f} to {after:.1f} times the noise"
+    return f"{text} With this in the model, the held-out error of {SYMBOL[worst]} {fall}."
+
+
+def nearest_sentence(diagnosis: Mapping) -> str | None:
+    """The nearest model of an unexplained batch in a sentence; None without one."""
+    nearest = diagnosis.get("nearest")
+    if not nearest or not nearest["mechanisms"]:
+        return None
+    return f"Nearest model, {NOT_ACCEPTED}: {'; and '.join(map(claim, nearest['mechanisms']))}."
+
+
+def worst_channel(error: Mapping[str, Mapping]) -> str:
+    """Short name of the channel whose error before is largest over its noise."""
+    return max(error, key=lambda c: error[c]["before"] / error[c]["noise"])
+
+
+def claim(mechanism: Mapping) -> str:
+    """What is said of one mechanism, as ``the load's torque sensor reads 15 % high (14.7 to 14.9 %)``."""
+    known = registry.get(mechanism["name"])
+    parameters = {p["name"]: p for p in mechanism["parameters"]}
+    strength = parameters[known.strengths[0].name]["value"]
+    direction = re.compile(r"\[(.*?)\|(.*?)\]")
+    signed = direction.search(known.sentence) is not None
+    intervals = []
+
+    def value(match: re.Match) -> str:
+        if match[1] == "side":
+            return side(mechanism["place"])
+        p = parameters[match[1]]
+        flip = -1.0 if signed and p["value"] < 0 else 1.0
+        low, high = sorted((flip * p["low"], flip * p["high"]))
+        text, interval = quantity(flip * p["value"], low, high, "%" if match[2] else p["unit"])
+        intervals.append(interval)
+        return text
+
+    said = direction.sub(lambda match: match[1] if strength >= 0 else match[2], known.sentence)
+    said = re.sub(r"\{(\w+)(:%)?\}", value, said)
+    return f"{said} ({'; '.join(intervals)})" if intervals else said
+
+
+def quantity(value: float, low: float, high: float, unit: str) -> tuple[str, str]:
+    """A value with its unit, and its interval, both with as many digits as the interval leaves.
+
+    Parameters
+    ----------
+    value, low, high : float
+        In SI units.
+    unit : str
+        SI unit as in diagnosis.json, "1" for a number, or "%" for a number that is shown in per cent.
+    """
+    factor, printed = _scale(value, unit)
+    value, low, high = factor * value, factor * low, factor * high
+    reach = float(f"{(high - low) / 2:.3g}")  # without the rounding of binary numbers
+    digits = min(-_exponent(reach), 3 - _exponent(value)) if reach > 0 else 2 - _exponent(value)
+    digits = max(digits, 0)
+    return f"{value:.{digits}f}{printed}", f"{low:.{digits}f} to {high:.{digits}f}{printed}"
+
+
+def _exponent(value: float) -> int:
+    return floor(log10(abs(value))) if value else 0
+
+
+def _scale(value: float, unit: str) -> tuple[float, str]:
+    """Factor from SI to the printed unit, and that unit with a space before it."""
+    if unit == "%":
+        return 100.0, " %"
+    printed = re.sub(r"\^(\d)", lambda m: m[1].translate(_SUPERSCRIPT), unit).replace("*", " ")
+    if unit in _WITHOUT_PREFIX:
+        printed = "" if unit == "1" else f" {printed}"
+        power = _exponent(value)
+        if -3 <= power <= 3:
+            return 1.0, printed
+        return 10.0**-power, f"·10{str(power).translate(_SUPERSCRIPT)}{printed}"
+    size, prefix = next((p for p in _PREFIXES if abs(value) >= 0.1 * p[0]), _PREFIXES[0])
+    return 1 / size, f" {prefix}{printed}"
+
+
+def place_in_words(place: str) -> str:
+    """A place without its hyphen, as in ``drive pulley``."""
+    return place.replace("-", " ")
+
+
+def _placed(one: Mapping) -> str:
+    return f"{one['name']} at the {place_in_words(one['place'])}"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def joined(names: Sequence[str]) -> str:
+    """Names in a row: ``a, b and c``."""
+    return " and ".join((", ".join(names[:-1]), names[-1])) if len(names) > 1 else "".join(names)

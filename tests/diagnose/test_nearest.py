@@ -1,0 +1,40 @@
+"""The nearest model of an unexplained batch: its errors on held-out recordings are those of no other model."""
+
+from dataclasses import replace
+
+import pytest
+
+from ccmodel.channels import short_name
+from ccmodel.diagnose.candidate import fit
+from ccmodel.diagnose.comparison import Comparison
+from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.diagnose.result import report
+from ccmodel.diagnose.verdict import Judgement
+from ccmodel.model.general.run import Active
+from made_observations import NOISE, PARAMETERS, batch, calibrated
+
+SCALE = "torque-scale/drive-sensor/gain"
+
+
+def test_its_held_out_errors_stand_apart_from_those_of_the_verdict():
+    gain = Active("torque-scale", "drive-sensor", {"gain": 0.1})
+    recordings = batch(truth=replace(PARAMETERS, mechanisms=(gain,)))
+    base = calibrated(recordings)
+    hypothesis = Hypothesis((("torque-scale", "drive-sensor"),))
+    nearest = fit(recordings, hypothesis, base.free, base.values | {SCALE: 0.05})
+    comparison = Comparison(recordings, base, [nearest], {})
+    found = report("b", Judgement("unexplained", base, comparison, [nearest], [1.0], 0.1, []), PARAMETERS, [])
+    error, of_nearest = found["fit"]["error"], found["nearest"]["error"]
+    assert {c: e["after"] for c, e in error.items()} == {c: e["before"] for c, e in error.items()}
+    assert of_nearest["tau_in"]["before"] == error["tau_in"]["before"] > 3 * of_nearest["tau_in"]["after"]
+    for channel, sd in NOISE.items():
+        assert of_nearest[short_name(channel)]["after"] == pytest.approx(sd, rel=0.5)
+
+
+def test_other_verdicts_have_none():
+    recordings = batch()
+    base = calibrated(recordings)
+    found = report(
+        "b", Judgement("agrees", base, Comparison(recordings, base, [], {}), [], [], 1.0, []), PARAMETERS, []
+    )
+    assert found["nearest"] is None

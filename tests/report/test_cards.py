@@ -1,0 +1,85 @@
+"""Cards: their order, their origin, and what they must not leave unsaid."""
+
+from made_pages import ERROR, SCALE, diagnosis, summary
+
+from ccmodel.report.page.cards import cards, mechanisms_named, overview
+
+
+def made(*verdicts, measured=()):
+    diagnoses = [diagnosis(f"b-{verdict}", verdict) for verdict in verdicts]
+    origins = {name: "rig" for name in measured}
+    batches = [summary(d["batch"], origins.get(d["batch"], "virtual-rig")) for d in diagnoses]
+    return cards(batches, diagnoses)
+
+
+def larger(factor):
+    return {c: e | {"before": factor * e["before"]} for c, e in ERROR.items()}
+
+
+def test_measured_batches_come_first_and_then_the_largest_mismatch():
+    small, large = (diagnosis(name, "explained") for name in ("small", "large"))
+    large["fit"] = large["fit"] | {"error": larger(3.0)}
+    real = diagnosis("real", "agrees")
+    batches = [summary("silent"), summary("small"), summary("large"), summary("real", "rig")]
+    assert [c["batch"] for c in cards(batches, [small, large, real])] == ["real", "large", "small", "silent"]
+
+
+def test_a_simulated_batch_is_called_simulated_beside_a_measured_one():
+    found = {c["batch"]: c["origin"] for c in made("explained", "agrees", measured=["b-agrees"])}
+    assert found == {"b-explained": "simulated", "b-agrees": "measured"}
+
+
+def test_a_refused_batch_has_a_card_that_says_so():
+    refused = {"folder": "data/raw/broken", "batch": None, "recordings": [], "findings": []}
+    (card,) = cards([refused], [diagnosis("broken", None)])
+    assert (card["origin"], card["sentence"]) == (
+        "no usable recording",
+        "Not diagnosed: no recording that can be used.",
+    )
+
+
+def test_under_unexplained_the_errors_after_are_the_nearest_models():
+    (card,) = made("unexplained")
+    assert card["after_is"] == "nearest (not accepted)"
+    assert [round(row["after"], 2) for row in card["rows"]] == [1.2, 1.0]
+
+
+def test_a_diagnosis_of_before_this_page_has_no_errors_of_its_nearest_model():
+    old = diagnosis("b", "unexplained")
+    del old["nearest"]["error"]
+    (card,) = cards([summary("b")], [old])
+    assert card["after_is"] == ""
+    assert card["rows"][0]["after"] is None
+
+
+def test_agrees_with_an_error_above_the_noise_is_explained():
+    (card,) = made("agrees")
+    assert card["caution"].startswith("τ_out and θ_out: above the noise floor")
+    quiet = diagnosis("b", "agrees")
+    quiet["fit"]["error"] = {"tau_in": {"before": 1.1e-3, "after": 1.1e-3, "noise": 1e-3, "unit": "N*m"}}
+    assert cards([summary("b")], [quiet])[0]["caution"] is None
+    assert made("explained")[0]["caution"] is None
+
+
+def test_the_overview_counts_verdicts_and_says_how_far_the_errors_fall():
+    first, second, third = overview(made("explained", "unexplained", "agrees"))
+    assert first.startswith("2 of 3 batches differ from the calibrated model by more than noise: 1 explained")
+    assert "falls from 6.0 to 1.2 times the noise floor (batch b-explained)" in second
+    assert "nearest model (not accepted)" in third
+    assert overview(made("agrees")) == ["The calibrated model agrees with the batch."]
+    assert overview([]) == []
+
+
+def test_the_fall_is_that_of_the_largest_error_of_any_channel():
+    worse = diagnosis("b", "explained")
+    worse["fit"]["error"] = ERROR | {"theta_out": ERROR["theta_out"] | {"after": 4e-3}}
+    assert "falls from 6.0 to 4.0 times" in overview(cards([summary("b")], [worse]))[1]
+
+
+def test_every_mechanism_that_anything_names_is_listed():
+    asked = [
+        diagnosis("a", "explained", alternatives=[SCALE]),
+        diagnosis("b", "unexplained"),
+        diagnosis("c", None),
+    ]
+    assert mechanisms_named(asked) == ["backlash", "torque-scale"]

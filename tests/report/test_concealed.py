@@ -1,0 +1,73 @@
+"""What a rig has beside what was said of it."""
+
+import json
+
+import pytest
+from made_pages import BACKLASH, SCALE, content, diagnosis
+
+from ccmodel.report.page import write_page
+from ccmodel.report.page.concealed import beside, read_concealed
+from ccmodel.typed import InputError
+
+EFFECTS = [
+    {"name": "backlash", "place": "load-pulley", "text": "half gap 30 mrad", "source": "a <data sheet>"},
+    {"name": "torque-scale", "place": "drive-sensor", "text": "gain 5 %", "source": ""},
+    {"name": None, "place": None, "text": "inertia of the cable", "source": ""},
+]
+
+
+@pytest.fixture
+def concealed(tmp_path):
+    def write(effects=EFFECTS, batches=("b",), **changed):
+        file = tmp_path / "concealed.json"
+        rigs = [{"batches": list(batches), "effects": effects}]
+        file.write_text(json.dumps({"format": 1, "rigs": rigs} | changed))
+        return read_concealed(file)
+
+    return write
+
+
+@pytest.mark.parametrize(
+    ("said", "of_backlash", "of_scale"),
+    [
+        ({"verdict": "explained"}, "named", "not named"),
+        ({"verdict": "explained", "alternatives": [SCALE]}, "named", "alternative, but at the load sensor"),
+        ({"verdict": "unexplained"}, "in the nearest model, not accepted", "not named"),
+        ({"verdict": "agrees"}, "not named", "not named"),
+        ({"verdict": None}, "–", "–"),
+    ],
+)
+def test_each_effect_has_what_was_said_of_it(concealed, said, of_backlash, of_scale):
+    (table,) = beside(concealed(), [diagnosis("b", **said)])
+    assert [e["said"][0] for e in table["effects"][:2]] == [of_backlash, of_scale]
+
+
+def test_what_was_named_and_is_not_there_is_said(concealed):
+    (table,) = beside(concealed(EFFECTS[1:]), [diagnosis("b", "explained", mechanisms=[BACKLASH, SCALE])])
+    assert table["besides"] == ["backlash"]
+
+
+def test_what_is_left_is_said_with_the_model_that_leaves_it(concealed):
+    said = [diagnosis("b", "explained"), diagnosis("c", "unexplained"), diagnosis("d", "agrees")]
+    (table,) = beside(concealed(batches=["b", "c", "d", "e"]), said)
+    assert table["falls"] == [
+        "τ_out: 6.0 to 1.2 times the noise (model: extended)",
+        "τ_out: 6.0 to 1.2 times the noise (model: nearest (not accepted))",
+        "τ_out: 6.0 times the noise",
+        "–",
+    ]
+    assert table["verdicts"][-1] == "not diagnosed"
+
+
+def test_the_page_shows_it_only_where_it_is_stated(concealed, tmp_path):
+    for given, there in ((concealed(), True), (None, False)):
+        write_page(tmp_path / "index.html", content(diagnosis("b", "agrees"), concealed=given))
+        text = (tmp_path / "index.html").read_text()
+        assert ("What was concealed, and what was said" in text) == there
+        assert ("a &lt;data sheet&gt;" in text) == there
+
+
+def test_a_file_of_another_format_is_one_line(concealed):
+    with pytest.raises(InputError, match=r"concealed\.json, line 1: format: must be at most 1") as error:
+        concealed(format=2)
+    assert "\n" not in str(error.value)

@@ -1,0 +1,100 @@
+"""Verdicts in words: numbers, units, directions and places are those of the diagnosis."""
+
+import re
+
+import pytest
+from made_pages import BACKLASH, SCALE, diagnosis
+
+from ccmodel import mechanisms
+from ccmodel.report.verdict import claim, headline, nearest_sentence, quantity, sentence
+
+
+def gain(value, low, high, place="load-sensor"):
+    parameters = [{"name": "gain", "value": value, "low": low, "high": high, "unit": "1"}]
+    return {"name": "torque-scale", "place": place, "parameters": parameters}
+
+
+def test_a_claim_has_number_unit_interval_direction_and_place():
+    assert claim(SCALE) == "the load's torque sensor reads 14.8 % high (14.7 to 14.9 %)"
+    low = gain(-0.052, -0.055, -0.049, "drive-sensor")
+    assert claim(low) == "the drive's torque sensor reads 5.2 % low (4.9 to 5.5 %)"
+
+
+def test_an_interval_across_zero_keeps_its_signs():
+    assert claim(gain(0.01, -0.02, 0.04)).endswith("reads 1 % high (-2 to 4 %)")
+    assert claim(gain(-0.01, -0.04, 0.02)).endswith("reads 1 % low (-2 to 4 %)")
+
+
+@pytest.mark.parametrize("name", mechanisms.names())
+def test_every_mechanism_has_a_sentence_on_its_own_strengths(name):
+    mechanism = mechanisms.get(name)
+    fields = set(re.findall(r"\{(\w+)(?::%)?\}", mechanism.sentence)) - {"side"}
+    assert {p.name for p in mechanism.strengths} <= fields <= {p.name for p in mechanism.parameters}
+    assert ("[" in mechanism.sentence) <= mechanism.strengths[0].signed
+    for place in mechanism.places:
+        parameters = [
+            {
+                "name": p.name,
+                "value": p.start,
+                "low": 0.9 * p.start,
+                "high": 1.1 * p.start,
+                "unit": p.unit.replace(" ", "*"),
+            }
+            for p in mechanism.parameters
+        ]
+        said = claim({"name": name, "place": place, "parameters": parameters})
+        assert not set("{}[]|") & set(said)
+        assert ("{side}" in mechanism.sentence) <= (place.split("-")[0] in said)
+
+
+@pytest.mark.parametrize(
+    ("given", "shown"),
+    [
+        ((0.0301, 0.0292, 0.0309, "rad"), ("30.1 mrad", "29.2 to 30.9 mrad")),
+        ((3.04e-3, 2.9e-3, 3.2e-3, "N*m"), ("3.0 mN m", "2.9 to 3.2 mN m")),
+        ((2.7e-5, 2.4e-5, 3.0e-5, "m"), ("27 µm", "24 to 30 µm")),
+        ((0.87, 0.83, 0.92, "rad"), ("0.87 rad", "0.83 to 0.92 rad")),
+        ((1.23e-5, 1.1e-5, 1.3e-5, "kg*m^2"), ("1.2·10⁻⁵ kg m²", "1.1 to 1.3·10⁻⁵ kg m²")),
+        ((1.0, 1.0, 1.0, "1"), ("1.00", "1.00 to 1.00")),
+        ((0.0, 0.0, 0.0, "N"), ("0.00 N", "0.00 to 0.00 N")),
+        ((30.0, 29.9999, 30.0001, "s"), ("30.00 s", "30.00 to 30.00 s")),
+    ],
+)
+def test_a_quantity_has_the_digits_that_its_interval_leaves(given, shown):
+    assert quantity(*given) == shown
+
+
+def test_each_verdict_has_its_sentence():
+    assert "confidence 0.97" in sentence(diagnosis("b", "explained"))
+    assert "may be backlash at the load pulley (0.50)" in sentence(diagnosis("b", "undecided"))
+    unexplained = "Something is missing at the load pulley, and no listed mechanism explains it."
+    assert sentence(diagnosis("b", "unexplained")) == unexplained
+    assert "no missing physics" in sentence(diagnosis("b", "agrees"))
+    assert sentence(diagnosis("b", None)) == "Not diagnosed: no recording that can be used."
+
+
+def test_against_a_model_given_a_verdict_is_a_change():
+    assert sentence(diagnosis("b", "explained", is_held=True)).startswith("This has changed: the load follows")
+    assert "no change" in sentence(diagnosis("b", "agrees", is_held=True))
+    assert "Something has changed at the load pulley" in sentence(diagnosis("b", "unexplained", is_held=True))
+
+
+def test_all_possible_places_of_a_mismatch_are_said():
+    location = {"place": "load", "places": ["load", "load-pulley"], "channels": [], "phases": [], "text": ""}
+    assert "missing at the load or the load pulley, and" in sentence(diagnosis("b", "unexplained", location=location))
+
+
+def test_two_mechanisms_are_both_said_with_their_confidence():
+    said = sentence(diagnosis("b", "explained", mechanisms=[BACKLASH, SCALE]))
+    assert said.index("dead zone") < said.index("confidence 0.97; and the load's torque sensor")
+    assert said.endswith("confidence 0.99.")
+
+
+def test_the_headline_says_how_far_the_error_fell():
+    assert "of τ_out falls from 6.0 to 1.2 times the noise" in headline(diagnosis("b", "explained"))
+    assert "falls" not in headline(diagnosis("b", "agrees"))
+
+
+def test_the_nearest_model_is_never_said_without_its_label():
+    assert nearest_sentence(diagnosis("b", "unexplained")).startswith("Nearest model, not accepted: ")
+    assert nearest_sentence(diagnosis("b", "explained")) is None
