@@ -64,7 +64,8 @@ def test_every_effect_of_the_rig_is_among_the_concealed():
 
 
 @pytest.mark.parametrize(
-    ("key", "message"), [("rig.effects.drag", "has no"), ("rig.effects.relaxation.7.share", "has no"), ("rig", "no number")]
+    ("key", "message"),
+    [("rig.effects.drag", "has no"), ("rig.effects.relaxation.7.share", "has no"), ("rig", "no number")],
 )
 def test_a_size_that_the_campaign_does_not_state_is_refused(key, message):
     described = CAMPAIGN.model_dump(mode="json")
@@ -159,8 +160,6 @@ def test_a_batch_of_a_real_rig_is_kept(small_campaign, tmp_path):
 
 
 def test_an_unknown_batch_is_refused(tmp_path):
-    result = CliRunner().invoke(
-        app, ["record", str(CONFIG), "--out", str(tmp_path), "--batch", "lopps"]
-    )
+    result = CliRunner().invoke(app, ["record", str(CONFIG), "--out", str(tmp_path), "--batch", "lopps"])
     assert result.exit_code == 2
     assert not list(tmp_path.iterdir())
