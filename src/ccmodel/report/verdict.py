@@ -10,6 +10,7 @@ from ccmodel.mechanisms.contract import side
 
 # By the short names of diagnosis.json.
 SYMBOL = {channel.short_name: channel.symbol for channel in TABLE.values()}
+IN_WORDS = {channel.short_name: channel.words for channel in TABLE.values()}
 NOT_ACCEPTED = "not accepted"
 # A unit is printed with a prefix if the value is below a tenth of it; these units take none.
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))

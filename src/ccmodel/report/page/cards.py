@@ -5,6 +5,7 @@ from statistics import median
 
 from ccmodel.recording import ORIGIN
 from ccmodel.report.verdict import (
+    IN_WORDS,
     NOT_ACCEPTED,
     SYMBOL,
     joined,
@@ -110,7 +111,7 @@ def _rows(error: Mapping[str, Mapping], nearest: Mapping[str, Mapping] | None) -
     changed = nearest is not None or any(e["before"] != e["after"] for e in error.values())
     rows = [
         {
-            "symbol": SYMBOL[channel],
+            "channel": IN_WORDS[channel],
             "before": e["before"] / e["noise"],
             "after": after[channel]["after"] / e["noise"] if changed else None,
             "noise": e["noise"],

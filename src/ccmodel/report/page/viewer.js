@@ -273,7 +273,7 @@
     body.replaceChildren(...[settings.input, ...panels()].filter(c => run.sets[RECORDED][c]).map(channel => {
       const row = document.createElement("tr");
       const value = set => text((run.sets[set][channel]?.[at] ?? NaN) * settings.channels[channel].scale, channel);
-      row.append(cell("th", settings.channels[channel].symbol, { scope: "row", className: "t" }), cell("td", value(RECORDED)),
+      row.append(cell("th", settings.channels[channel].label, { scope: "row", className: "t" }), cell("td", value(RECORDED)),
         ...shown().map(set => cell("td", value(set))), cell("td", settings.channels[channel].unit, { className: "t" }));
       return row;
     }));
