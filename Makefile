@@ -37,7 +37,7 @@ real: $(VENV)/.ready  ## run the pipeline on the public da Vinci recordings: mak
 	$(call run_pipeline,config/real.yaml,results/real)
 
 data: $(VENV)/.ready  ## record data/raw again with the virtual rig
-	$(BIN)/virtualrig record config/virtual-rig.yaml --out data/raw
+	$(BIN)/virtualrig record config/virtual-rig.yaml --out data/raw --concealed data/concealed.json
 
 test: $(VENV)/.ready  ## run the tests and the linters
 	$(BIN)/python -m pytest -n $(CORES) --dist loadfile --no-loadscope-reorder

@@ -97,10 +97,13 @@ def prepare(campaign: Campaign, plan: RecordingPlan, draw: Generator) -> Prepara
     """Draw the initial state of one recording: friction, pretension and tension profile."""
     spread: Repeatability = campaign.repeatability
     low, high = spread.profile_share
+    earliest, latest = spread.tensioned_before_s
     return Preparation(
         friction_coefficient=campaign.rig.cable.friction_coefficient * (1 + spread.friction * draw.standard_normal()),
         pretension_N=plan.pretension_N * (1 + spread.pretension * draw.standard_normal()),
         profile_share=(draw.uniform(low, high), draw.uniform(low, high)),
+        # Without a range there is no draw, so that rigs without a past keep the noise of their recordings.
+        tensioned_before_s=draw.uniform(earliest, latest) if latest > earliest else latest,
     )
 
 
@@ -165,6 +168,23 @@ def description(campaign: Campaign, name: str, note: str, plans: Sequence[Record
             for plan in plans
         ],
     }
+
+
+def concealed(campaign: Campaign) -> dict:
+    """What the rig has and a batch does not state: each effect with its place, its size as a text, and its source."""
+    effects = [
+        {
+            "name": effect.name,
+            "place": effect.place,
+            "text": ", ".join(
+                f"{quantity} {campaign.value_of(key):.3g} {unit if unit != '1' else ''}".rstrip()
+                for quantity, (key, unit) in effect.sizes.items()
+            ),
+            "source": effect.source,
+        }
+        for effect in campaign.concealed
+    ]
+    return {"format": 1, "rigs": [{"batches": list(campaign.batches), "effects": effects}]}
 
 
 def log_name(plan: RecordingPlan) -> str:

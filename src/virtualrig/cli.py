@@ -1,5 +1,6 @@
 """Command line of the virtual rig."""
 
+import json
 import os
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +10,7 @@ from pydantic import ValidationError
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from virtualrig.campaign import BatchExistsError, record_campaign
+from virtualrig.campaign import BatchExistsError, concealed, record_campaign
 from virtualrig.config import read_campaign
 
 app = typer.Typer(no_args_is_help=True, add_completion=False)
@@ -29,6 +30,9 @@ def record(
     jobs: Annotated[int, typer.Option(min=1, help="Number of processes; the recordings do not depend on it.")] = (
         os.cpu_count() or 1
     ),
+    concealed_file: Annotated[
+        Path | None, typer.Option("--concealed", dir_okay=False, help="File for what the rig has and no batch states.")
+    ] = None,
 ) -> None:
     """Record the batches of a campaign; earlier batches of the virtual rig are replaced."""
     try:
@@ -45,6 +49,8 @@ def record(
             record_campaign(campaign, out, names, jobs, lambda done: progress.update(task, advance=1, description=done))
         except BatchExistsError as error:
             _fail(str(error))
+    if concealed_file:
+        concealed_file.write_text(json.dumps(concealed(campaign), indent=1) + "\n", encoding="utf-8")
 
 
 def _fail(message: str) -> None:

@@ -108,11 +108,13 @@ class Repeatability(Strict):
 
     `friction` and `pretension` are relative standard deviations. `profile_share` holds the bounds of the initial
     profile, drawn for each cable: ln T falls from the drive end to the load end by this share of mu phi.
+    `tensioned_before_s` holds the bounds of the time between tensioning and recording, in which the cables relax.
     """
 
     friction: Share
     pretension: Share
     profile_share: tuple[Share, Share]
+    tensioned_before_s: tuple[NonNegative, NonNegative] = (0.0, 0.0)
 
 
 class Numerics(Strict):
@@ -143,21 +145,29 @@ class RecordingPlan(Strict):
     excitation: Excitation
 
 
+Repeats = Annotated[int, Field(ge=1, le=26)]
+
+
 class Condition(Strict):
-    """One condition of a batch, recorded `repeats` times as `id`-a, `id`-b and so on."""
+    """One condition of a batch, recorded `repeats` times as `id`-a, `id`-b and so on.
+
+    A condition may state an excitation and a number of repeats of its own, in place of the batch's.
+    """
 
     id: str
     pretension_N: PositiveFloat
     conduit: tuple[Piece, ...] = Field(min_length=1)
+    excitation: Excitation | None = None
+    repeats: Repeats | None = None
 
 
 class BatchPlan(Strict):
-    """Plan of a batch: one excitation, applied under several conditions."""
+    """Plan of a batch: conditions, and the excitation and number of repeats of those that state none."""
 
     note: str
     excitation: Excitation
     conditions: tuple[Condition, ...] = Field(min_length=1)
-    repeats: Annotated[int, Field(ge=1, le=26)]
+    repeats: Repeats
 
     @property
     def recordings(self) -> list[RecordingPlan]:
@@ -167,11 +177,30 @@ class BatchPlan(Strict):
                 id=f"{condition.id}-{letter}",
                 pretension_N=condition.pretension_N,
                 conduit=condition.conduit,
-                excitation=self.excitation,
+                excitation=condition.excitation or self.excitation,
             )
             for condition in self.conditions
-            for letter in "abcdefghijklmnopqrstuvwxyz"[: self.repeats]
+            for letter in "abcdefghijklmnopqrstuvwxyz"[: condition.repeats or self.repeats]
         ]
+
+
+class Concealed(Strict):
+    """An effect of the rig that a diagnosis is not told.
+
+    Attributes
+    ----------
+    name, place : str
+        The mechanism that describes it, if any, and where it acts.
+    sizes : mapping of str to (str, str)
+        By quantity, the key of the campaign with its value ("rig.effects.drag_N"), and its unit.
+    source : str
+        Where the size comes from.
+    """
+
+    name: str | None
+    place: str
+    sizes: dict[str, tuple[str, str]] = Field(min_length=1)
+    source: str
 
 
 class Campaign(Strict):
@@ -182,7 +211,32 @@ class Campaign(Strict):
     sensors: Sensors
     repeatability: Repeatability
     numerics: Numerics
+    concealed: tuple[Concealed, ...] = ()
     batches: dict[str, BatchPlan]
+
+    def value_of(self, key: str) -> float:
+        """Value of a key with dots, as "repeatability.friction"; an index counts from 0.
+
+        Raises
+        ------
+        ValueError
+            If there is no such key, or no number.
+        """
+        value = self
+        for part in key.split("."):
+            try:
+                value = value[int(part)] if part.isdigit() else getattr(value, part)
+            except (AttributeError, IndexError, TypeError):
+                raise ValueError(f"concealed: the campaign has no '{key}'") from None
+        if not isinstance(value, float | int):
+            raise ValueError(f"concealed: '{key}' is no number")
+        return value
+
+    @model_validator(mode="after")
+    def _sizes_are_stated(self) -> Self:
+        for key, _ in (size for effect in self.concealed for size in effect.sizes.values()):
+            self.value_of(key)
+        return self
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> Self:

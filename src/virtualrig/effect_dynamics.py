@@ -46,6 +46,10 @@ def simulate(
     mass = rig.cable.density_kg_per_m * grid.cell_length_m
     drag = effects.drag_N * grid.cell_length_m / grid.cell_length_m.sum()
     tension, bristle = _initial_state(physics, grid, preparation, half_bend, drag)
+    share, time_constant_s = (
+        np.array([getattr(branch, name) for branch in effects.relaxation]) for name in ("share", "time_constant_s")
+    )
+    elastic, relaxed = _relaxed(tension, share, time_constant_s, preparation.tensioned_before_s)
 
     sample_s = time_s[1] - time_s[0]
     dt = _stable_step(physics, stiffness, mass, half_bend, drag, lengths, numerics)
@@ -57,14 +61,16 @@ def simulate(
         sample_s,
         int(np.ceil(sample_s / dt)),
         tension,
+        elastic,
+        relaxed,
         np.repeat(bristle[None], lengths.size, axis=0),
         lengths,
         stiffness,
-        _elongation(physics, tension, stiffness, _settling_length(effects, stiffness)),
+        _elongation(physics, elastic, stiffness, _settling_length(effects, stiffness)),
         _settling_length(effects, stiffness),
         grid.segment_length_m / grid.cell_length_m.sum(),
-        np.array([branch.share for branch in effects.relaxation]),
-        np.array([branch.time_constant_s for branch in effects.relaxation]),
+        share,
+        time_constant_s,
         numerics.wave_damping * np.sqrt(rig.cable.EA_N * rig.cable.density_kg_per_m),
         1 / mass,
         half_bend,
@@ -150,6 +156,16 @@ def _initial_state(physics, grid, preparation, half_bend, drag) -> tuple[NDArray
         force, before = hold * bristle, bristle
         bristle = wanted / np.divide(friction(force, bristle), force, out=np.ones_like(hold), where=force != 0)
     return tension, np.clip(bristle, -1, 1)
+
+
+def _relaxed(tension, share, time_constant_s, tensioned_before_s) -> tuple[NDArray, NDArray]:
+    """Elastic tension (N, shape (2, n + 1)) and its delayed parts (branches, 2, n + 1) of cables that were tensioned.
+
+    The elongation has been constant since then, so a branch has followed the elastic tension by 1 - exp(-t / tau).
+    """
+    followed = -np.expm1(-tensioned_before_s / time_constant_s)
+    elastic = tension / (1 - share @ followed)
+    return elastic, followed[:, None, None] * elastic
 
 
 def _elongation(physics, tension, stiffness, settling) -> NDArray:
@@ -295,6 +311,8 @@ def _run(
     sample_s,
     steps,
     start_tension,
+    start_elastic,
+    start_relaxed,
     bristles,
     lengths,
     stiffness,
@@ -325,9 +343,9 @@ def _run(
     u = np.zeros((2, nodes + 2))
     v = np.zeros((2, nodes + 2))
     tension = start_tension.copy()
-    elastic = start_tension.copy()
+    elastic = start_elastic.copy()
     base = np.empty(nodes + 1)
-    relaxed = np.zeros((relaxing.size, 2, nodes + 1))
+    relaxed = start_relaxed.copy()
     bristle = bristles[0].copy()
     strength = np.empty((2, nodes))
     hold = np.empty(nodes)

@@ -17,11 +17,14 @@ class Preparation:
         Mean tension along the conduit, of both cables, N.
     profile_share : tuple of float
         Fall of ln T from the drive end to the load end over mu phi, for cables A and B.
+    tensioned_before_s : float
+        Time between the tensioning of the cables and the first sample, in which they have relaxed, s.
     """
 
     friction_coefficient: float
     pretension_N: float
     profile_share: tuple[float, float]
+    tensioned_before_s: float = 0.0
 
 
 @dataclass(frozen=True)

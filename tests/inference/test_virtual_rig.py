@@ -1,4 +1,4 @@
-"""Fits of the recordings in data/raw, made by the virtual rig: another solver, with all of the paper's sensors."""
+"""Fits of recordings of a virtual rig without flaws: another solver, with all of the paper's sensors."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from ccmodel.model.parameters import Parameters
 from ccmodel.rig.ingest import ingest_batch
 from drawn_batches import SPREAD
 
-LOOPS = Path(__file__).parents[2] / "data/raw/loops"
+LOOPS = Path(__file__).parents[1] / "data/ideal-rig/loops"
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pandas as pd
@@ -106,6 +107,7 @@ def test_it_makes_figures_tables_and_the_page(finished):
     for name in ("pretension", "one-run"):
         assert (results / f"figures/{name}.png").stat().st_size > 10_000
         assert "<svg" in (results / f"figures/{name}.svg").read_text()
+        assert (results / f"figures/{name}.pdf").read_bytes().startswith(b"%PDF")
         assert f"figures/{name}.png" in (results / "index.html").read_text()
     for name in ("claims", "claims-model", "accuracy", "accuracy-ratio"):
         assert f"figures/{name}.png" in (results / "index.html").read_text()
@@ -129,14 +131,22 @@ def test_every_link_of_the_page_leads_somewhere(finished):
     assert not re.search(r'<img [^>]*?src="(?!data:)', text)
 
 
-def test_what_a_diagnosis_found_is_one_more_set_of_parameters(copy):
-    config = yaml.safe_load((copy / "config.yaml").read_text())
+@pytest.fixture(scope="module")
+def diagnosed(finished, tmp_path_factory):
+    """A copy of the finished run, with a diagnosis."""
+    folder = tmp_path_factory.mktemp("diagnosed") / "run"
+    shutil.copytree(finished, folder, copy_function=shutil.copy2)
+    config = yaml.safe_load((folder / "config.yaml").read_text())
     config["diagnose"] = "each"
     config["studies"]["one-run"]["parameters"] = "extended"
-    (copy / "config.yaml").write_text(yaml.safe_dump(config))
-    run = snakemake(copy)
+    (folder / "config.yaml").write_text(yaml.safe_dump(config))
+    run = snakemake(folder)
     assert run.returncode == 0, run.stdout + run.stderr
-    results = copy / "results"
+    return folder
+
+
+def test_what_a_diagnosis_found_is_one_more_set_of_parameters(diagnosed):
+    results = diagnosed / "results"
     assert json.loads((results / "diagnoses/tiny/diagnosis.json").read_text())["verdict"] == "agrees"
     nearest = json.loads((results / "diagnoses/tiny/nearest.json").read_text())
     assert nearest == {"succeeded": False, "message": "verdict 'agrees': the diagnosis has no nearest model"}
@@ -175,6 +185,28 @@ def test_a_rig_has_its_own_fits_and_a_batch_its_own_settings(copy):
         "tiny": {"estimated", "fitted", "calibrated", "extended"},
         "other": {"estimated", "calibrated", "extended"},
     }
+
+
+def test_snakemakes_report_has_page_diagnoses_tables_and_figures_with_their_captions(diagnosed):
+    run = snakemake(diagnosed, "--report", str(diagnosed / "report.zip"))
+    assert run.returncode == 0, run.stdout + run.stderr
+    with zipfile.ZipFile(diagnosed / "report.zip") as archive:
+        text = archive.read("report/report.html").decode()
+        entries, _ = json.JSONDecoder().raw_decode(text, text.index('{"results/index.html"'))
+        # They are the files of the run, not drawn again.
+        for file, entry in entries.items():
+            assert archive.read(f"report/{entry['data_uri']}") == (diagnosed / file).read_bytes(), file
+    results = diagnosed / "results"
+    wanted = {results / "index.html", *results.glob("diagnoses/*/report.html"), *results.glob("tables/*.csv")}
+    wanted |= set(results.glob("figures/**/*.png"))
+    assert set(entries) == {str(file.relative_to(diagnosed)) for file in wanted}
+    caption = {file: entry["caption"] for file, entry in entries.items()}
+    assert all(text.startswith("<p>") for text in caption.values())
+    assert "pretension: tiny. Loops of the last whole cycle" in caption["results/figures/pretension.png"]
+    assert "not recordings" in caption["results/figures/phases/response.png"]
+    assert "Diagnosis of batch tiny" in caption["results/diagnoses/tiny/report.html"]
+    labels = [tuple(entry["labels"].items()) for entry in entries.values()]
+    assert len(set(labels)) == len(labels), "every entry can be told from the others"
 
 
 def test_the_papers_simulated_figures_stand_under_a_heading_of_their_own(finished):

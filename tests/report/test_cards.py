@@ -63,7 +63,7 @@ def test_agrees_with_an_error_above_the_noise_is_explained():
 
 def test_the_overview_counts_verdicts_and_says_how_far_the_errors_fall():
     first, second, third = overview(made("explained", "unexplained", "agrees"))
-    assert first.startswith("2 of 3 batches differ from the calibrated model by more than noise: 1 explained")
+    assert first.startswith("2 of 3 batches differ from the calibrated model beyond noise: 1 explained")
     assert "falls from 6.0 to 1.2 times the noise floor (batch b-explained)" in second
     assert "nearest model (not accepted)" in third
     assert overview(made("agrees")) == ["The calibrated model agrees with the batch."]

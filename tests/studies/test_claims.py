@@ -13,6 +13,7 @@ from ccmodel.studies.claims.figure import model_figure, recordings_figure
 from ccmodel.studies.claims.settings import Claims
 from ccmodel.studies.claims.study import claims_of
 from ccmodel.studies.loops.settings import Measuring
+from ccmodel.studies.variables import batches_by_origin
 from model_runs import CABLE, STUDY
 
 CLAIMS = Claims(bend="bend", pretension="pretension", radius="radius", small_percent=5.0, model=STUDY)
@@ -77,17 +78,21 @@ def test_without_recordings_nothing_is_determined_and_no_number_is_made_up():
 
 def test_without_recordings_the_figures_can_still_be_drawn(tmp_path):
     claims = claims_of({"bend": [], "pretension": [], "radius": []}, None, CLAIMS, HOW)
-    for name, figure in (("a", recordings_figure(claims)), ("b", model_figure(claims, {}))):
-        save_figure(figure, tmp_path / f"{name}.png")
-        save_figure(figure, tmp_path / f"{name}.svg")
+    for name, figure in (("a", recordings_figure(claims, "")), ("b", model_figure(claims, {}))):
+        save_figure(figure, tmp_path / f"{name}.png", tmp_path / f"{name}.svg")
+    assert "no recording" in (tmp_path / "a.svg").read_text()
     assert "could not be run" in (tmp_path / "b.svg").read_text()
 
 
-def test_the_figures_call_the_virtual_rig_what_it_is(found, tmp_path):
-    save_figure(recordings_figure(list(found.values())), tmp_path / "a.svg")
+def test_the_figures_say_what_was_simulated(found, tmp_path):
+    origins = batches_by_origin([("loops", "virtual-rig"), ("radius", "rig"), ("loops", "virtual-rig")])
+    save_figure(recordings_figure(list(found.values()), origins), tmp_path / "a.svg")
     save_figure(model_figure(list(found.values()), model_runs.loop_placements(CABLE, STUDY)), tmp_path / "b.svg")
-    assert "virtual rig, simulated" in (tmp_path / "a.svg").read_text()
-    assert "loop at the drive end" in (tmp_path / "b.svg").read_text()
+    said = (tmp_path / "a.svg").read_text()
+    assert "recording (measured): radius; recording (virtual rig, simulated): loops" in said
+    said = (tmp_path / "b.svg").read_text()
+    assert "loop at the drive end" in said
+    assert "simulated (no recording)" in said
 
 
 def test_without_repeats_there_is_no_interval_and_it_is_said():

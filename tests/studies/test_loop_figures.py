@@ -1,5 +1,6 @@
 """What figures say of themselves; the pictures are looked at by people."""
 
+from dataclasses import replace
 from typing import get_args
 
 import matplotlib.pyplot as plt
@@ -7,8 +8,10 @@ import numpy as np
 import pytest
 
 from builders import recording
+from ccmodel.channels import TABLE
 from ccmodel.model.run import PRESCRIBED
-from ccmodel.studies.loops.settings import Figure, Study
+from ccmodel.report.figures import stamp_figure
+from ccmodel.studies.loops.settings import Figure, Measuring, Study
 from ccmodel.studies.loops.study import draw as draw_study
 
 FIGURES = get_args(Figure)
@@ -21,21 +24,31 @@ def closed():
     plt.close("all")
 
 
-def pair(origin="virtual-rig", given="model", **kw):
-    recorded = recording(**LOOP, **kw)
+def pair(origin="virtual-rig", given="model", batch="b", frequency=1.0, **kw):
+    recorded = replace(recording(**LOOP, **kw), batch=batch, excitation={"frequency_Hz": frequency})
     recorded = recorded.with_channels(recorded.channels, recorded.derived_from, origin)
-    sources = dict.fromkeys(recorded.channels, "model") | {"tau_out_Nm": given}
+    sources = dict.fromkeys(recorded.channels, "model") | {"theta_in_rad": PRESCRIBED, "tau_out_Nm": given}
     return recorded, recorded.with_channels(recorded.channels, sources, "model")
 
 
 def texts(figure):
-    found = [t.get_text() for ax in figure.axes for t in (ax.title, ax._left_title, *ax.texts)]
+    found = [t.get_text() for ax in figure.axes for t in (ax.title, ax._left_title, ax.yaxis.label, *ax.texts)]
     legend = [t.get_text() for legend in figure.legends for t in legend.get_texts()]
     return [t for t in (*found, *legend, figure.get_suptitle()) if t]
 
 
 def draw(pairs, figure="torque-loops", **kw):
-    return draw_study(pairs, Study(batches=["b"], figure=figure, variable="pretension", title="a study", **kw))
+    settings = {"variable": "pretension", "title": "a study"} | kw
+    return draw_study(pairs, Study(batches=["b"], figure=figure, **settings), Measuring())
+
+
+def drawn_loops(figure):
+    """Panels of loops, without the strips of residuals."""
+    return [ax for ax in figure.axes if "time" not in ax.get_xlabel() and "Δ" not in ax.get_ylabel()]
+
+
+def strips(figure):
+    return {ax.get_ylabel(): ax for ax in figure.axes if "Δ" in ax.get_ylabel()}
 
 
 @pytest.mark.parametrize("figure", FIGURES)
@@ -45,12 +58,94 @@ def test_a_virtual_rigs_recordings_are_never_called_measured(figure):
     assert not any("measured" in t or "experiment" in t for t in drawn)
 
 
-@pytest.mark.parametrize("figure", ["torque-loops", "torque-loops-apart", "drive-loops"])
+@pytest.mark.parametrize("figure", FIGURES)
 @pytest.mark.parametrize("order", [1, -1])
-def test_a_study_of_both_origins_says_both_and_which_is_which(figure, order):
-    drawn = texts(draw([pair("rig"), pair("virtual-rig", id="s")][::order], figure))
-    assert any("7 N, recording (measured)" in t for t in drawn)
-    assert any("7 N, recording (virtual rig, simulated)" in t for t in drawn)
+def test_every_batch_is_called_what_it_is_whatever_else_is_drawn(figure, order):
+    measured, simulated = pair("rig", batch="a"), pair("virtual-rig", batch="v", id="s")
+    pairs = [measured, simulated][::order]
+    drawn = draw(pairs, figure)
+    title = drawn.get_suptitle()
+    if figure == "transmission":
+        # It shows the first recording alone.
+        assert ("recording (measured): a" in title) == (order == 1)
+        assert ("recording (virtual rig, simulated): v" in title) == (order == -1)
+    else:
+        assert "recording (measured): a; recording (virtual rig, simulated): v" in title
+        for label in ("7 N, recording (measured)", "7 N, recording (virtual rig, simulated)"):
+            assert any(label in t for t in texts(drawn))
+
+
+@pytest.mark.parametrize("figure", FIGURES)
+def test_the_recording_is_seen_where_the_model_agrees_with_it(figure):
+    for ax in drawn_loops(draw([pair()], figure)):
+        recorded, simulated = ax.lines
+        assert recorded.get_xydata() == pytest.approx(simulated.get_xydata())
+        assert recorded.get_linewidth() > 2 * simulated.get_linewidth()
+        assert recorded.get_zorder() < simulated.get_zorder()
+        assert recorded.get_color() != simulated.get_color() or recorded.get_alpha() < 0.5
+
+
+def off_by(offset, channel="tau_in_Nm"):
+    recorded, simulated = pair()
+    channels = dict(simulated.channels) | {channel: simulated[channel] + offset}
+    return recorded, simulated.with_channels(channels, simulated.derived_from, "model")
+
+
+@pytest.mark.parametrize("figure", ["torque-loops", "torque-loops-apart"])
+def test_residuals_are_model_minus_recording_in_the_axis_unit(figure):
+    found = strips(draw([off_by(0.002)], figure))
+    assert set(found) == {f"Δ {TABLE[c].tex} (mN·m)" for c in ("tau_in_Nm", "tau_out_Nm")}
+    shown = {label: [line.get_ydata() for line in ax.lines[:2]] for label, ax in found.items()}
+    for label, (samples, mean) in shown.items():
+        wanted = 2.0 if "in" in label else 0.0
+        assert samples == pytest.approx(np.full(samples.size, wanted), abs=1e-9)
+        assert mean == pytest.approx(np.full(samples.size, wanted), abs=1e-9)
+    # One cycle of a 1 Hz sine.
+    assert next(iter(found.values())).lines[0].get_xdata()[[0, -1]] == pytest.approx([0, 1], abs=0.011)
+
+
+def test_a_channel_that_the_model_was_given_has_no_residual():
+    assert set(strips(draw([pair(given=PRESCRIBED)]))) == {f"Δ {TABLE['tau_in_Nm'].tex} (mN·m)"}
+    assert set(strips(draw([pair()], "drive-loops"))) == {f"Δ {TABLE['tau_in_Nm'].tex} (mN·m)"}
+
+
+def test_a_transmission_has_a_strip_below_each_loop_in_its_unit():
+    figure = draw([pair()], "transmission")
+    assert len(drawn_loops(figure)) == 1
+    ((label, strip),) = strips(figure).items()
+    assert label == "Δ (mN·m)"
+    assert len(strip.lines) == 5, "samples and moving mean of both torques, and zero"
+
+
+def test_many_recordings_get_a_panel_each():
+    pairs = [pair(id=f"r{i}", pretension_N=float(i + 1)) for i in range(10)]
+    assert len(drawn_loops(draw(pairs[:6]))) == 1
+    figure = draw(pairs)
+    assert len(drawn_loops(figure)) == 10
+    assert all(len(ax.lines) == 2 for ax in drawn_loops(figure))
+
+
+def test_conditions_differ_without_colour():
+    pairs = [pair(id=f"r{i}", pretension_N=float(i + 1)) for i in range(4)]
+    (ax,) = drawn_loops(draw(pairs))
+    models = [line for line in ax.lines if line.get_zorder() == 3]
+    assert len({line.get_linestyle() for line in models}) == 4
+    assert len({line.get_color() for line in models}) == 4
+
+
+@pytest.mark.parametrize("figure", FIGURES)
+def test_a_legend_covers_no_panel(figure):
+    pairs = [pair(id=f"r{i}", pretension_N=float(i + 1)) for i in range(4)]
+    drawn = draw(pairs, figure)
+    stamp_figure(drawn, "a stamp")
+    drawn.canvas.draw()
+    (legend,) = (legend.get_window_extent() for legend in drawn.legends)
+    (stamp,) = (t.get_window_extent() for t in drawn.texts if t.get_text() == "a stamp")
+    assert not stamp.overlaps(legend)
+    for ax in drawn.axes:
+        assert not ax.get_tightbbox().overlaps(legend)
+        assert not ax.get_tightbbox().overlaps(stamp)
+    assert legend.x0 >= 0 and legend.x1 <= drawn.bbox.width
 
 
 @pytest.mark.parametrize("figure", FIGURES)
@@ -58,19 +153,22 @@ def test_recordings_are_drawn_where_the_model_could_not_be_run(figure):
     recorded, _ = pair()
     drawn = draw([(recorded, None)], figure)
     assert any(ax.lines for ax in drawn.axes)
-    if figure != "transmission":
-        assert any("not simulated" in t for t in texts(drawn))
+    assert any("not simulated" in t for t in texts(drawn))
+    assert not any(line.get_xydata().size == 0 for ax in drawn.axes for line in ax.lines)
 
 
 def test_a_prescribed_load_torque_is_said():
-    assert "model, given the recorded load torque" in texts(draw([pair(given=PRESCRIBED)]))
+    given = pair(given=PRESCRIBED)
+    assert "model, given the recorded load torque" in texts(draw([given]))
+    assert "model, in part given the recorded load torque" in texts(draw([given, pair(id="s")]))
 
 
 def test_rows_of_panels_share_the_colours_of_conditions():
-    a, b = pair(pretension_N=3.5, id="a"), pair(pretension_N=7.0, id="b")
-    figure = draw([a, b], rows="recording")
-    (upper,), (lower,) = ([line.get_color() for line in ax.lines] for ax in (figure.axes[0], figure.axes[2]))
-    assert upper != lower
+    pairs = [pair(pretension_N=T, id=f"{T}-{n}", frequency=n) for n in (1, 2) for T in (3.5, 7.0)]
+    upper, lower = drawn_loops(draw(pairs, rows="frequency"))
+    colours = [[line.get_color() for line in ax.lines] for ax in (upper, lower)]
+    assert colours[0] == colours[1]
+    assert len(set(colours[0])) == 2
 
 
 @pytest.mark.parametrize("figure", FIGURES)

@@ -218,7 +218,13 @@ def test_a_tiny_run_writes_tables_and_figure(tiny_file, tmp_path):
         "failed.csv",
         "ranking.csv",
         "summary.json",
+        "table-one.png",
+        "table-one.svg",
+        "table-one.pdf",
     }
+    assert (tmp_path / "out/table-one.png").read_bytes() == figure.read_bytes()
+    svg = (tmp_path / "out/table-one.svg").read_text()
+    assert "all else is simulated" in svg and "sources" in svg
     ranked = pd.read_csv(tmp_path / "out/ranking.csv")
     assert set(ranked["by"]) <= {"errors", "errors and fit", "fit", "errors at the paper's fit"}
     assert set(ranked["norm"]) == {"peak-to-peak", "maximum", "rms"}

@@ -7,8 +7,8 @@ from virtualrig.config import Campaign, read_campaign
 
 @pytest.fixture(scope="session")
 def campaign() -> Campaign:
-    """The committed campaign."""
-    return read_campaign(ROOT / "config" / "virtual-rig.yaml")
+    """A rig without flaws."""
+    return read_campaign(ROOT / "tests" / "data" / "ideal-rig" / "rig.yaml")
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,7 @@
 """Batches on disk: the committed ones are complete and reproducible."""
 
 import gzip
+import json
 import shutil
 
 import numpy as np
@@ -10,12 +11,15 @@ import yaml
 from typer.testing import CliRunner
 from virtual_runs import ROOT, changed, plan_of
 
-from virtualrig.campaign import describe, record
+from virtualrig.campaign import concealed, describe, record
 from virtualrig.cli import app
+from virtualrig.config import read_campaign
+from virtualrig.effects import Effects
 from virtualrig.sensors import DECIMALS
 
 RAW = ROOT / "data" / "raw"
-BATCHES = ["half-loop", "loops", "pretension", "radius"]
+CONFIG = ROOT / "config" / "virtual-rig.yaml"
+CAMPAIGN = read_campaign(CONFIG)
 
 
 def read_log(path):
@@ -29,19 +33,51 @@ def small_campaign(campaign):
     return campaign.model_copy(update={"batches": {"half-loop": batch}})
 
 
-@pytest.mark.parametrize("name", BATCHES)
-def test_committed_description_follows_from_the_config(campaign, name):
+@pytest.mark.parametrize("name", CAMPAIGN.batches)
+def test_committed_description_follows_from_the_config(name):
     committed = yaml.safe_load((RAW / name / "batch.yaml").read_text())
-    assert committed == describe(campaign, name)
+    assert committed == describe(CAMPAIGN, name)
     assert committed["origin"] == "virtual-rig"
     files = {path.name for path in (RAW / name).iterdir()}
     assert files == {"batch.yaml"} | {recording["file"] for recording in committed["recordings"]}
 
 
-@pytest.mark.parametrize("name", BATCHES)
-def test_committed_logs_are_complete_and_within_the_sensors_range(campaign, name):
-    sensors = campaign.sensors
-    for plan in campaign.batches[name].recordings:
+def test_what_is_concealed_follows_from_the_config():
+    committed = json.loads((ROOT / "data" / "concealed.json").read_text())
+    assert committed == concealed(CAMPAIGN)
+    (rig,) = committed["rigs"]
+    assert rig["batches"] == list(CAMPAIGN.batches)
+    assert {"name": "pulley-friction", "place": "drive-pulley", "text": "friction torque 0.022 N m"}.items() <= (
+        rig["effects"][0].items()
+    )
+
+
+def test_every_effect_of_the_rig_is_among_the_concealed():
+    sizes = {key for effect in CAMPAIGN.concealed for key, _ in effect.sizes.values()}
+    present = CAMPAIGN.rig.effects.model_dump(exclude_defaults=True)
+    for name, value in present.items():
+        parts = value if name in ("drive_pulley", "load_pulley", "load", "drive_sensors", "load_sensors") else {"": 0}
+        for part in parts:
+            prefix = f"rig.effects.{name}.{part}".rstrip(".")
+            assert any(key.startswith(prefix) for key in sizes), prefix
+    assert CAMPAIGN.rig.effects != Effects()
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [("rig.effects.drag", "has no"), ("rig.effects.relaxation.7.share", "has no"), ("rig", "no number")],
+)
+def test_a_size_that_the_campaign_does_not_state_is_refused(key, message):
+    described = CAMPAIGN.model_dump(mode="json")
+    described["concealed"][0]["sizes"] = {"size": [key, "m"]}
+    with pytest.raises(ValueError, match=message):
+        type(CAMPAIGN).model_validate(described)
+
+
+@pytest.mark.parametrize("name", CAMPAIGN.batches)
+def test_committed_logs_are_complete_and_within_the_sensors_range(name):
+    sensors = CAMPAIGN.sensors
+    for plan in CAMPAIGN.batches[name].recordings:
         log = read_log(RAW / name / f"{plan.id}.csv.gz")
         assert list(log.columns) == list(DECIMALS)
         assert log.time_s.iloc[-1] == pytest.approx(plan.excitation.duration_s, abs=1 / sensors.sample_rate_Hz)
@@ -56,35 +92,35 @@ def test_committed_logs_are_complete_and_within_the_sensors_range(campaign, name
         assert rest.load_encoder_counts.nunique() == 1
 
 
-def test_radii_are_those_of_the_paper(campaign):
-    for condition in campaign.batches["radius"].conditions:
+def test_radii_are_those_of_the_paper():
+    for condition in CAMPAIGN.batches["radius"].conditions:
         before, loop, after = condition.conduit
         radius_cm = float(condition.id.removeprefix("radius-").removesuffix("cm"))
         assert 100 * loop.length_m / loop.bend_rad == pytest.approx(radius_cm, abs=1e-3)
         assert before == after
-        assert sum(piece.length_m for piece in condition.conduit) == pytest.approx(campaign.rig.cable.length_m)
+        assert sum(piece.length_m for piece in condition.conduit) == pytest.approx(CAMPAIGN.rig.cable.length_m)
 
 
-@pytest.mark.parametrize("name", BATCHES)
-def test_repeats_differ_by_about_a_percent(campaign, name):
-    for condition in campaign.batches[name].conditions:
+@pytest.mark.parametrize("name", [name for name, batch in CAMPAIGN.batches.items() if batch.repeats == 2])
+def test_repeats_differ_by_a_few_percent(name):
+    for condition in CAMPAIGN.batches[name].conditions:
         a, b = (read_log(RAW / name / f"{condition.id}-{letter}.csv.gz") for letter in "ab")
         cycle = a.time_s > a.time_s.iloc[-1] - 2
         difference = (a.drive_current_A - b.drive_current_A)[cycle]
         # Means over 20 ms reduce the white noise to 0.03 % of the torque's range. At 0.7 N the difference is little
         # more, because both cables are slack most of the time.
         smooth = difference.rolling(10).mean().dropna()
-        assert 5e-4 < (smooth - smooth.mean()).std() / np.ptp(a.drive_current_A[cycle]) < 0.03, condition.id
+        assert 5e-4 < (smooth - smooth.mean()).std() / np.ptp(a.drive_current_A[cycle]) < 0.06, condition.id
 
 
-def test_a_committed_recording_is_reproducible(campaign):
+def test_a_committed_recording_is_reproducible():
     """On another processor, rounding changes a few samples after a slack cable becomes taut."""
-    plan = plan_of(campaign, "pretension", "pretension-0.7N-a")
-    again = np.genfromtxt(gzip.decompress(record(campaign, "pretension", plan)).decode().splitlines(), delimiter=",")
+    plan = plan_of(CAMPAIGN, "pretension", "pretension-0.7N-a")
+    again = np.genfromtxt(gzip.decompress(record(CAMPAIGN, "pretension", plan)).decode().splitlines(), delimiter=",")
     committed = np.genfromtxt(RAW / "pretension" / "pretension-0.7N-a.csv.gz", delimiter=",")
     assert again.shape == committed.shape
     difference = again[1:] - committed[1:]
-    sensors = campaign.sensors
+    sensors = CAMPAIGN.sensors
     noise = [sensors.torque.noise_Nm / sensors.torque.constant_Nm_per_A] * 2
     noise += [sensors.load_cell.noise_N * sensors.load_cell.sensitivity_V_per_N] * 2
     assert (np.abs(difference[:, :3]).max(axis=0) <= [0, 1, 1]).all()  # time and counts
@@ -124,8 +160,6 @@ def test_a_batch_of_a_real_rig_is_kept(small_campaign, tmp_path):
 
 
 def test_an_unknown_batch_is_refused(tmp_path):
-    result = CliRunner().invoke(
-        app, ["record", str(ROOT / "config" / "virtual-rig.yaml"), "--out", str(tmp_path), "--batch", "lopps"]
-    )
+    result = CliRunner().invoke(app, ["record", str(CONFIG), "--out", str(tmp_path), "--batch", "lopps"])
     assert result.exit_code == 2
     assert not list(tmp_path.iterdir())

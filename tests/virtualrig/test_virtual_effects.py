@@ -1,12 +1,14 @@
 """Effects of the virtual rig: no trace where they are not, what is known of them where they are."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
 from virtual_runs import changed, channels, plan_of, strung
 
 from virtualrig import dynamics, effect_dynamics
-from virtualrig.campaign import run
+from virtualrig.campaign import prepare, run
 from virtualrig.config import Campaign
 from virtualrig.effects import Effects
 from virtualrig.grid import make_grid
@@ -135,6 +137,29 @@ def test_relaxation_decays_with_both_time_constants(recorded):
     expected = 7.3 * (1 - 0.1 * -np.expm1(-t.time_s / 0.3) - 0.1 * -np.expm1(-t.time_s / 5.0))
     for tension in TENSIONS:
         np.testing.assert_allclose(getattr(t, tension)[rest], expected[rest], rtol=1e-4)
+
+
+def test_a_cable_that_was_tensioned_earlier_relaxes_on_from_there(coarse):
+    """The rest goes on where a rest that began with the tensioning has come, at the tension that it has there."""
+    rig = changed(coarse, rig__effects=Effects.model_validate(ALONE["relaxation"]))
+    plan = plan_of(rig, "half-loop", "half-loop-7.3N-a", rest_s=2.0, start_up_cycles=1e-3, cycles=1e-3)
+    fresh = run(rig, plan, strung(rig, plan, (0.0, 0.0)))
+    earlier = replace(
+        strung(rig, plan, (0.0, 0.0)), pretension_N=np.interp(0.5, fresh.time_s, fresh.T1_N), tensioned_before_s=0.5
+    )
+    later = run(rig, plan, earlier)
+    for tension in TENSIONS:
+        expected = np.interp(later.time_s + 0.5, fresh.time_s, getattr(fresh, tension))
+        rest = later.time_s <= 1.4
+        np.testing.assert_allclose(getattr(later, tension)[rest], expected[rest], rtol=1e-4)
+
+
+def test_the_time_since_the_tensioning_is_drawn_within_its_range(coarse):
+    rig = changed(coarse, repeatability__tensioned_before_s=(120.0, 300.0))
+    plan = plan_of(rig, "half-loop", "half-loop-7.3N-a")
+    drawn = [prepare(rig, plan, np.random.default_rng(seed)).tensioned_before_s for seed in range(20)]
+    assert 120 <= min(drawn) < 200 < 220 < max(drawn) <= 300
+    assert prepare(coarse, plan, np.random.default_rng(0)).tensioned_before_s == 0.0
 
 
 def test_bearings_show_where_they_are(coarse, recorded):

@@ -3,10 +3,12 @@
 A study is a folder with
 
 1. ``settings.py``: its keys of the configuration, a class on `ccmodel.studies.settings.StudySettings` that also states
-   the runs that the study needs and the tables and figures that it makes,
+   the runs that the study needs, the tables and figures that it makes and what the figures show,
 2. ``study.py``: ``SETTINGS``, that class, and ``judge(settings, runs, measuring)``, the computation, which returns an
    `ccmodel.studies.run.Outcome`,
-3. ``figure.py``: its figures, if there is more to it than the figures,
+3. ``figure.py``: its figures, if there is more to it than the figures; a figure with recordings says in its title
+   which batches were measured and which simulated (`ccmodel.studies.variables.batches_by_origin`), and
+   `ccmodel.studies.run.run_study` stamps and saves it,
 4. ``part.html.j2``: its part of the page; `ccmodel.report.page.write_page` gives it ``parts``,
 
 and a field of `ccmodel.config.Config`. The rule in ``workflow/rules/studies.smk`` and the page take it from there.

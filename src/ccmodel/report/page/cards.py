@@ -149,7 +149,7 @@ def overview(made: Sequence[Mapping]) -> list[str]:
     of = "1 batch" if len(judged) == 1 else f"{len(judged)} batches"
     verb = "differs" if len(differing) == 1 else "differ"
     sentences = [
-        f"{len(differing)} of {of} {verb} from the calibrated model by more than noise: {joined(counts)}."
+        f"{len(differing)} of {of} {verb} from the calibrated model beyond noise: {joined(counts)}."
         if differing
         else f"The calibrated model agrees with {'the batch' if len(judged) == 1 else f'all {len(judged)} batches'}."
     ]

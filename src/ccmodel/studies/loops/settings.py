@@ -26,7 +26,7 @@ class Study(StudySettings):
     variable: Variable = Field("recording", description="what varies, and names the recordings in the legend")
     figure: Figure = Field("torque-loops", description="how it is drawn")
     parameters: str | None = Field(None, description="parameter set of the model; absent: each batch's default")
-    rows: Variable | None = Field(None, description="a row of panels for each value of this")
+    rows: Variable | None = Field(None, description="a panel for each value of this")
     title: str = Field("", description="what the figure shows, in a few words")
 
     @model_validator(mode="after")

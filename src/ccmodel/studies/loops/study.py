@@ -207,8 +207,10 @@ def _title_and_legend(
         figure, ": ".join(filter(None, (study.title, which))), batches_of(pairs), DIFFERENCE if simulated else ""
     )
     key = IN_LEGEND if conditions else ALONE
-    origins = " or ".join(sorted({ORIGIN[recorded.origin] for recorded, _ in pairs}))
-    handles = {origins: Line2D([], [], **key.recording), _model_title(pairs): Line2D([], [], **key.model)}
+    origins = {ORIGIN[recorded.origin] for recorded, _ in pairs}
+    # Of several origins, each condition's label says which is its own.
+    recording = origins.pop() if len(origins) == 1 else "recording"
+    handles = {recording: Line2D([], [], **key.recording), _model_title(pairs): Line2D([], [], **key.model)}
     handles |= {
         label: (Line2D([], [], **look.recording), Line2D([], [], **look.model)) for label, look in conditions.items()
     }
@@ -217,8 +219,10 @@ def _title_and_legend(
 
 def _model_title(pairs: Sequence[Pair]) -> str:
     """The model in a legend, with a load torque that it was given."""
-    given = any(s is not None and s.derived_from[TAU_OUT] == PRESCRIBED for _, s in pairs)
-    return f"{ORIGIN['model']}, given the recorded load torque" if given else ORIGIN["model"]
+    given = {s.derived_from[TAU_OUT] == PRESCRIBED for _, s in pairs if s is not None}
+    if True not in given:
+        return ORIGIN["model"]
+    return f"{ORIGIN['model']}, {'in part ' if False in given else ''}given the recorded load torque"
 
 
 def _joined(*parts: str) -> str:
