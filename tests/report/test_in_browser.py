@@ -127,7 +127,8 @@ def test_hovering_over_a_loop_shows_its_time(seen):
     area.scroll_into_view_if_needed()
     # Any sample of the first panel, where the page draws it.
     x, y = seen.page.evaluate("""() => {
-      const figure = document.querySelector("#viewer-loops"), {xaxis, yaxis} = figure._fullLayout, line = figure.data[0];
+      const figure = document.querySelector("#viewer-loops"), line = figure.data[0];
+      const {xaxis, yaxis} = figure._fullLayout;
       return [xaxis.l2p(line.x[100]), yaxis.l2p(line.y[100])];
     }""")
     box = area.bounding_box()
