@@ -58,7 +58,14 @@ def test_agrees_with_an_error_above_the_noise_is_explained():
     quiet = diagnosis("b", "agrees")
     quiet["fit"]["error"] = {"tau_in": {"before": 1.1e-3, "after": 1.1e-3, "noise": 1e-3, "unit": "N*m"}}
     assert cards([summary("b")], [quiet])[0]["caution"] is None
+
+
+def test_what_an_accepted_model_leaves_above_the_noise_is_said():
     assert made("explained")[0]["caution"] is None
+    worse = diagnosis("b", "explained")
+    worse["fit"]["error"] = ERROR | {"theta_out": ERROR["theta_out"] | {"after": 4e-3}}
+    (card,) = cards([summary("b")], [worse])
+    assert card["caution"].startswith("Left, times the noise: θ_out 4.0.")
 
 
 def test_the_overview_counts_verdicts_and_says_how_far_the_errors_fall():

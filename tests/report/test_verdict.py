@@ -88,6 +88,9 @@ def test_two_mechanisms_are_both_said_with_their_confidence():
     said = sentence(diagnosis("b", "explained", mechanisms=[BACKLASH, SCALE]))
     assert said.index("dead zone") < said.index("confidence 0.97; and the load's torque sensor")
     assert said.endswith("confidence 0.99.")
+    alike = sentence(diagnosis("b", "explained", mechanisms=[BACKLASH, SCALE | {"confidence": 0.97}]))
+    assert alike.count("confidence") == 1
+    assert alike.endswith("; confidence 0.97.")
 
 
 def test_the_headline_says_how_far_the_error_fell():

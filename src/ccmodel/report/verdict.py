@@ -35,8 +35,7 @@ def sentence(diagnosis: Mapping) -> str:
         model, nothing = ("model given", "no change") if held else ("calibrated model", "no missing physics")
         return f"The {model} agrees with the recordings within their noise; they show {nothing}."
     if verdict == "explained":
-        claims = [f"{claim(m)}, confidence {m['confidence']:.2f}" for m in diagnosis["mechanisms"]]
-        return _capital(f"{'this has changed: ' if held else ''}{'; and '.join(claims)}.")
+        return _capital(f"{'this has changed: ' if held else ''}{_with_confidence(diagnosis['mechanisms'])}.")
     if verdict == "undecided":
         return _undecided(diagnosis, missing)
     places = " or ".join(f"the {place_in_words(place)}" for place in possible_places(diagnosis))
@@ -48,6 +47,15 @@ def possible_places(diagnosis: Mapping) -> list[str]:
     acting = [m["place"] for m in diagnosis["mechanisms"] or diagnosis["likeliest"]]
     location = diagnosis["location"]
     return list(dict.fromkeys(p for p in acting or location.get("places") or [location["place"]] if p))
+
+
+def _with_confidence(mechanisms: Sequence[Mapping]) -> str:
+    """Claims with their confidence, once if it is the same for all."""
+    confidences = [f"confidence {m['confidence']:.2f}" for m in mechanisms]
+    claims = [claim(m) for m in mechanisms]
+    if len(set(confidences)) == 1:
+        return f"{'; and '.join(claims)}{', ' if len(claims) == 1 else '; '}{confidences[0]}"
+    return "; and ".join(map(", ".join, zip(claims, confidences, strict=True)))
 
 
 def _undecided(diagnosis: Mapping, missing: str) -> str:

@@ -22,7 +22,7 @@ MEANS = {
     "unexplained": "no listed mechanism fits",
     "agrees": "",
 }
-# An error that is so many times the noise floor, in any channel, asks for a sentence under `agrees`.
+# An error that is so many times the noise floor, in any channel, asks for a sentence if the model is accepted.
 CONSPICUOUS = 1.5
 
 
@@ -123,14 +123,20 @@ def _rows(error: Mapping[str, Mapping], nearest: Mapping[str, Mapping] | None) -
 
 
 def caution(diagnosis: Mapping) -> str | None:
-    """Why a model may agree although a channel's error exceeds its noise floor; None where none does."""
-    error = diagnosis["fit"]["error"]
-    above = [SYMBOL[c] for c, e in error.items() if e["before"] > CONSPICUOUS * e["noise"]]
-    if diagnosis["verdict"] != "agrees" or not above:
+    """What must be said if the model of the verdict leaves an error above the noise floor; None where it does not."""
+    above = {
+        SYMBOL[c]: e["after"] / e["noise"]
+        for c, e in diagnosis["fit"]["error"].items()
+        if e["after"] > CONSPICUOUS * e["noise"]
+    }
+    if diagnosis["verdict"] == "unexplained" or not above:
         return None
+    if diagnosis["verdict"] != "agrees":
+        left = joined([f"{symbol} {times:.1f}" for symbol, times in above.items()])
+        return f"Left, times the noise: {left}. The model does not account for all of the mismatch."
     square = diagnosis["fit"]["mean_square"]["calibrated"]
     return (
-        f"{joined(above)}: above the noise floor by differences between runs, which the verdict takes into account"
+        f"{joined([*above])}: above the noise floor by differences between runs, which the verdict takes into account"
         f" (mean square of the whitened residuals {square:.2g}; 1 is noise)."
     )
 
@@ -142,7 +148,7 @@ def overview(made: Sequence[Mapping]) -> list[str]:
         return ["No batch has been diagnosed."] if made else []
     differing = [card for card in judged if card["verdict"] != "agrees"]
     counts = [
-        f"{n} {verdict}{f' ({means})' if means else ''}"
+        f"{n} {'agree' if verdict == 'agrees' and n > 1 else verdict}{f' ({means})' if means else ''}"
         for verdict, means in MEANS.items()
         if (n := sum(c["verdict"] == verdict for c in judged))
     ]
