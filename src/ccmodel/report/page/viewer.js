@@ -117,7 +117,8 @@
       });
       const [y, r] = names.map(name => `y${name}`);
       if (!models().some(set => run.sets[set][channel])) {
-        layout.annotations.push({ text: models().length ? "given to the model" : "no model", xref: `${columns[1]} domain`, yref: `${r} domain`, x: 0.5, y: 0.5, showarrow: false, font: { color: "#57606a" } });
+        const middle = 1 - rows[1] * step - height / 2;
+        layout.annotations.push({ text: models().length ? "given to the model" : "no model", xref: `${columns[1]} domain`, yref: "paper", x: 0.5, y: middle, showarrow: false, font: { color: "#57606a" } });
       }
       data.push({ ...base, name: RECORDED, x: time, y: scaled(run.sets[RECORDED][channel], channel), xaxis: columns[0], yaxis: y, line: recordedLine });
       for (const set of shown()) {
