@@ -12,7 +12,7 @@ from ccmodel.recording import Recording
 
 COLUMNS = (
     dict.fromkeys(("batch", "recording", "origin", "parameters", "channel", "unit"), str)
-    | dict.fromkeys(("bias", "rmse", "peak_to_peak", "nrmse_percent", "window_from_s", "window_to_s"), float)
+    | dict.fromkeys(("bias", "rmse", "peak_to_peak", "maximum", "rms", "nrmse_percent", "window_from_s", "window_to_s"), float)
     | {"samples": int}
 )
 
@@ -56,8 +56,8 @@ def is_compared(recorded: Recording, simulated: Recording | None, channel: str) 
 def error_table(pairs: Iterable[tuple[Recording, Recording | None]], parameters: str) -> pd.DataFrame:
     """Mean and root mean square error of each channel over the last cycle, simulated minus recorded.
 
-    The normalised error is over the recording's peak to peak in that cycle; the paper's Table I does not state its
-    divisor.
+    The normalised error is over the recording's peak to peak in that cycle. The paper's Table I does not state its
+    divisor, so the recording's largest magnitude and root mean square in the cycle are stated as well.
 
     Parameters
     ----------
@@ -69,8 +69,8 @@ def error_table(pairs: Iterable[tuple[Recording, Recording | None]], parameters:
     Returns
     -------
     DataFrame
-        A row for each recording and channel, with the columns of `COLUMNS`: `bias` (the mean error), `rmse` and
-        `peak_to_peak` in `unit`. Channels that were not recorded, or that were given to the model, have no row.
+        A row for each recording and channel, with the columns of `COLUMNS`: `bias` (the mean error), `rmse`,
+        `peak_to_peak`, `maximum` and `rms` (of the recording) in `unit`. Channels that were not recorded, or that were given to the model, have no row.
     """
     rows = []
     for recorded, simulated in pairs:
@@ -85,6 +85,7 @@ def error_table(pairs: Iterable[tuple[Recording, Recording | None]], parameters:
             rmse = float(np.sqrt(np.mean(error**2)))
             span = float(np.ptp(measured))
             what = (recorded.batch, recorded.id, recorded.origin, parameters, channel, unit_of(channel))
-            errors = (float(np.mean(error)), rmse, span, 100 * rmse / span if span > 0 else np.nan)
+            sizes = (span, float(np.abs(measured).max()), float(np.sqrt(np.mean(measured**2))))
+            errors = (float(np.mean(error)), rmse, *sizes, 100 * rmse / span if span > 0 else np.nan)
             rows.append((*what, *errors, *recorded.time_s[window][[0, -1]], measured.size))
     return pd.DataFrame(rows, columns=list(COLUMNS)).astype(COLUMNS)

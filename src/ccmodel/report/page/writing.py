@@ -228,10 +228,27 @@ def _errors(content: Content) -> dict:
         "origin": ORIGIN,
         "channels": channels,
         "summary": _summary(errors, channels),
-        # The row of Table I is for rigs that record its channels; an instrument without load cells does not.
-        "paper": [PAPER_TABLE_I.get(c) for c in channels] if set(PAPER_TABLE_I) <= set(channels) else None,
+        "table_one": list(_beside_table_one(content)),
+        "paper": PAPER_TABLE_I,
         "rows": errors.to_dict("records"),
     }
+
+
+def _beside_table_one(content: Content) -> Iterable[dict]:
+    """For each fit, errors on its own recordings over three norms, beside those of the paper's Table I, %.
+
+    Only rigs that record the table's channels have them; an instrument without load cells does not.
+    """
+    for fit in content.fits:
+        fitted_to = set(fit.get("recordings", ()))
+        errors = content.errors[content.errors["parameters"] == fit["fit"]]
+        errors = errors[(errors["batch"] + "/" + errors["recording"]).isin(fitted_to)]
+        if fit["succeeded"] and set(PAPER_TABLE_I) <= set(errors["channel"]):
+            means = {
+                name: (100 * errors["rmse"] / errors[norm]).groupby(errors["channel"]).mean()
+                for name, norm in (("peak to peak", "peak_to_peak"), ("maximum", "maximum"), ("rms", "rms"))
+            }
+            yield {"fit": fit, "batches": sorted(set(errors["batch"])), "origin": errors["origin"].iloc[0], "over": means}
 
 
 def _sections(studies: Iterable[dict]) -> dict[str, list[dict]]:

@@ -19,9 +19,10 @@ from ccmodel.diagnose.location import PHASES, mismatch
 from ccmodel.diagnose.settings import ADEQUATE_LACK_OF_FIT
 from ccmodel.diagnose.verdict import nested_choice
 from ccmodel.mechanisms import catalogue
+from ccmodel.provenance import stamp
 from ccmodel.recording import ORIGIN
 from ccmodel.report.embedding import asset
-from ccmodel.report.figures import COLOURS, STYLE, legend_below
+from ccmodel.report.figures import COLOURS, STYLE, legend_below, stamp_figure, title_figure
 from ccmodel.report.verdict import (
     NOT_ACCEPTED,
     SYMBOL,
@@ -182,7 +183,8 @@ def _map(found: Diagnosis) -> Figure:
         for (row, column), value in np.ndenumerate(values):
             dark = value < np.sqrt(0.7 * highest)
             ax.text(column, row, f"{value:.1f}", ha="center", va="center", color="white" if dark else "black")
-    figure.suptitle("rms error on held-out recordings, in units of the noise", fontsize=9)
+    title_figure(figure, "held-out rms error, in units of the noise", _origin(found))
+    stamp_figure(figure, _stamp(found))
     return figure
 
 
@@ -202,7 +204,7 @@ def _loops(found: Diagnosis) -> Figure:
         observed = w.observations
         c = observed.channels.index(channel)
         theta = observed.given.theta_in[observed.judged]
-        ax.plot(theta, scale * observed.measured[c], color=FAINT, lw=2.2, label="recording")
+        ax.plot(theta, scale * observed.measured[c], color=FAINT, lw=2.2, label=_origin(found))
         models = [(j.calibrated, COLOURS[0], "--", _baseline(found.report))]
         if chosen[i] is not j.calibrated:
             models.append((chosen[i], COLOURS[1], "-", WITH_FOUND))
@@ -214,8 +216,20 @@ def _loops(found: Diagnosis) -> Figure:
         ax.set_title(observed.given.recording.id, fontsize=9)
         ax.set_xlabel(TABLE[THETA_IN].axis)
     axes[0][0].set_ylabel(TABLE[channel].axis)
-    legend_below(figure, axes[:, :1], columns=3)
+    legend_below(figure, axes[:, :1])
+    stamp_figure(figure, _stamp(found))
     return figure
+
+
+def _origin(found: Diagnosis) -> str:
+    """Whether the recordings were measured, in words; a batch has one origin."""
+    return ORIGIN[found.judgement.whitened[0].observations.given.recording.origin]
+
+
+def _stamp(found: Diagnosis) -> str:
+    """The line in the corner of a figure; the report stands for the settings, which it follows from."""
+    recordings = [w.observations.given.recording for w in found.judgement.whitened]
+    return stamp("ccmodel.studies.diagnosis.run", recordings, found.report)
 
 
 def _encoded(figure: Figure) -> str:
