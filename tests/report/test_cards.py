@@ -65,7 +65,7 @@ def test_what_an_accepted_model_leaves_above_the_noise_is_said():
     worse = diagnosis("b", "explained")
     worse["fit"]["error"] = ERROR | {"theta_out": ERROR["theta_out"] | {"after": 4e-3}}
     (card,) = cards([summary("b")], [worse])
-    assert card["caution"].startswith("Left, times the noise: θ_out 4.0.")
+    assert card["caution"] == "Not all is accounted for: up to 4.0 times the noise is left, in θ_out."
 
 
 def test_the_overview_counts_verdicts_and_says_how_far_the_errors_fall():

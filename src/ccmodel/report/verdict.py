@@ -121,6 +121,14 @@ def claim(mechanism: Mapping) -> str:
     return f"{said} ({'; '.join(intervals)})" if intervals else said
 
 
+def strength(mechanism: Mapping) -> str:
+    """Value of a mechanism's strength with its interval, as ``23.0 mN m (22.3 to 23.7 mN m)``."""
+    name = registry.get(mechanism["name"]).strengths[0].name
+    p = next(p for p in mechanism["parameters"] if p["name"] == name)
+    value, interval = quantity(p["value"], p["low"], p["high"], p["unit"])
+    return f"{value} ({interval})"
+
+
 def quantity(value: float, low: float, high: float, unit: str) -> tuple[str, str]:
     """A value with its unit, and its interval, both with as many digits as the interval leaves.
 

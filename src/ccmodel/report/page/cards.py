@@ -132,8 +132,8 @@ def caution(diagnosis: Mapping) -> str | None:
     if diagnosis["verdict"] == "unexplained" or not above:
         return None
     if diagnosis["verdict"] != "agrees":
-        left = joined([f"{symbol} {times:.1f}" for symbol, times in above.items()])
-        return f"Left, times the noise: {left}. The model does not account for all of the mismatch."
+        worst = max(above, key=above.get)
+        return f"Not all is accounted for: up to {above[worst]:.1f} times the noise is left, in {worst}."
     square = diagnosis["fit"]["mean_square"]["calibrated"]
     return (
         f"{joined([*above])}: above the noise floor by differences between runs, which the verdict takes into account"
