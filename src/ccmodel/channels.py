@@ -58,6 +58,11 @@ class Channel:
         return _PRINTED_UNIT[self.name.rsplit("_", 1)[1]]
 
     @property
+    def words(self) -> str:
+        """Quantity in words with its symbol in plain text."""
+        return self.label.replace(self.tex, self.symbol)
+
+    @property
     def axis(self) -> str:
         """Label of an axis, with its unit."""
         return f"{self.label} ({self.plot_unit or self.unit})"

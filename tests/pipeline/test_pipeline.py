@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -115,6 +116,19 @@ def test_it_makes_figures_tables_and_the_page(finished):
     assert csv["rmse"].to_numpy() == pytest.approx(parquet["rmse"].to_numpy(), rel=1e-4)
     assert set(parquet["parameters"]) == {"estimated", "fitted"}
     assert ccmodel("left-out", str(results)).returncode == 0
+
+
+def test_every_link_of_the_page_leads_somewhere(finished):
+    results = finished / "results"
+    text = (results / "index.html").read_text()
+    ids = set(re.findall(r'\bid="([^"]+)"', text))
+    links = re.findall(r'<a [^>]*?href="([^"]+)"', text)
+    assert {f"figures/{name}.{ending}" for name in ("pretension", "claims") for ending in ("svg", "pdf")} <= set(links)
+    for link in links:
+        name, _, anchor = link.partition("#")
+        assert (results / name).exists(), link
+        assert not anchor or anchor in ids, link
+    assert not re.search(r'<img [^>]*?src="(?!data:)', text)
 
 
 @pytest.fixture(scope="module")

@@ -58,12 +58,19 @@ def test_agrees_with_an_error_above_the_noise_is_explained():
     quiet = diagnosis("b", "agrees")
     quiet["fit"]["error"] = {"tau_in": {"before": 1.1e-3, "after": 1.1e-3, "noise": 1e-3, "unit": "N*m"}}
     assert cards([summary("b")], [quiet])[0]["caution"] is None
+
+
+def test_what_an_accepted_model_leaves_above_the_noise_is_said():
     assert made("explained")[0]["caution"] is None
+    worse = diagnosis("b", "explained")
+    worse["fit"]["error"] = ERROR | {"theta_out": ERROR["theta_out"] | {"after": 4e-3}}
+    (card,) = cards([summary("b")], [worse])
+    assert card["caution"] == "Not all is accounted for: up to 4.0 times the noise is left, in θ_out."
 
 
 def test_the_overview_counts_verdicts_and_says_how_far_the_errors_fall():
     first, second, third = overview(made("explained", "unexplained", "agrees"))
-    assert first.startswith("2 of 3 batches differ from the calibrated model by more than noise: 1 explained")
+    assert first.startswith("2 of 3 batches differ from the calibrated model beyond noise: 1 explained")
     assert "falls from 6.0 to 1.2 times the noise floor (batch b-explained)" in second
     assert "nearest model (not accepted)" in third
     assert overview(made("agrees")) == ["The calibrated model agrees with the batch."]

@@ -15,6 +15,11 @@ EFFECTS = [
     {"name": None, "place": None, "text": "inertia of the cable", "source": ""},
 ]
 
+SIZE = "30.1 mrad (29.2 to 30.9 mrad)"
+NAMED = f"named: {SIZE}"
+# As diagnosis.json states an alternative: without its parameters.
+ALTERNATIVE = {"name": "torque-scale", "place": "load-sensor", "confidence": 0.2}
+
 
 @pytest.fixture
 def concealed(tmp_path):
@@ -30,9 +35,9 @@ def concealed(tmp_path):
 @pytest.mark.parametrize(
     ("said", "of_backlash", "of_scale"),
     [
-        ({"verdict": "explained"}, "named", "not named"),
-        ({"verdict": "explained", "alternatives": [SCALE]}, "named", "alternative, but at the load sensor"),
-        ({"verdict": "unexplained"}, "in the nearest model, not accepted", "not named"),
+        ({"verdict": "explained"}, NAMED, "not named"),
+        ({"verdict": "explained", "alternatives": [ALTERNATIVE]}, NAMED, "alternative, but at the load sensor"),
+        ({"verdict": "unexplained"}, f"in the nearest model, not accepted: {SIZE}", "not named"),
         ({"verdict": "agrees"}, "not named", "not named"),
         ({"verdict": None}, "–", "–"),
     ],
@@ -40,6 +45,12 @@ def concealed(tmp_path):
 def test_each_effect_has_what_was_said_of_it(concealed, said, of_backlash, of_scale):
     (table,) = beside(concealed(), [diagnosis("b", **said)])
     assert [e["said"][0] for e in table["effects"][:2]] == [of_backlash, of_scale]
+
+
+def test_the_same_effect_at_two_places_is_named_at_each_by_itself(concealed):
+    effects = [EFFECTS[1] | {"place": place} for place in ("drive-sensor", "load-sensor")]
+    (table,) = beside(concealed(effects), [diagnosis("b", "explained", mechanisms=[SCALE])])
+    assert [e["said"] for e in table["effects"]] == [["not named"], ["named: 0.148 (0.147 to 0.149)"]]
 
 
 def test_what_was_named_and_is_not_there_is_said(concealed):

@@ -10,9 +10,8 @@ from ccmodel.mechanisms.contract import side
 
 # By the short names of diagnosis.json.
 SYMBOL = {channel.short_name: channel.symbol for channel in TABLE.values()}
+IN_WORDS = {channel.short_name: channel.words for channel in TABLE.values()}
 NOT_ACCEPTED = "not accepted"
-# Correct models leave held-out errors of up to 1.8 times the noise; a larger error after the mechanisms is stated.
-NOISE_LEFT = 2.0
 # A unit is printed with a prefix if the value is below a tenth of it; these units take none.
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 _WITHOUT_PREFIX = ("1", "1/m", "kg*m^2")
@@ -36,22 +35,11 @@ def sentence(diagnosis: Mapping) -> str:
         model, nothing = ("model given", "no change") if held else ("calibrated model", "no missing physics")
         return f"The {model} agrees with the recordings within their noise; they show {nothing}."
     if verdict == "explained":
-        claims = [f"{claim(m)}, confidence {m['confidence']:.2f}" for m in diagnosis["mechanisms"]]
-        return _capital(f"{'this has changed: ' if held else ''}{'; and '.join(claims)}.{_left(diagnosis)}")
+        return _capital(f"{'this has changed: ' if held else ''}{_with_confidence(diagnosis['mechanisms'])}.")
     if verdict == "undecided":
         return _undecided(diagnosis, missing)
     places = " or ".join(f"the {place_in_words(place)}" for place in possible_places(diagnosis))
     return f"Something {missing} at {places}, and no listed mechanism explains it."
-
-
-def _left(diagnosis: Mapping) -> str:
-    """A sentence on the error that the named mechanisms leave; empty if the noise explains it."""
-    error = diagnosis["fit"]["error"]
-    worst = max(error, key=lambda c: error[c]["after"] / error[c]["noise"])
-    ratio = error[worst]["after"] / error[worst]["noise"]
-    if ratio <= NOISE_LEFT:
-        return ""
-    return f" Something smaller is still missing: an error of {ratio:.1f} times the noise remains in {SYMBOL[worst]}."
 
 
 def possible_places(diagnosis: Mapping) -> list[str]:
@@ -59,6 +47,15 @@ def possible_places(diagnosis: Mapping) -> list[str]:
     acting = [m["place"] for m in diagnosis["mechanisms"] or diagnosis["likeliest"]]
     location = diagnosis["location"]
     return list(dict.fromkeys(p for p in acting or location.get("places") or [location["place"]] if p))
+
+
+def _with_confidence(mechanisms: Sequence[Mapping]) -> str:
+    """Claims with their confidence, once if it is the same for all."""
+    confidences = [f"confidence {m['confidence']:.2f}" for m in mechanisms]
+    claims = [claim(m) for m in mechanisms]
+    if len(set(confidences)) == 1:
+        return f"{'; and '.join(claims)}{', ' if len(claims) == 1 else '; '}{confidences[0]}"
+    return "; and ".join(map(", ".join, zip(claims, confidences, strict=True)))
 
 
 def _undecided(diagnosis: Mapping, missing: str) -> str:
@@ -122,6 +119,14 @@ def claim(mechanism: Mapping) -> str:
     said = direction.sub(lambda match: match[1] if strength >= 0 else match[2], known.sentence)
     said = re.sub(r"\{(\w+)(:%)?\}", value, said)
     return f"{said} ({'; '.join(intervals)})" if intervals else said
+
+
+def strength(mechanism: Mapping) -> str:
+    """Value of a mechanism's strength with its interval, as ``23.0 mN m (22.3 to 23.7 mN m)``."""
+    name = registry.get(mechanism["name"]).strengths[0].name
+    p = next(p for p in mechanism["parameters"] if p["name"] == name)
+    value, interval = quantity(p["value"], p["low"], p["high"], p["unit"])
+    return f"{value} ({interval})"
 
 
 def quantity(value: float, low: float, high: float, unit: str) -> tuple[str, str]:

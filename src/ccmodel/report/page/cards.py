@@ -5,6 +5,7 @@ from statistics import median
 
 from ccmodel.recording import ORIGIN
 from ccmodel.report.verdict import (
+    IN_WORDS,
     NOT_ACCEPTED,
     SYMBOL,
     joined,
@@ -21,7 +22,7 @@ MEANS = {
     "unexplained": "no listed mechanism fits",
     "agrees": "",
 }
-# An error that is so many times the noise floor, in any channel, asks for a sentence under `agrees`.
+# An error that is so many times the noise floor, in any channel, asks for a sentence if the model is accepted.
 CONSPICUOUS = 1.5
 
 
@@ -110,7 +111,7 @@ def _rows(error: Mapping[str, Mapping], nearest: Mapping[str, Mapping] | None) -
     changed = nearest is not None or any(e["before"] != e["after"] for e in error.values())
     rows = [
         {
-            "symbol": SYMBOL[channel],
+            "channel": IN_WORDS[channel],
             "before": e["before"] / e["noise"],
             "after": after[channel]["after"] / e["noise"] if changed else None,
             "noise": e["noise"],
@@ -122,14 +123,20 @@ def _rows(error: Mapping[str, Mapping], nearest: Mapping[str, Mapping] | None) -
 
 
 def caution(diagnosis: Mapping) -> str | None:
-    """Why a model may agree although a channel's error exceeds its noise floor; None where none does."""
-    error = diagnosis["fit"]["error"]
-    above = [SYMBOL[c] for c, e in error.items() if e["before"] > CONSPICUOUS * e["noise"]]
-    if diagnosis["verdict"] != "agrees" or not above:
+    """What must be said if the model of the verdict leaves an error above the noise floor; None where it does not."""
+    above = {
+        SYMBOL[c]: e["after"] / e["noise"]
+        for c, e in diagnosis["fit"]["error"].items()
+        if e["after"] > CONSPICUOUS * e["noise"]
+    }
+    if diagnosis["verdict"] == "unexplained" or not above:
         return None
+    if diagnosis["verdict"] != "agrees":
+        worst = max(above, key=above.get)
+        return f"Not all is accounted for: up to {above[worst]:.1f} times the noise is left, in {worst}."
     square = diagnosis["fit"]["mean_square"]["calibrated"]
     return (
-        f"{joined(above)}: above the noise floor by differences between runs, which the verdict takes into account"
+        f"{joined([*above])}: above the noise floor by differences between runs, which the verdict takes into account"
         f" (mean square of the whitened residuals {square:.2g}; 1 is noise)."
     )
 
@@ -141,14 +148,14 @@ def overview(made: Sequence[Mapping]) -> list[str]:
         return ["No batch has been diagnosed."] if made else []
     differing = [card for card in judged if card["verdict"] != "agrees"]
     counts = [
-        f"{n} {verdict}{f' ({means})' if means else ''}"
+        f"{n} {'agree' if verdict == 'agrees' and n > 1 else verdict}{f' ({means})' if means else ''}"
         for verdict, means in MEANS.items()
         if (n := sum(c["verdict"] == verdict for c in judged))
     ]
     of = "1 batch" if len(judged) == 1 else f"{len(judged)} batches"
     verb = "differs" if len(differing) == 1 else "differ"
     sentences = [
-        f"{len(differing)} of {of} {verb} from the calibrated model by more than noise: {joined(counts)}."
+        f"{len(differing)} of {of} {verb} from the calibrated model beyond noise: {joined(counts)}."
         if differing
         else f"The calibrated model agrees with {'the batch' if len(judged) == 1 else f'all {len(judged)} batches'}."
     ]

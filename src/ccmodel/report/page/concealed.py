@@ -6,7 +6,7 @@ from pathlib import Path
 from pydantic import Field
 
 from ccmodel.report.page.cards import after_is
-from ccmodel.report.verdict import SYMBOL, place_in_words, worst_channel
+from ccmodel.report.verdict import SYMBOL, place_in_words, strength, worst_channel
 from ccmodel.typed import TypedModel, load_yaml_model
 
 NAMED, ALTERNATIVE, NEAREST, NOT_NAMED = (
@@ -63,7 +63,7 @@ def beside(concealed: Concealed, diagnoses: Sequence[Mapping]) -> list[dict]:
                 "name": e.name,
                 "place": place_in_words(e.place) if e.place else "–",
                 "source": e.source,
-                "said": [_said_of(e, d) for d in said],
+                "said": [_said_of(e, rig, d) for d in said],
             }
             for e in rig.effects
         ]
@@ -79,8 +79,8 @@ def beside(concealed: Concealed, diagnoses: Sequence[Mapping]) -> list[dict]:
     return tables
 
 
-def _said_of(effect: Effect, diagnosis: Mapping) -> str:
-    """What a diagnosis said of an effect."""
+def _said_of(effect: Effect, rig: Rig, diagnosis: Mapping) -> str:
+    """What a diagnosis said of an effect, and not of the same effect at another place of the rig."""
     if not diagnosis["verdict"]:
         return "–"
     if effect.name is None:
@@ -90,12 +90,15 @@ def _said_of(effect: Effect, diagnosis: Mapping) -> str:
         (diagnosis["alternatives"], ALTERNATIVE),
         ((diagnosis.get("nearest") or {}).get("mechanisms", []), NEAREST),
     )
+    taken = {e.place for e in rig.effects if e.name == effect.name and e is not effect}
     for listed, said in kinds:
-        places = [m["place"] for m in listed if m["name"] == effect.name]
-        if effect.place in places or (places and effect.place is None):
-            return said
-        if places:
-            return f"{said}, but at the {place_in_words(places[0])}"
+        of_name = [m for m in listed if m["name"] == effect.name and m["place"] not in taken]
+        here = [m for m in of_name if effect.place in (m["place"], None)]
+        if of_name and not here:
+            said = f"{said}, but at the {place_in_words(of_name[0]['place'])}"
+        if of_name:
+            one = (here or of_name)[0]
+            return f"{said}: {strength(one)}" if "parameters" in one else said
     return NOT_NAMED
 
 

@@ -60,7 +60,10 @@
   };
 
   const models = () => Object.keys(run.sets).filter(name => name !== RECORDED);
-  const shown = () => models().filter(name => !hidden.has(name));
+  // An earlier model with the same values, as the extended model of a batch for which nothing was named.
+  const sameAs = set => models().slice(0, models().indexOf(set)).find(other =>
+    Object.entries(run.sets[set]).every(([channel, values]) => run.sets[other][channel] === values));
+  const shown = () => models().filter(name => !hidden.has(name) && !sameAs(name));
   const nameOf = set => (set === "nearest" ? "nearest (not accepted)" : set);
   const styleOf = set => STYLES[set] ?? OTHER_STYLES[models().filter(m => !STYLES[m]).indexOf(set) % OTHER_STYLES.length];
   const scaled = (values, channel) => Array.from(values, v => v * settings.channels[channel].scale);
@@ -97,9 +100,9 @@
     const data = [];
     const layout = {
       ...layoutBase(), height: count * ROW_HEIGHT + 40, hovermode: "x", hoverdistance: -1, spikedistance: -1,
-      xaxis: timeAxis(narrow ? [0, 1] : [0, 0.47], "y"),
+      xaxis: timeAxis(narrow ? [0, 1] : [0, 0.47]), annotations: [],
     };
-    if (!narrow) layout.xaxis2 = { ...timeAxis([0.55, 1], "y2"), matches: "x" };
+    if (!narrow) layout.xaxis2 = { ...timeAxis([0.55, 1]), matches: "x" };
     channels.forEach((channel, k) => {
       const rows = narrow ? [2 * k, 2 * k + 1] : [k, k];
       const names = [2 * k + 1, 2 * k + 2].map(n => (n === 1 ? "" : n));
@@ -113,6 +116,10 @@
         };
       });
       const [y, r] = names.map(name => `y${name}`);
+      if (!models().some(set => run.sets[set][channel])) {
+        const middle = 1 - rows[1] * step - height / 2;
+        layout.annotations.push({ text: models().length ? "given to the model" : "no model", xref: `${columns[1]} domain`, yref: "paper", x: 0.5, y: middle, showarrow: false, font: { color: "#57606a" } });
+      }
       data.push({ ...base, name: RECORDED, x: time, y: scaled(run.sets[RECORDED][channel], channel), xaxis: columns[0], yaxis: y, line: recordedLine });
       for (const set of shown()) {
         if (!run.sets[set][channel]) continue;
@@ -120,9 +127,6 @@
         data.push({ ...base, name: set, x: time, y: residual(set, channel), xaxis: columns[1], yaxis: r, line: lineOf(set) });
       }
     });
-    const last = `y${2 * channels.length - (narrow ? 0 : 1)}`.replace(/^y1$/, "y");
-    layout.xaxis.anchor = last;
-    if (!narrow) layout.xaxis2.anchor = `y${2 * channels.length}`;
     layout.shapes = shades(narrow ? ["x"] : ["x", "x2"]);
     return { data, layout };
   };
@@ -131,8 +135,8 @@
     margin: { l: 62, r: 12, t: 12, b: 42 }, paper_bgcolor: "#fff", plot_bgcolor: "#fff", showlegend: false,
     font: { family: "system-ui, sans-serif", size: 12, color: "#1f2328" }, dragmode: "zoom",
   });
-  const timeAxis = (domain, anchor) => ({
-    domain, anchor, title: { text: "time (s)", standoff: 4 }, gridcolor: "#e6e6e6", zeroline: false,
+  const timeAxis = domain => ({
+    domain, anchor: "free", position: 0, title: { text: "time (s)", standoff: 4 }, gridcolor: "#e6e6e6", zeroline: false,
     showspikes: true, spikemode: "across", spikesnap: "cursor", spikethickness: 1, spikedash: "solid", spikecolor: "#444",
     range: [run.time[0], run.time[run.count - 1]],
   });
@@ -273,7 +277,7 @@
     body.replaceChildren(...[settings.input, ...panels()].filter(c => run.sets[RECORDED][c]).map(channel => {
       const row = document.createElement("tr");
       const value = set => text((run.sets[set][channel]?.[at] ?? NaN) * settings.channels[channel].scale, channel);
-      row.append(cell("th", settings.channels[channel].symbol, { scope: "row", className: "t" }), cell("td", value(RECORDED)),
+      row.append(cell("th", settings.channels[channel].label, { scope: "row", className: "t" }), cell("td", value(RECORDED)),
         ...shown().map(set => cell("td", value(set))), cell("td", settings.channels[channel].unit, { className: "t" }));
       return row;
     }));
@@ -288,7 +292,8 @@
     recorded.append(swatch, RECORDED);
     fields.replaceChildren(legend, recorded, ...models().map(set => {
       const label = document.createElement("label");
-      const box = cell("input", "", { type: "checkbox", checked: !hidden.has(set), value: set });
+      const same = sameAs(set);
+      const box = cell("input", "", { type: "checkbox", checked: !hidden.has(set) && !same, disabled: Boolean(same), value: set });
       box.addEventListener("change", () => {
         if (box.checked) hidden.delete(set); else hidden.add(set);
         draw();
@@ -296,7 +301,7 @@
       const sample = cell("span", "", { className: "line" });
       sample.style.borderTopColor = styleOf(set).color;
       sample.style.borderTopStyle = { solid: "solid", dot: "dotted" }[styleOf(set).dash] ?? "dashed";
-      label.append(box, " ", sample, nameOf(set));
+      label.append(box, " ", sample, nameOf(set) + (same ? `: the same as ${nameOf(same)}` : ""));
       return label;
     }));
   };

@@ -36,7 +36,7 @@ def channel_table() -> dict[str, dict]:
     return {
         c.name: {
             "symbol": c.symbol,
-            "label": c.label.replace(c.tex, c.symbol),
+            "label": c.words,
             "unit": c.plot_unit or c.unit,
             "scale": c.scale,
         }

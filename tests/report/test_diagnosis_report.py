@@ -1,0 +1,38 @@
+"""The report of a diagnosis: what it must not leave unsaid."""
+
+import pytest
+from made_pages import content, diagnosis
+
+from ccmodel.report.page import write_page
+from ccmodel.studies.diagnosis.page import _caution, _map_in_words, write_not_diagnosed
+
+YELLOW = {"tau_in": {"at rest": 0.9, "after a reversal": 2.4, "under way": 1.0}}
+QUIET = {"tau_in": {"at rest": 0.9, "after a reversal": 1.2, "under way": float("nan")}}
+
+
+def test_agrees_over_yellow_cells_says_why():
+    said = _caution(diagnosis("b", "agrees"), YELLOW)
+    assert "although τ_in after a reversal (2.4) exceeds the noise floor" in said
+    assert "mean square of the whitened residuals is 1.1" in said
+
+
+@pytest.mark.parametrize(("verdict", "errors"), [("agrees", QUIET), ("explained", YELLOW)])
+def test_no_other_map_needs_it(verdict, errors):
+    assert _caution(diagnosis("b", verdict), errors) is None
+
+
+def test_the_map_is_told_to_readers_who_do_not_see_it():
+    assert _map_in_words(YELLOW).endswith("τ_in at rest 0.9, after a reversal 2.4, under way 1.0")
+
+
+def test_a_batch_that_was_not_diagnosed_has_a_report_with_a_way_back(tmp_path):
+    file = tmp_path / "report.html"
+    write_not_diagnosed(file, "b", "no <recording> that can be used", "../../index.html")
+    text = file.read_text()
+    assert "no &lt;recording&gt; that can be used" in text
+    assert '<a href="../../index.html">' in text
+    write_page(tmp_path / "index.html", content(diagnosis("b", None), reports={"b": text}))
+    assert (
+        "<h3>b: not diagnosed</h3>\n<p>no &lt;recording&gt; that can be used.</p>"
+        in (tmp_path / "index.html").read_text()
+    )
