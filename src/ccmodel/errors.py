@@ -12,7 +12,9 @@ from ccmodel.recording import Recording
 
 COLUMNS = (
     dict.fromkeys(("batch", "recording", "origin", "parameters", "channel", "unit"), str)
-    | dict.fromkeys(("bias", "rmse", "peak_to_peak", "maximum", "rms", "nrmse_percent", "window_from_s", "window_to_s"), float)
+    | dict.fromkeys(
+        ("bias", "rmse", "peak_to_peak", "maximum", "rms", "nrmse_percent", "window_from_s", "window_to_s"), float
+    )
     | {"samples": int}
 )
 
