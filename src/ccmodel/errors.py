@@ -72,7 +72,8 @@ def error_table(pairs: Iterable[tuple[Recording, Recording | None]], parameters:
     -------
     DataFrame
         A row for each recording and channel, with the columns of `COLUMNS`: `bias` (the mean error), `rmse`,
-        `peak_to_peak`, `maximum` and `rms` (of the recording) in `unit`. Channels that were not recorded, or that were given to the model, have no row.
+        `peak_to_peak`, `maximum` and `rms` (of the recording) in `unit`. Channels that were not recorded, or that were
+        given to the model, have no row.
     """
     rows = []
     for recorded, simulated in pairs:
