@@ -248,7 +248,12 @@ def _beside_table_one(content: Content) -> Iterable[dict]:
                 name: (100 * errors["rmse"] / errors[norm]).groupby(errors["channel"]).mean()
                 for name, norm in (("peak to peak", "peak_to_peak"), ("maximum", "maximum"), ("rms", "rms"))
             }
-            yield {"fit": fit, "batches": sorted(set(errors["batch"])), "origin": errors["origin"].iloc[0], "over": means}
+            yield {
+                "fit": fit,
+                "batches": sorted(set(errors["batch"])),
+                "origin": errors["origin"].iloc[0],
+                "over": means,
+            }
 
 
 def _sections(studies: Iterable[dict]) -> dict[str, list[dict]]:
