@@ -201,6 +201,12 @@ def main() -> None:
     passed = {kind: sum(not f.losses for _, f in found[kind]) for kind in ("noise", "anew")}
     again_of = Counter(line for kind in ("noise", "anew") for _, f in found[kind] for line in f.losses)
     compared = len(found["noise"][0][1].changes)
+    drawn_anew = []
+    if stated.anew:
+        drawn_anew = [
+            f"With friction, pretension and tension profile of every run drawn anew as well: **{passed['anew']} of"
+            f" {stated.anew}**, {100 * closest(found['anew']):.0f} % of the way."
+        ]
     section = [
         f"Made on {datetime.now(UTC):%Y-%m-%d} in {(time.monotonic() - started) / 60:.0f} minutes: {len(batches)}"
         f" batches of the virtual rig, {compared} comparisons in each run, parameters"
@@ -208,9 +214,8 @@ def main() -> None:
         "",
         f"**Other noise.** Recorded again with other sensor noise, zeros and encoder positions: **{passed['noise']} of"
         f" {stated.seeds}** runs without a loss. The error nearest to the end of its interval came"
-        f" {100 * closest(found['noise']):.0f} % of the way (in ln error). With friction, pretension and tension"
-        f" profile of every run drawn anew as well: **{passed['anew']} of {stated.anew}**"
-        + (f", {100 * closest(found['anew']):.0f} % of the way." if stated.anew else "."),
+        f" {100 * closest(found['noise']):.0f} % of the way (in ln error).",
+        *drawn_anew,
         *(f"- false alarm: {line}" for line in again_of),
         "",
         "**Faults, on the same recordings.**",

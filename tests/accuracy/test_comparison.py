@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.stats import norm, t
+from scipy.stats import t
 
 from ccmodel.accuracy.baseline import make_baseline, read_baseline, write_baseline
 from ccmodel.accuracy.comparison import GAINED, KEPT, LOST, UNKNOWN, Limits, compare
@@ -45,10 +45,12 @@ def test_on_the_same_recordings_one_percent_decides():
     assert outcome(before, batch([4.9, 5.1, 2.94, 3.04])) == GAINED
 
 
-def test_a_fit_may_end_elsewhere_within_its_uncertainty():
-    before, reach = batch([5.0] * 4, fit_sd=0.02), norm.isf(0.01) * 0.02 + np.log(1.01)
-    assert outcome(before, batch([5.0 * np.exp(0.99 * reach)] * 4)) == KEPT
-    assert outcome(before, batch([5.0 * np.exp(1.01 * reach)] * 4)) == LOST
+def test_the_uncertainty_of_a_fit_counts_where_its_recordings_were_made_again():
+    errors = [5.0, 5.01, 5.0, 5.01]
+    before, now = batch(errors, fit_sd=0.05), [1.2 * e for e in errors]
+    assert outcome(before, batch(now, digest="other", fit_sd=0.05)) == KEPT
+    assert outcome(batch(errors), batch(now, digest="other")) == LOST
+    assert outcome(before, batch(now, fit_sd=0.05)) == LOST, "on the same recordings the fit is the same"
 
 
 def test_recorded_again_the_scatter_of_repeats_decides():

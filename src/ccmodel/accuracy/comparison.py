@@ -4,17 +4,17 @@ What decides is the normalised error E of a channel of a batch with a parameter 
 it contains bias and scatter. The change is D = ln(E now / E accepted). There are two cases.
 
 **The same recordings** (equal digests of the raw files of the batch and of the batches that the set was fitted to). The
-pipeline is deterministic, so that noise, zeros and friction of the runs cancel and every change is one of the code. Two
-things can move E without a better or worse model: the numbers of another machine, taken as a share q of E, and a fit
-that ends elsewhere within its uncertainty. With u, the relative standard deviation of E due to the fit,
+pipeline is deterministic, so that noise, zeros and friction of the runs cancel and every change is one of the code.
+Only another machine or library can move E without a better or worse model, which is allowed a share q of E:
 
-    loss:  D > ln(1 + q) + z u,    z the normal quantile of 1 - alpha / m;  u = 0 for estimates.
+    loss:  D > ln(1 + q).
 
 **Recorded again.** The sensors' noise, their zeros, and friction and tension of the runs are drawn anew. Their effect
 is seen between repeats of a condition. Let s be the pooled standard deviation of ln error_r between repeats, over all
 batches of the rig, for the same channel and set, with nu degrees of freedom (that of the batch's own repeats if it is
 larger; a rig without repeats: that between all recordings of a batch, which also contains the conditions). Since E is
-the root of a mean of squares, ln E has the variance s^2 sum w_r^2 with w_r = error_r^2 / sum error_r^2, and
+the root of a mean of squares, ln E has the variance s^2 sum w_r^2 with w_r = error_r^2 / sum error_r^2. The errors of a
+fit are common to all recordings and not seen between repeats; u is the standard deviation of ln E due to them. Then
 
     loss:  D > ln(1 + q) + t sqrt(s^2 (sum w^2 accepted + sum w^2 now) + 2 u^2),
            t the quantile of 1 - alpha / m of Student's distribution with nu degrees of freedom.
@@ -35,7 +35,7 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 from pydantic import Field
-from scipy.stats import norm, t
+from scipy.stats import t
 
 from ccmodel.accuracy.measure import BatchAccuracy, Batches, ChannelAccuracy
 from ccmodel.channels import symbol_of
@@ -202,7 +202,7 @@ def _change(
     same = _same_recordings(batch, parameters, accepted, now)
     if same:
         before, after = _common(before, accepted[batch], now[batch]), _common(after, now[batch], accepted[batch])
-        reach = float(norm.isf(tail)) * accepted[batch].sets[parameters].channels[channel].fit_sd
+        reach = 0.0
     else:
         reach = _reach_again(accepted, now, batch, parameters, channel, tail)
     low, high = _range(before.error, None if reach is None else reach + np.log1p(share))
