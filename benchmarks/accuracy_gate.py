@@ -7,6 +7,7 @@ are then run on the same recordings and on recordings made again. Writes a secti
 """
 
 import argparse
+import sys
 import time
 import zlib
 from collections import Counter
@@ -120,12 +121,16 @@ def _trajectory(given) -> Trajectory:
 
 def record_again(campaign: Campaign, truth: Mapping, noise_seed: int, raw: Path) -> None:
     """Log true motions with the sensors' noise, zeros and positions of another seed."""
+    # Strokes are chosen for the campaign's own draws; the rig does not simulate a sensor beyond its range.
+    torque = campaign.sensors.torque.model_copy(update={"range_Nm": np.inf})
+    load_cell = campaign.sensors.load_cell.model_copy(update={"range_N": np.inf})
+    sensors = campaign.sensors.model_copy(update={"torque": torque, "load_cell": load_cell})
     for batch in dict.fromkeys(batch for batch, _ in truth):
         (raw / batch).mkdir(parents=True)
         (raw / batch / "batch.yaml").write_text(as_yaml(describe(campaign, batch)), encoding="utf-8")
         for plan in campaign.batches[batch].recordings:
             draw = np.random.default_rng([noise_seed, zlib.crc32(f"{batch}/{plan.id}".encode())])
-            columns = log(truth[batch, plan.id], campaign.sensors, campaign.rig, draw)
+            columns = log(truth[batch, plan.id], sensors, campaign.rig, draw)
             (raw / batch / log_name(plan)).write_bytes(compress(columns))
 
 
@@ -133,7 +138,9 @@ def one_run(given) -> tuple[str, Comparison]:
     """Name and outcome of one run, by the name of its fault or control and its folder of raw recordings."""
     name, fault, raw, batches, fits, accepted, limits = given
     with TemporaryDirectory() as scratch, (FAULTS | CONTROLS)[fault]():
-        return name, compare(accepted, run_pipeline(raw, batches, fits, Path(scratch)), limits)
+        found = compare(accepted, run_pipeline(raw, batches, fits, Path(scratch)), limits)
+    print(f"{name}: {len(found.losses)} losses", file=sys.stderr)
+    return name, found
 
 
 def lines(title: str, outcomes: list[tuple[str, Comparison]]) -> list[str]:

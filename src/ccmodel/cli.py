@@ -108,7 +108,7 @@ def accuracy_check(results: Results = Path("results")) -> None:
         _err.print(f"lost: {line}", style="red", markup=False)
     for line in found.not_compared:
         _err.print(f"not compared: {line}", style="yellow", markup=False)
-    typer.echo(summary)
+    typer.echo(f"accuracy: {summary}")
     if found.losses or found.not_compared or found.of(GAINED):
         typer.echo(f"if this accuracy is right, accept it: {ACCEPT}")
     if found.losses or found.not_compared:

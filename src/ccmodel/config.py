@@ -53,11 +53,7 @@ class Config(TypedModel):
     phases: PhaseExample | None = Field(None, description="simulated example of the paper's Figs. 5 to 7; absent: none")
 
     @model_validator(mode="after")
-    def _names_known(self):
-        means = {ESTIMATED: "the batches' own estimates"} | dict.fromkeys(MODEL_FILES, "models of the diagnoses")
-        for name in self.fits:
-            if name in means:
-                raise ValueError(f"fits.{name}: '{name}' names {means[name]}; call the fit something else")
+    def _batches_fit(self):
         listed = [batch for batches in self.rigs.values() for batch in batches]
         for batch in listed:
             if listed.count(batch) > 1:
@@ -68,6 +64,14 @@ class Config(TypedModel):
         for batch in self.diagnosing_by_batch:
             if not self.diagnosed([batch]):
                 raise ValueError(f"diagnosing_by_batch: '{batch}' is not diagnosed; name it in 'diagnose'")
+        return self
+
+    @model_validator(mode="after")
+    def _names_known(self):
+        means = {ESTIMATED: "the batches' own estimates"} | dict.fromkeys(MODEL_FILES, "models of the diagnoses")
+        for name in self.fits:
+            if name in means:
+                raise ValueError(f"fits.{name}: '{name}' names {means[name]}; call the fit something else")
         if taken := self.studies.keys() & self.judgements.keys():
             raise ValueError(f"studies.{min(taken)}: that is the name of another study; call it something else")
         named = {f"study '{name}'": study for name, study in self.studies.items()}

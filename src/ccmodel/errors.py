@@ -12,7 +12,9 @@ from ccmodel.recording import Recording
 
 COLUMNS = (
     dict.fromkeys(("batch", "recording", "origin", "parameters", "channel", "unit"), str)
-    | dict.fromkeys(("bias", "rmse", "peak_to_peak", "maximum", "rms", "nrmse_percent", "window_from_s", "window_to_s"), float)
+    | dict.fromkeys(
+        ("bias", "rmse", "peak_to_peak", "maximum", "rms", "nrmse_percent", "window_from_s", "window_to_s"), float
+    )
     | {"samples": int}
 )
 
@@ -70,7 +72,8 @@ def error_table(pairs: Iterable[tuple[Recording, Recording | None]], parameters:
     -------
     DataFrame
         A row for each recording and channel, with the columns of `COLUMNS`: `bias` (the mean error), `rmse`,
-        `peak_to_peak`, `maximum` and `rms` (of the recording) in `unit`. Channels that were not recorded, or that were given to the model, have no row.
+        `peak_to_peak`, `maximum` and `rms` (of the recording) in `unit`. Channels that were not recorded, or that were
+        given to the model, have no row.
     """
     rows = []
     for recorded, simulated in pairs:

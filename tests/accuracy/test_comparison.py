@@ -123,6 +123,18 @@ def test_a_batch_that_the_baseline_does_not_have_is_one_line():
     assert "batch new: the baseline does not have it" in line
 
 
+def test_a_parameter_set_or_channel_that_the_baseline_does_not_have_is_named():
+    now = batch([5.0] * 4)
+    one = now.sets["fitted"]
+    now.sets["extended"] = one
+    now.sets["fitted"] = SetAccuracy(fitted_to=[], channels=one.channels | {"T1_N": one.channels["tau_in_Nm"]})
+    lines = compare({"b": batch([5.0] * 4)}, {"b": now}, LIMITS).not_compared
+    assert [line.partition(":")[0] for line in lines] == [
+        "batch b, T1 with fitted parameters",
+        "batch b, extended parameters",
+    ]
+
+
 def test_a_verdict_that_determines_less_is_a_loss_on_the_same_recordings_only():
     def run(before, after, digest="same"):
         now = batch([5.0] * 4, verdict=after, digest=digest)

@@ -139,6 +139,7 @@ def diagnosed(finished, tmp_path_factory):
     config = yaml.safe_load((folder / "config.yaml").read_text())
     config["diagnose"] = "each"
     config["studies"]["one-run"]["parameters"] = "extended"
+    config["accuracy"] = {"parameters": "calibrated"}
     (folder / "config.yaml").write_text(yaml.safe_dump(config))
     run = snakemake(folder)
     assert run.returncode == 0, run.stdout + run.stderr
@@ -155,6 +156,9 @@ def test_what_a_diagnosis_found_is_one_more_set_of_parameters(diagnosed):
     by_set = errors[errors["channel"] == "tau_in_Nm"].groupby("parameters", observed=True)["rmse"].mean()
     assert by_set["extended"] == by_set["calibrated"] < 0.2 * by_set["estimated"]
     assert read_recordings(results / "simulated/nearest/tiny.nc") == []
+    by_recording = pd.read_csv(results / "tables/accuracy-by-recording.csv")
+    calibrated = "stiffness_N_per_m friction_coefficient load_stiffness_Nm_per_rad"
+    assert set(by_recording["inputs_left_out"]) == {calibrated}, "a diagnosis states no standard deviations"
     assert json.loads((results / "simulated/nearest/tiny.json").read_text()) == {"failures": []}
 
 
@@ -352,6 +356,23 @@ def test_a_misspelt_key_of_the_configuration_is_one_line(copy):
     assert run.returncode != 0
     assert "did you mean 'variable'" in run.stderr
     assert "Traceback" not in run.stderr
+
+
+def test_a_fit_with_a_name_of_a_diagnosis_and_a_missing_file_are_one_line(copy):
+    config = copy / "config.yaml"
+    text = config.read_text()
+    for edited, said in (
+        (
+            text.replace("fitted:", "calibrated:", 1),
+            "'calibrated' names models of the diagnoses; call the fit",
+        ),
+        (text + "concealed: nowhere.json\n", "concealed: there is no file nowhere.json"),
+    ):
+        config.write_text(edited)
+        run = snakemake(copy)
+        assert run.returncode != 0
+        assert len([line for line in run.stderr.splitlines() if said in line]) == 1
+        assert "Traceback" not in run.stderr
 
 
 def test_the_workflow_is_lint_clean(copy):

@@ -534,7 +534,7 @@ def test_a_sensor_without_its_constants_is_not_used(bench):
     assert "F_drive_N" not in ingested.recordings[0]
 
 
-@pytest.mark.parametrize("name", ["half-loop", "loops", "pretension", "radius"])
+@pytest.mark.parametrize("name", ["half-loop", "loops", "pretension", "radius", "rich"])
 def test_the_committed_batches_have_no_finding(name):
     ingested = ingest_batch(RAW / name)
     assert ingested.findings == []

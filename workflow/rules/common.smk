@@ -22,6 +22,8 @@ try:
     RESULTS = CONFIG.results
     BATCHES, UNUSABLE = batches_in(RAW)
     LOOPS = expand_studies(CONFIG, BATCHES)
+    if CONFIG.concealed and not Path(CONFIG.concealed).is_file():
+        raise InputError(f"concealed: there is no file {CONFIG.concealed}")
 except InputError as error:
     print(error, file=sys.stderr)
     sys.exit(2)

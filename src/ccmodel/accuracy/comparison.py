@@ -125,7 +125,7 @@ class Comparison:
     less : list of str
         A line on each batch, set, channel or recording that was compared before and is not any more.
     unknown : list of str
-        A line on each batch that the baseline does not have.
+        A line on each batch, set or channel that the baseline does not have.
     again : list of str
         Batches whose raw files are not those of the baseline.
     """
@@ -162,11 +162,7 @@ def compare(accepted: Batches, now: Batches, limits: Limits) -> Comparison:
     found = Comparison()
     found.less.extend(_less(accepted, now))
     common = [batch for batch in now if batch in accepted]
-    found.unknown.extend(
-        f"batch {b}: the baseline does not have it; accept it once its accuracy is right"
-        for b in now
-        if b not in accepted
-    )
+    found.unknown.extend(_unknown(accepted, now))
     found.again.extend(batch for batch in common if accepted[batch].digest != now[batch].digest)
     places = [(b, p, c) for b in common for p, c in _channels(now[b]) if (p, c) in set(_channels(accepted[b]))]
     tail = (1 - limits.coverage) / max(len(places), 1)
@@ -291,6 +287,21 @@ def _less(accepted: Batches, now: Batches) -> Iterator[str]:
                 yield f"batch {batch}: {parameters} parameters are not compared in this run"
                 continue
             yield from _fewer(batch, parameters, one.channels, before, after)
+
+
+def _unknown(accepted: Batches, now: Batches) -> Iterator[str]:
+    """What the baseline does not have: batches, and sets or channels of batches that it has."""
+    advice = "the baseline does not have it; accept it once its accuracy is right"
+    for batch, after in now.items():
+        if batch not in accepted:
+            yield f"batch {batch}: {advice}"
+            continue
+        before = set(_channels(accepted[batch]))
+        for parameters, one in after.sets.items():
+            if parameters not in accepted[batch].sets:
+                yield f"batch {batch}, {parameters} parameters: {advice}"
+            elif new := [symbol_of(c) for c in one.channels if (parameters, c) not in before]:
+                yield f"batch {batch}, {', '.join(new)} with {parameters} parameters: {advice}"
 
 
 def _fewer(

@@ -72,7 +72,7 @@ def check(results: Path) -> tuple[Comparison, str]:
 def summary(found: Comparison, date: str, commit: str) -> str:
     """A sentence on a comparison."""
     counts = f"{len(found.losses)} lost, {len(found.of(GAINED))} gained, {len(found.not_compared)} not compared"
-    text = f"accuracy: {len(found.changes)} channels against the baseline of {date[:10]} ({commit}): {counts}"
+    text = f"{len(found.changes)} comparisons with the baseline of {date[:10]} ({commit}): {counts}"
     if found.again:
         text += f"; recorded again since then, so that only a larger loss is seen: {', '.join(found.again)}"
     return text

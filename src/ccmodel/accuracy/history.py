@@ -112,7 +112,7 @@ def run_commit(commit: str, cores: int) -> tuple[pd.DataFrame, str]:
         if why:
             return rows_of({}, name, date, ""), f"{name}: skipped: {why}"
         try:
-            batches = measure(_simulated_in(folder / "results"), with_fits=False)
+            batches = measure(_simulated_in(folder / "results"), for_comparison=False)
         except Exception as error:  # a former format of the files, in any of the libraries that read them
             return rows_of({}, name, date, ""), f"{name}: skipped: its files cannot be read ({_one_line(error)})"
         return rows_of(batches, name, date, _version(folder)), f"{name}: {len(batches)} batches"
@@ -139,8 +139,8 @@ def _run_pipeline(folder: Path, cores: int) -> str:
     if run.returncode == 0:
         return ""
     lines = [line.strip() for line in (run.stderr + run.stdout).splitlines() if line.strip()]
-    telling = [line for line in lines if "error" in line.lower()]
-    return f"its run failed ({_one_line((telling or lines or ['no message'])[0])})"
+    first = next((k for k, line in enumerate(lines) if "error" in line.lower()), 0)
+    return f"its run failed ({_one_line(' '.join(lines[first : first + 2]).replace(f'{folder}/', ''))})"
 
 
 def _simulated_in(results: Path) -> list[Simulated]:

@@ -105,23 +105,24 @@ class BatchAccuracy(TypedModel):
 Batches = dict[str, BatchAccuracy]
 
 
-def measure(runs: Iterable[Simulated], with_fits: bool = True) -> Batches:
+def measure(runs: Iterable[Simulated], for_comparison: bool = True) -> Batches:
     """Accuracy of every batch and parameter set of a run; a set without a simulation is left out.
 
     Parameters
     ----------
     runs : iterable of Simulated
-    with_fits : bool
-        Whether the uncertainty of fits is run through the model (`ChannelAccuracy.fit_sd`).
+    for_comparison : bool
+        Whether to add what a comparison needs besides the errors: the digest of the raw files, and the uncertainty of
+        fits, run through the model (`ChannelAccuracy.fit_sd`).
     """
     by_batch: dict[str, list[Simulated]] = {}
     for run in runs:
         by_batch.setdefault(run.recordings.stem, []).append(run)
-    measured = {batch: _batch(of_batch, with_fits) for batch, of_batch in by_batch.items()}
+    measured = {batch: _batch(of_batch, for_comparison) for batch, of_batch in by_batch.items()}
     return {batch: accuracy for batch, accuracy in measured.items() if accuracy.sets}
 
 
-def _batch(runs: Sequence[Simulated], with_fits: bool) -> BatchAccuracy:
+def _batch(runs: Sequence[Simulated], for_comparison: bool) -> BatchAccuracy:
     recordings, sets, origin = {}, {}, ""
     for run in runs:
         pairs = read_pairs(run.recordings, run.simulated)
@@ -132,7 +133,7 @@ def _batch(runs: Sequence[Simulated], with_fits: bool) -> BatchAccuracy:
         recordings = recordings or {recorded.id: [0.0, 0.0, 0.0] for recorded, _ in pairs}
         for row in table.itertuples():
             recordings[row.recording] = [round(row.window_from_s, 4), round(row.window_to_s, 4), float(row.samples)]
-        known = fitted(run.recordings, run.fit) if with_fits else Fitted(None)
+        known = fitted(run.recordings, run.fit) if for_comparison else Fitted(None)
         fit_sds = _fit_sds(pairs, known, table)
         sets[run.parameters] = SetAccuracy(
             fitted_to=sorted({name.partition("/")[0] for name in known.recordings}),
@@ -145,7 +146,7 @@ def _batch(runs: Sequence[Simulated], with_fits: bool) -> BatchAccuracy:
     return BatchAccuracy(
         rig=runs[0].rig,
         origin=origin,
-        digest=_digest(runs[0].recordings),
+        digest=_digest(runs[0].recordings) if for_comparison else "",
         verdict=next(iter(verdicts), None),
         recordings=recordings,
         sets=sets,

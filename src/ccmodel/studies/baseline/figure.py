@@ -12,10 +12,12 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from ccmodel.report.figures import COLOURS, LINES, MARKERS, STYLE, empty_figure, legend_below, title_figure
 
 COLUMNS = 3
+# Commits that a panel has room to name.
+NAMED = 20
 
 
 def history_figure(history: pd.DataFrame, present: pd.DataFrame, origins: Mapping[str, str]) -> Figure:
-    """Median normalised error over the channels of each batch, at every commit and, as the last point, in this run.
+    """Median and largest error over the channels of each batch, at every commit and, as the last point, in this run.
 
     Parameters
     ----------
@@ -45,7 +47,7 @@ def history_figure(history: pd.DataFrame, present: pd.DataFrame, origins: Mappin
             # The axes are shared: names of commits stand below the last panel of each column.
             ax.tick_params(labelbottom=k + columns >= len(batches))
         legend_below(figure, axes)
-        title_figure(figure, "Error of the model over commits: median of the channels (line), all channels (band)")
+        title_figure(figure, "Error of the model over commits: median of the channels (thick) and worst channel (thin)")
     return figure
 
 
@@ -53,17 +55,18 @@ def _panel(ax: Axes, table: pd.DataFrame, commits: list[str], sets: list[str]) -
     at = {commit: k for k, commit in enumerate(commits)}
     for k, name in enumerate(sets):
         errors = table[table["set"] == name].groupby("commit")["error"]
-        found = pd.DataFrame({"middle": errors.median(), "low": errors.min(), "high": errors.max()})
-        if found.empty:
+        if not errors.ngroups:
             continue
-        found = found.reindex(commits)
-        x, colour = np.arange(len(commits)), COLOURS[k % len(COLOURS)]
-        ax.fill_between(x, found["low"], found["high"], color=colour, alpha=0.12, lw=0)
-        style = {"color": colour, "ls": LINES[k % len(LINES)], "marker": MARKERS[k % len(MARKERS)], "ms": 4}
-        ax.plot(x, found["middle"], lw=1.2, label=name, **style)
+        x, style = np.arange(len(commits)), {"color": COLOURS[k % len(COLOURS)], "ls": LINES[k % len(LINES)]}
+        ax.plot(
+            x, errors.median().reindex(commits), lw=1.4, marker=MARKERS[k % len(MARKERS)], ms=4, label=name, **style
+        )
+        ax.plot(x, errors.max().reindex(commits), lw=0.6, marker=".", ms=2, **style)
     ax.axvline(at[commits[-1]], color="#999999", lw=0.8, ls=":")
     ax.set_yscale("log")
     ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     ax.yaxis.set_minor_formatter(NullFormatter())
     ax.set_xlim(-0.5, len(commits) - 0.5)
-    ax.set_xticks(range(len(commits)), commits, rotation=90, fontsize=7)
+    every = -(-len(commits) // NAMED)
+    named = sorted({*range(0, len(commits) - every, every), len(commits) - 1})
+    ax.set_xticks(named, [commits[k] for k in named], rotation=90, fontsize=7)

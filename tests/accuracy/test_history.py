@@ -1,0 +1,102 @@
+"""Past commits: run in a clean worktree, measured by the present sources, skipped with a line where they fail."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from benchmarks.accuracy_gate import run_pipeline
+from builders import write_batch
+from ccmodel.accuracy.gate import fill_history
+from ccmodel.accuracy.history import COLUMNS, add_rows, head, overview, read_history, rows_of
+from ccmodel.typed import InputError
+
+# A pipeline that "simulates" by taking files that stand in the repository.
+SNAKEFILE = (
+    'rule all:\n    output: "results/tables/errors.csv"\n    shell: "cp -r stored/. results && touch {output}"\n'
+)
+FAILING = 'raise ValueError("this commit has a fault")\n'
+
+
+def git(folder: Path, *arguments: str) -> str:
+    identity = ["-c", "user.name=test", "-c", "user.email=test@example.org"]
+    run = subprocess.run(["git", *identity, *arguments], cwd=folder, capture_output=True, text=True, check=True)
+    return run.stdout.strip()
+
+
+def commit(folder: Path, snakefile: str, version: str) -> str:
+    (folder / "src/ccmodel").mkdir(parents=True, exist_ok=True)
+    (folder / "src/ccmodel/__init__.py").write_text(f'__version__ = "{version}"\n')
+    (folder / "Snakefile").write_text(snakefile)
+    git(folder, "add", "-A")
+    git(folder, "commit", "-qm", version)
+    return git(folder, "log", "-1", "--format=%h")
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    raw, results = tmp_path_factory.mktemp("raw"), tmp_path_factory.mktemp("results")
+    write_batch(raw / "tiny")
+    return results, run_pipeline(raw, ["tiny"], {}, results)
+
+
+@pytest.fixture
+def repository(measured, tmp_path, monkeypatch):
+    """A repository with an empty first commit, whose later commits make the stored results."""
+    git(tmp_path, "init", "-q")
+    git(tmp_path, "commit", "-qm", "empty", "--allow-empty")
+    shutil.copytree(measured[0], tmp_path / "stored")
+    (tmp_path / "config").mkdir()
+    (tmp_path / "config/config.yaml").write_text("{}\n")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_past_commits_are_run_and_measured_and_failures_are_lines(repository, measured):
+    first, good = git(repository, "rev-parse", "HEAD"), commit(repository, SNAKEFILE, "0.5.0")
+    bad = commit(repository, FAILING, "0.5.1")
+    said, file = [], repository / "history.csv"
+    fill_history(file, [f"{first}..HEAD", first], 1, said.append)
+    assert said[0] == f"{good}: 1 batches"
+    assert said[1].startswith(f"{bad}: skipped: its run failed")
+    assert "this commit has a fault" in said[1]
+    assert "it has no pipeline" in said[2]
+    table = read_history(file)
+    assert set(table["commit"]) == {good}
+    assert set(table["version"]) == {"0.5.0"}
+    now = measured[1]["tiny"].sets["estimated"].channels
+    for row in table.itertuples():
+        assert row.error == pytest.approx(now[row.channel].error, rel=1e-3)
+        assert row.bias == pytest.approx(now[row.channel].bias, rel=1e-3)
+    assert good in overview(file)
+    assert git(repository, "worktree", "list").count("\n") == 0, "no worktree is left"
+
+
+def test_an_unknown_revision_is_one_line(repository):
+    with pytest.raises(InputError, match="rev-list"):
+        fill_history(repository / "history.csv", ["nothing..HEAD"], 1, print)
+
+
+def test_rows_of_a_commit_replace_earlier_ones_and_stand_in_the_order_of_dates(measured, tmp_path):
+    file, batches = tmp_path / "history.csv", measured[1]
+    for name, date in (("b", "2026-02-01"), ("a", "2026-01-01"), ("b", "2026-02-01")):
+        add_rows(file, rows_of(batches, name, date, "1"))
+    table = read_history(file)
+    assert list(table.columns) == list(COLUMNS)
+    assert list(dict.fromkeys(table["commit"])) == ["a", "b"]
+    assert len(table) == 2 * len(batches["tiny"].sets["estimated"].channels)
+
+
+def test_a_file_with_other_columns_is_refused(tmp_path):
+    file = tmp_path / "history.csv"
+    file.write_text("commit,error\na,1\n")
+    with pytest.raises(InputError, match="columns must be commit, date"):
+        read_history(file)
+
+
+def test_changes_that_are_not_committed_are_marked(repository):
+    name = commit(repository, SNAKEFILE, "0.5.0")
+    assert head(repository)[0] == name
+    (repository / "Snakefile").write_text("")
+    assert head(repository)[0] == f"{name}+"
