@@ -64,8 +64,9 @@ def summary(batch: str, origin: str = "virtual-rig", note: str = "") -> dict:
     return {"folder": f"data/raw/{batch}", "batch": stated, "recordings": [{"id": "r"}], "findings": []}
 
 
-def run(batch: str = "b", id: str = "r", origin: str = "virtual-rig", duration: float = 12.0):
+def run(id: str = "r", origin: str = "virtual-rig", duration: float = 12.0, noise: float = 0.0):
     """A recording with all channels of a screen, and a calibrated and an extended model of it."""
+    random = np.random.default_rng(0)
     wave = lambda size, late=0.0: lambda t: size * np.sin(2 * np.pi * t - late)  # noqa: E731
     made = {"theta_out_rad": (0.8, 0.3), "tau_in_Nm": (0.05, 0.1), "tau_out_Nm": (0.04, 0.3)}
     tensions = {name: (lambda t: 7.0 + np.sin(2 * np.pi * t)) for name in ("T1_N", "T2_N", "T3_N", "T4_N")}
@@ -73,14 +74,17 @@ def run(batch: str = "b", id: str = "r", origin: str = "virtual-rig", duration: 
     recorded = recorded.with_channels(recorded.channels, recorded.derived_from, origin)
     models = {}
     for name, share in (("calibrated", 0.9), ("extended", 0.99)):
-        channels = {c: share * values for c, values in recorded.channels.items()}
+        channels = {
+            c: share * values + noise * np.ptp(values) * random.standard_normal(values.size)
+            for c, values in recorded.channels.items()
+        }
         models[name] = recorded.with_channels(channels, dict.fromkeys(channels, "model"), "model")
     return recorded, models
 
 
 def entries(count: int = 2, batch: str = "b", **kw) -> list[dict]:
     """Runs for the viewer."""
-    return [viewer.entry(*run(batch, f"run-{k}", **kw)) | {"batch": batch} for k in range(count)]
+    return [viewer.entry(*run(f"run-{k}", **kw)) | {"batch": batch} for k in range(count)]
 
 
 def content(*diagnoses: dict, **given) -> Content:

@@ -251,7 +251,8 @@ def test_every_table_has_a_caption_and_every_picture_a_text(seen):
 
 
 def test_two_hundred_recordings_open_in_time(browser, tmp_path):
-    one = entries(1)[0]
+    one = entries(1, noise=0.1)[0]
+    assert len(one["data"]) > 25_000, "as large as that of a recording with load cells"
     runs = [one | {"id": f"run-{k}"} for k in range(200)]
     write_page(tmp_path / "index.html", content(diagnosis("b", "explained"), runs=runs))
     started = time.perf_counter()

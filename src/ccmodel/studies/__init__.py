@@ -9,7 +9,8 @@ A study is a folder with
 3. ``figure.py``: its figures, if there is more to it than the figures; a figure with recordings says in its title
    which batches were measured and which simulated (`ccmodel.studies.variables.batches_by_origin`), and
    `ccmodel.studies.run.run_study` stamps and saves it,
-4. ``part.html.j2``: its part of the page; `ccmodel.report.page.write_page` gives it ``parts``,
+4. ``part.html.j2``: its part of the page; `ccmodel.report.page.write_page` gives it ``parts``, and takes the figures
+   to which it refers by their paths in the results folder into the page,
 
 and a field of `ccmodel.config.Config`. The rule in ``workflow/rules/studies.smk`` and the page take it from there.
 
