@@ -177,8 +177,8 @@ def concealed(campaign: Campaign) -> dict:
             "name": effect.name,
             "place": effect.place,
             "text": ", ".join(
-                f"{quantity} {campaign.value_of(key):.3g} {unit if unit != '1' else ''}".rstrip()
-                for quantity, (key, unit) in effect.sizes.items()
+                f"{quantity} {factor * campaign.value_of(key):.3g} {unit}"
+                for quantity, (key, factor, unit) in effect.sizes.items()
             ),
             "source": effect.source,
         }

@@ -191,15 +191,15 @@ class Concealed(Strict):
     ----------
     name, place : str
         The mechanism that describes it, if any, and where it acts.
-    sizes : mapping of str to (str, str)
-        By quantity, the key of the campaign with its value ("rig.effects.drag_N"), and its unit.
+    sizes : mapping of str to (str, float, str)
+        By quantity, the key of the campaign with its value ("rig.effects.drag_N"), and the factor to the printed unit.
     source : str
         Where the size comes from.
     """
 
     name: str | None
     place: str
-    sizes: dict[str, tuple[str, str]] = Field(min_length=1)
+    sizes: dict[str, tuple[str, PositiveFloat, str]] = Field(min_length=1)
     source: str
 
 
@@ -234,7 +234,7 @@ class Campaign(Strict):
 
     @model_validator(mode="after")
     def _sizes_are_stated(self) -> Self:
-        for key, _ in (size for effect in self.concealed for size in effect.sizes.values()):
+        for key, *_ in (size for effect in self.concealed for size in effect.sizes.values()):
             self.value_of(key)
         return self
 

@@ -47,13 +47,13 @@ def test_what_is_concealed_follows_from_the_config():
     assert committed == concealed(CAMPAIGN)
     (rig,) = committed["rigs"]
     assert rig["batches"] == list(CAMPAIGN.batches)
-    assert {"name": "pulley-friction", "place": "drive-pulley", "text": "friction torque 0.022 N m"}.items() <= (
+    assert {"name": "pulley-friction", "place": "drive-pulley", "text": "friction torque 22 mN m"}.items() <= (
         rig["effects"][0].items()
     )
 
 
 def test_every_effect_of_the_rig_is_among_the_concealed():
-    sizes = {key for effect in CAMPAIGN.concealed for key, _ in effect.sizes.values()}
+    sizes = {key for effect in CAMPAIGN.concealed for key, *_ in effect.sizes.values()}
     present = CAMPAIGN.rig.effects.model_dump(exclude_defaults=True)
     for name, value in present.items():
         parts = value if name in ("drive_pulley", "load_pulley", "load", "drive_sensors", "load_sensors") else {"": 0}
@@ -69,7 +69,7 @@ def test_every_effect_of_the_rig_is_among_the_concealed():
 )
 def test_a_size_that_the_campaign_does_not_state_is_refused(key, message):
     described = CAMPAIGN.model_dump(mode="json")
-    described["concealed"][0]["sizes"] = {"size": [key, "m"]}
+    described["concealed"][0]["sizes"] = {"size": [key, 1.0, "m"]}
     with pytest.raises(ValueError, match=message):
         type(CAMPAIGN).model_validate(described)
 

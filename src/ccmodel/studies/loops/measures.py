@@ -35,9 +35,11 @@ class Cycle:
     ----------
     channels : dict of str to ndarray, shape (n,)
     slack : ndarray of bool, shape (2, n)
-        Whether cable A and cable B are slack: both end tensions are below the threshold at more than half of the
-        samples within the smoothing window. A smoothed tension is not used: it rises above the threshold before the
-        cable is taut. Shape (0, n) if a tension was not recorded.
+        Whether cable A and cable B are slack: the tension at the load end is below the threshold at more than half of
+        the samples within the smoothing window. By the capstan bound the drive end then holds at most exp(mu phi) times
+        the threshold. Its own reading is not used: it contains the friction of the drive, half of it over R. A smoothed
+        tension is not used: it rises above the threshold before the cable is taut. Shape (0, n) if a tension was not
+        recorded.
     branches : tuple of ndarray of int
         Sample numbers of each branch, from one reversal of the drive to the next. The second branch runs over the end
         of the cycle and continues at its beginning.
@@ -97,7 +99,7 @@ def _slack(recording: Recording, how: Measuring, size: int) -> NDArray:
     """Attribute `slack` of a cycle, over the whole recording; `size` is the number of samples in the window."""
     if not all(c in recording for c in TENSIONS):
         return np.empty((0, recording.time_s.size), dtype=bool)
-    below = [np.maximum(recording[drive], recording[load]) < how.slack_below_N for drive, load in CABLES.values()]
+    below = [recording[load] < how.slack_below_N for _, load in CABLES.values()]
     return uniform_filter1d(np.array(below, dtype=float), size, axis=1) > 0.5
 
 
