@@ -50,7 +50,8 @@ def record(
         except BatchExistsError as error:
             _fail(str(error))
     if concealed_file:
-        concealed_file.write_text(json.dumps(concealed(campaign), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        text = json.dumps(concealed(campaign), indent=1, ensure_ascii=False)
+        concealed_file.write_text(text + "\n", encoding="utf-8")
 
 
 def _fail(message: str) -> None:

@@ -71,6 +71,28 @@ def test_a_trend_the_other_way_is_not_borne_out():
     assert claims[0].borne_out == Verdict.NO
 
 
+def test_a_flaw_of_the_rig_changes_the_recordings_claim_and_not_the_models():
+    """What the model leaves out: the cable of the longest bend had hardly any friction when it was recorded."""
+    pairs = pairs_over([(model_runs.even(STUDY, n * np.pi), 2.5) for n in (1, 2)])
+    flawed = [
+        (replace(model_runs.run(replace(CABLE, friction_scale=scale), r.path, study, 0.05), batch="b", id=r.id), s)
+        for (r, s), scale in zip(pairs, (1.0, 1.01, 0.2, 0.201), strict=True)
+        for study in [STUDY.model_copy(update={"pretension_N": 2.5, "amplitude_rad": 0.6})]
+    ]
+    claim = claims_of({"bend": flawed, "pretension": [], "radius": []}, None, CLAIMS, HOW)[0]
+    assert claim.borne_out == Verdict.NO
+    assert claim.by_model == Verdict.YES
+
+
+def test_what_the_model_alone_decides_has_no_second_verdict(found):
+    assert {name for name, claim in found.items() if claim.by_model is None} == {
+        "deadband-and-load",
+        "loop-placement",
+        "sections",
+    }
+    assert all(claim.by_model == Verdict.YES for claim in found.values() if claim.by_model is not None)
+
+
 def test_without_recordings_nothing_is_determined_and_no_number_is_made_up():
     claims = claims_of({"bend": [], "pretension": [], "radius": []}, None, CLAIMS, HOW)
     assert {claim.borne_out for claim in claims} == {Verdict.OPEN}

@@ -62,9 +62,13 @@ class Claim:
     name, section, says : str
         Our name for it, the paper's section, and the statement in our words.
     borne_out : Verdict
+        By the recordings, or for a claim on the model alone by the model.
     sentence : str
         The numbers in a sentence.
     rows : list of Row
+    by_model : Verdict or None
+        For a claim on recordings: whether the model of the same recordings bears it out. Where only the model does, the
+        difference is due to physics that the model leaves out, or to the scatter of the repeats.
     """
 
     name: str
@@ -73,6 +77,7 @@ class Claim:
     borne_out: Verdict
     sentence: str
     rows: list[Row] = field(default_factory=list)
+    by_model: Verdict | None = None
 
 
 def spread_percent(values: Sequence[float]) -> float | None:

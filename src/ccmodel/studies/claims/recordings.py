@@ -111,7 +111,8 @@ def _numbers(recordings: Sequence[Recording], quantity: str, how: Measuring) -> 
 def _trend(trend: _Trend, pairs: Sequence[Pair], claims: Claims, how: Measuring) -> Claim:
     series = {q: _series(pairs, trend.variable, q, claims, how) for q in trend.quantities + trend.shown}
     verdicts = [_has_sign(series[q], trend.sign, claims) for q in trend.quantities]
-    return Claim(trend.name, trend.section, trend.says, _joint(verdicts), *_sentence_and_rows(series))
+    by_model = _joint([_model_has_sign(series[q], trend.sign) for q in trend.quantities])
+    return Claim(trend.name, trend.section, trend.says, _joint(verdicts), *_sentence_and_rows(series), by_model)
 
 
 def _has_sign(series: _Series, sign: int, claims: Claims) -> str:
@@ -126,6 +127,14 @@ def _has_sign(series: _Series, sign: int, claims: Claims) -> str:
     return Verdict.NO if sign * whole.value + whole.reach(claims.coverage) < small else Verdict.OPEN
 
 
+def _model_has_sign(series: _Series, sign: int) -> str:
+    """Whether the model rises (sign +1) or falls (-1) from one condition that has a value to the next."""
+    values = [row.model for row in series.rows if row.model is not None]
+    if len(values) < 2:
+        return Verdict.OPEN
+    return Verdict.YES if all(sign * (b - a) > 0 for a, b in pairwise(values)) else Verdict.NO
+
+
 def _joint(verdicts: Sequence[str]) -> str:
     kinds = set(verdicts)
     if len(kinds) == 1:
@@ -136,24 +145,30 @@ def _joint(verdicts: Sequence[str]) -> str:
 def _phases(pairs: Sequence[Pair], claims: Claims, how: Measuring) -> Claim:
     """Phases IVa and IVb over pretension."""
     series = {q: _series(pairs, "pretension", q, claims, how) for q in ("IVa_share", "IVb_share")}
-    verdict = Verdict.OPEN
-    seen_a, seen_b = ([e.value > claims.seen_percent for e in s.estimates] for s in series.values())
-    if len(seen_a) > 2 and len(seen_b) == len(seen_a):
-        # Conditions are in rising order of pretension.
-        ends = (seen_a[0], seen_a[-1], seen_b[0], seen_b[-1]) == (True, False, True, False)
-        middle = any(a and not b for a, b in zip(seen_a, seen_b, strict=True))
-        verdict = Verdict.YES if ends and middle else Verdict.NO
+    verdict = _phases_seen(*([e.value for e in s.estimates] for s in series.values()), claims)
+    by_model = _phases_seen(*([r.model for r in s.rows if r.model is not None] for s in series.values()), claims)
     says = "a high pretension shows no phase IV, a middling one IVa, a low one IVb as well"
-    return Claim("phases-and-pretension", "V-B", says, verdict, *_sentence_and_rows(series))
+    return Claim("phases-and-pretension", "V-B", says, verdict, *_sentence_and_rows(series), by_model)
+
+
+def _phases_seen(share_a: Sequence[float], share_b: Sequence[float], claims: Claims) -> str:
+    """Whether IVa and IVb occur as claimed; shares (%) in rising order of pretension."""
+    if len(share_a) < 3 or len(share_b) != len(share_a):
+        return Verdict.OPEN
+    seen_a, seen_b = ([share > claims.seen_percent for share in shares] for shares in (share_a, share_b))
+    ends = (seen_a[0], seen_a[-1], seen_b[0], seen_b[-1]) == (True, False, True, False)
+    middle = any(a and not b for a, b in zip(seen_a, seen_b, strict=True))
+    return Verdict.YES if ends and middle else Verdict.NO
 
 
 def _radius(pairs: Sequence[Pair], parameters: Parameters | None, claims: Claims, how: Measuring) -> Claim:
     """Difference between the largest and the smallest of the radii's means."""
-    small, verdicts, parts, rows = claims.small_percent, [], [], []
+    small, verdicts, by_model, parts, rows = claims.small_percent, [], [], [], []
     for quantity in ("backlash", "width", "slope"):
         series = _series(pairs, "radius", quantity, claims, how)
         spread = _spread(series, claims)
         model = spread_percent([r.model for r in series.rows if r.model is not None])
+        by_model.append(Verdict.OPEN if model is None else Verdict.YES if model < small else Verdict.NO)
         rows += series.rows
         place = (f"{quantity}_spread", "%", "all radii", np.nan, series.rows[0].source if series.rows else "")
         if spread is None:
@@ -171,7 +186,7 @@ def _radius(pairs: Sequence[Pair], parameters: Parameters | None, claims: Claims
         rows.append(Row("backlash_spread", "%", "all radii, one pretension", np.nan, MODEL_ALONE, model=alone))
         sentence += f" At one and the same pretension the model's backlash differs by {percent(alone)} %."
     says = "at one angle of bend the loop's radius makes next to no difference"
-    return Claim("radius", "V-C", says, _joint(verdicts), sentence, rows)
+    return Claim("radius", "V-C", says, _joint(verdicts), sentence, rows, _joint(by_model))
 
 
 def _backlash_alone(

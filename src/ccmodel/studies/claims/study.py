@@ -57,7 +57,8 @@ def claims_of(
 
 
 def _stated(claim: Claim) -> dict[str, str]:
-    return {"section": claim.section, "says": claim.says, "borne_out": str(claim.borne_out)}
+    by_model = "" if claim.by_model is None else str(claim.by_model)
+    return {"section": claim.section, "says": claim.says, "borne_out": str(claim.borne_out), "by_model": by_model}
 
 
 def _loops(parameters: Parameters | None, claims: Claims) -> dict[str, Recording]:
