@@ -65,22 +65,35 @@ def test_what_an_accepted_model_leaves_above_the_noise_is_said():
     worse = diagnosis("b", "explained")
     worse["fit"]["error"] = ERROR | {"theta_out": ERROR["theta_out"] | {"after": 4e-3}}
     (card,) = cards([summary("b")], [worse])
-    assert card["caution"] == "Not all is accounted for: up to 4.0 times the noise is left, in θ_out."
+    assert card["caution"] == "Not all is accounted for: up to 4.0 times the noise is left, in the load angle θ_out."
 
 
-def test_the_overview_counts_verdicts_and_says_how_far_the_errors_fall():
-    first, second, third = overview(made("explained", "unexplained", "agrees"))
-    assert first.startswith("2 of 3 batches differ from the calibrated model beyond noise: 1 explained")
-    assert "falls from 6.0 to 1.2 times the noise floor (batch b-explained)" in second
-    assert "nearest model (not accepted)" in third
-    assert overview(made("agrees")) == ["The calibrated model agrees with the batch."]
+def test_the_overview_tells_measured_from_simulated_and_says_how_far_the_errors_fall():
+    measured, simulated = overview(made("explained", "unexplained", "agrees", measured=["b-unexplained"]))
+    assert measured.startswith("Measured, batch b-unexplained: unexplained (no listed mechanism fits).")
+    assert measured.endswith("6.0 → 1.2 (nearest model, not accepted; b-unexplained).")
+    assert simulated.startswith("Simulated, 2 batches: 1 explained (missing physics named) and 1 agrees.")
+    assert simulated.endswith("Largest held-out error over the noise floor: 6.0 → 1.2 (extended model; b-explained).")
+    assert overview(made("agrees")) == ["Simulated, batch b-agrees: agrees."]
     assert overview([]) == []
+    assert overview(made(None)) == ["No batch has been diagnosed."]
+
+
+def test_explained_with_more_than_noise_left_is_called_in_part():
+    worse = diagnosis("b", "explained")
+    worse["fit"]["error"] = ERROR | {"theta_out": ERROR["theta_out"] | {"after": 4e-3}}
+    (card,) = cards([summary("b")], [worse])
+    assert (card["verdict"], card["shown_verdict"]) == ("explained", "explained in part")
+    assert "explained in part (not all of the missing physics named)" in overview([card])[0]
+    assert made("explained")[0]["shown_verdict"] == "explained"
 
 
 def test_the_fall_is_that_of_the_largest_error_of_any_channel():
     worse = diagnosis("b", "explained")
     worse["fit"]["error"] = ERROR | {"theta_out": ERROR["theta_out"] | {"after": 4e-3}}
-    assert "falls from 6.0 to 4.0 times" in overview(cards([summary("b")], [worse]))[1]
+    (card,) = cards([summary("b")], [worse])
+    assert "6.0 → 4.0" in overview([card])[0]
+    assert card["largest"] == {"before": card["rows"][0]["before"], "after": 4.0}
 
 
 def test_every_mechanism_that_anything_names_is_listed():

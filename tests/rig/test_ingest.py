@@ -541,6 +541,6 @@ def test_the_committed_batches_have_no_finding(name):
     assert len(ingested.recordings) == len(ingested.batch.recordings)
     for recording in ingested.recordings:
         assert len(recording.channels) == 10
-        assert 0.3 < recording.rest_s < 0.8
+        assert 0.3 < recording.rest_s < 0.9
         assert abs(recording["theta_in_rad"][recording.time_s <= recording.rest_s]).max() < 0.0032
         assert recording["F_drive_N"][:50].mean() == pytest.approx(2 * recording.pretension_N, rel=0.3)

@@ -15,9 +15,11 @@ from ccmodel.report.verdict import (
     sentence,
 )
 
-# Of the verdicts, in the order of the summary.
+# Of the verdicts as cards show them, in the order of the summary.
+IN_PART = "explained in part"
 MEANS = {
     "explained": "missing physics named",
+    IN_PART: "not all of the missing physics named",
     "undecided": "candidates not told apart",
     "unexplained": "no listed mechanism fits",
     "agrees": "",
@@ -54,6 +56,7 @@ def _card(summary: Mapping, diagnoses: Mapping[str, Mapping]) -> dict:
         "mismatch": 0.0,
         "linked": False,
         "verdict": None,
+        "shown_verdict": "not diagnosed",
         "places": [],
     }
     diagnosis = diagnoses.get(name)
@@ -64,8 +67,11 @@ def _card(summary: Mapping, diagnoses: Mapping[str, Mapping]) -> dict:
         return card
     error, nearest = diagnosis["fit"]["error"], diagnosis.get("nearest")
     rows = _rows(error, (nearest or {}).get("error"))
+    # A pair can account for most of a mismatch and leave more than noise; the verdict alone does not say so.
+    in_part = diagnosis["verdict"] == "explained" and caution(diagnosis)
     return card | {
         "verdict": diagnosis["verdict"],
+        "shown_verdict": IN_PART if in_part else diagnosis["verdict"],
         "nearest": nearest_sentence(diagnosis),
         "mechanisms": _mechanisms(diagnosis),
         "next": (diagnosis.get("next_experiment") or {}).get("text"),
@@ -73,6 +79,9 @@ def _card(summary: Mapping, diagnoses: Mapping[str, Mapping]) -> dict:
         "place_text": joined([place_in_words(p) for p in possible_places(diagnosis)]),
         "rows": rows,
         "worst": rows[0],
+        "largest": {
+            key: max((r[key] for r in rows if r[key] is not None), default=None) for key in ("before", "after")
+        },
         "longest": max(1.0, *(max(r["before"], r["after"] or 0.0) for r in rows)),
         "after_is": after_is(diagnosis),
         "held_out": len(diagnosis["fit"]["held_out"]),
@@ -125,7 +134,7 @@ def _rows(error: Mapping[str, Mapping], nearest: Mapping[str, Mapping] | None) -
 def caution(diagnosis: Mapping) -> str | None:
     """What must be said if the model of the verdict leaves an error above the noise floor; None where it does not."""
     above = {
-        SYMBOL[c]: e["after"] / e["noise"]
+        (IN_WORDS if diagnosis["verdict"] != "agrees" else SYMBOL)[c]: e["after"] / e["noise"]
         for c, e in diagnosis["fit"]["error"].items()
         if e["after"] > CONSPICUOUS * e["noise"]
     }
@@ -133,7 +142,7 @@ def caution(diagnosis: Mapping) -> str | None:
         return None
     if diagnosis["verdict"] != "agrees":
         worst = max(above, key=above.get)
-        return f"Not all is accounted for: up to {above[worst]:.1f} times the noise is left, in {worst}."
+        return f"Not all is accounted for: up to {above[worst]:.1f} times the noise is left, in the {worst}."
     square = diagnosis["fit"]["mean_square"]["calibrated"]
     return (
         f"{joined([*above])}: above the noise floor by differences between runs, which the verdict takes into account"
@@ -142,35 +151,37 @@ def caution(diagnosis: Mapping) -> str | None:
 
 
 def overview(made: Sequence[Mapping]) -> list[str]:
-    """Sentences over all batches: how many differ from the model, how far the errors fall, the largest mismatch."""
+    """A sentence on the measured and one on the simulated batches: verdicts, and how far the errors fall."""
     judged = [card for card in made if card["verdict"]]
-    if not judged:
-        return ["No batch has been diagnosed."] if made else []
-    differing = [card for card in judged if card["verdict"] != "agrees"]
+    if made and not judged:
+        return ["No batch has been diagnosed."]
+    groups = [(origin, [card for card in judged if card["origin"] == origin]) for origin in ("measured", "simulated")]
+    return [_summary(origin, of) for origin, of in groups if of]
+
+
+def _summary(origin: str, of: Sequence[Mapping]) -> str:
     counts = [
-        f"{n} {'agree' if verdict == 'agrees' and n > 1 else verdict}{f' ({means})' if means else ''}"
-        for verdict, means in MEANS.items()
-        if (n := sum(c["verdict"] == verdict for c in judged))
+        f"{f'{n} ' if len(of) > 1 else ''}{shown}{f' ({means})' if means else ''}"
+        for shown, means in dict.fromkeys((c["shown_verdict"], MEANS[c["shown_verdict"]]) for c in _by_verdict(of))
+        for n in [sum(c["shown_verdict"] == shown for c in of)]
     ]
-    of = "1 batch" if len(judged) == 1 else f"{len(judged)} batches"
-    verb = "differs" if len(differing) == 1 else "differ"
-    sentences = [
-        f"{len(differing)} of {of} {verb} from the calibrated model beyond noise: {joined(counts)}."
-        if differing
-        else f"The calibrated model agrees with {'the batch' if len(judged) == 1 else f'all {len(judged)} batches'}."
+    named = f"batch {of[0]['batch']}" if len(of) == 1 else f"{len(of)} batches"
+    falls = [
+        _fall(those, model)
+        for verdict, model in (("explained", "extended model"), ("unexplained", f"nearest model, {NOT_ACCEPTED}"))
+        if (those := [c for c in of if c["verdict"] == verdict and c["worst"]["after"] is not None])
     ]
-    for verdicts, models in ((("explained",), "extended model"), (("unexplained",), f"nearest model ({NOT_ACCEPTED})")):
-        falls = [c for c in differing if c["verdict"] in verdicts and c["worst"]["after"] is not None]
-        if falls:
-            sentences.append(_fall(falls, models))
-    return sentences
+    error = f" Largest held-out error over the noise floor: {'; '.join(falls)}." if falls else ""
+    return f"{origin.capitalize()}, {named}: {joined(counts)}.{error}"
+
+
+def _by_verdict(of: Sequence[Mapping]) -> list[Mapping]:
+    order = list(MEANS)
+    return sorted(of, key=lambda card: order.index(card["shown_verdict"]))
 
 
 def _fall(of: Sequence[Mapping], model: str) -> str:
     """How far the largest error of any channel falls: of one batch, or the median of several."""
     before, after = (median(max(row[key] for row in card["rows"]) for card in of) for key in ("before", "after"))
-    over = f"batch {of[0]['batch']}" if len(of) == 1 else f"median of {len(of)} batches"
-    return (
-        f"With the {model}, the largest held-out error of any channel falls from {before:.1f} to {after:.1f} times the"
-        f" noise floor ({over})."
-    )
+    over = of[0]["batch"] if len(of) == 1 else f"median of {len(of)}"
+    return f"{before:.1f} → {after:.1f} ({model}; {over})"
