@@ -70,10 +70,10 @@ def test_what_an_accepted_model_leaves_above_the_noise_is_said():
 
 def test_the_overview_tells_measured_from_simulated_and_says_how_far_the_errors_fall():
     measured, simulated = overview(made("explained", "unexplained", "agrees", measured=["b-unexplained"]))
-    assert measured.startswith("Measured, batch b-unexplained: unexplained (no listed mechanism fits).")
-    assert measured.endswith("6.0 → 1.2 (nearest model, not accepted; b-unexplained).")
-    assert simulated.startswith("Simulated, 2 batches: 1 explained (missing physics named) and 1 agrees.")
-    assert simulated.endswith("Largest held-out error over the noise floor: 6.0 → 1.2 (extended model; b-explained).")
+    assert measured.startswith("Measured, batch b-unexplained: unexplained. Largest")
+    assert measured.endswith("6.0 → 1.2 (nearest model, not accepted).")
+    assert simulated.startswith("Simulated, 2 batches: 1 explained and 1 agrees.")
+    assert simulated.endswith("Largest held-out error over noise: 6.0 → 1.2 (extended model, b-explained).")
     assert overview(made("agrees")) == ["Simulated, batch b-agrees: agrees."]
     assert overview([]) == []
     assert overview(made(None)) == ["No batch has been diagnosed."]
@@ -84,7 +84,7 @@ def test_explained_with_more_than_noise_left_is_called_in_part():
     worse["fit"]["error"] = ERROR | {"theta_out": ERROR["theta_out"] | {"after": 4e-3}}
     (card,) = cards([summary("b")], [worse])
     assert (card["verdict"], card["shown_verdict"]) == ("explained", "explained in part")
-    assert "explained in part (not all of the missing physics named)" in overview([card])[0]
+    assert "batch b: explained in part." in overview([card])[0]
     assert made("explained")[0]["shown_verdict"] == "explained"
 
 

@@ -15,15 +15,9 @@ from ccmodel.report.verdict import (
     sentence,
 )
 
-# Of the verdicts as cards show them, in the order of the summary.
 IN_PART = "explained in part"
-MEANS = {
-    "explained": "missing physics named",
-    IN_PART: "not all of the missing physics named",
-    "undecided": "candidates not told apart",
-    "unexplained": "no listed mechanism fits",
-    "agrees": "",
-}
+# Verdicts as cards show them, in the order of the summary.
+SHOWN = ("explained", IN_PART, "undecided", "unexplained", "agrees")
 # An error that is so many times the noise floor, in any channel, asks for a sentence if the model is accepted.
 CONSPICUOUS = 1.5
 
@@ -160,28 +154,20 @@ def overview(made: Sequence[Mapping]) -> list[str]:
 
 
 def _summary(origin: str, of: Sequence[Mapping]) -> str:
-    counts = [
-        f"{f'{n} ' if len(of) > 1 else ''}{shown}{f' ({means})' if means else ''}"
-        for shown, means in dict.fromkeys((c["shown_verdict"], MEANS[c["shown_verdict"]]) for c in _by_verdict(of))
-        for n in [sum(c["shown_verdict"] == shown for c in of)]
-    ]
-    named = f"batch {of[0]['batch']}" if len(of) == 1 else f"{len(of)} batches"
+    counted = {shown: sum(card["shown_verdict"] == shown for card in of) for shown in SHOWN}
+    counts = [f"{n} {shown}" if len(of) > 1 else shown for shown, n in counted.items() if n]
     falls = [
-        _fall(those, model)
+        _fall(those, model, len(of) > 1)
         for verdict, model in (("explained", "extended model"), ("unexplained", f"nearest model, {NOT_ACCEPTED}"))
         if (those := [c for c in of if c["verdict"] == verdict and c["worst"]["after"] is not None])
     ]
-    error = f" Largest held-out error over the noise floor: {'; '.join(falls)}." if falls else ""
+    named = f"batch {of[0]['batch']}" if len(of) == 1 else f"{len(of)} batches"
+    error = f" Largest held-out error over noise: {'; '.join(falls)}." if falls else ""
     return f"{origin.capitalize()}, {named}: {joined(counts)}.{error}"
 
 
-def _by_verdict(of: Sequence[Mapping]) -> list[Mapping]:
-    order = list(MEANS)
-    return sorted(of, key=lambda card: order.index(card["shown_verdict"]))
-
-
-def _fall(of: Sequence[Mapping], model: str) -> str:
+def _fall(of: Sequence[Mapping], model: str, is_named: bool) -> str:
     """How far the largest error of any channel falls: of one batch, or the median of several."""
     before, after = (median(max(row[key] for row in card["rows"]) for card in of) for key in ("before", "after"))
-    over = of[0]["batch"] if len(of) == 1 else f"median of {len(of)}"
-    return f"{before:.1f} → {after:.1f} ({model}; {over})"
+    over = f"median of {len(of)}" if len(of) > 1 else of[0]["batch"]
+    return f"{before:.1f} → {after:.1f} ({model}{f', {over}' if is_named else ''})"
