@@ -110,7 +110,7 @@ def _besides(rig: Rig, diagnosis: Mapping) -> str:
 
 
 def _fall(diagnosis: Mapping) -> str:
-    """How far the worst channel's held-out error fell, and what is left of it."""
+    """Held-out error of the worst channel, before and after."""
     if not diagnosis["verdict"]:
         return "–"
     error = diagnosis["fit"]["error"]
