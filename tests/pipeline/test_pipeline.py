@@ -146,6 +146,16 @@ def diagnosed(finished, tmp_path_factory):
     return folder
 
 
+def test_the_page_holds_the_report_of_each_diagnosis(diagnosed):
+    page = (diagnosed / "results/index.html").read_text()
+    (section,) = re.findall(r'<details class="diagnosis" id="diagnosis-tiny">(.*?)</details>', page, re.DOTALL)
+    report = (diagnosed / "results/diagnoses/tiny/report.html").read_text()
+    headings = re.findall(r"<h2[^>]*>(.*?)</h2>", report)
+    assert len(headings) > 2
+    assert all(heading in section for heading in headings)
+    assert section.count("<img") == report.count("<img") > 0
+
+
 def test_what_a_diagnosis_found_is_one_more_set_of_parameters(diagnosed):
     results = diagnosed / "results"
     assert json.loads((results / "diagnoses/tiny/diagnosis.json").read_text())["verdict"] == "agrees"

@@ -12,6 +12,9 @@ from ccmodel.mechanisms.contract import side
 SYMBOL = {channel.short_name: channel.symbol for channel in TABLE.values()}
 IN_WORDS = {channel.short_name: channel.words for channel in TABLE.values()}
 NOT_ACCEPTED = "not accepted"
+# A held-out error above this many times the noise floor asks for a sentence under a model that is accepted. In the map
+# of a diagnosis it is yellow to the eye.
+CONSPICUOUS = 1.5
 # A unit is printed with a prefix if the value is below a tenth of it; these units take none.
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 _WITHOUT_PREFIX = ("1", "1/m", "kg*m^2")

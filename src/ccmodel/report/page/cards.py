@@ -5,6 +5,7 @@ from statistics import median
 
 from ccmodel.recording import ORIGIN
 from ccmodel.report.verdict import (
+    CONSPICUOUS,
     IN_WORDS,
     NOT_ACCEPTED,
     SYMBOL,
@@ -18,8 +19,6 @@ from ccmodel.report.verdict import (
 IN_PART = "explained in part"
 # Verdicts as cards show them, in the order of the summary.
 SHOWN = ("explained", IN_PART, "undecided", "unexplained", "agrees")
-# An error that is so many times the noise floor, in any channel, asks for a sentence if the model is accepted.
-CONSPICUOUS = 1.5
 
 
 def cards(batches: Sequence[Mapping], diagnoses: Sequence[Mapping]) -> list[dict]:

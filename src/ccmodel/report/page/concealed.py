@@ -52,7 +52,7 @@ def read_concealed(file: Path) -> Concealed:
 
 
 def beside(concealed: Concealed, diagnoses: Sequence[Mapping]) -> list[dict]:
-    """For each rig its effects, what each diagnosis said of them, what it said besides, and what is left."""
+    """For each rig its effects, what each diagnosis said of them and besides them, and the held-out errors."""
     of_batch = {d["batch"]: d for d in diagnoses}
     tables = []
     for rig in concealed.rigs:

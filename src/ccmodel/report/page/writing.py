@@ -93,9 +93,7 @@ def write_report(
     messages = _messages(raw, unusable, batches, fits, simulations)
     write_json(page_file.parent / LEFT_OUT, messages)
     diagnoses = [read_json(file) for file in inputs["diagnoses"]]
-    reports = {
-        d["batch"]: Path(f).read_text(encoding="utf-8") for d, f in zip(diagnoses, inputs["reports"], strict=True)
-    }
+    reports = [Path(file).read_text(encoding="utf-8") for file in inputs["reports"]]
     content = Content(
         batches=batches,
         errors=pd.read_parquet(inputs["errors"]),

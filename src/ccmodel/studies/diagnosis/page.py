@@ -24,6 +24,7 @@ from ccmodel.recording import ORIGIN
 from ccmodel.report.embedding import asset
 from ccmodel.report.figures import COLOURS, STYLE, legend_below, stamp_figure, title_figure
 from ccmodel.report.verdict import (
+    CONSPICUOUS,
     NOT_ACCEPTED,
     SYMBOL,
     headline,
@@ -37,8 +38,6 @@ LOOPS = 3
 CANDIDATES = 8
 FAINT = "#9a9a9a"
 WITH_FOUND = "with the mechanisms found"
-# A cell of the map above this many times the noise floor is yellow to the eye, and asks for a sentence under `agrees`.
-CONSPICUOUS = 1.5
 
 
 def _baseline(report: dict) -> str:
