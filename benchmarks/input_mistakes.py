@@ -1,0 +1,292 @@
+"""Are mistakes in logs and batch files named, and is nothing else accused? (`make input-checks`)
+
+Twenty mistakes are made in copies of batches, each with sizes, recordings and channels drawn from a seed, and the
+copies are read as `ccmodel check` reads them. The batches are a measured one, a simulated one and concealed cases of
+the proof with fresh seeds. The same batches without a mistake count the false alarms. Writes a section of
+docs/input-checks.md.
+"""
+
+import argparse
+import re
+import shutil
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pandas as pd
+from ruamel.yaml import YAML
+
+from ccmodel.rig.ingest import ingest_batch
+from proof.build import build
+from proof.cases import draw
+
+MEASURED, SIMULATED = Path("data/raw/da-vinci"), Path("data/raw/rich")
+PAGE = Path("docs/input-checks.md")
+BEGIN, END = "<!-- made by `make input-checks` -->", "<!-- end -->"
+COUNTS = ("drive_encoder_counts", "load_encoder_counts")
+NOISY = re.compile(r"_(current_A|torque_counts|load_cell_V)$")
+# Seeds of the draws: of the mistakes, and of the proof's cases, which no limit of the checks was chosen on.
+SEED, CASES_SEED = 20261123, 960000
+
+
+class NotApplicableError(Exception):
+    """The batch has no such channel or value."""
+
+
+@dataclass
+class Copy:
+    """A batch in memory, to be damaged.
+
+    Attributes
+    ----------
+    logs : dict of str to DataFrame
+        Logs by recording id.
+    description : dict
+        Content of batch.yaml.
+    donors : sequence of DataFrame
+        Logs of another rig.
+    """
+
+    logs: dict[str, pd.DataFrame]
+    description: dict
+    donors: Sequence[pd.DataFrame]
+
+    @property
+    def rig(self) -> dict:
+        """The section `rig`."""
+        return self.description["rig"]
+
+    def columns(self, pattern: str) -> list[str]:
+        """Columns of all logs whose name matches."""
+        found = [c for c in next(iter(self.logs.values())) if re.search(pattern, c)]
+        if not found:
+            raise NotApplicableError
+        return found
+
+    def any_log(self, random: np.random.Generator) -> str:
+        """Name of a recording."""
+        return str(random.choice(list(self.logs)))
+
+    def entry(self, name: str) -> dict:
+        """Entry of a recording."""
+        return next(e for e in self.description["recordings"] if e["id"] == name)
+
+
+def read_copy(folder: Path, donors: Sequence[pd.DataFrame] = ()) -> Copy:
+    """A batch as a copy in memory."""
+    description = YAML(typ="safe").load(folder / "batch.yaml")
+    logs = {e["id"]: pd.read_csv(folder / e["file"]) for e in description["recordings"]}
+    return Copy(logs, description, donors)
+
+
+def write_copy(copy: Copy, folder: Path) -> Path:
+    """Write a copy as a batch folder."""
+    folder.mkdir(parents=True)
+    copy.description["batch"] = folder.name
+    for name, table in copy.logs.items():
+        copy.entry(name)["file"] = f"{name}.csv"
+        table.to_csv(folder / f"{name}.csv", index=False)
+    yaml = YAML()
+    yaml.dump(copy.description, folder / "batch.yaml")
+    return folder
+
+
+def _times_in_ms(copy: Copy, random) -> str:
+    for table in copy.logs.values():
+        table["time_s"] *= 1e3
+    return "time_s"
+
+
+def _scale_of_angles(factor: Callable[[np.random.Generator], float], ends: Sequence[str]):
+    def damage(copy: Copy, random) -> str:
+        if len(ends) == 2:  # seen by the spring alone
+            _spring_of(copy)
+        by = factor(random)
+        for end in ends:
+            copy.rig[end]["encoder_counts_per_rev"] = float(copy.rig[end]["encoder_counts_per_rev"] / by)
+        return "theta"
+
+    return damage
+
+
+def _spring_of(copy: Copy) -> float:
+    if "spring_stiffness_Nm_per_rad" not in copy.rig["load"]:
+        raise NotApplicableError
+    return copy.rig["load"]["spring_stiffness_Nm_per_rad"]
+
+
+def _quadrature(random) -> float:
+    return float(random.choice([4.0, 0.25]))
+
+
+def _degrees(random) -> float:
+    return 180 / np.pi
+
+
+def _wrong_sign(pattern: str, what: str):
+    def damage(copy: Copy, random) -> str:
+        for column in copy.columns(pattern):
+            zero = 2 * copy.rig[column.split("_")[0]]["load_cell"]["zero_V"] if column.endswith("cell_V") else 0.0
+            for table in copy.logs.values():
+                table[column] = zero - table[column]
+        return what
+
+    return damage
+
+
+def _either_load_cell(copy: Copy, random) -> str:
+    end = random.choice(["drive", "load"])
+    return _wrong_sign(f"^{end}_load_cell_V", f"F_{end}")(copy, random)
+
+
+def _exchanged_ends(copy: Copy, random) -> str:
+    exchange = {"drive": "load", "load": "drive"}
+    for name, table in copy.logs.items():
+        renamed = {c: re.sub("^(drive|load)_", lambda m: f"{exchange[m[1]]}_", c) for c in table}
+        copy.logs[name] = table.rename(columns=renamed)
+    return "drive and load"
+
+
+def _constant(copy: Copy, random) -> str:
+    name, column = copy.any_log(random), random.choice(copy.columns("^(?!time_s|drive_encoder)"))
+    copy.logs[name][column] = copy.logs[name][column].iloc[0]
+    return column
+
+
+def _saturated(copy: Copy, random) -> str:
+    name, column = copy.any_log(random), random.choice(copy.columns(NOISY.pattern))
+    values = copy.logs[name][column]
+    middle, half = (values.max() + values.min()) / 2, np.ptp(values) / 2
+    limit = random.uniform(0.5, 0.8) * half
+    copy.logs[name][column] = values.clip(middle - limit, middle + limit).round(5)
+    return column
+
+
+def _wrapped(copy: Copy, random) -> str:
+    name, column = copy.any_log(random), random.choice(COUNTS)
+    values = copy.logs[name][column]
+    copy.logs[name][column] = (values - values.min()) % max(2 ** int(np.log2(0.7 * np.ptp(values))), 16)
+    return column
+
+
+def _copied(copy: Copy, random) -> str:
+    one, other = random.choice(list(copy.logs), 2, replace=False)
+    column = random.choice(copy.columns("^(?!time_s|drive_encoder)"))
+    n = min(len(copy.logs[one]), len(copy.logs[other]))
+    copy.logs[one] = copy.logs[one].iloc[:n].copy()
+    copy.logs[one][column] = copy.logs[other][column].to_numpy()[:n]
+    return {
+        "load_encoder_counts": "theta_out", "drive_current_A": "tau_in", "drive_torque_counts": "tau_in",
+        "load_current_A": "tau_out", "load_torque_counts": "tau_out", "drive_load_cell_V": "F_drive",
+        "load_load_cell_V": "F_load",
+    }[column]  # fmt: skip
+
+
+def _lost_samples(copy: Copy, random) -> str:
+    name = copy.any_log(random)
+    table = copy.logs[name]
+    time = table["time_s"].to_numpy()
+    speed = np.abs(pd.Series(np.gradient(table[COUNTS[0]], time)).rolling(41, center=True).mean())
+    speed = speed.where(time >= copy.entry(name).get("settled_s", 0.0))
+    fast = np.flatnonzero((speed > 0.7 * speed.max()).to_numpy())
+    at = int(random.choice(fast[fast < len(table) - 400]))
+    lost = max(2, round(random.uniform(0.03, 0.15) / np.median(np.diff(time))))
+    kept = table.drop(table.index[at : at + lost])
+    copy.logs[name] = kept.assign(time_s=time[: len(kept)])
+    return "time_s"
+
+
+def _drifting_clocks(copy: Copy, random) -> str:
+    rate = random.choice([-1, 1]) * random.uniform(0.006, 0.02)
+    for table in copy.logs.values():
+        time = table["time_s"].to_numpy()
+        for column in copy.columns("^load_"):
+            moved = np.interp(time[0] + (time - time[0]) * (1 + rate), time, table[column])
+            table[column] = np.round(moved) if column.endswith("counts") else moved.round(6)
+    return "clocks"
+
+
+def _other_rig(copy: Copy, random) -> str:
+    donors = [d for d in copy.donors if set(d) == set(next(iter(copy.logs.values())))]
+    if not donors:
+        raise NotApplicableError
+    name = copy.any_log(random)
+    copy.logs[name] = donors[random.integers(len(donors))].copy()
+    return name
+
+
+def _radius_in_mm(copy: Copy, random) -> str:
+    for end in ("drive", "load"):
+        copy.rig[end]["pulley_radius_m"] = float(copy.rig[end]["pulley_radius_m"] * 1e3)
+    return "pulley_radius_m"
+
+
+def _forgotten_bend(copy: Copy, random) -> str:
+    copy.columns("load_cell_V")
+    entry = copy.entry(copy.any_log(random))
+    entry["conduit"] = [piece | {"bend_rad": 0.0} for piece in entry["conduit"]]
+    return f"{entry['id']}: bend_rad"
+
+
+def _stated(section: str, key: str, needs: str = "load_cell_V"):
+    def damage(copy: Copy, random) -> str:
+        copy.columns(needs)
+        if key not in copy.rig[section]:
+            raise NotApplicableError
+        factor = float(np.exp(random.uniform(np.log(7), np.log(20)))) ** random.choice([-1, 1])
+        copy.rig[section][key] = float(copy.rig[section][key] * factor)
+        return f"rig.{section}.{key}"
+
+    return damage
+
+
+MISTAKES: Mapping[str, Callable[[Copy, np.random.Generator], str]] = {
+    "sample times in ms": _times_in_ms,
+    "both angles in degrees": _scale_of_angles(_degrees, ("drive", "load")),
+    "load angle in degrees": _scale_of_angles(_degrees, ("load",)),
+    "counts per turn of both ends off by four": _scale_of_angles(_quadrature, ("drive", "load")),
+    "counts per turn of one end off by four": lambda copy, random: _scale_of_angles(
+        _quadrature, (str(random.choice(["drive", "load"])),)
+    )(copy, random),
+    "sign of the drive torque": _wrong_sign("^drive_(current_A|torque_counts)", "tau_in"),
+    "sign of the load torque": _wrong_sign("^load_(current_A|torque_counts)", "tau_out"),
+    "sign of the load angle": _wrong_sign("^load_encoder_counts", "theta_out"),
+    "sign of a load cell": _either_load_cell,
+    "drive and load exchanged": _exchanged_ends,
+    "cables A and B exchanged": _wrong_sign("(current_A|torque_counts)$", "A and B"),
+    "a channel constant": _constant,
+    "a channel saturated": _saturated,
+    "an encoder wrapped": _wrapped,
+    "a channel copied from another recording": _copied,
+    "samples lost without a gap in time": _lost_samples,
+    "clocks that drift": _drifting_clocks,
+    "a recording of another rig": _other_rig,
+    "pulley radii in mm": _radius_in_mm,
+    "a forgotten bend": _forgotten_bend,
+    "stated stiffness": _stated("cable", "stiffness_N_per_m"),
+    "stated friction": _stated("cable", "friction_coefficient"),
+    "stated spring": _stated("load", "spring_stiffness_Nm_per_rad", "^load_(current_A|torque_counts)"),
+}
+
+
+def said_of(folder: Path) -> list[str]:
+    """What a check says cannot be, a sentence each."""
+    findings = ingest_batch(folder).findings
+    return [f"{f.column or ''} {Path(f.file).name} {f.text}" for f in findings if f.severity != "warning"]
+
+
+def made(source: Copy, mistake: str, seed: int, folder: Path) -> tuple[str, list[str]] | None:
+    """What is wrong and what is said of a copy with a mistake; None if the mistake cannot be made in it."""
+    copy = Copy({k: v.copy() for k, v in source.logs.items()}, deepcopy(source.description), source.donors)
+    try:
+        truth = MISTAKES[mistake](copy, np.random.default_rng([SEED, seed, list(MISTAKES).index(mistake)]))
+    except NotApplicableError:
+        return None
+    try:
+        return truth, said_of(write_copy(copy, folder))
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)

@@ -1,0 +1,59 @@
+"""Limits of the consistency checks.
+
+A limit lies beyond what the listed mechanisms do to a relation at the ends of their plausible ranges, and beyond the
+error of the estimate itself. `benchmarks/input_mistakes.py` counts the mistakes that are found and the false alarms.
+"""
+
+# Share of its greatest speed from which an end counts as moving; window, s, over which the speed is averaged.
+MOVING, SPEED_WINDOW_S = 0.3, 0.05
+# Share of the pretension, plus a force in N, from which a cable counts as taut.
+TAUT_SHARE, TAUT_N = 0.25, 0.3
+# The cable that is pulled carries this many times the tension of the other: its ratio of tensions is then determined.
+PULLED = 1.5
+# Fewest samples of an estimate.
+FEWEST_SAMPLES = 20
+
+# Correlation or share of work below which a sign is wrong. With the right sign it was 0.15 or more.
+WRONG_SIGN = -0.1
+# The same for the energy that is lost between the ends, as a share of the energy exchanged at both: 0.9 or more.
+WRONG_LOSS = -0.3
+# Share of the recordings that must show a wrong sign, so that the batch file is named and not the recordings.
+MOST_RECORDINGS = 0.7
+# Correlation of the two angles below which they are not of one run: 0.97 or more on the rigs seen so far.
+SAME_RUN = 0.8
+
+# Factor by which stated and found stiffness, friction or spring may differ. Compliant ends alone reach 2.
+STATED_FACTOR = 3.0
+# Travel of the load over that of the drive, both at the cable, in the recording of the greatest stroke. Friction and
+# stretch only lose travel: at least 0.74 remained, and 1 / 0.74 where the ends are exchanged.
+LEAST_TRAVEL, MOST_TRAVEL = 0.35, 1.6
+# Factor of the noted amplitude that points at the encoders. It never accuses alone: a note is no measurement.
+AMPLITUDE_FACTOR = 2.5
+# Factor between the sum of tensions at rest and twice the pretension, after an offset of the load cell in N.
+PRETENSION_FACTOR, PRETENSION_N = 2.0, 3.0
+# Torque over radius and sum at the load; above 1 a cable would push.
+MOST_TORQUE = 1.5
+# Radii of pulleys, m.
+SMALLEST_RADIUS_M, LARGEST_RADIUS_M = 3e-4, 0.25
+# Bend below which a conduit counts as straight, rad, and logarithm of the ratio of tensions that a straight one lacks.
+STRAIGHT_RAD, STRAIGHT_LOG_RATIO = 0.3, 0.25
+
+# Friction for each radian of stated bend, over that of every other recording with the same or a lower pretension.
+FORGOTTEN_BEND = 1.75
+# Scatter of a relation between recordings of one rig (standard deviation of its logarithm), where amplitude, speed and
+# tension do not explain it; and the distance, in such deviations, from which a recording is another rig's.
+SCATTER = {"spring": 0.07, "friction": 0.15, "stiffness": 0.15, "travel": 0.1, "pretension": 0.08, "amplitude": 0.1}
+OTHER_RIG = 4.0
+# Factor of stroke, tension and frequency within which recordings count as alike.
+ALIKE = 1.1
+
+# Rate at which the load's lag changes from cycle to cycle, s/s, and its change over the recording, s.
+DRIFT_RATE, DRIFT_S = 0.004, 0.02
+# Relative deviation of amplitude and period up to which cycles count as equal, and fewest crossings of the middle.
+EQUAL_CYCLES, FEWEST_CROSSINGS = 0.05, 4
+
+# Change of both angles in one sample, over the largest change near it and in steps of the encoder; samples nearby.
+LOST_FACTOR, LOST_STEPS, LOST_NEAR = 2.5, 2.0, 12
+
+# Share of equal changes from which a channel is a copy: sensors with noise, and angles, whose counts agree by chance.
+COPIED_NOISE, COPIED_ANGLE = 0.5, 0.98

@@ -1,0 +1,212 @@
+"""Parity relations: what two sensors, or a sensor and the batch file, say independently of each other.
+
+The relations are those of the transmission, with every mechanism of the project allowed for: cables pull, friction
+dissipates, a spring returns its energy, and a cable that slips along its whole conduit has the capstan's ratio of
+tensions, ln(T1 / T2) = mu phi.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from ccmodel.channels import F_DRIVE, F_LOAD, T1, T2, T3, T4, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
+from ccmodel.recording import Recording
+from ccmodel.rig.batch import Batch
+from ccmodel.rig.consistency import limits
+
+
+@dataclass(frozen=True)
+class Parity:
+    """Relations of one recording.
+
+    Attributes
+    ----------
+    recording : Recording
+    batch : Batch
+        The stated values.
+    """
+
+    recording: Recording
+    batch: Batch
+
+    @cached_property
+    def moving(self) -> Mapping[str, NDArray]:
+        """Channels after the initial rest and the start-up transient."""
+        r = self.recording
+        kept = r.time_s >= max(r.settled_s, r.rest_s)
+        return {name: values[kept] for name, values in r.channels.items()} | {"time_s": r.time_s[kept]}
+
+    @cached_property
+    def signs(self) -> dict[str, float]:
+        """Correlations and shares of work by relation, in -1 to 1, each positive if the signs are right.
+
+        - ``angles``: correlation of drive and load angle
+        - ``torques``: correlation of drive and load torque
+        - ``work``: net work of the drive, over the work exchanged
+        - ``load``: correlation of load torque and angle for a spring, otherwise net work on the load
+        - ``loss``: energy lost between the ends, over the energy exchanged at both
+        - ``F_drive``, ``F_load``: sign of the sum of tensions
+        """
+        found = {}
+        x = self.moving
+        spring = self.batch.rig.load.spring_stiffness_Nm_per_rad
+        if THETA_OUT in x:
+            found["angles"] = correlation(x[THETA_IN], x[THETA_OUT])
+        if TAU_IN in x and TAU_OUT in x:
+            found["torques"] = correlation(x[TAU_IN], x[TAU_OUT])
+        cycles = closed_part(x[THETA_IN])
+        drive, load = (work(x, ends, cycles) for ends in ((TAU_IN, THETA_IN), (TAU_OUT, THETA_OUT)))
+        if drive:
+            found["work"] = drive[0] / drive[1]
+        if load:
+            found["load"] = correlation(x[TAU_OUT], x[THETA_OUT]) if spring else load[0] / load[1]
+        if drive and load:
+            found["loss"] = (drive[0] - load[0]) / (abs(drive[0]) + abs(load[0]))
+        for name, channel in (("F_drive", F_DRIVE), ("F_load", F_LOAD)):
+            if channel in x:
+                found[name] = float(np.sign(np.median(x[channel])))
+        return {name: value for name, value in found.items() if np.isfinite(value)}
+
+    @cached_property
+    def ratios(self) -> dict[str, float]:
+        """Found over stated value by relation.
+
+        - ``travel``: travel of the load over that of the drive, at the cable
+        - ``amplitude``: half the stroke over the noted amplitude
+        - ``spring``: load torque over load angle, over the stated spring
+        - ``friction``: ln of the ratio of tensions in full slip, over mu phi
+        - ``stiffness``: mean tension over stretch of the taut cables, over the stated stiffness
+        - ``pretension at the drive``, ``pretension at the load``: sum of tensions at rest over twice the pretension
+        - ``pretension``: their geometric mean, which friction while the cables were tensioned leaves as it is
+        - ``torque at the load``: torque over radius and sum of tensions, its 95 % quantile
+        """
+        x, rig, entry = self.moving, self.batch.rig, self.recording
+        radii = rig.drive.pulley_radius_m, rig.load.pulley_radius_m
+        found = {}
+        if (amplitude := entry.excitation.get("amplitude_rad")) and entry.excitation.get("wave") in ("sine", "triangle"):
+            found["amplitude"] = np.ptp(x[THETA_IN]) / 2 / amplitude
+        if THETA_OUT in x:
+            found["travel"] = np.ptp(x[THETA_OUT]) * radii[1] / (np.ptp(x[THETA_IN]) * radii[0])
+        if THETA_OUT in x and TAU_OUT in x and (spring := rig.load.spring_stiffness_Nm_per_rad):
+            angle = x[THETA_OUT] - x[THETA_OUT].mean()
+            found["spring"] = (angle @ x[TAU_OUT]) / (angle @ angle) / spring
+        resting = entry.time_s <= entry.rest_s if entry.rest_s else np.zeros(entry.time_s.size, dtype=bool)
+        for name, channel in (("drive", F_DRIVE), ("load", F_LOAD)):
+            if channel in entry and resting.any() and not entry.far_end:
+                found[f"pretension at the {name}"] = entry[channel][resting].mean() / (2 * entry.pretension_N)
+        ends = [found[f"pretension at the {name}"] for name in ("drive", "load") if f"pretension at the {name}" in found]
+        if ends and min(ends) > 0:
+            found["pretension"] = np.exp(np.mean(np.log(ends)))
+        if TAU_OUT in x and F_LOAD in x:
+            force = np.maximum(np.abs(x[F_LOAD]), limits.TAUT_N)
+            found["torque at the load"] = np.quantile(np.abs(x[TAU_OUT]) / radii[1] / force, 0.95)
+        if (log_ratio := self.log_ratio) is not None and self.capstan > 0:
+            found["friction"] = log_ratio / self.capstan
+        if (stiffness := self.stiffness) is not None:
+            found["stiffness"] = stiffness / self.stated_stiffness
+        return {name: float(value) for name, value in found.items() if np.isfinite(value)}
+
+    @property
+    def capstan(self) -> float:
+        """Stated mu phi."""
+        return self.batch.rig.cable.friction_coefficient * self.recording.path.bend_rad
+
+    @property
+    def stated_stiffness(self) -> float:
+        """Stated stiffness of this recording's length of cable, N/m."""
+        cable = self.batch.rig.cable
+        return cable.stiffness_N_per_m * cable.length_m / self.recording.path.length_m
+
+    @cached_property
+    def log_ratio(self) -> float | None:
+        """ln(T1 / T2) of the pulled cable in full slip, from the sums and the load's tensions; None if not determined.
+
+        With u = T1 / T2 and the other cable sliding against its tension, F_drive = u T2 + T4 / u. The drive torque,
+        which holds the friction of the drive's bearing, does not enter.
+        """
+        x = self.moving
+        if not all(name in x for name in (F_DRIVE, T2, T4, THETA_OUT)):
+            return None
+        found = []
+        for direction, pulled, other in ((1, T2, T4), (-1, T4, T2)):
+            a, b = x[pulled], np.maximum(x[other], 0.0)
+            slips = self._slips(direction) & (a > self._taut) & (a > limits.PULLED * b)
+            if slips.sum() >= limits.FEWEST_SAMPLES:
+                root = np.sqrt(np.maximum(x[F_DRIVE] ** 2 - 4 * a * b, 0.0))
+                ratio = ((x[F_DRIVE] + root) / (2 * np.where(slips, a, 1.0)))[slips]
+                found.append(np.median(np.log(np.maximum(ratio, 1e-9))))
+        return float(np.mean(found)) if found else None
+
+    @cached_property
+    def stiffness(self) -> float | None:
+        """Slope of the mean tension over the stretch of the taut cables, N/m; None if it is not determined."""
+        x, rig = self.moving, self.batch.rig
+        if not all(name in x for name in (T1, T2, T3, T4, THETA_OUT)):
+            return None
+        stretch = rig.drive.pulley_radius_m * x[THETA_IN] - rig.load.pulley_radius_m * x[THETA_OUT]
+        tension, length = [], []
+        for ends, sign in (((T1, T2), 1), ((T3, T4), -1)):
+            taut = np.minimum(x[ends[0]], x[ends[1]]) > self._taut
+            tension.append((x[ends[0]] + x[ends[1]])[taut] / 2)
+            length.append(sign * stretch[taut])
+        tension, length = np.concatenate(tension), np.concatenate(length)
+        if tension.size < limits.FEWEST_SAMPLES or not np.ptp(length) > 0 or not np.ptp(tension) > 0:
+            return None
+        # Both have errors: the geometric mean of the two regressions.
+        covariance = np.cov(length, tension)
+        return float(np.sign(covariance[0, 1]) * np.sqrt(covariance[1, 1] / covariance[0, 0]))
+
+    @property
+    def _taut(self) -> float:
+        return limits.TAUT_SHARE * self.recording.pretension_N + limits.TAUT_N
+
+    def _slips(self, direction: int) -> NDArray:
+        """Samples at which both ends move fast in a direction: both cables slip along the whole conduit."""
+        x = self.moving
+        drive, load = (direction * speed(x[name], x["time_s"]) for name in (THETA_IN, THETA_OUT))
+        return (drive > limits.MOVING * np.abs(drive).max()) & (load > limits.MOVING * np.abs(load).max())
+
+
+def correlation(one: NDArray, other: NDArray) -> float:
+    """Correlation of two channels; nan if one is constant."""
+    x, y = one - one.mean(), other - other.mean()
+    scale = np.sqrt((x @ x) * (y @ y))
+    return float(x @ y / scale) if scale > 0 else np.nan
+
+
+def speed(values: NDArray, time_s: NDArray) -> NDArray:
+    """Derivative averaged over `limits.SPEED_WINDOW_S`, in 1/s of the values."""
+    window = max(3, round(limits.SPEED_WINDOW_S / float(np.median(np.diff(time_s)))) | 1)
+    return uniform_filter1d(np.gradient(uniform_filter1d(values, window), time_s), window)
+
+
+def crossings(values: NDArray) -> NDArray:
+    """Samples at which a channel crosses the middle of its range, not counting those of noise about it."""
+    middle, band = (values.max() + values.min()) / 2, 0.1 * np.ptp(values)
+    side = np.sign(np.where(np.abs(values - middle) > band, values - middle, 0.0))
+    known = np.flatnonzero(side)
+    changes = np.flatnonzero(np.diff(side[known]))
+    ends = zip(known[changes], known[changes + 1], strict=True)
+    return np.array([a + int(np.argmin(np.abs(values[a : b + 1] - middle))) for a, b in ends], dtype=int)
+
+
+def closed_part(angle: NDArray) -> slice:
+    """Samples between the first and the last crossing of the middle: a torque's zero does no work over them."""
+    found = crossings(angle)
+    return slice(found[0], found[-1] + 1) if found.size > 1 else slice(0, angle.size)
+
+
+def work(x: Mapping[str, NDArray], ends: tuple[str, str], part: slice) -> tuple[float, float] | None:
+    """Net and exchanged work of a torque over an angle, J; None without both, or if nothing is exchanged."""
+    if not all(name in x for name in ends):
+        return None
+    torque, angle = (x[name][part] for name in ends)
+    # Over a closed part the mean torque does no work, but it would count as work exchanged.
+    torque = torque - torque.mean()
+    steps = (torque[1:] + torque[:-1]) / 2 * np.diff(angle)
+    exchanged = float(np.abs(steps).sum())
+    return (float(steps.sum()), exchanged) if exchanged > 0 else None

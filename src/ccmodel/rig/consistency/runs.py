@@ -1,0 +1,168 @@
+"""Recordings that do not belong to their batch: another rig's, a forgotten bend, copied channels, two runs in one log."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ccmodel.channels import ANGLE_AT, CHANNELS, MEASURED, TENSIONS, THETA_IN, THETA_OUT
+from ccmodel.rig.consistency import limits
+from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
+from ccmodel.rig.consistency.parity import Parity, speed
+
+
+def foreign_runs(parities: Sequence[Parity]) -> list[Contradiction]:
+    """Contradictions of single recordings: the first that is found of each."""
+    found = []
+    for parity in parities:
+        others = [p for p in parities if p is not parity]
+        contradiction = _two_runs(parity) or _straight(parity) or _bend(parity, others) or _other_rig(parity, others)
+        if contradiction:
+            found.append(contradiction)
+    return found
+
+
+def copied_channels(parities: Sequence[Parity]) -> list[Contradiction]:
+    """Channels of a recording that repeat those of another, change by change."""
+    found = []
+    for k, parity in enumerate(parities):
+        for earlier in parities[:k]:
+            copied = [c for c in CHANNELS if c not in TENSIONS and _is_copy(parity, earlier, c)]
+            # The same command gives the same counts of the drive: that angle alone is no copy.
+            if any(c in MEASURED for c in copied):
+                names = ", ".join(copied)
+                text = (
+                    f"{names} of {parity.recording.id} repeat those of {earlier.recording.id}, sample by sample: noise"
+                    " does not repeat; one of the two logs holds a copy"
+                )
+                found.append(Contradiction(f"{parity.recording.id}: {names}", text, parity.recording.id))
+    return found
+
+
+def _is_copy(one: Parity, other: Parity, channel: str) -> bool:
+    if channel not in one.recording or channel not in other.recording:
+        return False
+    n = min(one.recording.time_s.size, other.recording.time_s.size)
+    a, b = (np.diff(p.recording[channel][:n]) for p in (one, other))
+    scale = 1e-9 * max(np.abs(a).max(initial=0.0), np.abs(b).max(initial=0.0))
+    changes = (np.abs(a) > scale) | (np.abs(b) > scale)
+    if changes.sum() < limits.FEWEST_SAMPLES:
+        return False
+    limit = limits.COPIED_ANGLE if channel in ANGLE_AT.values() else limits.COPIED_NOISE
+    return float(np.mean(np.abs(a - b)[changes] <= scale)) > limit
+
+
+def _two_runs(parity: Parity) -> Contradiction | None:
+    """Angles of the two ends that do not belong to one run."""
+    together = parity.signs.get("angles")
+    if together is None or abs(together) > limits.SAME_RUN:
+        return None
+    if parity.ratios["travel"] < limits.LEAST_TRAVEL:  # A load that hardly moves need not follow.
+        return None
+    text = (
+        f"the load angle of {parity.recording.id} does not follow its drive angle (correlation {together:.2f}): one of"
+        " the two is of another run, or their clocks are apart"
+    )
+    return Contradiction(f"{parity.recording.id}: theta_out", text, parity.recording.id, LIKELY)
+
+
+def _straight(parity: Parity) -> Contradiction | None:
+    """Friction of a conduit that is stated as straight."""
+    bend, found = parity.recording.path.bend_rad, parity.log_ratio
+    if found is None or bend > limits.STRAIGHT_RAD or found < limits.STRAIGHT_LOG_RATIO + parity.capstan:
+        return None
+    text = (
+        f"conduit of {parity.recording.id} is stated with {bend:.3g} rad of bend, but T1 / T2 reaches"
+        f" {np.exp(found):.3g} in full slip, as friction along {_bend_for(parity, found)} of bend: a forgotten bend_rad"
+    )
+    return Contradiction(f"{parity.recording.id}: bend_rad", text, parity.recording.id, LIKELY)
+
+
+def _bend_for(parity: Parity, log_ratio: float) -> str:
+    mu = parity.batch.rig.cable.friction_coefficient
+    return f"{log_ratio / mu:.2g} rad" if mu else "some radians"
+
+
+def _bend(parity: Parity, others: Sequence[Parity]) -> Contradiction | None:
+    """A recording with more friction for its bend than all others."""
+    tension = parity.recording.pretension_N
+    excess = _excess("friction", parity, [p for p in others if p.recording.pretension_N <= 1.1 * tension])
+    if np.exp(excess) < limits.FORGOTTEN_BEND:
+        return None
+    bend = parity.recording.path.bend_rad
+    text = (
+        f"conduit of {parity.recording.id} is stated with {bend:.3g} rad of bend, but its friction is"
+        f" {np.exp(excess):.2g} times that of the other recordings for each radian: a bend of"
+        f" {bend * np.exp(excess):.2g} rad would agree with them; check bend_rad"
+    )
+    return Contradiction(f"{parity.recording.id}: bend_rad", text, parity.recording.id, LIKELY)
+
+
+def _other_rig(parity: Parity, others: Sequence[Parity]) -> Contradiction | None:
+    """A recording whose spring, friction, stiffness, travel or pretension is not that of the others."""
+    deviations = deviations_of(parity, others)
+    distance = float(np.sqrt(sum((d / limits.SCATTER[name]) ** 2 for name, d in deviations.items())))
+    if distance < limits.OTHER_RIG:
+        return None
+    apart = [
+        f"{name} {np.exp(d):.2g} times" for name, d in deviations.items() if abs(d) > limits.SCATTER[name]
+    ]
+    text = (
+        f"{parity.recording.id} is of another rig or of other conditions than the batch states: compared with the"
+        f" recordings of similar stroke and tension it has {', '.join(apart)} theirs"
+    )
+    return Contradiction(parity.recording.id, text, parity.recording.id, SURE if distance > 6 else LIKELY)
+
+
+def deviations_of(parity: Parity, others: Sequence[Parity]) -> dict[str, float]:
+    """Logarithm of each relation over the nearest value of comparable recordings, 0 within their range.
+
+    Physics makes a relation rise or fall with the conditions: backlash and a stiffening load raise the spring with the
+    stroke and an inertia lowers it with the frequency; friction falls with the tension, and stiffness rises with it. An
+    excess is therefore compared only with recordings that should have more, a deficit with those that should have less.
+    """
+    found = {}
+    for name, conditions in _DEPENDENCE.items():
+        if parity.ratios.get(name, 0.0) > 0:
+            more = [p for p in others if all(_at_least(c(p), c(parity), sign) for c, sign in conditions)]
+            less = [p for p in others if all(_at_least(c(p), c(parity), -sign) for c, sign in conditions)]
+            found[name] = _excess(name, parity, more) - _excess(name, parity, less, -1)
+    return found
+
+
+def _stroke(parity: Parity) -> float:
+    return float(np.ptp(parity.moving[THETA_IN]))
+
+
+def _frequency(parity: Parity) -> float:
+    """Speed over angle, each as a root mean square, 1/s."""
+    x = parity.moving
+    return float(np.std(speed(x[THETA_IN], x["time_s"])) / max(np.std(x[THETA_IN]), 1e-12))
+
+
+def _tension(parity: Parity) -> float:
+    return parity.recording.pretension_N
+
+
+# Conditions that a relation rises (1) or falls (-1) with.
+_DEPENDENCE = {
+    "spring": ((_stroke, 1), (_frequency, -1)),
+    "friction": ((_tension, -1),),
+    "stiffness": ((_tension, 1),),
+    "travel": ((_stroke, 1),),
+    "pretension": ((_tension, 1), (_tension, -1)),
+    "amplitude": (),
+}
+
+
+def _at_least(other: float, here: float, sign: int) -> bool:
+    """Whether a condition of another recording is at least (sign 1) or at most (-1) that of this one, about."""
+    return other >= here / limits.ALIKE if sign > 0 else other <= here * limits.ALIKE
+
+
+def _excess(name: str, parity: Parity, others: Sequence[Parity], sign: int = 1) -> float:
+    """By how much the logarithm of a relation exceeds (sign 1) or falls below (-1) all others; 0 without others."""
+    values = [sign * np.log(p.ratios[name]) for p in others if p.ratios.get(name, 0.0) > 0]
+    if not values or parity.ratios.get(name, 0.0) <= 0:
+        return 0.0
+    return max(0.0, float(sign * np.log(parity.ratios[name]) - max(values)))

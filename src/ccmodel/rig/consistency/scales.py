@@ -1,0 +1,171 @@
+"""Wrong scales: a constant of the batch file that the recordings contradict."""
+
+from collections.abc import Mapping, Sequence
+from math import isclose
+
+import numpy as np
+
+from ccmodel.rig.batch import Batch
+from ccmodel.rig.consistency import limits
+from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
+from ccmodel.rig.consistency.parity import Parity
+
+# Factors that have a name, within 30 %: edges of an encoder, units of an angle.
+_NAMED = {4.0: "the edges of a quadrature encoder", 57.3: "degrees for radians", 6.28: "turns for radians"}
+_NAMED_WITHIN = 0.3
+
+
+def wrong_geometry(parities: Sequence[Parity]) -> list[Contradiction]:
+    """Radii, and scales of angles: the first that is found, since one makes the other relations wrong."""
+    ratios, batch = pooled(parities), parities[0].batch
+    return _radii(batch) or _angle_of_one_end(ratios) or _both_angles(ratios)
+
+
+def wrong_scales(parities: Sequence[Parity]) -> list[Contradiction]:
+    """Scale of the load torque, and stated values of spring, cable and pretension that the recordings contradict."""
+    ratios, batch = pooled(parities), parities[0].batch
+    return (_load_torque(ratios) or _spring(ratios, batch)) + _pretension(ratios) + _cable(ratios, batch)
+
+
+def pooled(parities: Sequence[Parity]) -> dict[str, float]:
+    """Median of each relation over the recordings; the travel is that of the greatest stroke."""
+    by_relation: dict[str, list[tuple[float, float]]] = {}
+    for parity in parities:
+        stroke = float(np.ptp(parity.moving["theta_in_rad"]))
+        for name, value in parity.ratios.items():
+            by_relation.setdefault(name, []).append((stroke, value))
+    found = {name: float(np.median([value for _, value in of])) for name, of in by_relation.items()}
+    if "travel" in by_relation:
+        found["travel"] = max(by_relation["travel"])[1]
+    return found
+
+
+def beyond(ratio: float | None, factor: float) -> int:
+    """1 if a ratio is above a factor, -1 if it is below its inverse, otherwise 0; 0 for a relation that is absent."""
+    if ratio is None:
+        return 0
+    return 1 if ratio > factor else -1 if ratio < 1 / factor else 0
+
+
+def _radii(batch: Batch) -> list[Contradiction]:
+    found = []
+    for end in batch.rig.ends:
+        radius = end.side.pulley_radius_m
+        if not limits.SMALLEST_RADIUS_M <= radius <= limits.LARGEST_RADIUS_M:
+            unit = f" (is it {radius:g} mm?)" if radius > limits.LARGEST_RADIUS_M else ""
+            text = f"rig.{end.name}.pulley_radius_m is {radius:g} m{unit}: no pulley of a cable rig; state it in m"
+            found.append(Contradiction(f"rig.{end.name}.pulley_radius_m", text))
+    return found
+
+
+def _angle_of_one_end(ratios: Mapping[str, float]) -> list[Contradiction]:
+    """Scale of one angle, from the travel of the load over that of the drive."""
+    travel = ratios.get("travel")
+    if travel is None or limits.LEAST_TRAVEL <= travel <= limits.MOST_TRAVEL:
+        return []
+    large = travel > limits.MOST_TRAVEL
+    # The relations that contain one of the two angles alone.
+    spring, amplitude = ratios.get("spring"), ratios.get("amplitude")
+    at_load = beyond(spring, 1.8) == (-1 if large else 1)
+    at_drive = beyond(amplitude, 1.8) == (-1 if large else 1)
+    end = "load" if at_load and not at_drive else "drive" if at_drive and not at_load else None
+    share = f"at the cable the load moves {travel:.3g} times as far as the drive"
+    reason = "it cannot move further" if large else "far more is lost than friction and stretch take"
+    which = f"of the {end} angle" if end else "of one of the two angles, or a pulley's radius,"
+    keys = f"rig.{end}.encoder_counts_per_rev" if end else "encoder_counts_per_rev and pulley_radius_m of both ends"
+    text = f"the scale {which} is wrong: {share}, and {reason}{_named(travel)}; check {keys} and the unit of the angle"
+    what = {"load": "theta_out", "drive": "theta_in", None: "theta_in or theta_out"}[end]
+    return [Contradiction(what, text, None, SURE if end else LIKELY)]
+
+
+def _both_angles(ratios: Mapping[str, float]) -> list[Contradiction]:
+    """Scale of both angles: spring, stiffness and noted amplitude are wrong by about the same factor."""
+    inverse = {name: 1 / ratios[name] for name in ("spring", "stiffness") if ratios.get(name, 0) > 0}
+    factors = inverse | {name: ratios[name] for name in ("amplitude",) if name in ratios}
+    sides = {beyond(factor, limits.AMPLITUDE_FACTOR if name == "amplitude" else 1.8) for name, factor in factors.items()}
+    if len(factors) < 2 or len(sides) != 1 or sides == {0} or "spring" not in factors:
+        return []
+    if beyond(factors["spring"], limits.AMPLITUDE_FACTOR) == 0:
+        return []
+    size = "large" if sides == {1} else "small"
+    factor = factors["spring"] if sides == {1} else 1 / factors["spring"]
+    values = ", ".join(f"{name} {value:.3g} times" for name, value in _stated(ratios, factors).items())
+    text = (
+        f"both angles are {factor:.3g} times too {size}{_named(factor)}: found over stated is {values}; check"
+        " encoder_counts_per_rev of both ends and the unit of the angles"
+    )
+    return [Contradiction("theta_in and theta_out", text)]
+
+
+def _stated(ratios: Mapping[str, float], names) -> dict[str, float]:
+    return {name: ratios[name] for name in names}
+
+
+def _named(ratio: float) -> str:
+    """The name of a factor, or of its inverse, in words."""
+    factor = max(ratio, 1 / ratio)
+    for size, name in _NAMED.items():
+        if isclose(factor, size, rel_tol=_NAMED_WITHIN):
+            return f" (a factor of {size:g} is that of {name})"
+    return ""
+
+
+def _load_torque(ratios: Mapping[str, float]) -> list[Contradiction]:
+    found = ratios.get("torque at the load")
+    if found is None or found <= limits.MOST_TORQUE:
+        return []
+    text = (
+        f"the load torque over the radius reaches {found:.3g} times the sum of tensions there, which cables that only"
+        " pull cannot do; check the scale of the load torque, the radius and the load cell of the load"
+    )
+    return [Contradiction("tau_out", text)]
+
+
+def _spring(ratios: Mapping[str, float], batch: Batch) -> list[Contradiction]:
+    key = "load.spring_stiffness_Nm_per_rad"
+    ratio = ratios.get("spring")
+    if not beyond(ratio, limits.STATED_FACTOR) or key in batch.rig.nominal:
+        return []
+    stated = batch.rig.load.spring_stiffness_Nm_per_rad
+    text = (
+        f"rig.{key} is {stated:g}, and the recordings show {ratio * stated:.3g} N m/rad (load torque over load angle,"
+        f" {ratio:.3g} times as much); correct it, or the scale of the load torque or load angle"
+    )
+    return [Contradiction(f"rig.{key}", text)]
+
+
+def _pretension(ratios: Mapping[str, float]) -> list[Contradiction]:
+    ends = {name: ratios[name] for name in ("pretension at the drive", "pretension at the load") if name in ratios}
+    sides = {name: beyond(ratio, limits.PRETENSION_FACTOR) for name, ratio in ends.items()}
+    if not any(sides.values()):
+        return []
+    values = " and ".join(f"{ratio:.3g} times at the {name.rsplit(' ', 1)[1]}" for name, ratio in ends.items())
+    if len(ends) == 2 and len(set(sides.values())) == 1:
+        text = (
+            f"the sums of tensions at rest are {values} twice the stated pretension; pretension_N is that of one"
+            " cable, in N; check it, or the scale of both load cells"
+        )
+        return [Contradiction("pretension_N", text, None, LIKELY)]
+    name = next(name for name, side in sides.items() if side).rsplit(" ", 1)[1]
+    text = f"the sums of tensions at rest are {values} twice the stated pretension; check rig.{name}.load_cell"
+    return [Contradiction(f"F_{name}", text, None, LIKELY)]
+
+
+def _cable(ratios: Mapping[str, float], batch: Batch) -> list[Contradiction]:
+    """Stated stiffness and friction of the cable."""
+    stated = batch.rig.cable
+    found = []
+    for relation, key, value, unit, how in (
+        ("stiffness", "stiffness_N_per_m", stated.stiffness_N_per_m, " N/m", "mean tension over stretch"),
+        ("friction", "friction_coefficient", stated.friction_coefficient, "", "ratio of tensions in full slip"),
+    ):
+        ratio = ratios.get(relation)
+        if not beyond(ratio, limits.STATED_FACTOR) or f"cable.{key}" in batch.rig.nominal:
+            continue
+        other = "bend_rad" if relation == "friction" else "length_m and the pulley radii"
+        text = (
+            f"rig.cable.{key} is {value:g}, and the recordings show {ratio * value:.3g}{unit} ({how}, {ratio:.3g} times"
+            f" as much); correct it, or {other}"
+        )
+        found.append(Contradiction(f"rig.cable.{key}", text, None, SURE))
+    return found

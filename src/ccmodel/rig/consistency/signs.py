@@ -1,0 +1,107 @@
+"""Wrong signs and exchanged ends: which sensor makes the parity relations of sign negative."""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from ccmodel.rig.consistency import limits
+from ccmodel.rig.consistency.contradiction import Contradiction
+from ccmodel.rig.consistency.parity import Parity
+
+
+class _Fault(NamedTuple):
+    """A mistake, the relations (`Parity.signs`) that it makes negative, and its remedy."""
+
+    what: str
+    text: str
+    negative: frozenset[str]
+    remedy: str
+
+
+def _fault(what: str, text: str, negative: str, remedy: str) -> _Fault:
+    return _Fault(what, text, frozenset(negative.split()), remedy)
+
+
+FAULTS = (
+    _fault("tau_in", "the drive torque has the wrong sign", "work torques", "change rig.drive.torque_sign"),
+    _fault("tau_out", "the load torque has the wrong sign", "load torques", "change rig.load.torque_sign"),
+    _fault("theta_out", "the load angle has the wrong sign", "angles load", "change rig.load.encoder_sign"),
+    _fault("theta_in", "the drive angle has the wrong sign", "angles work", "change rig.drive.encoder_sign"),
+    _fault(
+        "cables A and B",
+        "cables A and B are exchanged: both torques have the wrong sign for the angles",
+        "work load",
+        "change rig.drive.torque_sign and rig.load.torque_sign, or both encoder signs",
+    ),
+    _fault("F_drive", "the load cell at the drive has the wrong sign", "F_drive", "change its sensitivity or wiring"),
+    _fault("F_load", "the load cell at the load has the wrong sign", "F_load", "change its sensitivity or wiring"),
+)
+EXCHANGED = _fault(
+    "drive and load",
+    "drive and load are exchanged",
+    "loss",
+    "exchange the columns (or the sides of batch.yaml) of drive and load",
+)
+EVIDENCE = {
+    "angles": "the load angle runs against the drive angle (correlation {:.2f})",
+    "torques": "the load torque runs against the drive torque (correlation {:.2f})",
+    "work": "the drive takes energy out of the cables ({:.2f} of the work exchanged; a drive puts energy in)",
+    "load": "the load torque pushes where a load resists ({:.2f}, +1 for a spring)",
+    "loss": "more energy leaves at the load than enters at the drive ({:.2f} of the energy exchanged)",
+    "F_drive": "the sum of tensions at the drive is negative, and cables cannot push",
+    "F_load": "the sum of tensions at the load is negative, and cables cannot push",
+}
+
+
+def wrong_signs(parities: Sequence[Parity]) -> list[Contradiction]:
+    """Sensors with a wrong sign and exchanged ends, of the batch or of single recordings."""
+    by_recording = [negative_relations(p.signs) for p in parities]
+    most_common, count = Counter(by_recording).most_common(1)[0]
+    found = []
+    if most_common and count >= limits.MOST_RECORDINGS * len(parities):
+        showing = [p for p, negative in zip(parities, by_recording, strict=True) if negative == most_common]
+        found += _contradictions(most_common, showing, None, f"in {count} of {len(parities)} recordings ")
+    for parity, negative in zip(parities, by_recording, strict=True):
+        if negative and not (found and negative == most_common):
+            found += _contradictions(negative, [parity], parity.recording.id, "")
+    return found
+
+
+def negative_relations(signs: Mapping[str, float]) -> frozenset[str]:
+    """Relations that are negative. The loss counts if all others are right: every wrong sign makes it negative."""
+    negative = {name for name, value in signs.items() if value < limits.WRONG_SIGN and name != "loss"}
+    if not negative and signs.get("loss", 1.0) < limits.WRONG_LOSS:
+        negative = {"loss"}
+    return frozenset(negative)
+
+
+def explanation(negative: frozenset[str], available: Iterable[str]) -> tuple[_Fault, ...]:
+    """The fewest mistakes that make just these of the available relations negative; empty if no two do."""
+    if negative == EXCHANGED.negative:
+        return (EXCHANGED,)
+    for count in (1, 2):
+        for faults in combinations(FAULTS, count):
+            expected: frozenset[str] = frozenset()
+            for fault in faults:
+                expected ^= fault.negative
+            if expected & set(available) == negative:
+                return faults
+    return ()
+
+
+def _contradictions(
+    negative: frozenset[str], parities: Sequence[Parity], recording: str | None, where: str
+) -> list[Contradiction]:
+    # A single relation of correlation may turn negative by physics alone; every mistake makes two of them negative.
+    faults = explanation(negative, set.intersection(*(set(p.signs) for p in parities)))
+    found = []
+    for fault in faults:
+        shown = sorted(fault.negative & negative)
+        evidence = " and ".join(
+            EVIDENCE[name].format(float(np.median([p.signs[name] for p in parities]))) for name in shown
+        )
+        found.append(Contradiction(fault.what, f"{fault.text}: {where}{evidence}; {fault.remedy}", recording))
+    return found
