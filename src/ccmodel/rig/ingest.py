@@ -11,6 +11,7 @@ from ccmodel.recording import Recording
 from ccmodel.rig.batch import Batch, RecordingEntry, load_batch
 from ccmodel.rig.calibration import calibrate
 from ccmodel.rig.column_checks import ColumnChecks
+from ccmodel.rig.consistency import check_consistency
 from ccmodel.rig.findings import Defect, Finding, LogError
 from ccmodel.rig.log import read_log
 from ccmodel.rig.sensor_checks import check_sensors
@@ -28,7 +29,8 @@ class Ingested:
     recordings : list of Recording
         Those that can be used, in the order of `batch.yaml`.
     findings : list of Finding
-        Warnings and refusals. A refused recording has one finding, a refusal; a used one may have several warnings.
+        Warnings, refusals and contradictions. A refused recording has one finding, a refusal; a used one may have
+        several warnings and contradictions.
     batch : Batch or None
         Content of `batch.yaml`: radii, spring, estimates of the cable. None if the batch is refused as a whole.
     """
@@ -71,6 +73,7 @@ def ingest_batch(folder: Path) -> Ingested:
                 recordings.append(recording)
                 findings += warnings
         findings += refusals
+    findings += check_consistency(recordings, batch)
     return Ingested(recordings, findings, batch)
 
 
@@ -89,7 +92,10 @@ def _attempt(batch: str, file: str, step: Callable[..., T], *args) -> tuple[T | 
 
 
 def _finding(batch: str, file: str, severity: str, defect: Defect) -> Finding:
-    return Finding(batch, file, defect.row, defect.column, severity, defect.text)
+    """A defect as a finding; one of a used log that contradicts is no warning."""
+    if severity == "warning" and defect.contradicts:
+        return Finding(batch, file, defect.row, defect.column, "inconsistent", defect.text)
+    return Finding(batch, file, defect.row, defect.column, severity, defect.text, contradicts=defect.contradicts)
 
 
 def _recording(
@@ -99,7 +105,7 @@ def _recording(
     log: tuple[pd.DataFrame, list[Defect]],
     columns: ColumnChecks,
 ) -> tuple[Recording, list[Finding]]:
-    """The recording of a log that could be read, and its warnings.
+    """The recording of a log that could be read, and the findings of it.
 
     `log` is the table of samples and the defects that reading it has found.
     """
@@ -109,12 +115,14 @@ def _recording(
     end = table["time_s"].iloc[-1]
     if entry.settled_s >= end:
         text = f"ends at {end:g} s, before settled_s {entry.settled_s:g} s of batch.yaml: no samples left"
-        raise LogError(None, None, text)
+        raise LogError(None, None, text, True)
     calibrated = calibrate(table, batch.rig)
     unconverted = [
         Defect(None, column, f"not used: batch.yaml lacks {key}, which converts it")
         for column, key in calibrated.missing.items()
     ]
+    # A column whose sensor batch.yaml does not state contradicts nothing: it is not used anyway.
+    faulty_sensors = [d._replace(contradicts=d.contradicts and d.column in columns.stated) for d in faulty_sensors]
     defects = [*reading_defects, *rare_columns, *faulty_sensors, *unconverted]
     findings = [_finding(batch.batch, file, "warning", defect) for defect in defects]
     recording = Recording(

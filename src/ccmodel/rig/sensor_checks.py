@@ -1,7 +1,7 @@
 """Checks for dead, stuck, reset, frozen and saturated sensors.
 
 A faulty drive encoder refuses the recording, since the drive angle is the input of the model. Any other dead sensor
-only removes its channel.
+only removes its channel. Both contradict `batch.yaml`, which states a sensor that works.
 """
 
 import numpy as np
@@ -29,7 +29,7 @@ def check_sensors(table: pd.DataFrame, rig: Rig) -> tuple[pd.DataFrame, list[Def
     -------
     table : DataFrame
         The columns that can be used.
-    warnings : list of Defect
+    defects : list of Defect
         Faults of the other sensors, and faults that leave a column usable.
 
     Raises
@@ -38,24 +38,24 @@ def check_sensors(table: pd.DataFrame, rig: Rig) -> tuple[pd.DataFrame, list[Def
         If the drive encoder is faulty.
     """
     _check_drive(table, rig)
-    warnings, dead = [], []
+    defects, dead = [], []
     for column in table.columns.drop(["time_s", DRIVE]):
         if fault := _dead(table, column, rig):
-            warnings.append(fault._replace(text=f"{fault.text}: column not used"))
+            defects.append(fault._replace(text=f"{fault.text}: column not used"))
             dead.append(column)
         elif column == LOAD:
-            warnings += _load_stands(table)
+            defects += _load_stands(table)
         else:
             # A sensor at the end of its range repeats one value: it is clipped and not frozen.
-            warnings += _saturated(table[column], rig.ranges.get(column)) or _frozen(table, column)
-    return table.drop(columns=dead), warnings
+            defects += _saturated(table[column], rig.ranges.get(column)) or _frozen(table, column)
+    return table.drop(columns=dead), defects
 
 
 def _check_drive(table: pd.DataFrame, rig: Rig) -> None:
     counts = table[DRIVE]
     if np.ptp(counts) <= limits.STILL_COUNTS:
         text = "stands still throughout: encoder stuck or drive switched off, the model has no input"
-        raise LogError(None, DRIVE, text)
+        raise LogError(None, DRIVE, text, True)
     if jump := _jump(table, DRIVE, rig.drive.encoder_counts_per_rev):
         raise LogError(*jump)
     # The load cannot move by itself: if it moves, the drive moves too.
@@ -65,7 +65,7 @@ def _check_drive(table: pd.DataFrame, rig: Rig) -> None:
         if np.ptp(table[LOAD].iloc[still]) > creep:
             first, last = table.index[still][[0, -1]]
             text = f"stands still up to row {last} while the load moves: encoder stuck"
-            raise LogError(int(first), DRIVE, text)
+            raise LogError(int(first), DRIVE, text, True)
 
 
 def _dead(table: pd.DataFrame, column: str, rig: Rig) -> Defect | None:
@@ -73,11 +73,13 @@ def _dead(table: pd.DataFrame, column: str, rig: Rig) -> Defect | None:
     if column == LOAD:
         if np.ptp(values) <= limits.STILL_COUNTS:
             text = "stands still throughout while the drive moves: encoder stuck or load locked"
-            return Defect(None, column, text)
+            # A load that batch.yaml states as fixed has to stand still.
+            return Defect(None, column, text, contradicts=rig.far_end != "fixed")
         counts_per_rev = rig.load.encoder_counts_per_rev
         return _jump(table, column, counts_per_rev) if counts_per_rev else None
     if np.ptp(values) == 0:
-        return Defect(None, column, f"is {values.iloc[0]:g} throughout: a sensor that is dead or was never connected")
+        text = f"is {values.iloc[0]:g} throughout: a sensor that is dead or was never connected"
+        return Defect(None, column, text, contradicts=True)
     return None
 
 
@@ -90,7 +92,7 @@ def _jump(table: pd.DataFrame, column: str, counts_per_rev: float) -> Defect | N
         return None
     more = f" (and {jumps.size - 1} more such jumps)" if jumps.size > 1 else ""
     text = f"jumps by {step[jumps[0]]:g} counts in one sample{more}: counter reset, wrapped or counts lost"
-    return Defect(int(table.index[jumps[0] + 1]), column, text)
+    return Defect(int(table.index[jumps[0] + 1]), column, text, contradicts=True)
 
 
 def _load_stands(table: pd.DataFrame) -> list[Defect]:
@@ -118,7 +120,7 @@ def _frozen(table: pd.DataFrame, column: str) -> list[Defect]:
     more = f" (and {len(frozen) - 1} more times)" if len(frozen) > 1 else ""
     value = table[column].iloc[frozen[0].start]
     text = f"stays at {value:g} up to row {last} while the drive moves{more}: sensor frozen"
-    return [Defect(int(first), column, text)]
+    return [Defect(int(first), column, text, contradicts=True)]
 
 
 def _standstills(table: pd.DataFrame, column: str) -> list[slice]:
@@ -151,5 +153,5 @@ def _saturated(values: pd.Series, sensor_range: tuple[float, float] | None) -> l
         run = longest_run(end)
         if length(run) >= limits.FLAT_SAMPLES:
             text = f"{what} in {end.sum()} samples, {length(run)} in a row from here: saturated"
-            found.append(Defect(int(values.index[run.start]), values.name, text))
+            found.append(Defect(int(values.index[run.start]), values.name, text, contradicts=True))
     return found
