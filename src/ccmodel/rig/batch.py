@@ -8,12 +8,35 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from ccmodel.channels import ANGLE_AT, SUM_AT, TENSIONS_AT, TORQUE_AT
+from ccmodel.channels import (
+    ANGLE_AT,
+    CHANNELS,
+    F_DRIVE,
+    F_LOAD,
+    SUM_AT,
+    TAU_IN,
+    TAU_OUT,
+    TENSIONS_AT,
+    THETA_IN,
+    THETA_OUT,
+    TORQUE_AT,
+)
 from ccmodel.geometry import ConduitPath
 from ccmodel.recording import FAR_ENDS
 from ccmodel.typed import InputError, NotNegative, Positive, Problem, TypedModel, load_yaml_model
 
-REQUIRED_COLUMNS = ("time_s", "drive_encoder_counts")
+# Columns of sensors as they are read out, by the channel that is calibrated from them. A log may have the channel
+# itself in their place: a physical column, which has the channel's name.
+RAW_COLUMNS = {
+    THETA_IN: ("drive_encoder_counts",),
+    THETA_OUT: ("load_encoder_counts",),
+    TAU_IN: ("drive_torque_counts", "drive_current_A"),
+    TAU_OUT: ("load_torque_counts", "load_current_A"),
+    F_DRIVE: ("drive_load_cell_V",),
+    F_LOAD: ("load_load_cell_V",),
+}
+# One of these is the input of the model.
+DRIVE_ANGLE_COLUMNS = (*RAW_COLUMNS[THETA_IN], THETA_IN)
 SENSOR_COLUMNS = (
     "load_encoder_counts",
     "drive_current_A",
@@ -22,8 +45,9 @@ SENSOR_COLUMNS = (
     "load_torque_counts",
     "drive_load_cell_V",
     "load_load_cell_V",
+    *(channel for channel in CHANNELS if channel != THETA_IN),
 )
-COLUMNS = REQUIRED_COLUMNS + SENSOR_COLUMNS
+COLUMNS = ("time_s", *DRIVE_ANGLE_COLUMNS, *SENSOR_COLUMNS)
 
 Sign = Literal[1, -1]
 NAMES = "a name is letters, digits and -_.+=,@ only and begins with a letter or digit"
@@ -61,11 +85,13 @@ class Side(TypedModel):
     """Pulley and sensors at one end.
 
     A sign is -1 if the sensor counts against the signs of the model. If a log has torque counts and a current, the
-    torque sensor is used, since the current only estimates the torque.
+    torque sensor is used, since the current only estimates the torque. `encoder_counts_per_rev` converts counts;
+    `angle_resolution_rad` is the step of an angle that is logged in rad, 0 or absent if it has none.
     """
 
     pulley_radius_m: Positive
-    encoder_counts_per_rev: Positive
+    encoder_counts_per_rev: Positive | None = None
+    angle_resolution_rad: NotNegative | None = None
     encoder_sign: Sign = 1
     encoder_accuracy_rad: Positive | None = None
     torque_constant_Nm_per_A: Positive | None = None
@@ -75,12 +101,8 @@ class Side(TypedModel):
 
 
 class LoadSide(Side):
-    """The load end; without a spring the load is the torque or motion measured at the load pulley.
+    """The load end; without a spring the load is the torque or motion measured at the load pulley."""
 
-    The encoder is optional here. At the drive it is the input of the model.
-    """
-
-    encoder_counts_per_rev: Positive | None = None
     spring_stiffness_Nm_per_rad: Positive | None = None
 
 
@@ -145,11 +167,6 @@ class Rig(TypedModel):
             raise ValueError("far_end and transmission: single-cable are stated together or not at all")
         if end is not None and (end == "spring") != (load.spring_stiffness_Nm_per_rad is not None):
             raise ValueError("load.spring_stiffness_Nm_per_rad is stated where far_end is spring, and only there")
-        if end == "measured-motion" and load.encoder_counts_per_rev is None:
-            raise ValueError("far_end is measured-motion, so load.encoder_counts_per_rev is needed")
-        sensors = load.load_cell, load.torque_sensor, load.torque_constant_Nm_per_A
-        if end == "measured-tension" and not any(sensors):
-            raise ValueError("far_end is measured-tension, so load.load_cell or a torque sensor there is needed")
         return self
 
     @model_validator(mode="after")
