@@ -11,8 +11,9 @@ from typing import NamedTuple
 import pandas as pd
 
 from ccmodel.channels import CHANNELS, F_LOAD, SUM_AT, T2, TAU_OUT, TENSIONS, THETA_OUT, TORQUE_AT
-from ccmodel.rig.batch import RAW_COLUMNS, SENSOR_COLUMNS, Rig, Side
+from ccmodel.rig.batch import RAW_COLUMNS, SENSOR_COLUMNS, Batch, Rig, Side
 from ccmodel.rig.findings import Defect, LogError
+from ccmodel.typed import meaning_at
 
 
 class _Sensor(NamedTuple):
@@ -58,8 +59,8 @@ class ColumnChecks:
     def refusals(self) -> list[Defect]:
         """Keys without which the columns of the logs cannot be used, one line each: the batch is refused."""
         return [
-            Defect(None, None, f"{key}: fill in {what}; the logs have {', '.join(found)}")
-            for key, what, columns in _needed(self.rig)
+            Defect(None, None, f"{'.'.join(key)}: fill in {meaning_at(Batch, key)}; the logs have {', '.join(found)}")
+            for key, columns in _needed(self.rig)
             if (found := [column for column in columns if self.count[column]])
         ]
 
@@ -130,15 +131,13 @@ def _sensor(key: str, side: Side, columns: Mapping[str, str], channels: tuple, o
     return [_Sensor(tuple(stated), tuple(stated.values()), channels, others)] if stated else []
 
 
-def _needed(rig: Rig) -> Iterator[tuple[str, str, tuple[str, ...]]]:
-    """Keys that `batch.yaml` lacks, their meaning, and the columns that cannot be used without them."""
+def _needed(rig: Rig) -> Iterator[tuple[tuple[str, ...], tuple[str, ...]]]:
+    """Keys that `batch.yaml` lacks, and the columns that cannot be used without them."""
     counted = ["drive"] + ["load"] * (rig.far_end == "measured-motion")
     for end in rig.ends:
         if end.name in counted and end.side.encoder_counts_per_rev is None:
-            what = f"the counts per revolution of the {end.name} encoder"
-            yield f"rig.{end.name}.encoder_counts_per_rev", what, RAW_COLUMNS[end.angle]
+            yield ("rig", end.name, "encoder_counts_per_rev"), RAW_COLUMNS[end.angle]
     if rig.accuracy.torque_Nm is None:
-        yield "rig.accuracy.torque_Nm", "the accuracy of the torque sensors, N m", tuple(TORQUE_AT.values())
+        yield ("rig", "accuracy", "torque_Nm"), tuple(TORQUE_AT.values())
     if rig.accuracy.load_cell_N is None:
-        forces = (*SUM_AT.values(), *TENSIONS)
-        yield "rig.accuracy.load_cell_N", "the accuracy of the load cells, N", forces
+        yield ("rig", "accuracy", "load_cell_N"), (*SUM_AT.values(), *TENSIONS)
