@@ -18,6 +18,8 @@ GAP_FRACTION = 0.1
 # Highest speed of a pulley. Commanded speeds reach 3 rad/s, a snapping jaw reached 14 rad/s. A faster change is a
 # counter that was reset, wrapped or lost counts, and the angle after it has another zero.
 FASTEST_RAD_PER_S = 30.0
+# Share of the samples with faster changes from which they are no jumps: the angle is in another unit.
+FAST_FRACTION = 0.05
 # Smaller changes are noise of a counter at any speed: at high sampling rates one count is a high speed.
 LOST_COUNTS = 10
 # Travel of the load, in counts and as a share of its range, during which the drive encoder may stand still. The load
@@ -39,5 +41,16 @@ FROZEN_SAMPLES = 20
 FROZEN_NOISE_FRACTION = 0.5
 # Counts by which an encoder at rest may dither.
 STILL_COUNTS = 1
+# Width of the noise of an angle without a step, in standard deviations: noise of a few thousand samples spans 7 to 8.
+NOISE_WIDTH_SDS = 10
+# Finer steps of an angle, rad, have no effect on a model: 0.1 um of cable on a pulley of 6 mm. The angle is taken as it
+# is.
+FINE_STEP_RAD = 2e-5
+# Share of a step by which readings may differ from its multiples: a log writes them with few digits.
+OFF_STEP = 0.1
+# Share of the readings that may differ by more.
+OFF_STEP_FRACTION = 0.01
 # Duration of an initial rest. Less is the time to the first count of a motion.
 SHORTEST_REST_S = 0.1
+# Steps of time that no log of a moving rig has, s: the times are in ms or µs, or in days.
+SHORTEST_STEP_S, LONGEST_STEP_S = 2e-6, 0.2

@@ -11,7 +11,7 @@ import pandas as pd
 from scipy.ndimage import find_objects, label
 
 from ccmodel.rig import limits, readers
-from ccmodel.rig.batch import COLUMNS, REQUIRED_COLUMNS
+from ccmodel.rig.batch import COLUMNS, DRIVE_ANGLE_COLUMNS, RAW_COLUMNS
 from ccmodel.rig.findings import Defect, LogError
 from ccmodel.typed import nearest
 
@@ -55,14 +55,33 @@ def _check_header(header: list[str]) -> list[Defect]:
     for name in unknown:
         guess = nearest(name, [c for c in COLUMNS if c not in header], MISSPELT)
         if guess:
-            raise LogError(1, name, f"unknown column; did you mean '{guess}'?")
-    for name in REQUIRED_COLUMNS:
-        if name not in header:
-            raise LogError(1, name, f"this column is required and missing; found {', '.join(header)}")
+            convert = f" That is in {_unit(guess)}: convert the values." if _unit(guess) != _unit(name) else ""
+            raise LogError(1, name, f"unknown column; did you mean '{guess}'?{convert}")
+    if "time_s" not in header:
+        raise LogError(1, "time_s", f"this column is required and missing; found {', '.join(header)}")
+    if not set(DRIVE_ANGLE_COLUMNS) & set(header):
+        counts, angle = DRIVE_ANGLE_COLUMNS
+        text = f"this column, or {angle}, is required and missing; found {', '.join(header)}"
+        raise LogError(1, counts, text)
     for name in header:
         if name in COLUMNS and header.count(name) > 1:
             raise LogError(1, name, "this column is there twice: keep one")
-    return [Defect(1, name or "(no name)", "unknown column, not used") for name in unknown]
+    for channel, columns in RAW_COLUMNS.items():
+        raw = [column for column in columns if column in header]
+        if raw and channel in header:
+            text = f"the log has {' and '.join(raw)} too, which is the same quantity: keep one"
+            raise LogError(1, channel, text)
+    return [Defect(1, name or "(no name)", f"unknown column, not used{_other_unit(name)}") for name in unknown]
+
+
+def _unit(column: str) -> str:
+    return column.rpartition("_")[2]
+
+
+def _other_unit(unknown: str) -> str:
+    """What to do about a column of a known quantity in another unit, as theta_in_deg."""
+    known = [column for column in COLUMNS if column.rpartition("_")[0] == unknown.rpartition("_")[0]]
+    return f": convert it to {' or '.join(known)}" if known else ""
 
 
 def _numbers(raw: pd.DataFrame) -> pd.DataFrame:
@@ -109,6 +128,7 @@ def _check_time(time: pd.Series, warnings: list[Defect]) -> None:
         at = int(np.flatnonzero(step <= 0)[0]) + 1
         now, before = time.iloc[at], time.iloc[at - 1]
         raise LogError(int(time.index[at]), "time_s", f"time must increase, found {now:g} s after {before:g} s")
+    _check_unit_of_time(time, float(np.median(step)))
     # Over four rows: a clock of whole ms that alternates 1 and 2 ms has no step of 1.5 ms.
     usual = float((time.diff(4) / time.index.to_series().diff(4)).median())
     # A step over dropped rows is longer without being a gap; these rows have a warning already.
@@ -130,6 +150,16 @@ def _check_time(time: pd.Series, warnings: list[Defect]) -> None:
     first = int(time.index[np.flatnonzero(gaps)[0] + 1])
     text += ": they came late, few or none are lost" if uneven else ": samples were dropped"
     warnings.append(Defect(first, "time_s", text))
+
+
+def _check_unit_of_time(time: pd.Series, step: float) -> None:
+    if limits.SHORTEST_STEP_S <= step <= limits.LONGEST_STEP_S:
+        return
+    units = {"ms": 1e-3, "µs": 1e-6, "ns": 1e-9}
+    likely = next((u for u, s in units.items() if limits.SHORTEST_STEP_S * 10 <= step * s <= 0.05), None)
+    hint = f"are the times in {likely}? Convert them to s" if likely else "give the times in s"
+    text = f"samples are {step:.4g} s apart and the log lasts {time.iloc[-1] - time.iloc[0]:.4g} s: {hint}"
+    raise LogError(int(time.index[0]), "time_s", text, True)
 
 
 def _gap_text(count: int, longest: float, usual: float, uneven: bool) -> str:
