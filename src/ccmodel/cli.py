@@ -56,6 +56,20 @@ def check(batch: Folder) -> None:
         raise typer.Exit(1)
 
 
+@app.command()
+def init(folder: Folder) -> None:
+    """Write a commented batch.yaml for a folder of logs, and print what to fill in; keeps an existing one."""
+    from ccmodel.rig.batch import load_batch
+    from ccmodel.rig.drafting import draft_batch
+
+    typer.echo(f"{draft_batch(folder)}: fill in what is empty, then run: ccmodel check {folder}")
+    try:
+        load_batch(folder)
+    except InputError as error:
+        for problem in error.problems:
+            typer.echo(f"  line {problem.line}: {problem.text}")
+
+
 @app.command("import-mis-tool")
 def import_mis_tool(
     source: Folder,
