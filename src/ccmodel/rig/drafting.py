@@ -137,8 +137,8 @@ def _natural(path: Path) -> list:
 
 def _content(name: str, logs: Sequence[_Log], refused: dict[str, str]) -> Lines:
     columns = set().union(*(log.table.columns for log in logs))
-    yield f"# Draft of {len(logs)} logs by `ccmodel init`. Fill in what is empty, correct what is wrong. `ccmodel check`"
-    yield "# names what is still missing. Keys and units: docs/rig-log-format.md."
+    yield f"# Drafted from {len(logs)} logs by `ccmodel init`. Fill in what is empty and correct what is wrong."
+    yield "# `ccmodel check` names what is still missing. Keys and units: docs/rig-log-format.md."
     yield "format: 1"
     yield f"batch: {_text(name)}"
     yield "origin: rig  # measured; virtual-rig if it was simulated"

@@ -1,12 +1,14 @@
 """What a log shows before any physics: rate, rest, stroke, frequency; range, noise and resolution of each channel."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from ccmodel.channels import CHANNELS, THETA_IN
+from ccmodel.recording import Recording
 from ccmodel.rig.angle import smallest_step
 
 # Fewest samples of a rest from which noise is estimated.
@@ -77,6 +79,19 @@ class Overview:
     channels: tuple[ChannelOverview, ...]
 
 
+def overview_of(recording: Recording) -> Overview:
+    """Describe a recording in SI units; a channel that follows from others has no step of its own."""
+    channels = {name: recording[name] for name in CHANNELS if name in recording}
+    whole = overview(recording.time_s, channels, THETA_IN, recording.rest_s)
+    logged = [
+        c
+        if not any(other in recording.derived_from[c.name] for other in channels if other != c.name)
+        else replace(c, step=None)
+        for c in whole.channels
+    ]
+    return replace(whole, channels=tuple(logged))
+
+
 def overview(time_s: NDArray, channels: Mapping[str, NDArray], drive: str, rest_end_s: float) -> Overview:
     """Describe a log.
 
@@ -104,7 +119,9 @@ def overview(time_s: NDArray, channels: Mapping[str, NDArray], drive: str, rest_
         cycles=None if frequency is None else float((time_s[-1] - time_s[after][0]) * frequency),
         wave=wave,
         channels=tuple(
-            ChannelOverview(name, float(v.min()), float(v.max()), noise_of(v[: resting // 2]), smallest_step(v))
+            ChannelOverview(
+                name, float(v.min()) + 0.0, float(v.max()) + 0.0, noise_of(v[: resting // 2]), smallest_step(v)
+            )
             for name, v in channels.items()
         ),
     )
