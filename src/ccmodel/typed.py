@@ -34,6 +34,19 @@ Borrowed = Mapping[Loc, Loc]
 MAX_DEPTH = 50
 
 
+@dataclass(frozen=True)
+class FillIn:
+    """Marks a key that must not be left without a value in a file, even if it may be left out.
+
+    Attributes
+    ----------
+    meaning : str
+        What it is, with its unit, in words that follow "fill in"; "{parent}" stands for the name of the key above.
+    """
+
+    meaning: str
+
+
 class TypedModel(BaseModel):
     """Base of every typed file: frozen, no unknown keys, no silent conversions, no NaN or infinity."""
 
@@ -129,10 +142,9 @@ def load_yaml_model(path: Path, model: type[M]) -> M:
 def meaning_at(model: type[BaseModel], loc: Sequence) -> str | None:
     """What a key is, with its unit, in words that follow "fill in"; None where its model does not say so."""
     *parents, key = loc
-    found = _fields_at(model, parents).get(key)
-    if found is None or found.description is None:
-        return None
-    return found.description.replace("{parent}", str(parents[-1]) if parents else "")
+    field = _fields_at(model, parents).get(key)
+    meaning = next((m.meaning for m in (field.metadata if field else ()) if isinstance(m, FillIn)), None)
+    return meaning and meaning.replace("{parent}", str(parents[-1]) if parents else "")
 
 
 def nearest(name: str, known: Iterable[str], cutoff: float = 0.75) -> str | None:
@@ -228,7 +240,9 @@ def _read_yaml(path: Path) -> CommentedMap:
 
 
 def _kind(content: Any) -> str:
-    return "nothing" if content in (None, _EMPTY) else "a list" if isinstance(content, list) else f"a {type(content).__name__}"
+    if content is None or content is _EMPTY:
+        return "nothing"
+    return "a list" if isinstance(content, list) else f"a {type(content).__name__}"
 
 
 def _with_current_names(data: Any, renamed: Mapping[str, str], path: Path) -> Any:

@@ -25,7 +25,17 @@ from ccmodel.channels import (
 )
 from ccmodel.geometry import ConduitPath
 from ccmodel.recording import FAR_ENDS
-from ccmodel.typed import Borrowed, InputError, NotNegative, Positive, Problem, TypedModel, load_yaml_model, nearest
+from ccmodel.typed import (
+    Borrowed,
+    FillIn,
+    InputError,
+    NotNegative,
+    Positive,
+    Problem,
+    TypedModel,
+    load_yaml_model,
+    nearest,
+)
 
 # Columns of sensors as they are read out, by the channel that is calibrated from them. A log may have the channel
 # itself in their place: a physical column, which has the channel's name.
@@ -72,14 +82,14 @@ Name = Annotated[str, AfterValidator(_checked_name)]
 class LoadCell(TypedModel):
     """A load cell between slide and conduit plate: force = (V - zero_V) / sensitivity_V_per_N, in N."""
 
-    sensitivity_V_per_N: Positive = Field(description="the sensitivity of this load cell, V/N")
-    zero_V: float = Field(description="the reading of this load cell without force, V")
+    sensitivity_V_per_N: Annotated[Positive, FillIn("the sensitivity of this load cell, V/N")]
+    zero_V: Annotated[float, FillIn("the reading of this load cell without force, V")]
 
 
 class TorqueSensor(TypedModel):
     """A torque sensor logged in counts: torque = (counts - zero_counts) * Nm_per_count, in N m."""
 
-    Nm_per_count: Positive = Field(description="the scale of this torque sensor, N m per count")
+    Nm_per_count: Annotated[Positive, FillIn("the scale of this torque sensor, N m per count")]
     zero_counts: float = 0.0
 
 
@@ -91,18 +101,18 @@ class Side(TypedModel):
     `angle_resolution_rad` is the step of an angle that is logged in rad, 0 or absent if it has none.
     """
 
-    pulley_radius_m: Positive = Field(description="the radius of the {parent} pulley, m")
-    encoder_counts_per_rev: Positive | None = Field(
-        None, description="the counts of the {parent} encoder per revolution of its pulley"
-    )
-    angle_resolution_rad: NotNegative | None = Field(
-        None, description="the step of the {parent} angle, rad, 0 if it has none"
-    )
+    pulley_radius_m: Annotated[Positive, FillIn("the radius of the {parent} pulley, m")]
+    encoder_counts_per_rev: Annotated[
+        Positive | None, FillIn("the counts of the {parent} encoder per revolution of its pulley")
+    ] = None
+    angle_resolution_rad: Annotated[
+        NotNegative | None, FillIn("the step of the {parent} angle, rad, 0 if it has none")
+    ] = None
     encoder_sign: Sign = 1
-    encoder_accuracy_rad: Positive | None = Field(None, description="the accuracy of the {parent} encoder, rad")
-    torque_constant_Nm_per_A: Positive | None = Field(
-        None, description="the torque constant of the {parent} motor at its pulley, N m/A"
-    )
+    encoder_accuracy_rad: Annotated[Positive | None, FillIn("the accuracy of the {parent} encoder, rad")] = None
+    torque_constant_Nm_per_A: Annotated[
+        Positive | None, FillIn("the torque constant of the {parent} motor at its pulley, N m/A")
+    ] = None
     torque_sensor: TorqueSensor | None = None
     torque_sign: Sign = 1
     load_cell: LoadCell | None = None
@@ -111,25 +121,25 @@ class Side(TypedModel):
 class LoadSide(Side):
     """The load end; without a spring the load is the torque or motion measured at the load pulley."""
 
-    spring_stiffness_Nm_per_rad: Positive | None = Field(
-        None, description="the stiffness of the spring at the load, N m/rad, or remove the key if there is none"
-    )
+    spring_stiffness_Nm_per_rad: Annotated[
+        Positive | None, FillIn("the stiffness of the spring at the load, N m/rad, or remove the key if there is none")
+    ] = None
 
 
 class Cable(TypedModel):
     """Prior estimates of the cable; the stiffness is that of `length_m` of cable, so EA is their product."""
 
-    stiffness_N_per_m: Positive = Field(description="the stiffness of the cable, N/m")
-    length_m: Positive = Field(description="the length of cable that has this stiffness, m")
-    friction_coefficient: NotNegative = Field(description="the friction coefficient of the cable in its conduit")
+    stiffness_N_per_m: Annotated[Positive, FillIn("the stiffness of the cable, N/m")]
+    length_m: Annotated[Positive, FillIn("the length of cable that has this stiffness, m")]
+    friction_coefficient: Annotated[NotNegative, FillIn("the friction coefficient of the cable in its conduit")]
 
 
 class Accuracy(TypedModel):
     """Accuracy of the sensors, in SI units; absent for a sensor that the rig lacks."""
 
-    encoder_rad: Positive = Field(description="the accuracy of the angles, rad")
-    torque_Nm: Positive | None = Field(None, description="the accuracy of the torques, N m")
-    load_cell_N: Positive | None = Field(None, description="the accuracy of the load cells, N")
+    encoder_rad: Annotated[Positive, FillIn("the accuracy of the angles, rad")]
+    torque_Nm: Annotated[Positive | None, FillIn("the accuracy of the torques, N m")] = None
+    load_cell_N: Annotated[Positive | None, FillIn("the accuracy of the load cells, N")] = None
 
 
 class End(NamedTuple):
@@ -223,8 +233,8 @@ def _dotted_keys(model: type[BaseModel], above: str = "") -> Iterator[str]:
 class Piece(TypedModel):
     """A piece of the conduit with constant curvature."""
 
-    length_m: Positive = Field(description="the length of this piece of the conduit, m")
-    bend_rad: NotNegative = Field(description="the bend of this piece of the conduit, rad, 0 if it is straight")
+    length_m: Annotated[Positive, FillIn("the length of this piece of the conduit, m")]
+    bend_rad: Annotated[NotNegative, FillIn("the bend of this piece of the conduit, rad, 0 if it is straight")]
 
 
 Conduit = Annotated[tuple[Piece, ...], Field(min_length=1)]
@@ -237,8 +247,8 @@ class RecordingEntry(TypedModel):
 
     id: Name
     file: str
-    pretension_N: Positive = Field(description=PRETENSION)
-    conduit: Conduit = Field(description=CONDUIT)
+    pretension_N: Annotated[Positive, FillIn(PRETENSION)]
+    conduit: Annotated[Conduit, FillIn(CONDUIT)]
     excitation: dict[str, Any] = Field(default_factory=dict)
     settled_s: NotNegative = 0.0
     note: Any = None
@@ -261,8 +271,8 @@ class RecordingEntry(TypedModel):
 class RecordingDefaults(TypedModel):
     """Conditions of all recordings that do not state them themselves, key by key."""
 
-    pretension_N: Positive | None = Field(None, description=PRETENSION)
-    conduit: Conduit | None = Field(None, description=CONDUIT)
+    pretension_N: Annotated[Positive | None, FillIn(PRETENSION)] = None
+    conduit: Annotated[Conduit | None, FillIn(CONDUIT)] = None
     excitation: dict[str, Any] = Field(default_factory=dict)
     settled_s: NotNegative = 0.0
     note: Any = None
