@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import yaml
 
-R, COUNTS, KT, SENSITIVITY, ZERO = 0.006, 2000, 0.0234, 0.1, 0.25
+R, COUNTS, KT, SENSITIVITY, ZERO, T0 = 0.006, 2000, 0.0234, 0.1, 0.25, 3.5
 
 
 def description(ids=("one", "two")) -> dict:
@@ -30,7 +30,7 @@ def description(ids=("one", "two")) -> dict:
             {
                 "id": i,
                 "file": f"{i}.csv",
-                "pretension_N": 3.5,
+                "pretension_N": T0,
                 "conduit": [{"length_m": 0.4, "bend_rad": 0.0}, {"length_m": 0.8, "bend_rad": 3.1416}],
             }
             for i in ids
@@ -39,19 +39,28 @@ def description(ids=("one", "two")) -> dict:
 
 
 def table(n=400, dt=0.004, rest=0.4, seed=0) -> pd.DataFrame:
-    """Raw columns of a sine that starts from rest, with noise on currents and load cells."""
+    """Raw columns of a sine that starts from rest, with noise on currents and load cells.
+
+    The parity relations hold about as on a rig: the spring is the stated one, and both cables slip.
+    """
     noise = np.random.default_rng(seed).normal(0, 1, (n, 4))
     time = dt * np.arange(1, n + 1)
-    theta = 0.6 * np.sin(np.pi * np.maximum(time - rest, 0))
+    phase = np.pi * np.maximum(time - rest, 0)
+    theta = (0.6 + 0.01 * seed) * np.sin(phase)
+    load = 0.9 * theta
+    # Full slip: the pulled cable has exp(mu phi) times the load's tension at the drive, the other the inverse.
+    ratio = np.exp(0.147 * np.pi * np.sign(np.cos(phase)) * (time > rest))
+    t2, t4 = (T0 + 0.05 * load / R / 2 * sign for sign in (1, -1))
+    tau_in, f_drive = (t2 * ratio - t4 / ratio) * R, t2 * ratio + t4 / ratio
     return pd.DataFrame(
         {
             "time_s": time.round(6),
             "drive_encoder_counts": np.round(theta * COUNTS / 2 / np.pi).astype(int) + 100,
-            "load_encoder_counts": np.round(0.8 * theta * COUNTS / 2 / np.pi).astype(int) - 50,
-            "drive_current_A": (theta + 0.01 * noise[:, 0]).round(5),
-            "load_current_A": (0.5 * theta + 0.01 * noise[:, 1]).round(5),
-            "drive_load_cell_V": (0.95 + 0.01 * noise[:, 2]).round(5),
-            "load_load_cell_V": (0.95 + 0.01 * noise[:, 3]).round(5),
+            "load_encoder_counts": np.round(load * COUNTS / 2 / np.pi).astype(int) - 50,
+            "drive_current_A": (tau_in / KT + 0.01 * noise[:, 0]).round(5),
+            "load_current_A": (0.05 * load / KT + 0.01 * noise[:, 1]).round(5),
+            "drive_load_cell_V": (ZERO + SENSITIVITY * f_drive + 0.01 * noise[:, 2]).round(5),
+            "load_load_cell_V": (ZERO + SENSITIVITY * 2 * T0 + 0.01 * noise[:, 3]).round(5),
         }
     )
 

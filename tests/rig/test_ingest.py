@@ -1,9 +1,10 @@
 import gzip
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from made_up_batch import COUNTS, table
+from made_up_batch import COUNTS, KT, table
 
 from ccmodel.recording import read_recordings, write_recordings
 from ccmodel.rig import ingest
@@ -250,7 +251,7 @@ def test_the_recordings_of_a_batch_are_checked_against_one_another_last(bench, m
     given = []
     monkeypatch.setattr(ingest, "check_consistency", lambda *of: given.append(of) or [found])
     ingested = ingest_batch(bench.write().folder)
-    assert ingested.findings == [found]
+    assert ingested.findings == [replace(found, file=str(bench.folder / "batch.yaml"))]
     assert found.is_inconsistent
     assert given == [(ingested.recordings, ingested.batch)]
 
@@ -264,7 +265,9 @@ def test_findings_of_an_earlier_format_are_read():
 def test_a_load_encoder_that_stops_is_a_warning_and_kept(bench):
     changed("load_encoder_counts", lambda t: t.load_encoder_counts.where(t.index < 120, -30))(bench)
     ingested = ingest_batch(bench.folder)
-    (finding,) = ingested.findings
+    finding, *others = ingested.findings
+    # What the load then shows is not what the other recording shows.
+    assert all(f.severity == "inconsistent" for f in others)
     assert (finding.column, finding.severity) == ("load_encoder_counts", "warning")
     assert "stands still up to row 401 while the drive runs through its whole range" in finding.text
     assert "theta_out_rad" in ingested.recordings[0]
@@ -411,7 +414,7 @@ def test_a_stated_sensor_that_is_in_no_log_is_one_warning(bench):
 
 
 def test_a_torque_sensor_replaces_a_current(bench):
-    bench.described["rig"]["drive"]["torque_sensor"] = {"Nm_per_count": 4e-5}
+    bench.described["rig"]["drive"]["torque_sensor"] = {"Nm_per_count": KT}
     for name, frame in bench.tables.items():
         bench.tables[name] = frame.rename(columns={"drive_current_A": "drive_torque_counts"})
     ingested = ingest_batch(bench.write().folder)

@@ -1,7 +1,7 @@
 """Ingest: the folder of a batch is read into recordings, and into findings for everything that is wrong with it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -66,16 +66,20 @@ def ingest_batch(folder: Path) -> Ingested:
     if columns.refusals:
         return Ingested([], [_finding(name, batch_file, "refused", defect) for defect in columns.refusals])
     findings = [_finding(name, batch_file, "warning", defect) for defect in columns.warnings]
-    recordings = []
+    recordings, used_files = [], []
     for entry, file, (log, refusals) in zip(batch.recordings, files, logs, strict=True):
         if log is not None:
             used, refusals = _attempt(name, file, _recording, batch, entry, file, log, columns)
             if used is not None:
                 recording, warnings = used
                 recordings.append(recording)
+                used_files.append(file)
                 findings += warnings
         findings += refusals
-    findings += check_consistency(recordings, batch)
+    # What a faulty sensor reads contradicts everything else too: it is named once.
+    faulty = {finding.file for finding in findings if finding.severity == "inconsistent"}
+    sound = [r for r, file in zip(recordings, used_files, strict=True) if file not in faulty]
+    findings += [replace(f, file=str(folder / f.file)) for f in check_consistency(sound, batch)]
     return Ingested(recordings, findings, batch)
 
 
@@ -121,9 +125,7 @@ def _recording(
     calibrated = calibrate(table, batch.rig)
     unconverted = [Defect(None, column, f"not used: {why}") for column, why in calibrated.unused.items()]
     # A column that is not used contradicts nothing.
-    faulty_sensors = [
-        d._replace(contradicts=d.contradicts and d.column not in calibrated.unused) for d in faulty_sensors
-    ]
+    faulty_sensors = [d._replace(contradicts=d.contradicts and d.column in columns.stated) for d in faulty_sensors]
     defects = [*reading_defects, *rare_columns, *faulty_sensors, *unconverted]
     findings = [_finding(batch.batch, file, "warning", defect) for defect in defects]
     recording = Recording(

@@ -45,7 +45,7 @@ def check_sensors(table: pd.DataFrame, rig: Rig) -> tuple[pd.DataFrame, list[Def
     warnings, dead = _missing_steps(table, drive), []
     for column in table.columns.drop(["time_s", drive.column]):
         is_load = load is not None and column == load.column
-        if fault := _dead_load(table, load) if is_load else _dead(table, column):
+        if fault := _dead_load(table, load, rig) if is_load else _dead(table, column):
             warnings.append(fault._replace(text=f"{fault.text}: column not used"))
             dead.append(column)
         elif is_load:
@@ -96,10 +96,11 @@ def _check_drive(table: pd.DataFrame, drive: Angle, load: Angle | None) -> None:
             raise LogError(int(first), drive.column, text, True)
 
 
-def _dead_load(table: pd.DataFrame, load: Angle) -> Defect | None:
+def _dead_load(table: pd.DataFrame, load: Angle, rig: Rig) -> Defect | None:
     if np.ptp(load.values) <= limits.STILL_COUNTS * load.grain:
         text = "stands still throughout while the drive moves: encoder stuck or load locked"
-        return Defect(None, load.column, text, contradicts=True)
+        # A load that batch.yaml states as fixed has to stand still.
+        return Defect(None, load.column, text, contradicts=rig.far_end != "fixed")
     return _jump(table, load)
 
 

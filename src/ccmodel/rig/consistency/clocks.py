@@ -24,7 +24,9 @@ def drift_of(parity: Parity) -> tuple[float, float] | None:
     if min(m.size for m in marks) < limits.FEWEST_CROSSINGS or abs(marks[0].size - marks[1].size) > 1:
         return None
     count = min(m.size for m in marks)
-    drive, load = (_times(x["time_s"], x[name], m[:count]) for name, m in zip((THETA_IN, THETA_OUT), marks, strict=True))
+    drive, load = (
+        _times(x["time_s"], x[name], m[:count]) for name, m in zip((THETA_IN, THETA_OUT), marks, strict=True)
+    )
     if not _equal(np.diff(drive)) or not _equal(_strokes(x[THETA_IN], marks[0])):
         return None
     lag = load - drive

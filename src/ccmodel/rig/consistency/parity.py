@@ -87,7 +87,10 @@ class Parity:
         x, rig, entry = self.moving, self.batch.rig, self.recording
         radii = rig.drive.pulley_radius_m, rig.load.pulley_radius_m
         found = {}
-        if (amplitude := entry.excitation.get("amplitude_rad")) and entry.excitation.get("wave") in ("sine", "triangle"):
+        if (amplitude := entry.excitation.get("amplitude_rad")) and entry.excitation.get("wave") in (
+            "sine",
+            "triangle",
+        ):
             found["amplitude"] = np.ptp(x[THETA_IN]) / 2 / amplitude
         if THETA_OUT in x:
             found["travel"] = np.ptp(x[THETA_OUT]) * radii[1] / (np.ptp(x[THETA_IN]) * radii[0])
@@ -98,7 +101,9 @@ class Parity:
         for name, channel in (("drive", F_DRIVE), ("load", F_LOAD)):
             if channel in entry and resting.any() and not entry.far_end:
                 found[f"pretension at the {name}"] = entry[channel][resting].mean() / (2 * entry.pretension_N)
-        ends = [found[f"pretension at the {name}"] for name in ("drive", "load") if f"pretension at the {name}" in found]
+        ends = [
+            found[f"pretension at the {name}"] for name in ("drive", "load") if f"pretension at the {name}" in found
+        ]
         if ends and min(ends) > 0:
             found["pretension"] = np.exp(np.mean(np.log(ends)))
         if TAU_OUT in x and F_LOAD in x:

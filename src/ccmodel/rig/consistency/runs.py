@@ -3,9 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ccmodel.channels import ANGLE_AT, CHANNELS, MEASURED, TENSIONS, THETA_IN, THETA_OUT
+from ccmodel.channels import ANGLE_AT, CHANNELS, MEASURED, TENSIONS, THETA_IN
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
 from ccmodel.rig.consistency.parity import Parity, speed
@@ -104,9 +103,7 @@ def _other_rig(parity: Parity, others: Sequence[Parity]) -> Contradiction | None
     distance = float(np.sqrt(sum((d / limits.SCATTER[name]) ** 2 for name, d in deviations.items())))
     if distance < limits.OTHER_RIG:
         return None
-    apart = [
-        f"{name} {np.exp(d):.2g} times" for name, d in deviations.items() if abs(d) > limits.SCATTER[name]
-    ]
+    apart = [f"{name} {np.exp(d):.2g} times" for name, d in deviations.items() if abs(d) > limits.SCATTER[name]]
     text = (
         f"{parity.recording.id} is of another rig or of other conditions than the batch states: compared with the"
         f" recordings of similar stroke and tension it has {', '.join(apart)} theirs"

@@ -82,7 +82,9 @@ def _both_angles(ratios: Mapping[str, float]) -> list[Contradiction]:
     """Scale of both angles: spring, stiffness and noted amplitude are wrong by about the same factor."""
     inverse = {name: 1 / ratios[name] for name in ("spring", "stiffness") if ratios.get(name, 0) > 0}
     factors = inverse | {name: ratios[name] for name in ("amplitude",) if name in ratios}
-    sides = {beyond(factor, limits.AMPLITUDE_FACTOR if name == "amplitude" else 1.8) for name, factor in factors.items()}
+    sides = {
+        beyond(factor, limits.AMPLITUDE_FACTOR if name == "amplitude" else 1.8) for name, factor in factors.items()
+    }
     if len(factors) < 2 or len(sides) != 1 or sides == {0} or "spring" not in factors:
         return []
     if beyond(factors["spring"], limits.AMPLITUDE_FACTOR) == 0:
