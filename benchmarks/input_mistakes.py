@@ -20,6 +20,8 @@ import numpy as np
 import pandas as pd
 from ruamel.yaml import YAML
 
+from ccmodel.channels import ANGLE_AT, SUM_AT, TORQUE_AT
+from ccmodel.recording import Recording
 from ccmodel.rig.ingest import ingest_batch
 from proof.build import build
 from proof.cases import draw
@@ -48,12 +50,12 @@ class Copy:
     description : dict
         Content of batch.yaml.
     donors : sequence of DataFrame
-        Logs of another rig.
+        Recordings of other rigs.
     """
 
     logs: dict[str, pd.DataFrame]
     description: dict
-    donors: Sequence[pd.DataFrame]
+    donors: Sequence[Recording]
 
     @property
     def rig(self) -> dict:
@@ -76,11 +78,40 @@ class Copy:
         return next(e for e in self.description["recordings"] if e["id"] == name)
 
 
-def read_copy(folder: Path, donors: Sequence[pd.DataFrame] = ()) -> Copy:
+def read_copy(folder: Path, donors: Sequence[Recording] = ()) -> Copy:
     """A batch as a copy in memory."""
     description = YAML(typ="safe").load(folder / "batch.yaml")
     logs = {e["id"]: pd.read_csv(folder / e["file"]) for e in description["recordings"]}
     return Copy(logs, description, donors)
+
+
+def as_logged(recording: Recording, rig: Mapping, columns: Sequence[str]) -> pd.DataFrame | None:
+    """A recording of another rig as this rig would log it; None if it lacks a channel."""
+    found = {"time_s": recording.time_s.round(6)}
+    for column in columns:
+        if column == "time_s":
+            continue
+        end, sensor = column.split("_", 1)
+        side = rig[end]
+        channel, scale, zero = {
+            "encoder_counts": (
+                ANGLE_AT,
+                lambda s: s["encoder_counts_per_rev"] / 2 / np.pi * s.get("encoder_sign", 1),
+                0,
+            ),
+            "current_A": (TORQUE_AT, lambda s: s.get("torque_sign", 1) / s["torque_constant_Nm_per_A"], 0),
+            "torque_counts": (TORQUE_AT, lambda s: s.get("torque_sign", 1) / s["torque_sensor"]["Nm_per_count"], 0),
+            "load_cell_V": (
+                SUM_AT,
+                lambda s: s["load_cell"]["sensitivity_V_per_N"],
+                side.get("load_cell", {}).get("zero_V"),
+            ),
+        }[sensor]
+        if channel[end] not in recording:
+            return None
+        values = recording[channel[end]] * scale(side) + zero
+        found[column] = np.round(values) if sensor == "encoder_counts" else values.round(5)
+    return pd.DataFrame(found)
 
 
 def write_copy(copy: Copy, folder: Path) -> Path:
@@ -211,11 +242,12 @@ def _drifting_clocks(copy: Copy, random) -> str:
 
 
 def _other_rig(copy: Copy, random) -> str:
-    donors = [d for d in copy.donors if set(d) == set(next(iter(copy.logs.values())))]
-    if not donors:
-        raise NotApplicableError
     name = copy.any_log(random)
-    copy.logs[name] = donors[random.integers(len(donors))].copy()
+    donor = copy.donors[random.integers(len(copy.donors))]
+    log = as_logged(donor, copy.rig, list(copy.logs[name]))
+    if log is None:
+        raise NotApplicableError
+    copy.logs[name] = log
     return name
 
 
@@ -229,7 +261,7 @@ def _forgotten_bend(copy: Copy, random) -> str:
     copy.columns("load_cell_V")
     entry = copy.entry(copy.any_log(random))
     entry["conduit"] = [piece | {"bend_rad": 0.0} for piece in entry["conduit"]]
-    return f"{entry['id']}: bend_rad"
+    return f"{entry['id']}.csv bend_rad"
 
 
 def _stated(section: str, key: str, needs: str = "load_cell_V"):
@@ -276,7 +308,7 @@ MISTAKES: Mapping[str, Callable[[Copy, np.random.Generator], str]] = {
 def said_of(folder: Path) -> list[str]:
     """What a check says cannot be, a sentence each."""
     findings = ingest_batch(folder).findings
-    return [f"{f.column or ''} {Path(f.file).name} {f.text}" for f in findings if f.severity != "warning"]
+    return [f"{Path(f.file).name} {f.column}: {f.text}" for f in findings if f.is_inconsistent]
 
 
 def made(source: Copy, mistake: str, seed: int, folder: Path) -> tuple[str, list[str]] | None:

@@ -54,6 +54,19 @@ class Angle:
         counts = self.column.endswith("counts")
         return f"{change:g} counts" if counts else f"{change * self.rad_per_unit:.4g} rad"
 
+    def outstanding_changes(self) -> NDArray:
+        """Whether each change from sample to sample is larger than all others near it by more than counting explains.
+
+        Returns
+        -------
+        ndarray of bool, shape (n - 1,)
+        """
+        change, n = np.abs(np.diff(self.values)), limits.NEAR_SAMPLES
+        windows = np.lib.stride_tricks.sliding_window_view(np.pad(change, n, mode="reflect"), 2 * n + 1)
+        # Beside the sample itself are its neighbours, with which a lost count may share the jump.
+        near = np.delete(windows, [n - 1, n, n + 1], axis=1).max(axis=1)
+        return change > limits.OUTSTANDING_FACTOR * near + limits.OUTSTANDING_GRAINS * self.grain
+
     def still_samples(self) -> int:
         """Number of samples at the start during which the angle only dithers."""
         values = self.values

@@ -54,3 +54,5 @@ OFF_STEP_FRACTION = 0.01
 SHORTEST_REST_S = 0.1
 # Steps of time that no log of a moving rig has, s: the times are in ms or µs, or in days.
 SHORTEST_STEP_S, LONGEST_STEP_S = 2e-6, 0.2
+# A change of an angle stands out if it is this factor and so many counts above all changes of the samples near it.
+OUTSTANDING_FACTOR, OUTSTANDING_GRAINS, NEAR_SAMPLES = 2.5, 2.0, 12

@@ -5,11 +5,10 @@
 """
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from ccmodel.recording import Recording
 from ccmodel.rig.batch import Batch
-from ccmodel.rig.consistency.clocks import wrong_clocks
+from ccmodel.rig.consistency.clocks import drifting_clocks
 from ccmodel.rig.consistency.contradiction import Contradiction
 from ccmodel.rig.consistency.parity import Parity
 from ccmodel.rig.consistency.runs import copied_channels, foreign_runs
@@ -32,7 +31,7 @@ def contradictions(recordings: Sequence[Recording], batch: Batch) -> list[Contra
     intact = [p for p in parities if p.recording.id not in named]
     if not intact:
         return copies
-    for of_the_batch in (wrong_geometry, wrong_signs, wrong_clocks):
+    for of_the_batch in (wrong_geometry, wrong_signs, drifting_clocks):
         found = of_the_batch(intact)
         if any(c.recording is None for c in found):
             return [*copies, *found]
@@ -49,7 +48,6 @@ def check_consistency(recordings: list[Recording], batch: Batch) -> list[Finding
     """The contradictions of a batch as findings of severity "inconsistent"; see `contradictions`."""
     files = {entry.id: entry.file for entry in batch.recordings}
     return [
-        Finding(batch.batch, str(Path(files.get(c.recording, "batch.yaml"))), None, None, "inconsistent",
-                c.text, c.confidence)
+        Finding(batch.batch, files.get(c.recording, "batch.yaml"), None, c.what, "inconsistent", c.text, c.confidence)
         for c in contradictions(recordings, batch)
-    ]  # fmt: skip
+    ]

@@ -1,18 +1,14 @@
-"""Clocks: two that drift apart, and samples that were lost without a gap in time."""
+"""Clocks of the two ends that drift apart."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
-from ccmodel.channels import ANGLE_AT, THETA_IN, THETA_OUT
+from ccmodel.channels import THETA_IN, THETA_OUT
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
 from ccmodel.rig.consistency.parity import Parity, crossings
-
-
-def wrong_clocks(parities: Sequence[Parity]) -> list[Contradiction]:
-    """Clocks that drift apart, and lost samples."""
-    return [*_drift(parities), *(c for p in parities if (c := _lost_samples(p)))]
 
 
 def drift_of(parity: Parity) -> tuple[float, float] | None:
@@ -58,10 +54,11 @@ def _equal(values) -> bool:
 def _strokes(values, marks):
     """Greatest distance from the middle between crossings."""
     middle = (values.max() + values.min()) / 2
-    return np.array([np.abs(values[a : b + 1] - middle).max() for a, b in zip(marks[:-1], marks[1:], strict=True)])
+    return np.array([np.abs(values[a : b + 1] - middle).max() for a, b in pairwise(marks)])
 
 
-def _drift(parities: Sequence[Parity]) -> list[Contradiction]:
+def drifting_clocks(parities: Sequence[Parity]) -> list[Contradiction]:
+    """Clocks that drift apart, in a recording of equal cycles or more."""
     rates = {p.recording.id: d for p in parities if (d := drift_of(p))}
     drifting = {id_: d for id_, d in rates.items() if _drifts(*d)}
     if not drifting:
@@ -69,8 +66,8 @@ def _drift(parities: Sequence[Parity]) -> list[Contradiction]:
     rate = float(np.median([r for r, _ in drifting.values()]))
     change = max((c for _, c in drifting.values()), key=abs)
     text = (
-        f"the clocks of drive and load drift apart by {1e3 * abs(rate):.2g} ms a second: the load's lag changes by up to"
-        f" {1e3 * abs(change):.0f} ms over equal cycles of {', '.join(drifting)}; correct the time of one side"
+        f"the clocks of drive and load drift apart by {1e3 * abs(rate):.2g} ms a second: the load's lag changes by up"
+        f" to {1e3 * abs(change):.0f} ms over equal cycles of {', '.join(drifting)}; correct the time of one side"
     )
     single = next(iter(drifting)) if len(drifting) == 1 and len(parities) > 1 else None
     return [Contradiction("clocks of drive and load", text, single, SURE if len(drifting) > 1 else LIKELY)]
@@ -78,42 +75,3 @@ def _drift(parities: Sequence[Parity]) -> list[Contradiction]:
 
 def _drifts(rate: float, change: float) -> bool:
     return abs(rate) > limits.DRIFT_RATE and abs(change) > limits.DRIFT_S
-
-
-def _lost_samples(parity: Parity) -> Contradiction | None:
-    """A sample at which the angles of both ends jump together."""
-    r = parity.recording
-    jumps = None
-    for channel in ANGLE_AT.values():
-        if channel not in r:
-            return None
-        here = _jumps(r[channel], r.encoder_step_rad.get(channel, 0.0))
-        jumps = here if jumps is None else jumps & (here | np.roll(here, 1) | np.roll(here, -1))
-    at = np.flatnonzero(jumps)
-    if not at.size:
-        return None
-    step, speed = _size(r[THETA_IN], at[0])
-    text = (
-        f"both angles of {r.id} jump at {r.time_s[at[0] + 1]:.3f} s (drive by {1e3 * step:.1f} mrad, where a sample"
-        f" takes {1e3 * speed:.1f} mrad){f' and {at.size - 1} more times' if at.size > 1 else ''}: samples were lost and"
-        " the time does not show it; record it again"
-    )
-    return Contradiction(f"{r.id}: time_s", text, r.id, LIKELY)
-
-
-def _jumps(values, step_rad: float):
-    """Whether each change is larger than all others near it by more than counting explains."""
-    change = np.abs(np.diff(values))
-    n = limits.LOST_NEAR
-    padded = np.pad(change, n, mode="reflect")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * n + 1)
-    # The sample itself and its neighbours, which a lost count may share the jump with, are not near.
-    near = np.delete(windows, [n - 1, n, n + 1], axis=1).max(axis=1)
-    typical = max(step_rad, 1e-9 + 1e-3 * float(np.ptp(values)))
-    return change > limits.LOST_FACTOR * near + limits.LOST_STEPS * typical
-
-
-def _size(values, at: int) -> tuple[float, float]:
-    change = np.abs(np.diff(values))
-    near = np.r_[change[max(at - limits.LOST_NEAR, 0) : at], change[at + 1 : at + 1 + limits.LOST_NEAR]]
-    return float(change[at]), float(np.median(near))

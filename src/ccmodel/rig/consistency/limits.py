@@ -9,9 +9,9 @@ MOVING, SPEED_WINDOW_S = 0.3, 0.05
 # Share of the pretension, plus a force in N, from which a cable counts as taut.
 TAUT_SHARE, TAUT_N = 0.25, 0.3
 # The cable that is pulled carries this many times the tension of the other: its ratio of tensions is then determined.
-PULLED = 1.5
-# Fewest samples of an estimate.
-FEWEST_SAMPLES = 20
+PULLED = 1.25
+# Fewest samples of an estimate, and of one of a sensor's noise.
+FEWEST_SAMPLES, NOISE_SAMPLES = 20, 100
 
 # Correlation or share of work below which a sign is wrong. With the right sign it was 0.15 or more.
 WRONG_SIGN = -0.1
@@ -40,9 +40,13 @@ STRAIGHT_RAD, STRAIGHT_LOG_RATIO = 0.3, 0.25
 
 # Friction for each radian of stated bend, over that of every other recording with the same or a lower pretension.
 FORGOTTEN_BEND = 1.75
-# Scatter of a relation between recordings of one rig (standard deviation of its logarithm), where amplitude, speed and
-# tension do not explain it; and the distance, in such deviations, from which a recording is another rig's.
-SCATTER = {"spring": 0.07, "friction": 0.15, "stiffness": 0.15, "travel": 0.1, "pretension": 0.08, "amplitude": 0.1}
+# Scatter of a relation between recordings of one rig (standard deviation of its logarithm) where amplitude, speed and
+# tension do not explain it: about twice the largest that was seen, or what labs repeat to. And the distance, in such
+# deviations, from which a recording is another rig's.
+SCATTER = {
+    "spring": 0.06, "friction": 0.12, "stiffness": 0.15, "travel": 0.08, "pretension": 0.06, "amplitude": 0.1,
+    "frequency": 0.05, "noise": 0.3,
+}  # fmt: skip
 OTHER_RIG = 4.0
 # Factor of stroke, tension and frequency within which recordings count as alike.
 ALIKE = 1.1
@@ -51,9 +55,6 @@ ALIKE = 1.1
 DRIFT_RATE, DRIFT_S = 0.004, 0.02
 # Relative deviation of amplitude and period up to which cycles count as equal, and fewest crossings of the middle.
 EQUAL_CYCLES, FEWEST_CROSSINGS = 0.05, 4
-
-# Change of both angles in one sample, over the largest change near it and in steps of the encoder; samples nearby.
-LOST_FACTOR, LOST_STEPS, LOST_NEAR = 2.5, 2.0, 12
 
 # Share of equal changes from which a channel is a copy: sensors with noise, and angles, whose counts agree by chance.
 COPIED_NOISE, COPIED_ANGLE = 0.5, 0.98

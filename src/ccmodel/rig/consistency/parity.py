@@ -76,7 +76,8 @@ class Parity:
         """Found over stated value by relation.
 
         - ``travel``: travel of the load over that of the drive, at the cable
-        - ``amplitude``: half the stroke over the noted amplitude
+        - ``amplitude``, ``frequency``: those of a periodic motion over the noted ones
+        - ``noise of <channel>``: standard deviation of a sensor's white noise, in the channel's unit
         - ``spring``: load torque over load angle, over the stated spring
         - ``friction``: ln of the ratio of tensions in full slip, over mu phi
         - ``stiffness``: mean tension over stretch of the taut cables, over the stated stiffness
@@ -87,11 +88,14 @@ class Parity:
         x, rig, entry = self.moving, self.batch.rig, self.recording
         radii = rig.drive.pulley_radius_m, rig.load.pulley_radius_m
         found = {}
-        if (amplitude := entry.excitation.get("amplitude_rad")) and entry.excitation.get("wave") in (
-            "sine",
-            "triangle",
-        ):
+        noted = entry.excitation if entry.excitation.get("wave") in ("sine", "triangle") else {}
+        if amplitude := noted.get("amplitude_rad"):
             found["amplitude"] = np.ptp(x[THETA_IN]) / 2 / amplitude
+        if (frequency := noted.get("frequency_Hz")) and (marks := crossings(x[THETA_IN])).size > 2:
+            found["frequency"] = 0.5 / np.median(np.diff(x["time_s"][marks])) / frequency
+        for channel in (TAU_IN, TAU_OUT, F_DRIVE, F_LOAD):
+            if channel in x:
+                found[f"noise of {channel}"] = white_noise(x[channel])
         if THETA_OUT in x:
             found["travel"] = np.ptp(x[THETA_OUT]) * radii[1] / (np.ptp(x[THETA_IN]) * radii[0])
         if THETA_OUT in x and TAU_OUT in x and (spring := rig.load.spring_stiffness_Nm_per_rad):
@@ -174,6 +178,15 @@ class Parity:
         x = self.moving
         drive, load = (direction * speed(x[name], x["time_s"]) for name in (THETA_IN, THETA_OUT))
         return (drive > limits.MOVING * np.abs(drive).max()) & (load > limits.MOVING * np.abs(load).max())
+
+
+def white_noise(values: NDArray) -> float:
+    """Standard deviation of a sensor's white noise where it is quietest: stick and slip make noise of their own."""
+    # Motions hardly reach the third differences. The sum of squares of 1, -3, 3, -1 is 20; 0.6745 turns a median into a
+    # standard deviation.
+    differences = np.abs(np.diff(values, 3)) / 0.6745 / np.sqrt(20)
+    parts = np.array_split(differences, max(1, differences.size // limits.NOISE_SAMPLES))
+    return float(np.quantile([np.median(part) for part in parts], 0.1))
 
 
 def correlation(one: NDArray, other: NDArray) -> float:

@@ -1,10 +1,10 @@
-"""Recordings that do not belong to their batch: another rig's, a forgotten bend, copied channels, two runs in one log."""
+"""Recordings that do not belong to their batch: of another rig or bend, with copied channels, of two runs."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from ccmodel.channels import ANGLE_AT, CHANNELS, MEASURED, TENSIONS, THETA_IN
+from ccmodel.channels import ANGLE_AT, CHANNELS, F_DRIVE, F_LOAD, MEASURED, TAU_IN, TAU_OUT, TENSIONS, THETA_IN
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
 from ccmodel.rig.consistency.parity import Parity, speed
@@ -34,7 +34,7 @@ def copied_channels(parities: Sequence[Parity]) -> list[Contradiction]:
                     f"{names} of {parity.recording.id} repeat those of {earlier.recording.id}, sample by sample: noise"
                     " does not repeat; one of the two logs holds a copy"
                 )
-                found.append(Contradiction(f"{parity.recording.id}: {names}", text, parity.recording.id))
+                found.append(Contradiction(names, text, parity.recording.id))
     return found
 
 
@@ -62,7 +62,7 @@ def _two_runs(parity: Parity) -> Contradiction | None:
         f"the load angle of {parity.recording.id} does not follow its drive angle (correlation {together:.2f}): one of"
         " the two is of another run, or their clocks are apart"
     )
-    return Contradiction(f"{parity.recording.id}: theta_out", text, parity.recording.id, LIKELY)
+    return Contradiction("theta_out", text, parity.recording.id, LIKELY)
 
 
 def _straight(parity: Parity) -> Contradiction | None:
@@ -74,7 +74,7 @@ def _straight(parity: Parity) -> Contradiction | None:
         f"conduit of {parity.recording.id} is stated with {bend:.3g} rad of bend, but T1 / T2 reaches"
         f" {np.exp(found):.3g} in full slip, as friction along {_bend_for(parity, found)} of bend: a forgotten bend_rad"
     )
-    return Contradiction(f"{parity.recording.id}: bend_rad", text, parity.recording.id, LIKELY)
+    return Contradiction("bend_rad", text, parity.recording.id, LIKELY)
 
 
 def _bend_for(parity: Parity, log_ratio: float) -> str:
@@ -94,21 +94,27 @@ def _bend(parity: Parity, others: Sequence[Parity]) -> Contradiction | None:
         f" {np.exp(excess):.2g} times that of the other recordings for each radian: a bend of"
         f" {bend * np.exp(excess):.2g} rad would agree with them; check bend_rad"
     )
-    return Contradiction(f"{parity.recording.id}: bend_rad", text, parity.recording.id, LIKELY)
+    return Contradiction("bend_rad", text, parity.recording.id, LIKELY)
 
 
 def _other_rig(parity: Parity, others: Sequence[Parity]) -> Contradiction | None:
     """A recording whose spring, friction, stiffness, travel or pretension is not that of the others."""
-    deviations = deviations_of(parity, others)
-    distance = float(np.sqrt(sum((d / limits.SCATTER[name]) ** 2 for name, d in deviations.items())))
+    deviations = {name: d / limits.SCATTER[name.split(" ")[0]] for name, d in deviations_of(parity, others).items()}
+    distance = float(np.sqrt(sum(d**2 for d in deviations.values())))
     if distance < limits.OTHER_RIG:
         return None
-    apart = [f"{name} {np.exp(d):.2g} times" for name, d in deviations.items() if abs(d) > limits.SCATTER[name]]
+    worst = sorted(deviations, key=lambda name: -abs(deviations[name]))[:3]
+    apart = [f"{name} {_times(name, parity, others)}" for name in worst if abs(deviations[name]) > 1]
     text = (
-        f"{parity.recording.id} is of another rig or of other conditions than the batch states: compared with the"
-        f" recordings of similar stroke and tension it has {', '.join(apart)} theirs"
+        f"{parity.recording.id} is of another rig or of other conditions than the batch states: compared with the other"
+        f" recordings' medians, {', '.join(apart)}; check that the log is the one of this entry"
     )
     return Contradiction(parity.recording.id, text, parity.recording.id, SURE if distance > 6 else LIKELY)
+
+
+def _times(name: str, parity: Parity, others: Sequence[Parity]) -> str:
+    typical = float(np.median([p.ratios[name] for p in others if name in p.ratios]))
+    return f"is {parity.ratios[name] / typical:.2g} times theirs"
 
 
 def deviations_of(parity: Parity, others: Sequence[Parity]) -> dict[str, float]:
@@ -149,6 +155,8 @@ _DEPENDENCE = {
     "travel": ((_stroke, 1),),
     "pretension": ((_tension, 1), (_tension, -1)),
     "amplitude": (),
+    "frequency": (),
+    **{f"noise of {channel}": () for channel in (TAU_IN, TAU_OUT, F_DRIVE, F_LOAD)},
 }
 
 

@@ -18,7 +18,10 @@ _NAMED_WITHIN = 0.3
 def wrong_geometry(parities: Sequence[Parity]) -> list[Contradiction]:
     """Radii, and scales of angles: the first that is found, since one makes the other relations wrong."""
     ratios, batch = pooled(parities), parities[0].batch
-    return _radii(batch) or _angle_of_one_end(ratios) or _both_angles(ratios)
+    if radii := _radii(batch):
+        return radii
+    exchanged = _exchanged(ratios, batch) and float(np.median([p.signs.get("loss", 0.0) for p in parities])) < 0
+    return [] if exchanged else _angle_of_one_end(ratios) or _both_angles(ratios)
 
 
 def wrong_scales(parities: Sequence[Parity]) -> list[Contradiction]:
@@ -56,6 +59,13 @@ def _radii(batch: Batch) -> list[Contradiction]:
             text = f"rig.{end.name}.pulley_radius_m is {radius:g} m{unit}: no pulley of a cable rig; state it in m"
             found.append(Contradiction(f"rig.{end.name}.pulley_radius_m", text))
     return found
+
+
+def _exchanged(ratios: Mapping[str, float], batch: Batch) -> bool:
+    """Whether exchanged columns of the two ends would explain the travel, also with encoders of unlike counts."""
+    counts = [end.side.encoder_counts_per_rev for end in batch.rig.ends]
+    unlike = (counts[1] / counts[0]) ** 2 if all(counts) else 1.0
+    return 1 / limits.MOST_TRAVEL < 1 / (ratios.get("travel", 0.0) * unlike or np.inf) <= 1.05
 
 
 def _angle_of_one_end(ratios: Mapping[str, float]) -> list[Contradiction]:
