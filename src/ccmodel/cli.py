@@ -44,7 +44,10 @@ Folder = Annotated[Path, typer.Argument()]
 
 @app.command()
 def check(batch: Folder) -> None:
-    """Check a batch folder and print all findings; exits with 1 if a file cannot be used."""
+    """Check a batch folder and print all findings.
+
+    Exits with 1 if a file cannot be used or the inputs contradict one another.
+    """
     from ccmodel.rig.ingest import ingest_batch
 
     ingested = ingest_batch(batch)
@@ -52,7 +55,7 @@ def check(batch: Folder) -> None:
         typer.echo(f"{recording.id}: {recording.time_s.size} samples, {', '.join(recording.channels)}")
     for finding in ingested.findings:
         _print_finding(str(finding), finding.severity)
-    if any(f.severity == "refused" for f in ingested.findings):
+    if any(f.severity != "warning" for f in ingested.findings):
         raise typer.Exit(1)
 
 
@@ -160,6 +163,9 @@ def diagnose(
         list[str],
         typer.Option(help="As 'kink at conduit', or two with a comma: fit it in full whatever the screening says."),
     ] = [],  # noqa: B006
+    trust_inputs: Annotated[
+        bool, typer.Option("--trust-inputs", help="Diagnose even if the inputs contradict one another.")
+    ] = False,
     strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 unless the model agrees.")] = False,
 ) -> None:
     """Decide whether the calibrated model explains a batch; if not, locate and name the physics left out."""
@@ -176,7 +182,7 @@ def diagnose(
         first = next(e for e in error.errors() if e["type"] not in ("float_type", "dict_type"))
         option = "--tolerance" if first["loc"] else "--candidate"
         raise InputError(f"{option}: {first['msg'].removeprefix('Value error, ')}") from None
-    diagnosis = run(batch, out, options_of(settings, without, freeze), baseline, _progress)
+    diagnosis = run(batch, out, options_of(settings, without, freeze), baseline, _progress, trust_inputs)
     typer.echo(diagnosis["headline"])
     if strict and diagnosis["verdict"] != "agrees":
         raise typer.Exit(1)
@@ -283,7 +289,8 @@ def _progress(text: str) -> None:
 
 
 def _print_finding(line: str, severity: str) -> None:
-    style, word = {"warning": ("yellow", "warning"), "refused": ("red", "left out")}[severity]
+    words = {"warning": ("yellow", "warning"), "refused": ("red", "left out"), "inconsistent": ("red", "inconsistent")}
+    style, word = words[severity]
     _err.print(f"[{style}]{word}[/]: ", end="")
     _err.print(line, markup=False)
 

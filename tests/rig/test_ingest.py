@@ -237,6 +237,30 @@ def test_a_dead_sensor_that_is_not_stated_contradicts_nothing(bench):
     assert severities["is 0.25 throughout"] == "warning"
 
 
+def test_a_quiet_coarse_sensor_may_keep_its_value(bench):
+    """It stays at one value while friction takes up the motion, and at its extremes while the drive holds."""
+    noisy, quiet = bench.tables["one"], bench.tables["one"].copy()
+    theta = np.clip((noisy.time_s - 0.4) / 0.1, 0.0, 7.0)
+    quiet["drive_encoder_counts"] = np.round(200 * theta).astype(int)
+    quiet["load_encoder_counts"] = np.round(160 * np.maximum(theta - 4.0, 0.0)).astype(int)
+    quiet["load_current_A"] = np.round(np.maximum(theta - 4.0, 0.0), 3)
+    quiet["drive_current_A"] = np.round(theta + 0.001 * np.sin(70 * theta), 3)
+    bench.tables = {"one": quiet, "two": quiet.copy()}
+    found = {f.column: (f.severity, f.text.rpartition(": ")[2]) for f in ingest_batch(bench.write().folder).findings}
+    assert found["drive_current_A"] == ("warning", "saturated")
+    assert found["load_current_A"] == ("warning", "sensor frozen")
+
+
+def test_a_load_may_stand_still_through_a_small_motion(bench):
+    small = bench.tables["one"]
+    small["drive_encoder_counts"] = 100 + (small.drive_encoder_counts - 100) // 4
+    changed("load_encoder_counts", lambda t: 3)(bench)
+    (finding,) = ingest_batch(bench.folder).findings
+    assert (finding.column, finding.severity) == ("load_encoder_counts", "warning")
+    bench.tables["two"] = small
+    assert {f.severity for f in ingest_batch(bench.write().folder).findings} == {"inconsistent"}
+
+
 def test_a_load_that_is_stated_as_fixed_may_stand_still(bench):
     bench.described["rig"] |= {"transmission": "single-cable", "far_end": "fixed"}
     del bench.described["rig"]["load"]["spring_stiffness_Nm_per_rad"]

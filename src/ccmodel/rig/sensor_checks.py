@@ -15,7 +15,7 @@ from ccmodel.rig.log import length, longest_run, runs
 DRIVE, LOAD = "drive_encoder_counts", "load_encoder_counts"
 
 
-def check_sensors(table: pd.DataFrame, rig: Rig) -> tuple[pd.DataFrame, list[Defect]]:
+def check_sensors(table: pd.DataFrame, rig: Rig, largest_travel: float) -> tuple[pd.DataFrame, list[Defect]]:
     """Find faulty sensors.
 
     Parameters
@@ -24,6 +24,8 @@ def check_sensors(table: pd.DataFrame, rig: Rig) -> tuple[pd.DataFrame, list[Def
         Raw columns of a log; the index is the row in the file.
     rig : Rig
         The rig that wrote it.
+    largest_travel : float
+        Largest travel of the drive in a log of the batch (`drive_travel`).
 
     Returns
     -------
@@ -39,16 +41,23 @@ def check_sensors(table: pd.DataFrame, rig: Rig) -> tuple[pd.DataFrame, list[Def
     """
     _check_drive(table, rig)
     defects, dead = [], []
+    is_small = drive_travel(table) < limits.SMALL_TRAVEL_FRACTION * largest_travel
     for column in table.columns.drop(["time_s", DRIVE]):
         if fault := _dead(table, column, rig):
-            defects.append(fault._replace(text=f"{fault.text}: column not used"))
+            contradicts = fault.contradicts and not (is_small and fault.row is None)
+            defects.append(fault._replace(text=f"{fault.text}: column not used", contradicts=contradicts))
             dead.append(column)
         elif column == LOAD:
             defects += _load_stands(table)
         else:
             # A sensor at the end of its range repeats one value: it is clipped and not frozen.
-            defects += _saturated(table[column], rig.ranges.get(column)) or _frozen(table, column)
+            defects += _saturated(table, column, rig.ranges.get(column)) or _frozen(table, column)
     return table.drop(columns=dead), defects
+
+
+def drive_travel(table: pd.DataFrame) -> float:
+    """Travel of the drive over a log, in counts."""
+    return float(np.ptp(table[DRIVE]))
 
 
 def _check_drive(table: pd.DataFrame, rig: Rig) -> None:
@@ -66,6 +75,24 @@ def _check_drive(table: pd.DataFrame, rig: Rig) -> None:
             first, last = table.index[still][[0, -1]]
             text = f"stands still up to row {last} while the load moves: encoder stuck"
             raise LogError(int(first), DRIVE, text, True)
+
+
+def _is_noisy_at_rest(table: pd.DataFrame, column: str, odd: np.ndarray, most_repeats: float) -> bool:
+    """Whether a sensor repeats fewer than a share of its values while the drive rests, `odd` samples left out.
+
+    A converter that is coarser than its noise keeps its value wherever the cables keep their tension: at a rest, and
+    while friction takes up a motion. Only of a sensor that is noisy at rest is a constant value a fault.
+    """
+    rests = [
+        run
+        for run in runs(np.diff(table[DRIVE].to_numpy(), prepend=np.nan) == 0)
+        if length(run) > limits.FROZEN_SAMPLES
+    ]
+    at_rest = np.zeros(len(table), bool)
+    for rest in rests:
+        at_rest[rest] = True
+    repeats = (np.diff(table[column].to_numpy(), prepend=np.nan) == 0)[at_rest & ~odd]
+    return repeats.size > limits.FROZEN_SAMPLES and repeats.mean() < most_repeats
 
 
 def _dead(table: pd.DataFrame, column: str, rig: Rig) -> Defect | None:
@@ -120,7 +147,11 @@ def _frozen(table: pd.DataFrame, column: str) -> list[Defect]:
     more = f" (and {len(frozen) - 1} more times)" if len(frozen) > 1 else ""
     value = table[column].iloc[frozen[0].start]
     text = f"stays at {value:g} up to row {last} while the drive moves{more}: sensor frozen"
-    return [Defect(int(first), column, text, contradicts=True)]
+    is_still = np.zeros(len(table), bool)
+    for part in still:
+        is_still[part] = True
+    contradicts = _is_noisy_at_rest(table, column, is_still, limits.FROZEN_NOISE_FRACTION)
+    return [Defect(int(first), column, text, contradicts)]
 
 
 def _standstills(table: pd.DataFrame, column: str) -> list[slice]:
@@ -135,8 +166,8 @@ def _standstills(table: pd.DataFrame, column: str) -> list[slice]:
     ]
 
 
-def _saturated(values: pd.Series, sensor_range: tuple[float, float] | None) -> list[Defect]:
-    numbers = values.to_numpy()
+def _saturated(table: pd.DataFrame, column: str, sensor_range: tuple[float, float] | None) -> list[Defect]:
+    numbers = table[column].to_numpy()
     if sensor_range:
         ends = [numbers <= sensor_range[0], numbers >= sensor_range[1]]
         what = f"at the end of the sensor's range [{sensor_range[0]:g}, {sensor_range[1]:g}]"
@@ -149,9 +180,10 @@ def _saturated(values: pd.Series, sensor_range: tuple[float, float] | None) -> l
             return []
         what = "flat at its extreme value"
     found = []
+    contradicts = bool(sensor_range) or _is_noisy_at_rest(table, column, ends[0] | ends[1], limits.FLAT_NOISE_FRACTION)
     for end in ends:
         run = longest_run(end)
         if length(run) >= limits.FLAT_SAMPLES:
             text = f"{what} in {end.sum()} samples, {length(run)} in a row from here: saturated"
-            found.append(Defect(int(values.index[run.start]), values.name, text, contradicts=True))
+            found.append(Defect(int(table.index[run.start]), column, text, contradicts))
     return found

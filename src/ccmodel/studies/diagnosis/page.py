@@ -2,7 +2,7 @@
 
 import base64
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import jinja2
@@ -12,7 +12,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from ccmodel import mechanisms as registry
-from ccmodel.channels import TABLE, THETA_IN, short_name
+from ccmodel.channels import CHANNELS, TABLE, THETA_IN, short_name
 from ccmodel.diagnose.candidate import CandidateFit
 from ccmodel.diagnose.diagnosis import Diagnosis
 from ccmodel.diagnose.location import PHASES, mismatch
@@ -20,7 +20,7 @@ from ccmodel.diagnose.settings import ADEQUATE_LACK_OF_FIT
 from ccmodel.diagnose.verdict import nested_choice
 from ccmodel.mechanisms import catalogue
 from ccmodel.provenance import stamp
-from ccmodel.recording import ORIGIN
+from ccmodel.recording import ORIGIN, Recording
 from ccmodel.report.embedding import asset
 from ccmodel.report.figures import COLOURS, STYLE, legend_below, stamp_figure, title_figure
 from ccmodel.report.verdict import (
@@ -84,6 +84,34 @@ def write_diagnosis(file: Path, found: Diagnosis, page: str | None = None) -> No
             recordings=[w.observations.given.recording.id for w in found.judgement.whitened],
         )
     file.write_text(text, encoding="utf-8")
+
+
+def write_inconsistent(file: Path, report: Mapping, recordings: Sequence[Recording], page: str | None = None) -> None:
+    """Write the page of a batch whose inputs contradict one another: the contradictions, then what was read."""
+    channels = [c for c in CHANNELS if any(c in recording for recording in recordings)]
+    text = _template("inconsistent.html.j2").render(
+        report=report,
+        headline=headline(report),
+        origin=ORIGIN[recordings[0].origin] if recordings else None,
+        channels=[f"{TABLE[c].symbol}, {TABLE[c].plot_unit or TABLE[c].unit}" for c in channels],
+        rows=[_as_read(recording, channels) for recording in recordings],
+        page=page,
+    )
+    file.write_text(text, encoding="utf-8")
+
+
+def _as_read(recording: Recording, channels: Sequence[str]) -> dict:
+    """A recording's sampling, and the range of each channel; None for one that it lacks."""
+    time_s = recording.time_s
+    scaled = [TABLE[c].scale * recording[c] if c in recording else None for c in channels]
+    return {
+        "id": recording.id,
+        "samples": time_s.size,
+        "rate": f"{1 / np.median(np.diff(time_s)):.4g}",
+        "duration": f"{time_s[-1] - time_s[0]:.4g}",
+        "rest": f"{recording.rest_s - time_s[0]:.3g}" if recording.rest_s else "none",
+        "ranges": [None if values is None else f"{values.min():.4g} to {values.max():.4g}" for values in scaled],
+    }
 
 
 def write_not_diagnosed(file: Path, batch: str, why: str, page: str | None = None) -> None:
