@@ -79,13 +79,20 @@ def import_mis_tool(
 
 @app.command("left-out")
 def left_out(results: Folder) -> None:
-    """Print what the last run left out, and its warnings; exits with 1 if it left something out."""
+    """Print what the last run left out, contradictory inputs and warnings.
+
+    Exits with 1 if something was left out or inputs contradict one another.
+    """
     from ccmodel.report.page import left_out_of
 
     messages = left_out_of(results)
     for line in messages["warnings"]:
         _print_finding(line, "warning")
+    for line in messages["inconsistent"]:
+        _print_finding(line, "inconsistent")
     _exit_if_refused(messages["left_out"])
+    if messages["inconsistent"]:
+        raise typer.Exit(1)
 
 
 accuracy = typer.Typer(help="Watch the model's accuracy: compare a run with what was accepted.", no_args_is_help=True)
