@@ -64,7 +64,9 @@ def ingest_batch(folder: Path) -> Ingested:
     # All logs are read before any is checked: a column is judged by how many logs of the batch have it.
     tables = [log[0] if log else None for log, _ in logs]
     columns = ColumnChecks(batch.rig, tables)
-    travel = max((drive_travel(table) for table in tables if table is not None), default=0.0)
+    if columns.refusals:
+        return Ingested([], [_finding(name, batch_file, "refused", defect) for defect in columns.refusals])
+    travel = max((drive_travel(table, batch.rig) for table in tables if table is not None), default=0.0)
     findings = [_finding(name, batch_file, "warning", defect) for defect in columns.warnings]
     recordings = []
     for entry, file, (log, refusals) in zip(batch.recordings, files, logs, strict=True):
@@ -121,10 +123,7 @@ def _recording(
         text = f"ends at {end:g} s, before settled_s {entry.settled_s:g} s of batch.yaml: no samples left"
         raise LogError(None, None, text, True)
     calibrated = calibrate(table, batch.rig)
-    unconverted = [
-        Defect(None, column, f"not used: batch.yaml lacks {key}, which converts it")
-        for column, key in calibrated.missing.items()
-    ]
+    unconverted = [Defect(None, column, f"not used: {why}") for column, why in calibrated.unused.items()]
     # A column whose sensor batch.yaml does not state contradicts nothing: it is not used anyway.
     faulty_sensors = [d._replace(contradicts=d.contradicts and d.column in columns.stated) for d in faulty_sensors]
     defects = [*reading_defects, *rare_columns, *faulty_sensors, *unconverted]

@@ -12,7 +12,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from ccmodel import mechanisms as registry
-from ccmodel.channels import CHANNELS, TABLE, THETA_IN, short_name
+from ccmodel.channels import TABLE, THETA_IN, short_name
 from ccmodel.diagnose.candidate import CandidateFit
 from ccmodel.diagnose.diagnosis import Diagnosis
 from ccmodel.diagnose.location import PHASES, mismatch
@@ -33,6 +33,7 @@ from ccmodel.report.verdict import (
     possible_places,
     worst_channel,
 )
+from ccmodel.rig.overview import overview_of
 
 LOOPS = 3
 CANDIDATES = 8
@@ -88,30 +89,15 @@ def write_diagnosis(file: Path, found: Diagnosis, page: str | None = None) -> No
 
 def write_inconsistent(file: Path, report: Mapping, recordings: Sequence[Recording], page: str | None = None) -> None:
     """Write the page of a batch whose inputs contradict one another: the contradictions, then what was read."""
-    channels = [c for c in CHANNELS if any(c in recording for recording in recordings)]
     text = _template("inconsistent.html.j2").render(
         report=report,
         headline=headline(report),
         origin=ORIGIN[recordings[0].origin] if recordings else None,
-        channels=[f"{TABLE[c].symbol}, {TABLE[c].plot_unit or TABLE[c].unit}" for c in channels],
-        rows=[_as_read(recording, channels) for recording in recordings],
+        overviews={recording.id: overview_of(recording) for recording in recordings},
+        table=TABLE,
         page=page,
     )
     file.write_text(text, encoding="utf-8")
-
-
-def _as_read(recording: Recording, channels: Sequence[str]) -> dict:
-    """A recording's sampling, and the range of each channel; None for one that it lacks."""
-    time_s = recording.time_s
-    scaled = [TABLE[c].scale * recording[c] if c in recording else None for c in channels]
-    return {
-        "id": recording.id,
-        "samples": time_s.size,
-        "rate": f"{1 / np.median(np.diff(time_s)):.4g}",
-        "duration": f"{time_s[-1] - time_s[0]:.4g}",
-        "rest": f"{recording.rest_s - time_s[0]:.3g}" if recording.rest_s else "none",
-        "ranges": [None if values is None else f"{values.min():.4g} to {values.max():.4g}" for values in scaled],
-    }
 
 
 def write_not_diagnosed(file: Path, batch: str, why: str, page: str | None = None) -> None:
