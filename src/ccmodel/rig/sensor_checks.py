@@ -15,7 +15,7 @@ from ccmodel.rig.findings import Defect, LogError
 from ccmodel.rig.log import length, longest_run, runs
 
 
-def check_sensors(table: pd.DataFrame, rig: Rig) -> tuple[pd.DataFrame, list[Defect]]:
+def check_sensors(table: pd.DataFrame, rig: Rig, largest_travel: float) -> tuple[pd.DataFrame, list[Defect]]:
     """Find faulty sensors.
 
     Parameters
@@ -24,6 +24,8 @@ def check_sensors(table: pd.DataFrame, rig: Rig) -> tuple[pd.DataFrame, list[Def
         Columns of a log; the index is the row in the file.
     rig : Rig
         The rig that wrote it.
+    largest_travel : float
+        Largest travel of the drive in a log of the batch (`drive_travel`).
 
     Returns
     -------
@@ -42,18 +44,26 @@ def check_sensors(table: pd.DataFrame, rig: Rig) -> tuple[pd.DataFrame, list[Def
         if angle:
             _check_steps(table, angle)
     _check_drive(table, drive, load)
-    warnings, dead = _missing_steps(table, drive), []
+    defects, dead = _missing_steps(table, drive), []
+    is_small = drive_travel(table, rig) < limits.SMALL_TRAVEL_FRACTION * largest_travel
     for column in table.columns.drop(["time_s", drive.column]):
         is_load = load is not None and column == load.column
         if fault := _dead_load(table, load, rig) if is_load else _dead(table, column):
-            warnings.append(fault._replace(text=f"{fault.text}: column not used"))
+            contradicts = fault.contradicts and not (is_small and fault.row is None)
+            defects.append(fault._replace(text=f"{fault.text}: column not used", contradicts=contradicts))
             dead.append(column)
         elif is_load:
-            warnings += _missing_steps(table, load) + _load_stands(table, drive, load)
+            defects += _missing_steps(table, load) + _load_stands(table, drive, load)
         else:
             # A sensor at the end of its range repeats one value: it is clipped and not frozen.
-            warnings += _saturated(table[column], rig.ranges.get(column)) or _frozen(table, column, drive)
-    return table.drop(columns=dead), warnings
+            defects += _saturated(table, column, drive, rig.ranges.get(column)) or _frozen(table, column, drive)
+    return table.drop(columns=dead), defects
+
+
+def drive_travel(table: pd.DataFrame, rig: Rig) -> float:
+    """Peak to peak of the drive angle over a log, rad."""
+    drive = angle_of(table, rig.ends[0])
+    return float(np.ptp(drive.values) * drive.rad_per_unit)
 
 
 def _check_steps(table: pd.DataFrame, angle: Angle) -> None:
@@ -66,7 +76,7 @@ def _check_steps(table: pd.DataFrame, angle: Angle) -> None:
         seen = smallest_step(values)
         known = f"the readings have a step of {seen:.4g} rad" if seen else "the readings have no step"
         text = f"does not move in steps of {angle.key} {angle.step_rad:g} rad: {known}; state 0 to take it as it is"
-        raise LogError(int(table.index[np.argmax(off)]), angle.column, text)
+        raise LogError(int(table.index[np.argmax(off)]), angle.column, text, True)
 
 
 def _missing_steps(table: pd.DataFrame, angle: Angle) -> list[Defect]:
@@ -94,6 +104,20 @@ def _check_drive(table: pd.DataFrame, drive: Angle, load: Angle | None) -> None:
             first, last = table.index[still][[0, -1]]
             text = f"stands still up to row {last} while the load moves: encoder stuck"
             raise LogError(int(first), drive.column, text, True)
+
+
+def _is_noisy_at_rest(table: pd.DataFrame, column: str, drive: Angle, odd: NDArray, most_repeats: float) -> bool:
+    """Whether a sensor repeats fewer than a share of its values while the drive rests, `odd` samples left out.
+
+    A converter that is coarser than its noise keeps its value wherever the cables keep their tension: at a rest, and
+    while friction takes up a motion. Only of a sensor that is noisy at rest is a constant value a fault.
+    """
+    at_rest = np.zeros(len(table), bool)
+    at_rest[: drive.still_samples()] = True
+    for run in runs(np.diff(drive.values, prepend=np.nan) == 0):
+        at_rest[run] |= length(run) > limits.FROZEN_SAMPLES
+    repeats = (np.diff(table[column].to_numpy(), prepend=np.nan) == 0)[at_rest & ~odd]
+    return repeats.size > limits.FROZEN_SAMPLES and repeats.mean() < most_repeats
 
 
 def _dead_load(table: pd.DataFrame, load: Angle, rig: Rig) -> Defect | None:
@@ -181,7 +205,11 @@ def _frozen(table: pd.DataFrame, column: str, drive: Angle) -> list[Defect]:
     first, last = table.index[frozen[0]][[0, -1]]
     more = f" (and {len(frozen) - 1} more times)" if len(frozen) > 1 else ""
     text = f"stays at {values[frozen[0].start]:g} up to row {last} while the drive moves{more}: sensor frozen"
-    return [Defect(int(first), column, text, contradicts=True)]
+    is_still = np.zeros(len(table), bool)
+    for part in still:
+        is_still[part] = True
+    contradicts = _is_noisy_at_rest(table, column, drive, is_still, limits.FROZEN_NOISE_FRACTION)
+    return [Defect(int(first), column, text, contradicts)]
 
 
 def _standstills(table: pd.DataFrame, values: NDArray) -> list[slice]:
@@ -196,8 +224,10 @@ def _standstills(table: pd.DataFrame, values: NDArray) -> list[slice]:
     ]
 
 
-def _saturated(values: pd.Series, sensor_range: tuple[float, float] | None) -> list[Defect]:
-    numbers = values.to_numpy()
+def _saturated(
+    table: pd.DataFrame, column: str, drive: Angle, sensor_range: tuple[float, float] | None
+) -> list[Defect]:
+    numbers = table[column].to_numpy()
     if sensor_range:
         ends = [numbers <= sensor_range[0], numbers >= sensor_range[1]]
         what = f"at the end of the sensor's range [{sensor_range[0]:g}, {sensor_range[1]:g}]"
@@ -210,9 +240,11 @@ def _saturated(values: pd.Series, sensor_range: tuple[float, float] | None) -> l
             return []
         what = "flat at its extreme value"
     found = []
+    at_end = ends[0] | ends[1]
+    contradicts = bool(sensor_range) or _is_noisy_at_rest(table, column, drive, at_end, limits.FLAT_NOISE_FRACTION)
     for end in ends:
         run = longest_run(end)
         if length(run) >= limits.FLAT_SAMPLES:
             text = f"{what} in {end.sum()} samples, {length(run)} in a row from here: saturated"
-            found.append(Defect(int(values.index[run.start]), values.name, text, contradicts=True))
+            found.append(Defect(int(table.index[run.start]), column, text, contradicts))
     return found
