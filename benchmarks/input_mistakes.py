@@ -8,10 +8,10 @@ docs/input-checks.md.
 
 import argparse
 import re
-import shutil
 import sys
+import time
 from collections.abc import Callable, Mapping, Sequence
-from copy import deepcopy
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,6 +19,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pandas as pd
 from ruamel.yaml import YAML
+from scipy.stats import binomtest
 
 from ccmodel.channels import ANGLE_AT, SUM_AT, TORQUE_AT
 from ccmodel.recording import Recording
@@ -305,20 +306,117 @@ MISTAKES: Mapping[str, Callable[[Copy, np.random.Generator], str]] = {
 }
 
 
+@dataclass(frozen=True)
+class Outcome:
+    """What was said of a batch with a mistake.
+
+    Attributes
+    ----------
+    source, mistake : str
+        The batch and the mistake.
+    truth : str
+        What is wrong, as the check should call it.
+    said : list of str
+        The contradictions, a sentence each.
+    """
+
+    source: str
+    mistake: str
+    truth: str
+    said: list[str]
+
+    @property
+    def named(self) -> bool:
+        """Whether what is wrong is named."""
+        return any(self.truth in sentence.partition(": ")[0] for sentence in self.said)
+
+
 def said_of(folder: Path) -> list[str]:
-    """What a check says cannot be, a sentence each."""
-    findings = ingest_batch(folder).findings
-    return [f"{Path(f.file).name} {f.column}: {f.text}" for f in findings if f.is_inconsistent]
+    """What a check says cannot be: file and what is wrong in it, a colon, and the sentence."""
+    return [f"{Path(f.file).name} {f.column}: {f.text}" for f in ingest_batch(folder).findings if f.is_inconsistent]
 
 
-def made(source: Copy, mistake: str, seed: int, folder: Path) -> tuple[str, list[str]] | None:
-    """What is wrong and what is said of a copy with a mistake; None if the mistake cannot be made in it."""
-    copy = Copy({k: v.copy() for k, v in source.logs.items()}, deepcopy(source.description), source.donors)
+def outcome(source: Path, mistake: str, seed: int, others: Sequence[Path]) -> Outcome | None:
+    """The outcome of a mistake in a copy of a batch; None if the batch has no such channel or value."""
+    random = np.random.default_rng([SEED, seed, list(MISTAKES).index(mistake)])
+    donors = ingest_batch(others[seed % len(others)]).recordings if MISTAKES[mistake] is _other_rig else []
+    copy = read_copy(source, donors)
     try:
-        truth = MISTAKES[mistake](copy, np.random.default_rng([SEED, seed, list(MISTAKES).index(mistake)]))
+        truth = MISTAKES[mistake](copy, random)
     except NotApplicableError:
         return None
-    try:
-        return truth, said_of(write_copy(copy, folder))
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+    with TemporaryDirectory() as work:
+        return Outcome(source.name, mistake, truth, said_of(write_copy(copy, Path(work) / "copy")))
+
+
+def page_of(outcomes: Sequence[Outcome], alarms: Mapping[str, list[str]], took_s: float) -> str:
+    """The section of the page."""
+    sources = {"measured": {MEASURED.name}, "simulated": {SIMULATED.name}}
+    known = set.union(*sources.values())
+    sources["concealed cases"] = {o.source for o in outcomes} - known
+    rows = ["| mistake | " + " | ".join(sources) + " | missed |", "|---|" + "---|" * (len(sources) + 1)]
+    for mistake in MISTAKES:
+        cells = []
+        for of in sources.values():
+            tried = [o for o in outcomes if o.mistake == mistake and o.source in of]
+            cells.append(f"{sum(o.named for o in tried)} of {len(tried)}" if tried else "no such value")
+        missed = [", ".join(o.said) or "nothing said" for o in outcomes if o.mistake == mistake and not o.named]
+        rows.append(f"| {mistake} | {' | '.join(cells)} | {missed[0][:60] if missed else ''} |")
+    named = sum(o.named for o in outcomes)
+    low, high = (100 * p for p in binomtest(named, len(outcomes)).proportion_ci(0.95, "wilson"))
+    false = {name: said for name, said in alarms.items() if said}
+    lines = [
+        f"Named: **{named} of {len(outcomes)}** ({100 * named / len(outcomes):.1f} %, 95 % interval {low:.1f} to"
+        f" {high:.1f} %). False alarms: **{len(false)} of {len(alarms)}** batches without a mistake. Seed {SEED}, cases"
+        f" from seed {CASES_SEED}; {took_s / 60:.0f} min.",
+        "",
+        *rows,
+    ]
+    lines += [f"\nFalse alarm in {name}: {'; '.join(said)}" for name, said in false.items()]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Make the mistakes, count, and write the section."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--cases", type=int, default=40, help="fresh concealed cases without a mistake")
+    parser.add_argument("--repeats", type=int, default=5, help="draws of each mistake in each kind of batch")
+    parser.add_argument("--also", type=Path, nargs="*", default=[], help="further batches without a mistake")
+    parser.add_argument("--cores", type=int, default=2)
+    given = parser.parse_args()
+    started = time.time()
+    with TemporaryDirectory() as work, ProcessPoolExecutor(given.cores) as pool:
+        parts = np.array_split(np.arange(given.cases), given.cores)
+        recorded = [pool.submit(_cases, part.tolist(), Path(work) / str(k)) for k, part in enumerate(parts)]
+        cases = [case for future in recorded for case in future.result()]
+        untouched = [*sorted(p.parent for p in Path("data/raw").glob("*/batch.yaml")), *cases, *given.also]
+        alarms = dict(zip([str(p.name) for p in untouched], pool.map(said_of, untouched), strict=True))
+        jobs = [
+            pool.submit(outcome, source, mistake, seed, [c for c in cases if c != source])
+            for mistake in MISTAKES
+            for seed in range(given.repeats)
+            for source in (MEASURED, SIMULATED, cases[seed % len(cases)])
+        ]
+        outcomes = [found for job in jobs if (found := job.result())]
+    section = page_of(outcomes, alarms, time.time() - started)
+    print(section)
+    for one in outcomes:
+        if not one.named:
+            print(f"missed: {one.source}, {one.mistake}, {one.truth}: {one.said}", file=sys.stderr)
+    if PAGE.exists():
+        text = PAGE.read_text(encoding="utf-8")
+        before, rest = text.split(BEGIN)
+        PAGE.write_text(f"{before}{BEGIN}\n{section}\n{END}{rest.split(END)[1]}", encoding="utf-8")
+
+
+def _cases(seeds: Sequence[int], out: Path) -> list[Path]:
+    found = []
+    for seed in seeds:
+        case = draw(CASES_SEED + seed)
+        build(case, out)
+        found.append(out / "cases" / case.name)
+    return found
+
+
+if __name__ == "__main__":
+    main()

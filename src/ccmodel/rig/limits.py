@@ -33,6 +33,11 @@ WHOLE_TRAVEL_FRACTION = 0.95
 FLAT_SAMPLES = 5
 # Repeated samples, as a share, below which a channel counts as noisy for that.
 FLAT_NOISE_FRACTION = 0.1
+# A channel that repeats more is clipped if it stays at its extreme value this many times longer than anywhere else.
+FLAT_OVER_INSIDE = 4
+# Share of changes that turn the readings up or down, above which a channel without a rest counts as noisy. White noise
+# turns two times in three, a smooth channel hardly ever.
+NOISY_TURNS = 0.3
 # Duration and samples for which a noisy channel may keep one value while the drive moves; longer, it froze.
 FROZEN_S = 0.5
 FROZEN_SAMPLES = 20

@@ -106,18 +106,23 @@ def _check_drive(table: pd.DataFrame, drive: Angle, load: Angle | None) -> None:
             raise LogError(int(first), drive.column, text, True)
 
 
-def _is_noisy_at_rest(table: pd.DataFrame, column: str, drive: Angle, odd: NDArray, most_repeats: float) -> bool:
-    """Whether a sensor repeats fewer than a share of its values while the drive rests, `odd` samples left out.
+def _is_noisy(table: pd.DataFrame, column: str, drive: Angle, odd: NDArray, most_repeats: float) -> bool:
+    """Whether a sensor repeats fewer than a share of its values at rest, `odd` samples left out.
 
     A converter that is coarser than its noise keeps its value wherever the cables keep their tension: at a rest, and
-    while friction takes up a motion. Only of a sensor that is noisy at rest is a constant value a fault.
+    while friction takes up a motion. Only of a sensor that is noisy at rest is a constant value a fault. In a log
+    without a rest, noise is what turns the readings up and down from sample to sample.
     """
     at_rest = np.zeros(len(table), bool)
     at_rest[: drive.still_samples()] = True
     for run in runs(np.diff(drive.values, prepend=np.nan) == 0):
         at_rest[run] |= length(run) > limits.FROZEN_SAMPLES
-    repeats = (np.diff(table[column].to_numpy(), prepend=np.nan) == 0)[at_rest & ~odd]
-    return repeats.size > limits.FROZEN_SAMPLES and repeats.mean() < most_repeats
+    change = np.diff(table[column].to_numpy(), prepend=np.nan)
+    repeats = (change == 0)[at_rest & ~odd]
+    if repeats.size > limits.FROZEN_SAMPLES:
+        return bool(repeats.mean() < most_repeats)
+    turns = np.diff(np.sign(change[~odd & (change != 0)][1:])) != 0
+    return turns.size > limits.FROZEN_SAMPLES and bool(turns.mean() > limits.NOISY_TURNS)
 
 
 def _dead_load(table: pd.DataFrame, load: Angle, rig: Rig) -> Defect | None:
@@ -208,7 +213,7 @@ def _frozen(table: pd.DataFrame, column: str, drive: Angle) -> list[Defect]:
     is_still = np.zeros(len(table), bool)
     for part in still:
         is_still[part] = True
-    contradicts = _is_noisy_at_rest(table, column, drive, is_still, limits.FROZEN_NOISE_FRACTION)
+    contradicts = _is_noisy(table, column, drive, is_still, limits.FROZEN_NOISE_FRACTION)
     return [Defect(int(first), column, text, contradicts)]
 
 
@@ -228,20 +233,26 @@ def _saturated(
     table: pd.DataFrame, column: str, drive: Angle, sensor_range: tuple[float, float] | None
 ) -> list[Defect]:
     numbers = table[column].to_numpy()
+    most_repeats = limits.FLAT_NOISE_FRACTION
     if sensor_range:
         ends = [numbers <= sensor_range[0], numbers >= sensor_range[1]]
         what = f"at the end of the sensor's range [{sensor_range[0]:g}, {sensor_range[1]:g}]"
     else:
         ends = [numbers == numbers.min(), numbers == numbers.max()]
-        inside = ~(ends[0] | ends[1])
-        repeats = np.mean((np.diff(numbers) == 0)[inside[1:]]) if inside[1:].any() else 1.0
-        # A channel without noise dwells at its extremes by nature.
-        if repeats >= limits.FLAT_NOISE_FRACTION:
+        inside, repeats = ~(ends[0] | ends[1])[1:], np.diff(numbers) == 0
+        if not inside.any():
             return []
+        if repeats[inside].mean() >= limits.FLAT_NOISE_FRACTION:
+            # A channel without noise dwells at its extremes by nature, one with few steps everywhere.
+            if max(map(length, map(longest_run, ends))) <= limits.FLAT_OVER_INSIDE * length(
+                longest_run(repeats & inside)
+            ):
+                return []
+            most_repeats = limits.FROZEN_NOISE_FRACTION
         what = "flat at its extreme value"
     found = []
     at_end = ends[0] | ends[1]
-    contradicts = bool(sensor_range) or _is_noisy_at_rest(table, column, drive, at_end, limits.FLAT_NOISE_FRACTION)
+    contradicts = bool(sensor_range) or _is_noisy(table, column, drive, at_end, most_repeats)
     for end in ends:
         run = longest_run(end)
         if length(run) >= limits.FLAT_SAMPLES:

@@ -100,7 +100,7 @@ class Parity:
             found["travel"] = np.ptp(x[THETA_OUT]) * radii[1] / (np.ptp(x[THETA_IN]) * radii[0])
         if THETA_OUT in x and TAU_OUT in x and (spring := rig.load.spring_stiffness_Nm_per_rad):
             angle = x[THETA_OUT] - x[THETA_OUT].mean()
-            found["spring"] = (angle @ x[TAU_OUT]) / (angle @ angle) / spring
+            found["spring"] = (angle * x[TAU_OUT]).sum() / (angle * angle).sum() / spring
         resting = entry.time_s <= entry.rest_s if entry.rest_s else np.zeros(entry.time_s.size, dtype=bool)
         for name, channel in (("drive", F_DRIVE), ("load", F_LOAD)):
             if channel in entry and resting.any() and not entry.far_end:
@@ -191,9 +191,10 @@ def white_noise(values: NDArray) -> float:
 
 def correlation(one: NDArray, other: NDArray) -> float:
     """Correlation of two channels; nan if one is constant."""
+    # Sums, not dot products: for so few numbers the threads of BLAS cost more than they save.
     x, y = one - one.mean(), other - other.mean()
-    scale = np.sqrt((x @ x) * (y @ y))
-    return float(x @ y / scale) if scale > 0 else np.nan
+    scale = np.sqrt((x * x).sum() * (y * y).sum())
+    return float((x * y).sum() / scale) if scale > 0 else np.nan
 
 
 def speed(values: NDArray, time_s: NDArray) -> NDArray:
