@@ -56,6 +56,28 @@ def check(batch: Folder) -> None:
         raise typer.Exit(1)
 
 
+@app.command("import")
+def import_(
+    files: Annotated[list[Path], typer.Argument(help="The rig's logs, in any format.")],
+    out: Annotated[Path, typer.Option(help="Folder of the batch; its name becomes the batch's.")],
+    map_file: Annotated[
+        Path | None, typer.Option("--map", help="What each column is made of; without it, a map is guessed.")
+    ] = None,
+) -> None:
+    """Import logs of any format into a batch; without a map, guess one to be corrected."""
+    from ccmodel.rig import importing
+
+    if map_file is None:
+        guessed = importing.write_guess(files, out)
+        Console(highlight=False).print(*importing.guess_tables(guessed))
+        written = importing.next_of_guess(guessed, files, out)
+    else:
+        imported = importing.import_files(files, map_file, out)
+        Console(highlight=False).print(*importing.import_tables(imported))
+        written = importing.next_of_import(imported, out)
+    typer.echo(written)
+
+
 @app.command("import-mis-tool")
 def import_mis_tool(
     source: Folder,
