@@ -61,6 +61,8 @@ def ingest_batch(folder: Path) -> Ingested:
     logs = [_attempt(name, file, read_log, Path(file)) for file in files]
     # All logs are read before any is checked: a column is judged by how many logs of the batch have it.
     columns = ColumnChecks(batch.rig, [log[0] if log else None for log, _ in logs])
+    if columns.refusals:
+        return Ingested([], [_finding(name, batch_file, "refused", defect) for defect in columns.refusals])
     findings = [_finding(name, batch_file, "warning", defect) for defect in columns.warnings]
     recordings = []
     for entry, file, (log, refusals) in zip(batch.recordings, files, logs, strict=True):
@@ -111,10 +113,7 @@ def _recording(
         text = f"ends at {end:g} s, before settled_s {entry.settled_s:g} s of batch.yaml: no samples left"
         raise LogError(None, None, text)
     calibrated = calibrate(table, batch.rig)
-    unconverted = [
-        Defect(None, column, f"not used: batch.yaml lacks {key}, which converts it")
-        for column, key in calibrated.missing.items()
-    ]
+    unconverted = [Defect(None, column, f"not used: {why}") for column, why in calibrated.unused.items()]
     defects = [*reading_defects, *rare_columns, *faulty_sensors, *unconverted]
     findings = [_finding(batch.batch, file, "warning", defect) for defect in defects]
     recording = Recording(

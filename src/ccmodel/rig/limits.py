@@ -39,5 +39,14 @@ FROZEN_SAMPLES = 20
 FROZEN_NOISE_FRACTION = 0.5
 # Counts by which an encoder at rest may dither.
 STILL_COUNTS = 1
+# Width of the noise of an angle without a step, in standard deviations: noise of a few thousand samples spans 7 to 8.
+NOISE_WIDTH_SDS = 10
+# Finer steps of an angle, rad, have no effect on a model: 0.1 um of cable on a pulley of 6 mm. The angle is taken as it
+# is.
+FINE_STEP_RAD = 2e-5
+# Share of a step by which readings may differ from its multiples: a log writes them with few digits.
+OFF_STEP = 0.1
+# Share of the readings that may differ by more.
+OFF_STEP_FRACTION = 0.01
 # Duration of an initial rest. Less is the time to the first count of a motion.
 SHORTEST_REST_S = 0.1
