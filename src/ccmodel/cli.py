@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar
 import typer
 from pydantic import ValidationError
 from rich.console import Console
+from rich.text import Text
 from typer.core import TyperGroup
 
 from ccmodel.typed import InputError
@@ -69,11 +70,11 @@ def import_(
 
     if map_file is None:
         guessed = importing.write_guess(files, out)
-        Console(highlight=False).print(*importing.guess_tables(guessed))
+        _print_all(importing.guess_tables(guessed))
         written = importing.next_of_guess(guessed, files, out)
     else:
         imported = importing.import_files(files, map_file, out)
-        Console(highlight=False).print(*importing.import_tables(imported))
+        _print_all(importing.import_tables(imported))
         written = importing.next_of_import(imported, out)
     typer.echo(written)
 
@@ -298,6 +299,13 @@ def schema() -> None:
     from ccmodel.config import Config
 
     typer.echo(json.dumps(Config.model_json_schema(), indent=1))
+
+
+def _print_all(shown: list) -> None:
+    """Print tables at the width of the terminal, and each text in one line."""
+    console = Console(highlight=False)
+    for one in shown:
+        console.print(one, soft_wrap=isinstance(one, Text))
 
 
 def _progress(text: str) -> None:

@@ -182,7 +182,7 @@ def _from_zero(time: NDArray) -> NDArray:
 
 
 def _own_samples(one: Samples) -> Samples:
-    """Samples at the rows that have a number, if only every few rows have: the signal was sampled slower than others."""
+    """Samples at the rows that have a number, if only every few rows have one: it was sampled slower than others."""
     rows = np.flatnonzero(np.isfinite(one.values))
     if rows.size < 2 or np.median(np.diff(rows)) == 1:
         return one

@@ -6,7 +6,7 @@ TIME = "time_s"
 DRIVE_ANGLES = ("drive_encoder_counts", "theta_in_rad")
 # A column's name ends in its unit.
 _UNITS = {"s": "s", "counts": "count", "A": "A", "V": "V", "rad": "rad", "Nm": "Nm", "N": "N"}
-UNIT_OF = {column: _UNITS[column.rpartition("_")[2]] for column in (*COLUMNS,'theta_in_rad','theta_out_rad','tau_in_Nm','tau_out_Nm','F_drive_N','F_load_N','T1_N','T2_N','T3_N','T4_N')}
+UNIT_OF = {column: _UNITS[column.rpartition("_")[2]] for column in COLUMNS}
 # Every column but time, which follows from the drive angle's samples.
 CHANNELS = tuple(column for column in UNIT_OF if column != TIME)
 

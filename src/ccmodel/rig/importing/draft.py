@@ -113,7 +113,9 @@ def _has_drive_angle(file: SignalFile) -> bool:
     return any(g.column in DRIVE_ANGLES and g.sure for g in guess_file(file).guesses)
 
 
-def _roles(kinds: Mapping[tuple, list], names: Mapping[Path, str]) -> tuple[dict[str, tuple], dict[str, str], list[str]]:
+def _roles(
+    kinds: Mapping[tuple, list], names: Mapping[Path, str]
+) -> tuple[dict[str, tuple], dict[str, str], list[str]]:
     """Role of each kind of file, patterns of the further ones, and remarks."""
     keys = list(kinds)
     if len(keys) == 1:

@@ -300,9 +300,7 @@ def _by_lag(pair: list[Guess], aligned: Mapping[str, NDArray]) -> list[Guess]:
     ]
 
 
-def _the_other(
-    one: Guess, end: str, quantity: str, aligned: Mapping[str, NDArray], guesses: list[Guess]
-) -> Guess:
+def _the_other(one: Guess, end: str, quantity: str, aligned: Mapping[str, NDArray], guesses: list[Guess]) -> Guess:
     """The only signal of a quantity whose other end is known."""
     other = next(g for g in guesses if g.quantity == quantity and g.end is not None)
     drive, load = (one, other) if end == DRIVE else (other, one)
@@ -332,14 +330,16 @@ def _column_by_gain(quantity: str, end: str) -> str | None:
 def _without_rivals(guesses: list[Guess]) -> list[Guess]:
     """Only one signal is surely a column, and only one column is the drive angle."""
     result = list(guesses)
-    for columns in ([DRIVE_ANGLES, *((c,) for c in CHANNELS if c not in DRIVE_ANGLES)]):
+    for columns in [DRIVE_ANGLES, *((c,) for c in CHANNELS if c not in DRIVE_ANGLES)]:
         rivals = [g for g in result if g.column in columns and g.sure]
         if len(rivals) < 2:
             continue
         best = max(g.score for g in rivals)
         winners = [g for g in rivals if g.score == best]
         counts = [g for g in winners if g.unit == "count" or units.quantity_of(g.unit) == "counts"]
-        chosen = winners[0] if len(winners) == 1 else counts[0] if columns == DRIVE_ANGLES and len(counts) == 1 else None
+        chosen = (
+            winners[0] if len(winners) == 1 else counts[0] if columns == DRIVE_ANGLES and len(counts) == 1 else None
+        )
         for g in rivals:
             if g is not chosen:
                 others = ", ".join(f"'{r.signal}'" for r in rivals if r is not g)

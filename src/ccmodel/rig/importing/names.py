@@ -54,7 +54,9 @@ _END_PARTS = {
 }
 # Letters that name an end beside a quantity: q_m and q_l. They are hints only.
 _END_LETTERS = {"m": DRIVE, "d": DRIVE, "a": DRIVE, "l": LOAD, "e": LOAD}
-_UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "θ": " theta ", "ϑ": " theta ", "φ": " phi ", "τ": " tau "})
+_UMLAUTS = str.maketrans(
+    {"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "θ": " theta ", "ϑ": " theta ", "φ": " phi ", "τ": " tau "}
+)
 _PIECES = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 
 

@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 
 import pint
+
 DEFINITIONS = Path(__file__).with_name("units.txt")
 # Spellings of operators and signs; the keys are patterns.
 _SPELT = {
