@@ -38,6 +38,9 @@ _USUAL_UNIT = {ANGLE: "deg", TORQUE: "Nm", CURRENT: "A", FORCE: "N"}
 _WEIGHT = {"g": "gf", "kg": "kgf", "lb": "lbf", "oz": "ozf"}
 _TURN_RAD, _FEW_TURNS_DEG = 2 * np.pi, 20.0
 _ENDS = (DRIVE, LOAD)
+# Correlation from which two tensions are seen to move alike.
+_ALIKE = 0.5
+_UNKNOWN = "its name does not say what it is, and it has no unit: not used"
 
 
 @dataclass(frozen=True)
@@ -123,7 +126,8 @@ def guess_file(file: SignalFile) -> GuessedFile:
     rest = [s for s in file.signals if time is None or s.name != time.signal]
     guesses = [_first_guess(signal, readings[signal.name]) for signal in rest]
     aligned = _aligned(rest)
-    guesses = _with_tensions(guesses, readings)
+    guesses = _by_shape(guesses, aligned)
+    guesses = _with_tensions(guesses, readings, aligned)
     guesses = _with_ends(guesses, aligned)
     guesses = _with_columns(guesses)
     guesses = _without_rivals(guesses)
@@ -135,11 +139,12 @@ def _guess_time(signals: Sequence[Signal], readings: Mapping[str, Reading]) -> t
     if all(signal.time_s is not None for signal in signals):
         return None, True, "the file stores the time of each sample"
     clocks = [s for s in signals if shapes.is_clock(s.values) and readings[s.name].quantity != names.COUNTER]
-    named = [s for s in clocks if readings[s.name].quantity == TIME or units.quantity_of(s.unit) == "a time"]
-    if not clocks:
+    called = [s for s in signals if readings[s.name].quantity == TIME or units.quantity_of(s.unit) == "a time"]
+    named = [s for s in called if shapes.never_falls(s.values)]
+    if not clocks and not named:
         return None, False, "no signal rises in even steps: state time by its signal, or by rate_Hz"
     signal = (named or clocks)[0]
-    why = f"rises in even steps{' and is called so' if named else ''}"
+    why = "called so, and never falls" if named else "rises in even steps"
     stated = signal.unit if units.quantity_of(signal.unit) == "a time" else readings[signal.name].unit
     possible = shapes.units_of_clock(signal.values)
     step = float(np.median(np.diff(signal.values[np.isfinite(signal.values)])))
@@ -181,7 +186,11 @@ def _quantity(reading: Reading, measured: str, stated: str) -> tuple[str | None,
     if reading.quantity is None:
         if by_unit in (ANGLE, TORQUE, CURRENT, FORCE) and measured != "a voltage":
             return by_unit, tuple(filter(None, (said, f"unit {stated} is {measured}"))), False
-        return None, (f"neither its name nor its unit ({stated or 'none'}) says what it is: not used",), False
+        return (
+            None,
+            (f"neither its name nor its unit {stated} says what it is: not used" if stated else _UNKNOWN,),
+            False,
+        )
     if measured in names.MEASURES[reading.quantity] or not stated:
         return reading.quantity, (said,), False
     if by_unit in (ANGLE, TORQUE, CURRENT, FORCE) and measured != "a voltage":
@@ -236,7 +245,25 @@ def _aligned(signals: Sequence[Signal]) -> dict[str, NDArray]:
     return aligned
 
 
-def _with_tensions(guesses: list[Guess], readings: Mapping[str, Reading]) -> list[Guess]:
+def _by_shape(guesses: list[Guess], aligned: Mapping[str, NDArray]) -> list[Guess]:
+    """Angles among signals that neither name nor unit tells, where no angle is known: the smoothest that move alike."""
+    unknown = [g for g in guesses if g.quantity is None and g.column is None and g.why == (_UNKNOWN,)]
+    if any(g.quantity == ANGLE for g in guesses) or not unknown:
+        return guesses
+    drive = min(unknown, key=lambda g: shapes.roughness(aligned[g.signal]))
+    alike = [g for g in unknown if shapes.follows(aligned[drive.signal], aligned[g.signal]) is not None]
+    chosen = [drive, *sorted(alike, key=lambda g: shapes.roughness(aligned[g.signal]))[:1]]
+    result = list(guesses)
+    for one in chosen:
+        why = "its name and unit do not say so, but it is smooth as an angle"
+        unit = "count" if shapes.is_whole(aligned[one.signal]) else "deg"
+        result[result.index(one)] = replace(one, quantity=ANGLE, unit=unit, sure=False, why=(why,))
+    return result
+
+
+def _with_tensions(
+    guesses: list[Guess], readings: Mapping[str, Reading], aligned: Mapping[str, NDArray]
+) -> list[Guess]:
     """Four forces with the numbers 1 to 4 and no end are the tensions at the cables' ends."""
     numbered = {
         readings[g.signal].number: g
@@ -245,15 +272,24 @@ def _with_tensions(guesses: list[Guess], readings: Mapping[str, Reading]) -> lis
     }
     if not {1, 2, 3, 4} <= numbered.keys():
         return guesses
+    doubt = _numbering_doubt({number: aligned[numbered[number].signal] for number in (1, 2, 3, 4)})
     result = {}
     for number in (1, 2, 3, 4):
         one = numbered[number]
         called = "T" in readings[one.signal].words
-        numbers = "numbered as in the paper" if called else "one of four; the numbers may differ from the paper's"
-        result[one.signal] = replace(
-            one, column=f"T{number}_N", sure=one.sure and called, why=(*one.why, numbers), score=one.score + 2
-        )
+        why = (*one.why, doubt or ("numbered as in the paper" if called else "one of four: numbered as in the paper?"))
+        sure = one.sure and called and not doubt
+        result[one.signal] = replace(one, column=f"T{number}_N", sure=sure, why=why, score=one.score + 2)
     return [result.get(g.signal, g) for g in guesses]
+
+
+def _numbering_doubt(tensions: Mapping[int, NDArray]) -> str:
+    """What contradicts the paper's numbers: 1 and 2 are of cable A, and 1 falls where 3 rises. "" if nothing does."""
+    like = {number: shapes.correlation(tensions[1], tensions[number]) for number in (2, 3, 4)}
+    if max(like, key=lambda number: like[number]) == 2 or max(like.values()) < _ALIKE:
+        return ""
+    other = max(like, key=lambda number: like[number])
+    return f"tension 1 moves like {other}, and not like 2 as in the paper: which ends are these?"
 
 
 def _with_ends(guesses: list[Guess], aligned: Mapping[str, NDArray]) -> list[Guess]:
@@ -337,9 +373,8 @@ def _without_rivals(guesses: list[Guess]) -> list[Guess]:
         best = max(g.score for g in rivals)
         winners = [g for g in rivals if g.score == best]
         counts = [g for g in winners if g.unit == "count" or units.quantity_of(g.unit) == "counts"]
-        chosen = (
-            winners[0] if len(winners) == 1 else counts[0] if columns == DRIVE_ANGLES and len(counts) == 1 else None
-        )
+        # Of a drive angle in counts and in rad, the counts are what the sensor gave.
+        chosen = next((one[0] for one in (winners, counts) if len(one) == 1), None)
         for g in rivals:
             if g is not chosen:
                 others = ", ".join(f"'{r.signal}'" for r in rivals if r is not g)

@@ -54,7 +54,7 @@ _END_PARTS = {
 }
 # Letters that name an end beside a quantity: q_m and q_l. They are hints only.
 _END_LETTERS = {"m": DRIVE, "d": DRIVE, "a": DRIVE, "l": LOAD, "e": LOAD}
-_UMLAUTS = str.maketrans(
+_SPELT = str.maketrans(
     {"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "θ": " theta ", "ϑ": " theta ", "φ": " phi ", "τ": " tau "}
 )
 _PIECES = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
@@ -118,7 +118,7 @@ def read_name(name: str) -> Reading:
 
 def _pieces(name: str) -> tuple[list[str], list[str]]:
     """Words of a name as they are written, and in small letters; "load cell" is one word."""
-    raw = _PIECES.findall(name.translate(_UMLAUTS))
+    raw = _PIECES.findall(name.translate(_SPELT))
     text = " ".join(piece.lower() for piece in raw)
     return raw, re.sub(r"\bload ?cell\b", LOADCELL, text).split()
 

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.rig.importing.clocks import interpolation_cost
+
 # Rates and durations that recordings of a rig have. A time that has others in one unit is not in that unit.
 RATES_HZ, DURATIONS_S = (5.0, 50_000.0), (0.5, 7200.0)
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -30,6 +32,12 @@ def is_whole(values: NDArray) -> bool:
     """Whether a signal moves in whole numbers, as counts do."""
     finite = values[np.isfinite(values)]
     return finite.size > 0 and bool((finite == np.round(finite)).all()) and np.unique(finite).size >= _FEWEST_COUNTS
+
+
+def never_falls(values: NDArray) -> bool:
+    """Whether a signal rises or stays, as any time does."""
+    steps = np.diff(values[np.isfinite(values)])
+    return steps.size > 0 and bool((steps >= 0).all() and (steps > 0).mean() > _EVEN)
 
 
 def is_clock(values: NDArray) -> bool:
@@ -98,6 +106,13 @@ def sign_of_tension(force: NDArray) -> int | None:
     if is_constant(finite) or np.mean(np.sign(finite) == np.sign(at_rest)) < 0.99:
         return None
     return int(np.sign(at_rest)) or None
+
+
+def roughness(values: NDArray) -> float:
+    """Noise of a signal as a share of its standard deviation; an angle that moves is smoother than forces are."""
+    finite = values[np.isfinite(values)]
+    noise = interpolation_cost(finite, whole=False)[1]
+    return np.inf if noise is None or is_constant(finite) else float(noise / np.std(finite))
 
 
 def _sign(value: float, threshold: float) -> int | None:
