@@ -251,7 +251,9 @@ def _by_shape(guesses: list[Guess], aligned: Mapping[str, NDArray]) -> list[Gues
     if any(g.quantity == ANGLE for g in guesses) or not unknown:
         return guesses
     drive = min(unknown, key=lambda g: shapes.roughness(aligned[g.signal]))
-    alike = [g for g in unknown if shapes.follows(aligned[drive.signal], aligned[g.signal]) is not None]
+    alike = [
+        g for g in unknown if g is not drive and shapes.follows(aligned[drive.signal], aligned[g.signal]) is not None
+    ]
     chosen = [drive, *sorted(alike, key=lambda g: shapes.roughness(aligned[g.signal]))[:1]]
     result = list(guesses)
     for one in chosen:
