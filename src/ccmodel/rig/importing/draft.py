@@ -123,7 +123,7 @@ def _roles(
     stems = [[PurePath(names[path]).name for path, _ in kinds[key]] for key in keys]
     ends = [_shared_end(group, stems) for group in stems]
     recordings = [{name[: len(name) - len(end)] for name in group} for group, end in zip(stems, ends, strict=True)]
-    if any(r != recordings[0] for r in recordings) or len(set(ends)) < len(ends):
+    if "" in recordings[0] or any(r != recordings[0] for r in recordings) or len(set(ends)) < len(ends):
         others = ", ".join(names[kinds[key][0][0]] for key in keys[1:])
         text = f"{others}: other signals than {names[kinds[keys[0]][0][0]]}, and the guess is of the latter only"
         advice = "state by 'files' how they belong together, or import them apart"

@@ -205,13 +205,6 @@ class ImportMap(TypedModel):
     def _lines_left_to_be_confirmed(cls, channels):
         return {} if channels is None else channels
 
-    @field_validator("channels")
-    @classmethod
-    def _one_drive_angle(cls, channels):
-        if not channels.keys() & set(DRIVE_ANGLES):
-            raise ValueError(f"the drive angle is missing: state {' or '.join(DRIVE_ANGLES)}")
-        return channels
-
     @field_validator("recordings")
     @classmethod
     def _each_once(cls, recordings):
@@ -221,6 +214,12 @@ class ImportMap(TypedModel):
             if twice := sorted({name for name in names if names.count(name) > 1}):
                 raise ValueError(f"{what} '{twice[0]}' is given twice")
         return recordings
+
+    @model_validator(mode="after")
+    def _one_drive_angle(self):
+        if len(self.channels.keys() & set(DRIVE_ANGLES)) != 1:
+            raise ValueError(f"channels: the drive angle is missing or there twice: state {' or '.join(DRIVE_ANGLES)}")
+        return self
 
     @model_validator(mode="after")
     def _files_exist(self):

@@ -2,6 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import least_squares
 from scipy.signal import correlate, correlation_lags
 from scipy.stats import t as student
@@ -15,6 +16,9 @@ _GRID = 1 << 16
 _LEAST_CORRELATION = 0.9
 # Shortest overlap of the two, as a share of the shorter.
 _LEAST_OVERLAP = 0.25
+# Width of the filter before the fit, as a share of the period of the highest frequency; and the share of the power up
+# to it.
+_WIDTH, _POWER_SHARE = 0.05, 0.95
 # Blocks in which errors may be correlated.
 _BLOCKS = 20
 _CONFIDENCE = 0.95
@@ -45,28 +49,35 @@ def match_clocks(time: NDArray, values: NDArray, first_time: NDArray, first_valu
     """
     time, values = _finite(time, values)
     first_time, first_values = _finite(first_time, first_values)
-    middle = (time[0] + time[-1]) / 2
-    start = _lag(time, values, first_time, first_values)
+    step = _step(time, first_time)
+    here, there = _on_grid(time, values, step), _on_grid(first_time, first_values, step)
+    start = first_time[0] - time[0] + step * _lag(here, there)
+    # The same filter on both moves neither, and takes the noise out of the slopes that the fit follows.
+    width = _WIDTH / _highest_frequency(there, step) / step
+    here, there = gaussian_filter1d(here, width), gaussian_filter1d(there, width)
+    slope = np.gradient(there, step)
+    t, t_first = time[0] + step * np.arange(here.size), first_time[0] + step * np.arange(there.size)
+    middle = (t[0] + t[-1]) / 2
+    inside = _inside(t + start, t_first)
+    t, here = t[inside], here[inside]
 
     def on_first(p):
-        return time + p[0] + p[1] * (time - middle)
-
-    inside = _inside(on_first((start, 0.0)), first_time)
+        return t + p[0] + p[1] * (t - middle)
 
     def residuals(p):
-        there = np.interp(on_first(p)[inside], first_time, first_values)
-        basis = np.column_stack([there, np.ones_like(there)])
-        gain_and_zero = np.linalg.lstsq(basis, values[inside], rcond=None)[0]
-        return values[inside] - basis @ gain_and_zero
+        return p[2] * np.interp(on_first(p), t_first, there) + p[3] - here
 
-    # Scales: a step of time, and the drift that makes one over the recording.
-    step = float(np.median(np.diff(time)))
-    scale = np.array([step, step / (time[-1] - time[0])])
-    fit = least_squares(lambda x: residuals(x * scale + (start, 0.0)), np.zeros(2), diff_step=1e-2, x_scale=1.0)
-    centre, drift = fit.x * scale + (start, 0.0)
-    _check_similarity(fit.fun, values[inside])
-    half = _half_widths(fit.jac / scale, fit.fun)
-    text = f"matched over {np.ptp(time[inside]):.4g} s"
+    def jacobian(p):
+        at = on_first(p)
+        value, rise = np.interp(at, t_first, there), p[2] * np.interp(at, t_first, slope)
+        return np.column_stack([rise, rise * (t - middle), value, np.ones_like(value)])
+
+    gain, zero = np.polyfit(np.interp(t + start, t_first, there), here, 1)
+    fit = least_squares(residuals, [start, 0.0, gain, zero], jac=jacobian, x_scale="jac", xtol=1e-12, ftol=1e-12)
+    _check_similarity(fit.fun, here)
+    centre, drift = fit.x[:2]
+    half = _half_widths(fit.jac, fit.fun)
+    text = f"matched over {np.ptp(t):.4g} s"
     # t_first = t + centre + drift (t - middle), so that the offset at time zero is centre - drift * middle.
     return Clock(float(centre - drift * middle), float(drift), float(half[0]), float(half[1]), text)
 
@@ -86,24 +97,32 @@ def _inside(at: NDArray, first_time: NDArray) -> NDArray:
     return (at > first_time[0] + margin) & (at < first_time[-1] - margin)
 
 
-def _lag(time: NDArray, values: NDArray, first_time: NDArray, first_values: NDArray) -> float:
-    """Offset at which the two correlate most, to a step of the grid, s."""
+def _step(time: NDArray, first_time: NDArray) -> float:
+    """Step of the grid, s: the finer of the two, unless the recording has too many of them."""
     duration = max(np.ptp(time), np.ptp(first_time))
-    step = max(duration / _GRID, min(np.median(np.diff(time)), np.median(np.diff(first_time))))
-    here = _on_grid(time, values, step)
-    there = _on_grid(first_time, first_values, step)
+    return float(max(duration / _GRID, min(np.median(np.diff(time)), np.median(np.diff(first_time)))))
+
+
+def _lag(here: NDArray, there: NDArray) -> int:
+    """Samples by which the beginning of `here` is later in `there`, where the two are most alike."""
     lags = correlation_lags(there.size, here.size)
-    ones = correlate(np.ones_like(there), np.ones_like(here))
-    power = correlate(there**2, np.ones_like(here)) * correlate(np.ones_like(there), here**2)
-    long_enough = ones > _LEAST_OVERLAP * min(here.size, there.size)
-    similarity = np.abs(correlate(there, here)) / np.sqrt(np.maximum(power, power.max() * 1e-12))
-    best = int(np.argmax(np.where(long_enough, similarity, 0.0)))
-    return float(first_time[0] - time[0] + lags[best] * step)
+    ones = np.ones_like(here), np.ones_like(there)
+    overlap = correlate(ones[1], ones[0])
+    power = correlate(there**2, ones[0]) * correlate(ones[1], here**2)
+    likeness = np.abs(correlate(there, here)) / np.sqrt(np.maximum(power, power.max() * 1e-12))
+    long_enough = overlap > _LEAST_OVERLAP * min(here.size, there.size)
+    return int(lags[np.argmax(np.where(long_enough, likeness, 0.0))])
+
+
+def _highest_frequency(values: NDArray, step: float) -> float:
+    """Frequency below which a signal has nearly all of its power, Hz."""
+    power = np.abs(np.fft.rfft(values * np.hanning(values.size))) ** 2
+    share = np.cumsum(power) / power.sum()
+    return float(max(np.searchsorted(share, _POWER_SHARE), 1) / (values.size * step))
 
 
 def _on_grid(time: NDArray, values: NDArray, step: float) -> NDArray:
-    grid = np.arange(time[0], time[-1], step)
-    even = np.interp(grid, time, values)
+    even = np.interp(np.arange(time[0], time[-1], step), time, values)
     return even - even.mean()
 
 
