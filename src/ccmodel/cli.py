@@ -3,7 +3,7 @@
 import json
 import sys
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 from pydantic import ValidationError
@@ -12,6 +12,9 @@ from rich.text import Text
 from typer.core import TyperGroup
 
 from ccmodel.typed import InputError
+
+if TYPE_CHECKING:
+    from ccmodel.rig.overview import Overview
 
 
 class FormerOptions(TyperGroup):
@@ -45,12 +48,13 @@ Folder = Annotated[Path, typer.Argument()]
 
 @app.command()
 def check(batch: Folder) -> None:
-    """Check a batch folder and print all findings; exits with 1 if a file cannot be used."""
+    """Check a batch folder: a table for each recording and all findings; exits with 1 if a file cannot be used."""
     from ccmodel.rig.ingest import ingest_batch
+    from ccmodel.rig.overview import overview_of
 
     ingested = ingest_batch(batch)
     for recording in ingested.recordings:
-        typer.echo(f"{recording.id}: {recording.time_s.size} samples, {', '.join(recording.channels)}")
+        _print_overview(recording.id, overview_of(recording))
     for finding in ingested.findings:
         _print_finding(str(finding), finding.severity)
     if any(f.severity == "refused" for f in ingested.findings):
@@ -77,6 +81,20 @@ def import_(
         _print_all(importing.import_tables(imported))
         written = importing.next_of_import(imported, out)
     typer.echo(written)
+
+
+@app.command()
+def init(folder: Folder) -> None:
+    """Write a commented batch.yaml for a folder of logs, and print what to fill in; keeps an existing one."""
+    from ccmodel.rig.batch import load_batch
+    from ccmodel.rig.drafting import draft_batch
+
+    typer.echo(f"{draft_batch(folder)}: fill in what is empty, then run: ccmodel check {folder}")
+    try:
+        load_batch(folder)
+    except InputError as error:
+        for problem in error.problems:
+            typer.echo(f"  line {problem.line}: {problem.text}")
 
 
 @app.command("import-mis-tool")
@@ -310,6 +328,28 @@ def _print_all(shown: list) -> None:
 
 def _progress(text: str) -> None:
     _err.print(text, style="dim", markup=False)
+
+
+def _print_overview(name: str, seen: "Overview") -> None:
+    """A line on the recording and a line on each channel, which stay whole whatever the width of the terminal."""
+    from rich.table import Table
+
+    from ccmodel.channels import unit_of
+
+    rest = f"rest {seen.rest_s:.3g} s" if seen.rest_s else "no rest at the start"
+    motion = f"{seen.cycles:.1f} cycles at {seen.frequency_Hz:.4g} Hz" if seen.frequency_Hz else "no single frequency"
+    typer.echo(
+        f"{name}: {seen.samples} samples at {seen.rate_Hz:.5g} Hz, {seen.duration_s:.4g} s; {rest};"
+        f" stroke {seen.stroke:.4g} rad; {motion}{f' ({seen.wave})' if seen.wave else ''}"
+    )
+    table = Table("channel", box=None, pad_edge=False)
+    for title in ("lowest", "highest", "unit", "noise at rest", "resolution"):
+        table.add_column(title, justify="left" if title == "unit" else "right", no_wrap=True)
+    for c in seen.channels:
+        noise, step = ("none" if value is None else f"{value:.3g}" for value in (c.noise, c.step))
+        table.add_row(c.name, f"{c.low:.4g}", f"{c.high:.4g}", unit_of(c.name), noise, step)
+    Console(width=100, highlight=False).print(table, markup=False)
+    typer.echo()
 
 
 def _print_finding(line: str, severity: str) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ccmodel.channels import ANGLE_AT
 from ccmodel.rig import limits
 from ccmodel.rig.batch import RAW_COLUMNS, End
 
@@ -83,18 +84,23 @@ def angle_of(table: pd.DataFrame, end: End) -> Angle | None:
     end : End
         The end of the rig.
     """
-    (counts,), side, key = RAW_COLUMNS[end.angle], end.side, f"rig.{end.name}"
+    return angle_at(table, end.name, end.side.encoder_counts_per_rev, end.side.angle_resolution_rad)
+
+
+def angle_at(table: pd.DataFrame, end: str, counts_per_rev: float | None, step_rad: float | None) -> Angle | None:
+    """The same from the name of the end ("drive" or "load") and the two constants, where they are known."""
+    (counts,), angle, key = RAW_COLUMNS[ANGLE_AT[end]], ANGLE_AT[end], f"rig.{end}"
     if counts in table:
-        per_rev = side.encoder_counts_per_rev
-        rad = 2 * np.pi / per_rev if per_rev else None
-        return Angle(counts, table[counts].to_numpy(), rad, True, 1.0, f"{key}.encoder_counts_per_rev", bool(per_rev))
-    if end.angle not in table:
+        rad = 2 * np.pi / counts_per_rev if counts_per_rev else None
+        key = f"{key}.encoder_counts_per_rev"
+        return Angle(counts, table[counts].to_numpy(), rad, True, 1.0, key, counts_per_rev is not None)
+    if angle not in table:
         return None
-    values, key = table[end.angle].to_numpy(), f"{key}.angle_resolution_rad"
-    if step := side.angle_resolution_rad:
-        return Angle(end.angle, np.round((values - values[0]) / step), step, True, 1.0, key, True)
+    values, key = table[angle].to_numpy(), f"{key}.angle_resolution_rad"
+    if step_rad:
+        return Angle(angle, np.round((values - values[0]) / step_rad), step_rad, True, 1.0, key, True)
     width = noise_width(table["time_s"].to_numpy(), values)
-    return Angle(end.angle, values, 1.0, False, width, key, step is not None)
+    return Angle(angle, values, 1.0, False, width, key, step_rad is not None)
 
 
 def noise_width(time_s: NDArray, angle_rad: NDArray) -> float:
@@ -128,3 +134,11 @@ def smallest_step(values: NDArray) -> float | None:
             return float(gaps.sum() / multiples.sum())
         step = left[left > limits.OFF_STEP * step].min()
     return None
+
+
+def resolution_seen(time_s: NDArray, angle_rad: NDArray) -> float:
+    """Step in which an angle moves, rad; 0 if it has none that matters: a fine one, or one below its noise."""
+    step = smallest_step(angle_rad)
+    if step is None or step < limits.FINE_STEP_RAD:
+        return 0.0
+    return step if limits.NOISE_WIDTH_SDS * step > noise_width(time_s, angle_rad) else 0.0

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ccmodel.rig import limits
-from ccmodel.rig.angle import Angle, angle_of, smallest_step
+from ccmodel.rig.angle import Angle, angle_of, resolution_seen, smallest_step
 from ccmodel.rig.batch import Rig
 from ccmodel.rig.findings import Defect, LogError
 from ccmodel.rig.log import length, longest_run, runs
@@ -73,9 +73,8 @@ def _missing_steps(table: pd.DataFrame, angle: Angle) -> list[Defect]:
     """An angle in rad that moves in steps which `batch.yaml` does not state, so that they are taken for motion."""
     if angle.counted or angle.step_stated:
         return []
-    step = smallest_step(table[angle.column].to_numpy())
-    # A finer step than the noise is only the number of digits.
-    if step is None or step * limits.NOISE_WIDTH_SDS < angle.grain or step < limits.FINE_STEP_RAD:
+    step = resolution_seen(table["time_s"].to_numpy(), angle.values)
+    if not step:
         return []
     text = f"moves in steps of {step:.4g} rad, which are taken for motion: state {angle.key}, 0 if it has none"
     return [Defect(None, angle.column, text)]

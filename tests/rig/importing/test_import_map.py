@@ -40,13 +40,22 @@ def refused(tmp_path, text):
         ("unit: s}", "unit: deg}", "time: found 'deg', an angle; needed is a time such as 's'"),
         ("unit: s}", "unit: s, rate_Hz: 5.0}", "time is either a signal or a rate_Hz"),
         ("signal: F,", "signal: q,", "signal 'q' is given to theta_in_rad and F_drive_N: a sensor is one column"),
-        ("  theta_in_rad: {signal: q, unit: rad}\n", "", "the drive angle is missing or there twice"),
+        (
+            "  theta_in_rad: {signal: q, unit: rad}\n",
+            "",
+            "the drive angle is missing: state drive_encoder_counts or theta_in_rad",
+        ),
         ("  F_drive_N", "  theta_in_rad: {signal: x}\n  F_drive_N", 'duplicate key "theta_in_rad": remove one'),
+        (
+            "F_drive_N:",
+            "drive_encoder_counts:",
+            "channels: theta_in_rad and drive_encoder_counts are the same quantity",
+        ),
         ("signal: F,", "signal: F, file: far,", "channels.F_drive_N.file: 'far' is none of main"),
         (
             "channels:\n  theta_in_rad: {signal: q, unit: rad}\n  F_drive_N: {signal: F, unit: N}\n",
             "channels:\n",
-            "the drive angle is missing or there twice: state drive_encoder_counts or theta_in_rad",
+            "the drive angle is missing: state drive_encoder_counts or theta_in_rad",
         ),
         ("format: 1", "format: 1\nfiles: {far: {pattern: far.csv}}", "needs one * for the part that names"),
         (

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.channels import ANGLE_AT
+from ccmodel.rig.batch import RAW_COLUMNS
 from ccmodel.rig.importing import names, shapes, units
 from ccmodel.rig.importing.columns import CHANNELS, DRIVE_ANGLES, UNIT_OF
 from ccmodel.rig.importing.map import TimeSource
@@ -366,21 +368,24 @@ def _column_by_gain(quantity: str, end: str) -> str | None:
 
 
 def _without_rivals(guesses: list[Guess]) -> list[Guess]:
-    """Only one signal is surely a column, and only one column is the drive angle."""
+    """Only one signal is surely a column, and only one column a quantity at one end."""
     result = list(guesses)
-    for columns in [DRIVE_ANGLES, *((c,) for c in CHANNELS if c not in DRIVE_ANGLES)]:
-        rivals = [g for g in result if g.column in columns and g.sure]
-        if len(rivals) < 2:
-            continue
-        best = max(g.score for g in rivals)
-        winners = [g for g in rivals if g.score == best]
-        counts = [g for g in winners if g.unit == "count" or units.quantity_of(g.unit) == "counts"]
-        # Of a drive angle in counts and in rad, the counts are what the sensor gave.
-        chosen = next((one[0] for one in (winners, counts) if len(one) == 1), None)
+    for column in CHANNELS:
+        rivals = [g for g in result if g.column == column and g.sure]
+        best = [g for g in rivals if g.score == max(r.score for r in rivals)]
         for g in rivals:
-            if g is not chosen:
+            if len(best) > 1 or g is not best[0]:
                 others = ", ".join(f"'{r.signal}'" for r in rivals if r is not g)
-                result[result.index(g)] = replace(g, sure=False, why=(*g.why, f"{others} may be {columns[0]} too"))
+                result[result.index(g)] = replace(g, sure=False, why=(*g.why, f"{others} may be {column} too"))
+    for channel, raw in RAW_COLUMNS.items():
+        sure = {g.column for g in result if g.sure}
+        if channel not in sure or not sure & set(raw):
+            continue
+        # Counts are what the sensor of an angle gave; a torque or force is closer to what is wanted than its signal.
+        kept, dropped = (raw[0], {channel}) if channel in ANGLE_AT.values() else (channel, set(raw))
+        for g in [g for g in result if g.column in dropped and g.sure]:
+            why = (*g.why, f"the same quantity as {kept}: only one of the two can be used")
+            result[result.index(g)] = replace(g, sure=False, why=why)
     return result
 
 

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from ccmodel.rig.batch import Name, Sign
+from ccmodel.rig.batch import RAW_COLUMNS, Name, Sign
 from ccmodel.rig.importing import units
 from ccmodel.rig.importing.columns import CHANNELS, DRIVE_ANGLES, UNIT_OF
 from ccmodel.rig.readers.contract import TextLayout
@@ -216,9 +216,13 @@ class ImportMap(TypedModel):
         return recordings
 
     @model_validator(mode="after")
-    def _one_drive_angle(self):
-        if len(self.channels.keys() & set(DRIVE_ANGLES)) != 1:
-            raise ValueError(f"channels: the drive angle is missing or there twice: state {' or '.join(DRIVE_ANGLES)}")
+    def _each_quantity_once(self):
+        if not self.channels.keys() & set(DRIVE_ANGLES):
+            raise ValueError(f"channels: the drive angle is missing: state {' or '.join(DRIVE_ANGLES)}")
+        for channel, raw in RAW_COLUMNS.items():
+            both = [column for column in raw if column in self.channels]
+            if channel in self.channels and both:
+                raise ValueError(f"channels: {channel} and {both[0]} are the same quantity: keep one")
         return self
 
     @model_validator(mode="after")

@@ -13,6 +13,7 @@ import pandas as pd
 
 import ccmodel
 from ccmodel.rig.batch import NAMES, valid_name
+from ccmodel.rig.drafting import draft_batch
 from ccmodel.rig.importing.columns import TIME
 from ccmodel.rig.importing.map import ImportMap, load_map
 from ccmodel.rig.importing.recording import Built, FileError, build
@@ -213,10 +214,6 @@ def _sha256(path: Path) -> str:
 def _draft(folder: Path) -> bool:
     """Draft a `batch.yaml` where there is none."""
     if (folder / BATCH).exists():
-        return False
-    try:
-        from ccmodel.rig.drafting import draft_batch
-    except ImportError:
         return False
     draft_batch(folder)
     return True
