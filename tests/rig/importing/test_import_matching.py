@@ -33,7 +33,7 @@ def test_offset_and_drift_are_recovered(offset, drift):
 
 def test_the_stated_uncertainty_holds_in_about_nineteen_of_twenty():
     inside = {"offset": 0, "drift": 0}
-    cases = 40
+    cases = 30
     for seed in range(cases):
         offset, drift = 0.05 * seed - 1, 1e-5 * (seed - 20)
         found = match_clocks(*two_recordings(seed, offset, drift, noise=0.02))
@@ -41,8 +41,8 @@ def test_the_stated_uncertainty_holds_in_about_nineteen_of_twenty():
         error = found.on_first(np.array([middle]))[0] - (offset + (1 + drift) * middle)
         inside["offset"] += abs(error) <= found.offset_uncertainty_s
         inside["drift"] += abs(found.drift - drift) <= found.drift_uncertainty
-    # 38 of 40 are expected; fewer than 33 would be seen once in a hundred such tests.
-    assert min(inside.values()) >= 33, inside
+    # 28 of 30 are expected; fewer than 24 would be seen once in a hundred such tests.
+    assert min(inside.values()) >= 24, inside
 
 
 def test_an_inverted_and_coarse_signal_matches_too():
@@ -61,3 +61,19 @@ def test_other_quantities_are_refused():
     with pytest.raises(LogError) as caught:
         match_clocks(here, np.ones(here.size), first, values)
     assert "is constant" in caught.value.args[2]
+
+
+def test_a_motion_that_repeats_is_refused_rather_than_guessed():
+    here = np.arange(0, 20, 0.002)
+    with pytest.raises(LogError) as caught:
+        match_clocks(here, np.sin(np.pi * here), here.copy(), np.sin(np.pi * (here - 0.3)))
+    assert "the matched signals repeat" in caught.value.args[2]
+
+
+def test_a_motion_that_repeats_after_a_rest_is_matched():
+    def moves(time):
+        return np.sin(np.pi * np.maximum(time - 1, 0))
+
+    here = np.arange(0, 8, 0.002)
+    found = match_clocks(here, moves(here + 0.35), here.copy(), moves(here))
+    assert found.offset_s == pytest.approx(0.35, abs=1e-3)
