@@ -13,6 +13,8 @@ _GZIP = b"\x1f\x8b"
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _UTF16, _UTF32 = (b"\xff\xfe", b"\xfe\xff"), (b"\xff\xfe\0\0", b"\0\0\xfe\xff")
 _CONTROLS = re.compile(rb"[\x00-\x08\x0e-\x19\x1b-\x1f\x7f]")
+# Share of control characters up to which a file is a text that is damaged in a place. Of random bytes it is 0.1.
+_MOST_CONTROLS = 0.03
 
 
 class Kind(NamedTuple):
@@ -116,8 +118,10 @@ def not_text(kind: Kind) -> str:
 
 
 def is_text(head: bytes) -> bool:
-    """Whether bytes are text of an encoding that a log may have: without control characters, or UTF-16 or UTF-32."""
-    return head.startswith(_UTF16 + _UTF32) or wide(head) is not None or not _CONTROLS.search(head)
+    """Whether bytes are text of an encoding that a log may have, though it may be damaged in a place."""
+    if head.startswith(_UTF16 + _UTF32) or wide(head) is not None:
+        return True
+    return len(_CONTROLS.findall(head)) <= _MOST_CONTROLS * len(head)
 
 
 def wide(head: bytes) -> str | None:
