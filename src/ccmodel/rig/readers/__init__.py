@@ -20,7 +20,7 @@ import pandas as pd
 
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers import csv, signatures
-from ccmodel.rig.readers.attempt import COPY, attempt, attempt_apart
+from ccmodel.rig.readers.attempt import COPY, read_apart, read_here
 from ccmodel.rig.readers.contract import Format, Signal, SignalFile, TextLayout
 from ccmodel.rig.readers.log_table import log_of_signals
 from ccmodel.rig.readers.names import split_unit, unique
@@ -63,7 +63,7 @@ def read_signals(path: Path, text: TextLayout | None = None) -> SignalFile:
     except OSError as error:
         raise LogError(None, None, f"cannot be read ({error.strerror})") from None
     format = registry()[name]
-    result = attempt_apart(name, format, path) if format.apart else attempt(format, path, text)
+    result = read_apart(name, format, path) if format.apart else read_here(format, path, text)
     if isinstance(result, LogError):
         raise result
     return _checked(result, format)

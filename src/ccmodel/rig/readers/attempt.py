@@ -23,7 +23,7 @@ _PATIENCE_S, _PATIENCE_S_PER_MB = 60.0, 1.0
 _CHILD = "from ccmodel.rig.readers.attempt import _main; _main()"
 
 
-def attempt(format: Format, path: Path, text: TextLayout | None = None) -> SignalFile | LogError:
+def read_here(format: Format, path: Path, text: TextLayout | None = None) -> SignalFile | LogError:
     """Read a file, or say why it cannot be read.
 
     The error is returned and not raised, so that nothing of the library's own error outlives the attempt: objects of a
@@ -47,8 +47,8 @@ def attempt(format: Format, path: Path, text: TextLayout | None = None) -> Signa
             return _damaged(format, _detail(error))
 
 
-def attempt_apart(name: str, format: Format, path: Path) -> SignalFile | LogError:
-    """As `attempt`, in a process of its own; `name` is the module of the format."""
+def read_apart(name: str, format: Format, path: Path) -> SignalFile | LogError:
+    """As `read_here`, in a process of its own; `name` is the module of the format."""
     patience = _PATIENCE_S + _PATIENCE_S_PER_MB * path.stat().st_size / 1e6
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
     try:
@@ -60,13 +60,13 @@ def attempt_apart(name: str, format: Format, path: Path) -> SignalFile | LogErro
 
 
 def _main() -> None:
-    """The process of `attempt_apart`: the result goes to standard output, and nothing else does."""
+    """The process of `read_apart`: the result goes to standard output, and nothing else does."""
     from ccmodel.rig.readers import registry
 
     result = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     name, path = sys.argv[1:]
-    pickle.dump(attempt(registry()[name], Path(path)), result, protocol=5)
+    pickle.dump(read_here(registry()[name], Path(path)), result, protocol=5)
     result.close()
 
 

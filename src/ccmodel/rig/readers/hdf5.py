@@ -44,7 +44,7 @@ def _datasets(h5py, group, path: str = "", above: tuple = ()):
         link = group.get(key, getlink=True)
         if isinstance(link, h5py.ExternalLink):
             raise LogError(None, None, f"'{name}' is in another file ({link.filename}): give that file")
-        if isinstance(link, h5py.SoftLink) and key not in group:
+        if isinstance(link, h5py.SoftLink) and group.get(link.path) is None:
             raise LogError(None, None, f"'{name}' is a link to '{link.path}', which is not in the file: {COPY}")
         item = group[key]
         if isinstance(item, h5py.Dataset):

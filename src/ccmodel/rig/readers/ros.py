@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.rig.findings import LogError
+from ccmodel.rig.readers import signatures
 from ccmodel.rig.readers.contract import Format, Signal, SignalFile
 
 # Elements of an array that may be signals; a longer one is a picture, a cloud or a scan.
@@ -51,6 +53,11 @@ def read(path: Path) -> SignalFile:
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
+    kind = signatures.kind_of(path)
+    if path.is_file() and path.suffix != kind.advice:
+        raise LogError(
+            None, None, f"is {kind.text}, which is read only under its own ending: rename it to {kind.advice}"
+        )
     topics, unknown = {}, set()
     with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as bag:
         known = {c.id: c.msgtype in bag.typestore.fielddefs for c in bag.connections}

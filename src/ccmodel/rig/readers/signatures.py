@@ -63,11 +63,9 @@ _BEGINNINGS = {
     b"CDF\x02": Kind("a classic netCDF file", None, "save it as netCDF-4 or CSV"),
     b"\x93NUMPY": Kind("a NumPy array (npy)", None, "save it as CSV or MAT"),
     b"LOGG": Kind("a Vector BLF file", None, "save it as MDF4"),
-    b"%PDF": Kind("a PDF document", None, _AGAIN),
     b"\x89PNG": Kind("a PNG picture", None, _AGAIN),
     b"\xff\xd8\xff": Kind("a JPEG picture", None, _AGAIN),
     b"GIF8": Kind("a GIF picture", None, _AGAIN),
-    b"{\\rtf1": Kind("an RTF document", None, _AGAIN),
     b"BZh": Kind("a bzip2 archive", None, "unpack it"),
     b"\xfd7zXZ\0": Kind("an xz archive", None, "unpack it"),
     b"\x28\xb5\x2f\xfd": Kind("a Zstandard archive", None, "unpack it"),
@@ -75,6 +73,16 @@ _BEGINNINGS = {
     b"Rar!": Kind("a RAR archive", None, "unpack it"),
     b"\x7fELF": Kind("a program", None, _AGAIN),
 }
+
+# Documents that are text, or may be.
+_DOCUMENTS = {
+    b"%PDF": Kind("a PDF document", None, _AGAIN),
+    b"{\\rtf1": Kind("an RTF document", None, _AGAIN),
+    b"<!DOCTYPE": Kind("a web page", None, _AGAIN),
+    b"<html": Kind("a web page", None, _AGAIN),
+    b"version https://git-lfs": Kind("the pointer to a file in Git LFS", None, "fetch the file with 'git lfs pull'"),
+}
+_SQLITE = Kind("an SQLite database without a ROS 2 bag", None, "export its table as CSV")
 
 
 def kind_of(path: Path) -> Kind:
@@ -99,9 +107,12 @@ def kind_of_bytes(head: bytes) -> Kind:
     """Kind of a file that begins with these bytes."""
     if not head:
         return EMPTY
-    kind = next((kind for start, kind in _BEGINNINGS.items() if head.startswith(start)), None)
-    # The header of a text may begin with the same letters ("LOGGER;").
-    if kind and (kind.advice == _AGAIN or _CONTROLS.search(head)):
+    # The header of a text may begin with the same letters as another format ("LOGGER;").
+    known = _DOCUMENTS | _BEGINNINGS if _CONTROLS.search(head) else _DOCUMENTS
+    kind = next((kind for start, kind in known.items() if head.startswith(start)), None)
+    if kind and head.startswith(b"SQLite") and b"TABLE topics" not in head:
+        return _SQLITE
+    if kind:
         return kind
     if head.startswith(b"PK\x03\x04"):
         return XLSX if b"xl/" in head or b"[Content_Types].xml" in head[:100] else _ZIP

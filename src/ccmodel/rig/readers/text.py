@@ -350,6 +350,8 @@ def _table(lines: list[str], first: int, grid: _Grid) -> tuple[pd.DataFrame, lis
     if footer:
         remarks.append(f"{footer} lines below the samples are left out")
         numbered = numbered[:-footer]
+    if len(numbered) < 2:
+        raise LogError(None, None, _no_numbers([], lines))
     rows = [_row(i, line, grid) for i, line in numbered]
     table = pd.read_csv(
         io.StringIO("\n".join(rows)),
