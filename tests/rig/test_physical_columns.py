@@ -254,8 +254,8 @@ def angle_fault(bench, change, resolution=STEP):
         ("theta_in_rad", lambda v, i: v * 0 + 0.3, "refused", "stands still throughout: encoder stuck or drive"),
         ("theta_in_rad", lambda v, i: v.where(i < 200, v[199]), "refused", "while the load moves: encoder stuck"),
         ("theta_in_rad", lambda v, i: v - 120 * STEP * (i >= 180), "refused", "rad in one sample: counter reset"),
-        ("theta_out_rad", lambda v, i: v * 0 + 0.3, "warning", "stands still throughout while the drive moves"),
-        ("theta_out_rad", lambda v, i: v - 120 * STEP * (i >= 180), "warning", "rad in one sample: counter reset"),
+        ("theta_out_rad", lambda v, i: v * 0 + 0.3, "inconsistent", "stands still throughout while the drive moves"),
+        ("theta_out_rad", lambda v, i: v - 120 * STEP * (i >= 180), "inconsistent", "rad in one sample: counter reset"),
         ("theta_out_rad", lambda v, i: v.where(i < 120, v[119]), "warning", "while the drive runs through its whole"),
     ],
 )

@@ -109,7 +109,7 @@ def draft_batch(folder: Path) -> Path:
     logs, refused = _read(folder)
     if not logs:
         problems = [Problem(str(folder / file), None, text) for file, text in refused.items()]
-        none = Problem(str(folder), None, f"has no logs ({', '.join(registry())}): put them there")
+        none = Problem(str(folder), None, f"has no logs ({', '.join(_suffixes())}): put them there")
         raise InputError.of(*(problems or [none]))
     path.write_text("\n".join(_content(name, logs, refused)) + "\n", encoding="utf-8")
     return path
@@ -119,7 +119,7 @@ def _read(folder: Path) -> tuple[list[_Log], dict[str, str]]:
     """Logs of a folder by name, and why the others cannot be read."""
     logs, refused = [], {}
     for path in sorted(folder.rglob("*"), key=_natural):
-        if not path.is_file() or not path.name.lower().endswith(tuple(registry())):
+        if not path.is_file() or not path.name.lower().removesuffix(".gz").endswith(_suffixes()):
             continue
         file = path.relative_to(folder).as_posix()
         try:
@@ -128,6 +128,11 @@ def _read(folder: Path) -> tuple[list[_Log], dict[str, str]]:
             row, column, text = error.args
             refused[file] = ", ".join(str(part) for part in (f"row {row}" if row else "", column, text) if part)
     return logs, refused
+
+
+def _suffixes() -> tuple[str, ...]:
+    """Endings of the names of logs, of all formats."""
+    return tuple(suffix for format in registry().values() for suffix in format.suffixes)
 
 
 def _natural(path: Path) -> list:
