@@ -3,14 +3,18 @@
 import json
 import sys
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 from pydantic import ValidationError
 from rich.console import Console
+from rich.text import Text
 from typer.core import TyperGroup
 
 from ccmodel.typed import InputError
+
+if TYPE_CHECKING:
+    from ccmodel.rig.overview import Overview
 
 
 class FormerOptions(TyperGroup):
@@ -44,16 +48,56 @@ Folder = Annotated[Path, typer.Argument()]
 
 @app.command()
 def check(batch: Folder) -> None:
-    """Check a batch folder and print all findings; exits with 1 if a file cannot be used."""
+    """Check a batch folder: a table for each recording and all findings.
+
+    Exits with 1 if a file cannot be used or the inputs contradict one another.
+    """
     from ccmodel.rig.ingest import ingest_batch
+    from ccmodel.rig.overview import overview_of
 
     ingested = ingest_batch(batch)
     for recording in ingested.recordings:
-        typer.echo(f"{recording.id}: {recording.time_s.size} samples, {', '.join(recording.channels)}")
+        _print_overview(recording.id, overview_of(recording))
     for finding in ingested.findings:
         _print_finding(str(finding), finding.severity)
-    if any(f.severity == "refused" for f in ingested.findings):
+    if any(f.severity != "warning" for f in ingested.findings):
         raise typer.Exit(1)
+
+
+@app.command("import")
+def import_(
+    files: Annotated[list[Path], typer.Argument(help="The rig's logs, in any format.")],
+    out: Annotated[Path, typer.Option(help="Folder of the batch; its name becomes the batch's.")],
+    map_file: Annotated[
+        Path | None, typer.Option("--map", help="What each column is made of; without it, a map is guessed.")
+    ] = None,
+) -> None:
+    """Import logs of any format into a batch; without a map, guess one to be corrected."""
+    from ccmodel.rig import importing
+
+    if map_file is None:
+        guessed = importing.write_guess(files, out)
+        _print_all(importing.guess_tables(guessed))
+        written = importing.next_of_guess(guessed, files, out)
+    else:
+        imported = importing.import_files(files, map_file, out)
+        _print_all(importing.import_tables(imported))
+        written = importing.next_of_import(imported, out)
+    typer.echo(written)
+
+
+@app.command()
+def init(folder: Folder) -> None:
+    """Write a commented batch.yaml for a folder of logs, and print what to fill in; keeps an existing one."""
+    from ccmodel.rig.batch import load_batch
+    from ccmodel.rig.drafting import draft_batch
+
+    typer.echo(f"{draft_batch(folder)}: fill in what is empty, then run: ccmodel check {folder}")
+    try:
+        load_batch(folder)
+    except InputError as error:
+        for problem in error.problems:
+            typer.echo(f"  line {problem.line}: {problem.text}")
 
 
 @app.command("import-mis-tool")
@@ -76,13 +120,20 @@ def import_mis_tool(
 
 @app.command("left-out")
 def left_out(results: Folder) -> None:
-    """Print what the last run left out, and its warnings; exits with 1 if it left something out."""
+    """Print what the last run left out, contradictory inputs and warnings.
+
+    Exits with 1 if something was left out or inputs contradict one another.
+    """
     from ccmodel.report.page import left_out_of
 
     messages = left_out_of(results)
     for line in messages["warnings"]:
         _print_finding(line, "warning")
+    for line in messages["inconsistent"]:
+        _print_finding(line, "inconsistent")
     _exit_if_refused(messages["left_out"])
+    if messages["inconsistent"]:
+        raise typer.Exit(1)
 
 
 accuracy = typer.Typer(help="Watch the model's accuracy: compare a run with what was accepted.", no_args_is_help=True)
@@ -160,6 +211,9 @@ def diagnose(
         list[str],
         typer.Option(help="As 'kink at conduit', or two with a comma: fit it in full whatever the screening says."),
     ] = [],  # noqa: B006
+    trust_inputs: Annotated[
+        bool, typer.Option("--trust-inputs", help="Diagnose even if the inputs contradict one another.")
+    ] = False,
     strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 unless the model agrees.")] = False,
 ) -> None:
     """Decide whether the calibrated model explains a batch; if not, locate and name the physics left out."""
@@ -176,7 +230,7 @@ def diagnose(
         first = next(e for e in error.errors() if e["type"] not in ("float_type", "dict_type"))
         option = "--tolerance" if first["loc"] else "--candidate"
         raise InputError(f"{option}: {first['msg'].removeprefix('Value error, ')}") from None
-    diagnosis = run(batch, out, options_of(settings, without, freeze), baseline, _progress)
+    diagnosis = run(batch, out, options_of(settings, without, freeze), baseline, _progress, trust_inputs)
     typer.echo(diagnosis["headline"])
     if strict and diagnosis["verdict"] != "agrees":
         raise typer.Exit(1)
@@ -278,12 +332,42 @@ def schema() -> None:
     typer.echo(json.dumps(Config.model_json_schema(), indent=1))
 
 
+def _print_all(shown: list) -> None:
+    """Print tables at the width of the terminal, and each text in one line."""
+    console = Console(highlight=False)
+    for one in shown:
+        console.print(one, soft_wrap=isinstance(one, Text))
+
+
 def _progress(text: str) -> None:
     _err.print(text, style="dim", markup=False)
 
 
+def _print_overview(name: str, seen: "Overview") -> None:
+    """A line on the recording and a line on each channel, which stay whole whatever the width of the terminal."""
+    from rich.table import Table
+
+    from ccmodel.channels import unit_of
+
+    rest = f"rest {seen.rest_s:.3g} s" if seen.rest_s else "no rest at the start"
+    motion = f"{seen.cycles:.1f} cycles at {seen.frequency_Hz:.4g} Hz" if seen.frequency_Hz else "no single frequency"
+    typer.echo(
+        f"{name}: {seen.samples} samples at {seen.rate_Hz:.5g} Hz, {seen.duration_s:.4g} s; {rest};"
+        f" stroke {seen.stroke:.4g} rad; {motion}{f' ({seen.wave})' if seen.wave else ''}"
+    )
+    table = Table("channel", box=None, pad_edge=False)
+    for title in ("lowest", "highest", "unit", "noise at rest", "resolution"):
+        table.add_column(title, justify="left" if title == "unit" else "right", no_wrap=True)
+    for c in seen.channels:
+        noise, step = ("none" if value is None else f"{value:.3g}" for value in (c.noise, c.step))
+        table.add_row(c.name, f"{c.low:.4g}", f"{c.high:.4g}", unit_of(c.name), noise, step)
+    Console(width=100, highlight=False).print(table, markup=False)
+    typer.echo()
+
+
 def _print_finding(line: str, severity: str) -> None:
-    style, word = {"warning": ("yellow", "warning"), "refused": ("red", "left out")}[severity]
+    words = {"warning": ("yellow", "warning"), "refused": ("red", "left out"), "inconsistent": ("red", "inconsistent")}
+    style, word = words[severity]
     _err.print(f"[{style}]{word}[/]: ", end="")
     _err.print(line, markup=False)
 

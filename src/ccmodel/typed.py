@@ -7,13 +7,14 @@ problem: the file, the line in it, the key, the value found and the remedy.
 import difflib
 import json
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, ClassVar, Self, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic.fields import FieldInfo
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
 from ruamel.yaml.composer import Composer
@@ -25,9 +26,25 @@ from ruamel.yaml.tag import Tag
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 M = TypeVar("M", bound=BaseModel)
+# Path of a value: keys and indices from the top of a file. `Borrowed` gives the file's own path of a value.
+Loc = tuple[str | int, ...]
+Borrowed = Mapping[Loc, Loc]
 
 # Lists and mappings within each other that a file may hold; our own formats need 6.
 MAX_DEPTH = 50
+
+
+@dataclass(frozen=True)
+class FillIn:
+    """Marks a key that must not be left without a value in a file, even if it may be left out.
+
+    Attributes
+    ----------
+    meaning : str
+        What it is, with its unit, in words that follow "fill in"; "{parent}" stands for the name of the key above.
+    """
+
+    meaning: str
 
 
 class TypedModel(BaseModel):
@@ -36,6 +53,11 @@ class TypedModel(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
     # Current name of every key that was renamed, at any depth; files may still have the former name.
     renamed: ClassVar[Mapping[str, str]] = {}
+
+    @classmethod
+    def completed(cls, data: dict) -> tuple[dict, "Borrowed"]:
+        """Content of a file with what it states once for many places, and where each such value is in the file."""
+        return data, {}
 
 
 @dataclass(frozen=True)
@@ -100,16 +122,29 @@ def load_yaml_model(path: Path, model: type[M]) -> M:
     ------
     InputError
         If the file is missing, is not YAML, has a key twice or does not fit the model: one line for every problem.
+        A key without a value, where the model says what to fill in, is a problem even if it is optional.
     """
     content = _read_yaml(Path(path))
     data = _with_current_names(content, getattr(model, "renamed", {}), path)
+    gaps = {loc: f"{_dotted(loc)}: fill in {meaning}" for loc in _empty(data) if (meaning := meaning_at(model, loc))}
+    data, borrowed = model.completed(_filled(data)) if issubclass(model, TypedModel) else (_filled(data), {})
+    problems, cause = list(gaps.items()), None
     try:
         # JSON mode accepts a list for a tuple and text for a path or a choice, but stays strict on numbers.
-        return model.model_validate_json(json.dumps(data, default=str))
+        read = model.model_validate_json(json.dumps(data, default=str))
     except ValidationError as error:
-        raise InputError.of(
-            *(Problem(str(path), _line_of(content, loc), t) for loc, t in _explain(error, model))
-        ) from error
+        problems, cause = problems + _explain(_located(error, borrowed, gaps), model), error
+    if problems:
+        raise InputError.of(*(Problem(str(path), _line_of(content, loc), text) for loc, text in problems)) from cause
+    return read
+
+
+def meaning_at(model: type[BaseModel], loc: Sequence) -> str | None:
+    """What a key is, with its unit, in words that follow "fill in"; None where its model does not say so."""
+    *parents, key = loc
+    field = _fields_at(model, parents).get(key)
+    meaning = next((m.meaning for m in (field.metadata if field else ()) if isinstance(m, FillIn)), None)
+    return meaning and meaning.replace("{parent}", str(parents[-1]) if parents else "")
 
 
 def nearest(name: str, known: Iterable[str], cutoff: float = 0.75) -> str | None:
@@ -117,6 +152,30 @@ def nearest(name: str, known: Iterable[str], cutoff: float = 0.75) -> str | None
     by_lower = {k.lower(): k for k in known}
     matches = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=cutoff)
     return by_lower[matches[0]] if matches else None
+
+
+class _Empty:
+    """The value of a key that has none; `null` is a value."""
+
+
+_EMPTY = _Empty()
+
+
+def _empty(data: Any, loc: Loc = ()) -> Iterator[Loc]:
+    """Paths of the keys without a value."""
+    if data is _EMPTY:
+        yield loc
+    for key, value in data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ():
+        yield from _empty(value, (*loc, key))
+
+
+def _filled(data: Any) -> Any:
+    """The same with None for keys without a value."""
+    if isinstance(data, dict):
+        return {key: _filled(value) for key, value in data.items()}
+    if isinstance(data, list):
+        return [_filled(value) for value in data]
+    return None if data is _EMPTY else data
 
 
 class _TextKeys(Composer):
@@ -140,6 +199,8 @@ class _ValuesWithLines(RoundTripConstructor):
     def construct_object(self, node, deep=False):
         if node in self.recursive_objects:
             raise _error_at(node, "holds what cannot be read as keys and values: an alias of itself")
+        if isinstance(node, ScalarNode) and node.tag == "tag:yaml.org,2002:null" and not node.value:
+            return _EMPTY
         try:
             return super().construct_object(node, deep)
         except (ValueError, TypeError, LookupError, AttributeError, OverflowError) as error:
@@ -179,7 +240,9 @@ def _read_yaml(path: Path) -> CommentedMap:
 
 
 def _kind(content: Any) -> str:
-    return "nothing" if content is None else "a list" if isinstance(content, list) else f"a {type(content).__name__}"
+    if content is None or content is _EMPTY:
+        return "nothing"
+    return "a list" if isinstance(content, list) else f"a {type(content).__name__}"
 
 
 def _with_current_names(data: Any, renamed: Mapping[str, str], path: Path) -> Any:
@@ -213,14 +276,25 @@ _EXPECTED = {
 }
 
 
-def _explain(error: ValidationError, model: type[BaseModel]) -> list[tuple[tuple, str]]:
+def _located(error: ValidationError, borrowed: Borrowed, gaps: Iterable[Loc]) -> list[dict]:
+    """Errors where the file has their values, without those that follow from a gap."""
+    located = []
+    for e in error.errors(include_url=False):
+        ends = range(len(e["loc"]), 0, -1)
+        part = next((part for n in ends if (part := tuple(e["loc"][:n])) in borrowed), ())
+        e["loc"] = (*borrowed.get(part, ()), *e["loc"][len(part) :])
+        if not any(gap[: len(e["loc"])] == e["loc"] for gap in gaps) and not _is_follow_on(e):
+            located.append(e)
+    return located
+
+
+def _explain(errors: Sequence[dict], model: type[BaseModel]) -> list[tuple[tuple, str]]:
     """Place and text of every problem; a misspelt key is one problem, not also a missing key or a short list."""
     explained, meant = [], set()
-    errors = [e for e in error.errors(include_url=False) if not _is_follow_on(e)]
     for e in errors:
         if _is_unknown_key(e):
             *parent, key = (p for p in e["loc"] if p != "[key]")
-            known = _keys_at(model, parent)
+            known = list(_fields_at(model, parent))
             guess = nearest(str(key), known)
             meant.add((*parent, guess))
             advice = f"did you mean '{guess}'?" if guess else f"known keys are {', '.join(known)}"
@@ -230,7 +304,8 @@ def _explain(error: ValidationError, model: type[BaseModel]) -> list[tuple[tuple
             explained.append((e["loc"], f"key '{e['loc'][-1]}' is missing {_inside(e['loc'][:-1])}"))
         elif e["type"] != "missing" and not _is_unknown_key(e):
             explained.append((e["loc"], _wrong_value(e)))
-    return explained
+    # A value that many places borrow is one problem.
+    return list(dict.fromkeys(explained))
 
 
 def _is_follow_on(e: dict) -> bool:
@@ -262,25 +337,25 @@ def _inside(loc: Sequence) -> str:
     return f"in {_dotted(loc)}" if loc else "at the top level"
 
 
-def _keys_at(annotation: Any, loc: Sequence) -> list[str]:
+def _fields_at(annotation: Any, loc: Sequence) -> dict[str, FieldInfo | None]:
     """Keys of the model at `loc` within a type: a model, a list or mapping of models, or a union."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         if not loc:
-            return list(annotation.model_fields)
+            return annotation.model_fields
         field = annotation.model_fields.get(str(loc[0]))
-        return _keys_at(field.annotation, loc[1:]) if field else []
+        return _fields_at(field.annotation, loc[1:]) if field else {}
     origin, args = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
-        return _keys_at(args[0], loc)
+        return _fields_at(args[0], loc)
     if origin in (list, tuple) and loc:
-        return _keys_at(args[0], loc[1:])
+        return _fields_at(args[0], loc[1:])
     if origin is dict:
-        return _keys_at(args[1], loc[1:]) if loc else list(get_args(args[0]))
+        return _fields_at(args[1], loc[1:]) if loc else dict.fromkeys(get_args(args[0]))
     if origin in (Union, UnionType):
         # pydantic begins the path of a problem within a union with the name of the member that it tried.
-        found = [_keys_at(a, rest) for a in args for rest in (loc, loc[1:])]
-        return next((keys for keys in found if keys), [])
-    return []
+        found = [_fields_at(a, rest) for a in args for rest in (loc, loc[1:])]
+        return next((keys for keys in found if keys), {})
+    return {}
 
 
 def _line_of(content: Any, loc: Sequence) -> int:

@@ -10,7 +10,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from ccmodel.channels import F_LOAD, TAU_OUT, THETA_IN, THETA_OUT
 from ccmodel.encoder.reconstruction import reconstruct_motion
-from ccmodel.encoder.smoothing import OFFSET_SCORES
+from ccmodel.encoder.smoothing import DRAWS, OFFSET_SCORES
 from ccmodel.recording import Recording, stride
 
 # A measured load torque is the torque and its sensor's noise. The noise would move the load back and forth; a hand, a
@@ -19,6 +19,8 @@ LOAD_CUTOFF_HZ = 10.0
 
 # Before the first count, a drive has moved by up to a count, and the torque with it.
 STILL_RAD = 1e-5
+# Deviation of an angle without a step, in standard deviations of its noise, from which on it has moved.
+NOISE_SDS = 5
 
 PRESCRIBED = "prescribed"  # `derived_from` of a channel that the model takes as input
 
@@ -31,9 +33,10 @@ class ModelInput:
     ----------
     recording : Recording
     theta_in : ndarray, shape (n,)
-        The drive's motion behind its encoder's counts, rad; 0 at the rest at the start where there is one.
+        The drive's motion behind its encoder's counts or steps, rad; 0 at the rest at the start where there is one.
+        An angle without a step as it was recorded.
     drive_deviations : ndarray, shape (draws, n)
-        Likely deviations of that motion from the true one, rad; no draws where the drive's angle was not counted.
+        Likely deviations of that motion from the true one, rad; no draws of an angle without step and noise.
     drive_encoder_offset : ndarray, shape (n,)
         Effect on that motion of one standard deviation of the encoder's sub-count offset at the first rest, rad.
     theta_out : ndarray, shape (n,), or None
@@ -110,17 +113,35 @@ class ModelInput:
 
 
 def _motion(recording: Recording, channel: str) -> tuple[NDArray, NDArray, NDArray]:
-    """Motion behind an encoder's counts, likely deviations from it, and the effect of the sub-count offset, rad."""
+    """Motion behind an encoder's counts, likely deviations from it, and the effect of the sub-count offset, rad.
+
+    An angle without a step is taken as it is; the noise that it shows at rest is its deviation.
+    """
     if channel not in recording.encoder_step_rad:
-        return recording[channel], np.zeros((0, recording.time_s.size)), np.zeros(recording.time_s.size)
+        angle = recording[channel]
+        return angle, _noise_draws(angle, _noise_at_rest(recording, angle)), np.zeros(angle.size)
     step_rad = recording.encoder_step_rad[channel]
     found = reconstruct_motion(recording.time_s, recording[channel], step_rad, recording.rest_s)
     return found.theta_rad, found.deviations_rad, found.encoder_offset_rad
 
 
+def _noise_at_rest(recording: Recording, angle: NDArray) -> float:
+    """Standard deviation of an angle's noise, rad, from its changes from sample to sample at rest; 0 without a rest."""
+    changes = np.diff(angle[recording.time_s < recording.rest_s])
+    return float(np.median(np.abs(changes)) / (0.6745 * np.sqrt(2))) if changes.size else 0.0
+
+
+def _noise_draws(angle: NDArray, noise: float) -> NDArray:
+    """Draws of white noise, shape (draws, n); no draws without noise."""
+    return noise * np.random.default_rng(0).standard_normal((DRAWS if noise else 0, angle.size))
+
+
 def _rest(recording: Recording, theta_in: NDArray) -> slice:
-    """Samples at the start at which the drive does not move; its count rests for longer."""
-    moved = (recording.time_s >= recording.rest_s) | (np.abs(theta_in - theta_in[0]) > STILL_RAD)
+    """Samples at the start at which the drive does not move; its count rests for longer, and noise is no motion."""
+    still, level = STILL_RAD, theta_in[0]
+    if THETA_IN not in recording.encoder_step_rad and (noise := _noise_at_rest(recording, theta_in)):
+        still, level = max(STILL_RAD, NOISE_SDS * noise), theta_in[recording.time_s < recording.rest_s].mean()
+    moved = (recording.time_s >= recording.rest_s) | (np.abs(theta_in - level) > still)
     return slice(0, int(np.argmax(moved)) if moved.any() else recording.time_s.size)
 
 

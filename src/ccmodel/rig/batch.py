@@ -3,17 +3,52 @@
 All keys that were added later are optional, so a file written before them keeps its meaning.
 """
 
+from collections.abc import Iterator
+from functools import reduce
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, get_args
 
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, Field, field_validator, model_validator
 
-from ccmodel.channels import ANGLE_AT, SUM_AT, TENSIONS_AT, TORQUE_AT
+from ccmodel.channels import (
+    ANGLE_AT,
+    CHANNELS,
+    F_DRIVE,
+    F_LOAD,
+    SUM_AT,
+    TAU_IN,
+    TAU_OUT,
+    TENSIONS_AT,
+    THETA_IN,
+    THETA_OUT,
+    TORQUE_AT,
+)
 from ccmodel.geometry import ConduitPath
 from ccmodel.recording import FAR_ENDS
-from ccmodel.typed import InputError, NotNegative, Positive, Problem, TypedModel, load_yaml_model
+from ccmodel.typed import (
+    Borrowed,
+    FillIn,
+    InputError,
+    NotNegative,
+    Positive,
+    Problem,
+    TypedModel,
+    load_yaml_model,
+    nearest,
+)
 
-REQUIRED_COLUMNS = ("time_s", "drive_encoder_counts")
+# Columns of sensors as they are read out, by the channel that is calibrated from them. A log may have the channel
+# itself in their place: a physical column, which has the channel's name.
+RAW_COLUMNS = {
+    THETA_IN: ("drive_encoder_counts",),
+    THETA_OUT: ("load_encoder_counts",),
+    TAU_IN: ("drive_torque_counts", "drive_current_A"),
+    TAU_OUT: ("load_torque_counts", "load_current_A"),
+    F_DRIVE: ("drive_load_cell_V",),
+    F_LOAD: ("load_load_cell_V",),
+}
+# One of these is the input of the model.
+DRIVE_ANGLE_COLUMNS = (*RAW_COLUMNS[THETA_IN], THETA_IN)
 SENSOR_COLUMNS = (
     "load_encoder_counts",
     "drive_current_A",
@@ -22,8 +57,9 @@ SENSOR_COLUMNS = (
     "load_torque_counts",
     "drive_load_cell_V",
     "load_load_cell_V",
+    *(channel for channel in CHANNELS if channel != THETA_IN),
 )
-COLUMNS = REQUIRED_COLUMNS + SENSOR_COLUMNS
+COLUMNS = ("time_s", *DRIVE_ANGLE_COLUMNS, *SENSOR_COLUMNS)
 
 Sign = Literal[1, -1]
 NAMES = "a name is letters, digits and -_.+=,@ only and begins with a letter or digit"
@@ -46,14 +82,14 @@ Name = Annotated[str, AfterValidator(_checked_name)]
 class LoadCell(TypedModel):
     """A load cell between slide and conduit plate: force = (V - zero_V) / sensitivity_V_per_N, in N."""
 
-    sensitivity_V_per_N: Positive
-    zero_V: float
+    sensitivity_V_per_N: Annotated[Positive, FillIn("the sensitivity of this load cell, V/N")]
+    zero_V: Annotated[float, FillIn("the reading of this load cell without force, V")]
 
 
 class TorqueSensor(TypedModel):
     """A torque sensor logged in counts: torque = (counts - zero_counts) * Nm_per_count, in N m."""
 
-    Nm_per_count: Positive
+    Nm_per_count: Annotated[Positive, FillIn("the scale of this torque sensor, N m per count")]
     zero_counts: float = 0.0
 
 
@@ -61,43 +97,49 @@ class Side(TypedModel):
     """Pulley and sensors at one end.
 
     A sign is -1 if the sensor counts against the signs of the model. If a log has torque counts and a current, the
-    torque sensor is used, since the current only estimates the torque.
+    torque sensor is used, since the current only estimates the torque. `encoder_counts_per_rev` converts counts;
+    `angle_resolution_rad` is the step of an angle that is logged in rad, 0 or absent if it has none.
     """
 
-    pulley_radius_m: Positive
-    encoder_counts_per_rev: Positive
+    pulley_radius_m: Annotated[Positive, FillIn("the radius of the {parent} pulley, m")]
+    encoder_counts_per_rev: Annotated[
+        Positive | None, FillIn("the counts of the {parent} encoder per revolution of its pulley")
+    ] = None
+    angle_resolution_rad: Annotated[
+        NotNegative | None, FillIn("the step of the {parent} angle, rad, 0 if it has none")
+    ] = None
     encoder_sign: Sign = 1
-    encoder_accuracy_rad: Positive | None = None
-    torque_constant_Nm_per_A: Positive | None = None
+    encoder_accuracy_rad: Annotated[Positive | None, FillIn("the accuracy of the {parent} encoder, rad")] = None
+    torque_constant_Nm_per_A: Annotated[
+        Positive | None, FillIn("the torque constant of the {parent} motor at its pulley, N m/A")
+    ] = None
     torque_sensor: TorqueSensor | None = None
     torque_sign: Sign = 1
     load_cell: LoadCell | None = None
 
 
 class LoadSide(Side):
-    """The load end; without a spring the load is the torque or motion measured at the load pulley.
+    """The load end; without a spring the load is the torque or motion measured at the load pulley."""
 
-    The encoder is optional here. At the drive it is the input of the model.
-    """
-
-    encoder_counts_per_rev: Positive | None = None
-    spring_stiffness_Nm_per_rad: Positive | None = None
+    spring_stiffness_Nm_per_rad: Annotated[
+        Positive | None, FillIn("the stiffness of the spring at the load, N m/rad, or remove the key if there is none")
+    ] = None
 
 
 class Cable(TypedModel):
     """Prior estimates of the cable; the stiffness is that of `length_m` of cable, so EA is their product."""
 
-    stiffness_N_per_m: Positive
-    length_m: Positive
-    friction_coefficient: NotNegative
+    stiffness_N_per_m: Annotated[Positive, FillIn("the stiffness of the cable, N/m")]
+    length_m: Annotated[Positive, FillIn("the length of cable that has this stiffness, m")]
+    friction_coefficient: Annotated[NotNegative, FillIn("the friction coefficient of the cable in its conduit")]
 
 
 class Accuracy(TypedModel):
     """Accuracy of the sensors, in SI units; absent for a sensor that the rig lacks."""
 
-    encoder_rad: Positive
-    torque_Nm: Positive | None = None
-    load_cell_N: Positive | None = None
+    encoder_rad: Annotated[Positive, FillIn("the accuracy of the angles, rad")]
+    torque_Nm: Annotated[Positive | None, FillIn("the accuracy of the torques, N m")] = None
+    load_cell_N: Annotated[Positive | None, FillIn("the accuracy of the load cells, N")] = None
 
 
 class End(NamedTuple):
@@ -112,7 +154,10 @@ class End(NamedTuple):
 
 
 class Rig(TypedModel):
-    """The rig: both ends, the cable, the accuracy of the sensors and, by log column, their ranges."""
+    """The rig: both ends, the cable, the accuracy of the sensors and, by log column, their ranges.
+
+    `nominal` names stated values that nobody measured, as `cable.stiffness_N_per_m`.
+    """
 
     transmission: Literal["pull-pull", "single-cable"] = "pull-pull"
     far_end: Literal[FAR_ENDS] | None = None
@@ -121,6 +166,7 @@ class Rig(TypedModel):
     cable: Cable
     accuracy: Accuracy
     ranges: dict[Literal[SENSOR_COLUMNS], tuple[float, float]] = Field(default_factory=dict)
+    nominal: tuple[str, ...] = ()
 
     @property
     def ends(self) -> tuple[End, End]:
@@ -138,6 +184,24 @@ class Rig(TypedModel):
                 raise ValueError(f"{column}: a range is [lowest, highest], found [{low}, {high}]")
         return ranges
 
+    @field_validator("nominal")
+    @classmethod
+    def _nominal_keys_exist(cls, nominal):
+        known = list(_dotted_keys(cls))
+        for key in nominal:
+            if key not in known:
+                guess = nearest(key, known)
+                advice = f"did you mean '{guess}'?" if guess else "it is a path as cable.stiffness_N_per_m"
+                raise ValueError(f"there is no key '{key}' below rig; {advice}")
+        return nominal
+
+    @model_validator(mode="after")
+    def _nominal_keys_are_stated(self):
+        for key in self.nominal:
+            if reduce(lambda part, name: part and getattr(part, name), key.split("."), self) is None:
+                raise ValueError(f"nominal names '{key}', which is not stated: state it, or take it out of nominal")
+        return self
+
     @model_validator(mode="after")
     def _far_end_of_a_single_cable(self):
         load, end = self.load, self.far_end
@@ -145,11 +209,6 @@ class Rig(TypedModel):
             raise ValueError("far_end and transmission: single-cable are stated together or not at all")
         if end is not None and (end == "spring") != (load.spring_stiffness_Nm_per_rad is not None):
             raise ValueError("load.spring_stiffness_Nm_per_rad is stated where far_end is spring, and only there")
-        if end == "measured-motion" and load.encoder_counts_per_rev is None:
-            raise ValueError("far_end is measured-motion, so load.encoder_counts_per_rev is needed")
-        sensors = load.load_cell, load.torque_sensor, load.torque_constant_Nm_per_A
-        if end == "measured-tension" and not any(sensors):
-            raise ValueError("far_end is measured-tension, so load.load_cell or a torque sensor there is needed")
         return self
 
     @model_validator(mode="after")
@@ -162,11 +221,25 @@ class Rig(TypedModel):
         return self
 
 
+def _dotted_keys(model: type[BaseModel], above: str = "") -> Iterator[str]:
+    """Paths of all keys of a model and of the models in it."""
+    for name, field in model.model_fields.items():
+        yield f"{above}{name}"
+        for part in (field.annotation, *get_args(field.annotation)):
+            if isinstance(part, type) and issubclass(part, BaseModel):
+                yield from _dotted_keys(part, f"{above}{name}.")
+
+
 class Piece(TypedModel):
     """A piece of the conduit with constant curvature."""
 
-    length_m: Positive
-    bend_rad: NotNegative
+    length_m: Annotated[Positive, FillIn("the length of this piece of the conduit, m")]
+    bend_rad: Annotated[NotNegative, FillIn("the bend of this piece of the conduit, rad, 0 if it is straight")]
+
+
+Conduit = Annotated[tuple[Piece, ...], Field(min_length=1)]
+PRETENSION = "the tension to which each cable was set before the motion, N"
+CONDUIT = "the pieces of the conduit from the drive end, as [{length_m: 1.2, bend_rad: 3.14}]"
 
 
 class RecordingEntry(TypedModel):
@@ -174,8 +247,8 @@ class RecordingEntry(TypedModel):
 
     id: Name
     file: str
-    pretension_N: Positive
-    conduit: Annotated[tuple[Piece, ...], Field(min_length=1)]
+    pretension_N: Annotated[Positive, FillIn(PRETENSION)]
+    conduit: Annotated[Conduit, FillIn(CONDUIT)]
     excitation: dict[str, Any] = Field(default_factory=dict)
     settled_s: NotNegative = 0.0
     note: Any = None
@@ -195,15 +268,44 @@ class RecordingEntry(TypedModel):
         return ConduitPath([p.length_m for p in self.conduit], [p.bend_rad for p in self.conduit])
 
 
+class RecordingDefaults(TypedModel):
+    """Conditions of all recordings that do not state them themselves, key by key."""
+
+    pretension_N: Annotated[Positive | None, FillIn(PRETENSION)] = None
+    conduit: Annotated[Conduit | None, FillIn(CONDUIT)] = None
+    excitation: dict[str, Any] = Field(default_factory=dict)
+    settled_s: NotNegative = 0.0
+    note: Any = None
+
+
 class Batch(TypedModel):
-    """A whole `batch.yaml`."""
+    """A whole `batch.yaml`; the recordings have the defaults that they do not state."""
 
     format: Literal[1]
     batch: Name
     origin: Literal["rig", "virtual-rig"]
     note: Any = None
     rig: Rig
+    defaults: RecordingDefaults = RecordingDefaults()
     recordings: Annotated[tuple[RecordingEntry, ...], Field(min_length=1)]
+
+    @classmethod
+    def completed(cls, data: dict) -> tuple[dict, Borrowed]:
+        """Recordings with the defaults that they do not state."""
+        defaults, recordings = data.get("defaults"), data.get("recordings")
+        if not isinstance(defaults, dict) or not isinstance(recordings, list):
+            return data, {}
+        known = RecordingDefaults.model_fields
+        given = {key: value for key, value in defaults.items() if key in known}
+        # A misspelt default is one problem, and not also a missing key of each recording.
+        meant = set(given) | {nearest(key, known) for key in defaults.keys() - set(known)}
+        entries, borrowed = [], {}
+        for i, entry in enumerate(recordings):
+            if isinstance(entry, dict):
+                borrowed |= {("recordings", i, key): ("defaults", key) for key in meant - set(entry)}
+                entry = given | entry
+            entries.append(entry)
+        return data | {"recordings": entries}, borrowed
 
     @field_validator("recordings")
     @classmethod

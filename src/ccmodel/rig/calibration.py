@@ -1,17 +1,19 @@
-"""Calibration: raw columns to SI channels and the tensions at the cable ends.
+"""Calibration: columns of a log to SI channels, and the tensions at the cable ends.
 
 Signs are those of `docs/rig-log-format.md`: tau = (T1 - T3) R and F = T1 + T3 at the drive, likewise T2, T4 at the
 load.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ccmodel.channels import TENSIONS
 from ccmodel.rig import limits
+from ccmodel.rig.angle import Angle, angle_of
 from ccmodel.rig.batch import Accuracy, End, LoadCell, Rig, TorqueSensor
 
 
@@ -30,9 +32,9 @@ class Calibrated:
     accuracy : dict of str to float
         Accuracy of each channel, in its unit.
     encoder_step_rad : dict of str to float
-        Angle of one count of each angle, rad.
-    missing : dict of str to str
-        Log columns without a channel: the key that `batch.yaml` lacks for it.
+        Step of each angle, rad: one count, or the stated resolution. Absent for an angle without a step.
+    unused : dict of str to str
+        Log columns without a channel: the reason.
     """
 
     rest_s: float
@@ -40,7 +42,7 @@ class Calibrated:
     derived_from: dict[str, str] = field(default_factory=dict)
     accuracy: dict[str, float] = field(default_factory=dict)
     encoder_step_rad: dict[str, float] = field(default_factory=dict)
-    missing: dict[str, str] = field(default_factory=dict)
+    unused: dict[str, str] = field(default_factory=dict)
 
     def add(self, channel: str, values: NDArray, formula: str, accuracy: float) -> None:
         """Add a channel."""
@@ -48,12 +50,12 @@ class Calibrated:
 
 
 def calibrate(table: pd.DataFrame, rig: Rig) -> Calibrated:
-    """Convert the raw columns of one log to SI channels.
+    """Convert the columns of one log to SI channels.
 
     Parameters
     ----------
     table : DataFrame, shape (n, columns)
-        Raw columns, with at least `time_s` and `drive_encoder_counts`.
+        Columns of the log, with at least `time_s` and the drive angle.
     rig : Rig
         Constants of the rig.
 
@@ -63,58 +65,78 @@ def calibrate(table: pd.DataFrame, rig: Rig) -> Calibrated:
         Channels with formula and accuracy.
     """
     time = table["time_s"].to_numpy()
-    resting = _resting_samples(table)
+    angles = [angle_of(table, end) for end in rig.ends]
+    resting = resting_samples(time, [angle for angle in angles if angle])
     result = Calibrated(float(time[resting - 1]) if resting else 0.0)
-    for end in rig.ends:
-        _add_sensors(result, table, end, resting, rig.accuracy)
-        (_single_tension if rig.far_end else _tensions)(result, end)
+    for end, angle in zip(rig.ends, angles, strict=True):
+        if angle:
+            _add_angle(result, table, end, angle, resting, rig.accuracy)
+        _add_sensors(result, table, end, rig.accuracy)
+        (_single_tension if rig.far_end else _tensions)(result, end, rig.accuracy.load_cell_N)
+    _note_unused(result, table, rig)
     return result
 
 
-def _resting_samples(table: pd.DataFrame) -> int:
+def resting_samples(time_s: NDArray, angles: Sequence[Angle]) -> int:
     """Number of samples at the start during which drive and load only dither; 0 if the rig begins in motion."""
-    time = table["time_s"].to_numpy()
-    columns = [c for c in ("drive_encoder_counts", "load_encoder_counts") if c in table]
-    resting = min(_still_samples(table[c].to_numpy()) for c in columns)
-    return resting if time[resting - 1] - time[0] >= limits.SHORTEST_REST_S else 0
+    resting = min(angle.still_samples() for angle in angles)
+    return resting if time_s[resting - 1] - time_s[0] >= limits.SHORTEST_REST_S else 0
 
 
-def _still_samples(counts: NDArray) -> int:
-    spread = np.maximum.accumulate(counts) - np.minimum.accumulate(counts)
-    still = int(np.argmax(spread > limits.STILL_COUNTS)) if spread[-1] > limits.STILL_COUNTS else counts.size
-    # The first count of the motion looks like dither, so the rest ends at the last sample of its most frequent count.
-    values, frequency = np.unique(counts[:still], return_counts=True)
-    return int(np.flatnonzero(counts[:still] == values[np.argmax(frequency)])[-1]) + 1
+def _add_angle(
+    result: Calibrated, table: pd.DataFrame, end: End, angle: Angle, resting: int, accuracy: Accuracy
+) -> None:
+    """Add the angle of one end, zero at rest or at the first sample."""
+    if angle.rad_per_unit is None:
+        result.unused[angle.column] = _lacks(angle.key)
+        return
+    values, sign, formula = table[angle.column].to_numpy(), end.side.encoder_sign, "{0} - {1:g} rad, {2}"
+    zero, where = (values[:resting].mean(), "the mean at rest") if resting else (values[0], "the first sample")
+    turned = values - zero
+    if angle.column != end.angle:
+        turned, formula = turned * angle.rad_per_unit, "({0} - {1:g}, {2}) * 2 pi / {3:g}"
+    formula = formula.format(angle.column, zero, where, end.side.encoder_counts_per_rev or 0)
+    result.add(
+        end.angle,
+        sign * turned,
+        f"{'-' if sign < 0 else ''}{formula}",
+        end.side.encoder_accuracy_rad or accuracy.encoder_rad,
+    )
+    if angle.step_rad:
+        result.encoder_step_rad[end.angle] = angle.step_rad
 
 
-def _add_sensors(result: Calibrated, table: pd.DataFrame, end: End, resting: int, accuracy: Accuracy) -> None:
-    """Add the channels of the sensors at one end; a torque sensor is used rather than a current."""
+def _add_sensors(result: Calibrated, table: pd.DataFrame, end: End, accuracy: Accuracy) -> None:
+    """Add torque, force and tensions that are logged at one end; a torque sensor is used rather than a current."""
     side = end.side
-    angle, angle_accuracy = partial(_angle, resting), side.encoder_accuracy_rad or accuracy.encoder_rad
-    # Column of the log, key of its constants, calibration; sign, name and accuracy of the channel.
-    sensors = (
-        ("encoder_counts", "encoder_counts_per_rev", angle, side.encoder_sign, end.angle, angle_accuracy),
+    # Physical column and channel, sign, accuracy.
+    physical = (
+        (end.torque, side.torque_sign, accuracy.torque_Nm),
+        *((channel, 1, accuracy.load_cell_N) for channel in (end.force, *end.tensions)),
+    )
+    for channel, sign, accuracy_of_channel in physical:
+        if channel in table:
+            formula = f"{'-' if sign < 0 else ''}{channel} of the log"
+            result.add(channel, sign * table[channel].to_numpy(), formula, accuracy_of_channel)
+    # Raw column, key of its constants, calibration; sign, name and accuracy of the channel.
+    raw = (
         ("torque_counts", "torque_sensor", _sensor_torque, side.torque_sign, end.torque, accuracy.torque_Nm),
         ("current_A", "torque_constant_Nm_per_A", _motor_torque, side.torque_sign, end.torque, accuracy.torque_Nm),
         ("load_cell_V", "load_cell", _force, 1, end.force, accuracy.load_cell_N),
     )
-    for suffix, key, calibration, sign, channel, accuracy_of_channel in sensors:
+    for suffix, key, calibration, sign, channel, accuracy_of_channel in raw:
         column, constants = f"{end.name}_{suffix}", getattr(side, key)
         if column not in table or channel in result.channels:
             continue
         if constants is None:
-            result.missing[column] = f"rig.{end.name}.{key}"
+            result.unused[column] = _lacks(f"rig.{end.name}.{key}")
             continue
         values, formula = calibration(table[column].to_numpy(), column, constants)
         result.add(channel, sign * values, f"{'-' if sign < 0 else ''}{formula}", accuracy_of_channel)
-    if end.angle in result.channels:
-        result.encoder_step_rad[end.angle] = 2 * np.pi / side.encoder_counts_per_rev
 
 
-def _angle(resting: int, counts: NDArray, column: str, counts_per_rev: float) -> tuple[NDArray, str]:
-    zero, where = (counts[:resting].mean(), "the mean at rest") if resting else (counts[0], "the first sample")
-    formula = f"({column} - {zero:g}, {where}) * 2 pi / {counts_per_rev:g}"
-    return (counts - zero) * (2 * np.pi / counts_per_rev), formula
+def _lacks(key: str) -> str:
+    return f"batch.yaml lacks {key}, which converts it"
 
 
 def _sensor_torque(counts: NDArray, column: str, sensor: TorqueSensor) -> tuple[NDArray, str]:
@@ -131,24 +153,46 @@ def _force(volts: NDArray, column: str, cell: LoadCell) -> tuple[NDArray, str]:
     return (volts - cell.zero_V) / cell.sensitivity_V_per_N, formula
 
 
-def _tensions(result: Calibrated, end: End) -> None:
+def _tensions(result: Calibrated, end: End, load_cell_N: float | None) -> None:
+    """Add tensions from sum and torque, or sum and torque from tensions, whichever are not logged themselves."""
     force, torque, radius = end.force, end.torque, end.side.pulley_radius_m
-    if force not in result.channels or torque not in result.channels:
+    cable_a, cable_b = end.tensions
+    channels = result.channels
+    if cable_a in channels and cable_b in channels:
+        # The errors of the two sensors are independent.
+        accuracy = float(np.sqrt(2) * load_cell_N)
+        if force not in channels:
+            result.add(force, channels[cable_a] + channels[cable_b], f"{cable_a} + {cable_b}", accuracy)
+        if torque not in channels:
+            formula = f"({cable_a} - {cable_b}) * {radius:g} m"
+            result.add(torque, (channels[cable_a] - channels[cable_b]) * radius, formula, accuracy * radius)
+    if force not in channels or torque not in channels:
         return
-    difference = result.channels[torque] / radius
-    # The errors of the two sensors are independent.
+    difference = channels[torque] / radius
     accuracy = float(np.hypot(result.accuracy[force], result.accuracy[torque] / radius) / 2)
-    for name, sign in zip(end.tensions, (1, -1), strict=True):
-        formula = f"({force} {'+' if sign > 0 else '-'} {torque} / {radius:g} m) / 2"
-        result.add(name, (result.channels[force] + sign * difference) / 2, formula, accuracy)
+    for name, sign in ((cable_a, 1), (cable_b, -1)):
+        if name not in channels:
+            formula = f"({force} {'+' if sign > 0 else '-'} {torque} / {radius:g} m) / 2"
+            result.add(name, (channels[force] + sign * difference) / 2, formula, accuracy)
 
 
-def _single_tension(result: Calibrated, end: End) -> None:
+def _single_tension(result: Calibrated, end: End, load_cell_N: float | None) -> None:
     """Tension of a single cable at one end, from the load cell or else from the torque sensor."""
     (name,) = end.tensions
     force, torque, radius = end.force, end.torque, end.side.pulley_radius_m
-    if force in result.channels:
+    if name in result.channels:
+        if force not in result.channels:
+            result.add(force, result.channels[name], name, load_cell_N)
+    elif force in result.channels:
         result.add(name, result.channels[force], force, result.accuracy[force])
     elif torque in result.channels:
         formula = f"{torque} / {radius:g} m"
         result.add(name, result.channels[torque] / radius, formula, result.accuracy[torque] / radius)
+
+
+def _note_unused(result: Calibrated, table: pd.DataFrame, rig: Rig) -> None:
+    """Tensions of a cable that the rig does not have."""
+    known = {name for end in rig.ends for name in end.tensions}
+    for name in TENSIONS:
+        if name in table and name not in known:
+            result.unused[name] = "a single cable has no cable B"

@@ -5,21 +5,27 @@ purpose: one warning. A batch of one log has no majority, so a missing column re
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import pandas as pd
 
-from ccmodel.rig.batch import SENSOR_COLUMNS, Rig
+from ccmodel.channels import CHANNELS, F_LOAD, SUM_AT, T2, TAU_OUT, TENSIONS, THETA_OUT, TORQUE_AT
+from ccmodel.rig.batch import RAW_COLUMNS, SENSOR_COLUMNS, Batch, Rig, Side
 from ccmodel.rig.findings import Defect, LogError
+from ccmodel.typed import meaning_at
 
 
 class _Sensor(NamedTuple):
-    """A sensor of `batch.yaml`: its keys, the columns that may carry it and the channels that need it."""
+    """A sensor of `batch.yaml`: its keys, the columns that may carry it and the channels that need it.
+
+    `others` are physical columns that may stand in place of the raw ones.
+    """
 
     keys: tuple[str, ...]
     columns: tuple[str, ...]
     channels: tuple[str, ...]
+    others: tuple[str, ...] = ()
 
     @property
     def absent(self) -> Defect:
@@ -44,8 +50,19 @@ class ColumnChecks:
         self.readable = sum(log is not None for log in logs)
         self.single = len(logs) == 1
         self.count = Counter(column for log in logs if log is not None for column in log)
-        self.stated = {column for sensor in sensors for column in sensor.columns}
-        self.absent = [s for s in sensors if self.readable and not any(self.count[c] for c in s.columns)]
+        self.rig = rig
+        # A physical column needs no sensor in batch.yaml that converts it.
+        self.stated = {column for sensor in sensors for column in sensor.columns} | set(CHANNELS)
+        self.absent = [s for s in sensors if self.readable and not any(self.count[c] for c in (*s.columns, *s.others))]
+
+    @property
+    def refusals(self) -> list[Defect]:
+        """Keys without which the columns of the logs cannot be used, one line each: the batch is refused."""
+        return [
+            Defect(None, None, f"{'.'.join(key)}: fill in {meaning_at(Batch, key)}; the logs have {', '.join(found)}")
+            for key, columns in _needed(self.rig)
+            if (found := [column for column in columns if self.count[column]])
+        ]
 
     @property
     def warnings(self) -> list[Defect]:
@@ -68,9 +85,13 @@ class ColumnChecks:
                 f"column missing though batch.yaml states its sensor: {lost}; restore the column or, if the rig has no"
                 " such sensor, take its key out of batch.yaml",
             )
-        lost = [c for c in SENSOR_COLUMNS if self._expected(c) and c not in log]
+        lost = [c for c in SENSOR_COLUMNS if self._expected(c) and not {c, *_SAME_QUANTITY[c]} & set(log)]
         if lost:
             raise LogError(1, lost[0], f"column missing though other logs of the batch have it: {', '.join(lost)}")
+        wanted = _FAR_END_COLUMNS.get(self.rig.far_end, ())
+        if wanted and not set(wanted) & set(log) & self.stated:
+            text = f"far_end is {self.rig.far_end}: one of {', '.join(wanted)} is needed, and the key that converts it"
+            raise LogError(1, wanted[0], text)
         rare = [c for c in log if c in self.stated and not self._expected(c)]
         return [Defect(1, c, f"only {self.count[c]} of {self.readable} logs have this column") for c in rare]
 
@@ -80,16 +101,43 @@ class ColumnChecks:
         return twice > self.readable or (twice == self.readable and column in self.stated)
 
 
+# Columns of which the model's far end takes one.
+_FAR_END_COLUMNS = {
+    "measured-motion": (*RAW_COLUMNS[THETA_OUT], THETA_OUT),
+    "measured-tension": (*RAW_COLUMNS[F_LOAD], *RAW_COLUMNS[TAU_OUT], F_LOAD, TAU_OUT, T2),
+}
+# A raw column and the physical one that may stand in its place.
+_SAME_QUANTITY = {column: (channel,) for channel, columns in RAW_COLUMNS.items() for column in columns}
+_SAME_QUANTITY |= {channel: RAW_COLUMNS.get(channel, ()) for channel in CHANNELS}
+
+
 def _stated(rig: Rig) -> list[_Sensor]:
     sensors = []
     for end in rig.ends:
         key, side = f"rig.{end.name}", end.side
-        if end.name == "load" and side.encoder_counts_per_rev:
-            sensors.append(_Sensor((f"{key}.encoder_counts_per_rev",), ("load_encoder_counts",), (end.angle,)))
-        torques = {"torque_sensor": "torque_counts", "torque_constant_Nm_per_A": "current_A"}
-        torques = {f"{key}.{name}": f"{end.name}_{column}" for name, column in torques.items() if getattr(side, name)}
-        if torques:
-            sensors.append(_Sensor(tuple(torques), tuple(torques.values()), (end.torque, *end.tensions)))
-        if side.load_cell:
-            sensors.append(_Sensor((f"{key}.load_cell",), (f"{end.name}_load_cell_V",), (end.force, *end.tensions)))
+        if end.name == "load":
+            columns = {"encoder_counts_per_rev": "load_encoder_counts", "angle_resolution_rad": end.angle}
+            sensors += _sensor(key, side, columns, (end.angle,), (end.angle,))
+        columns = {"torque_sensor": f"{end.name}_torque_counts", "torque_constant_Nm_per_A": f"{end.name}_current_A"}
+        sensors += _sensor(key, side, columns, (end.torque, *end.tensions), (end.torque, *end.tensions))
+        columns = {"load_cell": f"{end.name}_load_cell_V"}
+        sensors += _sensor(key, side, columns, (end.force, *end.tensions), (end.force, *end.tensions))
     return sensors
+
+
+def _sensor(key: str, side: Side, columns: Mapping[str, str], channels: tuple, others: tuple) -> list[_Sensor]:
+    """The sensor of these columns by key, if one of its keys is stated."""
+    stated = {f"{key}.{name}": column for name, column in columns.items() if getattr(side, name) is not None}
+    return [_Sensor(tuple(stated), tuple(stated.values()), channels, others)] if stated else []
+
+
+def _needed(rig: Rig) -> Iterator[tuple[tuple[str, ...], tuple[str, ...]]]:
+    """Keys that `batch.yaml` lacks, and the columns that cannot be used without them."""
+    counted = ["drive"] + ["load"] * (rig.far_end == "measured-motion")
+    for end in rig.ends:
+        if end.name in counted and end.side.encoder_counts_per_rev is None:
+            yield ("rig", end.name, "encoder_counts_per_rev"), RAW_COLUMNS[end.angle]
+    if rig.accuracy.torque_Nm is None:
+        yield ("rig", "accuracy", "torque_Nm"), tuple(TORQUE_AT.values())
+    if rig.accuracy.load_cell_N is None:
+        yield ("rig", "accuracy", "load_cell_N"), (*SUM_AT.values(), *TENSIONS)

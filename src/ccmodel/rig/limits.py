@@ -37,7 +37,19 @@ FROZEN_SAMPLES = 20
 # Repeated samples, as a share, below which a channel counts as noisy for that: a coarse converter repeats a value now
 # and then (a fifth of the samples of the public recordings), but not 20 times in a row.
 FROZEN_NOISE_FRACTION = 0.5
+# Share of the batch's largest drive travel below which a sensor that never changes contradicts nothing: a small motion
+# may stay within what the friction of the conduits takes up.
+SMALL_TRAVEL_FRACTION = 0.5
 # Counts by which an encoder at rest may dither.
 STILL_COUNTS = 1
+# Width of the noise of an angle without a step, in standard deviations: noise of a few thousand samples spans 7 to 8.
+NOISE_WIDTH_SDS = 10
+# Finer steps of an angle, rad, have no effect on a model: 0.1 um of cable on a pulley of 6 mm. The angle is taken as it
+# is.
+FINE_STEP_RAD = 2e-5
+# Share of a step by which readings may differ from its multiples: a log writes them with few digits.
+OFF_STEP = 0.1
+# Share of the readings that may differ by more.
+OFF_STEP_FRACTION = 0.01
 # Duration of an initial rest. Less is the time to the first count of a motion.
 SHORTEST_REST_S = 0.1

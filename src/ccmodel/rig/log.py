@@ -11,7 +11,7 @@ import pandas as pd
 from scipy.ndimage import find_objects, label
 
 from ccmodel.rig import limits, readers
-from ccmodel.rig.batch import COLUMNS, REQUIRED_COLUMNS
+from ccmodel.rig.batch import COLUMNS, DRIVE_ANGLE_COLUMNS, RAW_COLUMNS
 from ccmodel.rig.findings import Defect, LogError
 from ccmodel.typed import nearest
 
@@ -55,14 +55,33 @@ def _check_header(header: list[str]) -> list[Defect]:
     for name in unknown:
         guess = nearest(name, [c for c in COLUMNS if c not in header], MISSPELT)
         if guess:
-            raise LogError(1, name, f"unknown column; did you mean '{guess}'?")
-    for name in REQUIRED_COLUMNS:
-        if name not in header:
-            raise LogError(1, name, f"this column is required and missing; found {', '.join(header)}")
+            convert = f" That is in {_unit(guess)}: convert the values." if _unit(guess) != _unit(name) else ""
+            raise LogError(1, name, f"unknown column; did you mean '{guess}'?{convert}")
+    if "time_s" not in header:
+        raise LogError(1, "time_s", f"this column is required and missing; found {', '.join(header)}")
+    if not set(DRIVE_ANGLE_COLUMNS) & set(header):
+        counts, angle = DRIVE_ANGLE_COLUMNS
+        text = f"this column, or {angle}, is required and missing; found {', '.join(header)}"
+        raise LogError(1, counts, text)
     for name in header:
         if name in COLUMNS and header.count(name) > 1:
             raise LogError(1, name, "this column is there twice: keep one")
-    return [Defect(1, name or "(no name)", "unknown column, not used") for name in unknown]
+    for channel, columns in RAW_COLUMNS.items():
+        raw = [column for column in columns if column in header]
+        if raw and channel in header:
+            text = f"the log has {' and '.join(raw)} too, which is the same quantity: keep one"
+            raise LogError(1, channel, text)
+    return [Defect(1, name or "(no name)", f"unknown column, not used{_other_unit(name)}") for name in unknown]
+
+
+def _unit(column: str) -> str:
+    return column.rpartition("_")[2]
+
+
+def _other_unit(unknown: str) -> str:
+    """What to do about a column of a known quantity in another unit, as theta_in_deg."""
+    known = [column for column in COLUMNS if column.rpartition("_")[0] == unknown.rpartition("_")[0]]
+    return f": convert it to {' or '.join(known)}" if known else ""
 
 
 def _numbers(raw: pd.DataFrame) -> pd.DataFrame:
