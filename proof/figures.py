@@ -9,6 +9,8 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
+from proof.outcome import INCONSISTENT
+
 # Colours of Okabe and Ito, distinguishable with any colour vision; the markers differ too.
 BLUE, ORANGE, GREY, GREEN, PURPLE = "#0072B2", "#E69F00", "#999999", "#009E73", "#CC79A7"
 # Panels in a row of the figure of detection.
@@ -142,7 +144,7 @@ def _confusion(table: dict[str, dict[str, int]]) -> Figure:
     A row is a true effect; the row "none" holds the clean cases. A column is what was reported: a mechanism, or a
     verdict that names none; the column "none" holds the cases without a diagnosis.
     """
-    verdicts = ["agrees", "undecided", "unexplained", "none"]
+    verdicts = ["agrees", "undecided", "unexplained", INCONSISTENT, "none"]
     # The true effects in the order of the rows, then the verdicts, then mechanisms that are no true effect of any case.
     columns = [*(n for n in table if n != "none"), *verdicts, *(n for row in table.values() for n in row)]
     reported = list(dict.fromkeys(n for n in columns if any(n in row for row in table.values())))

@@ -17,6 +17,9 @@ from proof.cases import CLEAN, draw
 
 # A mechanism with at least this confidence counts as stated with confidence.
 DECISION_THRESHOLD = 0.8
+# Verdict on recordings that contradict one another; it names no physics, and on recordings of a right rig it is a false
+# alarm of the consistency checks.
+INCONSISTENT = "inputs-inconsistent"
 # More mechanisms or alternatives than these are not counted.
 MOST_MECHANISMS = 2
 MOST_ALTERNATIVES = 4
@@ -141,7 +144,7 @@ class Outcome:
     @property
     def is_detected(self) -> bool:
         """Whether the diagnosis reports that physics is missing."""
-        return self.verdict not in ("agrees", "none")
+        return self.verdict not in ("agrees", "none", INCONSISTENT)
 
     @property
     def is_identified_first(self) -> bool:
@@ -208,4 +211,4 @@ def same_place(a: str | None, b: str | None) -> bool:
 
 def is_located(o: Outcome) -> bool:
     """Whether the reported place is that of a concealed effect."""
-    return bool(o.diagnosis) and any(same_place(o.diagnosis["place"], t["place"]) for t in o.key["truth"])
+    return o.is_detected and any(same_place(o.diagnosis["place"], t["place"]) for t in o.key["truth"])

@@ -99,6 +99,8 @@ The held-out recordings are simulated after the diagnosis has ended.
 - **Visible**: the recalibrated model's error on held-out recordings is at least 3 sqrt(2) noise floors in some channel,
   which is three standard deviations of the difference of two repeats.
 - **No candidate**: unlisted and removed cases.
+- **Inconsistent inputs**: all inputs of these cases are right, so the verdict `inputs-inconsistent` is a false alarm.
+  It names no physics and counts as not detected.
 - **Located**: the reported place is the true one. Places that no recording distinguishes count as equal: cable and
   conduit, a pulley and its cable end, the load and its pulley.
 - **Open** in the column "met": the 95 % interval includes the target, so that more cases are needed to decide.

@@ -8,8 +8,9 @@ import numpy as np
 from proof.calibration import calibration_error, compared_values, reliability
 from proof.detection import confusion, detection, detection_by_error
 from proof.intervals import bootstrap, count
-from proof.outcome import Outcome, is_located
+from proof.outcome import INCONSISTENT, Outcome, is_located
 
+INPUTS_ACCEPTED = "right inputs are not called inconsistent"
 COVERAGE = 0.9
 COVERAGE_RATE = "coverage of the 90 % intervals"
 CALIBRATION_ERROR = "expected calibration error of stated confidences"
@@ -20,6 +21,7 @@ def rates(outcomes: Sequence[Outcome]) -> list[dict]:
     """Every rate. A target is a least rate, but for the coverage, which must include its target in the interval."""
     return [
         count("a verdict is returned", outcomes, lambda o: o.diagnosis is not None, 1.0),
+        count(INPUTS_ACCEPTED, outcomes, lambda o: o.verdict != INCONSISTENT, 1.0),
         *_rates_of_listed(outcomes),
         count("no confident misidentification", outcomes, lambda o: not o.is_confidently_wrong, 0.98),
         *_rates_of_outsiders([o for o in outcomes if o.kind in ("unlisted", "removed")]),

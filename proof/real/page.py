@@ -138,7 +138,8 @@ def _reported(o: RealOutcome) -> str:
 
 
 def _mean_square(o: RealOutcome) -> str:
-    return f"{o.diagnosis['mean_square']['calibrated']:.2f}" if o.diagnosis else ""
+    square = o.diagnosis["mean_square"]["calibrated"] if o.diagnosis else None
+    return "" if square is None else f"{square:.2f}"
 
 
 def _nearest_mean_square(diagnosis: dict) -> float:

@@ -9,6 +9,7 @@ from pathlib import Path
 from proof import conceal
 from proof.build import folder_digest
 from proof.judge import write_result
+from proof.outcome import INCONSISTENT
 from proof.real.cases import RealCase, without_mechanism
 from proof.real.faults import write_batch
 from proof.real.plan import RealPlan
@@ -56,7 +57,10 @@ def _diagnosed(batch: Path, out: Path, options: list[str], baseline: Path | None
         completed = conceal.diagnose(batch, out, (), sources, options, baseline)
         if not completed.is_usable:
             raise ValueError(f"{batch.name}: {completed.failure} {completed.tampering}")
-    return json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
+    diagnosis = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
+    if diagnosis["verdict"] == INCONSISTENT:
+        raise ValueError(diagnosis["headline"])
+    return diagnosis
 
 
 def _options(plan: RealPlan, tolerance: float) -> list[str]:

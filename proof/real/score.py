@@ -125,6 +125,8 @@ def classification(o: RealOutcome) -> str:
             return "no diagnosis"
         case "agrees":
             return "true negative" if o.truth.place is None else "false negative"
+        case "inputs-inconsistent":
+            return "inputs called inconsistent"
         case "unexplained":
             return "unexplained, right place" if o.is_located else "unexplained, other place"
         case "explained":

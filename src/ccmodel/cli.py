@@ -48,7 +48,10 @@ Folder = Annotated[Path, typer.Argument()]
 
 @app.command()
 def check(batch: Folder) -> None:
-    """Check a batch folder: a table for each recording and all findings; exits with 1 if a file cannot be used."""
+    """Check a batch folder: a table for each recording and all findings.
+
+    Exits with 1 if a file cannot be used or the inputs contradict one another.
+    """
     from ccmodel.rig.ingest import ingest_batch
     from ccmodel.rig.overview import overview_of
 
@@ -57,7 +60,7 @@ def check(batch: Folder) -> None:
         _print_overview(recording.id, overview_of(recording))
     for finding in ingested.findings:
         _print_finding(str(finding), finding.severity)
-    if any(f.severity == "refused" for f in ingested.findings):
+    if any(f.severity != "warning" for f in ingested.findings):
         raise typer.Exit(1)
 
 
@@ -117,13 +120,20 @@ def import_mis_tool(
 
 @app.command("left-out")
 def left_out(results: Folder) -> None:
-    """Print what the last run left out, and its warnings; exits with 1 if it left something out."""
+    """Print what the last run left out, contradictory inputs and warnings.
+
+    Exits with 1 if something was left out or inputs contradict one another.
+    """
     from ccmodel.report.page import left_out_of
 
     messages = left_out_of(results)
     for line in messages["warnings"]:
         _print_finding(line, "warning")
+    for line in messages["inconsistent"]:
+        _print_finding(line, "inconsistent")
     _exit_if_refused(messages["left_out"])
+    if messages["inconsistent"]:
+        raise typer.Exit(1)
 
 
 accuracy = typer.Typer(help="Watch the model's accuracy: compare a run with what was accepted.", no_args_is_help=True)
@@ -201,6 +211,9 @@ def diagnose(
         list[str],
         typer.Option(help="As 'kink at conduit', or two with a comma: fit it in full whatever the screening says."),
     ] = [],  # noqa: B006
+    trust_inputs: Annotated[
+        bool, typer.Option("--trust-inputs", help="Diagnose even if the inputs contradict one another.")
+    ] = False,
     strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 unless the model agrees.")] = False,
 ) -> None:
     """Decide whether the calibrated model explains a batch; if not, locate and name the physics left out."""
@@ -217,7 +230,7 @@ def diagnose(
         first = next(e for e in error.errors() if e["type"] not in ("float_type", "dict_type"))
         option = "--tolerance" if first["loc"] else "--candidate"
         raise InputError(f"{option}: {first['msg'].removeprefix('Value error, ')}") from None
-    diagnosis = run(batch, out, options_of(settings, without, freeze), baseline, _progress)
+    diagnosis = run(batch, out, options_of(settings, without, freeze), baseline, _progress, trust_inputs)
     typer.echo(diagnosis["headline"])
     if strict and diagnosis["verdict"] != "agrees":
         raise typer.Exit(1)
@@ -353,7 +366,8 @@ def _print_overview(name: str, seen: "Overview") -> None:
 
 
 def _print_finding(line: str, severity: str) -> None:
-    style, word = {"warning": ("yellow", "warning"), "refused": ("red", "left out")}[severity]
+    words = {"warning": ("yellow", "warning"), "refused": ("red", "left out"), "inconsistent": ("red", "inconsistent")}
+    style, word = words[severity]
     _err.print(f"[{style}]{word}[/]: ", end="")
     _err.print(line, markup=False)
 

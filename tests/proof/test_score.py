@@ -44,6 +44,8 @@ VALUE = [{"name": "gain", "value": 0.051, "low": 0.04, "high": 0.06, "unit": "1"
 RIGHT = reported("explained", ("torque-scale", "drive-sensor", 0.95, VALUE))
 WRONG = reported("explained", ("pulley-friction", "drive-pulley", 0.95, []))
 AGREES = reported("agrees")
+# The inputs of every case are right.
+FALSE_ALARM = reported("inputs-inconsistent", place="drive-sensor")
 
 CLEAN = Outcome(answer("clean"), AGREES, errors=errors(1.0))
 FALSE_POSITIVE = Outcome(answer("clean"), WRONG, errors=errors(1.0))
@@ -51,6 +53,7 @@ IDENTIFIED = Outcome(answer("single", GAIN), RIGHT, errors=errors(11.0, 2.0))
 MISIDENTIFIED = Outcome(answer("single", GAIN), WRONG, errors=errors(11.0, 9.0))
 INVISIBLE = Outcome(answer("single", GAIN), AGREES, errors=errors(2.0, 2.0))
 MISSED = Outcome(answer("single", GAIN), AGREES, errors=errors(11.0, 11.0))
+CALLED_INCONSISTENT = Outcome(answer("single", GAIN), FALSE_ALARM)
 RUNOUT = ("unlisted-encoder-runout", "load-sensor", 0.02, {})
 OUTSIDER = Outcome(answer("unlisted", RUNOUT), reported("unexplained", place="load-sensor"), errors=errors(9.0, 9.0))
 OUTSIDER_MISIDENTIFIED = Outcome(
@@ -84,6 +87,10 @@ def rate_of(what, *outcomes):
         ("poor protocol", (UNDECIDED,), (1, 1)),
         ("undecided: a true effect", (UNDECIDED, IDENTIFIED), (1, 1)),
         ("coverage of the 90 %", (IDENTIFIED, MISIDENTIFIED), (1, 1)),
+        ("right inputs are not called", (CLEAN, IDENTIFIED, CALLED_INCONSISTENT), (2, 3)),
+        ("single, visible: detected", (IDENTIFIED, CALLED_INCONSISTENT), (1, 2)),
+        ("single, visible: located", (IDENTIFIED, CALLED_INCONSISTENT), (1, 2)),
+        ("no confident misidentification", (CALLED_INCONSISTENT,), (1, 1)),
         ("a verdict is returned", (IDENTIFIED, Outcome(answer("clean"), None, "refused")), (1, 2)),
     ],
 )
@@ -156,19 +163,21 @@ def test_every_miss_is_on_the_page(tmp_path):
         OUTSIDER,
         OUTSIDER_MISIDENTIFIED,
         UNDECIDED,
+        CALLED_INCONSISTENT,
     ]
     outcomes += [Outcome(answer("clean"), None, "refused: it imported virtualrig")]
     scored = scoring.score(outcomes)
-    assert len(scored["misses"]) == 5
+    assert len(scored["misses"]) == 6
     assert scored["confusion"]["torque-scale"] == {
         "torque-scale": 1,
         "pulley-friction": 1,
         "agrees": 2,
         "undecided": 1,
+        "inputs-inconsistent": 1,
     }
     figures = write_figures(scored, tmp_path / "figures")
     text = page(scored, figures, Source(tmp_path / "proof.md", tmp_path / "figures", "make proof", "All of them."))
-    assert text.count("case-1 (") == 5
+    assert text.count("case-1 (") == 6
     assert "imported virtualrig" in text
     assert "| clean: true negative | 1/3 |" in text
     assert all((tmp_path / "figures" / name).stat().st_size > 5000 for name in figures)

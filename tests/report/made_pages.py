@@ -52,6 +52,11 @@ def diagnosis(batch: str, verdict: str | None, **changed) -> dict:
     }
     if verdict == "unexplained":
         found["nearest"] = {"mechanisms": [BACKLASH], "mean_square": 9.0, "one_fault_at": [], "error": ERROR}
+    if verdict == "inputs-inconsistent":
+        found["location"] = {"place": None, "places": [], "channels": [], "phases": [], "text": ""}
+        found["fit"] |= {"held_out": [], "mean_square": {"calibrated": None, "extended": None}, "error": {}}
+        found["next_experiment"] = {"text": "Correct batch.yaml.", "separates": []}
+        found["not_judged"] = [{"what": "one.csv, tau_in_Nm", "why": "is 0 throughout", "confidence": 1.0}]
     if verdict == "undecided":
         found |= {"likeliest": [BACKLASH], "alternatives": [BACKLASH | {"confidence": 0.5}]}
     return found | changed

@@ -96,6 +96,15 @@ def test_the_fall_is_that_of_the_largest_error_of_any_channel():
     assert card["largest"] == {"before": card["rows"][0]["before"], "after": 4.0}
 
 
+def test_contradictory_inputs_stand_first_and_have_no_errors():
+    first, second = made("explained", "inputs-inconsistent")
+    assert (first["shown_verdict"], first["rows"], first["mechanisms"]) == ("inputs inconsistent", [], [])
+    assert first["sentence"].endswith("one.csv, tau_in_Nm: is 0 throughout. No model was fitted.")
+    assert second["verdict"] == "explained"
+    (line,) = overview([first, second])
+    assert line.startswith("Simulated, 2 batches: 1 explained and 1 inputs inconsistent.")
+
+
 def test_every_mechanism_that_anything_names_is_listed():
     asked = [
         diagnosis("a", "explained", alternatives=[SCALE]),

@@ -39,6 +39,7 @@ def concealed(tmp_path):
         ({"verdict": "explained", "alternatives": [ALTERNATIVE]}, NAMED, "alternative, but at the load sensor"),
         ({"verdict": "unexplained"}, f"in the nearest model, not accepted: {SIZE}", "not named"),
         ({"verdict": "agrees"}, "not named", "not named"),
+        ({"verdict": "inputs-inconsistent"}, "–", "–"),
         ({"verdict": None}, "–", "–"),
     ],
 )
@@ -59,12 +60,14 @@ def test_what_was_named_and_is_not_there_is_said(concealed):
 
 
 def test_what_is_left_is_said_with_the_model_that_leaves_it(concealed):
-    said = [diagnosis("b", "explained"), diagnosis("c", "unexplained"), diagnosis("d", "agrees")]
-    (table,) = beside(concealed(batches=["b", "c", "d", "e"]), said)
+    verdicts = {"b": "explained", "c": "unexplained", "d": "agrees", "f": "inputs-inconsistent"}
+    said = [diagnosis(batch, verdict) for batch, verdict in verdicts.items()]
+    (table,) = beside(concealed(batches=["b", "c", "d", "f", "e"]), said)
     assert table["falls"] == [
         "τ_out: 6.0 to 1.2 times the noise (model: extended)",
         "τ_out: 6.0 to 1.2 times the noise (model: nearest (not accepted))",
         "τ_out: 6.0 times the noise",
+        "–",
         "–",
     ]
     assert table["verdicts"][-1] == "not diagnosed"

@@ -50,7 +50,7 @@ def browser():
 def file(tmp_path_factory) -> Path:
     """A page with every verdict, a batch that was not diagnosed, and a text that tries to run as a script."""
     folder = tmp_path_factory.mktemp("page")
-    verdicts = ["explained", "undecided", "unexplained", "agrees", None]
+    verdicts = ["explained", "undecided", "unexplained", "agrees", "inputs-inconsistent", None]
     diagnoses = [diagnosis(f"batch-{verdict}", verdict) for verdict in verdicts]
     batches = [summary(d["batch"], note=HOSTILE) for d in diagnoses] + [summary("not-asked", "rig")]
     (folder / "tables").mkdir()

@@ -70,6 +70,8 @@ def test_each_verdict_has_its_sentence():
     unexplained = "Something is missing at the load pulley, and no listed mechanism explains it."
     assert sentence(diagnosis("b", "unexplained")) == unexplained
     assert "no missing physics" in sentence(diagnosis("b", "agrees"))
+    dead = "The inputs contradict one another. one.csv, tau_in_Nm: is 0 throughout. No model was fitted."
+    assert sentence(diagnosis("b", "inputs-inconsistent")) == dead
     assert sentence(diagnosis("b", None)) == "Not diagnosed: no recording that can be used."
 
 

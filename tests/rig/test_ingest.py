@@ -8,6 +8,7 @@ from made_up_batch import COUNTS, table
 from ccmodel.recording import read_recordings, write_recordings
 from ccmodel.rig import ingest
 from ccmodel.rig.batch import valid_name
+from ccmodel.rig.findings import Finding
 from ccmodel.rig.ingest import ingest_batch
 
 RAW = Path(__file__).parents[2] / "data/raw"
@@ -134,6 +135,7 @@ def test_a_bad_log_is_refused_in_one_line_and_the_good_one_comes_through(bench, 
     assert [r.id for r in ingested.recordings] == ["two"]
     (finding,) = ingested.findings
     assert finding.severity == "refused"
+    assert finding.is_inconsistent == name.startswith("drive "), "a damaged file contradicts nothing"
     assert text in finding.text
     assert finding.column == column
     if name not in ("many gaps", "drive stuck later"):
@@ -172,17 +174,19 @@ WARNED = {
         "time_s",
         "samples were dropped",
     ),
-    "load cell frozen": (
-        changed("drive_load_cell_V", lambda t: t.drive_load_cell_V.where((t.index < 150) | (t.index >= 290), 0.95)),
-        152,
-        "drive_load_cell_V",
-        "stays at 0.95 up to row 291 while the drive moves: sensor frozen",
-    ),
     "extra column": (
         changed("motor_temperature_degC", lambda t: "warm"),
         1,
         "motor_temperature_degC",
         "unknown column",
+    ),
+}
+CONTAMINATED = {
+    "load cell frozen": (
+        changed("drive_load_cell_V", lambda t: t.drive_load_cell_V.where((t.index < 150) | (t.index >= 290), 0.95)),
+        152,
+        "drive_load_cell_V",
+        "stays at 0.95 up to row 291 while the drive moves: sensor frozen",
     ),
     "clipped": (
         changed("drive_current_A", lambda t: t.drive_current_A.clip(upper=0.5)),
@@ -193,14 +197,14 @@ WARNED = {
 }
 
 
-@pytest.mark.parametrize("name", WARNED)
-def test_a_small_fault_is_one_warning(bench, name):
-    damage, row, column, text = WARNED[name]
+@pytest.mark.parametrize("name", [*WARNED, *CONTAMINATED])
+def test_a_small_fault_is_one_finding_and_keeps_the_channel(bench, name):
+    damage, row, column, text = (WARNED | CONTAMINATED)[name]
     damage(bench.write())
     ingested = ingest_batch(bench.folder)
     (finding,) = ingested.findings
     assert [r.id for r in ingested.recordings] == ["one", "two"]
-    assert (finding.severity, finding.column) == ("warning", column)
+    assert (finding.severity, finding.column) == ("warning" if name in WARNED else "inconsistent", column)
     assert text in finding.text
     assert row is None or finding.row == row
     assert ingested.recordings[0].warnings == (str(finding),)
@@ -220,10 +224,65 @@ def test_a_dead_sensor_takes_its_channels_with_it(bench, name):
     changed(column, lambda t: value)(bench)
     ingested = ingest_batch(bench.folder)
     (finding,) = ingested.findings
-    assert (finding.severity, finding.column) == ("warning", column)
+    assert (finding.severity, finding.column, finding.confidence) == ("inconsistent", column, 1.0)
     assert text in finding.text
     one, two = ingested.recordings
     assert set(two.channels) - set(one.channels) == channels
+
+
+def test_a_dead_sensor_that_is_not_stated_contradicts_nothing(bench):
+    del bench.described["rig"]["drive"]["load_cell"]
+    changed("drive_load_cell_V", lambda t: 0.25)(bench)
+    severities = {f.text.partition(":")[0]: f.severity for f in ingest_batch(bench.folder).findings}
+    assert severities["is 0.25 throughout"] == "warning"
+
+
+def test_a_quiet_coarse_sensor_may_keep_its_value(bench):
+    """It stays at one value while friction takes up the motion, and at its extremes while the drive holds."""
+    noisy, quiet = bench.tables["one"], bench.tables["one"].copy()
+    theta = np.clip((noisy.time_s - 0.4) / 0.1, 0.0, 7.0)
+    quiet["drive_encoder_counts"] = np.round(200 * theta).astype(int)
+    quiet["load_encoder_counts"] = np.round(160 * np.maximum(theta - 4.0, 0.0)).astype(int)
+    quiet["load_current_A"] = np.round(np.maximum(theta - 4.0, 0.0), 3)
+    quiet["drive_current_A"] = np.round(theta + 0.001 * np.sin(70 * theta), 3)
+    bench.tables = {"one": quiet, "two": quiet.copy()}
+    findings = ingest_batch(bench.write().folder).findings
+    assert {f.column for f in findings} == {"drive_current_A", "load_current_A"}
+    assert {f.severity for f in findings} == {"warning"}
+
+
+def test_a_load_may_stand_still_through_a_small_motion(bench):
+    small = bench.tables["one"]
+    small["drive_encoder_counts"] = 100 + (small.drive_encoder_counts - 100) // 4
+    changed("load_encoder_counts", lambda t: 3)(bench)
+    (finding,) = ingest_batch(bench.folder).findings
+    assert (finding.column, finding.severity) == ("load_encoder_counts", "warning")
+    bench.tables["two"] = small
+    assert {f.severity for f in ingest_batch(bench.write().folder).findings} == {"inconsistent"}
+
+
+def test_a_load_that_is_stated_as_fixed_may_stand_still(bench):
+    bench.described["rig"] |= {"transmission": "single-cable", "far_end": "fixed"}
+    del bench.described["rig"]["load"]["spring_stiffness_Nm_per_rad"]
+    changed("load_encoder_counts", lambda t: 3)(bench)
+    (finding,) = ingest_batch(bench.folder).findings
+    assert finding.severity == "warning"
+
+
+def test_the_recordings_of_a_batch_are_checked_against_one_another_last(bench, monkeypatch):
+    found = Finding("bench", "batch.yaml", None, "rig.drive.pulley_radius_m", "inconsistent", "is too large", 0.9)
+    given = []
+    monkeypatch.setattr(ingest, "check_consistency", lambda *of: given.append(of) or [found])
+    ingested = ingest_batch(bench.write().folder)
+    assert ingested.findings == [found]
+    assert found.is_inconsistent
+    assert given == [(ingested.recordings, ingested.batch)]
+
+
+def test_findings_of_an_earlier_format_are_read():
+    old = {"batch": "b", "file": "raw/b/one.csv", "row": 3, "column": "time_s", "severity": "refused", "text": "gap"}
+    finding = Finding(**old)
+    assert (finding.confidence, finding.is_inconsistent, finding.place) == (1.0, False, "one.csv, row 3, time_s")
 
 
 def test_a_load_encoder_that_stops_is_a_warning_and_kept(bench):
@@ -329,7 +388,9 @@ def test_nothing_left_after_the_transient(bench):
     bench.described["recordings"][0]["settled_s"] = 4.0
     ingested = ingest_batch(bench.write().folder)
     assert [r.id for r in ingested.recordings] == ["two"]
-    assert "before settled_s 4 s" in ingested.findings[0].text
+    (finding,) = ingested.findings
+    assert "before settled_s 4 s" in finding.text
+    assert (finding.severity, finding.is_inconsistent) == ("refused", True)
 
 
 LACKING = ["load_current_A", "drive_load_cell_V", "load_encoder_counts"]
@@ -458,7 +519,7 @@ def test_step_of_the_drive_encoder_is_not_its_accuracy(bench):
     assert recording.accuracy["theta_in_rad"] == 0.001
 
 
-def test_a_frozen_channel_is_a_warning_unless_the_drive_rests(bench):
+def test_a_frozen_channel_is_a_finding_unless_the_drive_rests(bench):
     changed("load_current_A", lambda t: t.load_current_A.where(t.index >= 350, t.load_current_A.abs().min()))(bench)
     findings = ingest_batch(bench.folder).findings
     assert [(f.column, f.row) for f in findings] == [("load_current_A", 2)]

@@ -3,8 +3,12 @@
 from importlib import import_module
 from pkgutil import iter_modules
 
+import h5py
 import pytest
+from asammdf import MDF, Signal
 from made_up_batch import table
+from nptdms import ChannelObject, TdmsWriter
+from scipy.io import savemat
 
 from ccmodel.rig import readers
 from ccmodel.rig.findings import LogError
@@ -16,19 +20,67 @@ def test_every_module_of_the_folder_with_a_format_is_registered():
     assert readers.registry().keys() == {
         m for m in modules if hasattr(import_module(f"{readers.__name__}.{m}"), "FORMAT")
     }
-    assert {"text", "parquet"} <= readers.registry().keys()
+    assert {"hdf5", "mat", "mdf", "parquet", "ros", "tdms", "text"} == readers.registry().keys()
 
 
-def test_a_format_gives_the_same_recording(bench):
+def write_mat(table, path):
+    savemat(path, {name: table[name].to_numpy() for name in table})
+
+
+def write_hdf5(table, path):
+    with h5py.File(path, "w") as file:
+        for name in table:
+            file[f"rig/{name}"] = table[name].to_numpy()
+
+
+def write_mdf(table, path):
+    """Time is the group's own time axis and no channel."""
+    with MDF(version="4.10") as file:
+        time = table["time_s"].to_numpy()
+        file.append([Signal(table[name].to_numpy(), time, name=name) for name in table if name != "time_s"])
+        file.save(path, overwrite=True)
+
+
+def write_tdms(table, path):
+    with TdmsWriter(path) as writer:
+        writer.write_segment([ChannelObject("log", name, table[name].to_numpy()) for name in table])
+
+
+def write_parquet(table, path):
+    table.to_parquet(path)
+
+
+WRITERS = {".parquet": write_parquet, ".mat": write_mat, ".h5": write_hdf5, ".mf4": write_mdf, ".tdms": write_tdms}
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_a_format_gives_the_same_recording(bench, suffix):
     plain = ingest_batch(bench.write().folder).recordings
     for entry in bench.described["recordings"]:
-        entry["file"] = f"{entry['id']}.parquet"
-        bench.tables[entry["id"]].to_parquet(bench.folder / entry["file"])
+        entry["file"] = f"{entry['id']}{suffix}"
+        WRITERS[suffix](bench.tables[entry["id"]], bench.folder / entry["file"])
     ingested = ingest_batch(bench.write().folder)
     assert ingested.findings == []
     for one, other in zip(plain, ingested.recordings, strict=True):
         assert one.channels.keys() == other.channels.keys()
         assert all((one[c] == other[c]).all() for c in one.channels)
+
+
+def test_signals_without_a_common_time_are_for_the_import(bench):
+    log = table()
+    with MDF(version="4.10") as file:
+        for name in ("drive_encoder_counts", "load_encoder_counts"):
+            step = 1 if name.startswith("drive") else 2
+            file.append([Signal(log[name].to_numpy()[::step], log["time_s"].to_numpy()[::step], name=name)])
+        file.save(bench.folder / "one.mf4", overwrite=True)
+    with pytest.raises(LogError) as error:
+        readers.read(bench.folder / "one.mf4")
+    assert "different lengths (200 to 400 samples)" in error.value.args[2]
+    assert "ccmodel import" in error.value.args[2]
+    write_mat(log.drop(columns="time_s"), bench.folder / "one.mat")
+    with pytest.raises(LogError) as error:
+        readers.read(bench.folder / "one.mat")
+    assert "none is named time_s" in error.value.args[2] and "ccmodel import" in error.value.args[2]
 
 
 def test_the_checks_name_the_rows_of_the_format(bench):

@@ -43,7 +43,7 @@ from ccmodel.repeats import pooled_scatter, without_repeat
 from ccmodel.typed import TypedModel
 
 # From the one that determines least; `agrees` and `explained` determine all.
-VERDICTS = {"not diagnosed": 0, "unexplained": 1, "undecided": 2, "explained": 3, "agrees": 3}
+VERDICTS = {"not diagnosed": 0, "inputs-inconsistent": 0, "unexplained": 1, "undecided": 2, "explained": 3, "agrees": 3}
 LOST, GAINED, KEPT, UNKNOWN = "lost", "gained", "kept", "not judged"
 # Share of the compared time of a recording that may be missing.
 SHORTER = 0.1

@@ -2,6 +2,7 @@
 
 from dataclasses import asdict
 from pathlib import Path
+from typing import Literal
 
 from pydantic import Field, ValidationError
 
@@ -26,6 +27,13 @@ class _ModelFile(TypedModel):
     provenance: dict = Field(default_factory=dict)
 
 
+class _NoModel(TypedModel):
+    """What stands in a model file of a diagnosis without such a model."""
+
+    succeeded: Literal[False]
+    message: str
+
+
 def model_as_dict(parameters: Parameters, provenance: dict) -> dict:
     """Content of a model file: the parameters without the solver's refinement."""
     numbers = asdict(parameters)
@@ -34,6 +42,14 @@ def model_as_dict(parameters: Parameters, provenance: dict) -> dict:
     in_file = {name: former for former, name in FORMER_NAMES.items()}
     numbers = {in_file.get(name, name): value for name, value in numbers.items()}
     return {"format": FORMAT, "parameters": numbers, "mechanisms": active, "provenance": provenance}
+
+
+def _reason_for_none(text: str) -> str | None:
+    """What a diagnosis or a fit without a model wrote in its place; None for any other text."""
+    try:
+        return _NoModel.model_validate_json(text).message
+    except ValidationError:
+        return None
 
 
 def read_model(path: Path) -> Parameters:
@@ -45,10 +61,13 @@ def read_model(path: Path) -> Parameters:
         With one line on the file's fault.
     """
     try:
-        stated = _ModelFile.model_validate_json(Path(path).read_text(encoding="utf-8"))
+        text = Path(path).read_text(encoding="utf-8")
+        stated = _ModelFile.model_validate_json(text)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
     except ValidationError as error:
+        if (reason := _reason_for_none(text)) is not None:
+            raise InputError(f"{path}: holds no model: {reason}") from None
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"])) or "the file"
         raise InputError(f"{path}: {where}: {first['msg']}; a model file is what a diagnosis or a fit wrote") from None

@@ -12,6 +12,8 @@ from ccmodel.mechanisms.contract import side
 SYMBOL = {channel.short_name: channel.symbol for channel in TABLE.values()}
 IN_WORDS = {channel.short_name: channel.words for channel in TABLE.values()}
 NOT_ACCEPTED = "not accepted"
+# Verdict on recordings that contradict one another or batch.yaml: no model is run.
+INPUTS_INCONSISTENT = "inputs-inconsistent"
 # A held-out error above this many times the noise floor asks for a sentence under a model that is accepted. In the map
 # of a diagnosis it is yellow to the eye.
 CONSPICUOUS = 1.5
@@ -32,6 +34,8 @@ def sentence(diagnosis: Mapping) -> str:
     verdict = diagnosis["verdict"]
     if verdict is None:
         return f"Not diagnosed: {diagnosis['why']}."
+    if verdict == INPUTS_INCONSISTENT:
+        return _contradiction(diagnosis["not_judged"])
     held = diagnosis["is_held"]
     missing = "has changed" if held else "is missing"
     if verdict == "agrees":
@@ -43,6 +47,13 @@ def sentence(diagnosis: Mapping) -> str:
         return _undecided(diagnosis, missing)
     places = " or ".join(f"the {place_in_words(place)}" for place in possible_places(diagnosis))
     return f"Something {missing} at {places}, and no listed mechanism explains it."
+
+
+def _contradiction(not_judged: Sequence[Mapping]) -> str:
+    """The first contradiction of the inputs, and how many there are besides."""
+    first, *others = not_judged
+    more = f" ({len(others)} more in the report)" if others else ""
+    return f"The inputs contradict one another. {first['what']}: {first['why'].rstrip('.')}{more}. No model was fitted."
 
 
 def possible_places(diagnosis: Mapping) -> list[str]:

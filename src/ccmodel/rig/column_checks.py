@@ -90,9 +90,7 @@ class ColumnChecks:
             raise LogError(1, lost[0], f"column missing though other logs of the batch have it: {', '.join(lost)}")
         wanted = _FAR_END_COLUMNS.get(self.rig.far_end, ())
         if wanted and not set(wanted) & set(log) & self.stated:
-            text = (
-                f"far_end is {self.rig.far_end}, which needs one of {', '.join(wanted)}, and the key that converts it"
-            )
+            text = f"far_end is {self.rig.far_end}: one of {', '.join(wanted)} is needed, and the key that converts it"
             raise LogError(1, wanted[0], text)
         rare = [c for c in log if c in self.stated and not self._expected(c)]
         return [Defect(1, c, f"only {self.count[c]} of {self.readable} logs have this column") for c in rare]

@@ -1,11 +1,12 @@
 """Findings: the faults of a batch and what became of the data."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal, NamedTuple
 
 
 class Defect(NamedTuple):
-    """A fault of a log that does not prevent its use.
+    """A fault of a log.
 
     Attributes
     ----------
@@ -15,11 +16,15 @@ class Defect(NamedTuple):
         The column, None if it concerns no column in particular.
     text : str
         The fault and what became of the data.
+    contradicts : bool
+        Whether the log contradicts itself or `batch.yaml`, as a dead sensor does. A damaged file does not: what it
+        lost says nothing about the rig.
     """
 
     row: int | None
     column: str | None
     text: str
+    contradicts: bool = False
 
 
 class LogError(Exception):
@@ -39,16 +44,36 @@ class Finding:
     row, column, text
         See `Defect`.
     severity : str
-        "warning" if the data are used, "refused" if they are not.
+        "warning" if the data are used, "refused" if they are not, "inconsistent" if they are read and contradict one
+        another or `batch.yaml`.
+    confidence : float
+        Probability that a contradiction is one, from 0 to 1.
+    contradicts : bool
+        Of a refusal: whether the file is left out for what it says (`Defect`) and not because it is damaged.
     """
 
     batch: str
     file: str
     row: int | None
     column: str | None
-    severity: Literal["warning", "refused"]
+    severity: Literal["warning", "refused", "inconsistent"]
     text: str
+    confidence: float = 1.0
+    contradicts: bool = False
 
     def __str__(self) -> str:
-        place = [self.file, f"row {self.row}" if self.row is not None else None, self.column]
-        return f"{', '.join(p for p in place if p)}: {self.text}"
+        return f"{self._place(self.file)}: {self.text}"
+
+    @property
+    def place(self) -> str:
+        """File, row and column without the folder, as ``one.csv, row 3, drive_current_A``."""
+        return self._place(Path(self.file).name)
+
+    @property
+    def is_inconsistent(self) -> bool:
+        """Whether no verdict on the physics can be drawn from the batch: its inputs contradict one another."""
+        return self.severity == "inconsistent" or self.contradicts
+
+    def _place(self, file: str) -> str:
+        place = [file, f"row {self.row}" if self.row is not None else None, self.column]
+        return ", ".join(p for p in place if p)

@@ -11,9 +11,10 @@ from ccmodel.recording import Recording
 from ccmodel.rig.batch import Batch, RecordingEntry, load_batch
 from ccmodel.rig.calibration import calibrate
 from ccmodel.rig.column_checks import ColumnChecks
+from ccmodel.rig.consistency import check_consistency
 from ccmodel.rig.findings import Defect, Finding, LogError
 from ccmodel.rig.log import read_log
-from ccmodel.rig.sensor_checks import check_sensors
+from ccmodel.rig.sensor_checks import check_sensors, drive_travel
 from ccmodel.typed import InputError
 
 T = TypeVar("T")
@@ -28,7 +29,8 @@ class Ingested:
     recordings : list of Recording
         Those that can be used, in the order of `batch.yaml`.
     findings : list of Finding
-        Warnings and refusals. A refused recording has one finding, a refusal; a used one may have several warnings.
+        Warnings, refusals and contradictions. A refused recording has one finding, a refusal; a used one may have
+        several warnings and contradictions.
     batch : Batch or None
         Content of `batch.yaml`: radii, spring, estimates of the cable. None if the batch is refused as a whole.
     """
@@ -60,19 +62,22 @@ def ingest_batch(folder: Path) -> Ingested:
     files = [str(folder / entry.file) for entry in batch.recordings]
     logs = [_attempt(name, file, read_log, Path(file)) for file in files]
     # All logs are read before any is checked: a column is judged by how many logs of the batch have it.
-    columns = ColumnChecks(batch.rig, [log[0] if log else None for log, _ in logs])
+    tables = [log[0] if log else None for log, _ in logs]
+    columns = ColumnChecks(batch.rig, tables)
     if columns.refusals:
         return Ingested([], [_finding(name, batch_file, "refused", defect) for defect in columns.refusals])
+    travel = max((drive_travel(table, batch.rig) for table in tables if table is not None), default=0.0)
     findings = [_finding(name, batch_file, "warning", defect) for defect in columns.warnings]
     recordings = []
     for entry, file, (log, refusals) in zip(batch.recordings, files, logs, strict=True):
         if log is not None:
-            used, refusals = _attempt(name, file, _recording, batch, entry, file, log, columns)
+            used, refusals = _attempt(name, file, _recording, batch, entry, file, log, columns, travel)
             if used is not None:
                 recording, warnings = used
                 recordings.append(recording)
                 findings += warnings
         findings += refusals
+    findings += check_consistency(recordings, batch)
     return Ingested(recordings, findings, batch)
 
 
@@ -91,7 +96,10 @@ def _attempt(batch: str, file: str, step: Callable[..., T], *args) -> tuple[T | 
 
 
 def _finding(batch: str, file: str, severity: str, defect: Defect) -> Finding:
-    return Finding(batch, file, defect.row, defect.column, severity, defect.text)
+    """A defect as a finding; one of a used log that contradicts is no warning."""
+    if severity == "warning" and defect.contradicts:
+        return Finding(batch, file, defect.row, defect.column, "inconsistent", defect.text)
+    return Finding(batch, file, defect.row, defect.column, severity, defect.text, contradicts=defect.contradicts)
 
 
 def _recording(
@@ -100,20 +108,24 @@ def _recording(
     file: str,
     log: tuple[pd.DataFrame, list[Defect]],
     columns: ColumnChecks,
+    travel: float,
 ) -> tuple[Recording, list[Finding]]:
-    """The recording of a log that could be read, and its warnings.
+    """The recording of a log that could be read, and the findings of it.
 
-    `log` is the table of samples and the defects that reading it has found.
+    `log` is the table of samples and the defects that reading it has found; `travel` is the batch's largest travel of
+    the drive.
     """
     table, reading_defects = log
     rare_columns = columns.check(table)
-    table, faulty_sensors = check_sensors(table, batch.rig)
+    table, faulty_sensors = check_sensors(table, batch.rig, travel)
     end = table["time_s"].iloc[-1]
     if entry.settled_s >= end:
         text = f"ends at {end:g} s, before settled_s {entry.settled_s:g} s of batch.yaml: no samples left"
-        raise LogError(None, None, text)
+        raise LogError(None, None, text, True)
     calibrated = calibrate(table, batch.rig)
     unconverted = [Defect(None, column, f"not used: {why}") for column, why in calibrated.unused.items()]
+    # A column whose sensor batch.yaml does not state contradicts nothing: it is not used anyway.
+    faulty_sensors = [d._replace(contradicts=d.contradicts and d.column in columns.stated) for d in faulty_sensors]
     defects = [*reading_defects, *rare_columns, *faulty_sensors, *unconverted]
     findings = [_finding(batch.batch, file, "warning", defect) for defect in defects]
     recording = Recording(

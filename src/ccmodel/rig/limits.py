@@ -37,6 +37,9 @@ FROZEN_SAMPLES = 20
 # Repeated samples, as a share, below which a channel counts as noisy for that: a coarse converter repeats a value now
 # and then (a fifth of the samples of the public recordings), but not 20 times in a row.
 FROZEN_NOISE_FRACTION = 0.5
+# Share of the batch's largest drive travel below which a sensor that never changes contradicts nothing: a small motion
+# may stay within what the friction of the conduits takes up.
+SMALL_TRAVEL_FRACTION = 0.5
 # Counts by which an encoder at rest may dither.
 STILL_COUNTS = 1
 # Width of the noise of an angle without a step, in standard deviations: noise of a few thousand samples spans 7 to 8.

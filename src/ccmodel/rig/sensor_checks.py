@@ -1,7 +1,7 @@
 """Checks for dead, stuck, reset, frozen and saturated sensors.
 
 A faulty drive encoder refuses the recording, since the drive angle is the input of the model. Any other dead sensor
-only removes its channel.
+only removes its channel. Both contradict `batch.yaml`, which states a sensor that works.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from ccmodel.rig.findings import Defect, LogError
 from ccmodel.rig.log import length, longest_run, runs
 
 
-def check_sensors(table: pd.DataFrame, rig: Rig) -> tuple[pd.DataFrame, list[Defect]]:
+def check_sensors(table: pd.DataFrame, rig: Rig, largest_travel: float) -> tuple[pd.DataFrame, list[Defect]]:
     """Find faulty sensors.
 
     Parameters
@@ -24,12 +24,14 @@ def check_sensors(table: pd.DataFrame, rig: Rig) -> tuple[pd.DataFrame, list[Def
         Columns of a log; the index is the row in the file.
     rig : Rig
         The rig that wrote it.
+    largest_travel : float
+        Largest travel of the drive in a log of the batch (`drive_travel`).
 
     Returns
     -------
     table : DataFrame
         The columns that can be used.
-    warnings : list of Defect
+    defects : list of Defect
         Faults of the other sensors, and faults that leave a column usable.
 
     Raises
@@ -42,18 +44,26 @@ def check_sensors(table: pd.DataFrame, rig: Rig) -> tuple[pd.DataFrame, list[Def
         if angle:
             _check_steps(table, angle)
     _check_drive(table, drive, load)
-    warnings, dead = _missing_steps(table, drive), []
+    defects, dead = _missing_steps(table, drive), []
+    is_small = drive_travel(table, rig) < limits.SMALL_TRAVEL_FRACTION * largest_travel
     for column in table.columns.drop(["time_s", drive.column]):
         is_load = load is not None and column == load.column
-        if fault := _dead_load(table, load) if is_load else _dead(table, column):
-            warnings.append(fault._replace(text=f"{fault.text}: column not used"))
+        if fault := _dead_load(table, load, rig) if is_load else _dead(table, column):
+            contradicts = fault.contradicts and not (is_small and fault.row is None)
+            defects.append(fault._replace(text=f"{fault.text}: column not used", contradicts=contradicts))
             dead.append(column)
         elif is_load:
-            warnings += _missing_steps(table, load) + _load_stands(table, drive, load)
+            defects += _missing_steps(table, load) + _load_stands(table, drive, load)
         else:
             # A sensor at the end of its range repeats one value: it is clipped and not frozen.
-            warnings += _saturated(table[column], rig.ranges.get(column)) or _frozen(table, column, drive)
-    return table.drop(columns=dead), warnings
+            defects += _saturated(table, column, drive, rig.ranges.get(column)) or _frozen(table, column, drive)
+    return table.drop(columns=dead), defects
+
+
+def drive_travel(table: pd.DataFrame, rig: Rig) -> float:
+    """Peak to peak of the drive angle over a log, rad."""
+    drive = angle_of(table, rig.ends[0])
+    return float(np.ptp(drive.values) * drive.rad_per_unit)
 
 
 def _check_steps(table: pd.DataFrame, angle: Angle) -> None:
@@ -64,9 +74,9 @@ def _check_steps(table: pd.DataFrame, angle: Angle) -> None:
     off = np.abs((values - values[0]) / angle.step_rad - angle.values) > limits.OFF_STEP
     if off.mean() > limits.OFF_STEP_FRACTION:
         seen = smallest_step(values)
-        known = f"the readings have a step of {seen:.4g} rad" if seen else "the readings have no step"
+        known = f"the readings have a step of {seen:.6g} rad" if seen else "the readings have no step"
         text = f"does not move in steps of {angle.key} {angle.step_rad:g} rad: {known}; state 0 to take it as it is"
-        raise LogError(int(table.index[np.argmax(off)]), angle.column, text)
+        raise LogError(int(table.index[np.argmax(off)]), angle.column, text, True)
 
 
 def _missing_steps(table: pd.DataFrame, angle: Angle) -> list[Defect]:
@@ -76,14 +86,14 @@ def _missing_steps(table: pd.DataFrame, angle: Angle) -> list[Defect]:
     step = resolution_seen(table["time_s"].to_numpy(), angle.values)
     if not step:
         return []
-    text = f"moves in steps of {step:.4g} rad, which are taken for motion: state {angle.key}, 0 if it has none"
+    text = f"moves in steps of {step:.6g} rad, which are taken for motion: state {angle.key}, 0 if it has none"
     return [Defect(None, angle.column, text)]
 
 
 def _check_drive(table: pd.DataFrame, drive: Angle, load: Angle | None) -> None:
     if np.ptp(drive.values) <= limits.STILL_COUNTS * drive.grain:
         text = "stands still throughout: encoder stuck or drive switched off, the model has no input"
-        raise LogError(None, drive.column, text)
+        raise LogError(None, drive.column, text, True)
     if jump := _jump(table, drive):
         raise LogError(*jump)
     # The load cannot move by itself: if it moves, the drive moves too.
@@ -93,20 +103,36 @@ def _check_drive(table: pd.DataFrame, drive: Angle, load: Angle | None) -> None:
         if np.ptp(load.values[still]) > creep:
             first, last = table.index[still][[0, -1]]
             text = f"stands still up to row {last} while the load moves: encoder stuck"
-            raise LogError(int(first), drive.column, text)
+            raise LogError(int(first), drive.column, text, True)
 
 
-def _dead_load(table: pd.DataFrame, load: Angle) -> Defect | None:
+def _is_noisy_at_rest(table: pd.DataFrame, column: str, drive: Angle, odd: NDArray, most_repeats: float) -> bool:
+    """Whether a sensor repeats fewer than a share of its values while the drive rests, `odd` samples left out.
+
+    A converter that is coarser than its noise keeps its value wherever the cables keep their tension: at a rest, and
+    while friction takes up a motion. Only of a sensor that is noisy at rest is a constant value a fault.
+    """
+    at_rest = np.zeros(len(table), bool)
+    at_rest[: drive.still_samples()] = True
+    for run in runs(np.diff(drive.values, prepend=np.nan) == 0):
+        at_rest[run] |= length(run) > limits.FROZEN_SAMPLES
+    repeats = (np.diff(table[column].to_numpy(), prepend=np.nan) == 0)[at_rest & ~odd]
+    return repeats.size > limits.FROZEN_SAMPLES and repeats.mean() < most_repeats
+
+
+def _dead_load(table: pd.DataFrame, load: Angle, rig: Rig) -> Defect | None:
     if np.ptp(load.values) <= limits.STILL_COUNTS * load.grain:
         text = "stands still throughout while the drive moves: encoder stuck or load locked"
-        return Defect(None, load.column, text)
+        # A load that batch.yaml states as fixed has to stand still.
+        return Defect(None, load.column, text, contradicts=rig.far_end != "fixed")
     return _jump(table, load)
 
 
 def _dead(table: pd.DataFrame, column: str) -> Defect | None:
     values = table[column]
     if np.ptp(values) == 0:
-        return Defect(None, column, f"is {values.iloc[0]:g} throughout: a sensor that is dead or was never connected")
+        text = f"is {values.iloc[0]:g} throughout: a sensor that is dead or was never connected"
+        return Defect(None, column, text, contradicts=True)
     return None
 
 
@@ -121,7 +147,7 @@ def _jump(table: pd.DataFrame, angle: Angle) -> Defect | None:
         return None
     more = f" (and {jumps.size - 1} more such jumps)" if jumps.size > 1 else ""
     text = f"jumps by {angle.in_words(step[jumps[0]])} in one sample{more}: counter reset, wrapped or counts lost"
-    return Defect(int(table.index[jumps[0] + 1]), angle.column, text)
+    return Defect(int(table.index[jumps[0] + 1]), angle.column, text, contradicts=True)
 
 
 def _load_stands(table: pd.DataFrame, drive: Angle, load: Angle) -> list[Defect]:
@@ -147,7 +173,11 @@ def _frozen(table: pd.DataFrame, column: str, drive: Angle) -> list[Defect]:
     first, last = table.index[frozen[0]][[0, -1]]
     more = f" (and {len(frozen) - 1} more times)" if len(frozen) > 1 else ""
     text = f"stays at {values[frozen[0].start]:g} up to row {last} while the drive moves{more}: sensor frozen"
-    return [Defect(int(first), column, text)]
+    is_still = np.zeros(len(table), bool)
+    for part in still:
+        is_still[part] = True
+    contradicts = _is_noisy_at_rest(table, column, drive, is_still, limits.FROZEN_NOISE_FRACTION)
+    return [Defect(int(first), column, text, contradicts)]
 
 
 def _standstills(table: pd.DataFrame, values: NDArray) -> list[slice]:
@@ -162,8 +192,10 @@ def _standstills(table: pd.DataFrame, values: NDArray) -> list[slice]:
     ]
 
 
-def _saturated(values: pd.Series, sensor_range: tuple[float, float] | None) -> list[Defect]:
-    numbers = values.to_numpy()
+def _saturated(
+    table: pd.DataFrame, column: str, drive: Angle, sensor_range: tuple[float, float] | None
+) -> list[Defect]:
+    numbers = table[column].to_numpy()
     if sensor_range:
         ends = [numbers <= sensor_range[0], numbers >= sensor_range[1]]
         what = f"at the end of the sensor's range [{sensor_range[0]:g}, {sensor_range[1]:g}]"
@@ -176,9 +208,11 @@ def _saturated(values: pd.Series, sensor_range: tuple[float, float] | None) -> l
             return []
         what = "flat at its extreme value"
     found = []
+    at_end = ends[0] | ends[1]
+    contradicts = bool(sensor_range) or _is_noisy_at_rest(table, column, drive, at_end, limits.FLAT_NOISE_FRACTION)
     for end in ends:
         run = longest_run(end)
         if length(run) >= limits.FLAT_SAMPLES:
             text = f"{what} in {end.sum()} samples, {length(run)} in a row from here: saturated"
-            found.append(Defect(int(values.index[run.start]), values.name, text))
+            found.append(Defect(int(table.index[run.start]), column, text, contradicts))
     return found

@@ -79,6 +79,7 @@ GAIN, DRIFT = {"fault": "gain-of-drive-torque"}, {"fault": "drift-of-drive-torqu
             True,
             0,
         ),
+        (judged("inputs-inconsistent", place="drive-sensor", **DRIFT), "inputs called inconsistent", False, 0),
         (judged("unexplained", place="drive-sensor", **DRIFT), "unexplained, right place", True, 0),
         (judged("unexplained", place="conduit", **DRIFT), "unexplained, other place", True, 0),
         (judged("undecided", [], ["relaxation at cable"], **DRIFT), "undecided, excludes it", True, 0),

@@ -1,12 +1,14 @@
 """Cards of the batches: what is wrong with the model, where, and how much better the extended one is."""
 
 from collections.abc import Mapping, Sequence
+from math import inf
 from statistics import median
 
 from ccmodel.recording import ORIGIN
 from ccmodel.report.verdict import (
     CONSPICUOUS,
     IN_WORDS,
+    INPUTS_INCONSISTENT,
     NOT_ACCEPTED,
     SYMBOL,
     joined,
@@ -16,13 +18,13 @@ from ccmodel.report.verdict import (
     sentence,
 )
 
-IN_PART = "explained in part"
+IN_PART, CONTRADICTORY = "explained in part", "inputs inconsistent"
 # Verdicts as cards show them, in the order of the summary.
-SHOWN = ("explained", IN_PART, "undecided", "unexplained", "agrees")
+SHOWN = ("explained", IN_PART, "undecided", "unexplained", CONTRADICTORY, "agrees")
 
 
 def cards(batches: Sequence[Mapping], diagnoses: Sequence[Mapping]) -> list[dict]:
-    """A card for each batch: measured batches first, then those with the largest mismatch.
+    """A card for each batch: measured batches first, then contradictory inputs, then those with the largest mismatch.
 
     Parameters
     ----------
@@ -50,6 +52,7 @@ def _card(summary: Mapping, diagnoses: Mapping[str, Mapping]) -> dict:
         "linked": False,
         "verdict": None,
         "shown_verdict": "not diagnosed",
+        "rows": [],
         "places": [],
     }
     diagnosis = diagnoses.get(name)
@@ -58,6 +61,10 @@ def _card(summary: Mapping, diagnoses: Mapping[str, Mapping]) -> dict:
     card |= {"sentence": sentence(diagnosis), "linked": True}
     if diagnosis["verdict"] is None:
         return card
+    if diagnosis["verdict"] == INPUTS_INCONSISTENT:
+        # They ask for a correction and have no errors, so they stand before the largest mismatch.
+        shown = {"verdict": INPUTS_INCONSISTENT, "shown_verdict": CONTRADICTORY, "mismatch": inf}
+        return card | shown | {"mechanisms": [], "places": possible_places(diagnosis)}
     error, nearest = diagnosis["fit"]["error"], diagnosis.get("nearest")
     rows = _rows(error, (nearest or {}).get("error"))
     # A pair can account for most of a mismatch and leave more than noise; the verdict alone does not say so.

@@ -6,7 +6,7 @@ from pathlib import Path
 from pydantic import Field
 
 from ccmodel.report.page.cards import after_is
-from ccmodel.report.verdict import SYMBOL, place_in_words, strength, worst_channel
+from ccmodel.report.verdict import INPUTS_INCONSISTENT, SYMBOL, place_in_words, strength, worst_channel
 from ccmodel.typed import TypedModel, load_yaml_model
 
 NAMED, ALTERNATIVE, NEAREST, NOT_NAMED = (
@@ -81,7 +81,7 @@ def beside(concealed: Concealed, diagnoses: Sequence[Mapping]) -> list[dict]:
 
 def _said_of(effect: Effect, rig: Rig, diagnosis: Mapping) -> str:
     """What a diagnosis said of an effect, and not of the same effect at another place of the rig."""
-    if not diagnosis["verdict"]:
+    if not diagnosis["verdict"] or diagnosis["verdict"] == INPUTS_INCONSISTENT:
         return "–"
     if effect.name is None:
         return "no mechanism describes it"
@@ -111,7 +111,7 @@ def _besides(rig: Rig, diagnosis: Mapping) -> str:
 
 def _fall(diagnosis: Mapping) -> str:
     """Held-out error of the worst channel, before and after."""
-    if not diagnosis["verdict"]:
+    if not diagnosis["verdict"] or not diagnosis["fit"]["error"]:
         return "–"
     error = diagnosis["fit"]["error"]
     worst = worst_channel(error)

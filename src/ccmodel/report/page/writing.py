@@ -17,6 +17,7 @@ from ccmodel.report.embedding import as_json, asset, with_figures
 from ccmodel.report.page import cards, viewer
 from ccmodel.report.page.concealed import Concealed, beside, read_concealed
 from ccmodel.report.page.formats import FILTERS
+from ccmodel.report.verdict import INPUTS_INCONSISTENT
 from ccmodel.rig.findings import Finding
 from ccmodel.steps.files import read_json, write_json
 from ccmodel.typed import InputError
@@ -50,7 +51,7 @@ class Content:
         Recordings and models for the viewer (`viewer.entry`).
     concealed : Concealed, optional
         What the simulated rigs have.
-    left_out, warnings : sequence of str
+    left_out, inconsistent, warnings : sequence of str
         Messages, as in `left_out_of`.
     """
 
@@ -63,6 +64,7 @@ class Content:
     runs: Sequence[dict] = ()
     concealed: Concealed | None = None
     left_out: Sequence[str] = ()
+    inconsistent: Sequence[str] = ()
     warnings: Sequence[str] = ()
 
 
@@ -90,9 +92,9 @@ def write_report(
         Messages on folders that cannot be a batch.
     """
     batches, fits, simulations = ([read_json(f) for f in inputs[k]] for k in ("summaries", "fits", "simulations"))
-    messages = _messages(raw, unusable, batches, fits, simulations)
-    write_json(page_file.parent / LEFT_OUT, messages)
     diagnoses = [read_json(file) for file in inputs["diagnoses"]]
+    messages = _messages(raw, unusable, batches, fits, simulations, diagnoses)
+    write_json(page_file.parent / LEFT_OUT, messages)
     reports = [Path(file).read_text(encoding="utf-8") for file in inputs["reports"]]
     content = Content(
         batches=batches,
@@ -121,12 +123,16 @@ def _runs(parameters: Sequence[str], recordings: Sequence[str], simulated: Seque
 
 
 def _messages(
-    raw: Path, unusable: Sequence[str], batches: Sequence[dict], fits: Sequence[dict], simulations: Sequence[dict]
-) -> dict[str, list[str]]:
-    """Lines on input that was left out, and on input that was used with a warning."""
+    raw: Path, unusable: Sequence[str], batches: Sequence[dict], fits: Sequence[dict], simulations: Sequence[dict],
+    diagnoses: Sequence[dict],
+) -> dict[str, list[str]]:  # fmt: skip
+    """Lines on input that was left out, on input that contradicts itself, and on input that was used with a warning."""
     imported = raw / "findings.json"
     findings = [Finding(**f) for f in (read_json(imported) if imported.exists() else [])]
     findings += [Finding(**f) for batch in batches for f in batch["findings"]]
+    # A contradiction in a batch that was diagnosed nevertheless is in inputs that the configuration trusts.
+    trusted = {d["batch"] for d in diagnoses if d["verdict"] not in (None, INPUTS_INCONSISTENT)}
+    contradictions = [f for f in findings if f.severity == "inconsistent"]
     failures = [line for simulation in simulations for line in simulation["failures"]]
     left_out = [
         *unusable,
@@ -135,11 +141,17 @@ def _messages(
         # A recording fails with every parameter set; one message is enough.
         *dict.fromkeys(f"not simulated: {line}" for line in failures),
     ]
-    return {"left_out": left_out, "warnings": [str(f) for f in findings if f.severity == "warning"]}
+    return {
+        "left_out": left_out,
+        "inconsistent": [str(f) for f in contradictions if f.batch not in trusted],
+        "warnings": [
+            str(f) for f in findings if f.severity == "warning" or (f in contradictions and f.batch in trusted)
+        ],
+    }
 
 
 def left_out_of(results: Path) -> dict[str, list[str]]:
-    """Messages of the last run into a results folder: ``left_out`` and ``warnings``.
+    """Messages of the last run into a results folder: ``left_out``, ``inconsistent`` and ``warnings``.
 
     Raises
     ------
@@ -149,7 +161,7 @@ def left_out_of(results: Path) -> dict[str, list[str]]:
     file = results / LEFT_OUT
     if not file.exists():
         raise InputError(f"{file}: not there, so no run came to its end; its own messages say why")
-    return read_json(file)
+    return {"inconsistent": []} | read_json(file)  # a run of before had none
 
 
 def write_page(file: Path, content: Content) -> None:
@@ -163,7 +175,8 @@ def write_page(file: Path, content: Content) -> None:
     verdicts = _verdicts(content)
     text = environment.get_template("report/page/page.html.j2").render(
         **verdicts, **_viewer(content, [card["batch"] for card in verdicts["cards"]]), **_errors(content),
-        sections=_sections(content.studies), fits=content.fits, left_out=content.left_out, warnings=content.warnings,
+        sections=_sections(content.studies), fits=content.fits, left_out=content.left_out,
+        inconsistent=content.inconsistent, warnings=content.warnings,
         notes={_batch_of(b): b["batch"]["note"] for b in content.batches if b["batch"] and b["batch"].get("note")},
     )  # fmt: skip
     file.write_text(with_figures(text, file.parent), encoding="utf-8")

@@ -9,10 +9,6 @@ a batch; such a log in CSV is read strictly (`ccmodel.rig.readers.csv`). The che
 same for all formats (`ccmodel.rig.log`).
 """
 
-import io
-import logging
-import warnings
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
@@ -24,13 +20,12 @@ import pandas as pd
 
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers import csv, signatures
+from ccmodel.rig.readers.attempt import COPY, read_apart, read_here
 from ccmodel.rig.readers.contract import Format, Signal, SignalFile, TextLayout
 from ccmodel.rig.readers.log_table import log_of_signals
 from ccmodel.rig.readers.names import split_unit, unique
 
 __all__ = ["Format", "Signal", "SignalFile", "TextLayout", "read", "read_signals", "registry"]
-
-_COPY = "copy it again from the recorder"
 
 
 @cache
@@ -62,45 +57,34 @@ def read_signals(path: Path, text: TextLayout | None = None) -> SignalFile:
     """
     path = Path(path)
     try:
-        format = _format_of(path)
-        with _quiet():
-            read_as = format.read(path, text) if format is registry()["text"] else format.read(path)
-        return _checked(read_as, format)
-    except LogError:
-        raise
+        name = _format_of(path)
     except FileNotFoundError:
         raise LogError(None, None, "there is no such file") from None
-    except ModuleNotFoundError as error:
-        advice = f"pip install 'ccmodel[{format.extra}]'"
-        raise LogError(None, None, f"a {format.name} needs the library {error.name}: {advice}") from None
-    except MemoryError:
-        raise LogError(None, None, "is too large for the memory, or damaged: " + _COPY) from None
-    except PermissionError as error:
+    except OSError as error:
         raise LogError(None, None, f"cannot be read ({error.strerror})") from None
-    except Exception as error:  # libraries raise anything for damaged files
-        text = f"the {format.name} is cut short or damaged ({_detail(error)}): {_COPY}"
-        raise LogError(None, None, text) from None
+    format = registry()[name]
+    result = read_apart(name, format, path) if format.apart else read_here(format, path, text)
+    if isinstance(result, LogError):
+        raise result
+    return _checked(result, format)
 
 
-def _format_of(path: Path) -> Format:
-    """The format of a file, of its first bytes; the ending of its name must not say otherwise."""
-    kind = signatures.kind_of(path)
-    ending = _ending(path)
-    named = [f for f in registry().values() if ending in f.suffixes]
+def _format_of(path: Path) -> str:
+    """Name of the format of a file, of its first bytes; the ending of its name must not say otherwise."""
+    kind, ending = signatures.kind_of(path), _ending(path)
+    named = [name for name, format in registry().items() if ending in format.suffixes]
+    asked = "text" if "text" in named else f"a {registry()[named[0]].name}" if named else "a log"
     if kind is signatures.EMPTY:
-        raise LogError(None, None, "is empty (0 bytes): record it again or copy it again")
+        raise LogError(None, None, f"is empty (0 bytes): record it again or {COPY}")
+    if kind is signatures.UNKNOWN and asked in ("text", "a log"):
+        raise LogError(None, None, f"is not text and of no format known here: {COPY}, or export it as CSV")
     if kind is signatures.UNKNOWN:
-        if not named or (registry()["text"] in named and len(named) == 1):
-            raise LogError(None, None, f"is not text and of no known format: it is damaged, {_COPY}, or save it as CSV")
-        text = f"does not begin as a {named[-1].name} does: it is damaged or of another format; {_COPY}"
-        raise LogError(None, None, text)
+        raise LogError(None, None, f"does not begin as {asked} does: it is damaged, or of another format; {COPY}")
     if kind.module is None:
-        raise LogError(None, None, f"is {kind.text}, not a log: {kind.advice}")
-    format = registry()[kind.module]
-    if named and format not in named:
-        asked = "text" if registry()["text"] in named else f"a {named[0].name}"
+        raise LogError(None, None, f"is {kind.text}, not {asked}: {kind.advice}")
+    if named and kind.module not in named:
         raise LogError(None, None, f"is {kind.text}, not {asked}: rename it to {kind.advice}")
-    return format
+    return kind.module
 
 
 def _ending(path: Path) -> str:
@@ -124,25 +108,6 @@ def _checked(file: SignalFile, format: Format) -> SignalFile:
             for name, (_, unit), s in zip(names, split, signals, strict=True)
         ),
     )
-
-
-def _detail(error: Exception) -> str:
-    """First line of what a library says, in short."""
-    said = " ".join(str(error).split())
-    return f"{type(error).__name__}: {said[:120]}" if said else type(error).__name__
-
-
-@contextmanager
-def _quiet():
-    """Keep libraries from printing and logging: what they find wrong is said once, by us."""
-    level = logging.root.manager.disable
-    logging.disable(logging.CRITICAL)
-    try:
-        with warnings.catch_warnings(), redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        logging.disable(level)
 
 
 def read(path: Path) -> pd.DataFrame:

@@ -95,9 +95,15 @@ class Format:
         exception for a damaged file; `LogError` if it can say more than that the file is damaged.
     extra : str or None
         Optional dependencies of the package that it needs.
+    apart : bool
+        Whether its library ends the process on some damaged files, so that it needs a process of its own.
+    repair : str
+        How a damaged file may be repaired, after "or".
     """
 
     name: str
     suffixes: tuple[str, ...]
     read: Callable[..., SignalFile]
     extra: str | None = None
+    apart: bool = False
+    repair: str = ""

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.rig.findings import LogError
+from ccmodel.rig.readers.attempt import COPY
 from ccmodel.rig.readers.columns import Columns
 from ccmodel.rig.readers.contract import Format, SignalFile
 
@@ -31,12 +32,11 @@ def read(path: Path) -> SignalFile:
     return SignalFile(tuple(columns.signals), None, columns.remarks())
 
 
-FORMAT = Format("HDF5 file", (".h5", ".hdf5", ".hdf", ".he5", ".nc"), read, extra="hdf5")
+FORMAT = Format("HDF5 file", (".h5", ".hdf5", ".hdf", ".he5", ".nc"), read, extra="hdf5", apart=True)
 
 
-def _datasets(h5py, group, path: str = "", seen: frozenset = frozenset()):
+def _datasets(h5py, group, path: str = "", above: tuple = ()):
     """Names and arrays of a group and the groups in it; a group that contains itself is entered once."""
-    seen = seen | {group.id.__hash__()}
     for key in group:
         if key.startswith("#"):  # what MATLAB keeps for itself
             continue
@@ -44,11 +44,13 @@ def _datasets(h5py, group, path: str = "", seen: frozenset = frozenset()):
         link = group.get(key, getlink=True)
         if isinstance(link, h5py.ExternalLink):
             raise LogError(None, None, f"'{name}' is in another file ({link.filename}): give that file")
-        item = group.get(key)
+        if isinstance(link, h5py.SoftLink) and group.get(link.path) is None:
+            raise LogError(None, None, f"'{name}' is a link to '{link.path}', which is not in the file: {COPY}")
+        item = group[key]
         if isinstance(item, h5py.Dataset):
             yield name, item
-        elif isinstance(item, h5py.Group) and item.id.__hash__() not in seen:
-            yield from _datasets(h5py, item, name, seen)
+        elif isinstance(item, h5py.Group) and item not in above:
+            yield from _datasets(h5py, item, name, (*above, item))
 
 
 def _add(columns: Columns, name: str, dataset) -> None:

@@ -53,7 +53,7 @@ def read(path: Path) -> SignalFile:
     return SignalFile(tuple(columns.signals), None, remarks)
 
 
-FORMAT = Format("MATLAB file", (".mat",), read, extra="mat")
+FORMAT = Format("MATLAB file", (".mat",), read, extra="mat", apart=True)
 
 
 def _advice(objects: list[tuple[str, str]]) -> str:

@@ -21,7 +21,7 @@ def read(path: Path) -> SignalFile:
     return SignalFile(tuple(columns.signals), _utc(started), columns.remarks())
 
 
-FORMAT = Format("MDF file", (".mf4", ".mdf", ".dat", ".mf3"), read, extra="mdf")
+FORMAT = Format("MDF file", (".mf4", ".mdf", ".dat", ".mf3"), read, extra="mdf", apart=True)
 
 
 def _add_group(columns: Columns, file, index: int, group) -> None:

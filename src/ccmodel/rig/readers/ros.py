@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.rig.findings import LogError
+from ccmodel.rig.readers import signatures
 from ccmodel.rig.readers.contract import Format, Signal, SignalFile
 
 # Elements of an array that may be signals; a longer one is a picture, a cloud or a scan.
@@ -51,8 +53,13 @@ def read(path: Path) -> SignalFile:
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
+    kind = signatures.kind_of(path)
+    if path.is_file() and path.suffix != kind.advice:
+        raise LogError(
+            None, None, f"is {kind.text}, which is read only under its own ending: rename it to {kind.advice}"
+        )
     topics, unknown = {}, set()
-    with _open(AnyReader, path, get_typestore(Stores.LATEST)) as bag:
+    with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as bag:
         known = {c.id: c.msgtype in bag.typestore.fielddefs for c in bag.connections}
         for connection, received, raw in bag.messages():
             if not known[connection.id]:
@@ -69,12 +76,8 @@ def read(path: Path) -> SignalFile:
     return SignalFile(tuple(signals), datetime.fromtimestamp(zero / _NS, UTC), tuple(dict.fromkeys(remarks)))
 
 
-FORMAT = Format("ROS bag", (".bag", ".mcap", ".db3"), read, extra="ros")
-
-
-def _open(reader, path: Path, typestore):
-    """The bag; rosbags goes by the ending of its name, so a file of another ending is read under the right one."""
-    return reader([path], default_typestore=typestore)
+_REPAIR = "repair it with 'rosbag reindex' (ROS 1) or 'ros2 bag reindex' (ROS 2)"
+FORMAT = Format("ROS bag", (".bag", ".mcap", ".db3"), read, extra="ros", repair=_REPAIR)
 
 
 def _collect(topic: dict, message: Any, received: int) -> None:

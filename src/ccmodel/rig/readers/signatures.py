@@ -13,6 +13,8 @@ _GZIP = b"\x1f\x8b"
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _UTF16, _UTF32 = (b"\xff\xfe", b"\xfe\xff"), (b"\xff\xfe\0\0", b"\0\0\xfe\xff")
 _CONTROLS = re.compile(rb"[\x00-\x08\x0e-\x19\x1b-\x1f\x7f]")
+# Share of control characters up to which a file is a text that is damaged in a place. Of random bytes it is 0.1.
+_MOST_CONTROLS = 0.03
 
 
 class Kind(NamedTuple):
@@ -61,11 +63,9 @@ _BEGINNINGS = {
     b"CDF\x02": Kind("a classic netCDF file", None, "save it as netCDF-4 or CSV"),
     b"\x93NUMPY": Kind("a NumPy array (npy)", None, "save it as CSV or MAT"),
     b"LOGG": Kind("a Vector BLF file", None, "save it as MDF4"),
-    b"%PDF": Kind("a PDF document", None, _AGAIN),
     b"\x89PNG": Kind("a PNG picture", None, _AGAIN),
     b"\xff\xd8\xff": Kind("a JPEG picture", None, _AGAIN),
     b"GIF8": Kind("a GIF picture", None, _AGAIN),
-    b"{\\rtf1": Kind("an RTF document", None, _AGAIN),
     b"BZh": Kind("a bzip2 archive", None, "unpack it"),
     b"\xfd7zXZ\0": Kind("an xz archive", None, "unpack it"),
     b"\x28\xb5\x2f\xfd": Kind("a Zstandard archive", None, "unpack it"),
@@ -73,6 +73,16 @@ _BEGINNINGS = {
     b"Rar!": Kind("a RAR archive", None, "unpack it"),
     b"\x7fELF": Kind("a program", None, _AGAIN),
 }
+
+# Documents that are text, or may be.
+_DOCUMENTS = {
+    b"%PDF": Kind("a PDF document", None, _AGAIN),
+    b"{\\rtf1": Kind("an RTF document", None, _AGAIN),
+    b"<!DOCTYPE": Kind("a web page", None, _AGAIN),
+    b"<html": Kind("a web page", None, _AGAIN),
+    b"version https://git-lfs": Kind("the pointer to a file in Git LFS", None, "fetch the file with 'git lfs pull'"),
+}
+_SQLITE = Kind("an SQLite database without a ROS 2 bag", None, "export its table as CSV")
 
 
 def kind_of(path: Path) -> Kind:
@@ -97,9 +107,12 @@ def kind_of_bytes(head: bytes) -> Kind:
     """Kind of a file that begins with these bytes."""
     if not head:
         return EMPTY
-    kind = next((kind for start, kind in _BEGINNINGS.items() if head.startswith(start)), None)
-    # The header of a text may begin with the same letters ("LOGGER;").
-    if kind and (kind.advice == _AGAIN or _CONTROLS.search(head)):
+    # The header of a text may begin with the same letters as another format ("LOGGER;").
+    known = _DOCUMENTS | _BEGINNINGS if _CONTROLS.search(head) else _DOCUMENTS
+    kind = next((kind for start, kind in known.items() if head.startswith(start)), None)
+    if kind and head.startswith(b"SQLite") and b"TABLE topics" not in head:
+        return _SQLITE
+    if kind:
         return kind
     if head.startswith(b"PK\x03\x04"):
         return XLSX if b"xl/" in head or b"[Content_Types].xml" in head[:100] else _ZIP
@@ -116,8 +129,10 @@ def not_text(kind: Kind) -> str:
 
 
 def is_text(head: bytes) -> bool:
-    """Whether bytes are text of an encoding that a log may have: without control characters, or UTF-16 or UTF-32."""
-    return head.startswith(_UTF16 + _UTF32) or wide(head) is not None or not _CONTROLS.search(head)
+    """Whether bytes are text of an encoding that a log may have, though it may be damaged in a place."""
+    if head.startswith(_UTF16 + _UTF32) or wide(head) is not None:
+        return True
+    return len(_CONTROLS.findall(head)) <= _MOST_CONTROLS * len(head)
 
 
 def wide(head: bytes) -> str | None:

@@ -95,7 +95,7 @@ def _seconds_of_day(text: pd.Series) -> NDArray:
     clock = text.where(text.str.count(":") != 1, text + ":00")
     if clock.str.contains("[AaPp][Mm]", na=False).any():
         clock = pd.to_datetime(clock, format="mixed").dt.strftime("%H:%M:%S.%f")
-    seconds = pd.to_timedelta(clock).dt.total_seconds().to_numpy(float, na_value=np.nan)
+    seconds = np.array(pd.to_timedelta(clock).dt.total_seconds(), float)
     known = np.isfinite(seconds)
     days = np.cumsum(np.diff(seconds[known], prepend=seconds[known][:1]) < -_DAY_S / 2)
     seconds[known] += _DAY_S * days

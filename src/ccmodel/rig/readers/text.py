@@ -27,7 +27,7 @@ WHITESPACE = "whitespace"
 SEPARATORS = ("\t", ";", "|", ",", WHITESPACE)
 _NAMES_OF_SEPARATORS = {"\t": "tab", WHITESPACE: "whitespace"}
 # Rows that show the layout, and header lines above the samples that may hold names and units.
-_SAMPLE_LINES = 1000
+_FEWEST_SAMPLE_LINES, _SAMPLE_LINES = 20, 1000
 _HEADER_LINES = 5
 # Lines without numbers that may follow the samples.
 _FOOTER_LINES = 3
@@ -195,12 +195,13 @@ def _is_comment(line: str) -> bool:
 
 def _grid(lines: list[str], layout: TextLayout) -> _Grid:
     """Separator and decimal sign under which most cells of the rows are numbers."""
-    if layout.first_line:
-        rows = lines[layout.first_line - 1 :]
-    else:
-        middle = 0 if len(lines) <= _SAMPLE_LINES else len(lines) // 2
-        rows = lines[middle:]
-    rows = [line for line in rows[:_SAMPLE_LINES] if line.strip() and not _is_comment(line)]
+    if layout.first_line and layout.first_line > len(lines):
+        text = f"text.first_line: the file has {len(lines)} lines only, found {layout.first_line}"
+        raise LogError(None, None, text)
+    # The end of a file holds samples, however many lines of notes it begins with.
+    count = min(max(len(lines) // 4, _FEWEST_SAMPLE_LINES), _SAMPLE_LINES)
+    rows = lines[(layout.first_line or 1) - 1 :][-count:]
+    rows = [line for line in rows if line.strip() and not _is_comment(line)]
     separators = (layout.separator,) if layout.separator else SEPARATORS
     decimals = (layout.decimal,) if layout.decimal else (".", ",")
     candidates = [c for s in separators for d in decimals if (c := _candidate(rows, _separator(s), d))]
@@ -227,14 +228,13 @@ def _candidate(rows: list[str], separator: str, decimal: str) -> tuple[int, _Gri
     width, count = max(Counter(map(len, split)).items(), key=lambda item: (item[1], item[0]))
     columns = list(zip(*(cells for cells in split if len(cells) == width), strict=True))
     filled = [[c for c in column if not _is_missing(c)] for column in columns]
-    numbers = tuple(bool(c) and 2 * sum(_is_number(x, decimal) for x in c) > len(c) for c in filled)
-    stamps = tuple(
-        bool(c) and 2 * sum(map(is_stamp, c)) > len(c) and not n for c, n in zip(filled, numbers, strict=True)
-    )
-    texts = sum(bool(c) for c in filled) - sum(numbers) - sum(stamps)
-    if not any(numbers):
+    # A column without an entry here may have one elsewhere.
+    numbers = tuple(2 * sum(_is_number(x, decimal) for x in c) > len(c) or not c for c in filled)
+    stamps = tuple(2 * sum(map(is_stamp, c)) > len(c) and not n for c, n in zip(filled, numbers, strict=True))
+    known = sum(bool(c) and (n or s) for c, n, s in zip(filled, numbers, stamps, strict=True))
+    if not any(c and n for c, n in zip(filled, numbers, strict=True)):
         return None
-    return count * (sum(numbers) + sum(stamps) - texts), _Grid(separator, decimal, numbers, stamps)
+    return count * (2 * known - sum(map(bool, filled))), _Grid(separator, decimal, numbers, stamps)
 
 
 def _no_numbers(rows: list[str], lines: list[str]) -> str:
@@ -245,9 +245,6 @@ def _no_numbers(rows: list[str], lines: list[str]) -> str:
 def _first_row(lines: list[str], grid: _Grid, layout: TextLayout) -> int:
     """Index of the first sample: two more rows follow it, comments and empty lines aside."""
     if layout.first_line:
-        if layout.first_line > len(lines):
-            text = f"text.first_line: the file has {len(lines)} lines only, found {layout.first_line}"
-            raise LogError(None, None, text)
         return layout.first_line - 1
     after = max(layout.header_line or 0, layout.unit_line or 0)
     candidates = [i for i in range(after, len(lines)) if lines[i].strip() and not _is_comment(lines[i])]
@@ -353,6 +350,8 @@ def _table(lines: list[str], first: int, grid: _Grid) -> tuple[pd.DataFrame, lis
     if footer:
         remarks.append(f"{footer} lines below the samples are left out")
         numbered = numbered[:-footer]
+    if len(numbered) < 2:
+        raise LogError(None, None, _no_numbers([], lines))
     rows = [_row(i, line, grid) for i, line in numbered]
     table = pd.read_csv(
         io.StringIO("\n".join(rows)),
@@ -391,10 +390,13 @@ def _signals(table, names, units, grid):
     if stamps:
         seconds, started, used, remark = seconds_of_stamps([table[i] for i in stamps[:2]])
         remarks += remark
-    texts = []
+    texts, empty = [], []
     for i in range(grid.width):
         if grid.numbers[i]:
             values, remark = _floats(table[i], names[i], grid.decimal)
+            if np.isnan(values).all():
+                empty += [names[i]] if names[i] != f"column_{i + 1}" else []
+                continue
             signals.append(Signal(names[i], units[i], values))
             remarks += remark
         elif stamps[:1] == [i]:
@@ -406,6 +408,8 @@ def _signals(table, names, units, grid):
             texts.append(names[i])
     if texts:
         remarks.append(f"columns of text are left out: {', '.join(texts)}")
+    if empty:
+        remarks.append(f"columns without an entry are left out: {', '.join(empty)}")
     return tuple(signals), started, remarks
 
 

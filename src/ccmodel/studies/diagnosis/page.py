@@ -2,7 +2,7 @@
 
 import base64
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import jinja2
@@ -20,7 +20,7 @@ from ccmodel.diagnose.settings import ADEQUATE_LACK_OF_FIT
 from ccmodel.diagnose.verdict import nested_choice
 from ccmodel.mechanisms import catalogue
 from ccmodel.provenance import stamp
-from ccmodel.recording import ORIGIN
+from ccmodel.recording import ORIGIN, Recording
 from ccmodel.report.embedding import asset
 from ccmodel.report.figures import COLOURS, STYLE, legend_below, stamp_figure, title_figure
 from ccmodel.report.verdict import (
@@ -33,6 +33,7 @@ from ccmodel.report.verdict import (
     possible_places,
     worst_channel,
 )
+from ccmodel.rig.overview import overview_of
 
 LOOPS = 3
 CANDIDATES = 8
@@ -83,6 +84,19 @@ def write_diagnosis(file: Path, found: Diagnosis, page: str | None = None) -> No
             loops=_encoded(_loops(found)),
             recordings=[w.observations.given.recording.id for w in found.judgement.whitened],
         )
+    file.write_text(text, encoding="utf-8")
+
+
+def write_inconsistent(file: Path, report: Mapping, recordings: Sequence[Recording], page: str | None = None) -> None:
+    """Write the page of a batch whose inputs contradict one another: the contradictions, then what was read."""
+    text = _template("inconsistent.html.j2").render(
+        report=report,
+        headline=headline(report),
+        origin=ORIGIN[recordings[0].origin] if recordings else None,
+        overviews={recording.id: overview_of(recording) for recording in recordings},
+        table=TABLE,
+        page=page,
+    )
     file.write_text(text, encoding="utf-8")
 
 

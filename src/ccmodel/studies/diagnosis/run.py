@@ -1,7 +1,6 @@
 """A batch -> its diagnosis: diagnosis.json, a page, and the models that were compared."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 
 from ccmodel import mechanisms as registry
@@ -11,11 +10,13 @@ from ccmodel.diagnose.diagnosis import diagnose as run
 from ccmodel.failure import ModelError
 from ccmodel.model.files import model_as_dict, read_model
 from ccmodel.model.parameters import Parameters
-from ccmodel.recording import read_recordings
+from ccmodel.recording import Recording, read_recordings
 from ccmodel.report.verdict import headline
+from ccmodel.rig.findings import Finding
 from ccmodel.rig.ingest import ingest_batch
 from ccmodel.steps.files import estimates_of, read_json, write_json
-from ccmodel.studies.diagnosis.page import write_diagnosis, write_not_diagnosed
+from ccmodel.studies.diagnosis import inconsistent
+from ccmodel.studies.diagnosis.page import write_diagnosis, write_inconsistent, write_not_diagnosed
 from ccmodel.studies.diagnosis.settings import MODEL_FILES, Diagnosing
 from ccmodel.typed import InputError
 
@@ -29,6 +30,7 @@ def diagnose(
     options: Options = Options(),  # noqa: B008
     baseline: Path | None = None,
     report: Callable[[str], None] = lambda text: None,
+    trust_inputs: bool = False,
 ) -> dict:
     """Diagnose a batch folder and write the files of its diagnosis.
 
@@ -41,6 +43,8 @@ def diagnose(
         Model file to start from, instead of the batch's own estimates.
     report : callable
         Gets a line on each stage.
+    trust_inputs : bool
+        Whether to diagnose even if the inputs contradict one another.
 
     Returns
     -------
@@ -58,20 +62,24 @@ def diagnose(
     except registry.UnknownMechanismError as error:
         raise InputError(f"--without: {error}") from None
     ingested = ingest_batch(batch)
-    if ingested.batch is None or not ingested.recordings:
+    contradict = not trust_inputs and any(f.is_inconsistent for f in ingested.findings)
+    if ingested.batch is None or not (ingested.recordings or contradict):
         refused = [str(f) for f in ingested.findings if f.severity == "refused"]
         raise InputError("\n".join(refused) or f"{batch}: no recording that can be used")
-    not_judged = _refused(map(asdict, ingested.findings))
     inputs = provenance.of_inputs(provenance.files_in(batch), batch)
     known = read_model(baseline) if baseline else None
     if options.freeze and known is None:
         raise InputError("--freeze: there is no model to hold; name one with --baseline")
-    try:
-        estimates = Parameters.estimated(ingested.batch.rig)
-        found = run(ingested.recordings, estimates, options, known, not_judged, report)
-    except (ModelError, ValueError) as error:
-        raise InputError(f"{batch}: {error}") from None
-    content = _write(found, inputs, out)
+    if contradict:
+        content = inconsistent.report(ingested.batch.batch, ingested.findings, options.freeze)
+        content = _write_inconsistent(content, ingested.recordings, inputs, out)
+    else:
+        try:
+            estimates, not_judged = Parameters.estimated(ingested.batch.rig), _not_judged(ingested.findings)
+            found = run(ingested.recordings, estimates, options, known, not_judged, report)
+        except (ModelError, ValueError) as error:
+            raise InputError(f"{batch}: {error}") from None
+        content = _write(found, inputs, out)
     if not content["nearest"]:
         (out / MODEL_FILES["nearest"]).unlink()
     return content
@@ -80,35 +88,60 @@ def diagnose(
 def diagnose_recordings(recordings_file: Path, out: Path, settings: Diagnosing | None = None) -> None:
     """Diagnose a batch that the pipeline has read; a batch that cannot be diagnosed has files with the reason."""
     estimates, recordings = estimates_of(recordings_file), read_recordings(recordings_file)
-    inputs = provenance.of_inputs([recordings_file])
+    settings, inputs = settings or Diagnosing(), provenance.of_inputs([recordings_file])
+    findings = [Finding(**f) for f in read_json(recordings_file.with_suffix(".json"))["findings"]]
+    if estimates is not None and not settings.trust_inputs and any(f.is_inconsistent for f in findings):
+        content = inconsistent.report(recordings_file.stem, findings)
+        _write_inconsistent(content, recordings, inputs, out, PAGE_OF_RUN)
+        return
     try:
         if estimates is None or not recordings:
             raise ModelError("no recording that can be used")
-        not_judged = _refused(read_json(recordings_file.with_suffix(".json"))["findings"])
-        found = run(recordings, estimates, options_of(settings or Diagnosing()), not_judged=not_judged)
+        found = run(recordings, estimates, options_of(settings), not_judged=_not_judged(findings))
     except (ModelError, ValueError) as error:
         name, reason = recordings_file.stem, str(error)
         out.mkdir(parents=True, exist_ok=True)
         write_json(out / "diagnosis.json", {"batch": name, "verdict": None, "why": reason})
-        for file in MODEL_FILES.values():
-            write_json(out / file, _no_model(reason))
+        _write_models(out, {}, dict.fromkeys(MODEL_FILES, reason))
         write_not_diagnosed(out / "report.html", name, reason, PAGE_OF_RUN)
         return
     _write(found, inputs, out, PAGE_OF_RUN)
 
 
-def _refused(findings: Iterable[Mapping]) -> list[dict[str, str]]:
-    """Files that were refused, with the reason."""
-    return [{"what": Path(f["file"]).name, "why": f["text"]} for f in findings if f["severity"] == "refused"]
+def _not_judged(findings: Iterable[Finding]) -> list[dict]:
+    """Files that were refused, and contradictions of inputs that are trusted, with the reason."""
+    refused = [{"what": Path(f.file).name, "why": f.text} for f in findings if f.severity == "refused"]
+    trusted = [f for f in findings if f.severity == "inconsistent"]
+    return [*refused, *({"what": f.place, "why": f.text, "confidence": f.confidence} for f in trusted)]
 
 
 def options_of(settings: Diagnosing, without: Sequence[str] = (), freeze: bool = False) -> Options:
     """Options of a diagnosis from the configuration's."""
-    return Options(**settings.model_dump(exclude_none=True), without=without, freeze=freeze)
+    stated = settings.model_dump(exclude_none=True, exclude={"trust_inputs"})
+    return Options(**stated, without=without, freeze=freeze)
 
 
-def _no_model(reason: str) -> dict:
-    return {"succeeded": False, "message": reason}
+def _write_models(out: Path, models: Mapping[str, dict], reasons: Mapping[str, str]) -> None:
+    """Write the model files; one without a model states the reason."""
+    for name, file in MODEL_FILES.items():
+        write_json(out / file, models.get(name) or {"succeeded": False, "message": reasons[name]})
+
+
+def _without(verdict: str) -> dict[str, str]:
+    """Why a verdict lacks a model, by the model's name."""
+    return {name: f"verdict '{verdict}': the diagnosis has no {name} model" for name in MODEL_FILES}
+
+
+def _write_inconsistent(
+    report: dict, recordings: Sequence[Recording], inputs: dict, out: Path, page: str | None = None
+) -> dict:
+    """Write diagnosis.json and the page of inputs that contradict one another, and files that state no model."""
+    out.mkdir(parents=True, exist_ok=True)
+    content = report | {"headline": headline(report), "provenance": inputs}
+    write_json(out / "diagnosis.json", content)
+    _write_models(out, {}, _without(report["verdict"]))
+    write_inconsistent(out / "report.html", content, recordings, page)
+    return content
 
 
 def _write(found: Diagnosis, inputs: dict, out: Path, page: str | None = None) -> dict:
@@ -120,8 +153,7 @@ def _write(found: Diagnosis, inputs: dict, out: Path, page: str | None = None) -
     models = {"calibrated": judged.calibrated, "extended": judged.best}
     if found.report["nearest"]:
         models["nearest"] = judged.nearest
-    for name, file in MODEL_FILES.items():
-        without = _no_model(f"verdict '{judged.verdict}': the diagnosis has no {name} model")
-        write_json(out / file, model_as_dict(found.model(models[name]), inputs) if name in models else without)
+    written = {name: model_as_dict(found.model(candidate), inputs) for name, candidate in models.items()}
+    _write_models(out, written, _without(judged.verdict))
     write_diagnosis(out / "report.html", found, page)
     return content

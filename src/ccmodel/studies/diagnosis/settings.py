@@ -23,6 +23,9 @@ class Diagnosing(TypedModel):
         default_factory=list,
         description="one or two mechanisms each, 'name at place', to fit in full whatever the screening says",
     )
+    trust_inputs: bool = Field(
+        False, description="whether to diagnose even if the recordings contradict one another or batch.yaml"
+    )
 
     @model_validator(mode="after")
     def _candidates_known(self):
