@@ -142,6 +142,15 @@ def test_tensions_give_the_pretension(tmp_path):
     assert "load_cell_N: 0.0" in text
 
 
+def test_a_negative_pretension_is_not_proposed(tmp_path):
+    tables = {"a.csv": physical(), "b.csv": physical().assign(F_drive_N=-10.0, F_load_N=-10.0)}
+    text = draft_batch(folder_of(tmp_path, tables)).read_text()
+    assert (
+        "  pretension_N:  # N; half the sum of tensions at rest is -5 N: is a load cell's sign or zero wrong?" in text
+    )
+    assert text.count("pretension_N") == 1
+
+
 def test_an_angle_without_a_step_is_said_to_have_none(tmp_path):
     table = physical(step=None)
     table["theta_in_rad"] += np.random.default_rng(0).normal(0, 1e-3, len(table)).round(4)

@@ -160,9 +160,13 @@ def _content(name: str, logs: Sequence[_Log], refused: dict[str, str]) -> Lines:
     yield from _accuracy(columns, logs)
     pretensions = {log.file: log.pretension_N for log in logs}
     alike = _alike(pretensions.values())
+    differ = alike is None and all(p is not None and p > 0 for p in pretensions.values())
     yield "defaults:  # of all recordings; an entry may state its own"
     if None in pretensions.values():
         yield "  pretension_N:  # N, the tension to which each cable was set before the motion"
+    elif min(pretensions.values()) <= 0:
+        least = f"{min(pretensions.values()):.3g} N"
+        yield f"  pretension_N:  # N; half the sum of tensions at rest is {least}: is a load cell's sign or zero wrong?"
     elif alike is not None:
         yield f"  pretension_N: {alike:.3g}  # half the sum of tensions at rest, mean of all recordings"
     else:
@@ -171,8 +175,7 @@ def _content(name: str, logs: Sequence[_Log], refused: dict[str, str]) -> Lines:
     yield "recordings:"
     ids = _ids([log.file for log in logs])
     for log in logs:
-        own = None if alike is not None else pretensions[log.file]
-        yield from _entry(ids[log.file], log, None if None in pretensions.values() else own)
+        yield from _entry(ids[log.file], log, pretensions[log.file] if differ else None)
     for file, text in refused.items():
         yield f"# not used: {file}: {text}"
 
