@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from ccmodel.rig.importing import units
 
 ANGLE, TORQUE, CURRENT, FORCE, TIME = "angle", "torque", "current", "force", "time"
-VELOCITY, COMMAND, COUNTER, OTHER = "speed", "command", "sample counter", "other"
+VELOCITY, COMMAND, COUNTER, OTHER = "speed", "command", "sample counter", "quantity without a column"
 DRIVE, LOAD = "drive", "load"
 LOADCELL = "loadcell"
 
