@@ -11,10 +11,14 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from ruamel.yaml import YAML
 
+from ccmodel.rig.readers import registry
+
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 # The conda environment is that of a job. Snakemake starts the job from outside; pip and hatchling install the package.
 RUNS_JOBS, INSTALLS = {"snakemake"}, {"pip", "hatchling"}
+# A reader of a log format imports its library where it needs it, and names the extra that installs it.
+READERS = "src/ccmodel/rig/readers"
 
 
 def by_name(requirements):
@@ -22,10 +26,10 @@ def by_name(requirements):
     return {canonicalize_name(r.name): r.specifier for r in parsed}
 
 
-def imported(package):
+def imported(package, files=None):
     """Top-level names of other packages that a package imports, anywhere in its modules."""
     names = set()
-    for file in (ROOT / "src" / package).rglob("*.py"):
+    for file in files or (ROOT / "src" / package).rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text())):
             if isinstance(node, ast.Import):
                 names |= {alias.name.partition(".")[0] for alias in node.names}
@@ -36,13 +40,25 @@ def imported(package):
 
 @pytest.mark.parametrize("package", ["ccmodel", "virtualrig"])
 def test_what_a_package_imports_is_a_dependency(package):
+    folder = ROOT / "src" / package
+    files = [file for file in folder.rglob("*.py") if not file.is_relative_to(ROOT / READERS)]
+    assert unknown(imported(package, files), PROJECT["dependencies"]) == set()
+
+
+def test_what_a_reader_imports_is_a_dependency_or_its_extra():
+    extras = {f.extra for f in registry().values() if f.extra}
+    assert set(PROJECT["optional-dependencies"]["formats"]) == {f"ccmodel[{','.join(sorted(extras))}]"}
+    for name, format in registry().items():
+        extra = PROJECT["optional-dependencies"][format.extra] if format.extra else []
+        module = imported("ccmodel", [ROOT / READERS / f"{name}.py"])
+        assert unknown(module, PROJECT["dependencies"] + extra) == set()
+
+
+def unknown(names, requirements):
+    """Imported names that no requirement installs."""
     distributions = packages_distributions()
-    missing = {
-        name
-        for name in imported(package)
-        if not {canonicalize_name(d) for d in distributions[name]} & by_name(PROJECT["dependencies"]).keys()
-    }
-    assert missing == set()
+    wanted = by_name(requirements).keys()
+    return {name for name in names if not {canonicalize_name(d) for d in distributions[name]} & wanted}
 
 
 def test_the_conda_environment_has_the_same_dependencies():

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import typer
 from pydantic import ValidationError
 from rich.console import Console
+from rich.text import Text
 from typer.core import TyperGroup
 
 from ccmodel.typed import InputError
@@ -61,6 +62,28 @@ def check(batch: Folder) -> None:
         _print_finding(str(finding), finding.severity)
     if any(f.severity != "warning" for f in ingested.findings):
         raise typer.Exit(1)
+
+
+@app.command("import")
+def import_(
+    files: Annotated[list[Path], typer.Argument(help="The rig's logs, in any format.")],
+    out: Annotated[Path, typer.Option(help="Folder of the batch; its name becomes the batch's.")],
+    map_file: Annotated[
+        Path | None, typer.Option("--map", help="What each column is made of; without it, a map is guessed.")
+    ] = None,
+) -> None:
+    """Import logs of any format into a batch; without a map, guess one to be corrected."""
+    from ccmodel.rig import importing
+
+    if map_file is None:
+        guessed = importing.write_guess(files, out)
+        _print_all(importing.guess_tables(guessed))
+        written = importing.next_of_guess(guessed, files, out)
+    else:
+        imported = importing.import_files(files, map_file, out)
+        _print_all(importing.import_tables(imported))
+        written = importing.next_of_import(imported, out)
+    typer.echo(written)
 
 
 @app.command()
@@ -307,6 +330,13 @@ def schema() -> None:
     from ccmodel.config import Config
 
     typer.echo(json.dumps(Config.model_json_schema(), indent=1))
+
+
+def _print_all(shown: list) -> None:
+    """Print tables at the width of the terminal, and each text in one line."""
+    console = Console(highlight=False)
+    for one in shown:
+        console.print(one, soft_wrap=isinstance(one, Text))
 
 
 def _progress(text: str) -> None:

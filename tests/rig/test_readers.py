@@ -1,36 +1,64 @@
 """Log readers: a new format needs one module, and the checks of a log are the same for all formats."""
 
-import numpy as np
-import pandas as pd
+from importlib import import_module
+from pkgutil import iter_modules
+
+import h5py
 import pytest
+from asammdf import MDF, Signal
 from made_up_batch import table
+from nptdms import ChannelObject, TdmsWriter
+from scipy.io import savemat
 
 from ccmodel.rig import readers
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.ingest import ingest_batch
 
 
-@pytest.fixture
-def parquet(monkeypatch):
-    """A reader of another format, registered like a module of the folder."""
-
-    def read(path):
-        raw = pd.read_parquet(path)
-        return raw.set_axis(np.arange(1, len(raw) + 1))
-
-    known = readers.registry()
-    monkeypatch.setattr(readers, "registry", lambda: known | {".parquet": read})
+def test_every_module_of_the_folder_with_a_format_is_registered():
+    modules = {m.name for m in iter_modules(readers.__path__)}
+    assert readers.registry().keys() == {
+        m for m in modules if hasattr(import_module(f"{readers.__name__}.{m}"), "FORMAT")
+    }
+    assert {"hdf5", "mat", "mdf", "parquet", "ros", "tdms", "text"} == readers.registry().keys()
 
 
-def test_every_module_of_the_folder_is_registered():
-    assert readers.registry().keys() == {".csv", ".csv.gz"}
+def write_mat(table, path):
+    savemat(path, {name: table[name].to_numpy() for name in table})
 
 
-def test_a_format_gives_the_same_recording(bench, parquet):
+def write_hdf5(table, path):
+    with h5py.File(path, "w") as file:
+        for name in table:
+            file[f"rig/{name}"] = table[name].to_numpy()
+
+
+def write_mdf(table, path):
+    """Time is the group's own time axis and no channel."""
+    with MDF(version="4.10") as file:
+        time = table["time_s"].to_numpy()
+        file.append([Signal(table[name].to_numpy(), time, name=name) for name in table if name != "time_s"])
+        file.save(path, overwrite=True)
+
+
+def write_tdms(table, path):
+    with TdmsWriter(path) as writer:
+        writer.write_segment([ChannelObject("log", name, table[name].to_numpy()) for name in table])
+
+
+def write_parquet(table, path):
+    table.to_parquet(path)
+
+
+WRITERS = {".parquet": write_parquet, ".mat": write_mat, ".h5": write_hdf5, ".mf4": write_mdf, ".tdms": write_tdms}
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_a_format_gives_the_same_recording(bench, suffix):
     plain = ingest_batch(bench.write().folder).recordings
     for entry in bench.described["recordings"]:
-        entry["file"] = f"{entry['id']}.parquet"
-        bench.tables[entry["id"]].to_parquet(bench.folder / entry["file"])
+        entry["file"] = f"{entry['id']}{suffix}"
+        WRITERS[suffix](bench.tables[entry["id"]], bench.folder / entry["file"])
     ingested = ingest_batch(bench.write().folder)
     assert ingested.findings == []
     for one, other in zip(plain, ingested.recordings, strict=True):
@@ -38,7 +66,24 @@ def test_a_format_gives_the_same_recording(bench, parquet):
         assert all((one[c] == other[c]).all() for c in one.channels)
 
 
-def test_the_checks_name_the_rows_of_the_format(bench, parquet):
+def test_signals_without_a_common_time_are_for_the_import(bench):
+    log = table()
+    with MDF(version="4.10") as file:
+        for name in ("drive_encoder_counts", "load_encoder_counts"):
+            step = 1 if name.startswith("drive") else 2
+            file.append([Signal(log[name].to_numpy()[::step], log["time_s"].to_numpy()[::step], name=name)])
+        file.save(bench.folder / "one.mf4", overwrite=True)
+    with pytest.raises(LogError) as error:
+        readers.read(bench.folder / "one.mf4")
+    assert "different lengths (200 to 400 samples)" in error.value.args[2]
+    assert "ccmodel import" in error.value.args[2]
+    write_mat(log.drop(columns="time_s"), bench.folder / "one.mat")
+    with pytest.raises(LogError) as error:
+        readers.read(bench.folder / "one.mat")
+    assert "none is named time_s" in error.value.args[2] and "ccmodel import" in error.value.args[2]
+
+
+def test_the_checks_name_the_rows_of_the_format(bench):
     bench.described["recordings"][0]["file"] = "one.parquet"
     table(seed=1).drop(index=range(100, 150)).to_parquet(bench.folder / "one.parquet")
     (finding,) = ingest_batch(bench.write().folder).findings

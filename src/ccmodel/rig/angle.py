@@ -137,16 +137,26 @@ def smallest_step(values: NDArray) -> float | None:
     levels = np.unique(values)
     if levels.size < 2:
         return None
-    gaps = np.diff(levels)
     finest = max(1e-9 * (levels[-1] - levels[0]), 16 * np.finfo(float).eps * np.abs(levels).max())
-    step = gaps.max()
-    while step > finest:
-        multiples = np.round(gaps / step)
-        left = np.abs(gaps - multiples * step)
-        if left.max() <= limits.OFF_STEP * step and multiples.sum() > 0:
-            return float(gaps.sum() / multiples.sum())
-        step = left[left > limits.OFF_STEP * step].min()
-    return None
+    gaps = np.sort(np.diff(levels))
+    gaps = gaps[gaps > finest]
+    step, smaller = gaps[0], True
+    while smaller:
+        step, smaller = _divided(gaps, step, finest)
+    return step
+
+
+def _divided(gaps: NDArray, step: float, finest: float) -> tuple[float | None, bool]:
+    """The step, refined by gaps of which it is a divisor; or a smaller one as soon as it is none, and whether it is."""
+    length, multiples = 0.0, 0.0
+    for gap in gaps:  # from the smallest on: a long one needs a step known well
+        n = round(gap / step)
+        rest = abs(gap - n * step)
+        if rest > limits.OFF_STEP * step:
+            return (rest, True) if rest > finest else (None, False)
+        length, multiples = length + gap, multiples + n
+        step = length / multiples
+    return float(step), False
 
 
 def resolution_seen(time_s: NDArray, angle_rad: NDArray) -> float:

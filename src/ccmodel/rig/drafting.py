@@ -109,7 +109,7 @@ def draft_batch(folder: Path) -> Path:
     logs, refused = _read(folder)
     if not logs:
         problems = [Problem(str(folder / file), None, text) for file, text in refused.items()]
-        none = Problem(str(folder), None, f"has no logs ({', '.join(registry())}): put them there")
+        none = Problem(str(folder), None, f"has no logs ({', '.join(_suffixes())}): put them there")
         raise InputError.of(*(problems or [none]))
     path.write_text("\n".join(_content(name, logs, refused)) + "\n", encoding="utf-8")
     return path
@@ -119,7 +119,7 @@ def _read(folder: Path) -> tuple[list[_Log], dict[str, str]]:
     """Logs of a folder by name, and why the others cannot be read."""
     logs, refused = [], {}
     for path in sorted(folder.rglob("*"), key=_natural):
-        if not path.is_file() or not path.name.lower().endswith(tuple(registry())):
+        if not path.is_file() or not path.name.lower().removesuffix(".gz").endswith(_suffixes()):
             continue
         file = path.relative_to(folder).as_posix()
         try:
@@ -128,6 +128,11 @@ def _read(folder: Path) -> tuple[list[_Log], dict[str, str]]:
             row, column, text = error.args
             refused[file] = ", ".join(str(part) for part in (f"row {row}" if row else "", column, text) if part)
     return logs, refused
+
+
+def _suffixes() -> tuple[str, ...]:
+    """Endings of the names of logs, of all formats."""
+    return tuple(suffix for format in registry().values() for suffix in format.suffixes)
 
 
 def _natural(path: Path) -> list:
@@ -155,9 +160,13 @@ def _content(name: str, logs: Sequence[_Log], refused: dict[str, str]) -> Lines:
     yield from _accuracy(columns, logs)
     pretensions = {log.file: log.pretension_N for log in logs}
     alike = _alike(pretensions.values())
+    differ = alike is None and all(p is not None and p > 0 for p in pretensions.values())
     yield "defaults:  # of all recordings; an entry may state its own"
     if None in pretensions.values():
         yield "  pretension_N:  # N, the tension to which each cable was set before the motion"
+    elif min(pretensions.values()) <= 0:
+        least = f"{min(pretensions.values()):.3g} N"
+        yield f"  pretension_N:  # N; half the sum of tensions at rest is {least}: is a load cell's sign or zero wrong?"
     elif alike is not None:
         yield f"  pretension_N: {alike:.3g}  # half the sum of tensions at rest, mean of all recordings"
     else:
@@ -166,8 +175,7 @@ def _content(name: str, logs: Sequence[_Log], refused: dict[str, str]) -> Lines:
     yield "recordings:"
     ids = _ids([log.file for log in logs])
     for log in logs:
-        own = None if alike is not None else pretensions[log.file]
-        yield from _entry(ids[log.file], log, None if None in pretensions.values() else own)
+        yield from _entry(ids[log.file], log, pretensions[log.file] if differ else None)
     for file, text in refused.items():
         yield f"# not used: {file}: {text}"
 

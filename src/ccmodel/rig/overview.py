@@ -131,6 +131,8 @@ def noise_of(values: NDArray) -> float | None:
     """Standard deviation of the readings of a rest about a straight line; None if they are too few."""
     if values.size < FEWEST_AT_REST:
         return None
+    if np.ptp(values) == 0:
+        return 0.0
     at = np.arange(values.size)
     return float(np.std(values - np.polynomial.Polynomial.fit(at, values, 1)(at), ddof=2))
 

@@ -74,7 +74,7 @@ def _check_steps(table: pd.DataFrame, angle: Angle) -> None:
     off = np.abs((values - values[0]) / angle.step_rad - angle.values) > limits.OFF_STEP
     if off.mean() > limits.OFF_STEP_FRACTION:
         seen = smallest_step(values)
-        known = f"the readings have a step of {seen:.4g} rad" if seen else "the readings have no step"
+        known = f"the readings have a step of {seen:.6g} rad" if seen else "the readings have no step"
         text = f"does not move in steps of {angle.key} {angle.step_rad:g} rad: {known}; state 0 to take it as it is"
         raise LogError(int(table.index[np.argmax(off)]), angle.column, text, True)
 
@@ -86,7 +86,7 @@ def _missing_steps(table: pd.DataFrame, angle: Angle) -> list[Defect]:
     step = resolution_seen(table["time_s"].to_numpy(), angle.values)
     if not step:
         return []
-    text = f"moves in steps of {step:.4g} rad, which are taken for motion: state {angle.key}, 0 if it has none"
+    text = f"moves in steps of {step:.6g} rad, which are taken for motion: state {angle.key}, 0 if it has none"
     return [Defect(None, angle.column, text)]
 
 

@@ -2,14 +2,12 @@
 
 import json
 import re
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from ccmodel.rig.batch import valid_name
 from ccmodel.rig.findings import Finding, LogError
+from ccmodel.rig.importing.replacing import replacing
 from ccmodel.rig.mis_tool.description import write_batch
 from ccmodel.rig.mis_tool.signs import sensor_signs
 from ccmodel.rig.mis_tool.trial import FEWEST_COLUMNS, FEWEST_ROWS, Trial, read_trial
@@ -65,7 +63,7 @@ def import_mis_tool(source: Path, out: Path) -> Imported:
                 f"{out}: would be replaced, but {entry.name} is from no import; give a new or empty folder"
             )
     files = _text_files(source)
-    with _replacing(out) as fresh:
+    with replacing(out) as fresh:
         fresh.mkdir()
         names, findings = _import_into(fresh, files)
         if not names:
@@ -102,7 +100,7 @@ def import_batch(source: Path, out: Path) -> Imported:
     files = _text_files(source)
     if inner := {f.parent for f in files} - {Path(source)}:
         raise InputError(f"{source}: has trials in {min(inner).name}; a batch is made of one folder of trials, name it")
-    with _replacing(out) as fresh:
+    with replacing(out) as fresh:
         findings = _import_folder(files, fresh, out.name)
         if not fresh.exists():
             raise _no_trial(source, files)
@@ -113,19 +111,6 @@ def _is_imported(folder: Path) -> bool:
     """Whether a folder is a batch that an import wrote."""
     description = folder / "batch.yaml"
     return description.is_file() and DOI in description.read_text(encoding="utf-8", errors="replace")
-
-
-@contextmanager
-def _replacing(out: Path) -> Iterator[Path]:
-    """A place for a new folder, which takes the place of `out` at the end if nothing was raised."""
-    out.parent.mkdir(parents=True, exist_ok=True)
-    # In the parent of `out`, since a folder can only be renamed within a file system.
-    with tempfile.TemporaryDirectory(prefix=".import-", dir=out.parent) as work:
-        fresh = Path(work) / out.name
-        yield fresh
-        if out.exists():
-            out.rename(Path(work) / f"earlier-{out.name}")
-        fresh.rename(out)
 
 
 def _text_files(source: Path) -> list[Path]:

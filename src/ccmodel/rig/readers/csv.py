@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from ccmodel.rig.findings import LogError
+from ccmodel.rig.readers import signatures
 
 SUFFIXES = (".csv", ".csv.gz")
 _QUOTED_CELL = re.compile(r'(?<![^,])"([^",]*)"(?![^,])')
@@ -43,6 +44,9 @@ def read(path: Path) -> pd.DataFrame:
 
 def _text(path: Path) -> str:
     raw = path.read_bytes()
+    kind = signatures.kind_of(path)
+    if kind.module != "text" and kind not in (signatures.UNKNOWN, signatures.EMPTY):
+        raise LogError(None, None, signatures.not_text(kind))
     if raw[:2] == b"\x1f\x8b":
         raw = _unzipped(raw)
     elif path.suffix == ".gz" and raw:

@@ -1,0 +1,220 @@
+"""The map that a guess makes: a text with comments, to be corrected by a person."""
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+
+from ccmodel.rig import readers
+from ccmodel.rig.findings import LogError
+from ccmodel.rig.importing.columns import DRIVE_ANGLES, UNIT_OF
+from ccmodel.rig.importing.guess import Guess, GuessedFile, guess_file
+from ccmodel.rig.importing.map import TimeSource
+from ccmodel.rig.importing.sources import MAIN, names_of
+from ccmodel.rig.importing.writing import MAP, check_folder
+from ccmodel.rig.readers.contract import SignalFile
+from ccmodel.typed import InputError, Problem
+
+_HEAD = """\
+# What each column of the log is made of: column = sign * gain * (signal - zero), in the unit of the column's name.
+# This is a guess. Correct it; a line behind "# " is not sure and not used: take "# " away where it is right.
+# Keys of a column: signal, unit, sign, gain, zero, delay_s, file, time (docs/import.md).
+"""
+# Words that YAML does not read as text.
+_NO_TEXT = {"null", "true", "false", "yes", "no", "on", "off", "~"}
+_PLAIN = re.compile(r"[^\W\d][\w .+*/°%-]*")
+
+
+@dataclass(frozen=True)
+class GuessedMap:
+    """A guessed map.
+
+    Attributes
+    ----------
+    file : Path
+        Where it was written.
+    guessed : dict of str to GuessedFile
+        By role of the file.
+    names : dict of str to str
+        Name of the file that was looked at, by role.
+    remarks : list of str
+        What reading the files assumed, and what else must be said.
+    """
+
+    file: Path
+    guessed: dict[str, GuessedFile]
+    names: dict[str, str]
+    remarks: list[str]
+
+
+def write_guess(files: Sequence[Path], out: Path) -> GuessedMap:
+    """Guess a map for files and write it to a folder.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        The files as the rig wrote them.
+    out : Path
+        Folder for `map.yaml`; no other file in it is touched.
+
+    Returns
+    -------
+    GuessedMap
+        The guess, for the terminal.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read (a line for each), the folder holds what no import wrote, or has a map.
+    """
+    out = Path(out).resolve()
+    check_folder(out)
+    target = out / MAP
+    if target.exists():
+        text = f"{target}: there is a map; use it with --map {target}, or remove it to have a new one guessed"
+        raise InputError(text)
+    if not files:
+        raise InputError("no file to import: give the rig's logs")
+    names = names_of([Path(f) for f in files])
+    kinds = _kinds(_read_all(names))
+    roles, patterns, remarks = _roles(kinds, names)
+    guessed = {role: guess_file(kinds[key][0][1]) for role, key in roles.items()}
+    looked_at = {role: names[kinds[key][0][0]] for role, key in roles.items()}
+    for role, key in roles.items():
+        remarks += [f"{looked_at[role]}: {remark}" for remark in kinds[key][0][1].remarks]
+    out.mkdir(parents=True, exist_ok=True)
+    target.write_text(map_text(guessed, patterns, remarks), encoding="utf-8")
+    return GuessedMap(target, guessed, looked_at, remarks)
+
+
+def _read_all(names: Mapping[Path, str]) -> dict[Path, SignalFile]:
+    read, problems = {}, []
+    for path, name in names.items():
+        try:
+            read[path] = readers.read_signals(path)
+        except LogError as error:
+            row, _, text = error.args
+            problems.append(Problem(name, row, text))
+    if problems:
+        raise InputError.of(*problems)
+    return read
+
+
+def _kinds(read: Mapping[Path, SignalFile]) -> dict[tuple, list[tuple[Path, SignalFile]]]:
+    """Files by the names of their signals; the kind with an angle of the drive first."""
+    kinds: dict[tuple, list] = {}
+    for path, file in read.items():
+        kinds.setdefault((path.suffix, *(s.name for s in file.signals)), []).append((path, file))
+    return dict(sorted(kinds.items(), key=lambda kind: not _has_drive_angle(kind[1][0][1])))
+
+
+def _has_drive_angle(file: SignalFile) -> bool:
+    return any(g.column in DRIVE_ANGLES and g.sure for g in guess_file(file).guesses)
+
+
+def _roles(
+    kinds: Mapping[tuple, list], names: Mapping[Path, str]
+) -> tuple[dict[str, tuple], dict[str, str], list[str]]:
+    """Role of each kind of file, patterns of the further ones, and remarks."""
+    keys = list(kinds)
+    if len(keys) == 1:
+        return {MAIN: keys[0]}, {}, []
+    stems = [[PurePath(names[path]).name for path, _ in kinds[key]] for key in keys]
+    ends = [_shared_end(group, stems) for group in stems]
+    recordings = [{name[: len(name) - len(end)] for name in group} for group, end in zip(stems, ends, strict=True)]
+    if "" in recordings[0] or any(r != recordings[0] for r in recordings) or len(set(ends)) < len(ends):
+        others = ", ".join(names[kinds[key][0][0]] for key in keys[1:])
+        text = f"{others}: other signals than {names[kinds[keys[0]][0][0]]}, and the guess is of the latter only"
+        advice = "state by 'files' how they belong together, or import them apart"
+        return {MAIN: keys[0]}, {}, [f"{text}; {advice}"]
+    roles, patterns = {}, {}
+    for key, end in zip(keys, ends, strict=True):
+        role = re.sub(r"\W+", "-", PurePath(end).stem).strip("-_.") or PurePath(end).suffix.strip(".") or "file"
+        role = role if role != MAIN else "first"
+        roles[role], patterns[role] = key, f"*{end}"
+    return roles, patterns, []
+
+
+def _shared_end(group: Sequence[str], groups: Sequence[Sequence[str]]) -> str:
+    """End of the names of one kind of file: what follows the part that all kinds of a recording share."""
+    starts = [name for other in groups if other is not group for name in other]
+    rests = set()
+    for name in group:
+        shared = max((_shared_start(name, start) for start in starts), key=len, default="")
+        rests.add(name[len(shared) :])
+    return rests.pop() if len(rests) == 1 else ""
+
+
+def _shared_start(one: str, other: str) -> str:
+    """The longest common beginning of two names, up to the end of a word."""
+    length = next((i for i, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other)))
+    return one[:length].rstrip("-_. ")
+
+
+def map_text(guessed: Mapping[str, GuessedFile], patterns: Mapping[str, str], remarks: Sequence[str]) -> str:
+    """Text of the map.
+
+    Parameters
+    ----------
+    guessed : mapping of str to GuessedFile
+        Guesses by role of the file.
+    patterns : mapping of str to str
+        Patterns of the files of one recording; empty if a recording is one file.
+    remarks : sequence of str
+        Written as comments.
+
+    Returns
+    -------
+    str
+        YAML with comments.
+    """
+    several = len(guessed) > 1
+    lines = [_HEAD, *(f"# {remark}" for remark in remarks), "format: 1"]
+    if not several:
+        lines += _time_lines(next(iter(guessed.values())), "")
+    lines += ["channels:"]
+    unused = []
+    for role, one in guessed.items():
+        lines += [f"  {_channel_line(guess, role if several else None)}" for guess in one.guesses if guess.column]
+        unused += [guess for guess in one.guesses if not guess.column]
+    lines += [f"  # not used: {_quoted(guess.signal)} ({'; '.join(guess.why)})" for guess in unused]
+    if several:
+        lines += ["files:"]
+        for role, one in guessed.items():
+            lines += [f"  {role}:", f"    pattern: {json.dumps(patterns[role])}", *_time_lines(one, "    ")]
+            if role != next(iter(guessed)):
+                lines += ["    # clock: {match: [signal here, the same quantity in the first file]}"]
+    questions = dict.fromkeys(text for one in guessed.values() for text in one.open)
+    lines += ["", "# Not in these files:", *(f"# - {question}" for question in questions)]
+    return "\n".join(lines) + "\n"
+
+
+def _time_lines(one: GuessedFile, indent: str) -> list[str]:
+    if one.time is None:
+        line = "" if one.time_is_sure else f"{indent}# time: {{rate_Hz: }}   "
+        return [f"{line or indent}# {one.time_why}"]
+    sign = "" if one.time_is_sure else "# "
+    return [f"{indent}{sign}time: {time_text(one.time)}   # {one.time_why}"]
+
+
+def time_text(time: TimeSource) -> str:
+    """A time source as the map has it."""
+    return f"{{signal: {_quoted(time.signal)}, unit: {_quoted(time.unit)}}}"
+
+
+def _channel_line(guess: Guess, role: str | None) -> str:
+    parts = [f"signal: {_quoted(guess.signal)}"]
+    parts += [f"unit: {_quoted(guess.unit)}"] if guess.unit else []
+    parts += ["sign: -1"] if guess.sign < 0 else []
+    if guess.unit and not guess.sure and guess.needs_gain:
+        parts.append(f'gain: "? {UNIT_OF[guess.column]}/{guess.unit}"')
+    parts += [f"file: {role}"] if role else []
+    line = f"{'' if guess.sure else '# '}{guess.column}: {{{', '.join(parts)}}}"
+    return f"{line}   # {'; '.join(filter(None, guess.why))}"
+
+
+def _quoted(text: str) -> str:
+    """A text that YAML reads as this text, inside braces too."""
+    plain = _PLAIN.fullmatch(text) and text == text.strip() and text.lower() not in _NO_TEXT
+    return text if plain else json.dumps(text, ensure_ascii=False)

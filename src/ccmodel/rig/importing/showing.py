@@ -1,0 +1,120 @@
+"""What an import shows on the terminal."""
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from ccmodel.rig.importing.clocks import Cost
+from ccmodel.rig.importing.columns import UNIT_OF
+from ccmodel.rig.importing.draft import GuessedMap
+from ccmodel.rig.importing.guess import Guess
+from ccmodel.rig.importing.writing import BATCH, MAP, Written
+
+# Files that the next command names one by one.
+_FEW_FILES = 4
+
+
+def guess_tables(guessed: GuessedMap) -> list[RenderableType]:
+    """A table for each kind of file: column, signal, unit, reasons; then what stays open."""
+    shown: list[RenderableType] = []
+    for role, one in guessed.guessed.items():
+        table = Table(title=guessed.names[role], title_justify="left", box=None, pad_edge=False, title_style="bold")
+        for heading in ("column", "signal", "unit", "sure", "why"):
+            table.add_column(heading, overflow="fold")
+        if one.time is not None:
+            signal, unit = one.time.signal or "", one.time.unit or ""
+            table.add_row(*_cells("time_s", signal, unit, "yes" if one.time_is_sure else "no", one.time_why))
+        elif not one.time_is_sure:
+            table.add_row(*_cells("time_s", "", "", "no", one.time_why))
+        for guess in one.guesses:
+            table.add_row(*_guess_cells(guess))
+        shown += [table, Text()]
+    shown += [Text(remark) for remark in guessed.remarks]
+    questions = dict.fromkeys(text for one in guessed.guessed.values() for text in one.open)
+    return [*shown, Text("Not in these files:"), *(Text(f"  {question}") for question in questions)]
+
+
+def next_of_guess(guessed: GuessedMap, files: Sequence[Path], out: Path) -> str:
+    """What to do after a guess."""
+    unsure = sum(bool(g.column) and not g.sure for one in guessed.guessed.values() for g in one.guesses)
+    lines = f"; {unsure} of its lines are not sure and stand behind '# '" if unsure else ""
+    map_file = Path(out) / MAP
+    return f"wrote {map_file}{lines}. Correct it, then: {_command(files, out, map_file)}"
+
+
+def import_tables(written: Written) -> list[RenderableType]:
+    """A table of the recordings, one of the joined clocks, and what was assumed."""
+    table = Table("recording", "samples", "duration", "rate", "columns", box=None, pad_edge=False)
+    for id_, one in written.recordings.items():
+        time = one.table["time_s"]
+        rate = 1 / time.diff().median()
+        columns = ", ".join(c for c in one.table if c != "time_s")
+        table.add_row(*_cells(id_, str(len(time)), f"{time.iloc[-1]:.4g} s", f"{rate:.4g} Hz", columns))
+    shown: list[RenderableType] = [table]
+    costs = [(id_, cost) for id_, one in written.recordings.items() for cost in one.costs]
+    if costs:
+        shown += [Text(), _cost_table(costs)]
+    remarks = [(id_, remark) for id_, one in written.recordings.items() for remark in one.remarks]
+    shown += [Text(), *(Text(line) for line in _together(remarks)), *(Text(line) for line in written.remarks)]
+    return shown
+
+
+def next_of_import(written: Written, out: Path) -> str:
+    """What to do after an import."""
+    folder = shlex.quote(str(out))
+    filled = f"fill in {Path(out) / BATCH}, then: " if written.drafted else ""
+    count = len(written.recordings)
+    return f"wrote {count} recording{'s' if count > 1 else ''} to {out}. Next, {filled}ccmodel check {folder}"
+
+
+def _guess_cells(guess: Guess) -> list[Text]:
+    sign = "-" if guess.sign < 0 else ""
+    sure = "" if not guess.column else "yes" if guess.sure else "no"
+    why = "; ".join(filter(None, guess.why))
+    return _cells(guess.column or "not used", sign + guess.signal, guess.unit, sure, why)
+
+
+def _cost_table(costs: Sequence[tuple[str, Cost]]) -> Table:
+    headings = ("joined", "signal", "rate", "by", "error midway", "noise", "offset", "drift", "clock")
+    table = Table(*headings, box=None, pad_edge=False)
+    for id_, cost in costs:
+        unit = UNIT_OF[cost.column]
+        offset = f"{cost.offset_s:.6g} s" + _plus_minus(cost.offset_uncertainty_s, 1.0, "s")
+        drift = f"{1e6 * cost.drift:.3g} ppm" + _plus_minus(cost.drift_uncertainty, 1e6, "ppm")
+        error, noise = (_number(value, unit) for value in (cost.interpolation_error, cost.noise))
+        row = (f"{id_} {cost.column}", cost.signal, f"{cost.rate_Hz:.4g} Hz", cost.by, error, noise, offset, drift)
+        table.add_row(*_cells(*row, cost.how))
+    return table
+
+
+def _plus_minus(uncertainty: float | None, scale: float, unit: str) -> str:
+    if uncertainty is None:
+        return " ± unknown"
+    return f" ± {scale * uncertainty:.2g} {unit}" if uncertainty else ""
+
+
+def _number(value: float | None, unit: str) -> str:
+    return "" if value is None else f"{value:.3g} {unit}"
+
+
+def _together(remarks: Sequence[tuple[str, str]]) -> list[str]:
+    """Remarks, those on several recordings once."""
+    by_text: dict[str, list[str]] = {}
+    for id_, text in remarks:
+        file, colon, rest = text.partition(": ")
+        by_text.setdefault(rest if colon else text, []).append(file if colon else id_)
+    return [f"{who[0]}{f' and {len(who) - 1} more' if len(who) > 1 else ''}: {text}" for text, who in by_text.items()]
+
+
+def _command(files: Sequence[Path], out: Path, map_file: Path) -> str:
+    named = " ".join(shlex.quote(str(f)) for f in files) if len(files) <= _FEW_FILES else "FILES (as before)"
+    return f"ccmodel import {named} --map {shlex.quote(str(map_file))} --out {shlex.quote(str(out))}"
+
+
+def _cells(*texts: str) -> list[Text]:
+    """Cells as they are: a name in brackets is no markup."""
+    return [Text(text) for text in texts]

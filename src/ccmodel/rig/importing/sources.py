@@ -1,0 +1,123 @@
+"""Which of the given files make up which recording."""
+
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+
+from ccmodel.rig.importing.map import ImportMap
+from ccmodel.typed import InputError
+
+MAIN = "main"
+# Endings that a compressed file has twice.
+_COMPRESSED = (".gz",)
+
+
+@dataclass(frozen=True)
+class Source:
+    """The files of a recording.
+
+    Attributes
+    ----------
+    id : str
+        The recording.
+    files : dict of str to Path
+        Its files by role ("main" or a key of the map's `files`). The first has the clock of the log.
+    """
+
+    id: str
+    files: dict[str, Path]
+
+
+def names_of(files: Sequence[Path]) -> dict[Path, str]:
+    """Names of files for people and for provenance: their paths below the folder that they share."""
+    resolved = {file: Path(os.path.abspath(file)) for file in files}
+    shared = os.path.commonpath([path.parent for path in resolved.values()])
+    return {file: path.relative_to(shared).as_posix() for file, path in resolved.items()}
+
+
+def safe_id(name: str) -> str:
+    """A valid id of a recording, from the name of a file."""
+    bare = PurePath(name)
+    stem = bare.with_suffix("") if bare.suffix in _COMPRESSED else bare
+    return re.sub(r"[^\w.+=,@-]+", "-", str(stem.with_suffix(""))).strip("-.") or "recording"
+
+
+def recordings_of(files: Sequence[Path], stated: ImportMap) -> tuple[list[Source], list[str]]:
+    """Sort files into recordings.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        The files given.
+    stated : ImportMap
+        Its `recordings`, or else its `files`, say which belong together.
+
+    Returns
+    -------
+    recordings : list of Source
+        In the order of the map, or else of the files.
+    remarks : list of str
+        Files that are left out.
+
+    Raises
+    ------
+    InputError
+        If a file that a recording needs was not given, or two files have the same place in a recording.
+    """
+    if not files:
+        raise InputError("no file to import: give the rig's logs")
+    names = names_of(list(dict.fromkeys(files)))
+    return _as_listed(names, stated) if stated.recordings else (_by_name(names, stated), [])
+
+
+def _as_listed(names: dict[Path, str], stated: ImportMap) -> tuple[list[Source], list[str]]:
+    sources, used = [], set()
+    for entry in stated.recordings:
+        found = [_given(listed, names, entry.id) for listed in entry.files]
+        used |= set(found)
+        sources.append(Source(entry.id, _by_role(found, stated, entry.id)))
+    left = [name for file, name in names.items() if file not in used]
+    return sources, [f"{name}: left out, no recording of the map has it" for name in left]
+
+
+def _given(listed: str, names: dict[Path, str], recording: str) -> Path:
+    wanted = PurePath(listed).parts
+    fitting = [file for file, name in names.items() if PurePath(name).parts[-len(wanted) :] == wanted]
+    if len(fitting) == 1:
+        return fitting[0]
+    if fitting:
+        raise InputError(f"recording '{recording}': {len(fitting)} files are called '{listed}': add their folder")
+    raise InputError(f"recording '{recording}': '{listed}' is not among the files given: give it too")
+
+
+def _by_name(names: dict[Path, str], stated: ImportMap) -> list[Source]:
+    """A recording for each main file; the further files are those whose star stands for the same name."""
+    groups: dict[str, list[Path]] = {}
+    for file, name in names.items():
+        groups.setdefault(_recording_of(name, stated) or safe_id(name), []).append(file)
+    return [Source(safe_id(id_), _by_role(found, stated, id_)) for id_, found in groups.items()]
+
+
+def _recording_of(name: str, stated: ImportMap) -> str | None:
+    parts = (rule.recording_of(PurePath(name).name) for rule in stated.files.values())
+    part = next((part for part in parts if part), None)
+    return part and safe_id(str(PurePath(name).with_name(part + ".log")))
+
+
+def _by_role(found: list[Path], stated: ImportMap, recording: str) -> dict[str, Path]:
+    roles: dict[str, Path] = {}
+    for file in found:
+        role = next((r for r, rule in stated.files.items() if rule.recording_of(file.name)), MAIN)
+        if role in roles:
+            both = f"{roles[role].name} and {file.name} would both be its '{role}' file"
+            advice = "state in the map by 'files' which is which, or by 'recordings' that they are two recordings"
+            raise InputError(f"recording '{recording}': {both}: {advice}")
+        roles[role] = file
+    missing = [role for role in stated.files if role not in roles]
+    if missing:
+        pattern = stated.files[missing[0]].pattern.replace("*", recording)
+        raise InputError(f"recording '{recording}': there is no {pattern} ('{missing[0]}'): give that file too")
+    order = [role for role in (MAIN, *stated.files) if role in roles]
+    return {role: roles[role] for role in order}

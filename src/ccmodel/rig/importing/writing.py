@@ -1,0 +1,219 @@
+"""The result of an import: a folder with a log for each recording, the map, and where all of it is from."""
+
+import hashlib
+import json
+import shutil
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+import ccmodel
+from ccmodel.rig.batch import NAMES, valid_name
+from ccmodel.rig.drafting import draft_batch
+from ccmodel.rig.importing.columns import TIME
+from ccmodel.rig.importing.map import ImportMap, load_map
+from ccmodel.rig.importing.recording import Built, FileError, build
+from ccmodel.rig.importing.replacing import replacing
+from ccmodel.rig.importing.sources import Source, names_of, recordings_of
+from ccmodel.typed import InputError, Problem
+
+MAP, PROVENANCE, BATCH = "map.yaml", "import.json", "batch.yaml"
+FORMAT = 1
+# Libraries whose versions can change what is read. Those that are not installed are left out.
+LIBRARIES = ("numpy", "pandas", "scipy", "pint", "asammdf", "npTDMS", "h5py", "pyarrow", "rosbags")
+# Significant digits of a value: more than any converter or encoder has.
+_DIGITS = 12
+
+
+@dataclass(frozen=True)
+class Written:
+    """Result of an import.
+
+    Attributes
+    ----------
+    folder : Path
+        The folder that was written.
+    recordings : dict of str to Built
+        Logs by id of the recording.
+    remarks : list of str
+        Files that were left out.
+    drafted : bool
+        Whether a `batch.yaml` was drafted.
+    """
+
+    folder: Path
+    recordings: dict[str, Built]
+    remarks: list[str] = field(default_factory=list)
+    drafted: bool = False
+
+
+def import_files(files: Sequence[Path], map_file: Path, out: Path) -> Written:
+    """Write the logs of recordings in any format to a batch folder.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        The files as the rig wrote them; they are only read.
+    map_file : Path
+        What each column is made of.
+    out : Path
+        Folder of the batch. The result of an earlier import is replaced as a whole, and only if this import succeeds; a
+        `batch.yaml` in it stays.
+
+    Returns
+    -------
+    Written
+        The logs and what was assumed.
+
+    Raises
+    ------
+    InputError
+        If the map or a file cannot be used (a line for each), or `out` holds anything but an import.
+    """
+    out = Path(out).resolve()
+    check_folder(out)
+    map_content = _content(map_file)
+    stated = load_map(map_file)
+    sources, remarks = recordings_of([Path(f) for f in files], stated)
+    names = names_of([file for source in sources for file in source.files.values()])
+    built = _build_all(sources, stated, names)
+    with replacing(out) as fresh:
+        fresh.mkdir()
+        for id_, one in built.items():
+            _write_log(fresh / f"{id_}.csv.gz", one.table)
+        (fresh / MAP).write_bytes(map_content)
+        text = json.dumps(_provenance(fresh, sources, built, names, remarks), indent=1, ensure_ascii=False)
+        (fresh / PROVENANCE).write_text(text + "\n", encoding="utf-8")
+        if (out / BATCH).exists():
+            shutil.copy2(out / BATCH, fresh / BATCH)
+    return Written(out, built, remarks, _draft(out))
+
+
+def check_folder(out: Path) -> None:
+    """Check that a folder may take an import.
+
+    Raises
+    ------
+    InputError
+        If its name is no batch's, or it holds files that no import wrote.
+    """
+    if not valid_name(out.name):
+        raise InputError(f"{out}: its name becomes the batch's, and {NAMES}: choose another folder")
+    if not out.exists():
+        return
+    if not out.is_dir():
+        raise InputError(f"{out}: is no folder; give a new or empty one")
+    own = {MAP, BATCH, PROVENANCE, ".DS_Store", *_files_of_import(out)}
+    if foreign := sorted(entry.name for entry in out.iterdir() if entry.name not in own):
+        raise InputError(f"{out}: would be replaced, but {foreign[0]} is from no import; give a new or empty folder")
+
+
+def _files_of_import(folder: Path) -> list[str]:
+    """Names of the logs that an earlier import wrote to a folder."""
+    try:
+        earlier = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
+        return [recording["file"] for recording in earlier["recordings"]]
+    except FileNotFoundError:
+        return []
+    except (OSError, ValueError, KeyError, TypeError):
+        raise InputError(f"{folder / PROVENANCE}: is not an import's; give a new or empty folder") from None
+
+
+def _content(file: Path) -> bytes:
+    try:
+        return Path(file).read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{file}: there is no such map; leave --map out and one is written to begin with") from None
+    except OSError as error:
+        raise InputError(f"{file}: the map cannot be read ({error.strerror})") from None
+
+
+def _build_all(sources: Sequence[Source], stated: ImportMap, names: dict[Path, str]) -> dict[str, Built]:
+    built, problems = {}, []
+    for source in sources:
+        try:
+            built[source.id] = build(source, stated, names)
+        except FileError as error:
+            problems.append(Problem(error.file, None, _one_line(error)))
+    if problems:
+        raise InputError.of(*dict.fromkeys(problems))
+    return built
+
+
+def _one_line(error: FileError) -> str:
+    row, column, text = error.args
+    place = [f"line {row}" if row is not None else None, column]
+    return ", ".join(p for p in place if p) + (": " if any(place) else "") + text
+
+
+def _write_log(path: Path, table: pd.DataFrame) -> None:
+    """Write a log; equal tables give equal bytes, since the stream has no time stamp."""
+    text = pd.DataFrame({name: _cells(values.to_numpy(), name) for name, values in table.items()})
+    compression = {"method": "gzip", "compresslevel": 9, "mtime": 0}
+    text.to_csv(path, index=False, compression=compression, lineterminator="\n")
+
+
+def _cells(values: np.ndarray, name: str) -> np.ndarray:
+    """Cells of a column: the shortest text of a number rounded to more digits than a sensor has."""
+    if name == TIME:
+        return np.array([f"{value:.9f}".rstrip("0").rstrip(".") for value in values], dtype=object)
+    return np.array(["" if np.isnan(v) else f"{v:.{_DIGITS}g}" for v in values], dtype=object)
+
+
+def _provenance(
+    folder: Path, sources: Sequence[Source], built: dict[str, Built], names: dict[Path, str], remarks: list[str]
+) -> dict:
+    return {
+        "format": FORMAT,
+        "ccmodel_version": ccmodel.__version__,
+        "libraries": {name: found for name in LIBRARIES if (found := _version(name))},
+        "map": {"file": MAP, "sha256": _sha256(folder / MAP)},
+        "remarks": remarks,
+        "recordings": [_recorded(folder, source, built[source.id], names) for source in sources],
+    }
+
+
+def _recorded(folder: Path, source: Source, one: Built, names: dict[Path, str]) -> dict:
+    file = f"{source.id}.csv.gz"
+    return {
+        "id": source.id,
+        "file": file,
+        "sha256": _sha256(folder / file),
+        "samples": len(one.table),
+        "started_s": one.started_s,
+        "sources": [
+            {"role": role, "file": names[path], "sha256": _sha256(path), "bytes": path.stat().st_size}
+            for role, path in source.files.items()
+        ],
+        "columns": one.formulas,
+        "cut_s": list(one.cut_s),
+        "joined": [asdict(cost) for cost in one.costs],
+        "remarks": one.remarks,
+    }
+
+
+def _version(library: str) -> str | None:
+    try:
+        return version(library)
+    except PackageNotFoundError:
+        return None
+
+
+def _sha256(path: Path) -> str:
+    """Digest of a file; of a folder (a ROS 2 bag), of its files' names and digests."""
+    if path.is_dir():
+        inner = [f"{f.relative_to(path).as_posix()} {_sha256(f)}" for f in sorted(path.rglob("*")) if f.is_file()]
+        return hashlib.sha256("\n".join(inner).encode()).hexdigest()
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _draft(folder: Path) -> bool:
+    """Draft a `batch.yaml` where there is none."""
+    if (folder / BATCH).exists():
+        return False
+    draft_batch(folder)
+    return True

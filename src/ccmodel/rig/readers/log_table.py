@@ -1,0 +1,47 @@
+"""The table of a log whose signals already carry the names of the format's columns."""
+
+import numpy as np
+import pandas as pd
+
+from ccmodel.rig.findings import LogError
+from ccmodel.rig.readers.contract import SignalFile
+
+TIME = "time_s"
+
+
+def log_of_signals(file: SignalFile, format: str) -> pd.DataFrame:
+    """Signals over one time base as the table of a log.
+
+    Parameters
+    ----------
+    file : SignalFile
+        Signals of the same length. Time is the signal `time_s`, or the time axis that all of them share.
+    format : str
+        Name of the format, for messages.
+
+    Returns
+    -------
+    DataFrame
+        A column a signal, named as the signal without its group; the index counts the samples from 1.
+
+    Raises
+    ------
+    LogError
+        If the signals have no common time.
+    """
+    names = [s.name.rpartition("/")[2] for s in file.signals]
+    lengths = {len(s.values) for s in file.signals}
+    importing = "bring it to the format of a batch with 'ccmodel import'"
+    if len(lengths) > 1:
+        text = f"the signals of the {format} have different lengths ({min(lengths)} to {max(lengths)} samples)"
+        raise LogError(None, None, f"{text}: {importing}")
+    columns = [s.values for s in file.signals]
+    if TIME not in names:
+        axes = [s.time_s for s in file.signals]
+        if axes[0] is None or any(a is None or not np.array_equal(a, axes[0]) for a in axes):
+            text = f"the signals of the {format} have no common time axis and none is named {TIME}"
+            raise LogError(None, TIME, f"{text}: {importing}")
+        names, columns = [TIME, *names], [axes[0], *columns]
+    index = np.arange(1, len(columns[0]) + 1)
+    # By position: a log with a name twice is refused by the checks of the columns.
+    return pd.DataFrame(dict(enumerate(columns)), index=index).set_axis(names, axis=1)

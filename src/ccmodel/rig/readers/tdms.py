@@ -1,0 +1,62 @@
+"""TDMS, the format of LabVIEW: groups of channels, each with its properties."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ccmodel.rig.findings import LogError
+from ccmodel.rig.readers.columns import Columns
+from ccmodel.rig.readers.contract import Format, SignalFile
+from ccmodel.rig.readers.stamps import seconds_of_times
+
+_UNIT_KEYS = ("unit_string", "NI_UnitDescription", "Unit", "unit", "Units", "units")
+
+
+def read(path: Path) -> SignalFile:
+    """Read a TDMS file; a channel with a waveform's start and step has its own time axis."""
+    from nptdms import TdmsFile
+
+    columns, starts = Columns(), {}
+    with TdmsFile.open(path) as file:
+        if file.file_status.incomplete_final_segment:
+            text = "the TDMS file is cut short: its last segment is incomplete; copy it again from the recorder"
+            raise LogError(None, None, text)
+        channels = [channel for group in file.groups() for channel in group.channels()]
+        for channel in channels:
+            _add(columns, channel, starts)
+    if not starts:
+        return SignalFile(tuple(columns.signals), None, columns.remarks())
+    return SignalFile(*_from_the_first(columns.signals, starts), columns.remarks())
+
+
+FORMAT = Format("TDMS file", (".tdms",), read, extra="tdms")
+
+
+def _add(columns: Columns, channel, starts: dict) -> None:
+    name, properties = f"{channel.group_name}/{channel.name}", channel.properties
+    unit = next((str(properties[k]) for k in _UNIT_KEYS if properties.get(k)), "")
+    values = channel[:]
+    if values.dtype.kind == "M":
+        seconds, start = seconds_of_times(values.astype("datetime64[ns]"))
+        columns.add(name, "s", seconds)
+        return
+    step = properties.get("wf_increment", 0)
+    time = None
+    if isinstance(step, int | float) and np.isfinite(step) and step > 0:
+        time = float(properties.get("wf_start_offset", 0.0)) + float(step) * np.arange(len(values))
+        start = properties.get("wf_start_time")
+        if isinstance(start, np.datetime64) and not np.isnat(start):
+            starts[name] = start
+    columns.add(name, unit, values, time)
+
+
+def _from_the_first(signals, starts):
+    """Signals with their times from the earliest start of a waveform, and that start."""
+    first = min(starts.values())
+    zero = seconds_of_times(np.array([first]).astype("datetime64[ns]"))[1]
+    late = {name: (start - first) / np.timedelta64(1, "s") for name, start in starts.items()}
+    moved = (
+        type(s)(s.name, s.unit, s.values, s.time_s + late[s.name]) if late.get(s.name) and s.time_s is not None else s
+        for s in signals
+    )
+    return tuple(moved), zero

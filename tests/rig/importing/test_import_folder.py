@@ -1,0 +1,254 @@
+"""What an import writes, and what it never touches."""
+
+import gzip
+import hashlib
+import json
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pytest
+from made_up_lab import counts, recording, write_text
+
+from ccmodel.rig import readers
+from ccmodel.rig.importing import import_files
+from ccmodel.rig.log import read_log
+from ccmodel.typed import InputError
+
+MAP = """\
+# the lab's own comment
+format: 1
+time: {signal: t, unit: s}
+channels:
+  drive_encoder_counts: {signal: enc, unit: count}
+  F_drive_N: {signal: F, unit: N}
+"""
+
+
+class Lab:
+    """A folder of two recordings, a map and the folder of the batch."""
+
+    def __init__(self, root):
+        self.root, self.map, self.batch = root, root / "map.yaml", root / "batch-1"
+        self.map.write_text(MAP)
+        self.files = [self.log("one", 1), self.log("two", 2)]
+
+    def log(self, name, seed):
+        r = recording(seed)
+        columns = {"t": r["time_s"], "enc": counts(r["theta_in_rad"]), "F": r["F_drive_N"]}
+        return write_text(self.root / "lab" / f"{name}.csv", columns)
+
+    def run(self, files=None, batch=None):
+        return import_files(files or self.files, self.map, batch or self.batch)
+
+    def provenance(self):
+        return json.loads((self.batch / "import.json").read_text())
+
+
+@pytest.fixture
+def lab(tmp_path):
+    return Lab(tmp_path)
+
+
+def sha256(path):
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def test_a_folder_with_logs_map_and_provenance(lab):
+    lab.run()
+    names = {entry.name for entry in lab.batch.iterdir()} - {"batch.yaml"}
+    assert names == {"one.csv.gz", "two.csv.gz", "map.yaml", "import.json"}
+    assert (lab.batch / "map.yaml").read_text() == MAP
+    stated = lab.provenance()
+    assert stated["map"]["sha256"] == sha256(lab.map)
+    assert stated["libraries"]["pint"]
+    one = stated["recordings"][0]
+    assert one["sources"] == [
+        {"role": "main", "file": "one.csv", "sha256": sha256(lab.files[0]), "bytes": lab.files[0].stat().st_size}
+    ]
+    assert one["sha256"] == sha256(lab.batch / "one.csv.gz")
+    assert str(lab.root) not in (lab.batch / "import.json").read_text()
+    table, _ = read_log(lab.batch / "one.csv.gz")
+    assert (table["drive_encoder_counts"] % 1 == 0).all()
+    assert b"." not in gzip.decompress((lab.batch / "one.csv.gz").read_bytes()).splitlines()[1].split(b",")[1]
+
+
+def test_the_same_files_give_the_same_bytes(lab):
+    lab.run()
+    first = {entry.name: entry.read_bytes() for entry in lab.batch.iterdir()}
+    lab.run()
+    other = lab.root / "elsewhere" / "batch-1"
+    lab.run(batch=other)
+    for name, content in first.items():
+        assert (lab.batch / name).read_bytes() == content
+        assert (other / name).read_bytes() == content
+
+
+def test_a_repeated_import_replaces_its_own_and_keeps_batch_yaml(lab):
+    lab.run()
+    (lab.batch / "batch.yaml").write_text("mine: true\n")
+    lab.run(lab.files[:1])
+    assert {e.name for e in lab.batch.iterdir()} == {"one.csv.gz", "map.yaml", "import.json", "batch.yaml"}
+    assert (lab.batch / "batch.yaml").read_text() == "mine: true\n"
+
+
+def test_a_failed_import_leaves_all_as_it_was(lab):
+    lab.run()
+    before = {entry.name: entry.read_bytes() for entry in lab.batch.iterdir()}
+    lab.files[0].write_bytes(b"")
+    lab.files[1].write_bytes(b"\x00\x01\x02 nothing")
+    with pytest.raises(InputError) as caught:
+        lab.run()
+    lines = str(caught.value).splitlines()
+    assert [line.partition(":")[0] for line in lines] == ["one.csv", "two.csv"]
+    assert {entry.name: entry.read_bytes() for entry in lab.batch.iterdir()} == before
+    assert {entry.name for entry in lab.root.iterdir()} == {"lab", "map.yaml", "batch-1"}
+
+
+def test_what_is_no_import_is_never_replaced(lab):
+    lab.batch.mkdir()
+    (lab.batch / "thesis.txt").write_text("years of work")
+    with pytest.raises(InputError, match="would be replaced, but thesis.txt is from no import"):
+        lab.run()
+    with pytest.raises(InputError, match="would be replaced, but one.csv is from no import"):
+        lab.run(batch=lab.root / "lab")
+    (lab.batch / "thesis.txt").rename(lab.batch / "import.json")
+    with pytest.raises(InputError, match="import.json: is not an import's"):
+        lab.run()
+    assert (lab.batch / "import.json").read_text() == "years of work"
+    with pytest.raises(InputError, match="its name becomes the batch's"):
+        lab.run(batch=lab.root / "a batch")
+
+
+def test_files_of_one_name_from_two_folders(lab):
+    for day, file in enumerate(lab.files):
+        (lab.root / f"day{day}").mkdir()
+        file.rename(lab.root / f"day{day}/run.csv")
+    lab.run([lab.root / "day0/run.csv", lab.root / "day1/run.csv"])
+    assert {r["id"]: r["sources"][0]["file"] for r in lab.provenance()["recordings"]} == {
+        "day0-run": "day0/run.csv",
+        "day1-run": "day1/run.csv",
+    }
+
+
+def test_listed_recordings_have_the_ids_of_the_map(lab):
+    lab.map.write_text(MAP + "recordings:\n- {id: sine-slow, files: [two.csv]}\n")
+    written = lab.run()
+    assert list(written.recordings) == ["sine-slow"]
+    assert written.remarks == ["one.csv: left out, no recording of the map has it"]
+    lab.map.write_text(MAP + "recordings:\n- {id: sine-slow, files: [three.csv]}\n")
+    with pytest.raises(InputError, match="recording 'sine-slow': 'three.csv' is not among the files given"):
+        lab.run()
+
+
+SEVERAL = """\
+format: 1
+time: {signal: t, unit: s}
+channels:
+  theta_in_rad: {signal: q, unit: rad, file: main}
+  theta_out_rad: {signal: q, unit: rad, file: load}
+  T4_N: {signal: enc, unit: N}
+  F_load_N: {signal: F, unit: N, delay_s: 0.004}
+files:
+  load:
+    pattern: "*_load.csv"
+    time: {signal: ms, unit: ms}
+    CLOCK
+"""
+
+
+def several(root, offset=0.0, drift=0.0):
+    """A recording in two files: the load's clock is t_first = offset + (1 + drift) t."""
+    r = recording(3)
+    first = write_text(root / "lab/run1.csv", {"t": r["time_s"], "q": r["theta_in_rad"], "F": 0 * r["time_s"]})
+    at = np.arange(0.2, 5.5, 0.004)
+    real = {name: np.interp(at, r["time_s"], values) for name, values in r.items()}
+    delayed = np.interp(at - 0.004, r["time_s"], r["theta_out_rad"])
+    columns = {
+        "ms": 1e3 * (at - offset) / (1 + drift),
+        "q": real["theta_out_rad"],
+        "again": 100 * real["theta_in_rad"],
+        "enc": counts(real["theta_out_rad"]),
+        "G": 6 + delayed,
+    }
+    return r, [first, write_text(root / "lab/run1_load.csv", columns)]
+
+
+def import_several(root, clock, offset=0.0, drift=0.0):
+    r, files = several(root, offset, drift)
+    text = SEVERAL.replace("CLOCK", f"clock: {clock}" if clock else "").replace("signal: F,", "signal: G,")
+    (root / "map.yaml").write_text(text)
+    return r, import_files(files, root / "map.yaml", root / "batch")
+
+
+def test_two_files_of_one_recording_with_a_stated_clock(tmp_path):
+    r, written = import_several(tmp_path, "{offset_s: -12.5, drift: 1.0e-4}", -12.5, 1e-4)
+    assert list(written.recordings) == ["run1"]
+    table = written.recordings["run1"].table
+    at = table["time_s"] + 0.2
+    expected = np.interp(at, r["time_s"], r["theta_out_rad"])
+    assert table["theta_out_rad"].to_numpy() == pytest.approx(expected, abs=2e-3)
+    assert table["F_load_N"].to_numpy() == pytest.approx(6 + expected, abs=2e-3)
+    cost = json.loads((tmp_path / "batch/import.json").read_text())["recordings"][0]["joined"]
+    assert [c["column"] for c in cost] == ["theta_out_rad", "T4_N", "F_load_N"]
+    assert {c["how"] for c in cost} == {"stated in the map"}
+    assert cost[2]["delay_s"] == 0.004
+
+
+def test_two_files_whose_clocks_are_matched(tmp_path):
+    _, written = import_several(tmp_path, "{match: [again, q]}", -12.5, 1e-4)
+    cost = written.recordings["run1"].costs[0]
+    assert cost.drift == pytest.approx(1e-4, abs=1.5 * cost.drift_uncertainty + 1e-6)
+    middle = 15.5
+    assert cost.offset_s + (1 + cost.drift) * middle == pytest.approx(
+        -12.5 + (1 + 1e-4) * middle, abs=1.5 * cost.offset_uncertainty_s + 1e-5
+    )
+
+
+def test_two_files_without_a_common_clock_are_taken_to_start_together(tmp_path):
+    _, written = import_several(tmp_path, "", -12.5)
+    one = written.recordings["run1"]
+    assert "run1_load.csv and run1.csv are taken to start together: state 'clock' in the map if not" in one.remarks
+    assert one.costs[0].offset_s == pytest.approx(-12.7)
+    assert one.costs[0].offset_uncertainty_s is None
+
+
+def test_absolute_start_times_align_files(tmp_path, monkeypatch):
+    """Files that store times and their absolute start need no clock."""
+    r, files = several(tmp_path)
+    text = SEVERAL.replace("signal: F,", "signal: G,").replace("time: {signal: t, unit: s}\n", "")
+    text = text.replace("    time: {signal: ms, unit: ms}\n    CLOCK\n", "")
+    (tmp_path / "map.yaml").write_text(text)
+    start = datetime(2024, 5, 1, 12, 0, 0, 1000, UTC)
+    read = readers.read_signals
+
+    def with_times(path, layout=None):
+        file = read(path, layout)
+        late = timedelta(seconds=0.2) if "load" in path.name else timedelta(0)
+        time = file.signals[0].values * (1e-3 if late else 1) - late.total_seconds()
+        signals = tuple(replace(signal, time_s=time) for signal in file.signals)
+        return replace(file, signals=signals, started=start + late)
+
+    monkeypatch.setattr(readers, "read_signals", with_times)
+    written = import_files(files, tmp_path / "map.yaml", tmp_path / "batch")
+    cost = written.recordings["run1"].costs[0]
+    assert (cost.offset_s, cost.offset_uncertainty_s) == (0.2, 1e-3)
+    assert cost.how == "absolute start times of both files"
+    table = written.recordings["run1"].table
+    expected = np.interp(table["time_s"] + 0.2, r["time_s"], r["theta_out_rad"])
+    assert table["theta_out_rad"].to_numpy() == pytest.approx(expected, abs=2e-3)
+
+
+def test_a_signal_that_two_files_have_needs_its_file(tmp_path):
+    _, files = several(tmp_path)
+    text = SEVERAL.replace("    CLOCK\n", "").replace(", file: main", "")
+    (tmp_path / "map.yaml").write_text(text)
+    with pytest.raises(InputError, match="run1.csv: 'q' is also in run1_load.csv: state the channel's 'file'"):
+        import_files(files, tmp_path / "map.yaml", tmp_path / "batch")
+
+
+def test_a_missing_further_file_is_named(tmp_path):
+    _, files = several(tmp_path)
+    (tmp_path / "map.yaml").write_text(SEVERAL.replace("    CLOCK\n", ""))
+    with pytest.raises(InputError, match=r"recording 'run1': there is no run1_load.csv \('load'\): give that file too"):
+        import_files(files[:1], tmp_path / "map.yaml", tmp_path / "batch")

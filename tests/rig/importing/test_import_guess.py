@@ -1,0 +1,267 @@
+"""The guess on the headers of labs, all made up."""
+
+import numpy as np
+import pytest
+from made_up_lab import counts, recording, write_text
+
+from ccmodel.rig.importing import import_files, write_guess
+from ccmodel.rig.importing.map import load_map
+from ccmodel.typed import InputError
+
+R = recording()
+T, DEG, KT = R["time_s"], 180 / np.pi, 0.0234
+
+
+def guess(tmp_path, columns, **layout):
+    """Lines of the guess that are sure (sign and signal by column), and those that are not."""
+    write_text(tmp_path / "lab/run.csv", columns, **layout)
+    guessed = write_guess([tmp_path / "lab/run.csv"], tmp_path / "batch").guessed["main"]
+    sure = {g.column: (g.sign * 1, g.signal, g.unit) for g in guessed.guesses if g.column and g.sure}
+    open_ = {g.column: (g.sign, g.signal, g.unit) for g in guessed.guesses if g.column and not g.sure}
+    return guessed, sure, open_
+
+
+def imported(tmp_path):
+    return import_files([tmp_path / "lab/run.csv"], tmp_path / "batch/map.yaml", tmp_path / "batch").recordings["run"]
+
+
+def test_a_german_lab(tmp_path):
+    columns = {
+        "Zeit [ms]": 1e3 * T,
+        "Antriebswinkel [°]": DEG * R["theta_in_rad"],
+        "Abtriebswinkel [°]": -DEG * R["theta_out_rad"],
+        "Antriebsmoment [mNm]": -1e3 * R["tau_in_Nm"],
+        "Abtriebsmoment [mNm]": 1e3 * R["tau_out_Nm"],
+        "Kraftsumme Antrieb [N]": R["F_drive_N"],
+        "Sollwinkel [°]": DEG * R["theta_in_rad"],
+    }
+    layout = {"separator": ";", "decimal": ",", "encoding": "cp1252", "head": ["Prüfstand 3", "Datum: 1.2.2024"]}
+    guessed, sure, open_ = guess(tmp_path, columns, **layout)
+    assert (guessed.time.signal, guessed.time.unit, guessed.time_is_sure) == ("Zeit", "ms", True)
+    assert sure == {
+        "theta_in_rad": (1, "Antriebswinkel", "°"),
+        "theta_out_rad": (-1, "Abtriebswinkel", "°"),
+        "tau_in_Nm": (-1, "Antriebsmoment", "mNm"),
+        "tau_out_Nm": (1, "Abtriebsmoment", "mNm"),
+        "F_drive_N": (1, "Kraftsumme Antrieb", "N"),
+    }
+    assert open_ == {}
+    table = imported(tmp_path).table
+    for column in sure:
+        assert table[column].to_numpy() == pytest.approx(R[column], abs=1e-9), column
+
+
+def test_an_english_lab_of_encoders_currents_and_load_cells(tmp_path):
+    columns = {
+        "timestamp_us": 1e6 * T,
+        "enc_motor": counts(R["theta_in_rad"]),
+        "enc_load": counts(R["theta_out_rad"]),
+        "motor_current_A": R["tau_in_Nm"] / KT,
+        "loadcell_prox_V": 0.1 * R["F_drive_N"] + 0.25,
+        "loadcell_dist_V": 0.1 * R["F_load_N"] + 0.25,
+        "motor_pos_cmd": R["theta_in_rad"],
+    }
+    guessed, sure, open_ = guess(tmp_path, columns, separator="\t")
+    assert guessed.time.unit == "us"
+    assert sure == {
+        "drive_encoder_counts": (1, "enc_motor", "count"),
+        "load_encoder_counts": (1, "enc_load", "count"),
+        "drive_current_A": (1, "motor_current_A", "A"),
+        "drive_load_cell_V": (1, "loadcell_prox_V", "V"),
+        "load_load_cell_V": (1, "loadcell_dist_V", "V"),
+    }
+    assert open_ == {}
+    said = " ".join(guessed.open)
+    assert "torque constant of the drive motor" in said
+    assert "sensitivity and zero of the load load cell" in said
+    assert "stiffness of the load's spring" in said
+
+
+def test_a_lab_with_the_papers_tensions(tmp_path):
+    columns = {
+        "Time (s)": T,
+        "Input Angle (deg)": DEG * R["theta_in_rad"],
+        "Output Angle (deg)": DEG * R["theta_out_rad"],
+        **{f"T{n} (N)": R[f"T{n}_N"] for n in (1, 2, 3, 4)},
+    }
+    _, sure, _ = guess(tmp_path, columns)
+    assert {c: s[1] for c, s in sure.items() if c.startswith("T")} == {f"T{n}_N": f"T{n}" for n in (1, 2, 3, 4)}
+
+
+def test_tensions_that_are_numbered_otherwise_are_not_sure(tmp_path):
+    columns = {
+        "Time (s)": T,
+        "Input Angle (deg)": DEG * R["theta_in_rad"],
+        **{f"T{n} (N)": R[f"T{m}_N"] for n, m in ((1, 1), (2, 3), (3, 2), (4, 4))},
+    }
+    guessed, sure, open_ = guess(tmp_path, columns)
+    assert set(sure) == {"theta_in_rad"}
+    assert set(open_) == {"T1_N", "T2_N", "T3_N", "T4_N"}
+    assert any("tension 1 moves like 3, and not like 2" in " ".join(g.why) for g in guessed.guesses)
+
+
+def test_a_lab_without_units_is_left_to_the_person(tmp_path):
+    columns = {"t": T, "q_m": R["theta_in_rad"], "q_l": R["theta_out_rad"], "tau_m": R["tau_in_Nm"]}
+    guessed, sure, open_ = guess(tmp_path, columns)
+    assert sure == {}
+    assert (guessed.time.signal, guessed.time.unit, guessed.time_is_sure) == ("t", "s", True)
+    assert "500 Hz in s" in guessed.time_why
+    assert {column: signal for column, (_, signal, _) in open_.items()} == {
+        "theta_in_rad": "q_m",
+        "theta_out_rad": "q_l",
+        "tau_in_Nm": "tau_m",
+    }
+    with pytest.raises(InputError, match="the drive angle is missing"):
+        imported(tmp_path)
+    text = (tmp_path / "batch/map.yaml").read_text()
+    (tmp_path / "batch/map.yaml").write_text(text.replace("\n  # ", "\n  "))
+    assert imported(tmp_path).table["theta_in_rad"].to_numpy() == pytest.approx(R["theta_in_rad"])
+
+
+def test_a_lab_that_numbers_its_sensors(tmp_path):
+    """The ends are seen by the lag only, so that nothing is sure."""
+    columns = {
+        "Time [s]": T,
+        "Encoder1 [counts]": counts(R["theta_out_rad"]),
+        "Encoder2 [counts]": counts(R["theta_in_rad"]),
+        "Force1 [lbf]": R["F_drive_N"],
+        "Force2 [lbf]": R["F_load_N"],
+    }
+    _, sure, open_ = guess(tmp_path, columns)
+    assert sure == {}
+    assert open_["drive_encoder_counts"][1] == "Encoder2"
+    assert open_["load_encoder_counts"][1] == "Encoder1"
+    assert {open_[c][1] for c in ("F_drive_N", "F_load_N")} == {"Force1", "Force2"}
+
+
+def test_a_lab_of_bare_channels(tmp_path):
+    columns = {
+        "sample": np.arange(T.size),
+        "a0": R["F_drive_N"],
+        "a1": DEG * R["theta_out_rad"],
+        "a2": DEG * R["theta_in_rad"],
+    }
+    guessed, sure, open_ = guess(tmp_path, columns, separator=" ")
+    assert (guessed.time, sure) == (None, {})
+    assert "rate_Hz" in guessed.time_why
+    assert {c: s[1] for c, s in open_.items()} == {"theta_in_rad": "a2", "theta_out_rad": "a1"}
+
+
+def test_a_lab_of_weights_and_pulling_cells_with_the_wrong_sign(tmp_path):
+    columns = {
+        "time [s]": T,
+        "actuator position [rad]": R["theta_in_rad"],
+        "tip angle [rad]": R["theta_out_rad"],
+        "Kraft Motor [N]": -R["F_drive_N"],
+        "tendon force distal [g]": R["F_load_N"] * 1e3 / 9.80665,
+    }
+    guessed, sure, open_ = guess(tmp_path, columns)
+    assert sure["F_drive_N"] == (-1, "Kraft Motor", "N")
+    assert open_ == {"F_load_N": (1, "tendon force distal", "gf")}
+    assert "g is a mass" in " ".join(next(g for g in guessed.guesses if g.column == "F_load_N").why)
+
+
+def test_two_signals_that_may_be_one_column_are_both_left_open(tmp_path):
+    columns = {
+        "time [s]": T,
+        "motor angle [deg]": DEG * R["theta_in_rad"],
+        "input angle [deg]": DEG * R["theta_in_rad"],
+    }
+    guessed, sure, _ = guess(tmp_path, columns)
+    assert sure == {}
+    assert "'input angle' may be" in " ".join(guessed.guesses[0].why)
+
+
+def test_counts_win_over_an_angle_that_is_made_from_them(tmp_path):
+    columns = {
+        "time [s]": T,
+        "motor angle [deg]": DEG * R["theta_in_rad"],
+        "motor encoder [counts]": counts(R["theta_in_rad"]),
+    }
+    _, sure, open_ = guess(tmp_path, columns)
+    assert set(sure) == {"drive_encoder_counts"}
+    assert set(open_) == {"theta_in_rad"}
+
+
+def test_a_unit_that_cannot_be_is_doubted(tmp_path):
+    columns = {"time [s]": T, "motor angle [rad]": DEG * R["theta_in_rad"] * 3}
+    guessed, sure, _ = guess(tmp_path, columns)
+    assert sure == {}
+    assert "in rad it would turn" in " ".join(guessed.guesses[0].why)
+
+
+@pytest.mark.parametrize(("scale", "unit"), [(1, "s"), (1e3, "ms"), (1e6, "us")])
+def test_the_unit_of_time_follows_from_the_rate(tmp_path, scale, unit):
+    guessed, _, _ = guess(tmp_path, {"time": scale * T, "motor angle [rad]": R["theta_in_rad"]})
+    assert (guessed.time.unit, guessed.time_is_sure) == (unit, True)
+
+
+def test_a_rate_that_may_be_in_two_units_is_left_open(tmp_path):
+    """10 000 steps of 0.1: 1000 s at 10 Hz, or 1 s at 10 kHz."""
+    r = recording(seconds=20)
+    guessed, _, _ = guess(tmp_path, {"time": 50 * r["time_s"], "motor angle [rad]": r["theta_in_rad"]})
+    assert not guessed.time_is_sure
+    assert "a step of 0.1 may be in s or ms: state the unit" in guessed.time_why
+
+
+def test_names_that_yaml_would_not_read_as_text(tmp_path):
+    columns = {"time [s]": T, "motor: angle, {x #1} [rad]": R["theta_in_rad"], "yes [N]": R["F_drive_N"]}
+    write_text(tmp_path / "lab/run.csv", columns, separator="\t")
+    guessed = write_guess([tmp_path / "lab/run.csv"], tmp_path / "batch")
+    stated = load_map(guessed.file)
+    assert stated.channels["theta_in_rad"].signal == guessed.guessed["main"].guesses[0].signal
+
+
+def test_further_files_of_a_recording_are_seen_by_their_names(tmp_path):
+    r = R
+    for name in ("sine", "step"):
+        write_text(tmp_path / f"lab/{name}_drive.csv", {"t [s]": T, "motor angle [rad]": r["theta_in_rad"]})
+        load = {"t [ms]": 1e3 * T[::2], "load angle [deg]": DEG * r["theta_out_rad"][::2]}
+        write_text(tmp_path / f"lab/{name}_load.csv", load)
+    files = sorted((tmp_path / "lab").iterdir())
+    write_guess(files, tmp_path / "batch")
+    written = import_files(files, tmp_path / "batch/map.yaml", tmp_path / "batch")
+    assert list(written.recordings) == ["sine", "step"]
+    table = written.recordings["sine"].table
+    assert table["theta_out_rad"].to_numpy() == pytest.approx(r["theta_out_rad"][: len(table)], abs=2e-3)
+
+
+def test_files_that_do_not_belong_together_are_said(tmp_path):
+    write_text(tmp_path / "lab/a.csv", {"t [s]": T, "motor angle [rad]": R["theta_in_rad"]})
+    write_text(tmp_path / "lab/b.csv", {"t [s]": T, "temperature [s]": R["theta_in_rad"]})
+    guessed = write_guess(sorted((tmp_path / "lab").iterdir()), tmp_path / "batch")
+    assert any(remark.startswith("b.csv: other signals than a.csv") for remark in guessed.remarks)
+
+
+def test_a_map_is_never_overwritten(tmp_path):
+    guess(tmp_path, {"t [s]": T, "motor angle [rad]": R["theta_in_rad"]})
+    with pytest.raises(InputError, match="there is a map; use it with --map"):
+        write_guess([tmp_path / "lab/run.csv"], tmp_path / "batch")
+
+
+def test_letters_and_words_of_two_meanings(tmp_path):
+    """T is a torque by its unit; l is the load beside m only; load may be a force."""
+    columns = {
+        "t [s]": T,
+        "q_m [rad]": R["theta_in_rad"],
+        "q_l [rad]": R["theta_out_rad"],
+        "T_in [Nm]": R["tau_in_Nm"],
+        "Load [N]": R["F_drive_N"],
+    }
+    _, sure, open_ = guess(tmp_path, columns)
+    assert {c: s[1] for c, s in sure.items()} == {"theta_in_rad": "q_m", "theta_out_rad": "q_l", "tau_in_Nm": "T_in"}
+    assert {s[1] for s in open_.values()} == {"Load"}
+
+
+def test_left_is_not_load(tmp_path):
+    columns = {"t [s]": T, "motor angle [rad]": R["theta_in_rad"], "F_l [N]": R["F_drive_N"], "F_r [N]": R["F_load_N"]}
+    _, sure, _ = guess(tmp_path, columns)
+    assert set(sure) == {"theta_in_rad"}
+
+
+def test_times_of_an_uneven_clock_are_still_times(tmp_path):
+    steps = np.random.default_rng(0).choice([1, 2, 5], T.size)
+    guessed, _, _ = guess(
+        tmp_path, {"millis [ms]": np.cumsum(steps).astype(float), "motor angle [rad]": R["theta_in_rad"]}
+    )
+    assert (guessed.time.signal, guessed.time.unit) == ("millis", "ms")
