@@ -237,3 +237,31 @@ def test_a_map_is_never_overwritten(tmp_path):
     guess(tmp_path, {"t [s]": T, "motor angle [rad]": R["theta_in_rad"]})
     with pytest.raises(InputError, match="there is a map; use it with --map"):
         write_guess([tmp_path / "lab/run.csv"], tmp_path / "batch")
+
+
+def test_letters_and_words_of_two_meanings(tmp_path):
+    """T is a torque by its unit; l is the load beside m only; load may be a force."""
+    columns = {
+        "t [s]": T,
+        "q_m [rad]": R["theta_in_rad"],
+        "q_l [rad]": R["theta_out_rad"],
+        "T_in [Nm]": R["tau_in_Nm"],
+        "Load [N]": R["F_drive_N"],
+    }
+    _, sure, open_ = guess(tmp_path, columns)
+    assert {c: s[1] for c, s in sure.items()} == {"theta_in_rad": "q_m", "theta_out_rad": "q_l", "tau_in_Nm": "T_in"}
+    assert {s[1] for s in open_.values()} == {"Load"}
+
+
+def test_left_is_not_load(tmp_path):
+    columns = {"t [s]": T, "motor angle [rad]": R["theta_in_rad"], "F_l [N]": R["F_drive_N"], "F_r [N]": R["F_load_N"]}
+    _, sure, _ = guess(tmp_path, columns)
+    assert set(sure) == {"theta_in_rad"}
+
+
+def test_times_of_an_uneven_clock_are_still_times(tmp_path):
+    steps = np.random.default_rng(0).choice([1, 2, 5], T.size)
+    guessed, _, _ = guess(
+        tmp_path, {"millis [ms]": np.cumsum(steps).astype(float), "motor angle [rad]": R["theta_in_rad"]}
+    )
+    assert (guessed.time.signal, guessed.time.unit) == ("millis", "ms")

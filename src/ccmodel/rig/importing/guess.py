@@ -128,6 +128,7 @@ def guess_file(file: SignalFile) -> GuessedFile:
     rest = [s for s in file.signals if time is None or s.name != time.signal]
     guesses = [_first_guess(signal, readings[signal.name]) for signal in rest]
     aligned = _aligned(rest)
+    guesses = _without_lone_letters(guesses, readings)
     guesses = _by_shape(guesses, aligned)
     guesses = _with_tensions(guesses, readings, aligned)
     guesses = _with_ends(guesses, aligned)
@@ -168,16 +169,20 @@ def _first_guess(signal: Signal, reading: Reading) -> Guess:
         return Guess(signal.name, column, unit, 1, True, (why,), reading.quantity, reading.end, 9)
     if shapes.is_constant(signal.values):
         return Guess(signal.name, None, signal.unit, why=("constant: not used",))
-    if reading.quantity in (names.COMMAND, names.COUNTER, names.OTHER, names.VELOCITY, TIME):
-        return Guess(signal.name, None, signal.unit, why=(f"a {reading.quantity}, by its name: not used",))
     stated = signal.unit if units.states_unit(signal.unit) else reading.unit
     measured = units.quantity_of(stated) if stated else ""
+    if reading.quantity == TIME and measured not in ("", "a time"):
+        reading = replace(reading, quantity=None)  # T is a torque or a tension too
+    if reading.quantity in (names.COMMAND, names.COUNTER, names.OTHER, names.VELOCITY, TIME):
+        return Guess(signal.name, None, signal.unit, why=(f"a {reading.quantity}, by its name: not used",))
     quantity, why, doubt = _quantity(reading, measured, stated)
     if quantity is None:
         return Guess(signal.name, None, stated, why=why)
     unit, unit_why, unit_is_sure = _unit(signal, quantity, stated, measured)
     score = (reading.quantity is not None) + 2 * (reading.end is not None and not reading.end_is_hint) + bool(stated)
     sure = unit_is_sure and not doubt
+    if quantity == FORCE and reading.words == ("load",):
+        return Guess(signal.name, None, unit, 1, False, (*why, "load may mean the force"), quantity, None, score)
     return Guess(signal.name, None, unit, 1, sure, (*why, *unit_why), quantity, reading.end, score)
 
 
@@ -245,6 +250,15 @@ def _aligned(signals: Sequence[Signal]) -> dict[str, NDArray]:
         filled = np.interp(at, own[has], signal.values[has]) if has.any() else np.full(at.size, np.nan)
         aligned[signal.name] = filled
     return aligned
+
+
+def _without_lone_letters(guesses: list[Guess], readings: Mapping[str, Reading]) -> list[Guess]:
+    """An end that a letter says (q_m, q_l) is sure only if both letters occur: F_l may be the left force."""
+    hinted = {g.signal for g in guesses if g.end and readings[g.signal].end_is_hint}
+    if {readings[name].end for name in hinted} == set(_ENDS):
+        return guesses
+    doubt = "its end is said by one letter only"
+    return [replace(g, sure=False, why=(*g.why, doubt)) if g.signal in hinted else g for g in guesses]
 
 
 def _by_shape(guesses: list[Guess], aligned: Mapping[str, NDArray]) -> list[Guess]:

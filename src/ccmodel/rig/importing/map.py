@@ -218,7 +218,8 @@ class ImportMap(TypedModel):
     @model_validator(mode="after")
     def _each_quantity_once(self):
         if not self.channels.keys() & set(DRIVE_ANGLES):
-            raise ValueError(f"channels: the drive angle is missing: state {' or '.join(DRIVE_ANGLES)}")
+            advice = "in a guessed map, take '# ' away from its line"
+            raise ValueError(f"channels: the drive angle is missing: state {' or '.join(DRIVE_ANGLES)} ({advice})")
         for channel, raw in RAW_COLUMNS.items():
             both = [column for column in raw if column in self.channels]
             if channel in self.channels and both:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from ccmodel.rig.importing import units
 
 ANGLE, TORQUE, CURRENT, FORCE, TIME = "angle", "torque", "current", "force", "time"
-VELOCITY, COMMAND, COUNTER, OTHER = "speed", "command", "sample counter", "other"
+VELOCITY, COMMAND, COUNTER, OTHER = "speed", "command", "sample counter", "quantity without a column"
 DRIVE, LOAD = "drive", "load"
 LOADCELL = "loadcell"
 
@@ -53,7 +53,7 @@ _END_PARTS = {
     LOAD: ("abtrieb", "last", "load", "output", "ausgang", "distal", "greifer"),
 }
 # Letters that name an end beside a quantity: q_m and q_l. They are hints only.
-_END_LETTERS = {"m": DRIVE, "d": DRIVE, "a": DRIVE, "l": LOAD, "e": LOAD}
+_END_LETTERS = {"m": DRIVE, "l": LOAD}
 _SPELT = str.maketrans(
     {"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "θ": " theta ", "ϑ": " theta ", "φ": " phi ", "τ": " tau "}
 )

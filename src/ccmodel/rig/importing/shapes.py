@@ -102,8 +102,10 @@ def sign_of_load_torque(angle: NDArray, torque: NDArray) -> int | None:
 def sign_of_tension(force: NDArray) -> int | None:
     """Sign of a force that cables can have: positive at rest, and nearly everywhere."""
     finite = force[np.isfinite(force)]
+    if is_constant(finite):
+        return None
     at_rest = np.median(finite[: max(int(_REST * finite.size), 10)])
-    if is_constant(finite) or np.mean(np.sign(finite) == np.sign(at_rest)) < 0.99:
+    if np.mean(np.sign(finite) == np.sign(at_rest)) < 0.99:
         return None
     return int(np.sign(at_rest)) or None
 

@@ -41,7 +41,7 @@ def guess_tables(guessed: GuessedMap) -> list[RenderableType]:
 def next_of_guess(guessed: GuessedMap, files: Sequence[Path], out: Path) -> str:
     """What to do after a guess."""
     unsure = sum(bool(g.column) and not g.sure for one in guessed.guessed.values() for g in one.guesses)
-    lines = f"; {unsure} lines in it wait for your word" if unsure else ""
+    lines = f"; {unsure} of its lines are not sure and stand behind '# '" if unsure else ""
     map_file = Path(out) / MAP
     return f"wrote {map_file}{lines}. Correct it, then: {_command(files, out, map_file)}"
 
@@ -67,7 +67,8 @@ def next_of_import(written: Written, out: Path) -> str:
     """What to do after an import."""
     folder = shlex.quote(str(out))
     filled = f"fill in {Path(out) / BATCH}, then: " if written.drafted else ""
-    return f"wrote {len(written.recordings)} recordings to {out}. Next, {filled}ccmodel check {folder}"
+    count = len(written.recordings)
+    return f"wrote {count} recording{'s' if count > 1 else ''} to {out}. Next, {filled}ccmodel check {folder}"
 
 
 def _guess_cells(guess: Guess) -> list[Text]:
