@@ -66,6 +66,8 @@ HEADERS = {
     "a separator at the end": "t;x;\n",
     "names separated otherwise": "# t, x\n",
     "an empty line below": "t;x\n\n",
+    "ranges below": "t;x\n10 V;5 V\n",
+    "a note on the separator": "sep=;\nt;x\n",
 }
 
 
@@ -87,6 +89,19 @@ def test_without_a_header_columns_are_numbered(tmp_path):
     file = read(tmp_path, "0 1.5\n1 2.5\n2 3.5\n")
     assert columns(file) == {"column_1": ("", [0, 1, 2]), "column_2": ("", [1.5, 2.5, 3.5])}
     assert "no line of names" in file.remarks[0]
+
+
+def test_rows_that_end_with_a_separator(tmp_path):
+    file = read(tmp_path, "t,x\n0,1,\n1,2,\n2,3,\n")
+    assert columns(file) == {"t": ("", [0, 1, 2]), "x": ("", [1, 2, 3])}
+
+
+def test_two_tables_in_a_file_are_refused(tmp_path):
+    content = "t,x\n" + "0,1\n" * 30 + "t,x,y\n" + "0,1,2\n" * 30
+    with pytest.raises(LogError) as error:
+        read(tmp_path, content)
+    assert "has 30 more rows of numbers, of another table, above the samples of line 33 on" in error.value.args[2]
+    assert len(read(tmp_path, content, layout=TextLayout(first_line=33)).signals) == 3
 
 
 def test_a_labview_file(tmp_path):
@@ -118,7 +133,9 @@ def test_columns_of_text_and_lines_of_comment_are_left_out_and_named(tmp_path):
     assert columns(file) == {"t": ("", [0, 1, 2]), "x": ("", [1, 2, 3])}
     said = " ".join(file.remarks)
     assert (
-        "columns of text are left out: state" in said and "1 lines of comment" in said and "below the samples" in said
+        "columns of text are left out: state (such as 'STOP')" in said
+        and "1 lines of comment" in said
+        and "below the samples" in said
     )
 
 

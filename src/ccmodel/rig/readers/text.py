@@ -29,6 +29,8 @@ _NAMES_OF_SEPARATORS = {"\t": "tab", WHITESPACE: "whitespace"}
 # Rows that show the layout, and header lines above the samples that may hold names and units.
 _FEWEST_SAMPLE_LINES, _SAMPLE_LINES = 20, 1000
 _HEADER_LINES = 5
+# Rows of numbers that the notes above the samples may have.
+_OTHER_ROWS = 5
 # Lines without numbers that may follow the samples.
 _FOOTER_LINES = 3
 _COMMENT_SIGNS = ("#", "%", "//", "!", "*")
@@ -53,12 +55,15 @@ class _Grid:
         Decimal sign.
     numbers, stamps : tuple of bool
         Whether a cell holds numbers, or dates and times.
+    open_end : bool
+        Whether rows end with a separator: the last cell is empty, and names may leave it out.
     """
 
     separator: str
     decimal: str
     numbers: tuple[bool, ...]
     stamps: tuple[bool, ...]
+    open_end: bool = False
 
     @property
     def width(self) -> int:
@@ -83,6 +88,8 @@ def read(path: Path, layout: TextLayout | None = None) -> SignalFile:
     lines, remarks = _lines(text)
     grid = _grid(lines, layout)
     first = _first_row(lines, grid, layout)
+    if not layout.first_line:
+        _check_single_table(lines[:first], grid)
     names, units, header = _names_and_units(lines[:first], grid, layout)
     table, dropped = _table(lines, first, grid)
     signals, started, more = _signals(table, names, units, grid)
@@ -234,7 +241,7 @@ def _candidate(rows: list[str], separator: str, decimal: str) -> tuple[int, _Gri
     known = sum(bool(c) and (n or s) for c, n, s in zip(filled, numbers, stamps, strict=True))
     if not any(c and n for c, n in zip(filled, numbers, strict=True)):
         return None
-    return count * (2 * known - sum(map(bool, filled))), _Grid(separator, decimal, numbers, stamps)
+    return count * (2 * known - sum(map(bool, filled))), _Grid(separator, decimal, numbers, stamps, not filled[-1])
 
 
 def _no_numbers(rows: list[str], lines: list[str]) -> str:
@@ -254,6 +261,15 @@ def _first_row(lines: list[str], grid: _Grid, layout: TextLayout) -> int:
         if grid.is_row(lines[i]) and all(len(cells) == grid.width for cells in following):
             return i
     raise LogError(None, None, _no_numbers([], lines))
+
+
+def _check_single_table(above: list[str], grid: _Grid) -> None:
+    """Rows of another table above the samples would be lost without a word."""
+    rows = [_cells(line, grid.separator) for line in above if line[:1].isdigit() or line[:1] in "+- "]
+    rows = [cells for cells in rows if len(cells) > 1 and all(_is_number(c, grid.decimal) for c in cells)]
+    if len(rows) > _OTHER_ROWS:
+        text = f"has {len(rows)} more rows of numbers, of another table, above the samples of line {len(above) + 1} on"
+        raise LogError(None, None, f"{text}: split the file, or state text.first_line")
 
 
 def _names_and_units(above: list[str], grid: _Grid, layout: TextLayout) -> tuple[list[str], list[str], str]:
@@ -325,6 +341,8 @@ def _header_cells(line: str, grid: _Grid) -> list[str] | None:
     for cells in ways:
         while len(cells) > grid.width and not cells[-1]:
             cells = cells[:-1]
+        if grid.open_end and len(cells) == grid.width - 1:
+            cells = [*cells, ""]
         if len(cells) == grid.width:
             return [cell.strip().strip("\"'").strip() for cell in cells]
     # An export for LabVIEW names a column of comments that its rows leave out.
@@ -334,7 +352,9 @@ def _header_cells(line: str, grid: _Grid) -> list[str] | None:
 def _are_words(cells: list[str], grid: _Grid) -> bool:
     """Whether cells are names or units: at least half of them are filled, and few are numbers."""
     filled = [cell for cell in cells if cell]
-    return 2 * len(filled) >= len(cells) and 2 * sum(_is_number(c, grid.decimal) for c in filled) < len(filled)
+    # "10 V" is the range of a channel, not its name.
+    values = sum(_is_number(c.split()[0], grid.decimal) for c in filled)
+    return 2 * len(filled) >= len(cells) and 2 * values < len(filled)
 
 
 def _table(lines: list[str], first: int, grid: _Grid) -> tuple[pd.DataFrame, list[str]]:
@@ -405,7 +425,7 @@ def _signals(table, names, units, grid):
         elif i in stamps[:2] and used == 2:
             continue
         elif table[i].notna().any():
-            texts.append(names[i])
+            texts.append(f"{names[i]} (such as '{table[i].dropna().iloc[-1]}')")
     if texts:
         remarks.append(f"columns of text are left out: {', '.join(texts)}")
     if empty:
