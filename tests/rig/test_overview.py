@@ -79,7 +79,7 @@ def test_check_prints_a_table_for_each_recording_and_its_findings(bench):
     lines = result.stdout.splitlines()
     heads = [line for line in lines if line.startswith(("one:", "two:"))]
     assert len(heads) == 2
-    assert "400 samples at 250 Hz, 1.596 s; rest 0.396 s; stroke 0.9519 rad" in heads[0]
+    assert "400 samples at 250 Hz, 1.596 s; rest 0.396 s; stroke 0.9676 rad" in heads[0]
     rows = [line.split() for line in lines if line.startswith("F_drive_N")]
     assert [len(row) for row in rows] == [6, 6]
     assert float(rows[0][1]) < 7 < float(rows[0][2])

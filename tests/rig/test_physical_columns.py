@@ -83,7 +83,7 @@ def test_an_angle_without_a_step_is_not_snapped_and_its_noise_is_seen(bench, cou
         theta = 0.6 * np.sin(np.pi * np.maximum(time - 0.4, 0)) + 0.2
         return in_si_units(table).assign(
             theta_in_rad=theta + random.normal(0, noise, time.size),
-            theta_out_rad=0.8 * theta + random.normal(0, noise, time.size),
+            theta_out_rad=0.9 * theta + random.normal(0, noise, time.size),
         )
 
     changed(without_scales(bench, resolution=None), smooth)

@@ -242,13 +242,12 @@ def _saturated(
         inside, repeats = ~(ends[0] | ends[1])[1:], np.diff(numbers) == 0
         if not inside.any():
             return []
-        if repeats[inside].mean() >= limits.FLAT_NOISE_FRACTION:
-            # A channel without noise dwells at its extremes by nature, one with few steps everywhere.
-            if max(map(length, map(longest_run, ends))) <= limits.FLAT_OVER_INSIDE * length(
-                longest_run(repeats & inside)
-            ):
-                return []
+        at_ends, elsewhere = max(length(longest_run(end)) for end in ends), length(longest_run(repeats & inside))
+        if at_ends > limits.FLAT_OVER_INSIDE * elsewhere:
             most_repeats = limits.FROZEN_NOISE_FRACTION
+        elif repeats[inside].mean() >= limits.FLAT_NOISE_FRACTION:
+            # A channel without noise dwells at its extremes by nature, one with few steps everywhere.
+            return []
         what = "flat at its extreme value"
     found = []
     at_end = ends[0] | ends[1]

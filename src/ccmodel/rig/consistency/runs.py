@@ -4,7 +4,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ccmodel.channels import ANGLE_AT, CHANNELS, F_DRIVE, F_LOAD, MEASURED, TAU_IN, TAU_OUT, TENSIONS, THETA_IN
+from ccmodel.channels import (
+    ANGLE_AT,
+    CHANNELS,
+    F_DRIVE,
+    F_LOAD,
+    TAU_IN,
+    TAU_OUT,
+    TENSIONS,
+    THETA_IN,
+    THETA_OUT,
+)
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
 from ccmodel.rig.consistency.parity import Parity, speed
@@ -27,8 +37,9 @@ def copied_channels(parities: Sequence[Parity]) -> list[Contradiction]:
     for k, parity in enumerate(parities):
         for earlier in parities[:k]:
             copied = [c for c in CHANNELS if c not in TENSIONS and _is_copy(parity, earlier, c)]
-            # The same command gives the same counts of the drive: that angle alone is no copy.
-            if any(c in MEASURED for c in copied):
+            # The same command gives the same counts of the drive, and perhaps of the load: angles that agree together
+            # are no copies.
+            if set(copied) - set(ANGLE_AT.values()) or copied == [THETA_OUT]:
                 names = ", ".join(copied)
                 text = (
                     f"{names} of {parity.recording.id} repeat those of {earlier.recording.id}, sample by sample: noise"
@@ -62,7 +73,7 @@ def _two_runs(parity: Parity) -> Contradiction | None:
         f"the load angle of {parity.recording.id} does not follow its drive angle (correlation {together:.2f}): one of"
         " the two is of another run, or their clocks are apart"
     )
-    return Contradiction("theta_out", text, parity.recording.id, LIKELY)
+    return Contradiction(THETA_OUT, text, parity.recording.id, LIKELY)
 
 
 def _straight(parity: Parity) -> Contradiction | None:

@@ -5,6 +5,7 @@ from math import isclose
 
 import numpy as np
 
+from ccmodel.channels import ANGLE_AT, SUM_AT, TAU_OUT, THETA_IN, THETA_OUT
 from ccmodel.rig.batch import Batch
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
@@ -34,7 +35,7 @@ def pooled(parities: Sequence[Parity]) -> dict[str, float]:
     """Median of each relation over the recordings; the travel is that of the greatest stroke."""
     by_relation: dict[str, list[tuple[float, float]]] = {}
     for parity in parities:
-        stroke = float(np.ptp(parity.moving["theta_in_rad"]))
+        stroke = float(np.ptp(parity.moving[THETA_IN]))
         for name, value in parity.ratios.items():
             by_relation.setdefault(name, []).append((stroke, value))
     found = {name: float(np.median([value for _, value in of])) for name, of in by_relation.items()}
@@ -84,7 +85,7 @@ def _angle_of_one_end(ratios: Mapping[str, float]) -> list[Contradiction]:
     which = f"of the {end} angle" if end else "of one of the two angles, or a pulley's radius,"
     keys = f"rig.{end}.encoder_counts_per_rev" if end else "encoder_counts_per_rev and pulley_radius_m of both ends"
     text = f"the scale {which} is wrong: {share}, and {reason}{_named(travel)}; check {keys} and the unit of the angle"
-    what = {"load": "theta_out", "drive": "theta_in", None: "theta_in or theta_out"}[end]
+    what = ANGLE_AT[end] if end else f"{THETA_IN} or {THETA_OUT}"
     return [Contradiction(what, text, None, SURE if end else LIKELY)]
 
 
@@ -106,7 +107,7 @@ def _both_angles(ratios: Mapping[str, float]) -> list[Contradiction]:
         f"both angles are {factor:.3g} times too {size}{_named(factor)}: found over stated is {values}; check"
         " encoder_counts_per_rev of both ends and the unit of the angles"
     )
-    return [Contradiction("theta_in and theta_out", text)]
+    return [Contradiction(f"{THETA_IN} and {THETA_OUT}", text)]
 
 
 def _stated(ratios: Mapping[str, float], names) -> dict[str, float]:
@@ -130,7 +131,7 @@ def _load_torque(ratios: Mapping[str, float]) -> list[Contradiction]:
         f"the load torque over the radius reaches {found:.3g} times the sum of tensions there, which cables that only"
         " pull cannot do; check the scale of the load torque, the radius and the load cell of the load"
     )
-    return [Contradiction("tau_out", text)]
+    return [Contradiction(TAU_OUT, text)]
 
 
 def _spring(ratios: Mapping[str, float], batch: Batch) -> list[Contradiction]:
@@ -160,7 +161,7 @@ def _pretension(ratios: Mapping[str, float]) -> list[Contradiction]:
         return [Contradiction("pretension_N", text, None, LIKELY)]
     name = next(name for name, side in sides.items() if side).rsplit(" ", 1)[1]
     text = f"the sums of tensions at rest are {values} twice the stated pretension; check rig.{name}.load_cell"
-    return [Contradiction(f"F_{name}", text, None, LIKELY)]
+    return [Contradiction(SUM_AT[name], text, None, LIKELY)]
 
 
 def _cable(ratios: Mapping[str, float], batch: Batch) -> list[Contradiction]:

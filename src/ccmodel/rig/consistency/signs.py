@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ccmodel.channels import F_DRIVE, F_LOAD, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import Contradiction
 from ccmodel.rig.consistency.parity import Parity
@@ -26,18 +27,18 @@ def _fault(what: str, text: str, negative: str, remedy: str) -> _Fault:
 
 
 FAULTS = (
-    _fault("tau_in", "the drive torque has the wrong sign", "work torques", "change rig.drive.torque_sign"),
-    _fault("tau_out", "the load torque has the wrong sign", "load torques", "change rig.load.torque_sign"),
-    _fault("theta_out", "the load angle has the wrong sign", "angles load", "change rig.load.encoder_sign"),
-    _fault("theta_in", "the drive angle has the wrong sign", "angles work", "change rig.drive.encoder_sign"),
+    _fault(TAU_IN, "the drive torque has the wrong sign", "work torques", "change rig.drive.torque_sign"),
+    _fault(TAU_OUT, "the load torque has the wrong sign", "load torques", "change rig.load.torque_sign"),
+    _fault(THETA_OUT, "the load angle has the wrong sign", "angles load", "change rig.load.encoder_sign"),
+    _fault(THETA_IN, "the drive angle has the wrong sign", "angles work", "change rig.drive.encoder_sign"),
     _fault(
         "cables A and B",
         "cables A and B are exchanged: both torques have the wrong sign for the angles",
         "work load",
         "change rig.drive.torque_sign and rig.load.torque_sign, or both encoder signs",
     ),
-    _fault("F_drive", "the load cell at the drive has the wrong sign", "F_drive", "change its sensitivity or wiring"),
-    _fault("F_load", "the load cell at the load has the wrong sign", "F_load", "change its sensitivity or wiring"),
+    _fault(F_DRIVE, "the load cell at the drive has the wrong sign", "F_drive", "change its sensitivity or wiring"),
+    _fault(F_LOAD, "the load cell at the load has the wrong sign", "F_load", "change its sensitivity or wiring"),
 )
 EXCHANGED = _fault(
     "drive and load",

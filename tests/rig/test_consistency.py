@@ -1,0 +1,151 @@
+"""Parity relations of known values, and mistakes in recorded batches."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_up_batch import T0, Bench, table
+
+from benchmarks.input_mistakes import MISTAKES, Copy, outcome, read_copy, said_of, write_copy
+from ccmodel.rig.consistency.clocks import drift_of
+from ccmodel.rig.consistency.parity import Parity, closed_part, crossings, white_noise
+from ccmodel.rig.consistency.signs import EXCHANGED, FAULTS, explanation, negative_relations
+from ccmodel.rig.ingest import ingest_batch
+
+SIMULATED, OTHER = Path("data/raw/pretension"), Path("tests/data/ideal-rig/loops")
+SIGNS = {"angles": 1.0, "torques": 0.5, "work": 0.9, "load": 1.0, "loss": 0.9, "F_drive": 1.0, "F_load": 1.0}
+# Values that a rig without load cells and spring does not have, and recordings of another rig: all are of one tool.
+NOT_MEASURED = ("both angles", "both ends off", "load cell", "forgotten", "stated", "another rig")
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    """Four trials of the da Vinci instrument."""
+    copy = read_copy(Path("data/raw/da-vinci"))
+    kept = ["trial-11", "trial-21", "trial-23", "trial-43"]
+    copy.description["recordings"] = [copy.entry(name) for name in kept]
+    few = Copy({name: copy.logs[name] for name in kept}, copy.description, [])
+    return write_copy(few, tmp_path_factory.mktemp("measured") / "da-vinci")
+
+
+def parity_of(tmp_path, **changes):
+    bench = Bench(tmp_path)
+    bench.tables["one"] = table(n=2000, seed=1, **changes)
+    ingested = ingest_batch(bench.write().folder)
+    return Parity(ingested.recordings[0], ingested.batch)
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_in_a_simulated_batch_is_named(mistake):
+    found = outcome(SIMULATED, mistake, 1, [OTHER])
+    assert found.named, found.said
+
+
+@pytest.mark.parametrize("mistake", [m for m in MISTAKES if not any(part in m for part in NOT_MEASURED)])
+def test_a_mistake_in_a_measured_batch_is_named(measured, mistake):
+    found = outcome(measured, mistake, 1, [OTHER])
+    assert found.named, found.said
+
+
+@pytest.mark.parametrize("name", ["half-loop", "loops", "pretension", "radius", "rich"])
+def test_a_batch_without_mistakes_contradicts_nothing(name):
+    assert said_of(Path("data/raw") / name) == []
+
+
+def test_measured_trials_contradict_nothing(measured):
+    assert said_of(measured) == []
+
+
+def test_an_exchange_of_names_throughout_is_no_mistake(tmp_path):
+    """Cables A and B may be named either way: all angles and torques then change their sign."""
+    copy = read_copy(SIMULATED)
+    for log in copy.logs.values():
+        for column in ("drive_encoder_counts", "load_encoder_counts", "drive_current_A", "load_current_A"):
+            log[column] = -log[column]
+    assert said_of(write_copy(copy, tmp_path / "mirrored")) == []
+
+
+def test_a_nominal_value_is_not_compared(tmp_path):
+    copy = read_copy(SIMULATED)
+    copy.rig["cable"]["stiffness_N_per_m"] *= 10.0
+    (said,) = said_of(write_copy(copy, tmp_path / "stated"))
+    assert said.startswith("batch.yaml rig.cable.stiffness_N_per_m")
+    copy.rig["nominal"] = ["cable.stiffness_N_per_m"]
+    assert said_of(write_copy(copy, tmp_path / "nominal")) == []
+
+
+def test_relations_of_a_rig_whose_values_are_known(tmp_path):
+    parity = parity_of(tmp_path)
+    assert parity.log_ratio == pytest.approx(0.147 * np.pi, rel=0.03)
+    expected = {"spring": 1.0, "travel": 0.9, "friction": 1.0, "pretension": 1.0}
+    assert {name: parity.ratios[name] for name in expected} == pytest.approx(expected, rel=0.03)
+    assert parity.ratios["noise of F_load_N"] == pytest.approx(0.1, rel=0.2)
+    assert all(value > 0.1 for value in parity.signs.values())
+
+
+def test_a_relation_without_its_sensors_is_absent(tmp_path):
+    bench = Bench(tmp_path)
+    for side in ("drive", "load"):
+        del bench.described["rig"][side]["load_cell"]
+    bench.tables = {name: t.drop(columns=["drive_load_cell_V", "load_load_cell_V"]) for name, t in bench.tables.items()}
+    ingested = ingest_batch(bench.write().folder)
+    parity = Parity(ingested.recordings[0], ingested.batch)
+    assert parity.log_ratio is None and parity.stiffness is None
+    assert not {"friction", "stiffness", "pretension"} & set(parity.ratios)
+    assert not {"F_drive", "F_load"} & set(parity.signs)
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.what)
+def test_a_wrong_sign_explains_what_it_makes_negative(fault):
+    signs = {name: -value if name in fault.negative else value for name, value in SIGNS.items()} | {"loss": -0.5}
+    assert explanation(negative_relations(signs), signs) == (fault,)
+
+
+def test_energy_from_nowhere_means_exchanged_ends_if_all_signs_are_right():
+    signs = SIGNS | {"loss": -0.9}
+    assert explanation(negative_relations(signs), signs) == (EXCHANGED,)
+
+
+def test_a_correlation_alone_accuses_no_sensor():
+    signs = SIGNS | {"torques": -0.5}
+    assert explanation(negative_relations(signs), signs) == ()
+
+
+@pytest.mark.parametrize("rate", [-0.02, -0.008, 0.008, 0.02])
+def test_the_rate_of_a_drift_is_found(tmp_path, rate):
+    bench = Bench(tmp_path)
+    steady = table(n=3000, seed=1)
+    time = steady.time_s.to_numpy()
+    for column in [c for c in steady if c.startswith("load")]:
+        steady[column] = np.interp(time * (1 - rate), time, steady[column])
+    steady["load_encoder_counts"] = steady["load_encoder_counts"].round()
+    bench.tables["one"] = steady[time < 11.5]
+    ingested = ingest_batch(bench.write().folder)
+    found, change = drift_of(Parity(ingested.recordings[0], ingested.batch))
+    assert found == pytest.approx(rate, rel=0.1)
+    assert np.sign(change) == np.sign(rate)
+
+
+def test_clocks_that_agree_do_not_drift(tmp_path):
+    assert drift_of(parity_of(tmp_path)) == pytest.approx((0.0, 0.0), abs=2e-3)
+
+
+def test_white_noise_is_found_below_a_motion():
+    random, time = np.random.default_rng(4), np.arange(0, 10, 0.002)
+    values = 5.0 * np.sin(np.pi * time) + random.normal(0, 0.03, time.size)
+    assert white_noise(values) == pytest.approx(0.03, rel=0.25)
+
+
+def test_a_zero_does_no_work_over_the_closed_part():
+    angle = np.sin(np.linspace(0, 10.5, 4000))
+    part = closed_part(angle)
+    assert abs(angle[part][-1] - angle[part][0]) < 2e-3
+    assert crossings(angle).size == 3
+
+
+def test_pretensions_are_stated_for_each_cable(tmp_path):
+    bench = Bench(tmp_path)
+    for entry in bench.described["recordings"]:
+        entry["pretension_N"] = 3 * T0
+    said = said_of(bench.write().folder)
+    assert any(sentence.startswith("batch.yaml pretension_N") for sentence in said)
