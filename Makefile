@@ -6,7 +6,7 @@ CORES ?= 2
 # The former name of REGRESSORS.
 REGRESSORS ?= $(RIVALS)
 
-.PHONY: help results real data test bench accuracy-gate diagnosis-settings table-one coverage proof proof-full proof-real lint lock clean
+.PHONY: help results real data test bench accuracy-gate input-checks diagnosis-settings table-one coverage proof proof-full proof-real lint lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -48,6 +48,9 @@ bench: $(VENV)/.ready  ## measure speed and accuracy: results/bench.json, docs/f
 
 accuracy-gate: $(VENV)/.ready  ## count false alarms and catches of the comparison with the accepted accuracy: docs/accuracy.md
 	$(BIN)/python -m benchmarks.accuracy_gate --cores $(CORES)
+
+input-checks: $(VENV)/.ready  ## count the mistakes in logs and batch files that the checks name: docs/input-checks.md
+	$(BIN)/python -m benchmarks.input_mistakes --cores $(CORES)
 
 coverage: $(VENV)/.ready  ## count how often the fits' 90 % intervals hold the truth: docs/coverage.md
 	$(BIN)/python benchmarks/interval_coverage.py

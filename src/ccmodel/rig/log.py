@@ -146,7 +146,7 @@ def _check_time(time: pd.Series, warnings: list[Defect]) -> None:
     text = _gap_text(gaps.sum(), step[worst], usual, uneven)
     if step[worst] > limits.GAP_S or lost > limits.GAP_FRACTION * (time.iloc[-1] - time.iloc[0]):
         text += f" ({lost:.3g} s lost in all): too long to be bridged, record it again"
-        raise LogError(int(time.index[worst + 1]), "time_s", text)
+        raise LogError(int(time.index[worst + 1]), "time_s", text, True)
     first = int(time.index[np.flatnonzero(gaps)[0] + 1])
     text += ": they came late, few or none are lost" if uneven else ": samples were dropped"
     warnings.append(Defect(first, "time_s", text))

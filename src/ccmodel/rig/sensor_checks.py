@@ -49,7 +49,7 @@ def check_sensors(table: pd.DataFrame, rig: Rig, largest_travel: float) -> tuple
     for column in table.columns.drop(["time_s", drive.column]):
         is_load = load is not None and column == load.column
         if fault := _dead_load(table, load, rig) if is_load else _dead(table, column):
-            contradicts = fault.contradicts and not (is_small and fault.row is None)
+            contradicts = fault.contradicts and not (is_small and is_load and fault.row is None)
             defects.append(fault._replace(text=f"{fault.text}: column not used", contradicts=contradicts))
             dead.append(column)
         elif is_load:
@@ -121,7 +121,18 @@ def _is_noisy(table: pd.DataFrame, column: str, drive: Angle, odd: NDArray, most
     repeats = (change == 0)[at_rest & ~odd]
     if repeats.size > limits.FROZEN_SAMPLES:
         return bool(repeats.mean() < most_repeats)
-    turns = np.diff(np.sign(change[~odd & (change != 0)][1:])) != 0
+    return is_noisy(change[~odd][1:])
+
+
+def is_noisy(change: NDArray) -> bool:
+    """Whether the changes of a channel from sample to sample turn it up and down as noise does.
+
+    Parameters
+    ----------
+    change : ndarray, shape (n,)
+        Differences of the readings.
+    """
+    turns = np.diff(np.sign(change[change != 0])) != 0
     return turns.size > limits.FROZEN_SAMPLES and bool(turns.mean() > limits.NOISY_TURNS)
 
 

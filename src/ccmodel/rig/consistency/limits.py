@@ -36,7 +36,7 @@ MOST_TORQUE = 1.5
 # Radii of pulleys, m.
 SMALLEST_RADIUS_M, LARGEST_RADIUS_M = 3e-4, 0.25
 # Bend below which a conduit counts as straight, rad, and logarithm of the ratio of tensions that a straight one lacks.
-STRAIGHT_RAD, STRAIGHT_LOG_RATIO = 0.3, 0.25
+STRAIGHT_RAD, STRAIGHT_LOG_RATIO = 0.3, 0.2
 
 # Friction for each radian of stated bend, over that of every other recording with the same or a lower pretension.
 FORGOTTEN_BEND = 1.75

@@ -18,6 +18,7 @@ from ccmodel.channels import (
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
 from ccmodel.rig.consistency.parity import Parity, speed
+from ccmodel.rig.sensor_checks import is_noisy
 
 
 def foreign_runs(parities: Sequence[Parity]) -> list[Contradiction]:
@@ -58,7 +59,12 @@ def _is_copy(one: Parity, other: Parity, channel: str) -> bool:
     changes = (np.abs(a) > scale) | (np.abs(b) > scale)
     if changes.sum() < limits.FEWEST_SAMPLES:
         return False
-    limit = limits.COPIED_ANGLE if channel in ANGLE_AT.values() else limits.COPIED_NOISE
+    if channel in ANGLE_AT.values():
+        limit = limits.COPIED_ANGLE
+    elif is_noisy(a):
+        limit = limits.COPIED_NOISE
+    else:  # Without noise, equal physics gives equal readings.
+        return False
     return float(np.mean(np.abs(a - b)[changes] <= scale)) > limit
 
 

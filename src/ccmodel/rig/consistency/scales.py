@@ -14,6 +14,8 @@ from ccmodel.rig.consistency.parity import Parity
 # Factors that have a name, within 30 %: edges of an encoder, units of an angle.
 _NAMED = {4.0: "the edges of a quadrature encoder", 57.3: "degrees for radians", 6.28: "turns for radians"}
 _NAMED_WITHIN = 0.3
+# Factor up to which a relation that supports another may be right: estimates and compliant ends reach it.
+_SAME = 1.8
 
 
 def wrong_geometry(parities: Sequence[Parity]) -> list[Contradiction]:
@@ -75,10 +77,12 @@ def _angle_of_one_end(ratios: Mapping[str, float]) -> list[Contradiction]:
     if travel is None or limits.LEAST_TRAVEL <= travel <= limits.MOST_TRAVEL:
         return []
     large = travel > limits.MOST_TRAVEL
+    if not large and ratios.get("stiffness", 0.0) > 1 / _SAME:
+        return []  # The cables stretch that much: a stiff load, not a scale.
     # The relations that contain one of the two angles alone.
     spring, amplitude = ratios.get("spring"), ratios.get("amplitude")
-    at_load = beyond(spring, 1.8) == (-1 if large else 1)
-    at_drive = beyond(amplitude, 1.8) == (-1 if large else 1)
+    at_load = beyond(spring, _SAME) == (-1 if large else 1)
+    at_drive = beyond(amplitude, _SAME) == (-1 if large else 1)
     end = "load" if at_load and not at_drive else "drive" if at_drive and not at_load else None
     share = f"at the cable the load moves {travel:.3g} times as far as the drive"
     reason = "it cannot move further" if large else "far more is lost than friction and stretch take"
@@ -93,25 +97,18 @@ def _both_angles(ratios: Mapping[str, float]) -> list[Contradiction]:
     """Scale of both angles: spring, stiffness and noted amplitude are wrong by about the same factor."""
     inverse = {name: 1 / ratios[name] for name in ("spring", "stiffness") if ratios.get(name, 0) > 0}
     factors = inverse | {name: ratios[name] for name in ("amplitude",) if name in ratios}
-    sides = {
-        beyond(factor, limits.AMPLITUDE_FACTOR if name == "amplitude" else 1.8) for name, factor in factors.items()
-    }
-    if len(factors) < 2 or len(sides) != 1 or sides == {0} or "spring" not in factors:
-        return []
-    if beyond(factors["spring"], limits.AMPLITUDE_FACTOR) == 0:
+    sides = {beyond(f, limits.AMPLITUDE_FACTOR if name == "amplitude" else _SAME) for name, f in factors.items()}
+    found = factors.get("spring", factors.get("amplitude", 1.0))
+    if len(factors) < 2 or len(sides) != 1 or beyond(found, limits.AMPLITUDE_FACTOR) == 0:
         return []
     size = "large" if sides == {1} else "small"
-    factor = factors["spring"] if sides == {1} else 1 / factors["spring"]
-    values = ", ".join(f"{name} {value:.3g} times" for name, value in _stated(ratios, factors).items())
+    factor = max(found, 1 / found)
+    values = ", ".join(f"{name} {ratios[name]:.3g} times" for name in factors)
     text = (
         f"both angles are {factor:.3g} times too {size}{_named(factor)}: found over stated is {values}; check"
         " encoder_counts_per_rev of both ends and the unit of the angles"
     )
     return [Contradiction(f"{THETA_IN} and {THETA_OUT}", text)]
-
-
-def _stated(ratios: Mapping[str, float], names) -> dict[str, float]:
-    return {name: ratios[name] for name in names}
 
 
 def _named(ratio: float) -> str:

@@ -37,6 +37,12 @@ FAULTS = (
         "work load",
         "change rig.drive.torque_sign and rig.load.torque_sign, or both encoder signs",
     ),
+    _fault(
+        "cables A and B",
+        "cables A and B are exchanged at one end",
+        "angles torques",
+        "change encoder_sign and torque_sign of one end",
+    ),
     _fault(F_DRIVE, "the load cell at the drive has the wrong sign", "F_drive", "change its sensitivity or wiring"),
     _fault(F_LOAD, "the load cell at the load has the wrong sign", "F_load", "change its sensitivity or wiring"),
 )
