@@ -62,6 +62,12 @@ def check(batch: Folder) -> None:
         _print_finding(str(finding), finding.severity)
     if any(f.severity != "warning" for f in ingested.findings):
         raise typer.Exit(1)
+    if not any(recording.shows_tensions for recording in ingested.recordings):
+        typer.echo(
+            "the logs do not show the tensions at both ends, as load cells and torques do: a diagnosis will take the"
+            " initial tension from pretension_N, and identify nothing with certainty"
+        )
+    typer.echo(f"nothing contradicts another value. Next: ccmodel diagnose {batch} --out DIR")
 
 
 @app.command("import")

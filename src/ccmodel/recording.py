@@ -98,6 +98,11 @@ class Recording:
         return CABLES["A"] if self.far_end else TENSIONS
 
     @property
+    def shows_tensions(self) -> bool:
+        """Whether the tensions at all ends of the cables are recorded or follow from other channels."""
+        return all(tension in self for tension in self.tensions)
+
+    @property
     def load_motion_is_given(self) -> bool:
         """Whether the far end of a single cable is fixed or follows its recorded motion."""
         return self.far_end in ("fixed", "measured-motion")

@@ -87,6 +87,19 @@ def test_check_prints_a_table_for_each_recording_and_its_findings(bench):
     assert float(rows[0][4]) == pytest.approx(0.1, rel=0.5)
     assert float(rows[0][5]) == pytest.approx(1e-4)
     assert "unknown column, not used" in result.output
+    assert lines[-1].endswith(f"Next: ccmodel diagnose {bench.folder} --out DIR")
+
+
+def test_check_says_that_the_initial_tension_will_not_be_observed(bench):
+    with_torques = CliRunner().invoke(app, ["check", str(bench.write().folder)]).output
+    for end in ("drive", "load"):
+        del bench.described["rig"][end]["torque_constant_Nm_per_A"]
+        for table in bench.tables.values():
+            del table[f"{end}_current_A"]
+    without = CliRunner().invoke(app, ["check", str(bench.write().folder)])
+    assert without.exit_code == 0
+    assert "the logs do not show the tensions at both ends" in without.output
+    assert "the logs do not show" not in with_torques
 
 
 def test_check_exits_with_1_if_a_log_is_refused(bench):
@@ -95,3 +108,4 @@ def test_check_exits_with_1_if_a_log_is_refused(bench):
     assert result.exit_code == 1
     assert "two: 400 samples" in result.output
     assert "there is no such file" in result.output
+    assert "Next:" not in result.output

@@ -109,6 +109,8 @@ def test_fields_within_fields_arrays_by_index_and_pictures_left_out(tmp_path):
     file = read_signals(write(tmp_path / "bag", *messages))
     signals = {s.name: s for s in file.signals}
     assert signals["ft/wrench/torque/z"].values.tolist() == [2.0 * i for i in range(12)]
+    assert [signals[f"ft/wrench/{part}/z"].unit for part in ("force", "torque")] == ["N", "N*m"]
+    assert signals["counts/data/2"].unit == ""
     assert np.flatnonzero(np.isnan(signals["counts/data/2"].values)).tolist() == [5]
     assert not any(name.startswith("picture/data") for name in signals)
     assert any("counts/data: 1 messages have another number of elements" in remark for remark in file.remarks)

@@ -43,7 +43,7 @@ def observations_of(
         raise ModelError("none of the recordings can be compared with the model: " + not_judged[0]["why"])
     observed = [o for o in usable if o.given.initial_tension_observed]
     if observed:
-        why = "its initial tension is not observed at rest by load cells, as that of the others is"
+        why = "its tensions are not observed at rest by load cells and torques, as those of the others are"
         not_judged += [_entry(o.id, why) for o in usable if o not in observed]
     usable = observed or usable
     return usable, [*not_judged, *_missing(usable), *_tolerated(tolerance)]
@@ -83,7 +83,10 @@ def _missing(observations: Sequence[Observations]) -> NotJudged:
         elif lacking:
             found.append(_entry(f"{channel} of {', '.join(lacking)}", "not recorded there, or not usable"))
     if not all(o.given.initial_tension_observed for o in observations):
-        why = "not observed at rest by load cells: the initial tension is fitted as one share of the stated pretension"
+        why = (
+            "load cells and torques of both ends do not show them at rest: the initial tension is fitted as one share"
+            " of the stated pretension"
+        )
         found.append(_entry("initial tension, ratio of the pulley radii, zeros of the torques", why))
     if len(observations) == 1:
         found.append(_entry("held-out error", "a single recording: nothing can be held out"))

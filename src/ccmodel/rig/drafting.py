@@ -26,6 +26,7 @@ from ccmodel.typed import InputError, Problem
 ENDS = ("drive", "load")
 # Spread of the pretensions of several recordings, as a share, up to which they are one.
 ONE_PRETENSION = 0.1
+_IF_KNOWN = "; put the tension that was set, if you know it"
 
 Lines = Iterator[str]
 
@@ -161,17 +162,17 @@ def _content(name: str, logs: Sequence[_Log], refused: dict[str, str]) -> Lines:
     pretensions = {log.file: log.pretension_N for log in logs}
     alike = _alike(pretensions.values())
     differ = alike is None and all(p is not None and p > 0 for p in pretensions.values())
-    yield "defaults:  # of all recordings; an entry may state its own"
+    yield "defaults:  # of all recordings; one that differs states the key below, as {id: a, ..., conduit: [...]}"
     if None in pretensions.values():
         yield "  pretension_N:  # N, the tension to which each cable was set before the motion"
     elif min(pretensions.values()) <= 0:
         least = f"{min(pretensions.values()):.3g} N"
         yield f"  pretension_N:  # N; half the sum of tensions at rest is {least}: is a load cell's sign or zero wrong?"
     elif alike is not None:
-        yield f"  pretension_N: {alike:.3g}  # half the sum of tensions at rest, mean of all recordings"
+        yield f"  pretension_N: {alike:.3g}  # half the sum of tensions at rest, mean of all recordings{_IF_KNOWN}"
     else:
-        yield "  # pretension_N differs and stands in each entry: half the sum of its tensions at rest"
-    yield "  conduit: [{length_m: , bend_rad: }]  # pieces from the drive end: m, rad (180 degrees = 3.1416)"
+        yield f"  # pretension_N differs and stands in each entry: half the sum of its tensions at rest{_IF_KNOWN}"
+    yield "  conduit: [{length_m: , bend_rad: }]  # pieces of even bend, from the drive end: m, rad (180 deg = 3.1416)"
     yield "recordings:"
     ids = _ids([log.file for log in logs])
     for log in logs:

@@ -20,17 +20,21 @@ from ccmodel.rig.readers.contract import Format, Signal, SignalFile
 MOST_ELEMENTS = 64
 # Fields that name the elements of the arrays beside them.
 _NAME_FIELDS = ("name", "names", "joint_names", "interface_names")
+# Units of the fields of a message type, where its definition leaves no choice. A joint state may be of an angle or of a
+# displacement, and states none.
+_UNITS = {("geometry_msgs/msg/Wrench", "force"): "N", ("geometry_msgs/msg/Wrench", "torque"): "N*m"}
 _NS = 1_000_000_000
 # Stamps of a message differ less than this from the time of its arrival, unless they are of a simulation's clock.
 _SAME_CLOCK_NS = 24 * 3600 * _NS
 
 
 class _Place(NamedTuple):
-    """Where numbers are in a message: steps to them, and the names of their elements; () for a single number."""
+    """Where numbers are in a message: steps to them, the names of their elements (() for a number), and their unit."""
 
     steps: tuple[str | int, ...]
     name: str
     elements: tuple[str, ...]
+    unit: str = ""
 
 
 @dataclass
@@ -47,8 +51,8 @@ def read(path: Path) -> SignalFile:
     """Read a ROS 1 bag, or a ROS 2 bag: its folder, or its .mcap or .db3 file.
 
     Fields are named by their path from the topic, elements of an array by the names beside it in the message
-    (`joint_states/position/joint1`) or else by their index. Time is the stamp of the header, or else the time at which
-    the bag received the message.
+    (`joint_states/position/joint1`) or else by their index. The force and torque of a wrench have a unit. Time is the
+    stamp of the header, or else the time at which the bag received the message.
     """
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
@@ -115,7 +119,9 @@ def _places(value: Any, steps: tuple, names: tuple[str, ...]) -> Iterator[_Place
         names = _names_in(value) or names
         for key in value.__dataclass_fields__:
             if key not in ("__msgtype__", "header"):
-                yield from _places(getattr(value, key), (*steps, key), names)
+                unit = _UNITS.get((value.__msgtype__, key))
+                for place in _places(getattr(value, key), (*steps, key), names):
+                    yield place._replace(unit=unit or place.unit)
 
 
 def _named(places: Iterator[_Place], steps: tuple, index: int, names: tuple[str, ...]) -> Iterator[_Place]:
@@ -163,6 +169,7 @@ def _clock(series: _Series) -> tuple[list[int], bool]:
 
 def _signals(topic: str, by_names: dict, zero: int, remarks: list[str]) -> Iterator[Signal]:
     chunks: dict[str, list[tuple[NDArray, NDArray]]] = {}
+    units: dict[str, str] = {}
     for series in by_names.values():
         times, other = _clock(series)
         if other:
@@ -173,11 +180,12 @@ def _signals(topic: str, by_names: dict, zero: int, remarks: list[str]) -> Itera
             for k, column in enumerate(values.T):
                 name = "/".join(p for p in (topic.strip("/"), place.name, *place.elements[k : k + 1]) if p)
                 chunks.setdefault(name, []).append((time, column))
+                units[name] = place.unit
     for name, parts in chunks.items():
         time, values = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
         # Several nodes may publish the same joint under lists of names that differ.
         order = np.argsort(time, kind="stable") if len(parts) > 1 else slice(None)
-        yield Signal(name, "", values[order], time[order])
+        yield Signal(name, units[name], values[order], time[order])
 
 
 def _block(values: list, width: int, name: str, remarks: list[str]) -> NDArray:
