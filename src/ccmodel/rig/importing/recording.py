@@ -242,7 +242,8 @@ def _clock(file: _File, first: _File, stated: ImportMap, remarks: list[str]) -> 
     begins = [_first_time(f) for f in (file, first)]
     if min(begins) > _CALENDAR_S:
         return Clock(0.0, 0.0, None, None, "both count from the same date")
-    remarks.append(f"{file.name} and {first.name} are taken to start together: state 'clock' in the map if not")
+    text = f"taken to start together with {first.name}; state 'clock' in the map if not"
+    remarks.append(f"{file.name}: {text}")
     return Clock(begins[1] - begins[0], 0.0, None, None, "taken to start together")
 
 
