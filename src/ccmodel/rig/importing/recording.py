@@ -22,8 +22,8 @@ from ccmodel.typed import nearest
 
 # Times above this count from a calendar date; two files of the same zero then share a clock.
 _CALENDAR_S = 1e8
-# Counts may differ from whole numbers by rounding only.
-_WHOLE = 1e-6
+# Counts may differ from whole numbers as far as the angle they are made from was rounded.
+_WHOLE = 0.1
 
 
 @dataclass(frozen=True)
