@@ -205,10 +205,20 @@ def test_two_files_whose_clocks_are_matched(tmp_path):
     )
 
 
+def test_a_main_file_belongs_to_the_recording_of_its_folder(tmp_path):
+    _, (first, load) = several(tmp_path)
+    folder = tmp_path / "lab/run1"
+    folder.mkdir()
+    files = [first.rename(folder / "drive.csv"), load.rename(folder / "load.csv")]
+    text = SEVERAL.replace("CLOCK", "").replace("signal: F,", "signal: G,").replace("*_load.csv", "*/load.csv")
+    (tmp_path / "map.yaml").write_text(text)
+    assert list(import_files(files, tmp_path / "map.yaml", tmp_path / "batch").recordings) == ["run1"]
+
+
 def test_two_files_without_a_common_clock_are_taken_to_start_together(tmp_path):
     _, written = import_several(tmp_path, "", -12.5)
     one = written.recordings["run1"]
-    assert "run1_load.csv and run1.csv are taken to start together: state 'clock' in the map if not" in one.remarks
+    assert "run1_load.csv: taken to start together with run1.csv; state 'clock' in the map if not" in one.remarks
     assert one.costs[0].offset_s == pytest.approx(-12.7)
     assert one.costs[0].offset_uncertainty_s is None
 

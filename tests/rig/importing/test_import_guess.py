@@ -233,6 +233,106 @@ def test_files_that_do_not_belong_together_are_said(tmp_path):
     assert any(remark.startswith("b.csv: other signals than a.csv") for remark in guessed.remarks)
 
 
+def folders(root, files=("drive", "load")):
+    """Recordings that are folders of two files with equal columns."""
+    for name in ("sine", "step"):
+        for file, end in zip(files, ("in", "out"), strict=True):
+            columns = {"t_s": T, "angle_deg": DEG * R[f"theta_{end}_rad"], "torque_mNm": 1e3 * R[f"tau_{end}_Nm"]}
+            write_text(root / f"{name}/{file}.csv", columns)
+    return sorted(root.glob("*/*.csv"))
+
+
+def test_folders_with_a_file_of_each_end_are_recordings(tmp_path):
+    files = folders(tmp_path / "lab")
+    write_guess(files, tmp_path / "batch")
+    written = import_files(files, tmp_path / "batch/map.yaml", tmp_path / "batch")
+    assert list(written.recordings) == ["sine", "step"]
+    for column in ("theta_in_rad", "theta_out_rad", "tau_in_Nm", "tau_out_Nm"):
+        assert written.recordings["sine"].table[column].to_numpy() == pytest.approx(R[column]), column
+
+
+def test_one_folder_is_one_recording(tmp_path):
+    files = folders(tmp_path / "lab")[:2]
+    write_guess(files, tmp_path / "batch")
+    written = import_files(files, tmp_path / "batch/map.yaml", tmp_path / "batch")
+    assert list(written.recordings) == ["sine"]
+
+
+def test_files_of_equal_signals_that_are_not_called_by_an_end_are_recordings(tmp_path):
+    guessed = write_guess(folders(tmp_path / "lab", ("first", "second")), tmp_path / "batch")
+    assert list(guessed.guessed) == ["main"]
+
+
+def test_files_of_both_ends_that_cannot_be_paired_are_said(tmp_path):
+    files = folders(tmp_path / "lab")[:3]
+    guessed = write_guess(files, tmp_path / "batch")
+    assert list(guessed.guessed) == ["main"]
+    assert any("state by 'files' which is which" in remark for remark in guessed.remarks)
+
+
+def test_names_that_end_with_a_prefixed_unit(tmp_path):
+    columns = {
+        "time_µs": 1e6 * T,
+        "motor_angle_mrad": 1e3 * R["theta_in_rad"],
+        "motor_current_mA": 1e3 * R["tau_in_Nm"] / KT,
+        "load_torque_µNm": 1e6 * R["tau_out_Nm"],
+        "F_drive_kN": 1e-3 * R["F_drive_N"],
+        "loadForceN": R["F_load_N"],
+    }
+    guessed, sure, _ = guess(tmp_path, columns)
+    assert guessed.time.unit == "µs"
+    assert {column: unit for column, (_, _, unit) in sure.items()} == {
+        "theta_in_rad": "mrad",
+        "drive_current_A": "mA",
+        "tau_out_Nm": "µNm",
+        "F_drive_N": "kN",
+        "F_load_N": "N",
+    }
+
+
+def test_a_unit_joined_to_a_word_that_may_be_its_prefix_is_left_open(tmp_path):
+    """Motor strom A, or stro mA?"""
+    columns = {"time [s]": T, "motor angle [rad]": R["theta_in_rad"], "MotorStromA": R["tau_in_Nm"] / KT}
+    _, sure, open_ = guess(tmp_path, columns)
+    assert set(sure) == {"theta_in_rad"}
+    assert open_["drive_current_A"][1] == "MotorStromA"
+
+
+def test_a_motor_at_the_load(tmp_path):
+    """The group says the end where both ends have a motor; where a name says both ends, none is sure."""
+    columns = {
+        "time [s]": T,
+        "Drive/Position [rad]": R["theta_in_rad"],
+        "Load/Position [rad]": R["theta_out_rad"],
+        "Drive/Motor current [A]": R["tau_in_Nm"] / KT,
+        "Load/Motor current [A]": R["tau_out_Nm"] / KT,
+        "load motor torque [Nm]": R["tau_out_Nm"],
+    }
+    _, sure, open_ = guess(tmp_path, columns)
+    assert sure["drive_current_A"][1] == "Drive/Motor current"
+    assert sure["load_current_A"][1] == "Load/Motor current"
+    assert {signal for _, signal, _ in open_.values()} == {"load motor torque"}
+
+
+def tensions_by_cable(first, second):
+    columns = {"time [s]": T, "drive angle [rad]": R["theta_in_rad"], "load angle [rad]": R["theta_out_rad"]}
+    columns |= {f"f{first}_drive [N]": R["T1_N"], f"f{second}_drive [N]": R["T3_N"]}
+    return columns | {f"f{first}_load [N]": R["T2_N"], f"f{second}_load [N]": R["T4_N"]}
+
+
+def test_forces_in_each_cable_are_tensions(tmp_path):
+    _, sure, _ = guess(tmp_path, tensions_by_cable("A", "B"))
+    tensions = {column: signal for column, (_, signal, _) in sure.items() if column.startswith("T")}
+    assert tensions == {"T1_N": "fA_drive", "T2_N": "fA_load", "T3_N": "fB_drive", "T4_N": "fB_load"}
+
+
+def test_cables_that_a_positive_angle_does_not_pull_are_not_sure(tmp_path):
+    guessed, sure, open_ = guess(tmp_path, tensions_by_cable("B", "A"))
+    assert set(sure) == {"theta_in_rad", "theta_out_rad"}
+    assert set(open_) == {"T1_N", "T2_N", "T3_N", "T4_N"}
+    assert any("which cable is A" in " ".join(g.why) for g in guessed.guesses)
+
+
 def test_a_map_is_never_overwritten(tmp_path):
     guess(tmp_path, {"t [s]": T, "motor angle [rad]": R["theta_in_rad"]})
     with pytest.raises(InputError, match="there is a map; use it with --map"):

@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 from made_up_lab import recording, write_text
 
@@ -102,6 +103,15 @@ def test_a_file_without_units_needs_them_in_the_map(tmp_path):
         import_of(tmp_path, GOOD.replace(", unit: N", ""), **columns)
     with pytest.raises(InputError, match="states no unit of the time 't': add it to the map"):
         import_of(tmp_path, GOOD.replace("unit: s", ""), **columns)
+
+
+def test_counts_from_an_angle_that_was_written_with_few_digits(tmp_path):
+    r = recording()
+    whole = np.round(r["theta_in_rad"] * 4096 / 2 / np.pi)
+    column = 'drive_encoder_counts: {signal: q, unit: deg, gain: "11.3777778 count/deg"}'
+    text = GOOD.replace("theta_in_rad: {signal: q, unit: rad}", column)
+    written = import_of(tmp_path, text, t=r["time_s"], q=np.round(whole * 360 / 4096, 4), F=r["F_drive_N"])
+    assert written.table["drive_encoder_counts"].tolist() == whole.tolist()
 
 
 def test_degrees_are_no_counts(tmp_path):

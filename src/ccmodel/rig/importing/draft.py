@@ -1,16 +1,18 @@
 """The map that a guess makes: a text with comments, to be corrected by a person."""
 
 import json
+import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 
 from ccmodel.rig import readers
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.importing.columns import DRIVE_ANGLES, UNIT_OF
-from ccmodel.rig.importing.guess import Guess, GuessedFile, guess_file
+from ccmodel.rig.importing.guess import Guess, GuessedFile, guess_file, open_questions
 from ccmodel.rig.importing.map import TimeSource
+from ccmodel.rig.importing.names import DRIVE, LOAD, read_name
 from ccmodel.rig.importing.sources import MAIN, names_of
 from ccmodel.rig.importing.writing import MAP, check_folder
 from ccmodel.rig.readers.contract import SignalFile
@@ -77,9 +79,11 @@ def write_guess(files: Sequence[Path], out: Path) -> GuessedMap:
     if not files:
         raise InputError("no file to import: give the rig's logs")
     names = names_of([Path(f) for f in files])
-    kinds = _kinds(_read_all(names))
-    roles, patterns, remarks = _roles(kinds, names)
-    guessed = {role: guess_file(kinds[key][0][1]) for role, key in roles.items()}
+    kinds, roles, patterns, remarks = _sorted_files(_read_all(names), names)
+    ends = {role: read_name(role).end if patterns else None for role in roles}
+    guessed = {role: guess_file(kinds[key][0][1], ends[role]) for role, key in roles.items()}
+    questions = tuple(open_questions([guess for one in guessed.values() for guess in one.guesses]))
+    guessed = {role: replace(one, open=questions) for role, one in guessed.items()}
     looked_at = {role: names[kinds[key][0][0]] for role, key in roles.items()}
     for role, key in roles.items():
         remarks += [f"{looked_at[role]}: {remark}" for remark in kinds[key][0][1].remarks]
@@ -101,6 +105,35 @@ def _read_all(names: Mapping[Path, str]) -> dict[Path, SignalFile]:
     return read
 
 
+def _sorted_files(
+    read: Mapping[Path, SignalFile], names: Mapping[Path, str]
+) -> tuple[dict[tuple, list], dict, dict, list]:
+    """Files by kind, and what `_roles` says of the kinds."""
+    kinds = _kinds(read)
+    by_end = _kinds_by_end(kinds)
+    if not by_end:
+        return kinds, *_roles(kinds, names)
+    roles, patterns, _ = _roles(by_end, names)
+    # One file of each end in one folder is one recording.
+    roles, patterns = (roles, patterns) if patterns else _roles_in_folders(by_end, fewest=1) or ({}, {})
+    if patterns:
+        return by_end, roles, patterns, []
+    text = "some names of files say drive and some load: if two are one recording, state by 'files' which is which"
+    return kinds, *_roles(kinds, names)[:2], [text]
+
+
+def _kinds_by_end(kinds: Mapping[tuple, list]) -> dict[tuple, list[tuple[Path, SignalFile]]]:
+    """Files with the same signals, apart by the end that their names say; empty unless both ends occur."""
+    if len(kinds) > 1:
+        return {}
+    ((key, files),) = kinds.items()
+    ends: dict[str | None, list] = {DRIVE: [], LOAD: []}
+    for path, file in files:
+        reading = read_name(path.stem)
+        ends.setdefault(None if reading.end_is_hint else reading.end, []).append((path, file))
+    return {} if not all(ends.values()) or None in ends else {(*key, end): found for end, found in ends.items()}
+
+
 def _kinds(read: Mapping[Path, SignalFile]) -> dict[tuple, list[tuple[Path, SignalFile]]]:
     """Files by the names of their signals; the kind with an angle of the drive first."""
     kinds: dict[tuple, list] = {}
@@ -120,6 +153,8 @@ def _roles(
     keys = list(kinds)
     if len(keys) == 1:
         return {MAIN: keys[0]}, {}, []
+    if of_folders := _roles_in_folders(kinds):
+        return *of_folders, []
     stems = [[PurePath(names[path]).name for path, _ in kinds[key]] for key in keys]
     ends = [_shared_end(group, stems) for group in stems]
     recordings = [{name[: len(name) - len(end)] for name in group} for group, end in zip(stems, ends, strict=True)]
@@ -130,10 +165,33 @@ def _roles(
         return {MAIN: keys[0]}, {}, [f"{text}; {advice}"]
     roles, patterns = {}, {}
     for key, end in zip(keys, ends, strict=True):
-        role = re.sub(r"\W+", "-", PurePath(end).stem).strip("-_.") or PurePath(end).suffix.strip(".") or "file"
-        role = role if role != MAIN else "first"
+        role = _role(PurePath(end).stem) or PurePath(end).suffix.strip(".") or "file"
         roles[role], patterns[role] = key, f"*{end}"
     return roles, patterns, []
+
+
+def _roles_in_folders(kinds: Mapping[tuple, list], fewest: int = 2) -> tuple[dict[str, tuple], dict[str, str]] | None:
+    """Roles and patterns if each folder is a recording, with a file of each kind that has the same name everywhere."""
+    paths = {key: [Path(os.path.abspath(path)) for path, _ in files] for key, files in kinds.items()}
+    called = {key: {path.name for path in found} for key, found in paths.items()}
+    folders = [sorted(path.parent for path in found) for found in paths.values()]
+    if (
+        len(folders[0]) < fewest
+        or any(f != folders[0] for f in folders)
+        or any(len(names) > 1 for names in called.values())
+    ):
+        return None
+    roles, patterns = {}, {}
+    for key, (name,) in called.items():
+        role = _role(PurePath(name).stem) or "file"
+        role = role if role not in roles else PurePath(name).suffix.strip(".")
+        roles[role], patterns[role] = key, f"*/{name}"
+    return roles, patterns
+
+
+def _role(text: str) -> str:
+    role = re.sub(r"\W+", "-", text).strip("-_.")
+    return role if role != MAIN else "first"
 
 
 def _shared_end(group: Sequence[str], groups: Sequence[Sequence[str]]) -> str:
@@ -184,7 +242,8 @@ def map_text(guessed: Mapping[str, GuessedFile], patterns: Mapping[str, str], re
         for role, one in guessed.items():
             lines += [f"  {role}:", f"    pattern: {json.dumps(patterns[role])}", *_time_lines(one, "    ")]
             if role != next(iter(guessed)):
-                lines += ["    # clock: {match: [signal here, the same quantity in the first file]}"]
+                match = "{match: [signal here, the same quantity in the first file]}"
+                lines += [f"    # clock: {{offset_s: , drift: 0}}   # or {match}; without it, the files start together"]
     questions = dict.fromkeys(text for one in guessed.values() for text in one.open)
     lines += ["", "# Not in these files:", *(f"# - {question}" for question in questions)]
     return "\n".join(lines) + "\n"

@@ -40,6 +40,8 @@ _USUAL_UNIT = {ANGLE: "deg", TORQUE: "Nm", CURRENT: "A", FORCE: "N"}
 _WEIGHT = {"g": "gf", "kg": "kgf", "lb": "lbf", "oz": "ozf"}
 _TURN_RAD, _FEW_TURNS_DEG = 2 * np.pi, 20.0
 _ENDS = (DRIVE, LOAD)
+# Numbers of the tensions of cables A and B at each end.
+_TENSIONS = {DRIVE: (1, 3), LOAD: (2, 4)}
 # Correlation from which two tensions are seen to move alike.
 _ALIKE = 0.5
 _UNKNOWN = "its name does not say what it is, and it has no unit: not used"
@@ -110,13 +112,15 @@ class GuessedFile:
     open: tuple[str, ...] = field(default=())
 
 
-def guess_file(file: SignalFile) -> GuessedFile:
+def guess_file(file: SignalFile, end: str | None = None) -> GuessedFile:
     """Guess what the signals of a file are.
 
     Parameters
     ----------
     file : SignalFile
         One file of a recording.
+    end : str or None
+        End of the transmission that the name of the file says, for signals whose names say none.
 
     Returns
     -------
@@ -128,14 +132,16 @@ def guess_file(file: SignalFile) -> GuessedFile:
     rest = [s for s in file.signals if time is None or s.name != time.signal]
     guesses = [_first_guess(signal, readings[signal.name]) for signal in rest]
     aligned = _aligned(rest)
+    guesses = [_with_end_of_file(g, end) for g in guesses] if end else guesses
     guesses = _without_lone_letters(guesses, readings)
     guesses = _by_shape(guesses, aligned)
     guesses = _with_tensions(guesses, readings, aligned)
     guesses = _with_ends(guesses, aligned)
+    guesses = _with_cables(guesses, readings, aligned)
     guesses = _with_columns(guesses)
     guesses = _without_rivals(guesses)
     guesses = _with_signs(guesses, aligned)
-    return GuessedFile(time, sure, why, tuple(guesses), tuple(_open_questions(guesses)))
+    return GuessedFile(time, sure, why, tuple(guesses), tuple(open_questions(guesses)))
 
 
 def _guess_time(signals: Sequence[Signal], readings: Mapping[str, Reading]) -> tuple[TimeSource | None, bool, str]:
@@ -252,6 +258,12 @@ def _aligned(signals: Sequence[Signal]) -> dict[str, NDArray]:
     return aligned
 
 
+def _with_end_of_file(one: Guess, end: str) -> Guess:
+    if one.quantity is None or one.end is not None or one.column is not None:
+        return one
+    return replace(one, end=end, score=one.score + 2, why=(*one.why, f"the name of the file says {end}"))
+
+
 def _without_lone_letters(guesses: list[Guess], readings: Mapping[str, Reading]) -> list[Guess]:
     """An end that a letter says (q_m, q_l) is sure only if both letters occur: F_l may be the left force."""
     hinted = {g.signal for g in guesses if g.end and readings[g.signal].end_is_hint}
@@ -364,6 +376,26 @@ def _the_other(one: Guess, end: str, quantity: str, aligned: Mapping[str, NDArra
     return replace(one, end=end, sure=one.sure and bool(seen), why=(*one.why, reason))
 
 
+def _with_cables(guesses: list[Guess], readings: Mapping[str, Reading], aligned: Mapping[str, NDArray]) -> list[Guess]:
+    """Forces in cable A and in cable B at one end are tensions, and not their sum."""
+    forces = [g for g in guesses if g.quantity == FORCE and g.column is None and units.quantity_of(g.unit) == "a force"]
+    at = {(g.end, readings[g.signal].cable): g for g in forces}
+    angle = {g.end: aligned[g.signal] for g in guesses if g.quantity == ANGLE and g.end}
+    result = {}
+    for end in _ENDS:
+        pair = [at.get((end, cable)) for cable in ("a", "b")]
+        if None in pair or sum(g.end == end for g in forces) > 2:
+            continue
+        rule = shapes.sign_of_drive_torque if end == DRIVE else shapes.sign_of_load_torque
+        difference = aligned[pair[0].signal] - aligned[pair[1].signal]
+        swapped = end in angle and rule(angle[end], difference) == -1
+        for g, number, cable in zip(pair, _TENSIONS[end], "AB", strict=True):
+            doubt = "but a positive angle pulls B: which cable is A, or which sign has the angle?" if swapped else ""
+            why = (*g.why, f"cable {cable} at the {end}", doubt)
+            result[g.signal] = replace(g, column=f"T{number}_N", sure=g.sure and not swapped, why=why)
+    return [result.get(g.signal, g) for g in guesses]
+
+
 def _with_columns(guesses: list[Guess]) -> list[Guess]:
     result = []
     for g in guesses:
@@ -432,7 +464,7 @@ def _with_signs(guesses: list[Guess], aligned: Mapping[str, NDArray]) -> list[Gu
     return result
 
 
-def _open_questions(guesses: Sequence[Guess]) -> list[str]:
+def open_questions(guesses: Sequence[Guess]) -> list[str]:
     """What no log says and batch.yaml needs."""
     columns = {g.column for g in guesses if g.column}
     texts = []

@@ -1,6 +1,6 @@
 """The map of an import: what each column of a log is made of (`map.yaml`, `docs/import.md`)."""
 
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
@@ -143,7 +143,8 @@ class FileRule(TypedModel):
     Attributes
     ----------
     pattern : str
-        Its name, with one `*` for the part that names the recording, such as "*_load.csv".
+        Its name, with one `*` for the part that names the recording, such as "*_load.csv"; with its folder if the
+        folder names the recording, such as "*/load.csv".
     time, text, clock
         As for the whole map, for this file.
     """
@@ -160,8 +161,14 @@ class FileRule(TypedModel):
             raise ValueError("needs one * for the part that names the recording, as '*_load.csv'")
         return pattern
 
-    def recording_of(self, name: str) -> str | None:
-        """Part of a file's name that the star stands for; None if the name does not fit."""
+    @property
+    def depth(self) -> int:
+        """Number of names in the pattern: 1 for that of the file, 2 with its folder."""
+        return self.pattern.count("/") + 1
+
+    def recording_of(self, path: PurePath) -> str | None:
+        """Part of a file's path that the star stands for; None if the path does not fit."""
+        name = "/".join(path.parts[-self.depth :])
         before, after = self.pattern.split("*")
         fits = name.startswith(before) and name.endswith(after) and len(name) > len(before) + len(after)
         return name[len(before) : len(name) - len(after)] if fits else None

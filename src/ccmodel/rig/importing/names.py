@@ -28,7 +28,7 @@ _WORDS = {
     VELOCITY: "vel velocity speed omega w dq qd dtheta rpm drehzahl geschwindigkeit",
     ANGLE: "q pos position ang angle theta th phi enc encoder rot rotation winkel drehwinkel geber drehgeber lage"
     " inkrementalgeber resolver counts",
-    TORQUE: "torque torq trq tq tau moment mom drehmoment md",
+    TORQUE: "torque torq trq tq tau moment mom drehmoment md effort",
     CURRENT: "current curr cur strom i iq amps isense",
     FORCE: "force f loadcell lc cell tension kraft seilkraft zugkraft dms kmd kraftsensor fsum pretension",
     TIME: "time t zeit timestamp stamp ts zeitstempel uhrzeit elapsed clock secs",
@@ -52,11 +52,14 @@ _END_PARTS = {
     DRIVE: ("antrieb", "motor", "drive", "input", "eingang", "proximal", "actuator"),
     LOAD: ("abtrieb", "last", "load", "output", "ausgang", "distal", "greifer"),
 }
+# Words for a device that both ends may have: in Load/Motor current the group says the end.
+_DEVICES = ("motor", "mot", "mtr", "actuator", "aktor", "servo")
 # Letters that name an end beside a quantity: q_m and q_l. They are hints only.
 _END_LETTERS = {"m": DRIVE, "l": LOAD}
 _SPELT = str.maketrans(
     {"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "θ": " theta ", "ϑ": " theta ", "φ": " phi ", "τ": " tau "}
 )
+_WORD_END = re.compile(r"[^\s_./:,;()\[\]-]+$")
 _PIECES = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 
 
@@ -76,6 +79,8 @@ class Reading:
         Unit at the end of the name; "" if there is none.
     number : int or None
         Number in it.
+    cable : str or None
+        "a" or "b", if a letter by itself says so.
     words : tuple of str
         The words that say so.
     """
@@ -85,6 +90,7 @@ class Reading:
     end_is_hint: bool
     unit: str
     number: int | None
+    cable: str | None
     words: tuple[str, ...]
 
 
@@ -92,18 +98,18 @@ def read_name(name: str) -> Reading:
     """Read the name of a signal."""
     raw, pieces = _pieces(name)
     quantity, said_quantity = _find(pieces, _WORDS, _PARTS)
-    unit = _unit_at_end(raw, quantity)
+    unit = _unit_at_end(name, raw, quantity)
     without_unit = pieces[: len(pieces) - len(_PIECES.findall(unit))] if unit else pieces
     if quantity is None and "M" in raw:
         quantity, said_quantity = TORQUE, "M"
     if len(raw) == 2 and raw[0] == "T" and raw[1] in "1234":
         quantity, said_quantity = FORCE, "T"
     # A joined word may say both (Lastwinkel), a single one only one of the two.
-    end, said_end = _find([p for p in without_unit if p not in (said_quantity, LOADCELL)], _ENDS, _END_PARTS)
-    if end is None and said_quantity != LOADCELL:
+    end, said_end, contradicted = _end([p for p in without_unit if p not in (said_quantity, LOADCELL)], name)
+    if end is None and not contradicted and said_quantity != LOADCELL:
         end, said_end = _find([said_quantity], {}, _END_PARTS)
     hint = None
-    if end is None and quantity is not None:
+    if end is None and not contradicted and quantity is not None:
         hint = next((p for p in without_unit if p in _END_LETTERS and p != said_quantity.lower()), None)
     numbers = [int(piece) for piece in pieces if piece.isdigit() and len(piece) == 1]
     return Reading(
@@ -112,6 +118,7 @@ def read_name(name: str) -> Reading:
         hint is not None,
         unit,
         numbers[-1] if numbers else None,
+        cables.pop() if len(cables := {"a", "b"} & set(without_unit)) == 1 else None,
         tuple(dict.fromkeys(word for word in (said_quantity, said_end or hint) if word)),
     )
 
@@ -133,11 +140,31 @@ def _find(pieces: list[str], words: dict[str, str], parts: dict[str, tuple[str, 
     return None, ""
 
 
+def _end(pieces: list[str], name: str) -> tuple[str | None, str, bool]:
+    """End that the words of a name say, the word, and whether other words say the other end, so that none is known."""
+    said = {end: _find(pieces, {end: _ENDS[end]}, {end: _END_PARTS[end]})[1] for end in (DRIVE, LOAD)}
+    if not all(said.values()):
+        end = next((end for end, word in said.items() if word), None)
+        return end, said.get(end, ""), False
+    group, _, own = (_pieces(part)[1] for part in name.rpartition("/"))
+    device_only = said[DRIVE] in _DEVICES and said[DRIVE] in own and said[LOAD] in group
+    return (LOAD, said[LOAD], False) if device_only else (None, "", True)
+
+
 def _joined(part: str, word: str) -> bool:
     return word.startswith(part) or word.endswith(part) or word.endswith(part + "s")
 
 
-def _unit_at_end(raw: list[str], quantity: str | None) -> str:
-    """Unit that ends a name, as in tau_Nm; a last word such as "in" is none unless it measures the quantity."""
-    last = raw[-1] if len(raw) > 1 else ""
-    return last if last and units.quantity_of(last) in MEASURES.get(quantity, ()) else ""
+def _unit_at_end(name: str, raw: list[str], quantity: str | None) -> str:
+    """Unit that ends a name, as in tau_Nm; a last word such as "in" is none unless it measures the quantity.
+
+    The end of a joined word is none either if it may be a longer one: StromA may be A or mA.
+    """
+    if len(raw) < 2:
+        return ""
+    word = _WORD_END.search(name)
+    ends = (word[0] if word else "", raw[-1])
+    unit = next((end for end in ends if end and units.quantity_of(end) in MEASURES.get(quantity, ())), "")
+    before = name[: name.rfind(unit)][-1:] if unit else ""
+    longer = before.isalpha() and units.quantity_of(before + unit) == units.quantity_of(unit)
+    return "" if longer else unit

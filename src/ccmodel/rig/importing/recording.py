@@ -22,8 +22,8 @@ from ccmodel.typed import nearest
 
 # Times above this count from a calendar date; two files of the same zero then share a clock.
 _CALENDAR_S = 1e8
-# Counts may differ from whole numbers by rounding only.
-_WHOLE = 1e-6
+# Counts may differ from whole numbers as far as the angle they are made from was rounded.
+_WHOLE = 0.1
 
 
 @dataclass(frozen=True)
@@ -242,7 +242,8 @@ def _clock(file: _File, first: _File, stated: ImportMap, remarks: list[str]) -> 
     begins = [_first_time(f) for f in (file, first)]
     if min(begins) > _CALENDAR_S:
         return Clock(0.0, 0.0, None, None, "both count from the same date")
-    remarks.append(f"{file.name} and {first.name} are taken to start together: state 'clock' in the map if not")
+    text = f"taken to start together with {first.name}; state 'clock' in the map if not"
+    remarks.append(f"{file.name}: {text}")
     return Clock(begins[1] - begins[0], 0.0, None, None, "taken to start together")
 
 

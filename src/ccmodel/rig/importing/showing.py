@@ -47,7 +47,7 @@ def next_of_guess(guessed: GuessedMap, files: Sequence[Path], out: Path) -> str:
 
 
 def import_tables(written: Written) -> list[RenderableType]:
-    """A table of the recordings, one of the joined clocks, and what was assumed."""
+    """A table of the recordings, one of the joined columns and one of their clocks, and what was assumed."""
     table = Table("recording", "samples", "duration", "rate", "columns", box=None, pad_edge=False)
     for id_, one in written.recordings.items():
         time = one.table["time_s"]
@@ -57,7 +57,7 @@ def import_tables(written: Written) -> list[RenderableType]:
     shown: list[RenderableType] = [table]
     costs = [(id_, cost) for id_, one in written.recordings.items() for cost in one.costs]
     if costs:
-        shown += [Text(), _cost_table(costs)]
+        shown += [Text(), _cost_table([cost for _, cost in costs]), Text(), _clock_table(costs)]
     remarks = [(id_, remark) for id_, one in written.recordings.items() for remark in one.remarks]
     shown += [Text(), *(Text(line) for line in _together(remarks)), *(Text(line) for line in written.remarks)]
     return shown
@@ -78,16 +78,33 @@ def _guess_cells(guess: Guess) -> list[Text]:
     return _cells(guess.column or "not used", sign + guess.signal, guess.unit, sure, why)
 
 
-def _cost_table(costs: Sequence[tuple[str, Cost]]) -> Table:
-    headings = ("joined", "signal", "rate", "by", "error midway", "noise", "offset", "drift", "clock")
+def _cost_table(costs: Sequence[Cost]) -> Table:
+    """A row for each joined column, with its largest error and noise of all recordings."""
+    headings = ("joined", "signal", "rate", "by", "error midway", "noise")
     table = Table(*headings, box=None, pad_edge=False)
+    for column in dict.fromkeys(cost.column for cost in costs):
+        of_column = [cost for cost in costs if cost.column == column]
+        one, unit = of_column[0], UNIT_OF[column]
+        errors, noises = ([c.interpolation_error for c in of_column], [c.noise for c in of_column])
+        rate = min(cost.rate_Hz for cost in of_column)
+        row = (column, one.signal, f"{rate:.4g} Hz", one.by, _largest(errors, unit), _largest(noises, unit))
+        table.add_row(*_cells(*row))
+    return table
+
+
+def _clock_table(costs: Sequence[tuple[str, Cost]]) -> Table:
+    """A row for each clock; recordings whose clocks are alike share one."""
+    columns: dict[tuple, list[str]] = {}
     for id_, cost in costs:
-        unit = UNIT_OF[cost.column]
         offset = f"{cost.offset_s:.6g} s" + _plus_minus(cost.offset_uncertainty_s, 1.0, "s")
         drift = f"{1e6 * cost.drift:.3g} ppm" + _plus_minus(cost.drift_uncertainty, 1e6, "ppm")
-        error, noise = (_number(value, unit) for value in (cost.interpolation_error, cost.noise))
-        row = (f"{id_} {cost.column}", cost.signal, f"{cost.rate_Hz:.4g} Hz", cost.by, error, noise, offset, drift)
-        table.add_row(*_cells(*row, cost.how))
+        columns.setdefault((id_, offset, drift, cost.how), []).append(cost.column)
+    alike: dict[tuple, list[str]] = {}
+    for (id_, *clock), joined in columns.items():
+        alike.setdefault((_and_more(joined), *clock), []).append(id_)
+    table = Table("recording", "joined", "offset", "drift", "clock", box=None, pad_edge=False)
+    for clock, ids in alike.items():
+        table.add_row(*_cells(_and_more(ids), *clock))
     return table
 
 
@@ -97,8 +114,13 @@ def _plus_minus(uncertainty: float | None, scale: float, unit: str) -> str:
     return f" ± {scale * uncertainty:.2g} {unit}" if uncertainty else ""
 
 
-def _number(value: float | None, unit: str) -> str:
-    return "" if value is None else f"{value:.3g} {unit}"
+def _largest(values: Sequence[float | None], unit: str) -> str:
+    known = [value for value in values if value is not None]
+    return f"{max(known):.3g} {unit}" if known else ""
+
+
+def _and_more(names: Sequence[str]) -> str:
+    return f"{names[0]}{f' and {len(names) - 1} more' if len(names) > 1 else ''}"
 
 
 def _together(remarks: Sequence[tuple[str, str]]) -> list[str]:
@@ -107,7 +129,7 @@ def _together(remarks: Sequence[tuple[str, str]]) -> list[str]:
     for id_, text in remarks:
         file, colon, rest = text.partition(": ")
         by_text.setdefault(rest if colon else text, []).append(file if colon else id_)
-    return [f"{who[0]}{f' and {len(who) - 1} more' if len(who) > 1 else ''}: {text}" for text, who in by_text.items()]
+    return [f"{_and_more(who)}: {text}" for text, who in by_text.items()]
 
 
 def _command(files: Sequence[Path], out: Path, map_file: Path) -> str:

@@ -32,7 +32,7 @@ class Source:
 
 def names_of(files: Sequence[Path]) -> dict[Path, str]:
     """Names of files for people and for provenance: their paths below the folder that they share."""
-    resolved = {file: Path(os.path.abspath(file)) for file in files}
+    resolved = {file: _absolute(file) for file in files}
     shared = os.path.commonpath([path.parent for path in resolved.values()])
     return {file: path.relative_to(shared).as_posix() for file, path in resolved.items()}
 
@@ -94,22 +94,38 @@ def _given(listed: str, names: dict[Path, str], recording: str) -> Path:
 
 def _by_name(names: dict[Path, str], stated: ImportMap) -> list[Source]:
     """A recording for each main file; the further files are those whose star stands for the same name."""
+    named = {file: _recording_of(file, name, stated) for file, name in names.items()}
+    ids = {id_ for id_ in named.values() if id_}
     groups: dict[str, list[Path]] = {}
     for file, name in names.items():
-        groups.setdefault(_recording_of(name, stated) or safe_id(name), []).append(file)
+        folder = _id_in(name, 2, _absolute(file).parent.name)
+        own = folder if folder in ids and _by_folder(stated) else safe_id(name)
+        groups.setdefault(named[file] or own, []).append(file)
     return [Source(safe_id(id_), _by_role(found, stated, id_)) for id_, found in groups.items()]
 
 
-def _recording_of(name: str, stated: ImportMap) -> str | None:
-    parts = (rule.recording_of(PurePath(name).name) for rule in stated.files.values())
-    part = next((part for part in parts if part), None)
-    return part and safe_id(str(PurePath(name).with_name(part + ".log")))
+def _recording_of(file: Path, name: str, stated: ImportMap) -> str | None:
+    fits = ((rule, rule.recording_of(_absolute(file))) for rule in stated.files.values())
+    return next((_id_in(name, rule.depth, part) for rule, part in fits if part), None)
+
+
+def _id_in(name: str, depth: int, part: str) -> str:
+    """Id of a recording that `part` names, below the folders above the last `depth` names of a path."""
+    return safe_id("/".join((*PurePath(name).parts[:-depth], f"{part}.log")))
+
+
+def _by_folder(stated: ImportMap) -> bool:
+    return any(rule.depth > 1 for rule in stated.files.values())
+
+
+def _absolute(file: Path) -> Path:
+    return Path(os.path.abspath(file))
 
 
 def _by_role(found: list[Path], stated: ImportMap, recording: str) -> dict[str, Path]:
     roles: dict[str, Path] = {}
     for file in found:
-        role = next((r for r, rule in stated.files.items() if rule.recording_of(file.name)), MAIN)
+        role = next((r for r, rule in stated.files.items() if rule.recording_of(_absolute(file))), MAIN)
         if role in roles:
             both = f"{roles[role].name} and {file.name} would both be its '{role}' file"
             advice = "state in the map by 'files' which is which, or by 'recordings' that they are two recordings"

@@ -246,7 +246,8 @@ def _candidate(rows: list[str], separator: str, decimal: str) -> tuple[int, _Gri
 
 def _no_numbers(rows: list[str], lines: list[str]) -> str:
     found = (rows or lines)[0].strip()[:40]
-    return f"has no rows of numbers (found '{found}'): it is no log, or its separator must be stated (text.separator)"
+    advice = "it is no log (leave it out), or its separator must be stated (text.separator)"
+    return f"has no rows of numbers (found '{found}'): {advice}"
 
 
 def _first_row(lines: list[str], grid: _Grid, layout: TextLayout) -> int:
