@@ -270,7 +270,7 @@ def _stated(section: str, key: str, needs: str = "load_cell_V"):
         copy.columns(needs)
         if key not in copy.rig[section]:
             raise NotApplicableError
-        factor = float(np.exp(random.uniform(np.log(7), np.log(20)))) ** random.choice([-1, 1])
+        factor = float(np.exp(random.uniform(np.log(4), np.log(20)))) ** random.choice([-1, 1])
         copy.rig[section][key] = float(copy.rig[section][key] * factor)
         return f"rig.{section}.{key}"
 

@@ -149,3 +149,16 @@ def test_pretensions_are_stated_for_each_cable(tmp_path):
         entry["pretension_N"] = 3 * T0
     said = said_of(bench.write().folder)
     assert any(sentence.startswith("batch.yaml pretension_N") for sentence in said)
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        (lambda d: d["rig"]["accuracy"].update(torque_Nm=0.1), "rig.accuracy.torque_Nm"),
+        (lambda d: d["recordings"][0].update(conduit=[{"length_m": 1200.0, "bend_rad": 3.1416}]), "length_m"),
+    ],
+)
+def test_a_stated_value_in_another_unit_is_named(tmp_path, change, named):
+    bench = Bench(tmp_path)
+    change(bench.described)
+    assert any(sentence.startswith(f"batch.yaml {named}") for sentence in said_of(bench.write().folder))

@@ -35,6 +35,8 @@ PRETENSION_FACTOR, PRETENSION_N = 2.0, 3.0
 MOST_TORQUE = 1.5
 # Radii of pulleys, m.
 SMALLEST_RADIUS_M, LARGEST_RADIUS_M = 3e-4, 0.25
+# Longest path of a conduit, m, and stated accuracy as a share of the largest range that its sensors show.
+LONGEST_PATH_M, COARSEST_ACCURACY = 100.0, 0.5
 # Bend below which a conduit counts as straight, rad, and logarithm of the ratio of tensions that a straight one lacks.
 STRAIGHT_RAD, STRAIGHT_LOG_RATIO = 0.3, 0.2
 
@@ -58,3 +60,5 @@ EQUAL_CYCLES, FEWEST_CROSSINGS = 0.05, 4
 
 # Share of equal changes from which a channel is a copy: sensors with noise, and angles, whose counts agree by chance.
 COPIED_NOISE, COPIED_ANGLE = 0.5, 0.98
+# White noise over the stated accuracy above which a channel has noise, and not only digits.
+NOISE_OVER_ACCURACY = 0.1

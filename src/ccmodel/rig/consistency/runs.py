@@ -17,7 +17,7 @@ from ccmodel.channels import (
 )
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
-from ccmodel.rig.consistency.parity import Parity, speed
+from ccmodel.rig.consistency.parity import Parity, speed, white_noise
 from ccmodel.rig.sensor_checks import is_noisy
 
 
@@ -61,7 +61,10 @@ def _is_copy(one: Parity, other: Parity, channel: str) -> bool:
         return False
     if channel in ANGLE_AT.values():
         limit = limits.COPIED_ANGLE
-    elif is_noisy(a):
+    elif (
+        is_noisy(a)
+        or white_noise(one.recording[channel]) > limits.NOISE_OVER_ACCURACY * one.recording.accuracy[channel]
+    ):
         limit = limits.COPIED_NOISE
     else:  # Without noise, equal physics gives equal readings.
         return False

@@ -5,7 +5,7 @@ from math import isclose
 
 import numpy as np
 
-from ccmodel.channels import ANGLE_AT, SUM_AT, TAU_OUT, THETA_IN, THETA_OUT
+from ccmodel.channels import ANGLE_AT, SUM_AT, TAU_OUT, THETA_IN, THETA_OUT, TORQUE_AT
 from ccmodel.rig.batch import Batch
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
@@ -21,8 +21,8 @@ _SAME = 1.8
 def wrong_geometry(parities: Sequence[Parity]) -> list[Contradiction]:
     """Radii, and scales of angles: the first that is found, since one makes the other relations wrong."""
     ratios, batch = pooled(parities), parities[0].batch
-    if radii := _radii(batch):
-        return radii
+    if units := [*_radii(batch), *_lengths(parities)]:
+        return units
     exchanged = _exchanged(ratios, batch) and float(np.median([p.signs.get("loss", 0.0) for p in parities])) < 0
     return [] if exchanged else _angle_of_one_end(ratios) or _both_angles(ratios)
 
@@ -30,7 +30,8 @@ def wrong_geometry(parities: Sequence[Parity]) -> list[Contradiction]:
 def wrong_scales(parities: Sequence[Parity]) -> list[Contradiction]:
     """Scale of the load torque, and stated values of spring, cable and pretension that the recordings contradict."""
     ratios, batch = pooled(parities), parities[0].batch
-    return (_load_torque(ratios) or _spring(ratios, batch)) + _pretension(ratios) + _cable(ratios, batch)
+    found = (_load_torque(ratios) or _spring(ratios, batch)) + _pretension(ratios) + _cable(ratios, batch)
+    return [*found, *_accuracies(parities)]
 
 
 def pooled(parities: Sequence[Parity]) -> dict[str, float]:
@@ -62,6 +63,32 @@ def _radii(batch: Batch) -> list[Contradiction]:
             text = f"rig.{end.name}.pulley_radius_m is {radius:g} m{unit}: no pulley of a cable rig; state it in m"
             found.append(Contradiction(f"rig.{end.name}.pulley_radius_m", text))
     return found
+
+
+def _lengths(parities: Sequence[Parity]) -> list[Contradiction]:
+    """Conduits that are longer than any, as lengths in mm are."""
+    longest = max(parities, key=lambda p: p.recording.path.length_m).recording
+    if longest.path.length_m <= limits.LONGEST_PATH_M:
+        return []
+    text = (
+        f"the conduit of {longest.id} is {longest.path.length_m:g} m long: are the lengths in mm? State length_m in m"
+    )
+    return [Contradiction("length_m", text)]
+
+
+def _accuracies(parities: Sequence[Parity]) -> list[Contradiction]:
+    """Stated accuracies that are as large as what the sensors read."""
+    stated = {**dict.fromkeys(TORQUE_AT.values(), "torque_Nm"), **dict.fromkeys(SUM_AT.values(), "load_cell_N")}
+    found = {}
+    for channel, key in stated.items():
+        reading = [p for p in parities if channel in p.recording]
+        largest = max((float(np.abs(p.moving[channel]).max()) for p in reading), default=np.inf)
+        if reading and (accuracy := reading[0].recording.accuracy[channel]) > limits.COARSEST_ACCURACY * largest:
+            text = (
+                f"rig.accuracy.{key} is {accuracy:g}, but {channel} reads at most {largest:.3g}: is it in another unit?"
+            )
+            found[key] = Contradiction(f"rig.accuracy.{key}", text)
+    return list(found.values())
 
 
 def _exchanged(ratios: Mapping[str, float], batch: Batch) -> bool:
