@@ -225,7 +225,7 @@ def test_names_that_yaml_would_take_for_numbers_stay_text(tmp_path):
     assert [(r.id, r.file) for r in batch.recordings] == [
         ("1e5", "1e5.csv"),
         ("007", "007.csv"),
-        ("run--2-", "run (2).csv"),
+        ("run-2", "run (2).csv"),
     ]
 
 

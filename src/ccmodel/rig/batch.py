@@ -3,9 +3,10 @@
 All keys that were added later are optional, so a file written before them keeps its meaning.
 """
 
+import re
 from collections.abc import Iterator
 from functools import reduce
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 from pydantic import AfterValidator, BaseModel, Field, field_validator, model_validator
@@ -62,12 +63,28 @@ SENSOR_COLUMNS = (
 COLUMNS = ("time_s", *DRIVE_ANGLE_COLUMNS, *SENSOR_COLUMNS)
 
 Sign = Literal[1, -1]
+# Endings that a compressed file has beside that of its content.
+_COMPRESSED = (".gz",)
 NAMES = "a name is letters, digits and -_.+=,@ only and begins with a letter or digit"
 
 
 def valid_name(name: str) -> bool:
     """Whether a batch or recording can have this name: it becomes a folder, a file and a group of a netCDF file."""
     return all(c.isalnum() or c in "-_.+=,@" for c in name) and (name[:1].isalnum() or name[:1] == "_")
+
+
+def recording_id(file: str) -> str:
+    """A valid id of a recording, from the name of its file without the ending, or both of a compressed file.
+
+    Parameters
+    ----------
+    file : str
+        Name of the file, with folders if these tell recordings apart.
+    """
+    path = PurePath(file)
+    stem = path.with_suffix("") if path.suffix in _COMPRESSED else path
+    name = re.sub(r"[^\w.+=,@-]+", "-", str(stem.with_suffix(""))).strip("-.") or "recording"
+    return name if valid_name(name) else f"r{name}"
 
 
 def _checked_name(name: str) -> str:

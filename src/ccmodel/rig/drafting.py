@@ -15,7 +15,7 @@ import pandas as pd
 
 from ccmodel.channels import ANGLE_AT, SUM_AT, TENSIONS_AT, THETA_IN, TORQUE_AT
 from ccmodel.rig.angle import angle_at, resolution_seen
-from ccmodel.rig.batch import NAMES, RAW_COLUMNS, valid_name
+from ccmodel.rig.batch import DRIVE_ANGLE_COLUMNS, NAMES, recording_id, valid_name
 from ccmodel.rig.calibration import resting_samples
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.log import read_log
@@ -63,7 +63,7 @@ class _Log:
     def overview(self) -> Overview:
         """What it shows."""
         time = self.table["time_s"].to_numpy()
-        drive = next(column for column in (*RAW_COLUMNS[THETA_IN], THETA_IN) if column in self.table)
+        drive = next(column for column in DRIVE_ANGLE_COLUMNS if column in self.table)
         channels = {name: self.table[name].to_numpy() for name in self.table if name != "time_s"}
         return overview(time, channels, drive, float(time[self.resting - 1]) if self.resting else float(time[0]))
 
@@ -253,9 +253,7 @@ def _ids(files: Sequence[str]) -> dict[str, str]:
     """Names of recordings: those of their files without endings, as far as a name can have their characters."""
     ids: dict[str, str] = {}
     for file in files:
-        name = re.sub(r"(\.(csv|gz|\w{2,7}))+$", "", Path(file).name, flags=re.IGNORECASE)
-        name = "".join(c if c.isalnum() or c in "-_.+=,@" else "-" for c in name)
-        name = name if valid_name(name) else f"r{name}"
+        name = recording_id(Path(file).name)
         while name in ids.values():
             name += "-2"
         ids[file] = name

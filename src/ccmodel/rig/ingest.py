@@ -81,7 +81,8 @@ def ingest_batch(folder: Path) -> Ingested:
     # What a faulty sensor reads contradicts everything else too: it is named once.
     faulty = {finding.file for finding in findings if finding.severity == "inconsistent"}
     sound = [r for r, file in zip(recordings, used_files, strict=True) if file not in faulty]
-    findings += [replace(f, file=str(folder / f.file)) for f in check_consistency(sound, batch)]
+    contradictions, errors = _attempt(name, batch_file, check_consistency, sound, batch)
+    findings += [replace(f, file=str(folder / f.file)) for f in contradictions or []] + errors
     return Ingested(recordings, findings, batch)
 
 

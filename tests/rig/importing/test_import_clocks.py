@@ -115,6 +115,15 @@ def test_times_that_do_not_increase_are_refused_where_clocks_are_joined():
     assert "the times of 's_F_drive_N' must increase, found 0.495 s after 0.495 s (sample 101)" in caught.value.args[2]
 
 
+@pytest.mark.parametrize("count", [0, 1, 5])
+def test_a_column_with_hardly_any_numbers_is_refused(count):
+    time = np.arange(0, 5, 0.005)
+    values = np.where(np.arange(time.size) < count, 5.0, np.nan)
+    with pytest.raises(LogError) as caught:
+        join([DRIVE, samples("F_drive_N", time, values)])
+    assert f"'s_F_drive_N' has {count} numbers only" in caught.value.args[2]
+
+
 def test_no_time_in_common():
     with pytest.raises(LogError) as caught:
         join([DRIVE, samples("F_drive_N", BASE + 100, wave(BASE))])

@@ -131,6 +131,14 @@ def test_files_of_one_name_from_two_folders(lab):
     }
 
 
+def test_a_point_in_a_name_is_no_ending(lab):
+    names = ["pretension_2.50.csv", "pretension_2.75.csv"]
+    files = [file.rename(file.with_name(name)) for file, name in zip(lab.files, names, strict=False)]
+    lab.run(files)
+    assert [r["id"] for r in lab.provenance()["recordings"]] == ["pretension_2.50", "pretension_2.75"]
+    assert all((lab.batch / f"{name}.gz").exists() for name in names)
+
+
 def test_listed_recordings_have_the_ids_of_the_map(lab):
     lab.map.write_text(MAP + "recordings:\n- {id: sine-slow, files: [two.csv]}\n")
     written = lab.run()

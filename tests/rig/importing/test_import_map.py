@@ -38,6 +38,13 @@ def refused(tmp_path, text):
         ("unit: N}", "unit: V, gain: 10}", "state the gain with its unit, as '10 N/V'"),
         ("unit: N}", "unit: V, gain: 10 Nm/V}", "gives no N; the gain's unit must be that of N per V"),
         ("unit: N}", "unit: N, gain: 0}", "channels.F_drive_N.gain: must not be zero"),
+        ("unit: N}", "unit: A, gain: 0 N/A}", "channels.F_drive_N: found '0 N/A'; a gain is a number other than 0"),
+        ("unit: N}", "unit: A, gain: 1e400 N/A}", "a gain is a number other than 0"),
+        (
+            "signal: F,",
+            "signal: q, file: main,",
+            "signal 'q' is given to theta_in_rad and F_drive_N: a sensor is one column",
+        ),
         ("unit: s}", "unit: deg}", "time: found 'deg', an angle; needed is a time such as 's'"),
         ("unit: s}", "unit: s, rate_Hz: 5.0}", "time is either a signal or a rate_Hz"),
         ("signal: F,", "signal: q,", "signal 'q' is given to theta_in_rad and F_drive_N: a sensor is one column"),

@@ -77,3 +77,24 @@ def test_a_motion_that_repeats_after_a_rest_is_matched():
     here = np.arange(0, 8, 0.002)
     found = match_clocks(here, moves(here + 0.35), here.copy(), moves(here))
     assert found.offset_s == pytest.approx(0.35, abs=1e-3)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_a_chirp_after_a_rest_does_not_repeat(noise):
+    random, time = np.random.default_rng(8), np.arange(0, 20, 0.004)
+
+    def chirp(at):
+        moving = np.maximum(at - 2.0, 0.0)
+        return np.sin(2 * np.pi * (0.2 * moving + 0.03 * moving**2))
+
+    late = np.arange(0, 18, 0.002)
+    here = chirp(late + 0.7) + random.normal(0, noise + 1e-9, late.size)
+    clock = match_clocks(late, here, time, chirp(time))
+    assert clock.offset_s == pytest.approx(0.7, abs=0.003)
+
+
+def test_clocks_that_differ_by_a_unit_are_refused():
+    time = np.arange(0, 20, 0.004)
+    walk = np.interp(time, np.arange(0, 21), np.random.default_rng(2).normal(0, 1, 21))
+    with pytest.raises(LogError, match="check the units of time"):
+        match_clocks(time * 0.97, walk, time, walk)

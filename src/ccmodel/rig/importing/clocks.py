@@ -156,9 +156,11 @@ def join(samples: Sequence[Samples]) -> Joined:
     Raises
     ------
     LogError
-        If times do not increase, or the columns have no time in common.
+        If times do not increase, a column has hardly any numbers, or the columns have no time in common.
     """
     own = [_own_samples(one) for one in samples]
+    for one in own:
+        _check_has_numbers(one)
     base, others = own[0], own[1:]
     remarks = [_sparse_text(one, kept) for one, kept in zip(samples, own, strict=True) if kept is not one]
     joined = [one for one in others if not _has_times_of(one, base)]
@@ -175,6 +177,13 @@ def join(samples: Sequence[Samples]) -> Joined:
     cut = (float(time[0] - base.time_s[0]), float(base.time_s[-1] - time[-1]))
     remarks += _cut_text(base, joined, cut)
     return Joined(_from_zero(time), columns, costs, cut, remarks)
+
+
+def _check_has_numbers(one: Samples) -> None:
+    count = int(np.isfinite(one.values).sum())
+    if count < limits.FEWEST_SAMPLES:
+        text = f"'{one.signal}' has {count} numbers only: take {one.column} out of the map, or record it again"
+        raise LogError(None, None, text)
 
 
 def _from_zero(time: NDArray) -> NDArray:

@@ -1,9 +1,8 @@
 """Columns that an import writes, with their units as pint reads them."""
 
-from ccmodel.rig.batch import COLUMNS, DRIVE_ANGLE_COLUMNS
+from ccmodel.rig.batch import COLUMNS
 
 TIME = "time_s"
-DRIVE_ANGLES = DRIVE_ANGLE_COLUMNS
 # A column's name ends in its unit.
 _UNITS = {"s": "s", "counts": "count", "A": "A", "V": "V", "rad": "rad", "Nm": "Nm", "N": "N"}
 UNIT_OF = {column: _UNITS[column.rpartition("_")[2]] for column in COLUMNS}

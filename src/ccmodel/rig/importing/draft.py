@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 
 from ccmodel.rig import readers
+from ccmodel.rig.batch import DRIVE_ANGLE_COLUMNS
 from ccmodel.rig.findings import LogError
-from ccmodel.rig.importing.columns import DRIVE_ANGLES, UNIT_OF
+from ccmodel.rig.importing.columns import UNIT_OF
 from ccmodel.rig.importing.guess import Guess, GuessedFile, guess_file, open_questions
-from ccmodel.rig.importing.map import TimeSource
+from ccmodel.rig.importing.map import MAIN, TimeSource
 from ccmodel.rig.importing.names import DRIVE, LOAD, read_name
-from ccmodel.rig.importing.sources import MAIN, names_of
+from ccmodel.rig.importing.sources import names_of
 from ccmodel.rig.importing.writing import MAP, check_folder
 from ccmodel.rig.readers.contract import SignalFile
 from ccmodel.typed import InputError, Problem
@@ -143,7 +144,7 @@ def _kinds(read: Mapping[Path, SignalFile]) -> dict[tuple, list[tuple[Path, Sign
 
 
 def _has_drive_angle(file: SignalFile) -> bool:
-    return any(g.column in DRIVE_ANGLES and g.sure for g in guess_file(file).guesses)
+    return any(g.column in DRIVE_ANGLE_COLUMNS and g.sure for g in guess_file(file).guesses)
 
 
 def _roles(

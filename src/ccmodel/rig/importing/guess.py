@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.channels import ANGLE_AT
-from ccmodel.rig.batch import RAW_COLUMNS
+from ccmodel.rig.batch import DRIVE_ANGLE_COLUMNS, RAW_COLUMNS
 from ccmodel.rig.importing import names, shapes, units
-from ccmodel.rig.importing.columns import CHANNELS, DRIVE_ANGLES, UNIT_OF
+from ccmodel.rig.importing.columns import CHANNELS, UNIT_OF
 from ccmodel.rig.importing.map import TimeSource
 from ccmodel.rig.importing.names import ANGLE, CURRENT, DRIVE, FORCE, LOAD, TIME, TORQUE, Reading
 from ccmodel.rig.readers.contract import Signal, SignalFile
@@ -38,7 +38,8 @@ _COLUMNS = {
 # The unit of a quantity where nothing states one: a guess to be confirmed.
 _USUAL_UNIT = {ANGLE: "deg", TORQUE: "Nm", CURRENT: "A", FORCE: "N"}
 _WEIGHT = {"g": "gf", "kg": "kgf", "lb": "lbf", "oz": "ozf"}
-_TURN_RAD, _FEW_TURNS_DEG = 2 * np.pi, 20.0
+# Turns of a pulley above which the unit of its angle is in doubt: a cable is not wound up.
+_TURN_RAD, _MOST_TURNS = 2 * np.pi, 20.0
 _ENDS = (DRIVE, LOAD)
 # Numbers of the tensions of cables A and B at each end.
 _TENSIONS = {DRIVE: (1, 3), LOAD: (2, 4)}
@@ -158,7 +159,8 @@ def _guess_time(signals: Sequence[Signal], readings: Mapping[str, Reading]) -> t
     possible = shapes.units_of_clock(signal.values)
     step = float(np.median(np.diff(signal.values[np.isfinite(signal.values)])))
     if stated:
-        return TimeSource(signal=signal.name, unit=stated), bool(named), f"{why}; the file states {stated}"
+        says = "file states" if units.quantity_of(signal.unit) == "a time" else "name says"
+        return TimeSource(signal=signal.name, unit=stated), bool(named), f"{why}; the {says} {stated}"
     if len(possible) == 1:
         rate = 1 / (step * shapes.TIME_UNITS[possible[0]])
         why += f"; a step of {step:.6g} is {rate:.6g} Hz in {possible[0]}, and no rate of a recording in other units"
@@ -239,7 +241,7 @@ def _impossible(values: NDArray, quantity: str, measured: str, stated: str) -> s
     if quantity != ANGLE or measured != "an angle":
         return ""
     turns = float(np.nanmax(values) - np.nanmin(values)) * units.factor(stated, "rad") / _TURN_RAD
-    return f"in {stated} it would turn {turns:.3g} times: is that its unit?" if turns > _FEW_TURNS_DEG else ""
+    return f"in {stated} it would turn {turns:.3g} times: is that its unit?" if turns > _MOST_TURNS else ""
 
 
 def _aligned(signals: Sequence[Signal]) -> dict[str, NDArray]:
@@ -468,7 +470,7 @@ def open_questions(guesses: Sequence[Guess]) -> list[str]:
     """What no log says and batch.yaml needs."""
     columns = {g.column for g in guesses if g.column}
     texts = []
-    if not columns & set(DRIVE_ANGLES):
+    if not columns & set(DRIVE_ANGLE_COLUMNS):
         close = nearest("drive angle", [g.signal for g in guesses], 0.3)
         texts.append(f"no signal is seen to be the drive angle{f' (is it {close!r}?)' if close else ''}: state it")
     for end in _ENDS:

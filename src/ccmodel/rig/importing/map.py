@@ -5,14 +5,16 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from ccmodel.rig.batch import RAW_COLUMNS, Name, Sign
+from ccmodel.rig.batch import DRIVE_ANGLE_COLUMNS, RAW_COLUMNS, Name, Sign
 from ccmodel.rig.importing import units
-from ccmodel.rig.importing.columns import CHANNELS, DRIVE_ANGLES, UNIT_OF
+from ccmodel.rig.importing.columns import CHANNELS, UNIT_OF
 from ccmodel.rig.readers.contract import TextLayout
 from ccmodel.typed import InputError, Positive, Problem, TypedModel, load_yaml_model
 
 # A drift of more than this is no drift of a clock but another unit.
 LARGEST_DRIFT = 0.01
+# The first file of a recording, where a map does not call it otherwise.
+MAIN = "main"
 Text = Annotated[str, Field(min_length=1)]
 
 
@@ -224,9 +226,10 @@ class ImportMap(TypedModel):
 
     @model_validator(mode="after")
     def _each_quantity_once(self):
-        if not self.channels.keys() & set(DRIVE_ANGLES):
+        if not self.channels.keys() & set(DRIVE_ANGLE_COLUMNS):
             advice = "in a guessed map, take '# ' away from its line"
-            raise ValueError(f"channels: the drive angle is missing: state {' or '.join(DRIVE_ANGLES)} ({advice})")
+            columns = " or ".join(DRIVE_ANGLE_COLUMNS)
+            raise ValueError(f"channels: the drive angle is missing: state {columns} ({advice})")
         for channel, raw in RAW_COLUMNS.items():
             both = [column for column in raw if column in self.channels]
             if channel in self.channels and both:
@@ -235,11 +238,11 @@ class ImportMap(TypedModel):
 
     @model_validator(mode="after")
     def _files_exist(self):
-        known = ["main", *self.files]
+        known = [MAIN, *self.files]
         for column, channel in self.channels.items():
             if channel.file is not None and channel.file not in known:
                 raise ValueError(f"channels.{column}.file: '{channel.file}' is none of {', '.join(known)}")
-        if "main" in self.files:
+        if MAIN in self.files:
             raise ValueError("files: 'main' is the file that fits no pattern: choose another name")
         return self
 
@@ -277,7 +280,7 @@ def _wrong_units(stated: ImportMap) -> list[str]:
 def _taken_twice(stated: ImportMap) -> list[str]:
     by_signal: dict[tuple, list[str]] = {}
     for column, channel in stated.channels.items():
-        by_signal.setdefault((channel.file, channel.signal), []).append(column)
+        by_signal.setdefault((channel.file or MAIN, channel.signal), []).append(column)
     return [
         f"signal '{signal}' is given to {' and '.join(columns)}: a sensor is one column"
         for (_, signal), columns in by_signal.items()

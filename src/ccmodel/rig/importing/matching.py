@@ -11,6 +11,7 @@ from scipy.stats import t as student
 
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.importing.clocks import Clock
+from ccmodel.rig.importing.map import LARGEST_DRIFT
 
 # Samples of the uniform grid on which the lag is looked for.
 _GRID = 1 << 16
@@ -68,16 +69,20 @@ def match_clocks(time: NDArray, values: NDArray, first_time: NDArray, first_valu
     here, there = (gaussian_filter1d(values, width)[::every] for values in (here, there))
     starts = [first_time[0] - time[0] + step * lag for lag in lags]
     fits = [_fit(start, time[0], here, first_time[0], there, step * every) for start in starts]
-    return _best([fit for fit in fits if fit is not None])
+    return _best([fit for fit in fits if fit is not None], 0.25 / highest)
 
 
 @dataclass(frozen=True)
 class _Fit:
-    """A clock, the share of the power that it leaves unexplained, and the overlap as a share of the shorter signal."""
+    """A clock, the share of the power that it leaves unexplained, and the overlap as a share of the shorter signal.
+
+    `middle_s` is its offset in the middle of the overlap, which the fit determines best.
+    """
 
     clock: Clock
     misfit: float
     overlap: float
+    middle_s: float
 
 
 def _fit(start: float, begin: float, here: NDArray, first_begin: float, there: NDArray, step: float) -> _Fit | None:
@@ -108,21 +113,32 @@ def _fit(start: float, begin: float, here: NDArray, first_begin: float, there: N
     text = f"matched over {np.ptp(t):.4g} s"
     # t_first = t + centre + drift (t - middle), so that the offset at time zero is centre - drift * middle.
     clock = Clock(centre - drift * middle, drift, float(half[0]), float(half[1]), text)
-    return _Fit(clock, float(np.var(fit.fun) / np.var(here)), np.ptp(t) / step / min(inside.size, there.size))
+    return _Fit(clock, float(np.var(fit.fun) / np.var(here)), np.ptp(t) / step / min(inside.size, there.size), centre)
 
 
-def _best(fits: list[_Fit]) -> Clock:
-    """The fit that leaves least; of several that leave the same, the one with the longest overlap."""
+def _best(fits: list[_Fit], apart_s: float) -> Clock:
+    """The fit that leaves least; of several clocks that leave the same, the one with the longest overlap.
+
+    Fits whose offsets differ by less than `apart_s` are one clock, found from several starts.
+    """
     least = min((fit.misfit for fit in fits), default=1.0)
     if least > 1 - _LEAST_CORRELATION**2:
         text = f"the matched signals correlate by {max(1 - least, 0) ** 0.5:.2f} only: match two of the same quantity"
         raise LogError(None, None, text)
-    alike = [fit for fit in fits if fit.misfit <= _SAME_MISFIT * least + _NO_MISFIT]
+    alike: list[_Fit] = []
+    for fit in sorted(fits, key=lambda fit: (fit.misfit, -fit.overlap)):
+        is_new = all(abs(fit.middle_s - other.middle_s) > apart_s for other in alike)
+        if is_new and fit.misfit <= _SAME_MISFIT * least + _NO_MISFIT:
+            alike.append(fit)
     if sum(fit.overlap > _FULL_OVERLAP for fit in alike) > 1:
         offsets = " and ".join(f"{fit.clock.offset_s:.4g} s" for fit in alike[:2])
         text = f"the matched signals repeat, and offsets of {offsets} fit alike"
         raise LogError(None, None, f"{text}: match a motion that does not repeat, or state offset_s")
-    return max(alike, key=lambda fit: fit.overlap).clock
+    best = max(alike, key=lambda fit: fit.overlap).clock
+    if abs(best.drift) > LARGEST_DRIFT:
+        text = f"the clocks of the matched signals differ by {100 * best.drift:.3g} %: check the units of time"
+        raise LogError(None, None, text)
+    return best
 
 
 def _finite(time: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:

@@ -10,13 +10,14 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ccmodel.rig import readers
+from ccmodel.rig.batch import DRIVE_ANGLE_COLUMNS
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.importing import units
 from ccmodel.rig.importing.clocks import Clock, Cost, Samples, join
-from ccmodel.rig.importing.columns import DRIVE_ANGLES, TIME, UNIT_OF, is_encoder
-from ccmodel.rig.importing.map import Channel, ImportMap, TimeSource
+from ccmodel.rig.importing.columns import TIME, UNIT_OF, is_encoder
+from ccmodel.rig.importing.map import MAIN, Channel, ImportMap, TimeSource
 from ccmodel.rig.importing.matching import match_clocks
-from ccmodel.rig.importing.sources import MAIN, Source
+from ccmodel.rig.importing.sources import Source
 from ccmodel.rig.readers.contract import Signal, SignalFile
 from ccmodel.typed import nearest
 
@@ -132,7 +133,7 @@ def build(source: Source, stated: ImportMap, names: Mapping[Path, str]) -> Built
     remarks = [f"{file.name}: {remark}" for file in files.values() for remark in file.read.remarks]
     first = next(iter(files.values()))
     clocks = {role: _clock(file, first, stated, remarks) for role, file in files.items()}
-    drive = next(column for column in DRIVE_ANGLES if column in stated.channels)
+    drive = next(column for column in DRIVE_ANGLE_COLUMNS if column in stated.channels)
     order = [drive, *(column for column in stated.channels if column != drive)]
     samples, formulas = [], {}
     for column in order:
@@ -212,7 +213,9 @@ def _whole(values: NDArray, file: str, column: str) -> NDArray:
     if off.any():
         at = int(np.argmax(off))
         text = f"must be whole counts, found {values[at]:.6g} at sample {at + 1}: give an angle as theta_in_rad"
-        raise FileError(file, None, column, text if column in DRIVE_ANGLES else text.replace("theta_in", "theta_out"))
+        raise FileError(
+            file, None, column, text if column in DRIVE_ANGLE_COLUMNS else text.replace("theta_in", "theta_out")
+        )
     return whole
 
 

@@ -29,7 +29,7 @@ def replacing(out: Path) -> Iterator[Path]:
             out.rename(earlier)
         try:
             fresh.rename(out)
-        except OSError:
+        except BaseException:
             if earlier.exists():
                 earlier.rename(out)
             raise

@@ -1,17 +1,13 @@
 """Which of the given files make up which recording."""
 
 import os
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 
-from ccmodel.rig.importing.map import ImportMap
+from ccmodel.rig.batch import recording_id
+from ccmodel.rig.importing.map import MAIN, ImportMap
 from ccmodel.typed import InputError
-
-MAIN = "main"
-# Endings that a compressed file has twice.
-_COMPRESSED = (".gz",)
 
 
 @dataclass(frozen=True)
@@ -35,13 +31,6 @@ def names_of(files: Sequence[Path]) -> dict[Path, str]:
     resolved = {file: _absolute(file) for file in files}
     shared = os.path.commonpath([path.parent for path in resolved.values()])
     return {file: path.relative_to(shared).as_posix() for file, path in resolved.items()}
-
-
-def safe_id(name: str) -> str:
-    """A valid id of a recording, from the name of a file."""
-    bare = PurePath(name)
-    stem = bare.with_suffix("") if bare.suffix in _COMPRESSED else bare
-    return re.sub(r"[^\w.+=,@-]+", "-", str(stem.with_suffix(""))).strip("-.") or "recording"
 
 
 def recordings_of(files: Sequence[Path], stated: ImportMap) -> tuple[list[Source], list[str]]:
@@ -99,9 +88,9 @@ def _by_name(names: dict[Path, str], stated: ImportMap) -> list[Source]:
     groups: dict[str, list[Path]] = {}
     for file, name in names.items():
         folder = _id_in(name, 2, _absolute(file).parent.name)
-        own = folder if folder in ids and _by_folder(stated) else safe_id(name)
+        own = folder if folder in ids and _by_folder(stated) else recording_id(name)
         groups.setdefault(named[file] or own, []).append(file)
-    return [Source(safe_id(id_), _by_role(found, stated, id_)) for id_, found in groups.items()]
+    return [Source(id_, _by_role(found, stated, id_)) for id_, found in groups.items()]
 
 
 def _recording_of(file: Path, name: str, stated: ImportMap) -> str | None:
@@ -111,7 +100,7 @@ def _recording_of(file: Path, name: str, stated: ImportMap) -> str | None:
 
 def _id_in(name: str, depth: int, part: str) -> str:
     """Id of a recording that `part` names, below the folders above the last `depth` names of a path."""
-    return safe_id("/".join((*PurePath(name).parts[:-depth], f"{part}.log")))
+    return recording_id("/".join((*PurePath(name).parts[:-depth], f"{part}.log")))
 
 
 def _by_folder(stated: ImportMap) -> bool:

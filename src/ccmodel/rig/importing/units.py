@@ -5,6 +5,7 @@ Angles and counts are dimensions of their own (`units.txt`), so that neither is 
 
 import re
 from functools import cache
+from math import isfinite
 from pathlib import Path
 
 import pint
@@ -95,6 +96,8 @@ def gain_factor(gain: str, found: str, needed: str) -> float:
     if match is None:
         raise UnitError(f"found {gain!r}; needed is a number and its unit, as '0.0234 N*m/A'")
     number, unit = float(match[1]), _unit(match[2])
+    if not isfinite(number) or number == 0:
+        raise UnitError(f"found {gain!r}; a gain is a number other than 0")
     result = _registry().Quantity(number, unit) * _registry().Quantity(1.0, _unit(found))
     try:
         return float(result.to(_unit(needed)).magnitude)

@@ -121,7 +121,10 @@ def _axis_of_capture(axis: Any, data) -> np.ndarray | None:
     if not isinstance(axis, dict) or data is None:
         return None
     times, step = axis.get("Data"), axis.get("Raster")
-    scale = {"ms": 1e-3, "us": 1e-6, "µs": 1e-6}.get(_text(axis, ("Unit",)), 1.0)
+    unit = _text(axis, ("Unit",))
+    scale = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6}.get(unit)
+    if scale is None:
+        raise LogError(None, None, f"its time axis is in '{unit}': save it in s, ms or µs")
     if _is_vector(times):
         return np.ravel(times).astype(float) * scale
     if _is_numbers(step) and step.size == 1 and float(step.flat[0]) > 0:
