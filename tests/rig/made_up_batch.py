@@ -38,7 +38,7 @@ def description(ids=("one", "two")) -> dict:
     }
 
 
-def table(n=400, dt=0.004, rest=0.4, seed=0) -> pd.DataFrame:
+def table(n=400, dt=0.004, rest=0.4, seed=0, bend=np.pi) -> pd.DataFrame:
     """Raw columns of a sine that starts from rest, with noise on currents and load cells.
 
     The parity relations hold about as on a rig: the spring is the stated one, and both cables slip.
@@ -49,7 +49,7 @@ def table(n=400, dt=0.004, rest=0.4, seed=0) -> pd.DataFrame:
     theta = (0.6 + 0.01 * seed) * np.sin(phase)
     load = 0.9 * theta
     # Full slip: the pulled cable has exp(mu phi) times the load's tension at the drive, the other the inverse.
-    ratio = np.exp(0.147 * np.pi * np.sign(np.cos(phase)) * (time > rest))
+    ratio = np.exp(0.147 * bend * np.sign(np.cos(phase)) * (time > rest))
     t2, t4 = (T0 + 0.05 * load / R / 2 * sign for sign in (1, -1))
     tau_in, f_drive = (t2 * ratio - t4 / ratio) * R, t2 * ratio + t4 / ratio
     return pd.DataFrame(

@@ -90,7 +90,7 @@ def test_a_relation_without_its_sensors_is_absent(tmp_path):
     bench.tables = {name: t.drop(columns=["drive_load_cell_V", "load_load_cell_V"]) for name, t in bench.tables.items()}
     ingested = ingest_batch(bench.write().folder)
     parity = Parity(ingested.recordings[0], ingested.batch)
-    assert parity.log_ratio is None and parity.stiffness is None
+    assert parity.log_ratio is None and parity.stiffnesses is None
     assert not {"friction", "stiffness", "pretension"} & set(parity.ratios)
     assert not {"F_drive", "F_load"} & set(parity.signs)
 
@@ -109,6 +109,8 @@ def test_energy_from_nowhere_means_exchanged_ends_if_all_signs_are_right():
 def test_a_correlation_alone_accuses_no_sensor():
     signs = SIGNS | {"torques": -0.5}
     assert explanation(negative_relations(signs), signs) == ()
+    without_load_angle = {name: value for name, value in signs.items() if name not in ("angles", "load")}
+    assert explanation(negative_relations(signs), without_load_angle) == ()
 
 
 @pytest.mark.parametrize("rate", [-0.02, -0.008, 0.008, 0.02])
@@ -162,3 +164,63 @@ def test_a_stated_value_in_another_unit_is_named(tmp_path, change, named):
     bench = Bench(tmp_path)
     change(bench.described)
     assert any(sentence.startswith(f"batch.yaml {named}") for sentence in said_of(bench.write().folder))
+
+
+def honest_rig(tmp_path, **changes):
+    """A batch of the made-up rig with other sizes, all of them stated truly."""
+    bench = Bench(tmp_path)
+    for entry in bench.described["recordings"]:
+        entry["conduit"] = [{"length_m": 1.2, "bend_rad": changes.get("bend", np.pi)}]
+    bench.tables = {name: table(n=2000, seed=seed, **changes) for seed, name in enumerate(("one", "two"), 1)}
+    return bench
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.02, 6.0])
+def test_a_straight_or_tight_conduit_contradicts_nothing(tmp_path, bend):
+    assert said_of(honest_rig(tmp_path, bend=bend).write().folder) == []
+
+
+@pytest.mark.parametrize("without", ["load_current_A", "load_encoder_counts"])
+def test_a_single_step_shows_no_sign(tmp_path, without):
+    """Over less than a cycle the cables store energy, and a torque's zero does work."""
+    bench = honest_rig(tmp_path)
+    for name, log in bench.tables.items():
+        bench.tables[name] = log[log.time_s < 0.4 + 0.45].drop(columns=without)
+    side = bench.described["rig"]["load"]
+    del side["torque_constant_Nm_per_A" if without == "load_current_A" else "encoder_counts_per_rev"]
+    assert said_of(bench.write().folder) == []
+
+
+def test_a_gap_in_time_is_no_lost_sample(tmp_path):
+    bench = honest_rig(tmp_path)
+    log = bench.tables["one"]
+    bench.tables["one"] = log[(log.index < 150) | (log.index > 165)]
+    assert said_of(bench.write().folder) == []
+    jumped = bench.tables["one"].assign(time_s=log.time_s.to_numpy()[: len(bench.tables["one"])])
+    bench.tables["one"] = jumped
+    (said,) = said_of(bench.write().folder)
+    assert "samples were lost and the time does not show it" in said
+
+
+def test_a_load_that_no_torque_moves_may_rest(tmp_path):
+    bench = honest_rig(tmp_path)
+    log = bench.tables["one"]
+    still = log.assign(load_encoder_counts=7)
+    bench.tables["one"] = still
+    assert any("stands still" in sentence for sentence in said_of(bench.write().folder))
+    noise = np.random.default_rng(1).normal(0, 0.004, len(log)).round(5)
+    bench.tables["one"] = still.assign(load_current_A=noise)
+    assert not any("stands still" in sentence for sentence in said_of(bench.write().folder))
+
+
+def test_degrees_in_the_place_of_rad_are_called_so(tmp_path):
+    bench = honest_rig(tmp_path)
+    step = 2 * np.pi / 2000
+    for end, channel in (("drive", "theta_in_rad"), ("load", "theta_out_rad")):
+        side = bench.described["rig"][end]
+        del side["encoder_counts_per_rev"]
+        side["angle_resolution_rad"] = step
+        for name, log in bench.tables.items():
+            counts = f"{end}_encoder_counts"
+            bench.tables[name] = log.assign(**{channel: np.degrees(log[counts] * step)}).drop(columns=counts)
+    assert all("is the column in degrees?" in sentence for sentence in said_of(bench.write().folder))

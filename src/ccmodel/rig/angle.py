@@ -54,14 +54,22 @@ class Angle:
         counts = self.column.endswith("counts")
         return f"{change:g} counts" if counts else f"{change * self.rad_per_unit:.4g} rad"
 
-    def outstanding_changes(self) -> NDArray:
+    def outstanding_changes(self, time_s: NDArray) -> NDArray:
         """Whether each change from sample to sample is larger than all others near it by more than counting explains.
+
+        A change over a gap in time is judged by its rate.
+
+        Parameters
+        ----------
+        time_s : ndarray, shape (n,)
+            Times of the samples, s.
 
         Returns
         -------
         ndarray of bool, shape (n - 1,)
         """
-        change, n = np.abs(np.diff(self.values)), limits.NEAR_SAMPLES
+        step, n = np.diff(time_s), limits.NEAR_SAMPLES
+        change = np.abs(np.diff(self.values)) / np.maximum(step / np.median(step), 1.0)
         windows = np.lib.stride_tricks.sliding_window_view(np.pad(change, n, mode="reflect"), 2 * n + 1)
         # Beside the sample itself are its neighbours, with which a lost count may share the jump.
         near = np.delete(windows, [n - 1, n, n + 1], axis=1).max(axis=1)

@@ -58,6 +58,10 @@ FINE_STEP_RAD = 2e-5
 OFF_STEP = 0.1
 # Share of the readings that may differ by more.
 OFF_STEP_FRACTION = 0.01
+# Travel of the load, in counts, that its torque must cause against its spring before a still encoder counts as stuck.
+MOVED_GRAINS = 5
+# Range of a torque, in standard deviations of its noise, that is no noise.
+ABOVE_NOISE_SDS = 10
 # Duration of an initial rest. Less is the time to the first count of a motion.
 SHORTEST_REST_S = 0.1
 # Steps of time that no log of a moving rig has, s: the times are in ms or µs, or in days.

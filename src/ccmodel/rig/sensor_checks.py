@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ccmodel.channels import TAU_OUT
 from ccmodel.rig import limits
 from ccmodel.rig.angle import Angle, angle_of, resolution_seen, smallest_step
 from ccmodel.rig.batch import Rig
@@ -74,6 +75,9 @@ def _check_steps(table: pd.DataFrame, angle: Angle) -> None:
     off = np.abs((values - values[0]) / angle.step_rad - angle.values) > limits.OFF_STEP
     if off.mean() > limits.OFF_STEP_FRACTION:
         seen = smallest_step(values)
+        if seen and np.isclose(seen, np.degrees(angle.step_rad), rtol=0.02):
+            text = f"moves in steps of {seen:.4g}, which is {angle.key} in degrees: is the column in degrees?"
+            raise LogError(int(table.index[np.argmax(off)]), angle.column, text, True)
         known = f"the readings have a step of {seen:.6g} rad" if seen else "the readings have no step"
         text = f"does not move in steps of {angle.key} {angle.step_rad:g} rad: {known}; state 0 to take it as it is"
         raise LogError(int(table.index[np.argmax(off)]), angle.column, text, True)
@@ -139,9 +143,30 @@ def is_noisy(change: NDArray) -> bool:
 def _dead_load(table: pd.DataFrame, load: Angle, rig: Rig) -> Defect | None:
     if np.ptp(load.values) <= limits.STILL_COUNTS * load.grain:
         text = "stands still throughout while the drive moves: encoder stuck or load locked"
-        # A load that batch.yaml states as fixed has to stand still.
-        return Defect(None, load.column, text, contradicts=rig.far_end != "fixed")
+        # A load that batch.yaml states as fixed has to stand still, and one that no torque moves may.
+        contradicts = rig.far_end != "fixed" and _is_moved(table, load, rig)
+        return Defect(None, load.column, text, contradicts=contradicts)
     return _jump(table, load)
+
+
+def _is_moved(table: pd.DataFrame, load: Angle, rig: Rig) -> bool:
+    """Whether the load's torque would move it against its spring; True where torque or spring is not known."""
+    scales = {
+        TAU_OUT: 1.0,
+        "load_current_A": rig.load.torque_constant_Nm_per_A,
+        "load_torque_counts": rig.load.torque_sensor and rig.load.torque_sensor.Nm_per_count,
+    }
+    spring = rig.load.spring_stiffness_Nm_per_rad
+    column = next((name for name, scale in scales.items() if scale and name in table), None)
+    if column is None or spring is None or load.rad_per_unit is None:
+        return True
+    values = table[column].to_numpy()
+    low, high = np.quantile(values, [0.05, 0.95])
+    # The change from sample to sample is mostly noise, of twice its variance.
+    noise = np.std(np.diff(values)) / np.sqrt(2)
+    moved_rad = (high - low) * scales[column] / spring
+    is_noise = high - low < limits.ABOVE_NOISE_SDS * noise
+    return not is_noise and bool(moved_rad > limits.MOVED_GRAINS * load.grain * load.rad_per_unit)
 
 
 def _dead(table: pd.DataFrame, column: str) -> Defect | None:
@@ -183,7 +208,8 @@ def _lost_samples(table: pd.DataFrame, drive: Angle, load: Angle | None) -> Defe
     """A sample at which the angles of both ends jump: samples are missing, and the time does not show it."""
     if load is None or len(table) <= 2 * limits.NEAR_SAMPLES:
         return None
-    at_drive, at_load = drive.outstanding_changes(), load.outstanding_changes()
+    time = table["time_s"].to_numpy()
+    at_drive, at_load = drive.outstanding_changes(time), load.outstanding_changes(time)
     jumps = np.flatnonzero(at_drive & (at_load | np.roll(at_load, 1) | np.roll(at_load, -1)))
     # Noise of an angle without a step stands out now and then, in both at once only by chance.
     if jumps.size == 0 or jumps.size > limits.FAST_FRACTION * len(table):

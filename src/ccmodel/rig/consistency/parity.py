@@ -48,7 +48,7 @@ class Parity:
         - ``torques``: correlation of drive and load torque
         - ``work``: net work of the drive, over the work exchanged
         - ``load``: correlation of load torque and angle for a spring, otherwise net work on the load
-        - ``loss``: energy lost between the ends, over the energy exchanged at both
+        - ``loss``: energy lost between the ends, over the work exchanged at the end that exchanges more
         - ``F_drive``, ``F_load``: sign of the sum of tensions
         """
         found = {}
@@ -65,7 +65,7 @@ class Parity:
         if load:
             found["load"] = correlation(x[TAU_OUT], x[THETA_OUT]) if spring else load[0] / load[1]
         if drive and load:
-            found["loss"] = (drive[0] - load[0]) / (abs(drive[0]) + abs(load[0]))
+            found["loss"] = (drive[0] - load[0]) / max(drive[1], load[1])
         for name, channel in (("F_drive", F_DRIVE), ("F_load", F_LOAD)):
             if channel in x:
                 found[name] = float(np.sign(np.median(x[channel])))
@@ -80,7 +80,8 @@ class Parity:
         - ``noise of <channel>``: standard deviation of a sensor's white noise, in the channel's unit
         - ``spring``: load torque over load angle, over the stated spring
         - ``friction``: ln of the ratio of tensions in full slip, over mu phi
-        - ``stiffness``: mean tension over stretch of the taut cables, over the stated stiffness
+        - ``stiffness``: mean tension over stretch of the taut cables, over the stated stiffness; friction makes it
+          uncertain, and ``nearest stiffness`` is the value within its bounds that is nearest to the stated one
         - ``pretension at the drive``, ``pretension at the load``: sum of tensions at rest over twice the pretension
         - ``pretension``: their geometric mean, which friction while the cables were tensioned leaves as it is
         - ``torque at the load``: torque over radius and sum of tensions, its 95 % quantile
@@ -113,10 +114,12 @@ class Parity:
         if TAU_OUT in x and F_LOAD in x:
             force = np.maximum(np.abs(x[F_LOAD]), limits.TAUT_N)
             found["torque at the load"] = np.quantile(np.abs(x[TAU_OUT]) / radii[1] / force, 0.95)
-        if (log_ratio := self.log_ratio) is not None and self.capstan > 0:
+        if (log_ratio := self.log_ratio) is not None and self.capstan > limits.LEAST_CAPSTAN:
             found["friction"] = log_ratio / self.capstan
-        if (stiffness := self.stiffness) is not None:
-            found["stiffness"] = stiffness / self.stated_stiffness
+        if (slopes := self.stiffnesses) is not None:
+            low, high = sorted(slope / self.stated_stiffness for slope in slopes)
+            found["stiffness"] = np.sign(low) * np.sqrt(low * high)
+            found["nearest stiffness"] = float(np.clip(1.0, low, high))
         return {name: float(value) for name, value in found.items() if np.isfinite(value)}
 
     @property
@@ -151,8 +154,12 @@ class Parity:
         return float(np.mean(found)) if found else None
 
     @cached_property
-    def stiffness(self) -> float | None:
-        """Slope of the mean tension over the stretch of the taut cables, N/m; None if it is not determined."""
+    def stiffnesses(self) -> tuple[float, float] | None:
+        """Slope of the mean tension over the stretch of the taut cables, N/m; None if it is not determined.
+
+        Friction scatters both. The regression of the tension on the stretch gives the lower bound, that of the stretch
+        on the tension the upper.
+        """
         x, rig = self.moving, self.batch.rig
         if not all(name in x for name in (T1, T2, T3, T4, THETA_OUT)):
             return None
@@ -163,11 +170,17 @@ class Parity:
             tension.append((x[ends[0]] + x[ends[1]])[taut] / 2)
             length.append(sign * stretch[taut])
         tension, length = np.concatenate(tension), np.concatenate(length)
-        if tension.size < limits.FEWEST_SAMPLES or not np.ptp(length) > 0 or not np.ptp(tension) > 0:
+        # Where the cables are often slack, the few taut samples show the friction front and not the stiffness.
+        if (
+            tension.size < limits.MOSTLY_TAUT * 2 * x[THETA_IN].size
+            or not np.ptp(length) > 0
+            or not np.ptp(tension) > 0
+        ):
             return None
-        # Both have errors: the geometric mean of the two regressions.
-        covariance = np.cov(length, tension)
-        return float(np.sign(covariance[0, 1]) * np.sqrt(covariance[1, 1] / covariance[0, 0]))
+        (variance, covariance), (_, of_tension) = np.cov(length, tension)
+        if covariance == 0:
+            return None
+        return float(covariance / variance), float(of_tension / covariance)
 
     @property
     def _taut(self) -> float:
@@ -213,15 +226,18 @@ def crossings(values: NDArray) -> NDArray:
     return np.array([a + int(np.argmin(np.abs(values[a : b + 1] - middle))) for a, b in ends], dtype=int)
 
 
-def closed_part(angle: NDArray) -> slice:
-    """Samples between the first and the last crossing of the middle: a torque's zero does no work over them."""
+def closed_part(angle: NDArray) -> slice | None:
+    """Samples between the first and the last crossing of the middle; None without a whole cycle.
+
+    A torque's zero does no work over them, and the energy that the cables store is nearly the same at both ends.
+    """
     found = crossings(angle)
-    return slice(found[0], found[-1] + 1) if found.size > 1 else slice(0, angle.size)
+    return slice(found[0], found[-1] + 1) if found.size > 2 else None
 
 
-def work(x: Mapping[str, NDArray], ends: tuple[str, str], part: slice) -> tuple[float, float] | None:
+def work(x: Mapping[str, NDArray], ends: tuple[str, str], part: slice | None) -> tuple[float, float] | None:
     """Net and exchanged work of a torque over an angle, J; None without both, or if nothing is exchanged."""
-    if not all(name in x for name in ends):
+    if part is None or not all(name in x for name in ends):
         return None
     torque, angle = (x[name][part] for name in ends)
     # Over a closed part the mean torque does no work, but it would count as work exchanged.

@@ -146,7 +146,7 @@ def deviations_of(parity: Parity, others: Sequence[Parity]) -> dict[str, float]:
     """
     found = {}
     for name, conditions in _DEPENDENCE.items():
-        if parity.ratios.get(name, 0.0) > 0:
+        if parity.ratios.get(name, 0.0) > (limits.LEAST_TRAVEL if name == "travel" else 0.0):
             more = [p for p in others if all(_at_least(c(p), c(parity), sign) for c, sign in conditions)]
             less = [p for p in others if all(_at_least(c(p), c(parity), -sign) for c, sign in conditions)]
             found[name] = _excess(name, parity, more) - _excess(name, parity, less, -1)

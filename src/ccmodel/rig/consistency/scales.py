@@ -5,7 +5,7 @@ from math import isclose
 
 import numpy as np
 
-from ccmodel.channels import ANGLE_AT, SUM_AT, TAU_OUT, THETA_IN, THETA_OUT, TORQUE_AT
+from ccmodel.channels import ANGLE_AT, F_DRIVE, F_LOAD, SUM_AT, TAU_OUT, THETA_IN, THETA_OUT, TORQUE_AT
 from ccmodel.rig.batch import Batch
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
@@ -14,6 +14,18 @@ from ccmodel.rig.consistency.parity import Parity
 # Factors that have a name, within 30 %: edges of an encoder, units of an angle.
 _NAMED = {4.0: "the edges of a quadrature encoder", 57.3: "degrees for radians", 6.28: "turns for radians"}
 _NAMED_WITHIN = 0.3
+# What a negative friction or stiffness means.
+_EXCHANGED = {
+    "friction": (
+        f"{F_DRIVE} and {F_LOAD}",
+        "the sum of tensions is lower at the drive, which pulls, than friction allows: the load cells of drive and load"
+        " are exchanged",
+    ),
+    "nearest stiffness": (
+        f"{THETA_IN} and {THETA_OUT}",
+        "the tension falls where the cables stretch: the angles of drive and load are exchanged",
+    ),
+}
 # Factor up to which a relation that supports another may be right: estimates and compliant ends reach it.
 _SAME = 1.8
 
@@ -104,7 +116,7 @@ def _angle_of_one_end(ratios: Mapping[str, float]) -> list[Contradiction]:
     if travel is None or limits.LEAST_TRAVEL <= travel <= limits.MOST_TRAVEL:
         return []
     large = travel > limits.MOST_TRAVEL
-    if not large and ratios.get("stiffness", 0.0) > 1 / _SAME:
+    if not large and ratios.get("nearest stiffness", 0.0) > 1 / _SAME:
         return []  # The cables stretch that much: a stiff load, not a scale.
     # The relations that contain one of the two angles alone.
     spring, amplitude = ratios.get("spring"), ratios.get("amplitude")
@@ -122,7 +134,7 @@ def _angle_of_one_end(ratios: Mapping[str, float]) -> list[Contradiction]:
 
 def _both_angles(ratios: Mapping[str, float]) -> list[Contradiction]:
     """Scale of both angles: spring, stiffness and noted amplitude are wrong by about the same factor."""
-    inverse = {name: 1 / ratios[name] for name in ("spring", "stiffness") if ratios.get(name, 0) > 0}
+    inverse = {name: 1 / ratios[name] for name in ("spring", "nearest stiffness") if ratios.get(name, 0) > 0}
     factors = inverse | {name: ratios[name] for name in ("amplitude",) if name in ratios}
     sides = {beyond(f, limits.AMPLITUDE_FACTOR if name == "amplitude" else _SAME) for name, f in factors.items()}
     found = factors.get("spring", factors.get("amplitude", 1.0))
@@ -193,11 +205,14 @@ def _cable(ratios: Mapping[str, float], batch: Batch) -> list[Contradiction]:
     stated = batch.rig.cable
     found = []
     for relation, key, value, unit, how in (
-        ("stiffness", "stiffness_N_per_m", stated.stiffness_N_per_m, " N/m", "mean tension over stretch"),
+        ("nearest stiffness", "stiffness_N_per_m", stated.stiffness_N_per_m, " N/m", "mean tension over stretch"),
         ("friction", "friction_coefficient", stated.friction_coefficient, "", "ratio of tensions in full slip"),
     ):
         ratio = ratios.get(relation)
         if not beyond(ratio, limits.STATED_FACTOR) or f"cable.{key}" in batch.rig.nominal:
+            continue
+        if ratio < -1 / limits.STATED_FACTOR:
+            found.append(Contradiction(*_EXCHANGED[relation]))
             continue
         other = "bend_rad" if relation == "friction" else "length_m and the pulley radii"
         text = (
