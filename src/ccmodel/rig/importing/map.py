@@ -189,7 +189,7 @@ class ImportMap(TypedModel):
     Attributes
     ----------
     text : TextLayout or None
-        Layout of text files; what it leaves out is found from the file.
+        Layout of text files; omitted keys are found from the file.
     time : TimeSource or None
         None if the files store the time of each sample.
     channels : dict
