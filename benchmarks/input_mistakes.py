@@ -1,4 +1,4 @@
-"""Are mistakes in logs and batch files named, and is nothing else accused? (`make input-checks`)
+"""How often are mistakes in logs and batch files identified, and how many are false positives? (`make input-checks`)
 
 Twenty mistakes are made in copies of batches, each with sizes, recordings and channels drawn from a seed, and the
 copies are read as `ccmodel check` reads them. The batches are a measured one, a simulated one and concealed cases of
@@ -50,7 +50,7 @@ class Copy:
         Logs by recording id.
     description : dict
         Content of batch.yaml.
-    donors : sequence of DataFrame
+    donors : sequence of Recording
         Recordings of other rigs.
     """
 

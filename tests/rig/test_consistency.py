@@ -106,7 +106,7 @@ def test_energy_from_nowhere_means_exchanged_ends_if_all_signs_are_right():
     assert explanation(negative_relations(signs), signs) == (EXCHANGED,)
 
 
-def test_a_correlation_alone_accuses_no_sensor():
+def test_a_correlation_alone_identifies_no_sensor():
     signs = SIGNS | {"torques": -0.5}
     assert explanation(negative_relations(signs), signs) == ()
     without_load_angle = {name: value for name, value in signs.items() if name not in ("angles", "load")}

@@ -31,10 +31,10 @@ STATED_FACTOR = 3.0
 # Travel of the load over that of the drive, both at the cable, in the recording of the greatest stroke. Friction and
 # stretch only lose travel: at least 0.74 remained, and 1 / 0.74 where the ends are exchanged.
 LEAST_TRAVEL, MOST_TRAVEL = 0.35, 1.6
-# Factor of the noted amplitude that points at the encoders. It never accuses alone: a note is no measurement.
+# Factor of the noted amplitude that points at the encoders. Alone it is no contradiction: a note is no measurement.
 AMPLITUDE_FACTOR = 2.5
-# Factor between the sum of tensions at rest and twice the pretension, after an offset of the load cell in N.
-PRETENSION_FACTOR, PRETENSION_N = 2.0, 3.0
+# Factor between the sum of tensions at rest and twice the pretension.
+PRETENSION_FACTOR = 2.0
 # Torque over radius and sum at the load; above 1 a cable would push.
 MOST_TORQUE = 1.5
 # Radii of pulleys, m.

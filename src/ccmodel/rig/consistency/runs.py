@@ -59,16 +59,13 @@ def _is_copy(one: Parity, other: Parity, channel: str) -> bool:
     changes = (np.abs(a) > scale) | (np.abs(b) > scale)
     if changes.sum() < limits.FEWEST_SAMPLES:
         return False
-    if channel in ANGLE_AT.values():
-        limit = limits.COPIED_ANGLE
-    elif (
-        is_noisy(a)
-        or white_noise(one.recording[channel]) > limits.NOISE_OVER_ACCURACY * one.recording.accuracy[channel]
-    ):
-        limit = limits.COPIED_NOISE
-    else:  # Without noise, equal physics gives equal readings.
+    is_angle = channel in ANGLE_AT.values()
+    equal = float(np.mean(np.abs(a - b)[changes] <= scale))
+    if equal <= (limits.COPIED_ANGLE if is_angle else limits.COPIED_NOISE):
         return False
-    return float(np.mean(np.abs(a - b)[changes] <= scale)) > limit
+    # Without noise, equal physics gives equal readings.
+    least_noise = limits.NOISE_OVER_ACCURACY * one.recording.accuracy[channel]
+    return is_angle or is_noisy(a) or white_noise(one.recording[channel]) > least_noise
 
 
 def _two_runs(parity: Parity) -> Contradiction | None:
