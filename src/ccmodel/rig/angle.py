@@ -132,6 +132,22 @@ def noise_width(time_s: NDArray, angle_rad: NDArray) -> float:
     return max(limits.NOISE_WIDTH_SDS * float(np.std(start - curve(time), ddof=3)), limits.FINE_STEP_RAD)
 
 
+def passes_of_zero(values: NDArray, band: float) -> tuple[NDArray, NDArray]:
+    """Last sample before and first sample after each pass of zero, from beyond a band on one side to beyond the other.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Deviations from the level that is passed.
+    band : float
+        Deviation up to which noise about the level does not count.
+    """
+    side = np.sign(np.where(np.abs(values) > band, values, 0.0))
+    known = np.flatnonzero(side)
+    changes = np.flatnonzero(np.diff(side[known]))
+    return known[changes], known[changes + 1]
+
+
 def smallest_step(values: NDArray) -> float | None:
     """The step of which all differences of values are multiples: their greatest common divisor, or None.
 

@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 
 from ccmodel.channels import CHANNELS, THETA_IN
 from ccmodel.recording import Recording
-from ccmodel.rig.angle import smallest_step
+from ccmodel.rig.angle import passes_of_zero, smallest_step
 
 # Fewest samples of a rest from which noise is estimated.
 FEWEST_AT_REST = 20
@@ -167,10 +167,7 @@ def motion_of(time_s: NDArray, angle: NDArray) -> tuple[float | None, str | None
 
 def _crossings(time_s: NDArray, swing: NDArray) -> NDArray:
     """Times at which a motion of peak to peak 1 passes its middle, each once however noisy it is."""
-    side = np.where(swing > CROSSING_BAND / 2, 1, np.where(swing < -CROSSING_BAND / 2, -1, 0))
-    known = np.flatnonzero(side)
-    changes = np.flatnonzero(np.diff(side[known]))
-    before, after = known[changes], known[changes + 1]
+    before, after = passes_of_zero(swing, CROSSING_BAND / 2)
     share = swing[before] / (swing[before] - swing[after])
     return time_s[before] + share * (time_s[after] - time_s[before])
 

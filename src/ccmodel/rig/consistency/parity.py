@@ -15,6 +15,7 @@ from scipy.ndimage import uniform_filter1d
 
 from ccmodel.channels import F_DRIVE, F_LOAD, T1, T2, T3, T4, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
 from ccmodel.recording import Recording
+from ccmodel.rig.angle import passes_of_zero
 from ccmodel.rig.batch import Batch
 from ccmodel.rig.consistency import limits
 
@@ -219,10 +220,7 @@ def speed(values: NDArray, time_s: NDArray) -> NDArray:
 def crossings(values: NDArray) -> NDArray:
     """Samples at which a channel crosses the middle of its range, not counting those of noise about it."""
     middle, band = (values.max() + values.min()) / 2, 0.1 * np.ptp(values)
-    side = np.sign(np.where(np.abs(values - middle) > band, values - middle, 0.0))
-    known = np.flatnonzero(side)
-    changes = np.flatnonzero(np.diff(side[known]))
-    ends = zip(known[changes], known[changes + 1], strict=True)
+    ends = zip(*passes_of_zero(values - middle, band), strict=True)
     return np.array([a + int(np.argmin(np.abs(values[a : b + 1] - middle))) for a, b in ends], dtype=int)
 
 
