@@ -1,6 +1,6 @@
 """Figures from which the diagnosis's settings were set by hand, on new practice cases of the virtual rig.
 
-The settings marked *Practice* in `ccmodel.diagnose.settings` separate correct from wrong candidate models. This script
+The settings marked *Practice* in `ccmodel.diagnosis.settings` separate correct from wrong candidate models. This script
 draws cases with seeds of its own, diagnoses them, and prints the distributions that the settings have to separate,
 with each setting beside its distribution.
 
@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from ccmodel.diagnose import settings
-from ccmodel.diagnose.candidate import CandidateFit
-from ccmodel.diagnose.diagnosis import diagnose
-from ccmodel.diagnose.verdict import Judgement
+from ccmodel.diagnosis import settings
+from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.run import diagnose
+from ccmodel.diagnosis.verdict import Judgement
 from ccmodel.model.parameters import Parameters
 from ccmodel.rig.ingest import ingest_batch
 from proof.build import record

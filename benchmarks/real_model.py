@@ -24,11 +24,11 @@ from numpy.typing import NDArray
 from real_regressor import COUNTS, STEP_S, TARGETS, VARIED, folds, is_resolved, rms
 
 from ccmodel.config import load_config
-from ccmodel.diagnose.calibration import calibration
-from ccmodel.diagnose.candidate import fit
-from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.observations import first_cycles
-from ccmodel.diagnose.whitening import whiten
+from ccmodel.diagnosis.calibration import calibration
+from ccmodel.diagnosis.candidate import fit
+from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.observations import first_cycles
+from ccmodel.diagnosis.whitening import whiten
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.pool import each
 from ccmodel.model.files import read_model

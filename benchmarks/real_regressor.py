@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.ensemble import HistGradientBoostingRegressor
 
-from ccmodel.diagnose.drive import since_reversal, speed
+from ccmodel.diagnosis.drive import since_reversal, speed
 from ccmodel.model.run import ModelInput
 from ccmodel.recording import Recording
 from ccmodel.rig.ingest import ingest_batch

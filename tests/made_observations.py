@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from builders import recording
-from ccmodel.diagnose.candidate import fit
-from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.whitening import whiten
+from ccmodel.diagnosis.candidate import fit
+from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.whitening import whiten
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.problem import Free
 from ccmodel.model.parameters import Parameters

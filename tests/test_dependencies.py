@@ -15,8 +15,8 @@ from ccmodel.rig.readers import registry
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-# The conda environment is that of a job. Snakemake starts the job from outside; pip and hatchling install the package.
-RUNS_JOBS, INSTALLS = {"snakemake"}, {"pip", "hatchling"}
+# The conda environment is that of a job, which Snakemake starts from outside; pip and hatchling install the package.
+INSTALLS = {"pip", "hatchling"}
 # A reader of a log format imports its library where it needs it, and names the extra that installs it.
 READERS = "src/ccmodel/rig/readers"
 
@@ -65,7 +65,5 @@ def test_the_conda_environment_has_the_same_dependencies():
     listed = by_name(YAML(typ="safe").load(ROOT / "workflow/envs/ccmodel.yaml")["dependencies"])
     assert listed.pop("python") == Requirement(f"python{PROJECT['requires-python']}").specifier
     wanted = by_name(PROJECT["dependencies"])
-    assert {name: listed[name] for name in listed.keys() - INSTALLS} == {
-        name: wanted[name] for name in wanted.keys() - RUNS_JOBS
-    }
+    assert {name: listed[name] for name in listed.keys() - INSTALLS} == wanted
     assert listed.keys() >= INSTALLS

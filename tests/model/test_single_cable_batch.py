@@ -4,7 +4,7 @@ import pytest
 import yaml
 
 from ccmodel.config import Study
-from ccmodel.diagnose.diagnosis import diagnose
+from ccmodel.diagnosis.run import diagnose
 from ccmodel.inference.least_squares import solve
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.problem import Free, Problem

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from ccmodel import mechanisms as registry
 from ccmodel.channels import TABLE_ONE
 from ccmodel.cli import app
-from ccmodel.diagnose.hypothesis import single_mechanisms
+from ccmodel.diagnosis.hypothesis import single_mechanisms
 from ccmodel.studies.table_one import rank
 from ccmodel.studies.table_one.effects import Effect, all_effects, depends_on_time, finer, scaled
 from ccmodel.studies.table_one.refit import refit

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from ccmodel.channels import TABLE
-from ccmodel.diagnose.location import TEXT
-from ccmodel.diagnose.result import FORMAT
+from ccmodel.diagnosis.location import TEXT
+from ccmodel.diagnosis.result import FORMAT
 from ccmodel.report.verdict import INPUTS_INCONSISTENT
 from ccmodel.rig.findings import Finding
 

@@ -13,11 +13,11 @@ from matplotlib.figure import Figure
 
 from ccmodel import mechanisms as registry
 from ccmodel.channels import TABLE, THETA_IN, short_name
-from ccmodel.diagnose.candidate import CandidateFit
-from ccmodel.diagnose.diagnosis import Diagnosis
-from ccmodel.diagnose.location import PHASES, mismatch
-from ccmodel.diagnose.settings import ADEQUATE_LACK_OF_FIT
-from ccmodel.diagnose.verdict import nested_choice
+from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.location import PHASES, mismatch
+from ccmodel.diagnosis.run import Diagnosis
+from ccmodel.diagnosis.settings import ADEQUATE_LACK_OF_FIT
+from ccmodel.diagnosis.verdict import nested_choice
 from ccmodel.mechanisms import catalogue
 from ccmodel.provenance import stamp
 from ccmodel.recording import ORIGIN, Recording

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from ccmodel import mechanisms as registry
 from ccmodel import provenance
-from ccmodel.diagnose.diagnosis import Diagnosis, Options
-from ccmodel.diagnose.diagnosis import diagnose as run
+from ccmodel.diagnosis.run import Diagnosis, Options
+from ccmodel.diagnosis.run import diagnose as run
 from ccmodel.failure import ModelError
 from ccmodel.model.files import model_as_dict, read_model
 from ccmodel.model.parameters import Parameters

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 
 from ccmodel import mechanisms as registry
-from ccmodel.diagnose.hypothesis import single_mechanisms
+from ccmodel.diagnosis.hypothesis import single_mechanisms
 from ccmodel.mechanisms import Parameter
 from ccmodel.studies.table_one.settings import Grid
 

@@ -8,11 +8,11 @@ from scipy.stats import t as student
 
 from ccmodel import mechanisms as registry
 from ccmodel.channels import short_name, unit_of
-from ccmodel.diagnose import experiment, location, settings
-from ccmodel.diagnose.candidate import CandidateFit, discretisation_shift, fit
-from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.observations import NotJudged
-from ccmodel.diagnose.verdict import Judgement, nested_choice
+from ccmodel.diagnosis import experiment, location, settings
+from ccmodel.diagnosis.candidate import CandidateFit, discretisation_shift, fit
+from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.observations import NotJudged
+from ccmodel.diagnosis.verdict import Judgement, nested_choice
 from ccmodel.failure import ModelError
 from ccmodel.inference.intervals import COVERAGE
 from ccmodel.model.parameters import Parameters, mechanism_key

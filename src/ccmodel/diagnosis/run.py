@@ -8,15 +8,15 @@ from dataclasses import dataclass
 
 from threadpoolctl import threadpool_limits
 
-from ccmodel.diagnose import settings
-from ccmodel.diagnose.calibration import tested_model
-from ccmodel.diagnose.candidate import CandidateFit, fit
-from ccmodel.diagnose.hypothesis import single_mechanisms, stated_hypothesis
-from ccmodel.diagnose.observations import observations_of
-from ccmodel.diagnose.result import report
-from ccmodel.diagnose.selection import Progress, Selection, silent
-from ccmodel.diagnose.verdict import Judgement, judge
-from ccmodel.diagnose.whitening import whiten
+from ccmodel.diagnosis import settings
+from ccmodel.diagnosis.calibration import tested_model
+from ccmodel.diagnosis.candidate import CandidateFit, fit
+from ccmodel.diagnosis.hypothesis import single_mechanisms, stated_hypothesis
+from ccmodel.diagnosis.observations import observations_of
+from ccmodel.diagnosis.result import report
+from ccmodel.diagnosis.selection import Progress, Selection, silent
+from ccmodel.diagnosis.verdict import Judgement, judge
+from ccmodel.diagnosis.whitening import whiten
 from ccmodel.inference.observations import Tolerance
 from ccmodel.inference.pool import each
 from ccmodel.model.parameters import Parameters

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from ccmodel.channels import TAU_IN, THETA_OUT
-from ccmodel.diagnose import settings
-from ccmodel.diagnose.candidate import CandidateFit
-from ccmodel.diagnose.drive import since_reversal, speed
-from ccmodel.diagnose.whitening import Whitened
+from ccmodel.diagnosis import settings
+from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.drive import since_reversal, speed
+from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.inference.pool import each
 from ccmodel.model.run import simulate
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.diagnose import settings
+from ccmodel.diagnosis import settings
 from ccmodel.model.run import ModelInput
 
 

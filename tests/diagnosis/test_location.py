@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ccmodel.diagnose.comparison import Comparison
-from ccmodel.diagnose.location import location, prominent
-from ccmodel.diagnose.verdict import Judgement
-from ccmodel.diagnose.whitening import whiten
+from ccmodel.diagnosis.comparison import Comparison
+from ccmodel.diagnosis.location import location, prominent
+from ccmodel.diagnosis.verdict import Judgement
+from ccmodel.diagnosis.whitening import whiten
 from ccmodel.model.general.run import Active
 from made_observations import NOISE, PARAMETERS, batch, calibrated
 

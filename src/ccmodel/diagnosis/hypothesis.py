@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 from ccmodel import mechanisms as registry
-from ccmodel.diagnose import settings
+from ccmodel.diagnosis import settings
 from ccmodel.inference.problem import Free
 from ccmodel.mechanisms import Parameter
 from ccmodel.model.general.run import Active

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from builders import recording
-from ccmodel.diagnose.location import PHASES, phases_of
-from ccmodel.diagnose.whitening import relinearised, whiten
+from ccmodel.diagnosis.location import PHASES, phases_of
+from ccmodel.diagnosis.whitening import relinearised, whiten
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS
 from ccmodel.inference.observations import Observations
 from ccmodel.model.general import Active

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ccmodel.diagnose import settings
-from ccmodel.diagnose.candidate import continued, discretisation_shift, fit
-from ccmodel.diagnose.hypothesis import Hypothesis
+from ccmodel.diagnosis import settings
+from ccmodel.diagnosis.candidate import continued, discretisation_shift, fit
+from ccmodel.diagnosis.hypothesis import Hypothesis
 from made_observations import batch, calibrated
 
 LOW = np.array([0.0, 1e-3])

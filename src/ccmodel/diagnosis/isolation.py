@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ccmodel.channels import PLACES_OF, TAU_OUT, THETA_OUT
-from ccmodel.diagnose.candidate import CandidateFit, fit
-from ccmodel.diagnose.whitening import Whitened, whiten
+from ccmodel.diagnosis.candidate import CandidateFit, fit
+from ccmodel.diagnosis.whitening import Whitened, whiten
 from ccmodel.failure import ModelError
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.pool import each

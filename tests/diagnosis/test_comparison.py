@@ -7,15 +7,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ccmodel.diagnose import verdict as verdicts
-from ccmodel.diagnose.candidate import CandidateFit
-from ccmodel.diagnose.comparison import Comparison, well_specified
-from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.lack_of_fit import LackOfFit
-from ccmodel.diagnose.screening import Score
-from ccmodel.diagnose.selection import Selection, improves_on_members
-from ccmodel.diagnose.settings import RIVAL, SUFFICIENT, SURE
-from ccmodel.diagnose.verdict import judge, nested_choice
+from ccmodel.diagnosis import verdict as verdicts
+from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.comparison import Comparison, well_specified
+from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.lack_of_fit import LackOfFit
+from ccmodel.diagnosis.screening import Score
+from ccmodel.diagnosis.selection import Selection, improves_on_members
+from ccmodel.diagnosis.settings import RIVAL, SUFFICIENT, SURE
+from ccmodel.diagnosis.verdict import judge, nested_choice
 from ccmodel.inference.effective_samples import in_comparison
 from ccmodel.inference.problem import Free
 from made_observations import batch, calibrated

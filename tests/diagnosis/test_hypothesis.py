@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from ccmodel import mechanisms
-from ccmodel.diagnose.hypothesis import Hypothesis, plausible, single_mechanisms
-from ccmodel.diagnose.screening import scaled
+from ccmodel.diagnosis.hypothesis import Hypothesis, plausible, single_mechanisms
+from ccmodel.diagnosis.screening import scaled
 from ccmodel.model.parameters import mechanism_parameter
 from made_observations import PARAMETERS
 

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
-from ccmodel.diagnose import settings
-from ccmodel.diagnose.candidate import CandidateFit
-from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.whitening import Whitened
+from ccmodel.diagnosis import settings
+from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.failure import ModelError
 from ccmodel.inference.pool import each
 from ccmodel.model.parameters import mechanism_key

@@ -3,12 +3,12 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from ccmodel.diagnose import settings
-from ccmodel.diagnose.candidate import CandidateFit, fit
-from ccmodel.diagnose.comparison import Comparison
-from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.screening import Score, screen
-from ccmodel.diagnose.whitening import Whitened, relinearised
+from ccmodel.diagnosis import settings
+from ccmodel.diagnosis.candidate import CandidateFit, fit
+from ccmodel.diagnosis.comparison import Comparison
+from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.screening import Score, screen
+from ccmodel.diagnosis.whitening import Whitened, relinearised
 from ccmodel.failure import ModelError
 from ccmodel.inference.pool import each
 from ccmodel.inference.problem import Free

@@ -7,9 +7,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.diagnose import settings
-from ccmodel.diagnose.hypothesis import Hypothesis, plausible
-from ccmodel.diagnose.whitening import Whitened
+from ccmodel.diagnosis import settings
+from ccmodel.diagnosis.hypothesis import Hypothesis, plausible
+from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.failure import ModelError
 from ccmodel.inference.cross_validation import inverse_of, leave_one_out
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS, mean_weight

@@ -16,11 +16,11 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import norm
 
-from ccmodel.diagnose import settings
-from ccmodel.diagnose.candidate import CandidateFit
-from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.lack_of_fit import LackOfFit, lack_of_fit
-from ccmodel.diagnose.whitening import Whitened
+from ccmodel.diagnosis import settings
+from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
+from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.inference.effective_samples import in_comparison
 
 

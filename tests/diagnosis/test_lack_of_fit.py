@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ccmodel.diagnose.candidate import CandidateFit
-from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.lack_of_fit import lack_of_fit
+from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.lack_of_fit import lack_of_fit
 from made_observations import batch
 
 

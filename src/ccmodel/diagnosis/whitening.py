@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.channels import THETA_OUT, ZERO_OF
-from ccmodel.diagnose import settings
+from ccmodel.diagnosis import settings
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS
 from ccmodel.inference.jacobian import STEP, jacobian, size_of
 from ccmodel.inference.observations import Observations

@@ -5,14 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ccmodel.diagnose import settings
-from ccmodel.diagnose.candidate import CandidateFit
-from ccmodel.diagnose.comparison import Comparison
-from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.isolation import isolate
-from ccmodel.diagnose.lack_of_fit import LackOfFit
-from ccmodel.diagnose.screening import Score
-from ccmodel.diagnose.whitening import Whitened
+from ccmodel.diagnosis import settings
+from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.comparison import Comparison
+from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.isolation import isolate
+from ccmodel.diagnosis.lack_of_fit import LackOfFit
+from ccmodel.diagnosis.screening import Score
+from ccmodel.diagnosis.whitening import Whitened
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from ccmodel.diagnose.candidate import CandidateFit
-from ccmodel.diagnose.comparison import Comparison
-from ccmodel.diagnose.experiment import (
+from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.comparison import Comparison
+from ccmodel.diagnosis.experiment import (
     experiments,
     motions,
     planned_observations,
@@ -13,9 +13,9 @@ from ccmodel.diagnose.experiment import (
     recordings_wanted,
     separation,
 )
-from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.settings import EXPERIMENT_RATE_HZ
-from ccmodel.diagnose.verdict import Judgement
+from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.settings import EXPERIMENT_RATE_HZ
+from ccmodel.diagnosis.verdict import Judgement
 from ccmodel.inference.problem import Free
 from made_observations import PARAMETERS, batch
 

@@ -14,9 +14,9 @@ from typer.testing import CliRunner
 
 from builders import write_batch
 from ccmodel import cli
-from ccmodel.diagnose.candidate import CandidateFit
-from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.result import alternatives_of, mechanism_of
+from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.result import alternatives_of, mechanism_of
 from ccmodel.failure import ModelError
 from ccmodel.inference import pool
 from ccmodel.model.files import read_model

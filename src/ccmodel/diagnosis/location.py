@@ -6,12 +6,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from ccmodel.channels import PLACES_OF, short_name
-from ccmodel.diagnose import settings
-from ccmodel.diagnose.candidate import CandidateFit
-from ccmodel.diagnose.drive import is_moving, since_reversal
-from ccmodel.diagnose.isolation import channels_of, isolate
-from ccmodel.diagnose.verdict import Judgement
-from ccmodel.diagnose.whitening import Whitened
+from ccmodel.diagnosis import settings
+from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.drive import is_moving, since_reversal
+from ccmodel.diagnosis.isolation import channels_of, isolate
+from ccmodel.diagnosis.verdict import Judgement
+from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.model.run import ModelInput
 
 # Phases of the drive's motion.
@@ -62,7 +62,7 @@ def prominent(square: dict[str, float], share: float) -> list[str]:
 def _places(judgement: Judgement) -> list[str]:
     """Possible places of a mismatch that no mechanism explains, the most likely first.
 
-    If no part alone is at fault (`ccmodel.diagnose.isolation`), the fault lies between drive and load, where nearly
+    If no part alone is at fault (`ccmodel.diagnosis.isolation`), the fault lies between drive and load, where nearly
     every effect acts along the conduits. Places that this does not separate are ordered by their screening scores.
     """
     whitened, calibrated = judgement.whitened, judgement.calibrated

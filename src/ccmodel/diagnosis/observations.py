@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ccmodel.channels import MEASURED
-from ccmodel.diagnose import settings
+from ccmodel.diagnosis import settings
 from ccmodel.failure import ModelError
 from ccmodel.inference.observations import Observations, Tolerance
 from ccmodel.model.parameters import Parameters

@@ -9,14 +9,14 @@ import pytest
 from builders import recording
 from ccmodel.cli import diagnose
 from ccmodel.config import Config, load_config
-from ccmodel.diagnose import candidate
-from ccmodel.diagnose.calibration import calibration
-from ccmodel.diagnose.candidate import best_start, fit, starting_points
-from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.observations import first_cycles
-from ccmodel.diagnose.selection import Selection
-from ccmodel.diagnose.verdict import judge
-from ccmodel.diagnose.whitening import Whitened
+from ccmodel.diagnosis import candidate
+from ccmodel.diagnosis.calibration import calibration
+from ccmodel.diagnosis.candidate import best_start, fit, starting_points
+from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.observations import first_cycles
+from ccmodel.diagnosis.selection import Selection
+from ccmodel.diagnosis.verdict import judge
+from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.failure import ModelError
 from ccmodel.inference.least_squares import Solution
 from ccmodel.inference.observations import Observations

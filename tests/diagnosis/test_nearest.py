@@ -5,11 +5,11 @@ from dataclasses import replace
 import pytest
 
 from ccmodel.channels import short_name
-from ccmodel.diagnose.candidate import fit
-from ccmodel.diagnose.comparison import Comparison
-from ccmodel.diagnose.hypothesis import Hypothesis
-from ccmodel.diagnose.result import report
-from ccmodel.diagnose.verdict import Judgement
+from ccmodel.diagnosis.candidate import fit
+from ccmodel.diagnosis.comparison import Comparison
+from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.result import report
+from ccmodel.diagnosis.verdict import Judgement
 from ccmodel.model.general.run import Active
 from made_observations import NOISE, PARAMETERS, batch, calibrated
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ccmodel.diagnose.comparison import Comparison
-from ccmodel.diagnose.result import contradicting_recording
-from ccmodel.diagnose.verdict import Judgement
-from ccmodel.diagnose.whitening import whiten
+from ccmodel.diagnosis.comparison import Comparison
+from ccmodel.diagnosis.result import contradicting_recording
+from ccmodel.diagnosis.verdict import Judgement
+from ccmodel.diagnosis.whitening import whiten
 from ccmodel.geometry import ConduitPath
 from made_observations import PARAMETERS, batch, calibrated
 

@@ -13,11 +13,11 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.diagnose import settings
-from ccmodel.diagnose.candidate import CandidateFit
-from ccmodel.diagnose.drive import speed
-from ccmodel.diagnose.verdict import Judgement
-from ccmodel.diagnose.whitening import Whitened, nuisances, shrinkage_of
+from ccmodel.diagnosis import settings
+from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.drive import speed
+from ccmodel.diagnosis.verdict import Judgement
+from ccmodel.diagnosis.whitening import Whitened, nuisances, shrinkage_of
 from ccmodel.failure import ModelError
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS
 from ccmodel.inference.jacobian import inward, jacobian, size_of

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ccmodel.channels import TAU_IN, TAU_OUT, ZERO_OF
-from ccmodel.diagnose import settings
-from ccmodel.diagnose.hypothesis import PAPER, Hypothesis
+from ccmodel.diagnosis import settings
+from ccmodel.diagnosis.hypothesis import PAPER, Hypothesis
 from ccmodel.inference.least_squares import Search, solve
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.problem import Free, Problem
