@@ -6,7 +6,7 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 _PAGE = """# Mechanisms
 
 Physics that the paper's model leaves out. Made from the files of `src/ccmodel/mechanisms` by
-`ccmodel mechanisms --markdown > docs/mechanisms.md`; do not edit. [How to add one](add-a-mechanism.md).
+`ccmodel mechanisms --markdown > docs/mechanisms.md`; do not edit. [How to add one](how-to/add-a-mechanism.md).
 
 Symbols are those of the [glossary](glossary.md), in plain letters. "Mistaken for" also lists two parameters and a state
 of the paper's model: the stiffness K, the friction coefficient mu, and a slack cable.
