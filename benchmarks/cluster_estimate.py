@@ -40,7 +40,7 @@ class Cluster:
 
     nodes: int
     start_s: float = 25.0
-    poll_s: float = 40.0
+    poll_s: float = 20.0
     submitted: int = 100
 
 
