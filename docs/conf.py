@@ -24,7 +24,6 @@ extensions = [
     "repository_links",
 ]
 exclude_patterns = ["_extensions"]
-suppress_warnings = ["toc.empty_glob"]
 
 # Every reference that leads nowhere is an error (`sphinx-build -n -W`). Other libraries' names have no pages here, and
 # their inventories would have to be fetched.

@@ -10,7 +10,7 @@ INDEX = "mechanisms.md"
 _MADE = """Made from `src/ccmodel/mechanisms` by `ccmodel mechanisms --markdown docs`; do not edit."""
 _INDEX = f"""# Mechanisms
 
-Physics that the paper's model leaves out, a page each. {_MADE} [How to add one](add-a-mechanism.md).
+Physics that the paper's model leaves out, a page each. {_MADE} [How to add one](how-to/add-a-mechanism.md).
 
 Symbols are those of the [glossary](glossary.md). "Look-alikes" are other mechanisms, or two parameters and a state of
 the paper's model: the stiffness K, the friction coefficient mu, and a slack cable. Names, places, parameters and ranges
