@@ -10,16 +10,19 @@ from ccmodel.errors import error_table
 from ccmodel.failure import ModelError
 from ccmodel.model.files import read_model
 from ccmodel.model.run import ModelInput, simulate
+from ccmodel.progress import Progress, silent, within
 from ccmodel.recording import Recording
 from ccmodel.rig.ingest import ingest_batch
 from ccmodel.steps.files import write_channels
 from ccmodel.steps.simulate import simulate_each
 from ccmodel.typed import InputError
 
+# Share of reading the logs in the time of a prediction.
+READING = 0.5
 MOTION = ["time_s", THETA_IN]
 
 
-def predict(batch: Path, model_file: Path, out: Path) -> tuple[list[str], pd.DataFrame]:
+def predict(batch: Path, model_file: Path, out: Path, progress: Progress = silent) -> tuple[list[str], pd.DataFrame]:
     """Write a CSV for each recording of a batch folder: the sensor readings by a model file, at the recording's times.
 
     The model is given the drive angle, the readings at rest and, if it has no load law, the load torque.
@@ -31,9 +34,9 @@ def predict(batch: Path, model_file: Path, out: Path) -> tuple[list[str], pd.Dat
     DataFrame
         Errors of the others (`ccmodel.errors.error_table`).
     """
-    parameters, ingested = read_model(model_file), ingest_batch(batch)
+    parameters, ingested = read_model(model_file), ingest_batch(batch, within(progress, 0.0, READING))
     messages = [str(f) for f in ingested.findings if f.severity == "refused"]
-    pairs, failures = simulate_each(ingested.recordings, parameters)
+    pairs, failures = simulate_each(ingested.recordings, parameters, within(progress, READING, 1.0))
     messages += [f"{recording.batch}/{recording.id}: {error}" for recording, error in failures]
     out.mkdir(parents=True, exist_ok=True)
     for recording, simulated in pairs:

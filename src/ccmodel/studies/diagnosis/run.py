@@ -1,6 +1,6 @@
 """A batch -> its diagnosis: diagnosis.json, a page, and the models that were compared."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from ccmodel import mechanisms as registry
@@ -10,6 +10,7 @@ from ccmodel.diagnosis.run import diagnose as run
 from ccmodel.failure import ModelError
 from ccmodel.model.files import model_as_dict, read_model
 from ccmodel.model.parameters import Parameters
+from ccmodel.progress import Progress, silent, within
 from ccmodel.recording import Recording, read_recordings
 from ccmodel.report.verdict import headline
 from ccmodel.rig.findings import Finding
@@ -22,6 +23,8 @@ from ccmodel.typed import InputError
 
 # The page of a run of the pipeline, seen from the report of a diagnosis.
 PAGE_OF_RUN = "../../index.html"
+# Shares of the time at which the batch is read, and at which the page is written.
+INGEST, PAGE = 0.05, 0.95
 
 
 def diagnose(
@@ -29,7 +32,7 @@ def diagnose(
     out: Path,
     options: Options = Options(),  # noqa: B008
     baseline: Path | None = None,
-    report: Callable[[str], None] = lambda text: None,
+    progress: Progress = silent,
     trust_inputs: bool = False,
 ) -> dict:
     """Diagnose a batch folder and write the files of its diagnosis.
@@ -41,8 +44,7 @@ def diagnose(
     options : Options
     baseline : Path, optional
         Model file to start from, instead of the batch's own estimates.
-    report : callable
-        Gets a line on each stage.
+    progress : Progress
     trust_inputs : bool
         Whether to diagnose even if the inputs contradict one another.
 
@@ -61,7 +63,7 @@ def diagnose(
             registry.get(name)
     except registry.UnknownMechanismError as error:
         raise InputError(f"--without: {error}") from None
-    ingested = ingest_batch(batch)
+    ingested = ingest_batch(batch, within(progress, 0.0, INGEST))
     contradict = not trust_inputs and any(f.is_inconsistent for f in ingested.findings)
     if ingested.batch is None or not (ingested.recordings or contradict):
         refused = [str(f) for f in ingested.findings if f.severity == "refused"]
@@ -76,16 +78,19 @@ def diagnose(
     else:
         try:
             estimates, not_judged = Parameters.estimated(ingested.batch.rig), _not_judged(ingested.findings)
-            found = run(ingested.recordings, estimates, options, known, not_judged, report)
+            found = run(ingested.recordings, estimates, options, known, not_judged, within(progress, INGEST, PAGE))
         except (ModelError, ValueError) as error:
             raise InputError(f"{batch}: {error}") from None
+        progress("writing the page", PAGE)
         content = _write(found, inputs, out)
     if not content["nearest"]:
         (out / MODEL_FILES["nearest"]).unlink()
     return content
 
 
-def diagnose_recordings(recordings_file: Path, out: Path, settings: Diagnosing | None = None) -> None:
+def diagnose_recordings(
+    recordings_file: Path, out: Path, settings: Diagnosing | None = None, progress: Progress = silent
+) -> None:
     """Diagnose a batch that the pipeline has read; a batch that cannot be diagnosed has files with the reason."""
     estimates, recordings = estimates_of(recordings_file), read_recordings(recordings_file)
     settings, inputs = settings or Diagnosing(), provenance.of_inputs([recordings_file])
@@ -97,7 +102,7 @@ def diagnose_recordings(recordings_file: Path, out: Path, settings: Diagnosing |
     try:
         if estimates is None or not recordings:
             raise ModelError("no recording that can be used")
-        found = run(recordings, estimates, options_of(settings), not_judged=_not_judged(findings))
+        found = run(recordings, estimates, options_of(settings), None, _not_judged(findings), progress)
     except (ModelError, ValueError) as error:
         name, reason = recordings_file.stem, str(error)
         out.mkdir(parents=True, exist_ok=True)
