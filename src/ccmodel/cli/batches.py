@@ -15,9 +15,6 @@ if TYPE_CHECKING:
 
     from ccmodel.rig.overview import Overview
 
-# Width of a table that stays whole whatever the width of the terminal.
-_WHOLE = 100
-
 
 def add_to(app: typer.Typer) -> None:
     """Add the commands."""
@@ -26,7 +23,9 @@ def add_to(app: typer.Typer) -> None:
 
 
 def init(
-    folder: Annotated[Path, typer.Argument(help="Folder of logs.", callback=input_folder, show_default=False)],
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="Folder of logs.", callback=input_folder, show_default=False)
+    ],
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -95,7 +94,7 @@ def _lines(name: str, seen: "Overview") -> "list[RenderableType]":
         f"{name}: {seen.samples} samples at {seen.rate_Hz:.5g} Hz, {seen.duration_s:.4g} s; {rest};"
         f" stroke {seen.stroke:.4g} rad; {motion}{f' ({seen.wave})' if seen.wave else ''}"
     )
-    table = Table("channel", box=None, pad_edge=False, width=None)
+    table = Table("channel", box=None, pad_edge=False)
     for title in ("lowest", "highest", "unit", "noise at rest", "resolution"):
         table.add_column(title, justify="left" if title == "unit" else "right", no_wrap=True)
     for c in seen.channels:

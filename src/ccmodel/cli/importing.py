@@ -24,7 +24,9 @@ def add_to(app: typer.Typer) -> None:
 
 
 def import_(
-    files: Annotated[list[Path], typer.Argument(help="The rig's logs, in any format.", show_default=False)],
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILES", help="The rig's logs, in any format.", show_default=False)
+    ],
     out: Annotated[Path, out_folder("Folder of the batch; its name becomes the batch's.")],
     map_file: Annotated[
         Path | None,
@@ -81,7 +83,10 @@ def _import_as_data(imported: "Written") -> dict:
 
 def import_mis_tool(
     source: Annotated[
-        Path, typer.Argument(help="The data set or one of its folders.", callback=input_folder, show_default=False)
+        Path,
+        typer.Argument(
+            metavar="SOURCE", help="The data set or one of its folders.", callback=input_folder, show_default=False
+        ),
     ],
     out: Annotated[Path, out_folder("Folder for the batches, one for each tool and angle.")],
     name: Annotated[

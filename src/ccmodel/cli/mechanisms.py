@@ -19,7 +19,10 @@ def mechanisms(
     name: Annotated[
         str | None,
         typer.Argument(
-            help="Print the whole entry of this one.", autocompletion=completion.mechanisms, show_default=False
+            metavar="NAME",
+            help="Print the whole entry of this one.",
+            autocompletion=completion.mechanisms,
+            show_default=False,
         ),
     ] = None,
     markdown: Annotated[bool, typer.Option("--markdown", help="Print docs/mechanisms.md.")] = False,

@@ -85,7 +85,7 @@ def input_file(ctx: typer.Context, value: Path | None) -> Path | None:
 
 _BATCH = {"callback": batch_folder, "autocompletion": completion.batch_folders, "show_default": False}
 
-Batch = Annotated[Path, typer.Argument(help="Folder of a batch, or its batch.yaml.", **_BATCH)]
+Batch = Annotated[Path, typer.Argument(metavar="BATCH", help="Folder of a batch, or its batch.yaml.", **_BATCH)]
 BatchOption = Annotated[Path | None, typer.Option("--batch", help="Folder of a batch, or its batch.yaml.", **_BATCH)]
 Model = Annotated[
     Path,
@@ -93,7 +93,9 @@ Model = Annotated[
         "--model", help="A model file, as a diagnosis or a fit writes it.", callback=input_file, show_default=False
     ),
 ]
-Results = Annotated[Path, typer.Argument(help="Folder of a run's results.", callback=input_folder)]
+Results = Annotated[
+    Path, typer.Argument(metavar="RESULTS", help="Folder of a run's results, or of a diagnosis.", callback=input_folder)
+]
 Cores = Annotated[int, typer.Option("--cores", min=1, help="Number of processes.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document; errors too.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print the result alone: no progress, hints or warnings.")]

@@ -23,7 +23,9 @@ def add_to(app: typer.Typer) -> None:
 def table_one(
     settings: Annotated[
         Path,
-        typer.Argument(help="config/table-one.yaml or one like it.", callback=input_file, show_default=False),
+        typer.Argument(
+            metavar="SETTINGS", help="config/table-one.yaml or one like it.", callback=input_file, show_default=False
+        ),
     ],
     out: Annotated[Path, out_folder("Folder for the tables.")],
     figure: Annotated[Path, typer.Option(help="File for the figure, PNG or SVG.", show_default=False)],

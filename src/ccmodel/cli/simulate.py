@@ -20,7 +20,12 @@ def add_to(app: typer.Typer) -> None:
 def simulate(
     motion: Annotated[
         Path,
-        typer.Argument(help="CSV with the columns time_s and theta_in_rad.", callback=input_file, show_default=False),
+        typer.Argument(
+            metavar="MOTION",
+            help="CSV with the columns time_s and theta_in_rad.",
+            callback=input_file,
+            show_default=False,
+        ),
     ],
     model: Model,
     out: Annotated[Path, out_file("File for the sensor readings, CSV.")],
