@@ -6,7 +6,7 @@ CORES ?= 2
 # The former name of REGRESSORS.
 REGRESSORS ?= $(RIVALS)
 
-.PHONY: help results real data test bench accuracy-gate input-checks diagnosis-settings table-one coverage proof proof-full proof-real lint lock clean
+.PHONY: help results real data test docs bench accuracy-gate input-checks diagnosis-settings table-one coverage proof proof-full proof-real lint lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -42,6 +42,11 @@ data: $(VENV)/.ready  ## record data/raw again with the virtual rig
 test: $(VENV)/.ready  ## run the tests and the linters
 	$(BIN)/python -m pytest -n $(CORES) --dist loadfile --no-loadscope-reorder
 	$(MAKE) --no-print-directory lint
+
+# A fresh environment every time: a build that reuses the last one's is silent about pages it does not read again.
+docs: $(VENV)/.ready  ## build the documents: results/docs/html/index.html; a warning or a dead link is an error
+	$(BIN)/python -m sphinx -n -W --keep-going -E -q -d results/docs/doctrees docs results/docs/html
+	@echo "The documents are results/docs/html/index.html"
 
 bench: $(VENV)/.ready  ## measure speed and accuracy: results/bench.json, docs/figures/work-precision.png
 	$(BIN)/python benchmarks/bench.py

@@ -1,5 +1,6 @@
 """The mechanisms that a diagnosis knows."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -25,7 +26,9 @@ def mechanisms(
             show_default=False,
         ),
     ] = None,
-    markdown: Annotated[bool, typer.Option("--markdown", help="Print docs/mechanisms.md.")] = False,
+    markdown: Annotated[
+        Path | None, typer.Option(help="Write the pages of all mechanisms into this folder.", show_default=False)
+    ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -36,9 +39,13 @@ def mechanisms(
     from ccmodel.typed import InputError
 
     output = Output(as_json, quiet)
+    if markdown is not None:
+        catalogue.write_pages(markdown)
+        output.result({"out": markdown})
+        return
     try:
         entries = [catalogue.parts(one) for one in ([name] if name else names())] if as_json else []
-        text = catalogue.page() if markdown else catalogue.entry(name) if name else None
+        text = catalogue.entry(name) if name else None
     except UnknownMechanismError as error:
         raise InputError(str(error)) from None
     if text is None:
