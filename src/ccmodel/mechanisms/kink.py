@@ -36,6 +36,7 @@ def _modifies_physics(settings, values):
 MECHANISM = Mechanism(
     name="kink",
     text=__doc__,
+    tex=r"\varphi(x) = \varphi_\mathrm{path}(x) + \begin{cases} 0 & x < s L \\ \beta & x \ge s L \end{cases}",
     sentence="the conduits have an extra bend of {beta} at one place",
     places=("conduit",),
     parameters=(

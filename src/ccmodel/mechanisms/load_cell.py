@@ -67,7 +67,7 @@ def _crosstalk(force, crosstalk, sensing, end):
     return force + crosstalk * (sensing.channels[TORQUE_AT[end]] / radius)
 
 
-def _fault(name, reading, parameter, mistaken_for, sentence, depends_on_time=False):
+def _fault(name, reading, tex, parameter, mistaken_for, sentence, depends_on_time=False):
     """Mechanism of one fault: `reading` gives the cell's values from the sum of tensions and the fault's parameter."""
 
     def modifies_observation(sensing, place, values):
@@ -77,6 +77,7 @@ def _fault(name, reading, parameter, mistaken_for, sentence, depends_on_time=Fal
     return Mechanism(
         name=name,
         text=reading.__doc__,
+        tex=tex,
         sentence=sentence,
         places=("drive-sensor", "load-sensor"),
         parameters=(parameter,),
@@ -95,16 +96,23 @@ MECHANISMS = (
     _fault(
         "load-cell-scale",
         _scale,
+        r"F_\mathrm{read} = (1 + \mathrm{gain})\,F",
         _GAIN,
         ("load-cell-offset", "cable-asymmetry"),
         "the {side}'s load cell reads {gain:%} [high|low]",
     ),
     _fault(
-        "load-cell-offset", _offset, _OFFSET, ("load-cell-scale",), "the {side}'s load cell reads {offset} [high|low]"
+        "load-cell-offset",
+        _offset,
+        r"F_\mathrm{read} = F + \mathrm{offset}",
+        _OFFSET,
+        ("load-cell-scale",),
+        "the {side}'s load cell reads {offset} [high|low]",
     ),
     _fault(
         "load-cell-drift",
         _drift,
+        r"F_\mathrm{read}(t) = F(t) + \mathrm{rate}\cdot(t - t_0)",
         _RATE,
         ("relaxation", "load-cell-offset"),
         "the zero of the {side}'s load cell drifts [up|down] by {rate}",
@@ -113,6 +121,7 @@ MECHANISMS = (
     _fault(
         "load-cell-crosstalk",
         _crosstalk,
+        r"F_\mathrm{read} = F + \mathrm{crosstalk}\cdot\frac{\tau}{R}",
         _CROSSTALK,
         ("load-cell-scale",),
         "the {side}'s load cell responds to {crosstalk:%} of the torque",
