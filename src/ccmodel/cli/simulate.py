@@ -13,7 +13,7 @@ from ccmodel.cli.output import Output
 
 def add_to(app: typer.Typer) -> None:
     """Add the command."""
-    example = "ccmodel simulate motion.csv --model out/model.json --batch data/raw/loops --out simulated.csv"
+    example = "ccmodel simulate motion.csv --model out/model.json --out simulated.csv"
     command(app, "simulate", MODEL, [example])(simulate)
 
 
@@ -31,7 +31,10 @@ def simulate(
     out: Annotated[Path, out_file("File for the sensor readings, CSV.")],
     batch: BatchOption = None,
     recording: Annotated[
-        str | None, typer.Option(help="Recording with the conduits; else the first.", show_default=False)
+        str | None,
+        typer.Option(
+            help="Recording whose conduits are used; else the first that the model was fitted to.", show_default=False
+        ),
     ] = None,
     pretension: Annotated[
         float | None, typer.Option(min=0.0, help="Pretension, N; else that recording's.", show_default=False)
@@ -39,12 +42,12 @@ def simulate(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Simulate the sensor readings of a rig for a motion of its drive, by a fitted model."""
-    from ccmodel.steps.predict import simulate_motion as run
-    from ccmodel.typed import InputError
+    """Simulate the sensor readings of a rig for a motion of its drive, by a fitted model.
 
-    if batch is None:
-        raise InputError("--batch: name the folder of a batch of the rig: the model file does not state its conduits")
+    A model file of an earlier version does not know the conduits of its rig: name a batch of it with --batch.
+    """
+    from ccmodel.steps.predict import simulate_motion as run
+
     output = Output(as_json, quiet)
     with leaving(out):
         run(motion, model, batch, out, recording, pretension)
