@@ -157,7 +157,7 @@ def _version(folder: Path) -> str:
     return text.partition('__version__ = "')[2].partition('"')[0]
 
 
-def _one_line(text) -> str:
+def _one_line(text: object) -> str:
     return " ".join(str(text).split())[:160]
 
 

@@ -109,10 +109,10 @@ def diagnose(
         If the model cannot be run on any of the recordings.
     """
     observations, missing = observations_of(recordings, estimates, options.tolerance, options.step_s, options.cycles)
-    not_judged = [*map(dict, not_judged), *missing]
+    unjudged = [*map(dict, not_judged), *missing]
     if options.freeze:
         why = "frozen at the baseline's values, as requested"
-        not_judged.append({"what": "stiffness, friction and everything else that a calibration would fit", "why": why})
+        unjudged.append({"what": "stiffness, friction and everything else that a calibration would fit", "why": why})
     tested_name = "the baseline" if baseline else "the paper's model"
     progress(f"calibrating {tested_name} on {len(observations)} recordings")
     # Two fits: a first one gives the model about which the errors are linearised and whitened, and the fit of the
@@ -126,5 +126,5 @@ def diagnose(
     selection = Selection(tested.free, mechanisms, forced, progress)
     comparison, scores = selection.run(whitened, calibrated)
     judgement = judge(comparison, scores)
-    content = report(recordings[0].batch, judgement, tested.estimates, not_judged)
+    content = report(recordings[0].batch, judgement, tested.estimates, unjudged)
     return Diagnosis(content, judgement, tested.estimates)

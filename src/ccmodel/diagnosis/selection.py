@@ -92,7 +92,7 @@ class Selection:
         found, seen = [], set()
         for first in firsts:
             partners = [h for h in self.mechanisms if h.acting[0] not in first.hypothesis.acting]
-            chosen = []
+            chosen: list[Score] = []
             for s in screen(whitened, first, partners):
                 pair = frozenset(first.hypothesis.acting + s.hypothesis.acting)
                 if s.gain > settings.WORTH_FITTING and pair not in seen and len(chosen) < settings.PARTNERS:
