@@ -6,7 +6,8 @@ CORES ?= 2
 # The former name of REGRESSORS.
 REGRESSORS ?= $(RIVALS)
 
-.PHONY: help results real data test bench accuracy-gate input-checks diagnosis-settings table-one coverage proof proof-full proof-real lint lock clean
+.PHONY: help results real data test docs bench accuracy-gate input-checks diagnosis-settings table-one coverage proof \
+  proof-full proof-real slurm-test lint lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -43,6 +44,11 @@ test: $(VENV)/.ready  ## run the tests and the linters
 	$(BIN)/python -m pytest -n $(CORES) --dist loadfile --no-loadscope-reorder
 	$(MAKE) --no-print-directory lint
 
+# A fresh environment every time: a build that reuses the last one's is silent about pages it does not read again.
+docs: $(VENV)/.ready  ## build the documents: results/docs/html/index.html; a warning or a dead link is an error
+	$(BIN)/python -m sphinx -n -W --keep-going -E -q -d results/docs/doctrees docs results/docs/html
+	@echo "The documents are results/docs/html/index.html"
+
 bench: $(VENV)/.ready  ## measure speed and accuracy: results/bench.json, docs/figures/work-precision.png
 	$(BIN)/python benchmarks/bench.py
 
@@ -75,10 +81,15 @@ proof-real: $(VENV)/.ready  ## seed faults in the public da Vinci recordings and
 	@$(BIN)/ccmodel import-mis-tool "$(DATA)" --out results/real/raw
 	$(BIN)/python -m proof real results/real/raw --out results/proof/real --page docs/real-concealment.md
 
+slurm-test: $(VENV)/.ready  ## run the pipeline and N cases of the proof as jobs of a local Slurm, and as ever; compare
+	BATCHES="$(BATCHES)" CASES="$(N)" tests/slurm/run
+
 lint: $(VENV)/.ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile proof/Snakefile workflow
+	$(BIN)/snakemake --lint
+	$(BIN)/snakemake --snakefile proof/Snakefile --lint
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/mypy --no-error-summary
 

@@ -1,21 +1,6 @@
-from snakemake.utils import min_version
-
-min_version("9.0")
-
-
-report: "workflow/report/overview.rst"
+# The workflow in Snakemake's standard layout, found by `snakemake` at the top.
+include: "workflow/Snakefile"
 
 
-include: "workflow/rules/common.smk"
-include: "workflow/rules/ingest.smk"
-include: "workflow/rules/fit.smk"
-include: "workflow/rules/simulate.smk"
-include: "workflow/rules/diagnose.smk"
-include: "workflow/rules/studies.smk"
-include: "workflow/rules/report.smk"
-
-
-rule all:
-    default_target: True
-    input:
-        f"{RESULTS}/index.html",
+# Rules of an included file are never the default target.
+workflow.default_target = "all"

@@ -309,15 +309,15 @@ def table_one(
 @app.command()
 def mechanisms(
     name: Annotated[str | None, typer.Argument(help="Print the whole entry of this one.")] = None,
-    markdown: Annotated[bool, typer.Option("--markdown", help="Print docs/mechanisms.md.")] = False,
+    markdown: Annotated[Path | None, typer.Option(help="Write the pages of all mechanisms into this folder.")] = None,
 ) -> None:
     """List the mechanisms: names, places, parameters with range and unit."""
     from rich.table import Table
 
     from ccmodel.mechanisms import UnknownMechanismError, catalogue
 
-    if markdown:
-        typer.echo(catalogue.page())
+    if markdown is not None:
+        catalogue.write_pages(markdown)
     elif name is None:
         table = Table("name", "places", "parameters", "what it is", box=None)
         for row in catalogue.rows():

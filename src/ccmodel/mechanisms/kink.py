@@ -37,6 +37,7 @@ def _modifies_physics(settings: Settings, values: Mapping[str, float]) -> None:
 MECHANISM = Mechanism(
     name="kink",
     text=__doc__,
+    tex=r"\varphi(x) = \varphi_\mathrm{path}(x) + \begin{cases} 0 & x < s L \\ \beta & x \ge s L \end{cases}",
     sentence="the conduits have an extra bend of {beta} at one place",
     places=("conduit",),
     parameters=(

@@ -77,6 +77,7 @@ def _crosstalk(force: NDArray, crosstalk: float, sensing: Sensing, end: str) -> 
 def _fault(
     name: str,
     reading: Reading,
+    tex: str,
     parameter: Parameter,
     mistaken_for: tuple[str, ...],
     sentence: str,
@@ -91,6 +92,7 @@ def _fault(
     return Mechanism(
         name=name,
         text=reading.__doc__ or "",
+        tex=tex,
         sentence=sentence,
         places=("drive-sensor", "load-sensor"),
         parameters=(parameter,),
@@ -109,16 +111,23 @@ MECHANISMS = (
     _fault(
         "load-cell-scale",
         _scale,
+        r"F_\mathrm{read} = (1 + \mathrm{gain})\,F",
         _GAIN,
         ("load-cell-offset", "cable-asymmetry"),
         "the {side}'s load cell reads {gain:%} [high|low]",
     ),
     _fault(
-        "load-cell-offset", _offset, _OFFSET, ("load-cell-scale",), "the {side}'s load cell reads {offset} [high|low]"
+        "load-cell-offset",
+        _offset,
+        r"F_\mathrm{read} = F + \mathrm{offset}",
+        _OFFSET,
+        ("load-cell-scale",),
+        "the {side}'s load cell reads {offset} [high|low]",
     ),
     _fault(
         "load-cell-drift",
         _drift,
+        r"F_\mathrm{read}(t) = F(t) + \mathrm{rate}\cdot(t - t_0)",
         _RATE,
         ("relaxation", "load-cell-offset"),
         "the zero of the {side}'s load cell drifts [up|down] by {rate}",
@@ -127,6 +136,7 @@ MECHANISMS = (
     _fault(
         "load-cell-crosstalk",
         _crosstalk,
+        r"F_\mathrm{read} = F + \mathrm{crosstalk}\cdot\frac{\tau}{R}",
         _CROSSTALK,
         ("load-cell-scale",),
         "the {side}'s load cell responds to {crosstalk:%} of the torque",

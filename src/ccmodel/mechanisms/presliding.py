@@ -29,6 +29,10 @@ def dahl(xi: float, slide: float, z0: float) -> tuple[float, float]:
 MECHANISM = Mechanism(
     name="presliding",
     text=__doc__,
+    tex=(
+        r"\frac{dz}{dt} = v \left(1 - \operatorname{sgn}(v)\,\frac{z}{z_0}\right), \qquad F_\mathrm{friction} = "
+        r"\mu N\,\frac{z}{z_0}"
+    ),
     sentence="friction builds up over {z0} of sliding",
     places=("conduit",),
     parameters=(Parameter("z0", "m", 5e-6, 200e-6, 50e-6, "presliding length of the bristle"),),

@@ -31,6 +31,10 @@ def winding_change(theta: float, rotation: float, e: float, psi: float) -> float
 MECHANISM = Mechanism(
     name="pulley-eccentricity",
     text=__doc__,
+    tex=(
+        r"R(\theta) = R\,\bigl(1 + e \sin(\theta + \psi)\bigr), \qquad w(\theta) = \int_0^\theta "
+        r"R(\vartheta)\,d\vartheta"
+    ),
     sentence="the {side} pulley's radius changes by ±{e:%} over a turn",
     places=("drive-pulley", "load-pulley"),
     parameters=(

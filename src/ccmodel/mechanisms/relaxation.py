@@ -34,6 +34,7 @@ def lag_weights(step_over_tau: float) -> tuple[float, float, float]:
 MECHANISM = Mechanism(
     name="relaxation",
     text=__doc__,
+    tex=r"T = T_e - r\,q, \qquad \frac{dq}{dt} = \frac{T_e - q}{\tau}, \qquad q(0) = 0",
     sentence="the cables lose {r:%} of their tension as time passes",
     places=("cable",),
     parameters=(

@@ -30,6 +30,7 @@ def _modifies_physics(settings: Settings, values: Mapping[str, float]) -> None:
 MECHANISM = Mechanism(
     name="running-in",
     text=__doc__,
+    tex=r"\mu(t, w) = \mu\,\Bigl(1 + \mathrm{change}\,\bigl(1 - e^{-t/\tau - \mathrm{per\_m}\,w}\bigr)\Bigr)",
     sentence="friction [rises|falls] by {change:%} through a recording",
     places=("conduit",),
     parameters=(

@@ -38,6 +38,7 @@ def stretch_at(tension: NDArray, settled: NDArray, stiffness: NDArray) -> NDArra
 MECHANISM = Mechanism(
     name="strand-settling",
     text=__doc__,
+    tex=r"T = EA\,\Bigl(u' - u_s\,\bigl(1 - e^{-u'/u_s}\bigr)\Bigr), \qquad u_s = \frac{T_\mathrm{scale}}{EA}",
     sentence="the cables soften where the tension is low, about {T_scale}",
     places=("cable",),
     parameters=(Parameter("T_scale", "N", 0.5, 10.0, 2.0, "tension scale of the settling"),),

@@ -39,6 +39,10 @@ def renewed(rested: float, slide: float, dt: float, vs: float, delta: float) -> 
 MECHANISM = Mechanism(
     name="stribeck",
     text=__doc__,
+    tex=(
+        r"\mu_\mathrm{eff} = \mu\,(1 + a\,r), \qquad \frac{dr}{ds} = \frac{e^{-(|v|/v_s)^\delta} - "
+        r"r}{20\,\mathrm{\mu m}}"
+    ),
     sentence="friction is {a:%} higher at rest than in motion",
     places=("conduit",),
     parameters=(

@@ -33,6 +33,7 @@ def _modifies_observation(sensing: Sensing, place: str, values: Mapping[str, flo
 MECHANISM = Mechanism(
     name="time-skew",
     text=__doc__,
+    tex=r"y_\mathrm{read}(t) = y(t - \mathrm{delay})",
     sentence="the {side}'s channels are late by {delay}",
     places=("drive-sensor", "load-sensor"),
     parameters=(Parameter("delay", "s", 2e-3, 50e-3, 10e-3, "delay of one side's channels"),),

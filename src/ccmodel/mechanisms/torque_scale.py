@@ -25,6 +25,7 @@ def _modifies_observation(sensing: Sensing, place: str, values: Mapping[str, flo
 MECHANISM = Mechanism(
     name="torque-scale",
     text=__doc__,
+    tex=r"\tau_\mathrm{read} = (1 + \mathrm{gain})\,\tau",
     sentence="the {side}'s torque sensor reads {gain:%} [high|low]",
     places=("drive-sensor", "load-sensor"),
     parameters=(Parameter("gain", "1", 0.02, 0.1, 0.05, "error of the gain", signed=True),),

@@ -7,13 +7,9 @@ from typing import Any
 
 import matplotlib
 from matplotlib.artist import Artist
-from matplotlib.layout_engine import ConstrainedLayoutEngine
-
-matplotlib.use("Agg")
-
-import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
 
 from ccmodel.channels import CABLES, TABLE, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
@@ -44,6 +40,14 @@ STYLE: dict[Any, Any] = {
 }
 
 
+def subplots(
+    rows: int = 1, columns: int = 1, figsize: tuple[float, float] = (9, 4), **style: Any
+) -> tuple[Figure, Any]:
+    """A figure for a file, with its panels; pyplot and the backend of a user's session know nothing of it."""
+    figure = Figure(figsize=figsize)
+    return figure, figure.subplots(rows, columns, **style)
+
+
 def plot_channels(
     ax: Axes, values: Mapping[str, NDArray] | Recording, x: str, y: str, samples: slice = slice(None), **style: Any
 ) -> None:
@@ -69,8 +73,8 @@ def say_in_panel(ax: Axes, text: str) -> None:
 
 def empty_figure(text: str) -> Figure:
     """A figure without data, which says why."""
-    with plt.rc_context(STYLE):
-        figure, ax = plt.subplots(figsize=(9, 2))
+    with matplotlib.rc_context(STYLE):
+        figure, ax = subplots(figsize=(9, 2))
         ax.set_axis_off()
         say_in_panel(ax, text)
     return figure
@@ -122,7 +126,7 @@ def save_figure(figure: Figure, *files: Path) -> None:
 
     Equal figures give equal files: panels are laid out once, and no file holds a date. Text stays text.
     """
-    with plt.rc_context(_FILES):
+    with matplotlib.rc_context(_FILES):
         _lay_out(figure)
         for file in map(Path, files):
             figure.savefig(file, dpi=150, metadata=_METADATA.get(file.suffix))

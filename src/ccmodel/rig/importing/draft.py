@@ -22,7 +22,7 @@ from ccmodel.typed import InputError, Problem
 _HEAD = """\
 # What each column of the log is made of: column = sign * gain * (signal - zero), in the unit of the column's name.
 # This is a guess. Correct it; a line behind "# " is not sure and not used: take "# " away where it is right.
-# Keys of a column: signal, unit, sign, gain, zero, delay_s, file, time (docs/import.md).
+# Keys of a column: signal, unit, sign, gain, zero, delay_s, file, time (docs/how-to/import-logs.md).
 """
 # Words that YAML does not read as text.
 _NO_TEXT = {"null", "true", "false", "yes", "no", "on", "off", "~"}

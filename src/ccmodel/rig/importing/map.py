@@ -1,4 +1,4 @@
-"""The map of an import: what each column of a log is made of (`map.yaml`, `docs/import.md`)."""
+"""The map of an import: what each column of a log is made of (`map.yaml`, `docs/how-to/import-logs.md`)."""
 
 from pathlib import Path, PurePath
 from typing import Annotated, Any, Literal, Self

@@ -14,6 +14,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers.contract import Format, SignalFile, TextLayout
@@ -51,12 +52,14 @@ def read_here(format: Format, path: Path, text: TextLayout | None = None) -> Sig
 def read_apart(name: str, format: Format, path: Path) -> SignalFile | LogError:
     """As `read_here`, in a process of its own; `name` is the module of the format."""
     patience = _PATIENCE_S + _PATIENCE_S_PER_MB * path.stat().st_size / 1e6
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
-    try:
-        command = [sys.executable, "-c", _CHILD, name, str(path)]
-        child = subprocess.run(command, capture_output=True, env=environment, timeout=patience, check=False)
-    except subprocess.TimeoutExpired:
-        return _damaged(format, f"not read after {patience:.0f} s")
+    command = [sys.executable, "-c", _CHILD, name, str(path)]
+    # A library that fails on a damaged file leaves its temporary files behind.
+    with TemporaryDirectory(prefix="ccmodel-read-") as scratch:
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p), "TMPDIR": scratch}
+        try:
+            child = subprocess.run(command, capture_output=True, env=environment, timeout=patience, check=False)
+        except subprocess.TimeoutExpired:
+            return _damaged(format, f"not read after {patience:.0f} s")
     return pickle.loads(child.stdout) if child.returncode == 0 else _damaged(format, "its library fails on it")
 
 
