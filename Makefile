@@ -91,6 +91,7 @@ lint: $(VENV)/.ready
 	$(BIN)/snakemake --lint
 	$(BIN)/snakemake --snakefile proof/Snakefile --lint
 	$(BIN)/lint-imports --no-cache
+	$(BIN)/mypy --no-error-summary
 
 lock:  ## pin the newest versions that fit pyproject.toml (needs uv)
 	uv pip compile pyproject.toml --all-extras --universal --python-version 3.11 --upgrade --generate-hashes \
