@@ -4,7 +4,7 @@ import ast
 import hashlib
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import fields, is_dataclass
 from functools import cache
 from pathlib import Path
@@ -98,10 +98,19 @@ def _file_of(name: str) -> Path | None:
 def _imports(file: Path) -> list[str]:
     """Modules that a file imports from the package; `from a import b` gives a.b if this is a module, else a."""
     names = []
-    for node in ast.walk(ast.parse(file.read_text())):
+    for node in _run(ast.parse(file.read_text())):
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             inner = {f"{node.module}.{alias.name}" for alias in node.names}
             names += [name if _file_of(name) else node.module for name in inner]
     return [name for name in names if name.partition(".")[0] == ccmodel.__name__]
+
+
+def _run(node: ast.AST) -> Iterator[ast.AST]:
+    """A node and all below it, without what only a type checker reads."""
+    yield node
+    if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
+        return
+    for child in ast.iter_child_nodes(node):
+        yield from _run(child)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
@@ -82,6 +83,11 @@ class Recording:
             if values.shape != self.time_s.shape:
                 raise ValueError(f"{name} has {values.size} samples, time has {self.time_s.size}")
 
+    def __repr__(self) -> str:
+        rate = f" at {self.rate_Hz:.4g} Hz" if self.time_s.size > 1 else ""
+        name = f"Recording {self.batch}/{self.id}, {ORIGIN[self.origin]}"
+        return f"{name}: {self.time_s.size} samples{rate}; {', '.join(self.channels)}"
+
     def __contains__(self, channel: str) -> bool:
         return channel in self.channels
 
@@ -91,6 +97,20 @@ class Recording:
             return self.channels[wanted]
         channels = {name: values[wanted] for name, values in self.channels.items()}
         return replace(self, time_s=self.time_s[wanted], channels=channels)
+
+    @property
+    def rate_Hz(self) -> float:
+        """Samples per second, by the median step."""
+        return float(1 / np.median(np.diff(self.time_s)))
+
+    def to_frame(self) -> pd.DataFrame:
+        """Channels over time: index ``time_s``, a column for each channel, SI units as the names say."""
+        columns = {name: self.channels[name] for name in CHANNELS if name in self.channels}
+        return pd.DataFrame(columns, index=pd.Index(self.time_s, name="time_s"))
+
+    def to_xarray(self) -> xr.Dataset:
+        """Channels over ``time_s`` and the conduit's pieces; units and sources are attributes of the variables."""
+        return _to_dataset(self)
 
     @property
     def tensions(self) -> tuple[str, ...]:

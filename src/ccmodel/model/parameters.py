@@ -136,6 +136,15 @@ def mechanism_parameter(key: str) -> tuple[str, str, str] | None:
     return tuple(parts) if len(parts) == 3 else None
 
 
+# Printed units by the ending of a parameter's name.
+_UNITS = {"_N_per_m": "N/m", "_Nm_per_rad": "N m/rad", "_Nm": "N m", "_N": "N", "_rad": "rad", "_m": "m"}
+
+
+def unit_of_parameter(name: str) -> str:
+    """SI unit of a parameter of `Parameters` as it is printed; 1 for a number."""
+    return next((unit for ending, unit in _UNITS.items() if name.endswith(ending)), "1")
+
+
 # Names in model files, and in older configuration files, of parameters that have another name here.
 FORMER_NAMES = {
     "drive_place": "drive_encoder_offset",

@@ -3,12 +3,9 @@
 import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib
-
-matplotlib.use("Agg")
-
-import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -40,6 +37,12 @@ STYLE = {
 }
 
 
+def subplots(rows: int = 1, columns: int = 1, figsize: tuple[float, float] = (9, 4), **style) -> tuple[Figure, Any]:
+    """A figure for a file, with its panels; pyplot and the backend of a user's session know nothing of it."""
+    figure = Figure(figsize=figsize)
+    return figure, figure.subplots(rows, columns, **style)
+
+
 def plot_channels(ax: Axes, values, x: str, y: str, samples: slice = slice(None), **style) -> None:
     """Channel `y` over channel `x`, in the units of their axes; `values` gives the values of a channel by its name."""
     ax.plot(values[x][samples] * TABLE[x].scale, values[y][samples] * TABLE[y].scale, **style)
@@ -63,8 +66,8 @@ def say_in_panel(ax: Axes, text: str) -> None:
 
 def empty_figure(text: str) -> Figure:
     """A figure without data, which says why."""
-    with plt.rc_context(STYLE):
-        figure, ax = plt.subplots(figsize=(9, 2))
+    with matplotlib.rc_context(STYLE):
+        figure, ax = subplots(figsize=(9, 2))
         ax.set_axis_off()
         say_in_panel(ax, text)
     return figure
@@ -115,7 +118,7 @@ def save_figure(figure: Figure, *files: Path) -> None:
 
     Equal figures give equal files: panels are laid out once, and no file holds a date. Text stays text.
     """
-    with plt.rc_context(_FILES):
+    with matplotlib.rc_context(_FILES):
         _lay_out(figure)
         for file in map(Path, files):
             figure.savefig(file, dpi=150, metadata=_METADATA.get(file.suffix))

@@ -39,6 +39,31 @@ class Ingested:
     findings: list[Finding]
     batch: Batch | None = None
 
+    @property
+    def contradicts(self) -> bool:
+        """Whether the inputs contradict one another, so that no verdict on the physics can be drawn from them."""
+        return any(finding.is_inconsistent for finding in self.findings)
+
+    def check_usable(self, source: Path | str, trust_inputs: bool = True) -> None:
+        """Raise `InputError` if no model can be compared with the batch.
+
+        Parameters
+        ----------
+        source : Path or str
+            What was read, in the message.
+        trust_inputs : bool
+            Whether recordings are needed even if the inputs contradict one another.
+
+        Raises
+        ------
+        InputError
+            One line for each refused file.
+        """
+        reported = self.contradicts and not trust_inputs
+        if self.batch is None or not (self.recordings or reported):
+            refused = [str(f) for f in self.findings if f.severity == "refused"]
+            raise InputError("\n".join(refused) or f"{source}: no recording that can be used")
+
 
 def ingest_batch(folder: Path) -> Ingested:
     """Read a batch of rig logs.

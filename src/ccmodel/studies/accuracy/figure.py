@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 
-import matplotlib.pyplot as plt
+import matplotlib
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ccmodel.recording import ORIGIN
-from ccmodel.report.figures import COLOURS, MARKERS, STYLE, empty_figure, legend_below, title_figure
+from ccmodel.report.figures import COLOURS, MARKERS, STYLE, empty_figure, legend_below, subplots, title_figure
 from ccmodel.studies.variables import batches_by_origin
 
 COLUMNS = 4
@@ -38,9 +38,9 @@ def ratio_figure(table: pd.DataFrame, lines: Sequence[dict]) -> Figure:
 def _panels(table: pd.DataFrame, lines: Sequence[dict], panel, title: str) -> Figure:
     if not lines:
         return empty_figure("no recording that the model could be run on")
-    with plt.rc_context(STYLE):
+    with matplotlib.rc_context(STYLE):
         rows = -(-len(lines) // COLUMNS)
-        figure, axes = plt.subplots(rows, COLUMNS, figsize=(12, 0.9 + 2.7 * rows), squeeze=False)
+        figure, axes = subplots(rows, COLUMNS, figsize=(12, 0.9 + 2.7 * rows), squeeze=False)
         for ax in axes.flat[len(lines) :]:
             ax.set_axis_off()
         batches = sorted(set(table["batch"]))

@@ -2,14 +2,14 @@
 
 from collections.abc import Mapping
 
-import matplotlib.pyplot as plt
+import matplotlib
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from ccmodel.report.figures import COLOURS, LINES, MARKERS, STYLE, empty_figure, legend_below, title_figure
+from ccmodel.report.figures import COLOURS, LINES, MARKERS, STYLE, empty_figure, legend_below, subplots, title_figure
 
 COLUMNS = 3
 # Commits that a panel has room to name.
@@ -33,8 +33,8 @@ def history_figure(history: pd.DataFrame, present: pd.DataFrame, origins: Mappin
     sets = list(dict.fromkeys(present["set"])) + sorted(set(table["set"]) - set(present["set"]))
     columns = min(COLUMNS, len(batches))
     rows = -(-len(batches) // columns)
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(
+    with matplotlib.rc_context(STYLE):
+        figure, axes = subplots(
             rows, columns, figsize=(4 * columns, 1.4 + 2.4 * rows), squeeze=False, sharey=True, sharex=True
         )
         for ax in axes.flat[len(batches) :]:

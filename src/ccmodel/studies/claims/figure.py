@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-import matplotlib.pyplot as plt
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -23,6 +23,7 @@ from ccmodel.report.figures import (
     name_axes,
     plot_channels,
     say_in_panel,
+    subplots,
     title_figure,
 )
 from ccmodel.studies.claims.claim import Claim, Row
@@ -60,8 +61,8 @@ def recordings_figure(claims: Sequence[Claim], origins: str) -> Figure:
         Which batches were measured and which simulated; empty without recordings.
     """
     rows_of = {claim.name: claim.rows for claim in claims}
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(2, 3, figsize=(12, 7.2))
+    with matplotlib.rc_context(STYLE):
+        figure, axes = subplots(2, 3, figsize=(12, 7.2))
         for ax, (name, quantities, ylabel, xlabel) in zip(axes.flat, PANELS, strict=True):
             rows = [row for row in rows_of[name] if np.isfinite(row.at)]
             ticks = list(dict.fromkeys(row.condition for row in rows))
@@ -107,8 +108,8 @@ def model_figure(claims: Sequence[Claim], loops: Mapping[str, Recording]) -> Fig
         Runs by the place of the loop.
     """
     rows_of = {claim.name: [row for row in claim.rows if row.model is not None] for claim in claims}
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(2, 2, figsize=(10, 7.8))
+    with matplotlib.rc_context(STYLE):
+        figure, axes = subplots(2, 2, figsize=(10, 7.8))
         letter_panels(axes.flat)
         for panel, ax, data in (
             (_load_panel, axes[0, 0], rows_of.get("deadband-and-load")),

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-import matplotlib.pyplot as plt
+import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -49,7 +49,7 @@ def draw(pairs: Sequence[Pair], study: Study, measuring: Measuring) -> Figure:
     """Draw a study as its settings ask; a study without a usable recording has a figure that says so."""
     if not pairs:
         return figures.empty_figure(f"{study.title}: no usable recording (see what was left out)")
-    with plt.rc_context(figures.STYLE):
+    with matplotlib.rc_context(figures.STYLE):
         return _DRAW[study.figure](pairs, study, measuring.smoothing_share)
 
 
@@ -136,12 +136,12 @@ def _grid(cells: int, strips: int, columns: int, shared: bool = True) -> tuple[F
     `shared` loops have the same axes, and strips of the same channel the same y axis.
     """
     if cells == 1:
-        figure = plt.figure(figsize=(9, max(3.4, 1.9 * strips) + 0.9))
+        figure = Figure(figsize=(9, max(3.4, 1.9 * strips) + 0.9))
         grid = figure.add_gridspec(strips, 2, width_ratios=(1.1, 1))
         places = [(grid[:, 0], [grid[i, 1] for i in range(strips)])]
     else:
         rows, depth = -(-cells // columns), 1 + strips
-        figure = plt.figure(figsize=((4.5 if columns == 2 else 3.7) * columns, rows * (3 + 1.3 * strips) + 0.9))
+        figure = Figure(figsize=((4.5 if columns == 2 else 3.7) * columns, rows * (3 + 1.3 * strips) + 0.9))
         grid = figure.add_gridspec(rows * depth, columns, height_ratios=[3, *[1.2] * strips] * rows)
         corners = [(depth * (i // columns), i % columns) for i in range(cells)]
         places = [(grid[r, c], [grid[r + 1 + i, c] for i in range(strips)]) for r, c in corners]

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from itertools import pairwise
 
-import matplotlib.pyplot as plt
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -15,7 +15,16 @@ from ccmodel.model.exact import CableProfile
 from ccmodel.model.load import SpringLoad
 from ccmodel.model.phases import PAPERS_PHASES, PhaseStudy, simulate_phases
 from ccmodel.model.transmission import Transmission
-from ccmodel.report.figures import COLOURS, STYLE, TRANSMISSION, legend_below, letter_panels, name_axes, plot_channels
+from ccmodel.report.figures import (
+    COLOURS,
+    STYLE,
+    TRANSMISSION,
+    legend_below,
+    letter_panels,
+    name_axes,
+    plot_channels,
+    subplots,
+)
 from ccmodel.studies.loops.settings import Measuring
 from ccmodel.studies.phases.settings import FIGURES, PhaseExample
 from ccmodel.studies.run import Outcome, Run
@@ -52,8 +61,8 @@ def study_of(example: PhaseExample) -> PhaseStudy:
 def response_figure(study: PhaseStudy) -> Figure:
     """The paper's Fig. 5, and the same over time: tensions, torques and angles with instants 1 to 8."""
     values = _values(study)
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(3, 2, figsize=(9, 10.4))
+    with matplotlib.rc_context(STYLE):
+        figure, axes = subplots(3, 2, figsize=(9, 10.4))
         for ax, (x, y) in zip(axes.flat, TRANSMISSION, strict=False):
             _loop(ax, study, values, x, y)
         _over_time(axes[2, 0], study, values, TENSIONS, "tension (N)")
@@ -68,8 +77,8 @@ def torque_loop_figure(study: PhaseStudy) -> Figure:
     """The paper's Fig. 6: load torque over drive torque, with the phases I to IV in colour and by name."""
     values = _values(study)
     curve = _curve(values, TAU_IN, TAU_OUT)
-    with plt.rc_context(STYLE):
-        figure, ax = plt.subplots(figsize=(7.2, 5.8))
+    with matplotlib.rc_context(STYLE):
+        figure, ax = subplots(figsize=(7.2, 5.8))
         start = slice(study.first_reversal + 1)
         plot_channels(ax, values, TAU_IN, TAU_OUT, start, color="0.6", lw=0.9, label="from rest")
         for first, last in _spells(study):
@@ -88,8 +97,8 @@ def torque_loop_figure(study: PhaseStudy) -> Figure:
 
 def profiles_figure(study: PhaseStudy) -> Figure:
     """The paper's Fig. 7: tension along both cables at instants 1 to 8, with a column for each stroke."""
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(2, 2, figsize=(9.4, 7.6), sharex=True, sharey=True)
+    with matplotlib.rc_context(STYLE):
+        figure, axes = subplots(2, 2, figsize=(9.4, 7.6), sharex=True, sharey=True)
         for column, stroke in enumerate(STROKES):
             for row, cable in enumerate("AB"):
                 ax = axes[row, column]

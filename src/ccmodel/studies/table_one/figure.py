@@ -1,6 +1,6 @@
 """The paper's Table I with the errors of the nearest effects, and the distance of every effect."""
 
-import matplotlib.pyplot as plt
+import matplotlib
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -24,8 +24,8 @@ CLOUDS = 6
 
 def table_one_figure(ranked: pd.DataFrame, singles: pd.DataFrame, study: TableOne) -> Figure:
     """Table I with the nearest errors by each norm, the fitted parameters, and the ranking."""
-    with plt.rc_context(STYLE):
-        figure = plt.figure(figsize=(13, 11))
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(13, 11))
         above, below = figure.subfigures(2, 1, height_ratios=(1, 1.3))
         for ax, norm in zip(above.subplots(1, len(NORMS)), NORMS, strict=True):
             _patterns(ax, ranked, norm, study)
