@@ -9,6 +9,7 @@ import argparse
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -45,23 +46,22 @@ def write_log(logged: pd.DataFrame, file: Path) -> None:
     file.write_text("\n".join([";".join(logged.columns), *rows]) + "\n", encoding="utf-8")
 
 
-def main() -> None:
-    """Record the batches and write the logs."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--out", type=Path, default=HERE, help="folder for logs/ and later/; this script's by default")
-    out = parser.parse_args().out
+def write_logs(out: Path, batches: Iterable[str] = FOLDERS) -> None:
+    """Record batches of the rig, and write their logs below `out`."""
     with tempfile.TemporaryDirectory() as folder:
-        command = Path(sys.executable).with_name("virtualrig")
-        subprocess.run([command, "record", HERE / "rig.yaml", "--out", folder], check=True)
-        for batch, name in FOLDERS.items():
+        command = [Path(sys.executable).with_name("virtualrig"), "record", HERE / "rig.yaml", "--out", folder]
+        subprocess.run([*command, *(f"--batch={batch}" for batch in batches)], check=True)
+        for batch in batches:
             stated = yaml.safe_load((Path(folder) / batch / "batch.yaml").read_text())
-            (out / name).mkdir(parents=True, exist_ok=True)
+            (out / FOLDERS[batch]).mkdir(parents=True, exist_ok=True)
             for entry in stated["recordings"]:
                 log = pd.read_csv(Path(folder) / batch / entry["file"])
                 # The virtual rig ends the names of its recordings with the letter of the repeat.
-                file = out / name / f"{entry['id'].removesuffix('-a')}.csv"
+                file = out / FOLDERS[batch] / f"{entry['id'].removesuffix('-a')}.csv"
                 write_log(as_the_lab_logs(log, stated["rig"]), file)
 
 
 if __name__ == "__main__":
-    main()
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--out", type=Path, default=HERE, help="folder for logs/ and later/; this script's by default")
+    write_logs(parser.parse_args().out)
