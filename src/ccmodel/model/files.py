@@ -1,4 +1,4 @@
-"""A model as a file: parameters, mechanisms and the rig's conditions, as JSON (docs/model-file.md)."""
+"""A model as a file: parameters, mechanisms and the rig's conditions, as JSON (docs/diagnosis.md, Model files)."""
 
 import json
 from collections.abc import Iterable, Mapping
