@@ -140,6 +140,7 @@ def load(folder: str | Path) -> Batch:
     folder = Path(folder)
     ingested = ingest_batch(folder)
     ingested.check_usable(folder, trust_inputs=False)
+    assert ingested.batch is not None
     inputs = provenance.of_inputs(provenance.files_in(folder), folder)
     return Batch(folder, tuple(ingested.recordings), tuple(ingested.findings), ingested.batch, inputs)
 
