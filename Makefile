@@ -6,7 +6,8 @@ CORES ?= 2
 # The former name of REGRESSORS.
 REGRESSORS ?= $(RIVALS)
 
-.PHONY: help results real data test docs bench accuracy-gate input-checks diagnosis-settings table-one coverage proof proof-full proof-real lint lock clean
+.PHONY: help results real data test docs bench accuracy-gate input-checks diagnosis-settings table-one coverage proof \
+  proof-full proof-real slurm-test lint lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -80,11 +81,17 @@ proof-real: $(VENV)/.ready  ## seed faults in the public da Vinci recordings and
 	@$(BIN)/ccmodel import-mis-tool "$(DATA)" --out results/real/raw || test $$? -eq 1  # 1: files were left out
 	$(BIN)/python -m proof real results/real/raw --out results/proof/real --page docs/real-concealment.md
 
+slurm-test: $(VENV)/.ready  ## run the pipeline and N cases of the proof as jobs of a local Slurm, and as ever; compare
+	BATCHES="$(BATCHES)" CASES="$(N)" tests/slurm/run
+
 lint: $(VENV)/.ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile proof/Snakefile workflow
+	$(BIN)/snakemake --lint
+	$(BIN)/snakemake --snakefile proof/Snakefile --lint
 	$(BIN)/lint-imports --no-cache
+	$(BIN)/mypy --no-error-summary
 
 lock:  ## pin the newest versions that fit pyproject.toml (needs uv)
 	uv pip compile pyproject.toml --all-extras --universal --python-version 3.11 --upgrade --generate-hashes \

@@ -179,10 +179,10 @@ def diagnose(
     """
     found = calibrate(recordings, estimates, options, baseline, within(progress, 0.0, CALIBRATED))
     tested, whitened = found.tested, found.whitened
-    not_judged = [*map(dict, not_judged), *found.not_judged]
+    unjudged = [*map(dict, not_judged), *found.not_judged]
     if options.freeze:
         why = "frozen at the baseline's values, as requested"
-        not_judged.append({"what": "stiffness, friction and everything else that a calibration would fit", "why": why})
+        unjudged.append({"what": "stiffness, friction and everything else that a calibration would fit", "why": why})
     mechanisms = single_mechanisms(options.without, tested.hypothesis)
     forced = [stated_hypothesis(stated) for stated in options.forced_candidates]
     selection = Selection(tested.free, mechanisms, forced, within(progress, CALIBRATED, SELECTED))
@@ -190,5 +190,5 @@ def diagnose(
     progress("deciding the verdict", SELECTED)
     judgement = judge(comparison, scores)
     progress("correcting the values for the discretisation, designing an experiment", JUDGED)
-    content = report(recordings[0].batch, judgement, tested.estimates, not_judged)
+    content = report(recordings[0].batch, judgement, tested.estimates, unjudged)
     return Diagnosis(content, judgement, tested.estimates)

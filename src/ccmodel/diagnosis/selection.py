@@ -101,7 +101,7 @@ class Selection:
             part = self._part(k / len(firsts), (k + 1) / len(firsts))
             part.progress(f"screening mechanisms beside {first.hypothesis}", 0.0)
             partners = [h for h in self.mechanisms if h.acting[0] not in first.hypothesis.acting]
-            chosen = []
+            chosen: list[Score] = []
             for s in screen(whitened, first, partners):
                 pair = frozenset(first.hypothesis.acting + s.hypothesis.acting)
                 if s.gain > settings.WORTH_FITTING and pair not in seen and len(chosen) < settings.PARTNERS:

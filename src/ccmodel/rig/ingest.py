@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pandas as pd
 
@@ -13,7 +13,7 @@ from ccmodel.rig.batch import Batch, RecordingEntry, load_batch
 from ccmodel.rig.calibration import calibrate
 from ccmodel.rig.column_checks import ColumnChecks
 from ccmodel.rig.consistency import check_consistency
-from ccmodel.rig.findings import Defect, Finding, LogError
+from ccmodel.rig.findings import Defect, Finding, LogError, Severity
 from ccmodel.rig.log import read_log
 from ccmodel.rig.sensor_checks import check_sensors, drive_travel
 from ccmodel.typed import InputError
@@ -117,7 +117,7 @@ def ingest_batch(folder: Path, progress: Progress = silent) -> Ingested:
     return Ingested(recordings, findings, batch)
 
 
-def _attempt(batch: str, file: str, step: Callable[..., T], *args) -> tuple[T | None, list[Finding]]:
+def _attempt(batch: str, file: str, step: Callable[..., T], *args: Any) -> tuple[T | None, list[Finding]]:
     """Result of a step and no findings, or None and the findings that refuse the file."""
     try:
         return step(*args), []
@@ -131,7 +131,7 @@ def _attempt(batch: str, file: str, step: Callable[..., T], *args) -> tuple[T | 
     return None, [_finding(batch, file, "refused", defect)]
 
 
-def _finding(batch: str, file: str, severity: str, defect: Defect) -> Finding:
+def _finding(batch: str, file: str, severity: Severity, defect: Defect) -> Finding:
     """A defect as a finding; one of a used log that contradicts is no warning."""
     if severity == "warning" and defect.contradicts:
         return Finding(batch, file, defect.row, defect.column, "inconsistent", defect.text)

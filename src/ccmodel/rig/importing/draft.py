@@ -262,14 +262,14 @@ def _time_lines(one: GuessedFile, indent: str) -> list[str]:
 
 def time_text(time: TimeSource) -> str:
     """A time source as the map has it."""
-    return f"{{signal: {_quoted(time.signal)}, unit: {_quoted(time.unit)}}}"
+    return f"{{signal: {_quoted(time.signal or '')}, unit: {_quoted(time.unit or '')}}}"
 
 
 def _channel_line(guess: Guess, role: str | None) -> str:
     parts = [f"signal: {_quoted(guess.signal)}"]
     parts += [f"unit: {_quoted(guess.unit)}"] if guess.unit else []
     parts += ["sign: -1"] if guess.sign < 0 else []
-    if guess.unit and not guess.sure and guess.needs_gain:
+    if guess.column and guess.unit and not guess.sure and guess.needs_gain:
         parts.append(f'gain: "? {UNIT_OF[guess.column]}/{guess.unit}"')
     parts += [f"file: {role}"] if role else []
     line = f"{'' if guess.sure else '# '}{guess.column}: {{{', '.join(parts)}}}"

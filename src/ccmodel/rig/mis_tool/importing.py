@@ -131,7 +131,8 @@ def _no_trial(source: Path, files: list[Path]) -> InputError:
 
 def _import_into(out: Path, files: list[Path], progress: Progress) -> tuple[list[str], list[Finding]]:
     """Write the batches; return their names and the findings."""
-    names, findings, taken = [], [], set()
+    names, findings = [], []
+    taken: set[str] = set()
     folders = sorted({f.parent for f in files})
     for folder in each_of(folders, progress, lambda one: f"converting {one.name}"):
         name = _unique(_safe(folder.resolve().name), taken)
@@ -153,7 +154,8 @@ def _import_folder(files: list[Path], out: Path, batch: str) -> list[Finding]:
 
 def _read_folder(files: list[Path], batch: str) -> tuple[dict[str, Trial], list[Finding]]:
     """Trials of a folder by recording id, and the findings."""
-    trials, findings, taken = {}, [], set()
+    trials, findings = {}, []
+    taken: set[str] = set()
     for file in files:
         try:
             trial = read_trial(file)
