@@ -141,7 +141,7 @@ def load(folder: str | Path) -> Batch:
     ingested = ingest_batch(folder)
     ingested.check_usable(folder, trust_inputs=False)
     inputs = provenance.of_inputs(provenance.files_in(folder), folder)
-    return Batch(folder, tuple(ingested.recordings), tuple(ingested.findings), ingested.batch, inputs)
+    return Batch(folder, tuple(ingested.recordings), tuple(ingested.findings), ingested.stated, inputs)
 
 
 def as_batch(batch: Batch | str | Path) -> Batch:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
+from typing import TypeAlias
 
 import pandas as pd
 import xarray as xr
@@ -18,7 +19,7 @@ from ccmodel.typed import InputError
 
 __all__ = ["Model", "Motion", "Prediction", "predict", "read_model", "simulate"]
 
-Motion = pd.DataFrame | xr.Dataset | str | Path
+Motion: TypeAlias = pd.DataFrame | xr.Dataset | str | Path
 
 
 @dataclass(frozen=True, eq=False, repr=False)
