@@ -23,11 +23,12 @@ def inline(writer: HTML5Translator, node: nodes.math) -> None:
 def block(writer: HTML5Translator, node: nodes.math_block) -> None:
     """Write an equation on lines of its own, with its number if it has one."""
     writer.body.append(writer.starttag(node, "div", CLASS="math"))
+    writer.body.append(f'<div class="equation">{_mathml(node, as_block=True)}</div>')
     if node["number"]:
         writer.body.append(f'<span class="eqno">({get_node_equation_number(writer, node)})')
         writer.add_permalink_ref(node, "Link to this equation")
         writer.body.append("</span>")
-    writer.body.append(_mathml(node, as_block=True) + "</div>\n")
+    writer.body.append("</div>\n")
     raise nodes.SkipNode
 
 

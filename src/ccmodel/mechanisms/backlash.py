@@ -30,7 +30,7 @@ MECHANISM = Mechanism(
     name="backlash",
     text=__doc__,
     tex=(
-        r"\tau_\mathrm{out} = \begin{cases} K_e\,(\theta - \mathrm{half\_gap}\,\operatorname{sgn}\theta) & "
+        r"\tau_\mathrm{out} = \begin{cases} K_e\,(\theta - \mathrm{half\_gap}\,\operatorname{sgn}(\theta)) & "
         r"|\theta| > \mathrm{half\_gap} \\ 0 & |\theta| \le \mathrm{half\_gap} \end{cases}"
     ),
     sentence="the load follows its pulley with a dead zone of ±{half_gap}",

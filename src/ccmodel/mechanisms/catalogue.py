@@ -1,6 +1,7 @@
 """The mechanisms as text: a table, whole entries, and the pages of ``docs/mechanisms.md`` and ``docs/mechanisms``."""
 
 import re
+from math import isfinite
 from pathlib import Path
 
 from ccmodel.mechanisms import get, module_of, names
@@ -102,21 +103,21 @@ def _where(mechanism: Mechanism) -> str:
 
 
 def _parameters(mechanism: Mechanism) -> str:
-    titles = ["parameter", "meaning", "unit", "plausible range", "limits", "start of a fit", "default"]
+    titles = ["parameter", "meaning", "unit", "plausible range", "start of a fit", "default"]
     return "\n".join([f"| {' | '.join(titles)} |", "|---" * len(titles) + "|", *map(_row, mechanism.parameters)])
 
 
 def _row(p: Parameter) -> str:
     sign = "±" if p.signed else ""
     unit = "" if p.unit == "1" else p.unit
-    limits = [f"{sense} {value:g}" for sense, value in ((">", p.above), ("<", p.below)) if abs(value) != float("inf")]
+    limits = [f"{sense} {value:g}" for sense, value in ((">", p.above), ("<", p.below)) if isfinite(value)]
+    possible = f" (always {' and '.join(limits)})" if limits else ""
     default = "must be given" if p.default is None else f"{p.default:.3g}"
     cells = (
         f"`{p.name}`",
         p.meaning,
         unit,
-        f"{sign}{p.low:.4g} to {sign}{p.high:.4g}",
-        ", ".join(limits),
+        f"{sign}{p.low:.4g} to {sign}{p.high:.4g}{possible}",
         f"{p.start:.3g}",
         default,
     )

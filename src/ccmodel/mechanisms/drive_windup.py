@@ -111,7 +111,7 @@ MECHANISM = Mechanism(
     text=__doc__,
     tex=(
         r"\varphi_\mathrm{motor} = \theta + \mathrm{compliance}\cdot\tau + "
-        r"\frac{\mathrm{lost\_motion}}{2}\,\operatorname{sgn}\dot\theta"
+        r"\frac{\mathrm{lost\_motion}}{2}\,\operatorname{sgn}(\dot\theta)"
     ),
     sentence="the drive train has a backlash of {lost_motion} and winds up by {compliance}",
     places=("drive-pulley",),

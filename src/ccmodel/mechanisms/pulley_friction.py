@@ -38,7 +38,7 @@ MECHANISM = Mechanism(
     text=__doc__,
     tex=(
         r"\tau_\mathrm{bearing} = \mathrm{friction\_torque}\cdot\xi, \qquad \frac{d\xi}{d\theta} = \frac{1 - "
-        r"\xi\,\operatorname{sgn}\omega}{\mathrm{presliding}}"
+        r"\xi\,\operatorname{sgn}(\omega)}{\mathrm{presliding}}"
     ),
     sentence="the {side} pulley's bearing has a friction torque of {friction_torque}",
     places=("drive-pulley", "load-pulley"),
