@@ -142,7 +142,7 @@ def load(folder: str | Path) -> Batch:
     ingested.check_usable(folder, trust_inputs=False)
     assert ingested.batch is not None
     inputs = provenance.of_inputs(provenance.files_in(folder), folder)
-    return Batch(folder, tuple(ingested.recordings), tuple(ingested.findings), ingested.batch, inputs)
+    return Batch(folder, tuple(ingested.recordings), tuple(ingested.findings), ingested.stated, inputs)
 
 
 def as_batch(batch: Batch | str | Path) -> Batch:
