@@ -1,8 +1,9 @@
 """Settings of the site that `make docs` builds. Nothing is fetched, neither by the build nor by a reader's browser."""
 
 import sys
-from importlib.metadata import version as installed_version
 from pathlib import Path
+
+import ccmodel
 
 HERE = Path(__file__).parent
 # Extensions of this folder's own.
@@ -11,7 +12,7 @@ sys.path.insert(0, str(HERE / "_extensions"))
 project = "ccmodel"
 author = "ccmodel developers"
 project_copyright = "ccmodel developers"
-version = release = installed_version("ccmodel")
+version = release = ccmodel.__version__
 
 extensions = [
     "myst_nb",
