@@ -26,7 +26,7 @@ define run_pipeline
 	@$(BIN)/snakemake --cores $(CORES) --configfile $(1) \
 	  || { echo "The run did not come to its end; the messages above say why" >&2; exit 1; }
 	@echo "The report is $(2)/index.html"
-	@status=0; $(BIN)/ccmodel left-out $(2) || status=1; $(or $(3),true) || status=1; exit $$status
+	@status=0; $(BIN)/ccmodel report $(2) || status=1; $(or $(3),true) || status=1; exit $$status
 endef
 
 results: $(VENV)/.ready  ## regenerate every figure, table and the report from data/raw; compare with the accepted accuracy
@@ -34,7 +34,7 @@ results: $(VENV)/.ready  ## regenerate every figure, table and the report from d
 
 real: $(VENV)/.ready  ## run the pipeline on the public da Vinci recordings: make real DATA=path
 	@test -n "$(DATA)" || { echo "make real needs DATA=path of the mis-tool-characterization data" >&2; exit 2; }
-	@$(BIN)/ccmodel import-mis-tool "$(DATA)" --out results/real/raw
+	@$(BIN)/ccmodel import-mis-tool "$(DATA)" --out results/real/raw || test $$? -eq 1  # 1: files were left out
 	$(call run_pipeline,config/real.yaml,results/real)
 
 data: $(VENV)/.ready  ## record data/raw again with the virtual rig
@@ -78,7 +78,7 @@ proof-full: $(VENV)/.ready  ## the full validation, or N of its cases drawn at r
 
 proof-real: $(VENV)/.ready  ## seed faults in the public da Vinci recordings and diagnose them: make proof-real DATA=path
 	@test -n "$(DATA)" || { echo "make proof-real needs DATA=path of the mis-tool-characterization data" >&2; exit 2; }
-	@$(BIN)/ccmodel import-mis-tool "$(DATA)" --out results/real/raw
+	@$(BIN)/ccmodel import-mis-tool "$(DATA)" --out results/real/raw || test $$? -eq 1  # 1: files were left out
 	$(BIN)/python -m proof real results/real/raw --out results/proof/real --page docs/real-concealment.md
 
 slurm-test: $(VENV)/.ready  ## run the pipeline and N cases of the proof as jobs of a local Slurm, and as ever; compare
@@ -91,6 +91,7 @@ lint: $(VENV)/.ready
 	$(BIN)/snakemake --lint
 	$(BIN)/snakemake --snakefile proof/Snakefile --lint
 	$(BIN)/lint-imports --no-cache
+	$(BIN)/mypy --no-error-summary
 
 lock:  ## pin the newest versions that fit pyproject.toml (needs uv)
 	uv pip compile pyproject.toml --all-extras --universal --python-version 3.11 --upgrade --generate-hashes \

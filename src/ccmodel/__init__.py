@@ -14,8 +14,9 @@ Nothing else is needed for work with recordings, fits, diagnoses and models. All
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
+# As in `typing`, which takes longer to load than all else here.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from ccmodel.api.batch import Batch, load
     from ccmodel.api.diagnosis import Diagnosis, diagnose
@@ -64,16 +65,21 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def _loaded(name: str) -> object:
     """A public name, loaded at its first use (PEP 562)."""
     if name == "__version__":
-        value: Any = _version()
+        value: object = _version()
     elif name in _PLACES:
         value = getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value
     return value
+
+
+# A type checker knows the names from the imports above, and reports any other.
+if not TYPE_CHECKING:
+    __getattr__ = _loaded
 
 
 def __dir__() -> list[str]:

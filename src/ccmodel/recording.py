@@ -4,6 +4,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any, overload
 
 import numpy as np
 import pandas as pd
@@ -76,7 +77,7 @@ class Recording:
     warnings: tuple[str, ...] = ()
     far_end: str | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name, values in self.channels.items():
             if name not in CHANNELS:
                 raise ValueError(f"{name} is not a channel of a recording; channels are {', '.join(CHANNELS)}")
@@ -91,7 +92,13 @@ class Recording:
     def __contains__(self, channel: str) -> bool:
         return channel in self.channels
 
-    def __getitem__(self, wanted: str | slice):
+    @overload
+    def __getitem__(self, wanted: str) -> NDArray: ...
+
+    @overload
+    def __getitem__(self, wanted: slice) -> "Recording": ...
+
+    def __getitem__(self, wanted: str | slice) -> "NDArray | Recording":
         """A channel by its name, or by a slice the recording with these samples of all channels."""
         if isinstance(wanted, str):
             return self.channels[wanted]
@@ -127,7 +134,9 @@ class Recording:
         """Whether the far end of a single cable is fixed or follows its recorded motion."""
         return self.far_end in ("fixed", "measured-motion")
 
-    def with_channels(self, channels: Mapping[str, NDArray], derived_from: Mapping[str, str], origin: str):
+    def with_channels(
+        self, channels: Mapping[str, NDArray], derived_from: Mapping[str, str], origin: str
+    ) -> "Recording":
         """The same run with other channels: those of a model, or some of the measured ones."""
         channels, derived_from = dict(channels), dict(derived_from)
         accuracy = self.accuracy if origin == self.origin else {}
@@ -183,9 +192,11 @@ def _to_dataset(recording: Recording) -> xr.Dataset:
 
 def _from_dataset(name: str, dataset: xr.Dataset) -> Recording:
     channels = {c: dataset[c].values for c in CHANNELS if c in dataset}
-    scalars = {name: kind(dataset.attrs[name]) for name, kind in _SCALARS.items()}
+    scalars: dict[str, Any] = {name: kind(dataset.attrs[name]) for name, kind in _SCALARS.items()}
     attributes = {c: dataset[c].attrs for c in channels}
-    of_sensors = {key: {c: float(a[key]) for c, a in attributes.items() if key in a} for key in _OF_SENSORS}
+    of_sensors: dict[str, Any] = {
+        key: {c: float(a[key]) for c, a in attributes.items() if key in a} for key in _OF_SENSORS
+    }
     return Recording(
         id=name,
         time_s=dataset["time_s"].values,

@@ -158,7 +158,7 @@ def _version(folder: Path) -> str:
     return tomllib.loads((folder / "pyproject.toml").read_text())["project"]["version"]
 
 
-def _one_line(text) -> str:
+def _one_line(text: object) -> str:
     return " ".join(str(text).split())[:160]
 
 

@@ -2,15 +2,13 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import ValidationError
 
+from ccmodel.progress import Progress, shown, silent
 from ccmodel.studies.diagnosis.settings import Diagnosing
 from ccmodel.typed import InputError
-
-if TYPE_CHECKING:
-    from ccmodel.progress import Progress
 
 # Standard deviation of the model discrepancy that counts as noise, as a share of a channel's peak to peak.
 Tolerance = float | Mapping[str, float]
@@ -47,16 +45,10 @@ def _line(error: Mapping[str, Any]) -> str:
 
 
 @contextmanager
-def progress_of(progress: "bool | Progress") -> Iterator["Progress"]:
+def progress_of(progress: bool | Progress) -> Iterator[Progress]:
     """How progress is shown: not at all, by a bar (True), or by a function of the user's."""
     if progress is True:
-        from ccmodel.progress import shown
-
         with shown() as bar:
             yield bar
     else:
-        yield progress or _silent
-
-
-def _silent(text: str, done: float | None = None) -> None:
-    """Report no progress."""
+        yield progress or silent

@@ -1,6 +1,6 @@
 """Candidate fits: a candidate model fitted to all recordings, with leave-one-out cross-validation."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -188,18 +188,18 @@ def starting_points(problem: Problem) -> list[NDArray]:
 
 def best_start(problem: Problem, starts: Sequence[NDArray]) -> Solution:
     """The best of short searches; a start at which the model cannot be run counts only if it can at none."""
-    found, failure = [], None
+    found, failures = [], []
     for x in starts:
         try:
             found.append(minimise(problem, x, replace(SEARCH, most_evaluations=settings.START_EVALUATIONS)))
         except ModelError as error:
-            failure = error
+            failures.append(error)
     if not found:
-        raise failure
+        raise failures[-1]
     return min(found, key=lambda solution: solution.cost)
 
 
-def continued(search, solution: Solution, k: int, low: NDArray) -> Solution:
+def continued(search: Callable[[NDArray], Solution], solution: Solution, k: int, low: NDArray) -> Solution:
     """Continuation in one unknown: from its value downwards by steps, as long as that lowers the cost."""
     while solution.x[k] > settings.CONTINUATION_FACTOR * low[k]:
         x = solution.x.copy()

@@ -14,13 +14,19 @@ from ccmodel.diagnosis.candidate import CandidateFit, fit
 from ccmodel.diagnosis.hypothesis import single_mechanisms, stated_hypothesis
 from ccmodel.diagnosis.observations import NotJudged, observations_of
 from ccmodel.diagnosis.result import report
-from ccmodel.diagnosis.selection import Progress, Selection, silent
+from ccmodel.diagnosis.selection import Selection
 from ccmodel.diagnosis.verdict import Judgement, judge
 from ccmodel.diagnosis.whitening import Whitened, whiten
 from ccmodel.inference.observations import Tolerance
 from ccmodel.inference.pool import each
 from ccmodel.model.parameters import Parameters
+from ccmodel.progress import Progress, silent, within
 from ccmodel.recording import Recording
+
+# Shares of the time at which the model is calibrated, the mechanisms are selected and the verdict is decided; and share
+# of the first fit in the time of a calibration. Measured on the batches of data/raw.
+CALIBRATED, SELECTED, JUDGED = 0.04, 0.88, 0.95
+FIRST_FIT = 0.5
 
 
 @dataclass(frozen=True)
@@ -133,9 +139,10 @@ def calibrate(
     """
     observations, missing = observations_of(recordings, estimates, options.tolerance, options.step_s, options.cycles)
     tested_name = "the baseline" if baseline else "the paper's model"
-    progress(f"calibrating {tested_name} on {len(observations)} recordings")
+    progress(f"calibrating {tested_name} on {len(observations)} recordings", 0.0)
     tested = tested_model(observations, estimates, baseline, options.freeze, only)
     at_estimates = [o.with_parameters(tested.estimates) for o in observations]
+    progress("calibrating with whitened errors", FIRST_FIT)
     whitened = each(at_estimates, lambda i, o: whiten(o, tested.model))
     return Calibration(tested, whitened, fit(whitened, tested.hypothesis, tested.free, tested.start), missing)
 
@@ -163,24 +170,25 @@ def diagnose(
         fitted again, unless the options freeze it.
     not_judged : sequence of {"what", "why"}
         What is left out already, such as refused recordings, with the reason; the report lists it.
-    progress : callable
-        Called with one line of text for each step of the work.
+    progress : Progress
 
     Raises
     ------
     ModelError
         If the model cannot be run on any of the recordings.
     """
-    found = calibrate(recordings, estimates, options, baseline, progress)
+    found = calibrate(recordings, estimates, options, baseline, within(progress, 0.0, CALIBRATED))
     tested, whitened = found.tested, found.whitened
-    not_judged = [*map(dict, not_judged), *found.not_judged]
+    unjudged = [*map(dict, not_judged), *found.not_judged]
     if options.freeze:
         why = "frozen at the baseline's values, as requested"
-        not_judged.append({"what": "stiffness, friction and everything else that a calibration would fit", "why": why})
+        unjudged.append({"what": "stiffness, friction and everything else that a calibration would fit", "why": why})
     mechanisms = single_mechanisms(options.without, tested.hypothesis)
     forced = [stated_hypothesis(stated) for stated in options.forced_candidates]
-    selection = Selection(tested.free, mechanisms, forced, progress)
+    selection = Selection(tested.free, mechanisms, forced, within(progress, CALIBRATED, SELECTED))
     comparison, scores = selection.run(whitened, found.fit)
+    progress("deciding the verdict", SELECTED)
     judgement = judge(comparison, scores)
-    content = report(recordings[0].batch, judgement, tested.estimates, not_judged)
+    progress("correcting the values for the discretisation, designing an experiment", JUDGED)
+    content = report(recordings[0].batch, judgement, tested.estimates, unjudged)
     return Diagnosis(content, judgement, tested.estimates)

@@ -17,7 +17,7 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
 @kernel(inline="always")
-def dead_zone(theta, half_gap):
+def dead_zone(theta: float, half_gap: float) -> tuple[float, float]:
     """Angle beyond the gap (rad) and its derivative by `theta`."""
     if theta > half_gap:
         return theta - half_gap, 1.0

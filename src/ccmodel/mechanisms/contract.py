@@ -112,10 +112,16 @@ class Settings:
     def __init__(self, neutral: Mapping[str, Any]):
         self.__dict__.update(neutral)
 
+    def __getattr__(self, name: str) -> Any:
+        raise self._unknown(name)
+
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in self.__dict__:
-            raise AttributeError(f"no mechanism declares the setting {name!r}; there are {', '.join(self.__dict__)}")
+            raise self._unknown(name)
         self.__dict__[name] = value
+
+    def _unknown(self, name: str) -> AttributeError:
+        return AttributeError(f"no mechanism declares the setting {name!r}; there are {', '.join(self.__dict__)}")
 
 
 @dataclass(frozen=True)
@@ -189,7 +195,7 @@ class Mechanism:
     modifies_physics: Callable[[Settings, Mapping[str, float]], None] | None = None
     modifies_observation: Callable[[Sensing, str, Mapping[str, float]], dict[str, NDArray]] | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         unknown = set(self.places) - set(PLACES)
         if unknown or not self.places:
             raise ValueError(f"{self.name}: places are {', '.join(PLACES)}; got {', '.join(self.places) or 'none'}")

@@ -21,7 +21,7 @@ FLOOR_N = 0.1
 
 
 @kernel(inline="always")
-def power_of_tension(tension, n):
+def power_of_tension(tension: float, n: float) -> tuple[float, float]:
     """Factor of mu at a tension (N), and its derivative by the tension (1/N)."""
     square = tension * tension + FLOOR_N * FLOOR_N
     factor = quick_exp(0.5 * n * quick_log(square / (REFERENCE_N * REFERENCE_N)))

@@ -19,7 +19,7 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
 @kernel(inline="always")
-def dahl(xi, slide, z0):
+def dahl(xi: float, slide: float, z0: float) -> tuple[float, float]:
     """Bristle xi = z / z0 after sliding by `slide` (m) in one direction, and its derivative by `slide` (1/m)."""
     direction = 1.0 if slide >= 0.0 else -1.0
     decay = quick_exp(-abs(slide) / z0)

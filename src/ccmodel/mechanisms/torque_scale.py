@@ -9,11 +9,15 @@ Separated by: strokes in both directions at equal torque: the error of a gain do
 Source: Isermann, Fault-Diagnosis Systems, Springer, 2006, doi:10.1007/3-540-30368-5, on sensor gain faults.
 """
 
+from collections.abc import Mapping
+
+from numpy.typing import NDArray
+
 from ccmodel.channels import TORQUE_AT
-from ccmodel.mechanisms.contract import Mechanism, Parameter, side
+from ccmodel.mechanisms.contract import Mechanism, Parameter, Sensing, side
 
 
-def _modifies_observation(sensing, place, values):
+def _modifies_observation(sensing: Sensing, place: str, values: Mapping[str, float]) -> dict[str, NDArray]:
     channel = TORQUE_AT[side(place)]
     return {channel: sensing.channels[channel] * (1 + values["gain"])}
 

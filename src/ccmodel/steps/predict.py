@@ -1,6 +1,6 @@
 """A model file -> predicted sensor readings: of a batch's recordings, or of any motion of the drive."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,12 +13,15 @@ from ccmodel.failure import ModelError
 from ccmodel.model.files import Model, read_model, read_model_file
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
+from ccmodel.progress import Progress, silent, within
 from ccmodel.recording import Recording
 from ccmodel.rig.ingest import ingest_batch
 from ccmodel.steps.files import Pair, write_channels
 from ccmodel.steps.simulate import simulate_each
 from ccmodel.typed import InputError
 
+# Share of reading the logs in the time of a prediction.
+READING = 0.5
 MOTION = ["time_s", THETA_IN]
 
 
@@ -41,24 +44,27 @@ class Predicted:
     errors: pd.DataFrame
 
 
-def predicted(recordings: Iterable[Recording], parameters: Parameters, name: str = "model") -> Predicted:
+def predicted(
+    recordings: Sequence[Recording], parameters: Parameters, name: str = "model", progress: Progress = silent
+) -> Predicted:
     """Predict the sensor readings of recordings, at their times.
 
     The model is given the drive angle, the readings at rest and, if it has no load law, the load torque.
 
     Parameters
     ----------
-    recordings : iterable of Recording
+    recordings : sequence of Recording
     parameters : Parameters
     name : str
         Name of the parameters in the table of errors.
+    progress : Progress
     """
-    pairs, failures = simulate_each(recordings, parameters)
+    pairs, failures = simulate_each(recordings, parameters, progress)
     lines = [f"{recording.batch}/{recording.id}: {error}" for recording, error in failures]
     return Predicted(pairs, lines, error_table(pairs, name))
 
 
-def predict(batch: Path, model_file: Path, out: Path) -> tuple[list[str], pd.DataFrame]:
+def predict(batch: Path, model_file: Path, out: Path, progress: Progress = silent) -> tuple[list[str], pd.DataFrame]:
     """Write a CSV for each recording of a batch folder: the sensor readings by a model file (`predicted`).
 
     Returns
@@ -68,9 +74,9 @@ def predict(batch: Path, model_file: Path, out: Path) -> tuple[list[str], pd.Dat
     DataFrame
         Errors of the others.
     """
-    parameters, ingested = read_model(model_file), ingest_batch(batch)
+    parameters, ingested = read_model(model_file), ingest_batch(batch, within(progress, 0.0, READING))
     messages = [str(f) for f in ingested.findings if f.severity == "refused"]
-    found = predicted(ingested.recordings, parameters, model_file.stem)
+    found = predicted(ingested.recordings, parameters, model_file.stem, within(progress, READING, 1.0))
     out.mkdir(parents=True, exist_ok=True)
     for _, simulated in found.pairs:
         write_channels(out / f"{simulated.id}.csv", simulated)

@@ -1,6 +1,7 @@
 """Error of the model over the project's commits: a panel for each batch, a line for each parameter set."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -57,7 +58,8 @@ def _panel(ax: Axes, table: pd.DataFrame, commits: list[str], sets: list[str]) -
         errors = table[table["set"] == name].groupby("commit")["error"]
         if not errors.ngroups:
             continue
-        x, style = np.arange(len(commits)), {"color": COLOURS[k % len(COLOURS)], "ls": LINES[k % len(LINES)]}
+        x = np.arange(len(commits))
+        style: dict[str, Any] = {"color": COLOURS[k % len(COLOURS)], "ls": LINES[k % len(LINES)]}
         ax.plot(
             x, errors.median().reindex(commits), lw=1.4, marker=MARKERS[k % len(MARKERS)], ms=4, label=name, **style
         )

@@ -8,10 +8,10 @@ from ccmodel import mechanisms as registry
 from ccmodel import provenance
 from ccmodel.diagnosis.run import Diagnosis, Options
 from ccmodel.diagnosis.run import diagnose as run
-from ccmodel.diagnosis.selection import Progress, silent
 from ccmodel.failure import ModelError
 from ccmodel.model.files import Model, RigConditions, read_model
 from ccmodel.model.parameters import Parameters
+from ccmodel.progress import Progress, silent, within
 from ccmodel.recording import Recording
 from ccmodel.report.verdict import headline
 from ccmodel.rig.findings import Finding
@@ -24,6 +24,8 @@ from ccmodel.typed import InputError
 
 # The page of a run of the pipeline, seen from the report of a diagnosis.
 PAGE_OF_RUN = "../../index.html"
+# Shares of the time at which the batch is read, and at which the page is written.
+INGEST, PAGE = 0.05, 0.95
 
 
 @dataclass(frozen=True)
@@ -76,8 +78,7 @@ def diagnosed(
     options : Options
     baseline : Parameters, optional
         Model to start from, instead of the batch's own estimates.
-    progress : callable
-        Gets a line on each stage.
+    progress : Progress
     trust_inputs : bool
         Whether to diagnose even if the inputs contradict one another.
 
@@ -152,14 +153,15 @@ def diagnose(
         If the batch or the model file cannot be used, or an excluded name is no mechanism.
     """
     check_options(options, baseline is not None, "--")
-    ingested = ingest_batch(batch)
+    ingested = ingest_batch(batch, within(progress, 0.0, INGEST))
     ingested.check_usable(batch, trust_inputs)
     inputs = provenance.of_inputs(provenance.files_in(batch), batch)
     known = read_model(baseline) if baseline else None
     try:
-        outcome = diagnosed(ingested, inputs, options, known, progress, trust_inputs)
+        outcome = diagnosed(ingested, inputs, options, known, within(progress, INGEST, PAGE), trust_inputs)
     except (ModelError, ValueError) as error:
         raise InputError(f"{batch}: {error}") from None
+    progress("writing the page", PAGE)
     write_alone(outcome, out)
     return outcome.content
 
@@ -178,14 +180,16 @@ def check_options(options: Options, has_baseline: bool, prefix: str = "") -> Non
         raise InputError(f"{prefix}freeze: there is no model to hold; name one with {prefix}baseline")
 
 
-def diagnose_recordings(recordings_file: Path, out: Path, settings: Diagnosing | None = None) -> None:
+def diagnose_recordings(
+    recordings_file: Path, out: Path, settings: Diagnosing | None = None, progress: Progress = silent
+) -> None:
     """Diagnose a batch that the pipeline has read; a batch that cannot be diagnosed has files with the reason."""
     settings, inputs = settings or Diagnosing(), provenance.of_inputs([recordings_file])
     ingested = read_ingested(recordings_file)
     try:
         if ingested.batch is None or not (ingested.recordings or (ingested.contradicts and not settings.trust_inputs)):
             raise ModelError("no recording that can be used")
-        outcome = diagnosed(ingested, inputs, options_of(settings), trust_inputs=settings.trust_inputs)
+        outcome = diagnosed(ingested, inputs, options_of(settings), None, progress, settings.trust_inputs)
     except (ModelError, ValueError) as error:
         name, reason = recordings_file.stem, str(error)
         out.mkdir(parents=True, exist_ok=True)

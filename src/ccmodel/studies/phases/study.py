@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -45,7 +46,7 @@ def judge(example: PhaseExample, runs: Sequence[Run] = (), measuring: Measuring 
 
 def study_of(example: PhaseExample) -> PhaseStudy:
     """Simulation of the example's motion with the exact solver."""
-    path = ConduitPath([example.conduit_length_m], [example.conduit_bend_rad])
+    path = ConduitPath(np.array([example.conduit_length_m]), np.array([example.conduit_bend_rad]))
     rigidity = example.cable_stiffness_N_per_m * example.conduit_length_m
     radius = example.pulley_radius_m
     return simulate_phases(
@@ -184,7 +185,7 @@ def _scaled(curve: NDArray) -> NDArray:
     return curve / np.where(extent > 0, extent, 1)
 
 
-def _label_sample(ax: Axes, curve: NDArray, sample: int, text: str, points: float = 11, **style) -> None:
+def _label_sample(ax: Axes, curve: NDArray, sample: int, text: str, points: float = 11, **style: Any) -> None:
     """Text next to a sample of a curve, in the direction with the largest clearance; of two equal ones the outer."""
     scaled = _scaled(curve)
     angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
@@ -193,7 +194,15 @@ def _label_sample(ax: Axes, curve: NDArray, sample: int, text: str, points: floa
     candidates = here[:, None] + 0.06 * direction
     clearance = np.hypot(*(candidates[:, :, None] - scaled[:, None, :])).min(axis=1)
     best = direction[:, np.argmax(clearance + 0.02 * (here - middle) @ direction)]
-    ax.annotate(text, curve[:, sample], points * best, textcoords="offset points", ha="center", va="center", **style)
+    ax.annotate(
+        text,
+        tuple(curve[:, sample]),
+        tuple(points * best),
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        **style,
+    )
 
 
 def _spells(study: PhaseStudy) -> list[tuple[int, int]]:
