@@ -6,7 +6,8 @@ CORES ?= 2
 # The former name of REGRESSORS.
 REGRESSORS ?= $(RIVALS)
 
-.PHONY: help results real data test bench accuracy-gate input-checks diagnosis-settings table-one coverage proof proof-full proof-real lint lock clean
+.PHONY: help results real data test docs bench accuracy-gate input-checks diagnosis-settings table-one coverage proof \
+  proof-full proof-real slurm-test lint lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -25,7 +26,7 @@ define run_pipeline
 	@$(BIN)/snakemake --cores $(CORES) --configfile $(1) \
 	  || { echo "The run did not come to its end; the messages above say why" >&2; exit 1; }
 	@echo "The report is $(2)/index.html"
-	@status=0; $(BIN)/ccmodel left-out $(2) || status=1; $(or $(3),true) || status=1; exit $$status
+	@status=0; $(BIN)/ccmodel report $(2) || status=1; $(or $(3),true) || status=1; exit $$status
 endef
 
 results: $(VENV)/.ready  ## regenerate every figure, table and the report from data/raw; compare with the accepted accuracy
@@ -33,7 +34,7 @@ results: $(VENV)/.ready  ## regenerate every figure, table and the report from d
 
 real: $(VENV)/.ready  ## run the pipeline on the public da Vinci recordings: make real DATA=path
 	@test -n "$(DATA)" || { echo "make real needs DATA=path of the mis-tool-characterization data" >&2; exit 2; }
-	@$(BIN)/ccmodel import-mis-tool "$(DATA)" --out results/real/raw
+	@$(BIN)/ccmodel import-mis-tool "$(DATA)" --out results/real/raw || test $$? -eq 1  # 1: files were left out
 	$(call run_pipeline,config/real.yaml,results/real)
 
 data: $(VENV)/.ready  ## record data/raw again with the virtual rig
@@ -42,6 +43,11 @@ data: $(VENV)/.ready  ## record data/raw again with the virtual rig
 test: $(VENV)/.ready  ## run the tests and the linters
 	$(BIN)/python -m pytest -n $(CORES) --dist loadfile --no-loadscope-reorder
 	$(MAKE) --no-print-directory lint
+
+# A fresh environment every time: a build that reuses the last one's is silent about pages it does not read again.
+docs: $(VENV)/.ready  ## build the documents: results/docs/html/index.html; a warning or a dead link is an error
+	$(BIN)/python -m sphinx -n -W --keep-going -E -q -d results/docs/doctrees docs results/docs/html
+	@echo "The documents are results/docs/html/index.html"
 
 bench: $(VENV)/.ready  ## measure speed and accuracy: results/bench.json, docs/figures/work-precision.png
 	$(BIN)/python benchmarks/bench.py
@@ -72,14 +78,20 @@ proof-full: $(VENV)/.ready  ## the full validation, or N of its cases drawn at r
 
 proof-real: $(VENV)/.ready  ## seed faults in the public da Vinci recordings and diagnose them: make proof-real DATA=path
 	@test -n "$(DATA)" || { echo "make proof-real needs DATA=path of the mis-tool-characterization data" >&2; exit 2; }
-	@$(BIN)/ccmodel import-mis-tool "$(DATA)" --out results/real/raw
+	@$(BIN)/ccmodel import-mis-tool "$(DATA)" --out results/real/raw || test $$? -eq 1  # 1: files were left out
 	$(BIN)/python -m proof real results/real/raw --out results/proof/real --page docs/real-concealment.md
+
+slurm-test: $(VENV)/.ready  ## run the pipeline and N cases of the proof as jobs of a local Slurm, and as ever; compare
+	BATCHES="$(BATCHES)" CASES="$(N)" tests/slurm/run
 
 lint: $(VENV)/.ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile proof/Snakefile workflow
+	$(BIN)/snakemake --lint
+	$(BIN)/snakemake --snakefile proof/Snakefile --lint
 	$(BIN)/lint-imports --no-cache
+	$(BIN)/mypy --no-error-summary
 
 lock:  ## pin the newest versions that fit pyproject.toml (needs uv)
 	uv pip compile pyproject.toml --all-extras --universal --python-version 3.11 --upgrade --generate-hashes \

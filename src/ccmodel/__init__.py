@@ -1,3 +1,97 @@
-"""Cable-conduit transmissions: recordings beside a distributed model, and the physics behind what differs."""
+"""Cable-conduit transmissions: recordings beside a distributed model, and the physics behind what differs.
 
-__version__ = "0.1.0"
+The public interface is the names in `__all__`:
+
+- `load` reads a folder of recordings into a `Batch` of `Recording`;
+- `fit` calibrates the paper's model to it, and gives a `Fit` with an `Interval` of each value;
+- `diagnose` decides whether that model explains the recordings, and gives a `Diagnosis`;
+- `simulate` and `predict` run a `Model`, which a fit or a diagnosis has found or `read_model` reads from a file;
+- `InputError` says in a line for each problem what cannot be used, and what to do.
+
+Nothing else is needed for work with recordings, fits, diagnoses and models. All modules below (``ccmodel.model``,
+``ccmodel.diagnosis`` and so on) are private and may change in any version. A name is loaded when it is first used:
+``import ccmodel`` itself loads no library.
+"""
+
+from importlib import import_module
+
+# As in `typing`, which takes longer to load than all else here.
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from ccmodel.api.batch import Batch, load
+    from ccmodel.api.diagnosis import Diagnosis, diagnose
+    from ccmodel.api.fit import Fit, fit
+    from ccmodel.api.model import Model, Prediction, predict, read_model, simulate
+    from ccmodel.inference.intervals import Interval
+    from ccmodel.recording import Recording
+    from ccmodel.typed import InputError
+
+    __version__: str
+
+# Module of each public name.
+_PLACES = {
+    "Batch": "api.batch",
+    "Diagnosis": "api.diagnosis",
+    "Fit": "api.fit",
+    "InputError": "typed",
+    "Interval": "inference.intervals",
+    "Model": "api.model",
+    "Prediction": "api.model",
+    "Recording": "recording",
+    "diagnose": "api.diagnosis",
+    "fit": "api.fit",
+    "load": "api.batch",
+    "predict": "api.model",
+    "read_model": "api.model",
+    "simulate": "api.model",
+}
+
+__all__ = [
+    "Batch",
+    "Diagnosis",
+    "Fit",
+    "InputError",
+    "Interval",
+    "Model",
+    "Prediction",
+    "Recording",
+    "__version__",
+    "diagnose",
+    "fit",
+    "load",
+    "predict",
+    "read_model",
+    "simulate",
+]
+
+
+def _loaded(name: str) -> object:
+    """A public name, loaded at its first use (PEP 562)."""
+    if name == "__version__":
+        value: object = _version()
+    elif name in _PLACES:
+        value = getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+# A type checker knows the names from the imports above, and reports any other.
+if not TYPE_CHECKING:
+    __getattr__ = _loaded
+
+
+def __dir__() -> list[str]:
+    """The public names."""
+    return sorted(__all__)
+
+
+def _version() -> str:
+    """Version of the installed package; that of sources that were never installed is unknown."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version(__name__)
+    except PackageNotFoundError:
+        return "0+unknown"

@@ -5,6 +5,7 @@ the drive and T2 at the load, cable B has T3 and T4. Code refers to a channel by
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 _PRINTED_UNIT = {"rad": "rad", "Nm": "N m", "N": "N"}
 
@@ -73,7 +74,7 @@ TAU_IN, TAU_OUT = "tau_in_Nm", "tau_out_Nm"
 F_DRIVE, F_LOAD = "F_drive_N", "F_load_N"
 T1, T2, T3, T4 = "T1_N", "T2_N", "T3_N", "T4_N"
 
-_MILLI = {"scale": 1e3, "plot_unit": "mN·m"}
+_MILLI: dict[str, Any] = {"scale": 1e3, "plot_unit": "mN·m"}
 TABLE = {
     channel.name: channel
     for channel in (

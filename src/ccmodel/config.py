@@ -1,7 +1,7 @@
 """The typed configuration of a pipeline run: which batches, what is fitted, which studies are made of them."""
 
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -53,7 +53,7 @@ class Config(TypedModel):
     phases: PhaseExample | None = Field(None, description="simulated example of the paper's Figs. 5 to 7; absent: none")
 
     @model_validator(mode="after")
-    def _batches_fit(self):
+    def _batches_fit(self) -> Self:
         listed = [batch for batches in self.rigs.values() for batch in batches]
         for batch in listed:
             if listed.count(batch) > 1:
@@ -67,7 +67,7 @@ class Config(TypedModel):
         return self
 
     @model_validator(mode="after")
-    def _names_known(self):
+    def _names_known(self) -> Self:
         means = {ESTIMATED: "the batches' own estimates"} | dict.fromkeys(MODEL_FILES, "models of the diagnoses")
         for name in self.fits:
             if name in means:
@@ -95,7 +95,7 @@ class Config(TypedModel):
         fits = [n for n, f in self.fits.items() if f.batches == EACH or any(self.same_rig(batch, b) for b in f.batches)]
         return [ESTIMATED, *fits, *(MODEL_FILES if self.diagnosed([batch]) else [])]
 
-    def parameters_of(self, study: StudySettings, batch: str) -> str:
+    def parameters_of(self, study: Study | Accuracy, batch: str) -> str:
         """Name of the parameter set that a study takes for a batch.
 
         The study's own; without one, the first fit of the batch's rig, or the calibrated model of its diagnosis, or its
@@ -163,7 +163,7 @@ def expand_studies(config: Config, batches: list[str]) -> dict[str, Study]:
                 raise InputError(
                     f"{where}: there is no batch '{batch}' in {config.raw}; there are {', '.join(batches)}"
                 )
-    expanded = {}
+    expanded: dict[str, Study] = {}
     for name, study in config.studies.items():
         wanted = batches if study.batches == EACH else study.batches
         if missing := [batch for batch in wanted if config.parameters_of(study, batch) not in config.sets_of(batch)]:
@@ -172,7 +172,7 @@ def expand_studies(config: Config, batches: list[str]) -> dict[str, Study]:
                 f"studies.{name}: there are no '{study.parameters}' parameters of {', '.join(missing)}: {why}"
             )
         title = study.title or name
-        copies = {name: {"title": title}}
+        copies: dict[str, dict[str, Any]] = {name: {"title": title}}
         if study.batches == EACH:
             copies = {f"{name}-{batch}": {"batches": [batch], "title": f"{title}, {batch}"} for batch in batches}
         expanded |= {figure: study.model_copy(update=update) for figure, update in copies.items()}

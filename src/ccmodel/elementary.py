@@ -5,7 +5,7 @@ A call of the mathematical library for each node takes longer than all other ari
 
 import numpy as np
 
-from ccmodel.kernel import small_kernel
+from ccmodel.kernel import kernel
 
 # 1.5 x 2^52. Adding it to a number below 2^51 rounds the number to an integer, which is then in the last bits of the
 # sum. The compiler must not reorder these terms, so `fastmath` is limited to contraction.
@@ -17,8 +17,8 @@ MANTISSA_BITS, EXPONENT_BIAS = 52, 1023
 SQRT_HALF_BITS = 4604544271217802189
 
 
-@small_kernel(fastmath={"contract"})
-def quick_exp(x):
+@kernel(forceinline=True, fastmath={"contract"})
+def quick_exp(x: float) -> float:
     """exp(x) to rounding error, for x from -700 to 700; x is clipped to this range."""
     x = min(max(x, -700.0), 700.0)
     shifted = x * LOG2_E + ROUNDER
@@ -30,8 +30,8 @@ def quick_exp(x):
     return power * (1.0 + r * (1.0 + r * (0.5 + r * tail)))
 
 
-@small_kernel(fastmath={"contract"})
-def quick_log(x):
+@kernel(forceinline=True, fastmath={"contract"})
+def quick_log(x: float) -> float:
     """ln(x) to rounding error, for a normal number x > 0."""
     bits = np.float64(x).view(np.int64)
     exponent = (bits - SQRT_HALF_BITS) >> MANTISSA_BITS
@@ -44,8 +44,8 @@ def quick_log(x):
     return power * LN2_HIGH + (2.0 * s + (2.0 * s * q * tail + power * LN2_LOW))
 
 
-@small_kernel(fastmath={"contract"})
-def quick_tanh(y):
+@kernel(forceinline=True, fastmath={"contract"})
+def quick_tanh(y: float) -> float:
     """tanh(y) for y >= 0: to rounding error below 0.05, to 1e-6 at 1."""
     y2 = y * y
     small = y * (945.0 + y2 * (105.0 + y2)) / (945.0 + y2 * (420.0 + 15.0 * y2))

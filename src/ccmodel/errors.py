@@ -44,7 +44,7 @@ def _upward_crossings(share: NDArray) -> list[int]:
     for sample in starts:
         if (share[armed_from:sample] < 0.25).any():
             crossings.append(int(sample))
-            armed_from = sample
+            armed_from = int(sample)
     return crossings
 
 

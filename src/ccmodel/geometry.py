@@ -33,7 +33,7 @@ class ConduitPath:
     piece_length_m: NDArray
     piece_bend_rad: NDArray
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         length = np.atleast_1d(np.asarray(self.piece_length_m, dtype=float))
         bend = np.atleast_1d(np.asarray(self.piece_bend_rad, dtype=float))
         if length.ndim != 1 or length.shape != bend.shape or length.size == 0:

@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr
 
 from ccmodel.inference.pool import set_threads
+from ccmodel.progress import Progress, log_lines
 
 
 @contextmanager
-def logged(file: str, threads: int = 1) -> Iterator[None]:
-    """Run a job with `threads` threads; write warnings, log lines and a traceback to its log file.
+def logged(file: str, threads: int = 1) -> Iterator[Progress]:
+    """Run a job with `threads` threads; write progress, warnings, log lines and a traceback to its log file.
 
     A job that fails exits with 1.
     """
@@ -19,7 +20,10 @@ def logged(file: str, threads: int = 1) -> Iterator[None]:
     with open(file, "w") as log, redirect_stderr(log):
         logging.basicConfig(stream=log, level=logging.INFO, force=True)
         try:
-            yield
+            progress = log_lines(log)
+            progress("started", 0.0)
+            yield progress
+            progress("ended", 1.0)
         except Exception:
             traceback.print_exc(file=log)
             log.flush()

@@ -1,6 +1,8 @@
 """Compilation of kernels with numba, and a cache on disk that is keyed by all of a kernel's sources."""
 
+from collections.abc import Callable
 from functools import partial
+from typing import Any, TypeVar, overload
 from uuid import uuid4
 
 import numba
@@ -36,7 +38,18 @@ def check_numba(version: str) -> None:
 check_numba(numba.__version__)
 
 
-def kernel(function=None, **options):
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+@overload
+def kernel(function: Function, **options: Any) -> Function: ...
+
+
+@overload
+def kernel(**options: Any) -> Callable[[Function], Function]: ...
+
+
+def kernel(function: Any = None, **options: Any) -> Any:
     """Compile `function`; cache it until its module, or a module of the package that it imports, changes.
 
     numba compares the time stamp of a kernel's own file only: a change in a file that the kernel calls would go
@@ -52,7 +65,8 @@ def kernel(function=None, **options):
     if function is None:
         return partial(kernel, **options)
     function.__qualname__ += f"_{source_digest(function.__module__, discovered=False)}"
-    compiled = njit(cache=True, nogil=True, no_cfunc_wrapper=True, **options)(function)
+    # The types of numba do not know all of its options.
+    compiled = njit(cache=True, nogil=True, no_cfunc_wrapper=True, **options)(function)  # type: ignore[call-overload]
     if hasattr(compiled, "get_call_template"):  # absent if numba is switched off
         _ignore_literals(compiled)
     if cache := getattr(compiled, "_cache", None):
@@ -61,7 +75,7 @@ def kernel(function=None, **options):
     return compiled
 
 
-def _ignore_literals(compiled):
+def _ignore_literals(compiled: Any) -> None:
     """Compile a kernel once for all literal arguments that other kernels call it with.
 
     Otherwise numba compiles the kernels of a cable separately for cable 0, for cable 1 and for a variable index, and
@@ -69,7 +83,7 @@ def _ignore_literals(compiled):
     """
     template_of = compiled.get_call_template
 
-    def by_type(args, kws):
+    def by_type(args: Any, kws: Any) -> Any:
         return template_of(
             tuple(map(types.unliteral, args)), {name: types.unliteral(kind) for name, kind in kws.items()}
         )
@@ -81,8 +95,13 @@ def _ignore_literals(compiled):
 small_kernel = kernel(forceinline=True)
 
 
-@intrinsic
-def borrowed(typing_context, value):
+Value = TypeVar("Value")
+# A kernel gives an intrinsic's arguments without the typing context.
+_intrinsic: Callable[[Callable[..., Any]], Callable[[Value], Value]] = intrinsic
+
+
+@_intrinsic
+def borrowed(typing_context: Any, value: Any) -> Any:
     """`value`, an array or a tuple with arrays, without a reference to its memory; for use inside kernels.
 
     Otherwise every kernel that receives an array increments and decrements its reference count, with atomic
@@ -90,19 +109,20 @@ def borrowed(typing_context, value):
     alive.
     """
 
-    def generate(context, builder, signature, arguments):
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return _without_owner(context, builder, value, arguments[0])
 
     return value(value), generate
 
 
-def _without_owner(context, builder, kind, value):
+def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     """LLVM value of the numba type `kind` with the owner removed from each of its arrays."""
     if isinstance(kind, types.Array):
         array = context.make_array(kind)(context, builder, value)
         array.meminfo = array.meminfo.type(None)
         return array._getvalue()
     if isinstance(kind, types.BaseTuple):
-        parts = [_without_owner(context, builder, part, builder.extract_value(value, i)) for i, part in enumerate(kind)]
+        kinds: Any = kind  # numba does not say that a type of tuples yields the types of their parts
+        parts = [_without_owner(context, builder, k, builder.extract_value(value, i)) for i, k in enumerate(kinds)]
         return context.make_tuple(builder, kind, parts)
     return value

@@ -4,10 +4,11 @@ import ast
 import hashlib
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import fields, is_dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -30,17 +31,17 @@ def of_inputs(paths: Iterable[Path], folder: Path = Path()) -> dict:
     return {"ccmodel_version": ccmodel.__version__, "sha256": digests}
 
 
-def stamp(module: str, *inputs) -> str:
+def stamp(module: str, *inputs: Any) -> str:
     """A line on a figure: version, and short digests of its inputs (`content_digest`) and of its module's sources."""
     return f"ccmodel {ccmodel.__version__}, inputs {content_digest(*inputs)[:8]}, sources {source_digest(module)[:8]}"
 
 
-def content_digest(*values) -> str:
+def content_digest(*values: Any) -> str:
     """Digest of values, of plain data, arrays and dataclasses, whatever files they were read from."""
     return hashlib.sha256(json.dumps(values, sort_keys=True, default=_plain).encode()).hexdigest()
 
 
-def _plain(value):
+def _plain(value: Any) -> Any:
     """An array or a dataclass as plain data, for a digest."""
     if isinstance(value, np.ndarray):
         return [value.dtype.str, value.shape, hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()]
@@ -98,10 +99,19 @@ def _file_of(name: str) -> Path | None:
 def _imports(file: Path) -> list[str]:
     """Modules that a file imports from the package; `from a import b` gives a.b if this is a module, else a."""
     names = []
-    for node in ast.walk(ast.parse(file.read_text())):
+    for node in _run(ast.parse(file.read_text())):
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             inner = {f"{node.module}.{alias.name}" for alias in node.names}
-            names += [name if _file_of(name) else node.module for name in inner]
+            names += [name if _file_of(name) else name.rpartition(".")[0] for name in inner]
     return [name for name in names if name.partition(".")[0] == ccmodel.__name__]
+
+
+def _run(node: ast.AST) -> Iterator[ast.AST]:
+    """A node and all below it, without what only a type checker reads."""
+    yield node
+    if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
+        return
+    for child in ast.iter_child_nodes(node):
+        yield from _run(child)

@@ -4,8 +4,10 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any, overload
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
@@ -75,22 +77,47 @@ class Recording:
     warnings: tuple[str, ...] = ()
     far_end: str | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name, values in self.channels.items():
             if name not in CHANNELS:
                 raise ValueError(f"{name} is not a channel of a recording; channels are {', '.join(CHANNELS)}")
             if values.shape != self.time_s.shape:
                 raise ValueError(f"{name} has {values.size} samples, time has {self.time_s.size}")
 
+    def __repr__(self) -> str:
+        rate = f" at {self.rate_Hz:.4g} Hz" if self.time_s.size > 1 else ""
+        name = f"Recording {self.batch}/{self.id}, {ORIGIN[self.origin]}"
+        return f"{name}: {self.time_s.size} samples{rate}; {', '.join(self.channels)}"
+
     def __contains__(self, channel: str) -> bool:
         return channel in self.channels
 
-    def __getitem__(self, wanted: str | slice):
+    @overload
+    def __getitem__(self, wanted: str) -> NDArray: ...
+
+    @overload
+    def __getitem__(self, wanted: slice) -> "Recording": ...
+
+    def __getitem__(self, wanted: str | slice) -> "NDArray | Recording":
         """A channel by its name, or by a slice the recording with these samples of all channels."""
         if isinstance(wanted, str):
             return self.channels[wanted]
         channels = {name: values[wanted] for name, values in self.channels.items()}
         return replace(self, time_s=self.time_s[wanted], channels=channels)
+
+    @property
+    def rate_Hz(self) -> float:
+        """Samples per second, by the median step."""
+        return float(1 / np.median(np.diff(self.time_s)))
+
+    def to_frame(self) -> pd.DataFrame:
+        """Channels over time: index ``time_s``, a column for each channel, SI units as the names say."""
+        columns = {name: self.channels[name] for name in CHANNELS if name in self.channels}
+        return pd.DataFrame(columns, index=pd.Index(self.time_s, name="time_s"))
+
+    def to_xarray(self) -> xr.Dataset:
+        """Channels over ``time_s`` and the conduit's pieces; units and sources are attributes of the variables."""
+        return _to_dataset(self)
 
     @property
     def tensions(self) -> tuple[str, ...]:
@@ -107,7 +134,9 @@ class Recording:
         """Whether the far end of a single cable is fixed or follows its recorded motion."""
         return self.far_end in ("fixed", "measured-motion")
 
-    def with_channels(self, channels: Mapping[str, NDArray], derived_from: Mapping[str, str], origin: str):
+    def with_channels(
+        self, channels: Mapping[str, NDArray], derived_from: Mapping[str, str], origin: str
+    ) -> "Recording":
         """The same run with other channels: those of a model, or some of the measured ones."""
         channels, derived_from = dict(channels), dict(derived_from)
         accuracy = self.accuracy if origin == self.origin else {}
@@ -163,9 +192,11 @@ def _to_dataset(recording: Recording) -> xr.Dataset:
 
 def _from_dataset(name: str, dataset: xr.Dataset) -> Recording:
     channels = {c: dataset[c].values for c in CHANNELS if c in dataset}
-    scalars = {name: kind(dataset.attrs[name]) for name, kind in _SCALARS.items()}
+    scalars: dict[str, Any] = {name: kind(dataset.attrs[name]) for name, kind in _SCALARS.items()}
     attributes = {c: dataset[c].attrs for c in channels}
-    of_sensors = {key: {c: float(a[key]) for c, a in attributes.items() if key in a} for key in _OF_SENSORS}
+    of_sensors: dict[str, Any] = {
+        key: {c: float(a[key]) for c, a in attributes.items() if key in a} for key in _OF_SENSORS
+    }
     return Recording(
         id=name,
         time_s=dataset["time_s"].values,

@@ -74,7 +74,11 @@ class Estimate:
 
     def reach(self, coverage: float) -> float | None:
         """Half width of the confidence interval of the mean; None without repeats."""
-        return float(t.ppf(0.5 + coverage / 2, self.freedom) * self.sd) if self.freedom else None
+        return self.half_width(coverage) if self.freedom else None
+
+    def half_width(self, coverage: float) -> float:
+        """Half width of that interval, with repeats; NaN without."""
+        return float(t.ppf(0.5 + coverage / 2, self.freedom) * self.sd)
 
 
 def estimates(groups: Sequence[Sequence[float]], relative: bool) -> list[Estimate]:

@@ -13,8 +13,10 @@ from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, ClassVar, Self, TypeVar, Union, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationError
 from pydantic.fields import FieldInfo
+from pydantic_core import CoreSchema, ErrorDetails
+from pydantic_core.core_schema import literal_schema
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
 from ruamel.yaml.composer import Composer
@@ -45,6 +47,16 @@ class FillIn:
     """
 
     meaning: str
+
+
+@dataclass(frozen=True)
+class OneOf:
+    """Restricts text to names that are made in the code; a `Literal` takes only names that are written out."""
+
+    names: tuple[str, ...]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return literal_schema(list(self.names))
 
 
 class TypedModel(BaseModel):
@@ -181,7 +193,7 @@ def _filled(data: Any) -> Any:
 class _TextKeys(Composer):
     """Reads every key as text, also one that looks like a number or a date: JSON has no other keys."""
 
-    def compose_node(self, parent, index):
+    def compose_node(self, parent: Node | None, index: Any) -> Node:
         node = super().compose_node(parent, index)
         if isinstance(parent, MappingNode) and index is None:
             if not isinstance(node, ScalarNode):
@@ -196,7 +208,7 @@ class _TextKeys(Composer):
 class _ValuesWithLines(RoundTripConstructor):
     """Gives the line of every value that cannot be read."""
 
-    def construct_object(self, node, deep=False):
+    def construct_object(self, node: Node, deep: bool = False) -> Any:
         if node in self.recursive_objects:
             raise _error_at(node, "holds what cannot be read as keys and values: an alias of itself")
         if isinstance(node, ScalarNode) and node.tag == "tag:yaml.org,2002:null" and not node.value:
@@ -276,7 +288,7 @@ _EXPECTED = {
 }
 
 
-def _located(error: ValidationError, borrowed: Borrowed, gaps: Iterable[Loc]) -> list[dict]:
+def _located(error: ValidationError, borrowed: Borrowed, gaps: Iterable[Loc]) -> list[ErrorDetails]:
     """Errors where the file has their values, without those that follow from a gap."""
     located = []
     for e in error.errors(include_url=False):
@@ -288,7 +300,7 @@ def _located(error: ValidationError, borrowed: Borrowed, gaps: Iterable[Loc]) ->
     return located
 
 
-def _explain(errors: Sequence[dict], model: type[BaseModel]) -> list[tuple[tuple, str]]:
+def _explain(errors: Sequence[ErrorDetails], model: type[BaseModel]) -> list[tuple[tuple, str]]:
     """Place and text of every problem; a misspelt key is one problem, not also a missing key or a short list."""
     explained, meant = [], set()
     for e in errors:
@@ -308,16 +320,16 @@ def _explain(errors: Sequence[dict], model: type[BaseModel]) -> list[tuple[tuple
     return list(dict.fromkeys(explained))
 
 
-def _is_follow_on(e: dict) -> bool:
+def _is_follow_on(e: ErrorDetails) -> bool:
     """Whether a list is too short only because pydantic does not count the entries that have problems themselves."""
     return e["type"] == "too_short" and len(e["input"]) >= e["ctx"]["min_length"]
 
 
-def _is_unknown_key(e: dict) -> bool:
+def _is_unknown_key(e: ErrorDetails) -> bool:
     return e["type"] == "extra_forbidden" or e["loc"][-1:] == ("[key]",)
 
 
-def _wrong_value(e: dict) -> str:
+def _wrong_value(e: ErrorDetails) -> str:
     context = e.get("ctx", {})
     if e["type"] == "value_error":
         text = str(context["error"])
@@ -337,7 +349,7 @@ def _inside(loc: Sequence) -> str:
     return f"in {_dotted(loc)}" if loc else "at the top level"
 
 
-def _fields_at(annotation: Any, loc: Sequence) -> dict[str, FieldInfo | None]:
+def _fields_at(annotation: Any, loc: Sequence) -> Mapping[str, FieldInfo | None]:
     """Keys of the model at `loc` within a type: a model, a list or mapping of models, or a union."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         if not loc:
@@ -350,12 +362,19 @@ def _fields_at(annotation: Any, loc: Sequence) -> dict[str, FieldInfo | None]:
     if origin in (list, tuple) and loc:
         return _fields_at(args[0], loc[1:])
     if origin is dict:
-        return _fields_at(args[1], loc[1:]) if loc else dict.fromkeys(get_args(args[0]))
+        return _fields_at(args[1], loc[1:]) if loc else dict.fromkeys(_choices(args[0]))
     if origin in (Union, UnionType):
         # pydantic begins the path of a problem within a union with the name of the member that it tried.
         found = [_fields_at(a, rest) for a in args for rest in (loc, loc[1:])]
         return next((keys for keys in found if keys), {})
     return {}
+
+
+def _choices(annotation: Any) -> Iterable[str]:
+    """Names that a key must be one of; none if it may be any."""
+    if get_origin(annotation) is Annotated:
+        return next((one.names for one in annotation.__metadata__ if isinstance(one, OneOf)), ())
+    return get_args(annotation)
 
 
 def _line_of(content: Any, loc: Sequence) -> int:

@@ -5,7 +5,7 @@ missing or unknown key is refused.
 """
 
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 from ruamel.yaml import YAML
@@ -222,7 +222,7 @@ class Campaign(Strict):
         ValueError
             If there is no such key, or no number.
         """
-        value = self
+        value: Any = self
         for part in key.split("."):
             try:
                 value = value[int(part)] if part.isdigit() else getattr(value, part)

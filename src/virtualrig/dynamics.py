@@ -51,11 +51,10 @@ def simulate(
     """
     if rig.effects.are_in_the_motion:
         return effect_dynamics.simulate(rig, grid, numerics, preparation, time_s, drive)
-    theta_out, *tensions = _channels(rig, grid, numerics, preparation, time_s, drive)
-    check_tensions(np.array(tensions), numerics.tension_limit_N)
-    T1, T2, T3, T4 = tensions
+    theta_out, T1, T2, T3, T4 = _channels(rig, grid, numerics, preparation, time_s, drive)
+    check_tensions(np.array([T1, T2, T3, T4]), numerics.tension_limit_N)
     radius = rig.pulley_radius_m
-    return Trajectory(time_s, drive[0], theta_out, *tensions, radius * (T1 - T3), radius * (T2 - T4))
+    return Trajectory(time_s, drive[0], theta_out, T1, T2, T3, T4, radius * (T1 - T3), radius * (T2 - T4))
 
 
 def _channels(
@@ -97,24 +96,24 @@ def _channels(
 
 @njit(cache=True, error_model="numpy")
 def _march(
-    theta_in,
-    omega_in,
-    sample_s,
-    steps,
-    start_tension,
-    start_bristle,
-    stiffness,
-    damper,
-    inverse_mass,
-    grip,
-    bristle_length,
-    drag_rate,
-    radius,
-    theta_out,
-    spring,
-    load_damping,
-    load_inertia,
-):
+    theta_in: NDArray,
+    omega_in: NDArray,
+    sample_s: float,
+    steps: int,
+    start_tension: NDArray,
+    start_bristle: NDArray,
+    stiffness: NDArray,
+    damper: float,
+    inverse_mass: NDArray,
+    grip: NDArray,
+    bristle_length: float,
+    drag_rate: float,
+    radius: float,
+    theta_out: float,
+    spring: float,
+    load_damping: float,
+    load_inertia: float,
+) -> NDArray:
     """Integrate over time; returns theta_out, T1, T2, T3, T4 at the samples, shape (5, samples).
 
     Row 0 of every state is cable A, row 1 cable B. Displacements are zero at the start, where the tensions are

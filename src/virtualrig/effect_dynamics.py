@@ -6,6 +6,7 @@ one function of each kind; effects with a state of their own stand in the loop b
 """
 
 from collections import namedtuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -25,7 +26,21 @@ CONDUIT_LAG_S = 1e-4
 # A tension (N), time (s), travel and position (m) at which every law of slow friction that is present has an effect.
 ANY_STATE = (2.3, 0.7, 0.011, 0.0037)
 
-Physics = namedtuple("Physics", ["bristle_length", "radius", "spring", "damping", "inertia", *numbers(Effects())])
+if TYPE_CHECKING:
+
+    class Physics(NamedTuple):
+        """Of the twins' numbers, a type checker knows only that they are numbers."""
+
+        bristle_length: float
+        radius: float
+        spring: float
+        damping: float
+        inertia: float
+
+        def __getattr__(self, name: str) -> float: ...
+
+else:
+    Physics = namedtuple("Physics", ["bristle_length", "radius", "spring", "damping", "inertia", *numbers(Effects())])
 slow_friction, friction_law = chained("slow_friction"), chained("friction")
 
 
@@ -139,7 +154,9 @@ def _settling_length(effects: Effects, stiffness: NDArray) -> NDArray:
     return (effects.strand_settling.tension_scale_N if effects.strand_settling else 0.0) / stiffness
 
 
-def _initial_state(physics, grid, preparation, half_bend, drag) -> tuple[NDArray, NDArray]:
+def _initial_state(
+    physics: Physics, grid: Grid, preparation: Preparation, half_bend: NDArray, drag: NDArray
+) -> tuple[NDArray, NDArray]:
     """Tension of the segments (N, shape (2, n + 1)) and bristles (shape (2, n)) that hold it in balance."""
     share = np.repeat(np.array(preparation.profile_share)[:, None], drag.size, axis=1)
     grip = np.tanh(half_bend)
@@ -158,7 +175,9 @@ def _initial_state(physics, grid, preparation, half_bend, drag) -> tuple[NDArray
     return tension, np.clip(bristle, -1, 1)
 
 
-def _relaxed(tension, share, time_constant_s, tensioned_before_s) -> tuple[NDArray, NDArray]:
+def _relaxed(
+    tension: NDArray, share: NDArray, time_constant_s: NDArray, tensioned_before_s: float
+) -> tuple[NDArray, NDArray]:
     """Elastic tension (N, shape (2, n + 1)) and its delayed parts (branches, 2, n + 1) of cables that were tensioned.
 
     The elongation has been constant since then, so a branch has followed the elastic tension by 1 - exp(-t / tau).
@@ -168,7 +187,7 @@ def _relaxed(tension, share, time_constant_s, tensioned_before_s) -> tuple[NDArr
     return elastic, followed[:, None, None] * elastic
 
 
-def _elongation(physics, tension, stiffness, settling) -> NDArray:
+def _elongation(physics: Physics, tension: NDArray, stiffness: NDArray, settling: NDArray) -> NDArray:
     """Elongation of each segment under its tension, m; all of one shape."""
     ideal = tension / stiffness
     if not physics.has_settling:
@@ -182,7 +201,7 @@ def _elongation(physics, tension, stiffness, settling) -> NDArray:
     return e
 
 
-def _load_angle(physics, tension_difference) -> float:
+def _load_angle(physics: Physics, tension_difference: float) -> float:
     """Angle at which the load's spring holds the difference of the cables' load-end tensions, rad."""
     theta = 0.0
     for _ in range(50):
@@ -195,7 +214,15 @@ def _load_angle(physics, tension_difference) -> float:
     return float(theta)
 
 
-def _stable_step(physics, stiffness, mass, half_bend, drag, lengths, numerics) -> float:
+def _stable_step(
+    physics: Physics,
+    stiffness: NDArray,
+    mass: NDArray,
+    half_bend: NDArray,
+    drag: NDArray,
+    lengths: NDArray,
+    numerics: Numerics,
+) -> float:
     """Time step (s) for the stiffest state: everything stuck at the highest tension allowed."""
     limit = numerics.tension_limit_N
     factor = 1 + physics.stribeck_rise
@@ -217,13 +244,13 @@ def _stable_step(physics, stiffness, mass, half_bend, drag, lengths, numerics) -
     return stable_step(stiffness.max(axis=0), mass, bristle, spring, pulley_mass, numerics)
 
 
-def _roundness(theta, share, phase):
+def _roundness(theta: Any, share: float, phase: float) -> Any:
     """A pulley's radius at an angle (rad), over its mean."""
     return 1 + share * np.sin(theta + phase)
 
 
 @njit(cache=True)
-def _bearing_course(theta, angle):
+def _bearing_course(theta: NDArray, angle: float) -> NDArray:
     z = np.zeros_like(theta)
     for j in range(1, theta.size):
         rotation = theta[j] - theta[j - 1]
@@ -238,24 +265,26 @@ def _bearing_torque(theta: NDArray, friction: PulleyFriction | None) -> NDArray 
 
 
 @njit(inline="always")
-def _winding(theta, share, phase):
+def _winding(theta: float, share: float, phase: float) -> float:
     """Cable travel over the mean radius, rad: the integral of the roundness."""
     return theta - share * np.cos(theta + phase)
 
 
 @njit(inline="always")
-def _dead_zone(theta, half_gap):
+def _dead_zone(theta: float, half_gap: float) -> float:
     return max(theta - half_gap, 0.0) + min(theta + half_gap, 0.0)
 
 
 @njit(inline="always")
-def _bristle(z, slide_over_length):
+def _bristle(z: float, slide_over_length: float) -> float:
     """Dahl's bristle after a slide, implicit: within its bounds for any step (as in `virtualrig.dynamics`)."""
     return (z + slide_over_length) / (1 + abs(slide_over_length))
 
 
 @njit(error_model="numpy")
-def _set_strength(p, strength, half_bend, tension, time, travel, drive):
+def _set_strength(
+    p: Physics, strength: NDArray, half_bend: NDArray, tension: NDArray, time: float, travel: float, drive: float
+) -> None:
     """Friction of the nodes per sum of the tensions on both sides, without what changes fast."""
     for c in range(2):
         position = drive if c == 0 else -drive
@@ -265,7 +294,7 @@ def _set_strength(p, strength, half_bend, tension, time, travel, drive):
 
 
 @njit(error_model="numpy")
-def _set_hold(p, hold, strength, rested, drag, T):
+def _set_hold(p: Physics, hold: NDArray, strength: NDArray, rested: NDArray, drag: NDArray, T: NDArray) -> None:
     """Friction (N) of one cable's nodes at fully deflected bristles."""
     n = hold.size
     for i in range(n):
@@ -273,7 +302,7 @@ def _set_hold(p, hold, strength, rested, drag, T):
 
 
 @njit(error_model="numpy")
-def _renew(p, rested, w, dt):
+def _renew(p: Physics, rested: NDArray, w: NDArray, dt: float) -> None:
     """Let the contacts of one cable's nodes adapt to their sliding speed `w`."""
     inverse, renewal = 1.0 / p.stribeck_speed, dt / p.stribeck_renewal
     for i in range(rested.size):
@@ -288,7 +317,16 @@ def _renew(p, rested, w, dt):
 
 
 @njit(error_model="numpy")
-def _set_elastic(p, elastic, x, stretch, stiffness, settling, share, shortening):
+def _set_elastic(
+    p: Physics,
+    elastic: NDArray,
+    x: NDArray,
+    stretch: NDArray,
+    stiffness: NDArray,
+    settling: NDArray,
+    share: NDArray,
+    shortening: float,
+) -> None:
     """Tension (N) of one cable's segments without dampers; `x` are the slides, `shortening` is the conduit's."""
     n1 = elastic.size
     for i in range(n1):
@@ -305,29 +343,29 @@ def _set_elastic(p, elastic, x, stretch, stiffness, settling, share, shortening)
 
 @cached
 def _run(
-    p,
-    theta_in,
-    omega_in,
-    sample_s,
-    steps,
-    start_tension,
-    start_elastic,
-    start_relaxed,
-    bristles,
-    lengths,
-    stiffness,
-    stretch,
-    settling,
-    share,
-    relaxing,
-    relaxing_time,
-    damper,
-    inverse_mass,
-    half_bend,
-    drag,
-    drag_rate,
-    theta_out,
-):
+    p: Physics,
+    theta_in: NDArray,
+    omega_in: NDArray,
+    sample_s: float,
+    steps: int,
+    start_tension: NDArray,
+    start_elastic: NDArray,
+    start_relaxed: NDArray,
+    bristles: NDArray,
+    lengths: NDArray,
+    stiffness: NDArray,
+    stretch: NDArray,
+    settling: NDArray,
+    share: NDArray,
+    relaxing: NDArray,
+    relaxing_time: NDArray,
+    damper: float,
+    inverse_mass: NDArray,
+    half_bend: NDArray,
+    drag: NDArray,
+    drag_rate: NDArray,
+    theta_out: float,
+) -> NDArray:
     """Integrate; returns theta_out, T1, T2, T3, T4 and the load bearing's torque at the samples, shape (6, samples).
 
     Rows and columns are those of `virtualrig.dynamics._run`; `bristles` has shape (elements, 2, n).

@@ -221,7 +221,13 @@ class StepAndHold(Strict):
 Excitation = Annotated[Sine | Triangle | Chirp | GrowingSine | WanderingSine | StepAndHold, Field(discriminator="wave")]
 
 
-def _swing(since, phase, phase_rate, start_up_s, motion) -> tuple[NDArray, NDArray]:
+def _swing(
+    since: NDArray,
+    phase: NDArray,
+    phase_rate: NDArray | float,
+    start_up_s: float,
+    motion: "Chirp | GrowingSine | WanderingSine",
+) -> tuple[NDArray, NDArray]:
     """Angle (rad) and rate (rad/s) of a sine of a given phase whose amplitude grows from zero; shapes (samples,)."""
     growth, slope = smooth_step(since / start_up_s)
     angle = motion.amplitude_rad * growth * np.sin(phase)
@@ -229,7 +235,7 @@ def _swing(since, phase, phase_rate, start_up_s, motion) -> tuple[NDArray, NDArr
     return angle, np.where(since > 0, rate, 0.0)
 
 
-def _trapezoid(since, whole_s, ramp_s) -> tuple[NDArray, NDArray]:
+def _trapezoid(since: NDArray, whole_s: float, ramp_s: float) -> tuple[NDArray, NDArray]:
     """Integral (s) of a trapezoidal rate, and the rate (0 to 1), for ramps of `ramp_s` within `whole_s`."""
     since = np.clip(since, 0.0, whole_s)
     until = whole_s - since

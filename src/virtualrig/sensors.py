@@ -64,8 +64,8 @@ def sensed(time_s: NDArray, truth: Side, rig: Rig, faults: SideSensors) -> Side:
     if faults == SideSensors():
         return truth
     reading = truth
-    for twin in filter(lambda twin: twin.read, TWINS.values()):
-        reading = twin.read(reading, truth, faults, time_s, rig.pulley_radius_m)
+    for read in filter(None, (twin.read for twin in TWINS.values())):
+        reading = read(reading, truth, faults, time_s, rig.pulley_radius_m)
     return reading
 
 

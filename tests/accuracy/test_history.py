@@ -26,8 +26,7 @@ def git(folder: Path, *arguments: str) -> str:
 
 
 def commit(folder: Path, snakefile: str, version: str) -> str:
-    (folder / "src/ccmodel").mkdir(parents=True, exist_ok=True)
-    (folder / "src/ccmodel/__init__.py").write_text(f'__version__ = "{version}"\n')
+    (folder / "pyproject.toml").write_text(f'[project]\nname = "ccmodel"\nversion = "{version}"\n')
     (folder / "Snakefile").write_text(snakefile)
     git(folder, "add", "-A")
     git(folder, "commit", "-qm", version)

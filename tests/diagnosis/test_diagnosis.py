@@ -106,6 +106,7 @@ def test_the_model_predicts_recordings(clean, tmp_path):
 
 @pytest.mark.parametrize(("verdict", "strict", "code"), [("agrees", 1, 0), ("explained", 1, 1), ("explained", 0, 0)])
 def test_a_watch_is_told_by_the_exit_code(tmp_path, monkeypatch, verdict, strict, code):
+    (tmp_path / "batch.yaml").touch()
     monkeypatch.setattr(stage, "diagnose", lambda *_: {"verdict": verdict, "headline": "it is as it is"})
     found = run("diagnose", tmp_path, "--out", tmp_path / "out", *["--strict"] * strict)
     assert found.exit_code == code

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from builders import recording
-from ccmodel.cli import diagnose
+from ccmodel.cli.diagnose import settings_of
 from ccmodel.config import Config, load_config
 from ccmodel.diagnosis import candidate
 from ccmodel.diagnosis.calibration import calibration
@@ -133,9 +133,9 @@ def test_a_tolerance_may_differ_by_channel():
         (["tau_in_Nm=0.9"], "less than 0.5"),
     ],
 )
-def test_a_tolerance_that_cannot_be_used_is_refused(tmp_path, stated, said):
+def test_a_tolerance_that_cannot_be_used_is_refused(stated, said):
     with pytest.raises(InputError, match=f"--tolerance: .*{said}"):
-        diagnose(tmp_path, tmp_path / "out", tolerance=stated)
+        settings_of(stated, None, None, [])
 
 
 def test_the_configuration_for_the_public_recordings_says_how_they_would_be_diagnosed():

@@ -66,10 +66,10 @@ def test_add_a_reader(tmp_path):
 
 
 def test_add_a_mechanism(tmp_path):
-    copy_of(["src", "docs/mechanisms.md"], tmp_path)
+    copy_of(["src", "docs/mechanisms.md", "docs/mechanisms"], tmp_path)
     guide = followed("add-a-mechanism", tmp_path, source=tmp_path / "src")
     assert len(guide.skipped) == 1
-    assert "## load-cell-nonlinearity" in (tmp_path / "docs/mechanisms.md").read_text(encoding="utf-8")
+    assert "load cell" in (tmp_path / "docs/mechanisms/load-cell-nonlinearity.md").read_text(encoding="utf-8")
 
 
 def test_watch(tmp_path):

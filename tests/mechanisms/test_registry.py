@@ -16,7 +16,7 @@ from ccmodel.model.general import Active
 from general_runs import OUTPUTS, rms, run, sine
 
 READ = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N")
-PAGE = Path(__file__).parents[2] / "docs" / "mechanisms.md"
+DOCS = Path(__file__).parents[2] / "docs"
 EVERYWHERE = [(name, place) for name in mechanisms.names() for place in mechanisms.get(name).places]
 # Where the equation excludes the neutral value: a parameter, a value near its neutral one, and the largest root mean
 # square difference of a channel from the paper's model there, as a share of peak to peak. A kink of no bend still puts
@@ -66,7 +66,7 @@ def test_an_unknown_name_is_answered_with_the_nearest():
 def declared_with(monkeypatch, *changed):
     """A registry of these mechanisms in place of those of their names."""
     others = [mechanisms.get(name) for name in mechanisms.names() if name not in {m.name for m in changed}]
-    monkeypatch.setattr(mechanisms, "_declared", lambda: [*others, *changed])
+    monkeypatch.setattr(mechanisms, "_declared", lambda: [(mechanism, "") for mechanism in (*others, *changed)])
     return mechanisms._registry.__wrapped__()
 
 
@@ -95,8 +95,16 @@ def test_a_setting_that_no_mechanism_declares_is_refused():
 
 
 def test_the_documentation_is_up_to_date():
-    """Names, parameters and ranges are a format: a change of them shows in this page's difference."""
-    assert PAGE.read_text(encoding="utf-8") == catalogue.page() + "\n"
+    """Names, parameters and ranges are a format: a change of them shows in the difference of these pages."""
+    found = [DOCS / "mechanisms.md", *(DOCS / "mechanisms").glob("*.md")]
+    assert {page.relative_to(DOCS).as_posix(): page.read_text(encoding="utf-8") for page in found} == catalogue.pages()
+
+
+def test_pages_of_mechanisms_that_no_longer_exist_are_removed(tmp_path):
+    (tmp_path / "mechanisms").mkdir()
+    (tmp_path / "mechanisms" / "phlogiston.md").write_text("# phlogiston")
+    assert CliRunner().invoke(app, ["mechanisms", "--markdown", str(tmp_path)]).exit_code == 0
+    assert {page.stem for page in (tmp_path / "mechanisms").glob("*.md")} == set(mechanisms.names())
 
 
 @pytest.mark.parametrize("name", mechanisms.names())

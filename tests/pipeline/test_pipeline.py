@@ -415,8 +415,3 @@ def test_a_fit_with_a_name_of_a_diagnosis_and_a_missing_file_are_one_line(copy):
         assert run.returncode != 0
         assert len([line for line in run.stderr.splitlines() if said in line]) == 1
         assert "Traceback" not in run.stderr
-
-
-def test_the_workflow_is_lint_clean(copy):
-    run = snakemake(copy, "--lint")
-    assert "Congratulations" in run.stdout + run.stderr, run.stdout + run.stderr

@@ -8,6 +8,8 @@ rule ingest:
         f"{RESULTS}/logs/ingest/{{batch}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/ingest/{{batch}}.tsv"
+    group:
+        "reading"
     conda:
         "../envs/ccmodel.yaml"
     threads: 1

@@ -9,6 +9,8 @@ rule tabulate_errors:
         f"{RESULTS}/logs/tabulate_errors.log",
     benchmark:
         f"{RESULTS}/benchmarks/tabulate_errors.tsv"
+    group:
+        "page"
     conda:
         "../envs/ccmodel.yaml"
     threads: 1
@@ -53,6 +55,8 @@ rule write_report:
         f"{RESULTS}/logs/write_report.log",
     benchmark:
         f"{RESULTS}/benchmarks/write_report.tsv"
+    group:
+        "page"
     conda:
         "../envs/ccmodel.yaml"
     threads: 1

@@ -9,6 +9,8 @@ rule simulate:
         f"{RESULTS}/logs/simulate/{{parameters}}/{{batch}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/simulate/{{parameters}}/{{batch}}.tsv"
+    group:
+        "simulating"
     conda:
         "../envs/ccmodel.yaml"
     threads: 1

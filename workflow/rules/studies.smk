@@ -24,6 +24,8 @@ for name, study in STUDIES.items():
             f"{RESULTS}/logs/studies/{name}.log",
         benchmark:
             f"{RESULTS}/benchmarks/studies/{name}.tsv"
+        group:
+            "studies"
         conda:
             "../envs/ccmodel.yaml"
         threads: 1

@@ -6,9 +6,10 @@ from ccmodel.jobs import logged
 from ccmodel.studies.diagnosis.run import diagnose_recordings
 from ccmodel.studies.diagnosis.settings import Diagnosing
 
-with logged(snakemake.log[0], snakemake.threads):
+with logged(snakemake.log[0], snakemake.threads) as progress:
     diagnose_recordings(
         Path(snakemake.input.recordings),
         Path(snakemake.output[0]).parent,
         Diagnosing.model_validate_json(snakemake.params.settings),
+        progress,
     )

@@ -5,5 +5,5 @@ from pathlib import Path
 from ccmodel.jobs import logged
 from ccmodel.steps.ingest import ingest
 
-with logged(snakemake.log[0], snakemake.threads):
-    ingest(Path(snakemake.params.folder), Path(snakemake.output.recordings), Path(snakemake.output.summary))
+with logged(snakemake.log[0], snakemake.threads) as progress:
+    ingest(Path(snakemake.params.folder), Path(snakemake.output.recordings), Path(snakemake.output.summary), progress)

@@ -5,10 +5,11 @@ from pathlib import Path
 from ccmodel.jobs import logged
 from ccmodel.steps.simulate import simulate
 
-with logged(snakemake.log[0], snakemake.threads):
+with logged(snakemake.log[0], snakemake.threads) as progress:
     simulate(
         Path(snakemake.input.recordings),
         Path(snakemake.input.fit) if snakemake.input.fit else None,
         Path(snakemake.output.simulated),
         Path(snakemake.output.summary),
+        progress,
     )

@@ -4,7 +4,7 @@ import json
 import platform
 from importlib.metadata import version
 from pathlib import Path
-from typing import Literal
+from typing import Any, Final, Literal
 
 from pydantic import ValidationError
 
@@ -13,7 +13,7 @@ from ccmodel.accuracy.comparison import Limits, intervals
 from ccmodel.accuracy.measure import Batches
 from ccmodel.typed import InputError, TypedModel
 
-FORMAT = 1
+FORMAT: Final = 1
 ACCEPT = 'ccmodel accuracy accept --reason "..."'
 LIBRARIES = ("numpy", "scipy", "numba")
 
@@ -74,7 +74,7 @@ def write_baseline(file: Path, baseline: Baseline) -> None:
     file.write_text(_text(baseline.model_dump(mode="json")) + "\n", encoding="utf-8")
 
 
-def _text(data, depth: int = 0) -> str:
+def _text(data: Any, depth: int = 0) -> str:
     """JSON whose innermost lists and mappings are on one line."""
     if not isinstance(data, dict) or "errors" in data or all(not isinstance(v, dict | list) for v in data.values()):
         return json.dumps(data, ensure_ascii=False)

@@ -30,7 +30,7 @@ that was compared before and is not any more is therefore a loss too. So is, on 
 determines less (`VERDICTS`).
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
@@ -41,6 +41,9 @@ from ccmodel.accuracy.measure import BatchAccuracy, Batches, ChannelAccuracy
 from ccmodel.channels import symbol_of
 from ccmodel.repeats import pooled_scatter, without_repeat
 from ccmodel.typed import TypedModel
+
+# Numbers of a channel by recording; None where there is none.
+Values = Callable[[ChannelAccuracy], Sequence[float | None]]
 
 # From the one that determines least; `agrees` and `explained` determine all.
 VERDICTS = {"not diagnosed": 0, "inputs-inconsistent": 0, "unexplained": 1, "undecided": 2, "explained": 3, "agrees": 3}
@@ -202,11 +205,19 @@ def _change(
     same = _same_recordings(batch, parameters, accepted, now)
     if same:
         before, after = _common(before, accepted[batch], now[batch]), _common(after, now[batch], accepted[batch])
-        reach = 0.0
+        reach: float | None = 0.0
     else:
         reach = _reach_again(accepted, now, batch, parameters, channel, tail)
     low, high = _range(before.error, None if reach is None else reach + np.log1p(share))
-    outcome = UNKNOWN if high is None else LOST if after.error > high else GAINED if after.error < low else KEPT
+    outcome = (
+        UNKNOWN
+        if low is None or high is None
+        else LOST
+        if after.error > high
+        else GAINED
+        if after.error < low
+        else KEPT
+    )
     return Change(
         batch, parameters, channel, before.error, after.error, before.bias, after.bias, low, high, same, outcome
     )
@@ -238,7 +249,7 @@ def _reach_again(
     return float(t.isf(tail, freedom) * np.sqrt(variance))
 
 
-def _scatter(batches: Batches, batch: str, parameters: str, channel: str, values) -> tuple[float, int]:
+def _scatter(batches: Batches, batch: str, parameters: str, channel: str, values: Values) -> tuple[float, int]:
     """Standard deviation between repeats and its degrees of freedom, of a rig's batches; or between all recordings."""
     of_rig = [b for b, one in batches.items() if one.rig == batches[batch].rig]
     groups = {b: _groups(batches[b], parameters, channel, values) for b in of_rig}
@@ -248,7 +259,7 @@ def _scatter(batches: Batches, batch: str, parameters: str, channel: str, values
     return pooled_scatter([[v for group in of_batch for v in group] for of_batch in groups.values()], relative=False)
 
 
-def _groups(batch: BatchAccuracy, parameters: str, channel: str, values) -> list[list[float]]:
+def _groups(batch: BatchAccuracy, parameters: str, channel: str, values: Values) -> list[list[float]]:
     """Values of the repeats of each condition."""
     one = batch.sets[parameters].channels.get(channel) if parameters in batch.sets else None
     groups: dict[str, list[float]] = {}

@@ -1,6 +1,6 @@
 """What `ccmodel accuracy` does: compare the last run with the baseline, accept it, fill the history of past commits."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from ccmodel.accuracy.baseline import ACCEPT, make_baseline, read_baseline, writ
 from ccmodel.accuracy.comparison import GAINED, Comparison, Limits, compare
 from ccmodel.accuracy.history import add_rows, commits_in, head, rows_of, run_commit
 from ccmodel.accuracy.measure import Batches
+from ccmodel.progress import Progress, each_of
 from ccmodel.steps.files import read_json
 from ccmodel.typed import InputError
 
@@ -96,16 +97,19 @@ def accept(results: Path, reason: str) -> State:
     return state
 
 
-def fill_history(file: Path, revisions: Iterable[str], cores: int, report: Callable[[str], None]) -> None:
-    """Run past commits and add their accuracy to a history; a commit that cannot be run is a line.
+def fill_history(file: Path, revisions: Iterable[str], cores: int, progress: Progress) -> list[str]:
+    """Run past commits and add their accuracy to a history; return a line on each commit that cannot be run.
 
     Raises
     ------
     InputError
         If git does not know a revision.
     """
-    for commit in commits_in(revisions):
+    skipped = []
+    for commit in each_of(commits_in(revisions), progress, lambda one: f"running commit {one[:7]}"):
         rows, line = run_commit(commit, cores)
-        report(line)
         if len(rows):
             add_rows(file, rows)
+        else:
+            skipped.append(line)
+    return skipped

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -153,11 +154,11 @@ def _simulated_in(results: Path) -> list[Simulated]:
 
 
 def _version(folder: Path) -> str:
-    text = (folder / "src/ccmodel/__init__.py").read_text()
-    return text.partition('__version__ = "')[2].partition('"')[0]
+    """Version of a past commit, from its pyproject.toml."""
+    return tomllib.loads((folder / "pyproject.toml").read_text())["project"]["version"]
 
 
-def _one_line(text) -> str:
+def _one_line(text: object) -> str:
     return " ".join(str(text).split())[:160]
 
 

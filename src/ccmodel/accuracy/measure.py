@@ -123,7 +123,9 @@ def measure(runs: Iterable[Simulated], for_comparison: bool = True) -> Batches:
 
 
 def _batch(runs: Sequence[Simulated], for_comparison: bool) -> BatchAccuracy:
-    recordings, sets, origin = {}, {}, ""
+    recordings: dict[str, list[float]] = {}
+    sets: dict[str, SetAccuracy] = {}
+    origin = ""
     for run in runs:
         pairs = read_pairs(run.recordings, run.simulated)
         table = error_table(pairs, run.parameters).dropna(subset="nrmse_percent")
@@ -157,11 +159,15 @@ def _channel(rows: pd.DataFrame, recordings: Sequence[str], fit_sd: float) -> Ch
     """Numbers in the order of the recordings, rounded so that a file of them can be read and compared."""
     biases = (100 * rows["bias"] / rows["peak_to_peak"]).reindex(recordings)
     errors = rows["nrmse_percent"].reindex(recordings)
-    return ChannelAccuracy(biases=_rounded(biases), errors=_rounded(errors), fit_sd=_rounded([fit_sd], 3)[0])
+    return ChannelAccuracy(biases=_rounded(biases), errors=_rounded(errors), fit_sd=_round(fit_sd, 3))
 
 
 def _rounded(values: Iterable[float], digits: int = DIGITS) -> list[float | None]:
-    return [None if np.isnan(value) else float(f"{value:.{digits}g}") for value in values]
+    return [None if np.isnan(value) else _round(value, digits) for value in values]
+
+
+def _round(value: float, digits: int) -> float:
+    return float(f"{value:.{digits}g}")
 
 
 def _numbers(values: Iterable[float | None]) -> np.ndarray:
@@ -175,7 +181,7 @@ def _fit_sds(pairs: Sequence[Pair], known: Fitted, table: pd.DataFrame) -> dict[
     which the model cannot be run, is left out.
     """
     sds = {name: sd for name, sd in known.sds.items() if sd is not None and np.isfinite(sd)}
-    if not sds:
+    if not sds or known.parameters is None:
         return {}
     given = [(recorded, ModelInput.of(recorded)) for recorded, simulated in pairs if simulated is not None]
     squares: dict[str, float] = {}
@@ -187,7 +193,8 @@ def _fit_sds(pairs: Sequence[Pair], known: Fitted, table: pd.DataFrame) -> dict[
             continue
         change = np.log(_error_by_channel(moved) / _error_by_channel(table))
         for channel, value in change.items():
-            squares[channel] = squares.get(channel, 0.0) + value**2
+            if np.isfinite(value):
+                squares[channel] = squares.get(channel, 0.0) + value**2
     return {channel: float(np.sqrt(square)) for channel, square in squares.items()}
 
 

@@ -1,6 +1,6 @@
 """Second stage: the unknowns of the calibrated model, and a first fit about which errors are whitened."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from ccmodel.channels import TAU_IN, TAU_OUT, ZERO_OF
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.hypothesis import PAPER, Hypothesis
+from ccmodel.failure import ModelError
 from ccmodel.inference.least_squares import Search, solve
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.problem import Free, Problem
@@ -42,10 +43,22 @@ class TestedModel:
 
 
 def tested_model(
-    observations: Sequence[Observations], estimates: Parameters, baseline: Parameters | None, freeze: bool
+    observations: Sequence[Observations],
+    estimates: Parameters,
+    baseline: Parameters | None,
+    freeze: bool,
+    only: Collection[str] | None = None,
 ) -> TestedModel:
-    """The paper's model with a first fit, or a baseline with its own values; a frozen baseline keeps them."""
+    """The paper's model with a first fit, or a baseline with its own values; a frozen baseline keeps them.
+
+    Parameters
+    ----------
+    only : collection of str, optional
+        Unknowns of the calibration that are fitted; all others keep their estimates.
+    """
     free = calibration(estimates, observations)
+    if only is not None:
+        free = _chosen(free, only)
     estimates = estimates.with_values({name: one.start for name, one in free.items()})
     if baseline is None:
         at_estimates = [o.with_parameters(estimates) for o in observations]
@@ -85,6 +98,15 @@ def calibration(estimates: Parameters, observations: Sequence[Observations]) -> 
             reach = max(float(np.ptp(o.given.recording[TAU_IN])) for o in has_torque)
             free |= {name: Free(0.0, -reach, reach) for name in (ZERO_OF[TAU_IN], ZERO_OF[TAU_OUT])}
     return free
+
+
+def _chosen(free: Mapping[str, Free], names: Collection[str]) -> dict[str, Free]:
+    """Some of the unknowns of a calibration, in its order."""
+    if unknown := [name for name in names if name not in free]:
+        raise ModelError(f"{', '.join(unknown)} cannot be fitted to these recordings; {', '.join(free)} can")
+    if not names:
+        raise ModelError(f"nothing to fit; these recordings determine {', '.join(free)}")
+    return {name: one for name, one in free.items() if name in names}
 
 
 def _free(estimate: float, low: float, high: float) -> Free:

@@ -1,11 +1,12 @@
 """Candidate fits: a candidate model fitted to all recordings, with leave-one-out cross-validation."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import t as student
 
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.hypothesis import Hypothesis, plausible
@@ -13,6 +14,7 @@ from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.failure import ModelError
 from ccmodel.inference.cross_validation import inverse_of, leave_one_out
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS, mean_weight
+from ccmodel.inference.intervals import COVERAGE, Interval
 from ccmodel.inference.jacobian import size_of
 from ccmodel.inference.least_squares import Search, Solution, minimise
 from ccmodel.inference.pool import each
@@ -53,6 +55,10 @@ class CandidateFit:
         By recording, values fitted to all other recordings.
     loo_residuals : list of ndarray, each of shape (rows + nuisances,)
         By recording, its whitened residuals at these values.
+    message : str
+        Why the search stopped.
+    converged : bool
+        Whether it came to a minimum.
     """
 
     hypothesis: Hypothesis
@@ -64,6 +70,8 @@ class CandidateFit:
     degrees_of_freedom: NDArray
     loo_values: list[dict[str, float]]
     loo_residuals: list[NDArray]
+    message: str = ""
+    converged: bool = True
 
     @cached_property
     def by_recording(self) -> NDArray:
@@ -79,6 +87,32 @@ class CandidateFit:
     def is_plausible(self) -> bool:
         """Whether its mechanisms' strengths lie within their plausible ranges."""
         return plausible(self.hypothesis, self.values)
+
+    def standard_deviations(self, shift: NDArray | float = 0.0) -> NDArray:
+        """Of each unknown, with a further error `shift` (of the discretisation, say); shape (unknowns,)."""
+        return np.hypot(np.sqrt(np.diag(self.covariance).clip(0.0)), shift)
+
+    def half_widths(self, shift: NDArray | float = 0.0) -> NDArray:
+        """Half-width of each unknown's 90 % interval, shape (unknowns,)."""
+        # With infinite degrees of freedom this is the normal distribution's quantile.
+        return student.ppf(0.5 + COVERAGE / 2, self.degrees_of_freedom) * self.standard_deviations(shift)
+
+    def intervals(self) -> dict[str, Interval]:
+        """The 90 % interval of each unknown of the calibration, within its bounds."""
+        rows = zip(self.values.items(), self.half_widths(), self.standard_deviations(), strict=True)
+        return {
+            name: Interval(max(value - reach, self.free[name].low), min(value + reach, self.free[name].high), sd)
+            for (name, value), reach, sd in ((one, float(reach), float(sd)) for one, reach, sd in rows)
+            if name in self.free
+        }
+
+    def at_bounds(self) -> list[str]:
+        """Unknowns of the calibration that stand at one of their bounds."""
+        return [name for name, free in self.free.items() if self._is_at_bound(self.values[name], free)]
+
+    @staticmethod
+    def _is_at_bound(value: float, free: Free) -> bool:
+        return any(np.isclose(value, bound, rtol=settings.AT_BOUND, atol=0.0) for bound in (free.low, free.high))
 
     def model(self, estimates: Parameters) -> Parameters:
         """The fitted model, with estimates of everything that is not fitted."""
@@ -127,6 +161,8 @@ def fit(
         left_out.degrees_of_freedom,
         [problem.values_of(x, 0) for x in left_out.values],
         left_out.residuals,
+        solution.message,
+        solution.converged,
     )
 
 
@@ -152,18 +188,18 @@ def starting_points(problem: Problem) -> list[NDArray]:
 
 def best_start(problem: Problem, starts: Sequence[NDArray]) -> Solution:
     """The best of short searches; a start at which the model cannot be run counts only if it can at none."""
-    found, failure = [], None
+    found, failures = [], []
     for x in starts:
         try:
             found.append(minimise(problem, x, replace(SEARCH, most_evaluations=settings.START_EVALUATIONS)))
         except ModelError as error:
-            failure = error
+            failures.append(error)
     if not found:
-        raise failure
+        raise failures[-1]
     return min(found, key=lambda solution: solution.cost)
 
 
-def continued(search, solution: Solution, k: int, low: NDArray) -> Solution:
+def continued(search: Callable[[NDArray], Solution], solution: Solution, k: int, low: NDArray) -> Solution:
     """Continuation in one unknown: from its value downwards by steps, as long as that lowers the cost."""
     while solution.x[k] > settings.CONTINUATION_FACTOR * low[k]:
         x = solution.x.copy()

@@ -155,7 +155,7 @@ def separation(planned: Sequence[Observations], refitted: Sequence[CandidateFit]
 def _absorbed(o: Observations, predicted: NDArray, candidate: CandidateFit) -> NDArray:
     """Effects of the uncertain values and nuisances, a standard deviation of each over the noise; (rows, k)."""
     names, x = list(candidate.values), np.array(list(candidate.values.values()))
-    free = candidate.free | candidate.hypothesis.free(candidate.values)
+    free = {**candidate.free} | candidate.hypothesis.free(candidate.values)
     sizes = np.array([size_of(name, value) for name, value in candidate.values.items()])
     steps = inward(settings.FIT_DIFFERENCE * sizes, x, np.array([free[name].high for name in names]))
     effects = jacobian(lambda at: o.errors(dict(zip(names, at, strict=True))).ravel(), x, steps, predicted)

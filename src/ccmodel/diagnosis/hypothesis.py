@@ -114,7 +114,8 @@ def single_mechanisms(without: Collection[str] = (), model: Hypothesis = PAPER) 
 
 def stated_hypothesis(stated: Collection[str]) -> Hypothesis:
     """A candidate model from texts such as "kink at conduit"."""
-    return Hypothesis(tuple(tuple(one.split(" at ", 1)) for one in stated))
+    parts = (one.partition(" at ") for one in stated)
+    return Hypothesis(tuple((name, place) for name, _, place in parts))
 
 
 def plausible(hypothesis: Hypothesis, values: Mapping[str, float]) -> bool:

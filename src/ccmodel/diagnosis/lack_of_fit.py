@@ -65,7 +65,13 @@ def lack_of_fit(whitened: Sequence[Whitened], candidate: CandidateFit) -> LackOf
     return LackOfFit((best if best.mean() > 0 else np.zeros_like(best)) - tolerated)
 
 
-def _reductions(features, residuals, gram, cross, penalty: float) -> NDArray:
+def _reductions(
+    features: Sequence[NDArray],
+    residuals: Sequence[NDArray],
+    gram: Sequence[NDArray],
+    cross: Sequence[NDArray],
+    penalty: float,
+) -> NDArray:
     """By recording, the reduction of its mean square by a ridge regression on the others."""
     G, b = sum(gram) + penalty * np.eye(len(gram[0])), sum(cross)
     predicted = [F @ np.linalg.solve(G - own, b - c) for F, own, c in zip(features, gram, cross, strict=True)]

@@ -4,6 +4,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ccmodel.channels import PLACES_OF, short_name
 from ccmodel.diagnosis import settings
@@ -74,7 +75,7 @@ def _places(judgement: Judgement) -> list[str]:
 
 def mismatch(whitened: Sequence[Whitened], candidate: CandidateFit) -> dict[str, dict[str, float]]:
     """Root mean square of the held-out errors over the noise floor, by channel and phase of the motion."""
-    collected = defaultdict(lambda: {p: [] for p in PHASES})
+    collected: dict[str, dict[str, list[NDArray]]] = defaultdict(lambda: {p: [] for p in PHASES})
     for i, w in enumerate(whitened):
         o = w.observations.with_parameters(candidate.held_out(i, w))
         floor = np.array([w.noise_floor[c] for c in o.channels])[:, None]

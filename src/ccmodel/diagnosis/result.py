@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
 
 from ccmodel import mechanisms as registry
 from ccmodel.channels import short_name, unit_of
@@ -14,7 +13,6 @@ from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.observations import NotJudged
 from ccmodel.diagnosis.verdict import Judgement, nested_choice
 from ccmodel.failure import ModelError
-from ccmodel.inference.intervals import COVERAGE
 from ccmodel.model.parameters import Parameters, mechanism_key
 
 FORMAT = 1
@@ -103,9 +101,7 @@ def mechanism_of(candidate: CandidateFit, k: int, confidence: float, shift: NDAr
     name, place = candidate.hypothesis.acting[k]
     names = list(candidate.values)
     shift = np.zeros(len(names)) if shift is None else shift
-    sds = np.hypot(np.sqrt(np.diag(candidate.covariance).clip(0.0)), shift)
-    # With infinite degrees of freedom this is the normal distribution's quantile.
-    reach = student.ppf(0.5 + COVERAGE / 2, candidate.degrees_of_freedom) * sds
+    reach = candidate.half_widths(shift)
     free = candidate.hypothesis.free(candidate.values)
     parameters = []
     for p in registry.get(name).parameters:
@@ -160,9 +156,7 @@ def contradicting_recording(judgement: Judgement) -> NotJudged:
 
 def _at_bounds(candidate: CandidateFit) -> NotJudged:
     """Calibrated values that stand at one of their bounds."""
-    found = []
-    for name, free in candidate.free.items():
-        value = candidate.values[name]
-        if any(np.isclose(value, bound, rtol=settings.AT_BOUND, atol=0.0) for bound in (free.low, free.high)):
-            found.append({"what": name, "why": f"stands at the end of its range, {value:.4g}: not a value to rely on"})
-    return found
+    return [
+        {"what": name, "why": f"stands at the end of its range, {candidate.values[name]:.4g}: not a value to rely on"}
+        for name in candidate.at_bounds()
+    ]

@@ -9,18 +9,24 @@ from dataclasses import dataclass
 from threadpoolctl import threadpool_limits
 
 from ccmodel.diagnosis import settings
-from ccmodel.diagnosis.calibration import tested_model
+from ccmodel.diagnosis.calibration import TestedModel, tested_model
 from ccmodel.diagnosis.candidate import CandidateFit, fit
 from ccmodel.diagnosis.hypothesis import single_mechanisms, stated_hypothesis
-from ccmodel.diagnosis.observations import observations_of
+from ccmodel.diagnosis.observations import NotJudged, observations_of
 from ccmodel.diagnosis.result import report
-from ccmodel.diagnosis.selection import Progress, Selection, silent
+from ccmodel.diagnosis.selection import Selection
 from ccmodel.diagnosis.verdict import Judgement, judge
-from ccmodel.diagnosis.whitening import whiten
+from ccmodel.diagnosis.whitening import Whitened, whiten
 from ccmodel.inference.observations import Tolerance
 from ccmodel.inference.pool import each
 from ccmodel.model.parameters import Parameters
+from ccmodel.progress import Progress, silent, within
 from ccmodel.recording import Recording
+
+# Shares of the time at which the model is calibrated, the mechanisms are selected and the verdict is decided; and share
+# of the first fit in the time of a calibration. Measured on the batches of data/raw.
+CALIBRATED, SELECTED, JUDGED = 0.04, 0.88, 0.95
+FIRST_FIT = 0.5
 
 
 @dataclass(frozen=True)
@@ -53,6 +59,33 @@ class Options:
 
 
 @dataclass(frozen=True)
+class Calibration:
+    """The calibrated model of a batch, which every candidate model is compared to.
+
+    Attributes
+    ----------
+    tested : TestedModel
+        The model that is tested, with its unknowns and their values from a first fit.
+    whitened : list of Whitened
+        The observations, their errors whitened about that first fit.
+    fit : CandidateFit
+        The calibrated model.
+    not_judged : list of {"what", "why"}
+        What the recordings do not let a fit judge.
+    """
+
+    tested: TestedModel
+    whitened: list[Whitened]
+    fit: CandidateFit
+    not_judged: NotJudged
+
+    @property
+    def model(self) -> Parameters:
+        """The calibrated model, which can simulate any recording of the rig."""
+        return self.fit.model(self.tested.estimates)
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """Result of a diagnosis.
 
@@ -77,7 +110,44 @@ class Diagnosis:
 
 # BLAS stays on one thread: recordings are worked on in parallel, and sums over several threads differ in their last
 # digits with the number of threads.
-@threadpool_limits.wrap(limits=1, user_api="blas")
+_one_thread = threadpool_limits.wrap(limits=1, user_api="blas")
+
+
+@_one_thread
+def calibrate(
+    recordings: Sequence[Recording],
+    estimates: Parameters,
+    options: Options = Options(),
+    baseline: Parameters | None = None,
+    progress: Progress = silent,
+    only: Collection[str] | None = None,
+) -> Calibration:
+    """Fit the paper's model, or a baseline, to recordings; parameters as of `diagnose`.
+
+    Two fits: a first one gives the model about which the errors are linearised and whitened, and the fit of the
+    whitened errors is the calibrated model.
+
+    Parameters
+    ----------
+    only : collection of str, optional
+        Unknowns that are fitted, of those that these recordings determine; all of them if none is stated.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be run on any of the recordings, or `only` has another name.
+    """
+    observations, missing = observations_of(recordings, estimates, options.tolerance, options.step_s, options.cycles)
+    tested_name = "the baseline" if baseline else "the paper's model"
+    progress(f"calibrating {tested_name} on {len(observations)} recordings", 0.0)
+    tested = tested_model(observations, estimates, baseline, options.freeze, only)
+    at_estimates = [o.with_parameters(tested.estimates) for o in observations]
+    progress("calibrating with whitened errors", FIRST_FIT)
+    whitened = each(at_estimates, lambda i, o: whiten(o, tested.model))
+    return Calibration(tested, whitened, fit(whitened, tested.hypothesis, tested.free, tested.start), missing)
+
+
+@_one_thread
 def diagnose(
     recordings: Sequence[Recording],
     estimates: Parameters,
@@ -100,31 +170,25 @@ def diagnose(
         fitted again, unless the options freeze it.
     not_judged : sequence of {"what", "why"}
         What is left out already, such as refused recordings, with the reason; the report lists it.
-    progress : callable
-        Called with one line of text for each step of the work.
+    progress : Progress
 
     Raises
     ------
     ModelError
         If the model cannot be run on any of the recordings.
     """
-    observations, missing = observations_of(recordings, estimates, options.tolerance, options.step_s, options.cycles)
-    not_judged = [*map(dict, not_judged), *missing]
+    found = calibrate(recordings, estimates, options, baseline, within(progress, 0.0, CALIBRATED))
+    tested, whitened = found.tested, found.whitened
+    unjudged = [*map(dict, not_judged), *found.not_judged]
     if options.freeze:
         why = "frozen at the baseline's values, as requested"
-        not_judged.append({"what": "stiffness, friction and everything else that a calibration would fit", "why": why})
-    tested_name = "the baseline" if baseline else "the paper's model"
-    progress(f"calibrating {tested_name} on {len(observations)} recordings")
-    # Two fits: a first one gives the model about which the errors are linearised and whitened, and the fit of the
-    # whitened errors is the calibrated model, to which every candidate is compared.
-    tested = tested_model(observations, estimates, baseline, options.freeze)
-    at_estimates = [o.with_parameters(tested.estimates) for o in observations]
-    whitened = each(at_estimates, lambda i, o: whiten(o, tested.model))
-    calibrated = fit(whitened, tested.hypothesis, tested.free, tested.start)
+        unjudged.append({"what": "stiffness, friction and everything else that a calibration would fit", "why": why})
     mechanisms = single_mechanisms(options.without, tested.hypothesis)
     forced = [stated_hypothesis(stated) for stated in options.forced_candidates]
-    selection = Selection(tested.free, mechanisms, forced, progress)
-    comparison, scores = selection.run(whitened, calibrated)
+    selection = Selection(tested.free, mechanisms, forced, within(progress, CALIBRATED, SELECTED))
+    comparison, scores = selection.run(whitened, found.fit)
+    progress("deciding the verdict", SELECTED)
     judgement = judge(comparison, scores)
-    content = report(recordings[0].batch, judgement, tested.estimates, not_judged)
+    progress("correcting the values for the discretisation, designing an experiment", JUDGED)
+    content = report(recordings[0].batch, judgement, tested.estimates, unjudged)
     return Diagnosis(content, judgement, tested.estimates)

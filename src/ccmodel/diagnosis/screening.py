@@ -92,7 +92,7 @@ class _Test:
         """Change of the weighted errors that a recalibration does not absorb."""
         extended = self.base.hypothesis.and_also(hypothesis)
         modelled = [w.with_parameters(extended.of(w.observations.parameters)) for w in self.whitened]
-        every = self.base.values | values
+        every = {**self.base.values, **values}
         try:
             moved = each(modelled, lambda i, w: w.errors(every) - self.base.residuals[i])
         except ModelError:

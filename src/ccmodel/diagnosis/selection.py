@@ -1,7 +1,8 @@
 """Forward selection: single mechanisms by their screening score, and a second mechanism where one does not suffice."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit, fit
@@ -12,12 +13,13 @@ from ccmodel.diagnosis.whitening import Whitened, relinearised
 from ccmodel.failure import ModelError
 from ccmodel.inference.pool import each
 from ccmodel.inference.problem import Free
+from ccmodel.progress import Progress, silent, within
 
-Progress = Callable[[str], None]
-
-
-def silent(text: str) -> None:
-    """Report no progress."""
+# Shares of a whole selection at which the mechanisms are screened, the single ones fitted and the covariance linearised
+# anew; the rest is the pairs'. Of the pairs' share, that of the screening for a second mechanism, and that at which all
+# are fitted. Measured on the batches of data/raw; they only serve the estimate of the time that is left.
+SCREENED, FITTED, RELINEARISED = 0.15, 0.35, 0.5
+PARTNERS_SCREENED, PAIRS_FITTED = 0.5, 0.8
 
 
 @dataclass(frozen=True)
@@ -32,8 +34,7 @@ class Selection:
         Single mechanisms that may be missing.
     forced : sequence of Hypothesis
         Singles or pairs that are fitted whatever their screening score.
-    progress : callable
-        Takes a line for each step of the work.
+    progress : Progress
     """
 
     free: Mapping[str, Free]
@@ -44,26 +45,31 @@ class Selection:
     def run(self, whitened: Sequence[Whitened], base: CandidateFit) -> tuple[Comparison, list[Score]]:
         """Select from all mechanisms; the comparison of what was fitted, and the screening scores."""
         text = f"calibrated model: leave-one-out mean square {base.mean_square:.2f} (1: noise); screening"
-        self.progress(f"{text} {len(self.mechanisms)} mechanisms")
+        self.progress(f"{text} {len(self.mechanisms)} mechanisms", 0.0)
         scores = screen(whitened, base, self.mechanisms)
         fewest = settings.FEWEST_FITTED if base.mean_square > settings.ADEQUATE else 0
         worth = [s for k, s in enumerate(scores) if s.values and (s.gain > settings.WORTH_FITTING or k < fewest)]
         leading = worth[: settings.MOST_FITTED]
         chosen = [s.hypothesis for s in leading]
         forced = [Score(h, 0.0, h.start) for h in self.forced if h not in chosen]
-        singles = self.fit_all(whitened, base, [*leading, *forced])
+        singles = self._part(SCREENED, FITTED).fit_all(whitened, base, [*leading, *forced])
         found = Comparison.of(whitened, base, singles, len(self.mechanisms))
         if not found.is_sufficient:
-            found = self.relinearise(found)
+            found = self._part(FITTED, RELINEARISED).relinearise(found)
         if not found.is_sufficient:
-            found = self.with_pairs(found)
+            found = self._part(RELINEARISED, 1.0).with_pairs(found)
         return found, scores
+
+    def _part(self, low: float, high: float) -> Self:
+        """The same, whose work takes these shares of the whole."""
+        return replace(self, progress=within(self.progress, low, high))
 
     def fit_all(self, whitened: Sequence[Whitened], base: CandidateFit, chosen: Sequence[Score]) -> list[CandidateFit]:
         """Fit extensions of a fitted model, from the values of their scores."""
         fitted = []
-        for score in chosen:
+        for k, score in enumerate(chosen):
             hypothesis = base.hypothesis.and_also(score.hypothesis)
+            self.progress(f"fitting {hypothesis}", k / len(chosen))
             try:
                 candidate = fit(whitened, hypothesis, self.free, base.values | score.values)
             except (ModelError, ValueError) as error:
@@ -77,28 +83,31 @@ class Selection:
         """The same with pairs that improve on their members, from adequate singles where there are any."""
         singles = [c for c in found.candidates if not c.hypothesis.is_pair]
         firsts = [c for c in singles if found.is_adequate(c)] or singles
-        every = [*found.candidates, *self._pairs(found.whitened, firsts[: settings.FIRSTS])]
+        pairs = self._part(0.0, PAIRS_FITTED)._pairs(found.whitened, firsts[: settings.FIRSTS])
+        every = [*found.candidates, *pairs]
         improving = [c for c in every if improves_on_members(c, every)]
         paired = Comparison.of(found.whitened, found.base, improving, found.screened)
         if not paired.has_adequate and paired.candidates[0].hypothesis.is_pair:
-            paired = self.relinearise(paired)
+            paired = self._part(PAIRS_FITTED, 1.0).relinearise(paired)
             improving = [c for c in paired.candidates if improves_on_members(c, paired.candidates)]
             paired = replace(paired, candidates=improving)
         # An inadequate pair does not displace an adequate single mechanism.
         return found if found.has_adequate and not paired.has_adequate else paired
 
     def _pairs(self, whitened: Sequence[Whitened], firsts: Sequence[CandidateFit]) -> list[CandidateFit]:
-        self.progress("a single mechanism is not sufficient; fitting pairs")
+        self.progress("a single mechanism is not sufficient; fitting pairs", 0.0)
         found, seen = [], set()
-        for first in firsts:
+        for k, first in enumerate(firsts):
+            part = self._part(k / len(firsts), (k + 1) / len(firsts))
+            part.progress(f"screening mechanisms beside {first.hypothesis}", 0.0)
             partners = [h for h in self.mechanisms if h.acting[0] not in first.hypothesis.acting]
-            chosen = []
+            chosen: list[Score] = []
             for s in screen(whitened, first, partners):
                 pair = frozenset(first.hypothesis.acting + s.hypothesis.acting)
                 if s.gain > settings.WORTH_FITTING and pair not in seen and len(chosen) < settings.PARTNERS:
                     seen.add(pair)
                     chosen.append(s)
-            found += self.fit_all(whitened, first, chosen)
+            found += part._part(PARTNERS_SCREENED, 1.0).fit_all(whitened, first, chosen)
         return found
 
     def relinearise(self, found: Comparison) -> Comparison:
@@ -109,7 +118,7 @@ class Selection:
         cost has several minima there.
         """
         best = found.candidates[0]
-        self.progress(f"linearising the covariance about {best.hypothesis}")
+        self.progress(f"linearising the covariance about {best.hypothesis}", 0.0)
         models = [best.model(w.observations.parameters) for w in found.whitened]
 
         def starts(candidate: CandidateFit) -> list[dict[str, float]]:

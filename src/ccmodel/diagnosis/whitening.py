@@ -52,6 +52,11 @@ class Whitened:
     noise_floor: Mapping[str, float]
 
     @property
+    def name(self) -> str:
+        """Batch and recording."""
+        return self.observations.name
+
+    @property
     def measured(self) -> NDArray:
         """Values of the observations, shape (channels, samples)."""
         return self.observations.measured
@@ -99,11 +104,16 @@ def nuisances(o: Observations) -> tuple[NDArray, int]:
     effects = []
     for name, value, spread in scalars:
         step = NUISANCE_STEP * size_of(name, value)
-        derivative = jacobian(lambda x, n=name: o.modelled({n: x[0]}), np.array([value]), np.array([step]), simulated)
-        effects.append(spread * derivative[..., 0] / o.sigma)
+        derivative = _derivative(o, name, value, step, simulated)
+        effects.append(spread * derivative / o.sigma)
     drawn = o.drive_errors({})
     columns = [*effects, *(d / np.sqrt(len(drawn)) for d in drawn)]
     return np.stack([c.ravel() for c in columns], axis=1), len(scalars)
+
+
+def _derivative(o: Observations, name: str, value: float, step: float, simulated: NDArray) -> NDArray:
+    """Of the simulated channels by one nuisance, shape (channels, samples)."""
+    return jacobian(lambda x: o.modelled({name: x[0]}), np.array([value]), np.array([step]), simulated)[..., 0]
 
 
 def shrinkage_of(s: NDArray) -> NDArray:

@@ -10,6 +10,7 @@ posterior is too, and the sweeps converge.
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ccmodel.kernel import kernel
 
@@ -20,7 +21,7 @@ DAMPING = 0.7
 
 
 @kernel
-def truncated_moments(mean, variance, low, high):
+def truncated_moments(mean: float, variance: float, low: float, high: float) -> tuple[float, float, float]:
     """Mean, variance and log of the mass of a normal distribution between `low` and `high`."""
     sd = math.sqrt(variance)
     a, b, side = (low - mean) / sd, (high - mean) / sd, 1.0
@@ -41,7 +42,9 @@ def truncated_moments(mean, variance, low, high):
 
 
 @kernel
-def matched_site(mean, variance, precision, shift, low, high):
+def matched_site(
+    mean: float, variance: float, precision: float, shift: float, low: float, high: float
+) -> tuple[float, float, float, float]:
     """Site of one interval by moment matching.
 
     Parameters
@@ -78,7 +81,7 @@ def matched_site(mean, variance, precision, shift, low, high):
 
 
 @kernel
-def banded_cholesky(stencil, weight, coupling, precision):
+def banded_cholesky(stencil: tuple[float, ...], weight: NDArray, coupling: NDArray, precision: NDArray) -> NDArray:
     """Cholesky factor of the banded precision matrix of a curve; entry [i, k] is L[i, i - k].
 
     Parameters are those of `sweep`. `stencil` is a tuple, so that the compiler knows its length and unrolls the inner
@@ -105,7 +108,7 @@ def banded_cholesky(stencil, weight, coupling, precision):
 
 
 @kernel
-def solve_transposed(L, x):
+def solve_transposed(L: NDArray, x: NDArray) -> None:
     """Solve L^T y = x in place; y has the posterior covariance if x is white noise of unit variance."""
     order, n = L.shape[1] - 1, x.size
     for i in range(n - 1, -1, -1):
@@ -115,7 +118,7 @@ def solve_transposed(L, x):
 
 
 @kernel
-def solve(L, x):
+def solve(L: NDArray, x: NDArray) -> None:
     """Solve L L^T y = x in place."""
     order = L.shape[1] - 1
     for i in range(x.size):
@@ -126,7 +129,7 @@ def solve(L, x):
 
 
 @kernel
-def banded_covariance(L, stencil):
+def banded_covariance(L: NDArray, stencil: tuple[float, ...]) -> NDArray:
     """Covariances of samples at most `order` apart; entry [i, k] is that of samples i and i - k.
 
     Takahashi's recursion: Takahashi, Fagan and Chen 1973, "Formation of a sparse bus impedance matrix".
@@ -144,7 +147,16 @@ def banded_covariance(L, stencil):
 
 
 @kernel
-def sweep(stencil, weight, coupling, low, high, observed, precision, shift):
+def sweep(
+    stencil: tuple[float, ...],
+    weight: NDArray,
+    coupling: NDArray,
+    low: NDArray,
+    high: NDArray,
+    observed: NDArray,
+    precision: NDArray,
+    shift: NDArray,
+) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray, float]:
     """Compute the posterior of a curve and correct the site of every interval, in place.
 
     Parameters
@@ -196,7 +208,7 @@ def sweep(stencil, weight, coupling, low, high, observed, precision, shift):
 
 
 @kernel
-def fit_basis(basis, prior, low, high, sweeps):
+def fit_basis(basis: NDArray, prior: NDArray, low: NDArray, high: NDArray, sweeps: int) -> tuple[float, float, float]:
     """Bayesian linear regression on interval-censored observations.
 
     Parameters

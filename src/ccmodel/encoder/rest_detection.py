@@ -87,14 +87,14 @@ def _rest(counts: NDArray, begin: int, end: int, arriving: int, leaving: int) ->
     middle = (begin + arriving + end - leaving) // 2
     first, last, offsets = 0, counts.size - 1, []
     if begin > 0:
-        start, *offset = _start_of_motion(counts[middle::-1] - still[0], middle - begin - arriving)
+        start, *estimate = _start_of_motion(counts[middle::-1] - still[0], middle - begin - arriving)
         first = middle - start
-        offsets.append(offset)
+        offsets.append(estimate)
     if end < counts.size:
-        start, *offset = _start_of_motion(counts[middle:] - still[0], end - leaving - 1 - middle)
+        start, *estimate = _start_of_motion(counts[middle:] - still[0], end - leaving - 1 - middle)
         last = middle + start
-        offsets.append(offset)
-    offset, variance = np.array(offsets or [UNIFORM]).T
+        offsets.append(estimate)
+    offset, variance = np.array(offsets if offsets else [UNIFORM]).T
     mean = (offset / variance).sum() / (1 / variance).sum()
     return Rest(first, last, still[0] + mean, 1 / (1 / variance).sum())
 

@@ -49,7 +49,7 @@ def leave_one_out(problem: Problem, solution: Solution) -> LeaveOneOut:
     """
     low, high = problem.bounds
     information = [block.information for block in solution.blocks]
-    total = sum(information)
+    total = sum(information, np.zeros_like(information[0]))
     inverse, without = inverse_of(total, problem.sizes), [inverse_of(total - H, problem.sizes) for H in information]
     values = [
         np.clip(solution.x + V @ block.score, low, high) for V, block in zip(without, solution.blocks, strict=True)

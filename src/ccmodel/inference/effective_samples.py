@@ -6,8 +6,10 @@ samples. Neither number below is derived from the errors' autocorrelation; both 
 """
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 # Of a channel in a fit of parameters.
 IN_FITS = 100
@@ -15,12 +17,20 @@ IN_FITS = 100
 IN_DIAGNOSIS = 20
 
 
-def fit_weight(observations) -> float:
+class Measured(Protocol):
+    """A recording with its measured values, shape (channels, samples)."""
+
+    @property
+    def measured(self) -> NDArray:
+        """Values of the channels that are compared."""
+
+
+def fit_weight(observations: Measured) -> float:
     """Weight of each squared error of a recording in a fit, so that a channel counts as `IN_FITS` samples at most."""
     return min(1.0, IN_FITS / observations.measured.shape[1])
 
 
-def mean_weight(observations) -> float:
+def mean_weight(observations: Measured) -> float:
     """Weight of each squared error of a recording where every recording counts by its mean square."""
     return 1.0 / observations.measured.size
 

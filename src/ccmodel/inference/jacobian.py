@@ -60,4 +60,6 @@ def jacobian(run: Callable[[NDArray], NDArray], x: NDArray, steps: NDArray, base
     for step, aside in zip(steps, np.diag(steps), strict=True):
         difference = (run(x + aside) - run(x - aside)) / 2 if base is None else run(x + aside) - base
         columns.append(difference / step)
-    return np.stack(columns, axis=-1) if columns else np.empty((*np.shape(base), 0))
+    if not columns:
+        return np.empty((*(run(x) if base is None else base).shape, 0))
+    return np.stack(columns, axis=-1)

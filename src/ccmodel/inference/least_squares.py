@@ -223,7 +223,9 @@ class _Reduced:
             self.origin[self.movable], self.units = 0.0, np.ones(self.movable.size)
         self.bounds = tuple(map(self.variables, problem.bounds))
         self.lowest_cost = np.inf
-        self.point, self.blocks, self.rows = None, [], np.empty((0, 0))
+        self.point: NDArray | None = None
+        self.blocks: list[Block] = []
+        self.rows = np.empty((0, 0))
 
     def variables(self, x: NDArray) -> NDArray:
         """The search's variables at a point given by all unknowns."""
@@ -273,7 +275,7 @@ class _Reduced:
 
     def blocks_at(self, x: NDArray) -> list[Block]:
         """By recording, errors and derivatives at a point."""
-        if not np.array_equal(x, self.point):
+        if self.point is None or not np.array_equal(x, self.point):
             self.blocks = self.problem.blocks(x, self.how.difference)
         return self.blocks
 

@@ -4,9 +4,12 @@ Compiled solvers release Python's lock, so threads are enough. Results come in t
 depend on the number of threads.
 """
 
+import multiprocessing
 import os
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
 
 _threads: int | None = None
 
@@ -32,3 +35,19 @@ def each(items: Sequence, work: Callable) -> list:
     """
     with ThreadPoolExecutor(threads()) as pool:
         return list(pool.map(work, range(len(items)), items))
+
+
+@contextmanager
+def processes(count: int) -> Iterator[ProcessPoolExecutor]:
+    """Processes for independent work; if the work is broken off, by Ctrl-C or an error, they end at once."""
+    # The terminal sends Ctrl-C to the workers too; this process alone answers it.
+    pool = ProcessPoolExecutor(count, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN))
+    try:
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for worker in multiprocessing.active_children():
+            worker.terminate()
+        raise
+    finally:
+        pool.shutdown()

@@ -8,11 +8,12 @@ accuracy. A prior is one more residual.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.inference.effective_samples import fit_weight
+from ccmodel.inference.effective_samples import Measured, fit_weight
 from ccmodel.inference.jacobian import STEP, inward, jacobian, size_of
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.pool import each
@@ -73,24 +74,38 @@ class Block:
         return self.derivatives.reshape(self.errors.size, self.columns.size)
 
 
+class HasErrors(Measured, Protocol):
+    """A recording with the errors of a model of it."""
+
+    @property
+    def name(self) -> str:
+        """Batch and recording."""
+
+    def errors(self, values: Mapping[str, float]) -> NDArray:
+        """Errors of the model with some parameters replaced, over the noise."""
+
+
+R = TypeVar("R", bound=HasErrors)
+
+
 @dataclass(frozen=True)
-class Problem:
+class Problem(Generic[R]):
     """Recordings and the unknowns of a model of them.
 
     Attributes
     ----------
     observations : sequence of Observations
-        Or whatever else has a name and ``errors(values)``, as whitened observations do.
+        Or whatever else has errors (`HasErrors`), as whitened observations do.
     shared, own : mapping of str to Free
         Unknowns with one value for all, and with one value for each recording.
     weight : callable
         Weight of a recording's squared errors, from its observations (`ccmodel.inference.effective_samples`).
     """
 
-    observations: Sequence[Observations]
+    observations: Sequence[R]
     shared: Mapping[str, Free]
     own: Mapping[str, Free] = field(default_factory=dict)
-    weight: Callable[[Observations], float] = fit_weight
+    weight: Callable[[Any], float] = fit_weight
 
     @cached_property
     def names(self) -> list[str]:
@@ -115,7 +130,8 @@ class Problem:
     @cached_property
     def bounds(self) -> tuple[NDArray, NDArray]:
         """Lowest and highest values, each of shape (unknowns,)."""
-        return tuple(np.array([getattr(f, end) for _, f in self.unknowns], dtype=float) for end in ("low", "high"))
+        low, high = [f.low for _, f in self.unknowns], [f.high for _, f in self.unknowns]
+        return np.array(low, dtype=float), np.array(high, dtype=float)
 
     @cached_property
     def prior_precision(self) -> NDArray:
@@ -162,11 +178,11 @@ class Problem:
         """
         return self._each(lambda i: self._block(x, i, step, None if errors is None else errors[i]))
 
-    def drive_errors(self, x: NDArray) -> list[NDArray]:
+    def drive_errors(self: "Problem[Observations]", x: NDArray) -> list[NDArray]:
         """By recording, draws of weighted errors from the uncertain drive motion; (draws, channels, samples)."""
         return self._each(lambda i: self.observations[i].drive_errors(self.values_of(x, i)) * self._root_weight(i))
 
-    def rounding_errors(self, x: NDArray) -> list[NDArray]:
+    def rounding_errors(self: "Problem[Observations]", x: NDArray) -> list[NDArray]:
         """By recording, draws of weighted rounding errors of counted angles; (phases, channels, samples)."""
         return self._each(lambda i: self.observations[i].rounding_errors(self.values_of(x, i)) * self._root_weight(i))
 

@@ -18,6 +18,7 @@ __all__ = [
     "UnknownMechanismError",
     "get",
     "march_settings",
+    "module_of",
     "names",
     "neutral_settings",
 ]
@@ -30,7 +31,7 @@ class UnknownMechanismError(ValueError):
 @cache
 def _registry() -> dict[str, Mechanism]:
     found: dict[str, Mechanism] = {}
-    for mechanism in _declared():
+    for mechanism, _ in _declared():
         if mechanism.name in found:
             raise ValueError(f"two mechanisms are called {mechanism.name}")
         found[mechanism.name] = mechanism
@@ -40,11 +41,12 @@ def _registry() -> dict[str, Mechanism]:
     return dict(sorted(found.items()))
 
 
-def _declared() -> Iterator[Mechanism]:
+def _declared() -> Iterator[tuple[Mechanism, str]]:
+    """Every mechanism and the name of its module within this package."""
     for module_info in iter_modules(__path__):
         module = import_module(f"{__name__}.{module_info.name}")
-        yield from getattr(module, "MECHANISMS", ())
-        yield from filter(None, [getattr(module, "MECHANISM", None)])
+        declared = [*getattr(module, "MECHANISMS", ()), getattr(module, "MECHANISM", None)]
+        yield from ((mechanism, module_info.name) for mechanism in declared if mechanism is not None)
 
 
 @cache
@@ -70,6 +72,11 @@ def march_settings() -> tuple[str, ...]:
 def names() -> tuple[str, ...]:
     """Names of all mechanisms, in alphabetical order."""
     return tuple(_registry())
+
+
+def module_of(name: str) -> str:
+    """Name of the module of this package that holds a mechanism."""
+    return next(module for mechanism, module in _declared() if mechanism.name == name)
 
 
 def get(name: str) -> Mechanism:

@@ -17,7 +17,7 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
 @kernel(inline="always")
-def dead_zone(theta, half_gap):
+def dead_zone(theta: float, half_gap: float) -> tuple[float, float]:
     """Angle beyond the gap (rad) and its derivative by `theta`."""
     if theta > half_gap:
         return theta - half_gap, 1.0
@@ -29,6 +29,10 @@ def dead_zone(theta, half_gap):
 MECHANISM = Mechanism(
     name="backlash",
     text=__doc__,
+    tex=(
+        r"\tau_\mathrm{out} = \begin{cases} K_e\,(\theta - \mathrm{half\_gap}\,\operatorname{sgn}(\theta)) & "
+        r"|\theta| > \mathrm{half\_gap} \\ 0 & |\theta| \le \mathrm{half\_gap} \end{cases}"
+    ),
     sentence="the load follows its pulley with a dead zone of ±{half_gap}",
     places=("load-pulley",),
     parameters=(Parameter("half_gap", "rad", 3.5e-3, 70e-3, 15e-3, "half of the dead zone"),),

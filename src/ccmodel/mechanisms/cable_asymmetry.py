@@ -15,6 +15,7 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 MECHANISM = Mechanism(
     name="cable-asymmetry",
     text=__doc__,
+    tex=r"\mu_B = \mathrm{ratio}\cdot\mu_A, \qquad (EA)_B = \mathrm{K\_ratio}\cdot(EA)_A",
     sentence="cable B has {ratio} times the friction and {K_ratio} times the stiffness of cable A",
     places=("cable",),
     parameters=(

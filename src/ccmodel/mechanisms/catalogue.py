@@ -1,15 +1,29 @@
-"""The mechanisms as text: a table, whole entries, and the page ``docs/mechanisms.md``."""
+"""The mechanisms as text: a table, whole entries, and the pages of ``docs/mechanisms.md`` and ``docs/mechanisms``."""
 
-from ccmodel.mechanisms import get, names
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+import re
+from math import isfinite
+from pathlib import Path
 
-_PAGE = """# Mechanisms
+from ccmodel.mechanisms import get, module_of, names
+from ccmodel.mechanisms.contract import PAPER_LOOK_ALIKES, Mechanism, Parameter
 
-Physics that the paper's model leaves out. Made from the files of `src/ccmodel/mechanisms` by
-`ccmodel mechanisms --markdown > docs/mechanisms.md`; do not edit. [How to add one](how-to/add-a-mechanism.md).
+INDEX = "mechanisms.md"
+_MADE = """Made from `src/ccmodel/mechanisms` by `ccmodel mechanisms --markdown docs`; do not edit."""
+_INDEX = f"""# Mechanisms
 
-Symbols are those of the [glossary](glossary.md), in plain letters. "Mistaken for" also lists two parameters and a state
-of the paper's model: the stiffness K, the friction coefficient mu, and a slack cable.
+Physics that the paper's model leaves out, a page each. {_MADE} [How to add one](how-to/add-a-mechanism.md).
+
+Symbols are those of the [glossary](glossary.md). "Look-alikes" are other mechanisms, or two parameters and a state of
+the paper's model: the stiffness K, the friction coefficient mu, and a slack cable. Names, places, parameters and ranges
+are a format: diagnoses and model files contain them.
+"""
+_CONTENTS = """
+```{toctree}
+:hidden:
+:glob:
+
+mechanisms/*
+```
 """
 
 
@@ -41,20 +55,91 @@ def parts(name: str) -> dict:
     return {"name": name, "summary": mechanism.summary, "facts": _facts(mechanism), "parameters": rows}
 
 
-def page() -> str:
-    """The page of all mechanisms, Markdown."""
-    return "\n".join([_PAGE, _table(rows()), *map(_section, map(get, names()))])
+def pages() -> dict[str, str]:
+    """Markdown pages by their paths within ``docs``: an index, and a page for each mechanism."""
+    return {INDEX: _INDEX + "\n" + _index() + _CONTENTS} | {f"mechanisms/{name}.md": _page(name) for name in names()}
 
 
-def _section(mechanism: Mechanism) -> str:
-    lines = ["", f"## {mechanism.name}", "", f"{mechanism.summary[0].upper()}{mechanism.summary[1:]}.", ""]
-    lines += [f"- **{title}.** {text}" for title, text in _facts(mechanism)]
-    lines += ["", "| parameter | plausible range | start of a fit | meaning |", "|---|---|---|---|"]
-    lines += [
-        f"| `{p.name}` | {_range(p).removeprefix(f'{p.name} ')} | {p.start:.3g} | {p.meaning}{_notes(p)} |"
-        for p in mechanism.parameters
-    ]
-    return "\n".join(lines)
+def write_pages(folder: Path) -> None:
+    """Write `pages` into a folder, and remove pages of mechanisms that no longer exist."""
+    made = pages()
+    (folder / "mechanisms").mkdir(parents=True, exist_ok=True)
+    for stale in (folder / "mechanisms").glob("*.md"):
+        if f"mechanisms/{stale.name}" not in made:
+            stale.unlink()
+    for path, text in made.items():
+        (folder / path).write_text(text, encoding="utf-8")
+
+
+def _page(name: str) -> str:
+    mechanism, module = get(name), module_of(name)
+    text = mechanism.paragraphs
+    sections = {
+        "Equation": f"{text['Equation']}.\n\n$$\n{mechanism.tex}\n$$\n\n{_where(mechanism)}",
+        "Parameters": _parameters(mechanism),
+        "Signature": f"{text['Signature']}.",
+        "Look-alikes": f"{_look_alikes(mechanism)}.",
+        "Separating experiment": f"{_sentence(mechanism.separated_by)}.",
+        "Source": f"{_linked(text['Source'])}.",
+        "In the code": f"[`ccmodel.mechanisms.{module}`](../../src/ccmodel/mechanisms/{module}.py). {_role(mechanism)}",
+    }
+    body = "\n\n".join(f"## {title}\n\n{section}" for title, section in sections.items())
+    return f"# {name}\n\n{_sentence(mechanism.summary)}.\n\n{body}\n\n---\n\n{_MADE}\n"
+
+
+def _sentence(text: str) -> str:
+    return text[0].upper() + text[1:]
+
+
+def _linked(source: str) -> str:
+    """A source with its DOIs as links."""
+    return re.sub(r"doi:(10\.\d{4,}/[^\s,;]+)", r"[doi:\1](https://doi.org/\1)", source)
+
+
+def _where(mechanism: Mechanism) -> str:
+    acts = " or ".join(f"`{place}`" for place in mechanism.places)
+    rate = "depends" if mechanism.depends_on_time else "does not depend"
+    return f"It acts at {acts}. Its effect {rate} on the rate of the motion."
+
+
+def _parameters(mechanism: Mechanism) -> str:
+    titles = ["parameter", "meaning", "unit", "plausible range", "start of a fit", "default"]
+    return "\n".join([f"| {' | '.join(titles)} |", "|---" * len(titles) + "|", *map(_row, mechanism.parameters)])
+
+
+def _row(p: Parameter) -> str:
+    sign = "±" if p.signed else ""
+    unit = "" if p.unit == "1" else p.unit
+    limits = [f"{sense} {value:g}" for sense, value in ((">", p.above), ("<", p.below)) if isfinite(value)]
+    possible = f" (always {' and '.join(limits)})" if limits else ""
+    default = "must be given" if p.default is None else f"{p.default:.3g}"
+    cells = (
+        f"`{p.name}`",
+        p.meaning,
+        unit,
+        f"{sign}{p.low:.4g} to {sign}{p.high:.4g}{possible}",
+        f"{p.start:.3g}",
+        default,
+    )
+    return f"| {' | '.join(cells)} |"
+
+
+def _look_alikes(mechanism: Mechanism) -> str:
+    return ", ".join(
+        f"`{name}` of the paper's model" if name in PAPER_LOOK_ALIKES else f"[{name}]({name}.md)"
+        for name in mechanism.mistaken_for
+    )
+
+
+def _role(mechanism: Mechanism) -> str:
+    """What it changes, and what a diagnosis assumes about it."""
+    if mechanism.modifies_observation is not None:
+        role = "It modifies the observation: the sensors' readings after a run."
+    else:
+        settings = ", ".join(f"`{name}`" for name in mechanism.neutral_settings)
+        role = f"It modifies the physics: the general solver's {settings}."
+    role += f" Model-form error: {mechanism.model_form_error:g} of its effect (mean square)."
+    return role + (" A diagnosis considers it only as a forced candidate." if mechanism.by_name_only else "")
 
 
 def _facts(mechanism: Mechanism) -> list[tuple[str, str]]:
@@ -81,6 +166,8 @@ def _notes(p: Parameter) -> str:
     return "" if p.default is None else f"; {p.default:.3g} if a model omits it"
 
 
-def _table(lines: list[tuple[str, ...]]) -> str:
+def _index() -> str:
     head = ["| name | places | parameters | what it is |", "|---|---|---|---|"]
-    return "\n".join(head + [f"| [{name}](#{name}) | {' | '.join(rest)} |" for name, *rest in lines])
+    return (
+        "\n".join(head + [f"| [{name}](mechanisms/{name}.md) | {' | '.join(rest)} |" for name, *rest in rows()]) + "\n"
+    )

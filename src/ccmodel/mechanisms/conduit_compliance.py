@@ -16,6 +16,7 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 MECHANISM = Mechanism(
     name="conduit-compliance",
     text=__doc__,
+    tex=r"\Delta L = -\,\mathrm{compliance}\cdot\Delta\bar T, \qquad \bar T = \frac{1}{L} \int_0^L T\,dx",
     sentence="the conduits shorten under tension, by {compliance}",
     places=("conduit",),
     parameters=(Parameter("compliance", "m/N", 3e-6, 80e-6, 20e-6, "shortening of the path per mean tension"),),

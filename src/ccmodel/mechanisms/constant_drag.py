@@ -15,6 +15,7 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 MECHANISM = Mechanism(
     name="constant-drag",
     text=__doc__,
+    tex=r"\left|\frac{\partial T}{\partial x}\right| \le \mu\,T\,\frac{d\varphi}{dx} + \frac{f_0}{L}",
     sentence="each cable drags with a constant {f0}, whatever its tension",
     places=("conduit",),
     parameters=(Parameter("f0", "N", 0.1, 5.0, 0.5, "drag of one whole cable"),),

@@ -3,7 +3,7 @@
 1. A file of this package holds one mechanism as ``MECHANISM``, or close relatives as ``MECHANISMS``. The registry
    finds it by listing the folder.
 2. Its docstring (a relative's: that of its function) is its ``text``: a title and the paragraphs of `PARAGRAPHS`. The
-   command line, ``docs/mechanisms.md`` and the report are made from it and from the fields.
+   command line, ``docs/mechanisms`` and the report are made from it and from the fields.
 3. A mechanism modifies either the physics or the observation. Before a run, its parameters are written into the
    solver's `Settings` as ``settings`` declares; a setting that is no number stands in ``structures`` and is written by
    ``modifies_physics``. After a run, ``modifies_observation`` changes what the sensors read.
@@ -112,10 +112,16 @@ class Settings:
     def __init__(self, neutral: Mapping[str, Any]):
         self.__dict__.update(neutral)
 
+    def __getattr__(self, name: str) -> Any:
+        raise self._unknown(name)
+
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in self.__dict__:
-            raise AttributeError(f"no mechanism declares the setting {name!r}; there are {', '.join(self.__dict__)}")
+            raise self._unknown(name)
         self.__dict__[name] = value
+
+    def _unknown(self, name: str) -> AttributeError:
+        return AttributeError(f"no mechanism declares the setting {name!r}; there are {', '.join(self.__dict__)}")
 
 
 @dataclass(frozen=True)
@@ -147,6 +153,8 @@ class Mechanism:
         A title, which is its summary, and paragraphs that begin with the names of `PARAGRAPHS`: its law in the
         parameters' symbols; what it does to a recording; the experiment that separates it from its look-alikes; author,
         title, journal, year and DOI of the equation or of where the effect is named.
+    tex : str
+        The law in TeX, with the parameters' names or their symbols.
     sentence : str
         What a report says where it is identified: ``{name}`` is the value of a parameter with its unit, ``{name:%}`` in
         per cent, ``{side}`` the end of the place; of ``[high|low]`` the first is for a positive strength.
@@ -174,6 +182,7 @@ class Mechanism:
 
     name: str
     text: str
+    tex: str
     sentence: str
     places: tuple[str, ...]
     parameters: tuple[Parameter, ...]
@@ -186,7 +195,7 @@ class Mechanism:
     modifies_physics: Callable[[Settings, Mapping[str, float]], None] | None = None
     modifies_observation: Callable[[Sensing, str, Mapping[str, float]], dict[str, NDArray]] | None = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         unknown = set(self.places) - set(PLACES)
         if unknown or not self.places:
             raise ValueError(f"{self.name}: places are {', '.join(PLACES)}; got {', '.join(self.places) or 'none'}")

@@ -15,11 +15,14 @@ Source: Nordin and Gutman, Controlling mechanical systems with backlash - a surv
 2002, doi:10.1016/S0005-1098(02)00047-X.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ccmodel.channels import TAU_IN, THETA_IN
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+from ccmodel.mechanisms.contract import Mechanism, Parameter, Sensing
 
 # Around a reversal a stationary pulley creeps and its encoder dithers.
 STANDSTILL_RAD = 2e-3
@@ -30,7 +33,7 @@ CUBIC = np.linalg.pinv(np.vander(SUPPORT, 4))
 
 
 @kernel
-def torque_of_train(time_s, theta, tau, compliance, lost_motion):
+def torque_of_train(time_s: NDArray, theta: NDArray, tau: NDArray, compliance: float, lost_motion: float) -> NDArray:
     """Torque at the motor (N m) while the pulley is stationary at a reversal; elsewhere `tau`.
 
     Parameters
@@ -64,7 +67,17 @@ def torque_of_train(time_s, theta, tau, compliance, lost_motion):
 
 
 @kernel
-def _fill_reversal(time_s, theta, tau, compliance, lost_motion, standstill, direction, extreme, torque):
+def _fill_reversal(
+    time_s: NDArray,
+    theta: NDArray,
+    tau: NDArray,
+    compliance: float,
+    lost_motion: float,
+    standstill: float,
+    direction: float,
+    extreme: int,
+    torque: NDArray,
+) -> None:
     """Fill in one reversal, at sample `extreme`, which the pulley approached in `direction` (1 or -1)."""
     first, last = extreme, extreme
     while first > 0 and abs(theta[first] - theta[extreme]) <= standstill:
@@ -86,15 +99,20 @@ def _fill_reversal(time_s, theta, tau, compliance, lost_motion, standstill, dire
         torque[i] = direction * max(lowest, highest)
 
 
-def _modifies_observation(sensing, place, values):
+def _modifies_observation(sensing: Sensing, place: str, values: Mapping[str, float]) -> dict[str, NDArray]:
     given = sensing.time_s, sensing.channels[THETA_IN], sensing.channels[TAU_IN]
-    torque = torque_of_train(*map(np.ascontiguousarray, given), values["compliance"], values["lost_motion"])
+    time_s, theta, tau = map(np.ascontiguousarray, given)
+    torque = torque_of_train(time_s, theta, tau, values["compliance"], values["lost_motion"])
     return {TAU_IN: torque}
 
 
 MECHANISM = Mechanism(
     name="drive-windup",
     text=__doc__,
+    tex=(
+        r"\varphi_\mathrm{motor} = \theta + \mathrm{compliance}\cdot\tau + "
+        r"\frac{\mathrm{lost\_motion}}{2}\,\operatorname{sgn}(\dot\theta)"
+    ),
     sentence="the drive train has a backlash of {lost_motion} and winds up by {compliance}",
     places=("drive-pulley",),
     parameters=(

@@ -12,9 +12,10 @@ Separated by: the time at which the friction front passes, which also gives s.
 Source: Agrawal, Peine and Yao 2010, Section VI: kinks introduced inadvertently.
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+from ccmodel.mechanisms.contract import Mechanism, Parameter, Settings
 
 
 class Kink(NamedTuple):
@@ -25,7 +26,7 @@ class Kink(NamedTuple):
     hold: float = 1.0
 
 
-def _modifies_physics(settings, values):
+def _modifies_physics(settings: Settings, values: Mapping[str, float]) -> None:
     if not 0 < values["s"] < 1:
         raise ValueError(f"a kink's s is a share of the length between 0 and 1; got {values['s']}")
     if not 0 <= values["hold"] <= 1:
@@ -36,6 +37,7 @@ def _modifies_physics(settings, values):
 MECHANISM = Mechanism(
     name="kink",
     text=__doc__,
+    tex=r"\varphi(x) = \varphi_\mathrm{path}(x) + \begin{cases} 0 & x < s L \\ \beta & x \ge s L \end{cases}",
     sentence="the conduits have an extra bend of {beta} at one place",
     places=("conduit",),
     parameters=(

@@ -1,10 +1,17 @@
 """Faults of a load cell, which measures the sum F of the two tensions on one side: gain, offset, drift, crosstalk."""
 
+from collections.abc import Callable, Mapping
+
+from numpy.typing import NDArray
+
 from ccmodel.channels import SUM_AT, TORQUE_AT
-from ccmodel.mechanisms.contract import Mechanism, Parameter, side
+from ccmodel.mechanisms.contract import Mechanism, Parameter, Sensing, side
+
+# Values of the cell from the sum of tensions, the fault's parameter, all channels, and the end of the transmission.
+Reading = Callable[[NDArray, float, Sensing, str], NDArray]
 
 
-def _scale(force, gain, sensing, end):
+def _scale(force: NDArray, gain: float, sensing: Sensing, end: str) -> NDArray:
     """A load cell's gain is off.
 
     Equation: The cell reads (1 + gain) F.
@@ -19,7 +26,7 @@ def _scale(force, gain, sensing, end):
     return force * (1 + gain)
 
 
-def _offset(force, offset, sensing, end):
+def _offset(force: NDArray, offset: float, sensing: Sensing, end: str) -> NDArray:
     """A load cell's zero is off.
 
     Equation: The cell reads F + offset.
@@ -35,7 +42,7 @@ def _offset(force, offset, sensing, end):
     return force + offset
 
 
-def _drift(force, rate, sensing, end):
+def _drift(force: NDArray, rate: float, sensing: Sensing, end: str) -> NDArray:
     """A load cell's zero drifts with time.
 
     Equation: The cell reads F + rate (t - t_0), with t_0 the start of the recording.
@@ -51,7 +58,7 @@ def _drift(force, rate, sensing, end):
     return force + rate * (sensing.time_s - sensing.time_s[0])
 
 
-def _crosstalk(force, crosstalk, sensing, end):
+def _crosstalk(force: NDArray, crosstalk: float, sensing: Sensing, end: str) -> NDArray:
     """A load cell responds to the torque.
 
     Equation: The cell reads F + crosstalk tau / R, with tau the torque on the same side.
@@ -67,16 +74,25 @@ def _crosstalk(force, crosstalk, sensing, end):
     return force + crosstalk * (sensing.channels[TORQUE_AT[end]] / radius)
 
 
-def _fault(name, reading, parameter, mistaken_for, sentence, depends_on_time=False):
+def _fault(
+    name: str,
+    reading: Reading,
+    tex: str,
+    parameter: Parameter,
+    mistaken_for: tuple[str, ...],
+    sentence: str,
+    depends_on_time: bool = False,
+) -> Mechanism:
     """Mechanism of one fault: `reading` gives the cell's values from the sum of tensions and the fault's parameter."""
 
-    def modifies_observation(sensing, place, values):
+    def modifies_observation(sensing: Sensing, place: str, values: Mapping[str, float]) -> dict[str, NDArray]:
         end = side(place)
         return {SUM_AT[end]: reading(sensing.channels[SUM_AT[end]], values[parameter.name], sensing, end)}
 
     return Mechanism(
         name=name,
-        text=reading.__doc__,
+        text=reading.__doc__ or "",
+        tex=tex,
         sentence=sentence,
         places=("drive-sensor", "load-sensor"),
         parameters=(parameter,),
@@ -95,16 +111,23 @@ MECHANISMS = (
     _fault(
         "load-cell-scale",
         _scale,
+        r"F_\mathrm{read} = (1 + \mathrm{gain})\,F",
         _GAIN,
         ("load-cell-offset", "cable-asymmetry"),
         "the {side}'s load cell reads {gain:%} [high|low]",
     ),
     _fault(
-        "load-cell-offset", _offset, _OFFSET, ("load-cell-scale",), "the {side}'s load cell reads {offset} [high|low]"
+        "load-cell-offset",
+        _offset,
+        r"F_\mathrm{read} = F + \mathrm{offset}",
+        _OFFSET,
+        ("load-cell-scale",),
+        "the {side}'s load cell reads {offset} [high|low]",
     ),
     _fault(
         "load-cell-drift",
         _drift,
+        r"F_\mathrm{read}(t) = F(t) + \mathrm{rate}\cdot(t - t_0)",
         _RATE,
         ("relaxation", "load-cell-offset"),
         "the zero of the {side}'s load cell drifts [up|down] by {rate}",
@@ -113,6 +136,7 @@ MECHANISMS = (
     _fault(
         "load-cell-crosstalk",
         _crosstalk,
+        r"F_\mathrm{read} = F + \mathrm{crosstalk}\cdot\frac{\tau}{R}",
         _CROSSTALK,
         ("load-cell-scale",),
         "the {side}'s load cell responds to {crosstalk:%} of the torque",

@@ -21,7 +21,7 @@ FLOOR_N = 0.1
 
 
 @kernel(inline="always")
-def power_of_tension(tension, n):
+def power_of_tension(tension: float, n: float) -> tuple[float, float]:
     """Factor of mu at a tension (N), and its derivative by the tension (1/N)."""
     square = tension * tension + FLOOR_N * FLOOR_N
     factor = quick_exp(0.5 * n * quick_log(square / (REFERENCE_N * REFERENCE_N)))
@@ -31,6 +31,7 @@ def power_of_tension(tension, n):
 MECHANISM = Mechanism(
     name="load-dependent-friction",
     text=__doc__,
+    tex=r"\mu(T) = \mu \left(\frac{T}{T_\mathrm{ref}}\right)^{n}, \qquad T_\mathrm{ref} = 5\,\mathrm{N}",
     sentence="the friction coefficient changes with tension to the power {n}",
     places=("conduit",),
     parameters=(Parameter("n", "1", -0.35, -0.05, -0.15, "exponent of the tension", scale="linear"),),

@@ -27,6 +27,7 @@ def load_damping(settings: Settings, stiffness: float) -> float:
 MECHANISM = Mechanism(
     name="load-inertia",
     text=__doc__,
+    tex=r"\tau_\mathrm{out} = K_e\,\theta + B\,\dot\theta + J\,\ddot\theta, \qquad B = 2\zeta\sqrt{J K_e}",
     sentence="the load has a moment of inertia of {J}",
     places=("load",),
     parameters=(

@@ -15,6 +15,7 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 MECHANISM = Mechanism(
     name="load-stiffening",
     text=__doc__,
+    tex=r"\tau_\mathrm{out} = K_e\,\theta + K_3\,\theta^3",
     sentence="the load's spring [stiffens|softens] with its angle by {K3}",
     places=("load",),
     parameters=(Parameter("K3", "N m/rad^3", 1e-3, 1.0, 0.03, "cubic stiffness", signed=True),),

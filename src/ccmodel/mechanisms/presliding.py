@@ -19,7 +19,7 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
 @kernel(inline="always")
-def dahl(xi, slide, z0):
+def dahl(xi: float, slide: float, z0: float) -> tuple[float, float]:
     """Bristle xi = z / z0 after sliding by `slide` (m) in one direction, and its derivative by `slide` (1/m)."""
     direction = 1.0 if slide >= 0.0 else -1.0
     decay = quick_exp(-abs(slide) / z0)
@@ -29,6 +29,10 @@ def dahl(xi, slide, z0):
 MECHANISM = Mechanism(
     name="presliding",
     text=__doc__,
+    tex=(
+        r"\frac{dz}{dt} = v \left(1 - \operatorname{sgn}(v)\,\frac{z}{z_0}\right), \qquad F_\mathrm{friction} = "
+        r"\mu N\,\frac{z}{z_0}"
+    ),
     sentence="friction builds up over {z0} of sliding",
     places=("conduit",),
     parameters=(Parameter("z0", "m", 5e-6, 200e-6, 50e-6, "presliding length of the bristle"),),

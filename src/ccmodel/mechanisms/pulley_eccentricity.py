@@ -17,13 +17,13 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
 @kernel
-def winding(theta, e, psi):
+def winding(theta: float, e: float, psi: float) -> tuple[float, float, float]:
     """Cable travel over R (rad), the radius over R, and the derivative of the latter by the angle."""
     return theta - e * np.cos(theta + psi), 1.0 + e * np.sin(theta + psi), e * np.cos(theta + psi)
 
 
 @kernel
-def winding_change(theta, rotation, e, psi):
+def winding_change(theta: float, rotation: float, e: float, psi: float) -> float:
     """Cable travel over R (rad) of a rotation from theta, without cancellation for a small one."""
     return rotation + 2.0 * e * np.sin(theta + psi + 0.5 * rotation) * np.sin(0.5 * rotation)
 
@@ -31,6 +31,10 @@ def winding_change(theta, rotation, e, psi):
 MECHANISM = Mechanism(
     name="pulley-eccentricity",
     text=__doc__,
+    tex=(
+        r"R(\theta) = R\,\bigl(1 + e \sin(\theta + \psi)\bigr), \qquad w(\theta) = \int_0^\theta "
+        r"R(\vartheta)\,d\vartheta"
+    ),
     sentence="the {side} pulley's radius changes by ±{e:%} over a turn",
     places=("drive-pulley", "load-pulley"),
     parameters=(

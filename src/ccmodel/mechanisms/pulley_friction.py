@@ -14,6 +14,7 @@ Journal 14(12), 1675-1682, 1976, doi:10.2514/3.61511.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
@@ -24,7 +25,7 @@ PRESLIDING_RAD = 2e-3
 
 
 @kernel
-def bearing(theta, presliding_rad):
+def bearing(theta: NDArray, presliding_rad: float) -> NDArray:
     """Friction over friction torque (-1 to 1) along angles (rad, shape (n,)) from an unloaded start."""
     share = np.zeros_like(theta)
     for j in range(1, theta.size):
@@ -35,6 +36,10 @@ def bearing(theta, presliding_rad):
 MECHANISM = Mechanism(
     name="pulley-friction",
     text=__doc__,
+    tex=(
+        r"\tau_\mathrm{bearing} = \mathrm{friction\_torque}\cdot\xi, \qquad \frac{d\xi}{d\theta} = \frac{1 - "
+        r"\xi\,\operatorname{sgn}(\omega)}{\mathrm{presliding}}"
+    ),
     sentence="the {side} pulley's bearing has a friction torque of {friction_torque}",
     places=("drive-pulley", "load-pulley"),
     parameters=(

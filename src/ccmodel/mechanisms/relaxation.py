@@ -20,7 +20,7 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
 @kernel
-def lag_weights(step_over_tau):
+def lag_weights(step_over_tau: float) -> tuple[float, float, float]:
     """Weights of q, of T_e before and of T_e after a step in q after it, for T_e linear in the step."""
     y = step_over_tau
     decay = np.exp(-y)
@@ -34,6 +34,7 @@ def lag_weights(step_over_tau):
 MECHANISM = Mechanism(
     name="relaxation",
     text=__doc__,
+    tex=r"T = T_e - r\,q, \qquad \frac{dq}{dt} = \frac{T_e - q}{\tau}, \qquad q(0) = 0",
     sentence="the cables lose {r:%} of their tension as time passes",
     places=("cable",),
     parameters=(

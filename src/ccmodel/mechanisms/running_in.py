@@ -12,13 +12,16 @@ Source: Blau, On the nature of running-in, Tribology International 38(11-12), 10
 doi:10.1016/j.triboint.2005.07.020.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
+from numpy.typing import NDArray
 
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+from ccmodel.mechanisms.contract import Mechanism, Parameter, Settings
 
 
-def _modifies_physics(settings, values):
-    def history(time_s, travel_m):
+def _modifies_physics(settings: Settings, values: Mapping[str, float]) -> None:
+    def history(time_s: NDArray, travel_m: NDArray) -> NDArray:
         return 1 + values["change"] * -np.expm1(-(time_s - time_s[0]) / values["tau"] - values["per_m"] * travel_m)
 
     settings.friction_history = history
@@ -27,6 +30,7 @@ def _modifies_physics(settings, values):
 MECHANISM = Mechanism(
     name="running-in",
     text=__doc__,
+    tex=r"\mu(t, w) = \mu\,\Bigl(1 + \mathrm{change}\,\bigl(1 - e^{-t/\tau - \mathrm{per\_m}\,w}\bigr)\Bigr)",
     sentence="friction [rises|falls] by {change:%} through a recording",
     places=("conduit",),
     parameters=(

@@ -11,6 +11,7 @@ Source: Feyrer, Wire Ropes: Tension, Endurance, Reliability, 2nd edition, Spring
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ccmodel.elementary import quick_exp
 from ccmodel.kernel import kernel
@@ -18,13 +19,13 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 
 @kernel(inline="always")
-def settling_tension(stretch, settled, stiffness):
+def settling_tension(stretch: float, settled: float, stiffness: float) -> tuple[float, float]:
     """Tension (N) of a piece at a stretch (m) >= 0, and its stiffness (N/m); `settled` is u_s times its length (m)."""
     decay = quick_exp(-stretch / settled)
     return stiffness * (stretch - settled * (1.0 - decay)), stiffness * (1.0 - decay)
 
 
-def stretch_at(tension, settled, stiffness):
+def stretch_at(tension: NDArray, settled: NDArray, stiffness: NDArray) -> NDArray:
     """Stretch (m) at which `settling_tension` gives `tension` (N), by Newton's method; arrays of one shape."""
     stretch = tension / stiffness + settled
     for _ in range(60):
@@ -37,6 +38,7 @@ def stretch_at(tension, settled, stiffness):
 MECHANISM = Mechanism(
     name="strand-settling",
     text=__doc__,
+    tex=r"T = EA\,\Bigl(u' - u_s\,\bigl(1 - e^{-u'/u_s}\bigr)\Bigr), \qquad u_s = \frac{T_\mathrm{scale}}{EA}",
     sentence="the cables soften where the tension is low, about {T_scale}",
     places=("cable",),
     parameters=(Parameter("T_scale", "N", 0.5, 10.0, 2.0, "tension scale of the settling"),),

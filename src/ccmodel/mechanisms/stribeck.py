@@ -25,7 +25,7 @@ RENEWAL_M = 2e-5
 
 
 @kernel(inline="always")
-def renewed(rested, slide, dt, vs, delta):
+def renewed(rested: float, slide: float, dt: float, vs: float, delta: float) -> float:
     """State r of the contact (0 to 1) after sliding by `slide` (m) within `dt` (s)."""
     decay = quick_exp(-abs(slide) / RENEWAL_M)
     ratio = abs(slide) / (dt * vs)
@@ -39,6 +39,10 @@ def renewed(rested, slide, dt, vs, delta):
 MECHANISM = Mechanism(
     name="stribeck",
     text=__doc__,
+    tex=(
+        r"\mu_\mathrm{eff} = \mu\,(1 + a\,r), \qquad \frac{dr}{ds} = \frac{e^{-(|v|/v_s)^\delta} - "
+        r"r}{20\,\mathrm{\mu m}}"
+    ),
     sentence="friction is {a:%} higher at rest than in motion",
     places=("conduit",),
     parameters=(

@@ -17,6 +17,7 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 MECHANISM = Mechanism(
     name="termination-compliance",
     text=__doc__,
+    tex=r"\Delta u_\mathrm{end} = \mathrm{compliance}\cdot T_\mathrm{end}",
     sentence="the cables' fastening at the {side} yields by {compliance}",
     places=("drive-end", "load-end"),
     parameters=(Parameter("compliance", "m/N", 3e-6, 150e-6, 20e-6, "compliance of one end of each cable"),),

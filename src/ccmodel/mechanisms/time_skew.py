@@ -13,15 +13,18 @@ Source: Mills, Internet time synchronization: the network time protocol, IEEE Tr
 1482-1493, 1991, doi:10.1109/26.103043, on clock offset.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ccmodel.channels import F_LOAD, TAU_OUT, THETA_OUT
-from ccmodel.mechanisms.contract import Mechanism, Parameter, side
+from ccmodel.mechanisms.contract import Mechanism, Parameter, Sensing, side
 
 _LOAD_CHANNELS = (THETA_OUT, TAU_OUT, F_LOAD)
 
 
-def _modifies_observation(sensing, place, values):
+def _modifies_observation(sensing: Sensing, place: str, values: Mapping[str, float]) -> dict[str, NDArray]:
     late = values["delay"] if side(place) == "load" else -values["delay"]
     t = sensing.time_s
     return {name: np.interp(t - late, t, sensing.channels[name]) for name in _LOAD_CHANNELS}
@@ -30,6 +33,7 @@ def _modifies_observation(sensing, place, values):
 MECHANISM = Mechanism(
     name="time-skew",
     text=__doc__,
+    tex=r"y_\mathrm{read}(t) = y(t - \mathrm{delay})",
     sentence="the {side}'s channels are late by {delay}",
     places=("drive-sensor", "load-sensor"),
     parameters=(Parameter("delay", "s", 2e-3, 50e-3, 10e-3, "delay of one side's channels"),),

@@ -9,11 +9,15 @@ Separated by: strokes in both directions at equal torque: the error of a gain do
 Source: Isermann, Fault-Diagnosis Systems, Springer, 2006, doi:10.1007/3-540-30368-5, on sensor gain faults.
 """
 
+from collections.abc import Mapping
+
+from numpy.typing import NDArray
+
 from ccmodel.channels import TORQUE_AT
-from ccmodel.mechanisms.contract import Mechanism, Parameter, side
+from ccmodel.mechanisms.contract import Mechanism, Parameter, Sensing, side
 
 
-def _modifies_observation(sensing, place, values):
+def _modifies_observation(sensing: Sensing, place: str, values: Mapping[str, float]) -> dict[str, NDArray]:
     channel = TORQUE_AT[side(place)]
     return {channel: sensing.channels[channel] * (1 + values["gain"])}
 
@@ -21,6 +25,7 @@ def _modifies_observation(sensing, place, values):
 MECHANISM = Mechanism(
     name="torque-scale",
     text=__doc__,
+    tex=r"\tau_\mathrm{read} = (1 + \mathrm{gain})\,\tau",
     sentence="the {side}'s torque sensor reads {gain:%} [high|low]",
     places=("drive-sensor", "load-sensor"),
     parameters=(Parameter("gain", "1", 0.02, 0.1, 0.05, "error of the gain", signed=True),),

@@ -15,6 +15,7 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 MECHANISM = Mechanism(
     name="viscous-friction",
     text=__doc__,
+    tex=r"\left|\frac{\partial T}{\partial x}\right| = \mu\,T\,\frac{d\varphi}{dx} + c\,|v|",
     sentence="the conduits have a viscous drag of {c}",
     places=("conduit",),
     # From a negligible film to half of Coulomb friction: 15 mN to 3 N over a metre of conduit at 3 mm/s.

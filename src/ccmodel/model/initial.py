@@ -33,7 +33,7 @@ class InitialTension:
     tension_A_N: NDArray
     tension_B_N: NDArray
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("x_m", "tension_A_N", "tension_B_N"):
             values = np.atleast_1d(np.asarray(getattr(self, name), dtype=float))
             if values.ndim != 1 or not np.isfinite(values).all():
@@ -103,7 +103,7 @@ class InitialTension:
         have the shape of `x`.
         """
         corner_phi = np.interp(self.x_m, x, phi)
-        return tuple(_interpolate(phi, corner_phi, T) for T in (self.tension_A_N, self.tension_B_N))
+        return _interpolate(phi, corner_phi, self.tension_A_N), _interpolate(phi, corner_phi, self.tension_B_N)
 
     def log_slopes(self, path: ConduitPath, friction_coefficient: float) -> tuple[NDArray, NDArray, NDArray]:
         """Corners in the plane of mu phi and ln T, checked against friction's bound |d ln T / d phi| <= mu.

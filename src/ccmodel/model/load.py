@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ccmodel.failure import ModelError
 
@@ -31,7 +31,7 @@ class SpringLoad:
     rest_known_to_Nm: float = 0.0
     rest_gap_position: float = 0.0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not (np.isfinite(self.stiffness_Nm_per_rad) and self.stiffness_Nm_per_rad >= 0):
             raise ModelError(
                 f"a load spring's stiffness is finite and not negative; got {self.stiffness_Nm_per_rad}"
@@ -54,7 +54,7 @@ class TorqueLoad:
     torque_Nm: NDArray
     parallel_Nm_per_rad: float = 0.0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not 0 <= self.parallel_Nm_per_rad < inf:
             raise ModelError(
                 f"a spring in parallel with a measured load is finite and not negative; got {self.parallel_Nm_per_rad}"
@@ -74,7 +74,7 @@ class AngleLoad:
 
     angle_rad: NDArray
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "angle_rad", one_row(self.angle_rad, "angle_rad"))
 
 
@@ -86,7 +86,7 @@ class FixedLoad:
 Load = SpringLoad | TorqueLoad | AngleLoad | FixedLoad
 
 
-def one_row(values, name: str) -> NDArray:
+def one_row(values: ArrayLike, name: str) -> NDArray:
     """`values` as a contiguous array of one finite number a sample; `ModelError` where they are not."""
     values = np.ascontiguousarray(values, dtype=float)
     if values.ndim != 1 or values.size == 0:

@@ -66,10 +66,17 @@ class ModelInput:
         tau_out, F_load = (_filtered(recording, channel) for channel in (TAU_OUT, F_LOAD))
         rest = _rest(recording, theta_in)
         every = stride(recording, step_s)
-        series = (theta_in, deviations, offset, theta_out, tau_out, F_load)
-        thinned = (None if values is None else values[..., ::every] for values in series)
-        resting = {c: values[rest] for c, values in (recording.channels | {"time_s": recording.time_s}).items()}
-        return cls(recording[::every], *thinned, resting)
+        resting = {c: values[rest] for c, values in ({**recording.channels, "time_s": recording.time_s}).items()}
+        return cls(
+            recording[::every],
+            theta_in[::every],
+            deviations[..., ::every],
+            offset[..., ::every],
+            _every(theta_out, every),
+            _every(tau_out, every),
+            _every(F_load, every),
+            resting,
+        )
 
     @classmethod
     def prescribed(cls, like: Recording, time_s: NDArray, theta_in: NDArray, pretension_N: float) -> "ModelInput":
@@ -110,6 +117,10 @@ class ModelInput:
     def deviations_given_offset(self) -> NDArray:
         """`drive_deviations` for a known sub-count offset at the first rest."""
         return self.drive_deviations - OFFSET_SCORES[: len(self.drive_deviations), None] * self.drive_encoder_offset
+
+
+def _every(values: NDArray | None, every: int) -> NDArray | None:
+    return None if values is None else values[..., ::every]
 
 
 def _motion(recording: Recording, channel: str) -> tuple[NDArray, NDArray, NDArray]:

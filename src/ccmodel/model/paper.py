@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from ccmodel.channels import TENSIONS
 from ccmodel.failure import ModelError
+from ccmodel.geometry import ConduitPath
 from ccmodel.kernel import kernel
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad, one_row
@@ -100,7 +101,7 @@ def simulate_pair(
     )
 
 
-def _nodes(path, sections):
+def _nodes(path: ConduitPath, sections: int) -> NDArray:
     """Arc lengths of the nodes: every corner of the path is one, so that each segment has one curvature (9)."""
     corners = np.concatenate([[0.0], np.cumsum(path.piece_length_m)])
     even = np.linspace(0, path.length_m, sections + 1)[1:-1]
@@ -108,7 +109,7 @@ def _nodes(path, sections):
     return np.sort(np.concatenate([corners, even[~near_corner]]))
 
 
-def _capstan_lines(x, phi, transmission):
+def _capstan_lines(x: NDArray, phi: NDArray, transmission: Transmission) -> tuple[NDArray, NDArray]:
     """E and P of (13) and (14) for motion towards the drive (row 0, S = -1) and towards the load (row 1, S = +1)."""
     S = np.array([[-1.0], [1.0]])
     mu = transmission.friction_coefficient
@@ -121,7 +122,7 @@ def _capstan_lines(x, phi, transmission):
 
 
 @kernel
-def _drive_front(T, u, a, E, P, h):
+def _drive_front(T: NDArray, u: NDArray, a: float, E: NDArray, P: NDArray, h: NDArray) -> tuple[int, float]:
     """Front from the drive end, moved to displacement `a`: (index of the partly moving segment, c of its line).
 
     The index is n, one past the last segment, where the motion has arrived at the load end.
@@ -137,7 +138,7 @@ def _drive_front(T, u, a, E, P, h):
 
 
 @kernel
-def _load_front(T, u, b, E, P, h):
+def _load_front(T: NDArray, u: NDArray, b: float, E: NDArray, P: NDArray, h: NDArray) -> tuple[int, float]:
     """The same from the load end, moved to displacement `b`; index -1 where the motion has arrived at the drive end."""
     n = h.size
     S = 1 if b > u[n] else -1
@@ -150,7 +151,9 @@ def _load_front(T, u, b, E, P, h):
 
 
 @kernel
-def _stagnation_point(u, a, b, P_left, P_right, E_left, E_right):
+def _stagnation_point(
+    u: NDArray, a: float, b: float, P_left: NDArray, P_right: NDArray, E_left: NDArray, E_right: NDArray
+) -> tuple[int, float]:
     """Stagnation point of a cable whose ends move in opposite directions: (node on its drive side, weight of the next).
 
     Node m stays at rest if the lines on both sides give it the same tension. The difference of the two changes sign
@@ -169,7 +172,18 @@ def _stagnation_point(u, a, b, P_left, P_right, E_left, E_right):
 
 
 @kernel
-def _move_cable(T, u, a, b, drive, E, P, h, T_new, u_new):
+def _move_cable(
+    T: NDArray,
+    u: NDArray,
+    a: float,
+    b: float,
+    drive: tuple[int, float],
+    E: NDArray,
+    P: NDArray,
+    h: NDArray,
+    T_new: NDArray,
+    u_new: NDArray,
+) -> None:
     """Write the state of one cable with its ends moved to `a` and `b` into `T_new`, `u_new`.
 
     `drive` is the result of `_drive_front` for `a`.
@@ -223,7 +237,9 @@ def _move_cable(T, u, a, b, drive, E, P, h, T_new, u_new):
 
 
 @kernel
-def _slide_from_stagnation(u, a, b, S_load, E, P, T_new, u_new):
+def _slide_from_stagnation(
+    u: NDArray, a: float, b: float, S_load: int, E: NDArray, P: NDArray, T_new: NDArray, u_new: NDArray
+) -> None:
     """Write the state of a cable that slides in opposite directions on both sides of a stagnation point."""
     n = u.size - 1
     right = (S_load + 1) // 2
@@ -244,8 +260,16 @@ def _slide_from_stagnation(u, a, b, S_load, E, P, T_new, u_new):
     u_new[n] = b
 
 
+# Both cables: T and u before the step, and after it.
+Cables = tuple[NDArray, NDArray, NDArray, NDArray]
+# Displacements of the drive ends, results of `_drive_front`, and displacements of the load ends before the step.
+Step = tuple[NDArray, tuple[tuple[int, float], tuple[int, float]], NDArray]
+
+
 @kernel
-def _imbalance(theta, cables, step, load, lines):
+def _imbalance(
+    theta: float, cables: Cables, step: Step, load: tuple[float, float, float], lines: tuple[NDArray, NDArray, NDArray]
+) -> float:
     """Torque of the cables less that of the load at load angle `theta`; writes the cables' new state.
 
     It falls as theta grows: the load end of A is let in, that of B drawn out.
@@ -262,7 +286,14 @@ def _imbalance(theta, cables, step, load, lines):
 
 
 @kernel
-def _balance(theta, guess, cables, step, load, lines):
+def _balance(
+    theta: float,
+    guess: float,
+    cables: Cables,
+    step: Step,
+    load: tuple[float, float, float],
+    lines: tuple[NDArray, NDArray, NDArray],
+) -> tuple[float, bool]:
     """Load angle at which the torques balance, by bracketing and false position (Illinois), and whether it exists.
 
     `guess` is the first step of the bracket. On return `cables` holds the state at that angle.
@@ -297,7 +328,17 @@ def _balance(theta, guess, cables, step, load, lines):
 
 
 @kernel
-def _march(theta_in, K_e, R_i, R_o, T_A0, T_B0, h, E, P):
+def _march(
+    theta_in: NDArray,
+    K_e: float,
+    R_i: float,
+    R_o: float,
+    T_A0: NDArray,
+    T_B0: NDArray,
+    h: NDArray,
+    E: NDArray,
+    P: NDArray,
+) -> tuple[NDArray, NDArray, int]:
     """Step through the samples: end tensions (4, n), load angle (n,), and the first sample without a balance, or -1."""
     n = h.size
     samples = theta_in.size

@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 from ccmodel.channels import TABLE, THETA_OUT, ZERO_OF
 from ccmodel.model.general.run import Active
+from ccmodel.rig.batch import Rig
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,7 @@ class Parameters:
         return self.friction_coefficient * self.friction_scale
 
     @classmethod
-    def estimated(cls, rig) -> "Parameters":
+    def estimated(cls, rig: Rig) -> "Parameters":
         """Estimates made beforehand, as a batch file states them (`ccmodel.rig.batch.Rig`)."""
         return cls(
             stiffness_N_per_m=rig.cable.stiffness_N_per_m,
@@ -107,10 +109,10 @@ class Parameters:
         ValueError
             If no active mechanism has such a parameter.
         """
-        own = {name: value for name, value in values.items() if mechanism_parameter(name) is None}
+        own: dict[str, Any] = {name: value for name, value in values.items() if mechanism_parameter(name) is None}
         active = {(m.name, m.place): dict(m.values) for m in self.mechanisms}
         for key in values.keys() - own.keys():
-            name, place, parameter = mechanism_parameter(key)
+            name, place, parameter = key.split("/")
             if parameter not in active.get((name, place), {}):
                 raise ValueError(f"{key}: the model has no {parameter} of {name} at {place}")
             active[name, place][parameter] = values[key]
@@ -133,7 +135,16 @@ def mechanism_key(mechanism: str, place: str, parameter: str) -> str:
 def mechanism_parameter(key: str) -> tuple[str, str, str] | None:
     """Mechanism, place and parameter of a name made by `mechanism_key`; None for any other name."""
     parts = key.split("/")
-    return tuple(parts) if len(parts) == 3 else None
+    return (parts[0], parts[1], parts[2]) if len(parts) == 3 else None
+
+
+# Printed units by the ending of a parameter's name.
+_UNITS = {"_N_per_m": "N/m", "_Nm_per_rad": "N m/rad", "_Nm": "N m", "_N": "N", "_rad": "rad", "_m": "m"}
+
+
+def unit_of_parameter(name: str) -> str:
+    """SI unit of a parameter of `Parameters` as it is printed; 1 for a number."""
+    return next((unit for ending, unit in _UNITS.items() if name.endswith(ending)), "1")
 
 
 # Names in model files, and in older configuration files, of parameters that have another name here.

@@ -74,7 +74,9 @@ def simulate_phases(
     response = simulate_pair(transmission, load, theta_in, initial)
     phase = papers_phases(response)
     instants = _instants(phase, samples_per_cycle)
-    halfway = {k: (instants[k] + instants[k + 1]) // 2 for k in (2, 6) if k in instants and k + 1 in instants}
+    halfway: dict[int, int] = {
+        k: (instants[k] + instants[k + 1]) // 2 for k in (2, 6) if k in instants and k + 1 in instants
+    }
     # The instants follow from the response; a second run, of milliseconds, keeps the profiles there.
     wanted = sorted({*instants.values(), *halfway.values()})
     response = simulate_pair(transmission, load, theta_in, initial, record_profiles_at=wanted)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Self
 
 from numpy.typing import NDArray
 
@@ -61,7 +62,7 @@ class PairResponse:
             F_LOAD: self.T2_N + self.T4_N,
         }
 
-    def complete(self):
+    def complete(self) -> Self:
         """The response itself, if every sample was solved in balance.
 
         Raises

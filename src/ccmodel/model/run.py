@@ -97,10 +97,10 @@ def _readings(
     if parameters.mechanisms or not isinstance(load, SpringLoad | FixedLoad):
         time_s = given.recording.time_s
         finer = parameters.refinement
-        response = general.simulate(
+        by_general = general.simulate(
             transmission, load, time_s, given.theta_in, initial, parameters.mechanisms, finer * general.ELEMENTS, finer
         )
-        return response.complete().read
+        return by_general.complete().read
     response = exact.simulate_pair(transmission, load, given.theta_in, initial)
     return response.complete().channels(given.theta_in)
 
@@ -139,8 +139,8 @@ def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension
     if not given.initial_tension_observed:
         return InitialTension.uniform(path, scale * parameters.pretension_share * given.recording.pretension_N)
     tensions = _tensions(_true_at_rest(given, parameters), given.recording, parameters)
-    A = tuple(scale * tensions[end] for end in CABLES["A"])
-    B = A if given.recording.far_end else tuple(scale * tensions[end] for end in CABLES["B"])
+    A = _both_ends("A", tensions, scale)
+    B = A if given.recording.far_end else _both_ends("B", tensions, scale)
     curvatures = parameters.tension_curvature_A, parameters.tension_curvature_B
     kinks_rad = sum(kink.hold * kink.bend_rad for kink in general.settings_of(parameters.mechanisms).kinks)
     return InitialTension.between_ends(path, parameters.friction, A, B, curvatures, kinks_rad)
@@ -202,3 +202,8 @@ def _zeroed(theta_out: NDArray, recording: Recording) -> NDArray:
         return theta_out - theta_out[0]
     judged = recording.time_s >= recording.settled_s
     return theta_out - theta_out[judged].mean() + recording[THETA_OUT][judged].mean()
+
+
+def _both_ends(cable: str, tensions: Mapping[str, NDArray | float], scale: float) -> tuple[float, float]:
+    near, far = CABLES[cable]
+    return float(scale * tensions[near]), float(scale * tensions[far])

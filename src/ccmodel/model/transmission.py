@@ -35,7 +35,7 @@ class Transmission:
     load_radius_m: float
     is_single_cable: bool = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("axial_rigidity_N", "drive_radius_m", "load_radius_m"):
             if not 0 < getattr(self, name) < inf:
                 raise ModelError(f"{name} must be positive and finite; got {getattr(self, name)}: check its unit")

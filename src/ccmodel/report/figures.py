@@ -3,17 +3,17 @@
 import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib
-
-matplotlib.use("Agg")
-
-import matplotlib.pyplot as plt
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
 
 from ccmodel.channels import CABLES, TABLE, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
+from ccmodel.recording import Recording
 
 # The palette of Okabe and Ito without its yellow, which is too faint on white; readable with any colour vision.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
@@ -22,11 +22,11 @@ LINES = ("-", "--", "-.", ":")
 FORMATS = ("png", "svg", "pdf")
 # Without what would make the files of two equal runs differ: dates, and random names of an SVG's parts.
 _METADATA = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-_FILES = {"svg.fonttype": "none", "svg.hashsalt": "ccmodel", "pdf.fonttype": 42}
+_FILES: dict[Any, Any] = {"svg.fonttype": "none", "svg.hashsalt": "ccmodel", "pdf.fonttype": 42}
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 # Panels of the paper's Figs. 5, 8 and 9: channel on the x axis, channel on the y axis.
 TRANSMISSION = (*CABLES.values(), (TAU_IN, TAU_OUT), (THETA_IN, THETA_OUT))
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.size": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -40,7 +40,17 @@ STYLE = {
 }
 
 
-def plot_channels(ax: Axes, values, x: str, y: str, samples: slice = slice(None), **style) -> None:
+def subplots(
+    rows: int = 1, columns: int = 1, figsize: tuple[float, float] = (9, 4), **style: Any
+) -> tuple[Figure, Any]:
+    """A figure for a file, with its panels; pyplot and the backend of a user's session know nothing of it."""
+    figure = Figure(figsize=figsize)
+    return figure, figure.subplots(rows, columns, **style)
+
+
+def plot_channels(
+    ax: Axes, values: Mapping[str, NDArray] | Recording, x: str, y: str, samples: slice = slice(None), **style: Any
+) -> None:
     """Channel `y` over channel `x`, in the units of their axes; `values` gives the values of a channel by its name."""
     ax.plot(values[x][samples] * TABLE[x].scale, values[y][samples] * TABLE[y].scale, **style)
 
@@ -63,8 +73,8 @@ def say_in_panel(ax: Axes, text: str) -> None:
 
 def empty_figure(text: str) -> Figure:
     """A figure without data, which says why."""
-    with plt.rc_context(STYLE):
-        figure, ax = plt.subplots(figsize=(9, 2))
+    with matplotlib.rc_context(STYLE):
+        figure, ax = subplots(figsize=(9, 2))
         ax.set_axis_off()
         say_in_panel(ax, text)
     return figure
@@ -78,7 +88,7 @@ def title_figure(figure: Figure, *lines: str) -> None:
 
 def legend_below(figure: Figure, axes: NDArray, columns: int | None = None) -> None:
     """One legend for all panels below them, each label once; without `columns`, as many as its longest label allows."""
-    handles = {}
+    handles: dict[str, Artist] = {}
     for ax in axes.flat:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
@@ -102,7 +112,8 @@ def stamp_figure(figure: Figure, text: str) -> None:
     """Write a line in the lower right corner, below everything else: what the figure was made with and from."""
     share = 0.16 / figure.get_figheight()
     room = (0, share, 1, 1 - share)
-    figure.get_layout_engine().set(rect=room)
+    if isinstance(engine := figure.get_layout_engine(), ConstrainedLayoutEngine):
+        engine.set(rect=room)
     _lay_out(figure)
     # The layout leaves room for a legend outside the panels only as long as the legend has no place of its own.
     for legend in figure.legends:
@@ -115,7 +126,7 @@ def save_figure(figure: Figure, *files: Path) -> None:
 
     Equal figures give equal files: panels are laid out once, and no file holds a date. Text stays text.
     """
-    with plt.rc_context(_FILES):
+    with matplotlib.rc_context(_FILES):
         _lay_out(figure)
         for file in map(Path, files):
             figure.savefig(file, dpi=150, metadata=_METADATA.get(file.suffix))

@@ -52,7 +52,7 @@ class Angle:
     def in_words(self, change: float) -> str:
         """A change of the angle with its unit."""
         counts = self.column.endswith("counts")
-        return f"{change:g} counts" if counts else f"{change * self.rad_per_unit:.4g} rad"
+        return f"{change:g} counts" if counts or self.rad_per_unit is None else f"{change * self.rad_per_unit:.4g} rad"
 
     def outstanding_changes(self, time_s: NDArray) -> NDArray:
         """Whether each change from sample to sample is larger than all others near it by more than counting explains.

@@ -7,8 +7,9 @@ import re
 from collections.abc import Iterator
 from functools import reduce
 from pathlib import Path, PurePath
-from typing import Annotated, Any, Literal, NamedTuple, get_args
+from typing import Annotated, Any, Literal, NamedTuple, Self, get_args
 
+import numpy as np
 from pydantic import AfterValidator, BaseModel, Field, field_validator, model_validator
 
 from ccmodel.channels import (
@@ -30,7 +31,9 @@ from ccmodel.typed import (
     Borrowed,
     FillIn,
     InputError,
+    Loc,
     NotNegative,
+    OneOf,
     Positive,
     Problem,
     TypedModel,
@@ -177,25 +180,26 @@ class Rig(TypedModel):
     """
 
     transmission: Literal["pull-pull", "single-cable"] = "pull-pull"
-    far_end: Literal[FAR_ENDS] | None = None
+    far_end: Annotated[str, OneOf(FAR_ENDS)] | None = None
     drive: Side
     load: LoadSide
     cable: Cable
     accuracy: Accuracy
-    ranges: dict[Literal[SENSOR_COLUMNS], tuple[float, float]] = Field(default_factory=dict)
+    ranges: dict[Annotated[str, OneOf(SENSOR_COLUMNS)], tuple[float, float]] = Field(default_factory=dict)
     nominal: tuple[str, ...] = ()
 
     @property
     def ends(self) -> tuple[End, End]:
         """Drive end and load end."""
-        sides, cables = {"drive": self.drive, "load": self.load}, 1 if self.far_end else 2
-        return tuple(
-            End(n, side, ANGLE_AT[n], TORQUE_AT[n], SUM_AT[n], TENSIONS_AT[n][:cables]) for n, side in sides.items()
-        )
+        return self._end("drive", self.drive), self._end("load", self.load)
+
+    def _end(self, name: str, side: "Side") -> "End":
+        tensions = TENSIONS_AT[name][: 1 if self.far_end else 2]
+        return End(name, side, ANGLE_AT[name], TORQUE_AT[name], SUM_AT[name], tensions)
 
     @field_validator("ranges")
     @classmethod
-    def _ranges_rise(cls, ranges):
+    def _ranges_rise(cls, ranges: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
         for column, (low, high) in ranges.items():
             if low >= high:
                 raise ValueError(f"{column}: a range is [lowest, highest], found [{low}, {high}]")
@@ -203,7 +207,7 @@ class Rig(TypedModel):
 
     @field_validator("nominal")
     @classmethod
-    def _nominal_keys_exist(cls, nominal):
+    def _nominal_keys_exist(cls, nominal: tuple[str, ...]) -> tuple[str, ...]:
         known = list(_dotted_keys(cls))
         for key in nominal:
             if key not in known:
@@ -213,14 +217,14 @@ class Rig(TypedModel):
         return nominal
 
     @model_validator(mode="after")
-    def _nominal_keys_are_stated(self):
+    def _nominal_keys_are_stated(self) -> Self:
         for key in self.nominal:
             if reduce(lambda part, name: part and getattr(part, name), key.split("."), self) is None:
                 raise ValueError(f"nominal names '{key}', which is not stated: state it, or take it out of nominal")
         return self
 
     @model_validator(mode="after")
-    def _far_end_of_a_single_cable(self):
+    def _far_end_of_a_single_cable(self) -> Self:
         load, end = self.load, self.far_end
         if (self.transmission == "single-cable") != (end is not None):
             raise ValueError("far_end and transmission: single-cable are stated together or not at all")
@@ -229,7 +233,7 @@ class Rig(TypedModel):
         return self
 
     @model_validator(mode="after")
-    def _accuracy_of_every_sensor(self):
+    def _accuracy_of_every_sensor(self) -> Self:
         for side in (self.drive, self.load):
             if (side.torque_constant_Nm_per_A or side.torque_sensor) and self.accuracy.torque_Nm is None:
                 raise ValueError("accuracy.torque_Nm is missing though the rig measures torque")
@@ -282,7 +286,7 @@ class RecordingEntry(TypedModel):
     @property
     def path(self) -> ConduitPath:
         """The conduit's path."""
-        return ConduitPath([p.length_m for p in self.conduit], [p.bend_rad for p in self.conduit])
+        return ConduitPath(np.array([p.length_m for p in self.conduit]), np.array([p.bend_rad for p in self.conduit]))
 
 
 class RecordingDefaults(TypedModel):
@@ -315,8 +319,10 @@ class Batch(TypedModel):
         known = RecordingDefaults.model_fields
         given = {key: value for key, value in defaults.items() if key in known}
         # A misspelt default is one problem, and not also a missing key of each recording.
-        meant = set(given) | {nearest(key, known) for key in defaults.keys() - set(known)}
-        entries, borrowed = [], {}
+        guesses = (nearest(key, known) for key in defaults.keys() - set(known))
+        meant = {*given, *(guess for guess in guesses if guess)}
+        entries = []
+        borrowed: dict[Loc, Loc] = {}
         for i, entry in enumerate(recordings):
             if isinstance(entry, dict):
                 borrowed |= {("recordings", i, key): ("defaults", key) for key in meant - set(entry)}
@@ -326,7 +332,7 @@ class Batch(TypedModel):
 
     @field_validator("recordings")
     @classmethod
-    def _each_once(cls, recordings):
+    def _each_once(cls, recordings: tuple[RecordingEntry, ...]) -> tuple[RecordingEntry, ...]:
         for key in ("id", "file"):
             values = [getattr(r, key) for r in recordings]
             twice = sorted({v for v in values if values.count(v) > 1})

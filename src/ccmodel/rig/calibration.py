@@ -44,8 +44,10 @@ class Calibrated:
     encoder_step_rad: dict[str, float] = field(default_factory=dict)
     unused: dict[str, str] = field(default_factory=dict)
 
-    def add(self, channel: str, values: NDArray, formula: str, accuracy: float) -> None:
-        """Add a channel."""
+    def add(self, channel: str, values: NDArray, formula: str, accuracy: float | None) -> None:
+        """Add a channel; `batch.yaml` states the accuracy of every sensor of the rig."""
+        if accuracy is None:
+            raise ValueError(f"{channel} has no stated accuracy")
         self.channels[channel], self.derived_from[channel], self.accuracy[channel] = values, formula, accuracy
 
 
@@ -114,6 +116,7 @@ def _add_sensors(result: Calibrated, table: pd.DataFrame, end: End, accuracy: Ac
         (end.torque, side.torque_sign, accuracy.torque_Nm),
         *((channel, 1, accuracy.load_cell_N) for channel in (end.force, *end.tensions)),
     )
+    sign: int
     for channel, sign, accuracy_of_channel in physical:
         if channel in table:
             formula = f"{'-' if sign < 0 else ''}{channel} of the log"

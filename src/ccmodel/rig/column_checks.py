@@ -85,10 +85,11 @@ class ColumnChecks:
                 f"column missing though batch.yaml states its sensor: {lost}; restore the column or, if the rig has no"
                 " such sensor, take its key out of batch.yaml",
             )
-        lost = [c for c in SENSOR_COLUMNS if self._expected(c) and not {c, *_SAME_QUANTITY[c]} & set(log)]
-        if lost:
-            raise LogError(1, lost[0], f"column missing though other logs of the batch have it: {', '.join(lost)}")
-        wanted = _FAR_END_COLUMNS.get(self.rig.far_end, ())
+        missing = [c for c in SENSOR_COLUMNS if self._expected(c) and not {c, *_SAME_QUANTITY[c]} & set(log)]
+        if missing:
+            text = f"column missing though other logs of the batch have it: {', '.join(missing)}"
+            raise LogError(1, missing[0], text)
+        wanted = _FAR_END_COLUMNS.get(self.rig.far_end or "", ())
         if wanted and not set(wanted) & set(log) & self.stated:
             text = f"far_end is {self.rig.far_end}: one of {', '.join(wanted)} is needed, and the key that converts it"
             raise LogError(1, wanted[0], text)
@@ -107,7 +108,9 @@ _FAR_END_COLUMNS = {
     "measured-tension": (*RAW_COLUMNS[F_LOAD], *RAW_COLUMNS[TAU_OUT], F_LOAD, TAU_OUT, T2),
 }
 # A raw column and the physical one that may stand in its place.
-_SAME_QUANTITY = {column: (channel,) for channel, columns in RAW_COLUMNS.items() for column in columns}
+_SAME_QUANTITY: dict[str, tuple[str, ...]] = {
+    column: (channel,) for channel, columns in RAW_COLUMNS.items() for column in columns
+}
 _SAME_QUANTITY |= {channel: RAW_COLUMNS.get(channel, ()) for channel in CHANNELS}
 
 

@@ -163,10 +163,11 @@ def _content(name: str, logs: Sequence[_Log], refused: dict[str, str]) -> Lines:
     alike = _alike(pretensions.values())
     differ = alike is None and all(p is not None and p > 0 for p in pretensions.values())
     yield "defaults:  # of all recordings; one that differs states the key below, as {id: a, ..., conduit: [...]}"
-    if None in pretensions.values():
+    known = [p for p in pretensions.values() if p is not None]
+    if len(known) < len(pretensions):
         yield "  pretension_N:  # N, the tension to which each cable was set before the motion"
-    elif min(pretensions.values()) <= 0:
-        least = f"{min(pretensions.values()):.3g} N"
+    elif min(known) <= 0:
+        least = f"{min(known):.3g} N"
         yield f"  pretension_N:  # N; half the sum of tensions at rest is {least}: is a load cell's sign or zero wrong?"
     elif alike is not None:
         yield f"  pretension_N: {alike:.3g}  # half the sum of tensions at rest, mean of all recordings{_IF_KNOWN}"

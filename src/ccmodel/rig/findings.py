@@ -31,6 +31,9 @@ class LogError(Exception):
     """A log cannot be used; the arguments are those of `Defect`."""
 
 
+Severity = Literal["warning", "refused", "inconsistent"]
+
+
 @dataclass(frozen=True)
 class Finding:
     """A fault of a batch or log, for the user.
@@ -56,7 +59,7 @@ class Finding:
     file: str
     row: int | None
     column: str | None
-    severity: Literal["warning", "refused", "inconsistent"]
+    severity: Severity
     text: str
     confidence: float = 1.0
     contradicts: bool = False

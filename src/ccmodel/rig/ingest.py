@@ -3,21 +3,24 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pandas as pd
 
+from ccmodel.progress import Progress, each_of, silent, within
 from ccmodel.recording import Recording
 from ccmodel.rig.batch import Batch, RecordingEntry, load_batch
 from ccmodel.rig.calibration import calibrate
 from ccmodel.rig.column_checks import ColumnChecks
 from ccmodel.rig.consistency import check_consistency
-from ccmodel.rig.findings import Defect, Finding, LogError
+from ccmodel.rig.findings import Defect, Finding, LogError, Severity
 from ccmodel.rig.log import read_log
 from ccmodel.rig.sensor_checks import check_sensors, drive_travel
 from ccmodel.typed import InputError
 
 T = TypeVar("T")
+# Share of reading the logs in the time of an ingest; the rest is checked as a whole.
+READING = 0.5
 
 
 @dataclass(frozen=True)
@@ -39,14 +42,40 @@ class Ingested:
     findings: list[Finding]
     batch: Batch | None = None
 
+    @property
+    def contradicts(self) -> bool:
+        """Whether the inputs contradict one another, so that no verdict on the physics can be drawn from them."""
+        return any(finding.is_inconsistent for finding in self.findings)
 
-def ingest_batch(folder: Path) -> Ingested:
+    def check_usable(self, source: Path | str, trust_inputs: bool = True) -> None:
+        """Raise `InputError` if no model can be compared with the batch.
+
+        Parameters
+        ----------
+        source : Path or str
+            What was read, in the message.
+        trust_inputs : bool
+            Whether recordings are needed even if the inputs contradict one another.
+
+        Raises
+        ------
+        InputError
+            One line for each refused file.
+        """
+        reported = self.contradicts and not trust_inputs
+        if self.batch is None or not (self.recordings or reported):
+            refused = [str(f) for f in self.findings if f.severity == "refused"]
+            raise InputError("\n".join(refused) or f"{source}: no recording that can be used")
+
+
+def ingest_batch(folder: Path, progress: Progress = silent) -> Ingested:
     """Read a batch of rig logs.
 
     Parameters
     ----------
     folder : Path
         Folder with `batch.yaml` and the logs, anywhere on disk; it is not changed.
+    progress : Progress
 
     Returns
     -------
@@ -60,7 +89,9 @@ def ingest_batch(folder: Path) -> Ingested:
     if batch is None:
         return Ingested([], refusals)
     files = [str(folder / entry.file) for entry in batch.recordings]
-    logs = [_attempt(name, file, read_log, Path(file)) for file in files]
+    # Reading takes most of the time.
+    reading = each_of(files, within(progress, 0.0, READING), lambda file: f"reading {Path(file).name}")
+    logs = [_attempt(name, file, read_log, Path(file)) for file in reading]
     # All logs are read before any is checked: a column is judged by how many logs of the batch have it.
     tables = [log[0] if log else None for log, _ in logs]
     columns = ColumnChecks(batch.rig, tables)
@@ -86,7 +117,7 @@ def ingest_batch(folder: Path) -> Ingested:
     return Ingested(recordings, findings, batch)
 
 
-def _attempt(batch: str, file: str, step: Callable[..., T], *args) -> tuple[T | None, list[Finding]]:
+def _attempt(batch: str, file: str, step: Callable[..., T], *args: Any) -> tuple[T | None, list[Finding]]:
     """Result of a step and no findings, or None and the findings that refuse the file."""
     try:
         return step(*args), []
@@ -100,7 +131,7 @@ def _attempt(batch: str, file: str, step: Callable[..., T], *args) -> tuple[T | 
     return None, [_finding(batch, file, "refused", defect)]
 
 
-def _finding(batch: str, file: str, severity: str, defect: Defect) -> Finding:
+def _finding(batch: str, file: str, severity: Severity, defect: Defect) -> Finding:
     """A defect as a finding; one of a used log that contradicts is no warning."""
     if severity == "warning" and defect.contradicts:
         return Finding(batch, file, defect.row, defect.column, "inconsistent", defect.text)

@@ -173,7 +173,10 @@ def _crossings(time_s: NDArray, swing: NDArray) -> NDArray:
 
 
 # Waves of peak 1 over the phase, rad, that pass 0 upwards at phase 0.
-_WAVES = {"sine": np.sin, "triangle": lambda phase: 2 / np.pi * np.arcsin(np.sin(phase))}
+_WAVES: dict[str, Callable[[NDArray], NDArray]] = {
+    "sine": np.sin,
+    "triangle": lambda phase: 2 / np.pi * np.arcsin(np.sin(phase)),
+}
 
 
 def _best_fit(time_s: NDArray, angle: NDArray, wave: Callable, start: Sequence[float]) -> tuple[float, float]:

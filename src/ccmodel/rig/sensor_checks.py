@@ -40,7 +40,7 @@ def check_sensors(table: pd.DataFrame, rig: Rig, largest_travel: float) -> tuple
     LogError
         If the drive encoder is faulty.
     """
-    drive, load = (angle_of(table, end) for end in rig.ends)
+    drive, load = _drive_angle(table, rig), angle_of(table, rig.ends[1])
     for angle in (drive, load):
         if angle:
             _check_steps(table, angle)
@@ -48,13 +48,13 @@ def check_sensors(table: pd.DataFrame, rig: Rig, largest_travel: float) -> tuple
     defects, dead = _missing_steps(table, drive), []
     is_small = drive_travel(table, rig) < limits.SMALL_TRAVEL_FRACTION * largest_travel
     for column in table.columns.drop(["time_s", drive.column]):
-        is_load = load is not None and column == load.column
-        if fault := _dead_load(table, load, rig) if is_load else _dead(table, column):
-            contradicts = fault.contradicts and not (is_small and is_load and fault.row is None)
+        load_here = load if load is not None and column == load.column else None
+        if fault := _dead(table, column) if load_here is None else _dead_load(table, load_here, rig):
+            contradicts = fault.contradicts and not (is_small and load_here is not None and fault.row is None)
             defects.append(fault._replace(text=f"{fault.text}: column not used", contradicts=contradicts))
             dead.append(column)
-        elif is_load:
-            defects += _missing_steps(table, load) + _load_stands(table, drive, load)
+        elif load_here is not None:
+            defects += _missing_steps(table, load_here) + _load_stands(table, drive, load_here)
         else:
             # A sensor at the end of its range repeats one value: it is clipped and not frozen.
             defects += _saturated(table, column, drive, rig.ranges.get(column)) or _frozen(table, column, drive)
@@ -63,19 +63,27 @@ def check_sensors(table: pd.DataFrame, rig: Rig, largest_travel: float) -> tuple
 
 def drive_travel(table: pd.DataFrame, rig: Rig) -> float:
     """Peak to peak of the drive angle over a log, rad."""
-    drive = angle_of(table, rig.ends[0])
-    return float(np.ptp(drive.values) * drive.rad_per_unit)
+    drive = _drive_angle(table, rig)
+    return float(np.ptp(drive.values) * (drive.rad_per_unit or np.nan))
+
+
+def _drive_angle(table: pd.DataFrame, rig: Rig) -> Angle:
+    """The drive's angle, without which no log is read."""
+    if (drive := angle_of(table, rig.ends[0])) is None:
+        raise LogError(1, None, "the drive angle is missing")
+    return drive
 
 
 def _check_steps(table: pd.DataFrame, angle: Angle) -> None:
     """Refuse an angle in rad that does not move in the steps that `batch.yaml` states."""
-    if not angle.key.endswith("angle_resolution_rad") or not angle.counted:
+    step_rad = angle.step_rad
+    if not angle.key.endswith("angle_resolution_rad") or step_rad is None:
         return
     values = table[angle.column].to_numpy()
-    off = np.abs((values - values[0]) / angle.step_rad - angle.values) > limits.OFF_STEP
+    off = np.abs((values - values[0]) / step_rad - angle.values) > limits.OFF_STEP
     if off.mean() > limits.OFF_STEP_FRACTION:
         seen = smallest_step(values)
-        if seen and np.isclose(seen, np.degrees(angle.step_rad), rtol=0.02):
+        if seen and np.isclose(seen, np.degrees(step_rad), rtol=0.02):
             text = f"moves in steps of {seen:.4g}, which is {angle.key} in degrees: is the column in degrees?"
             raise LogError(int(table.index[np.argmax(off)]), angle.column, text, True)
         known = f"the readings have a step of {seen:.6g} rad" if seen else "the readings have no step"

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pandas as pd
 
-from ccmodel.channels import CHANNELS
-from ccmodel.model.files import read_model
+from ccmodel.model.files import read_model_file
 from ccmodel.model.parameters import Parameters
 from ccmodel.recording import Recording, read_recordings
 from ccmodel.rig.batch import Batch
+from ccmodel.rig.findings import Finding
+from ccmodel.rig.ingest import Ingested
 
 # A recording and its simulation; None where the model could not be run.
 Pair = tuple[Recording, Recording | None]
@@ -33,6 +34,14 @@ def estimates_of(recordings_file: Path) -> Parameters | None:
     return None if batch is None else Parameters.estimated(Batch.model_validate(batch, strict=False).rig)
 
 
+def read_ingested(recordings_file: Path) -> Ingested:
+    """A batch that the pipeline has read, from its recordings and the summary next to them."""
+    summary = read_json(recordings_file.with_suffix(".json"))
+    stated = summary["batch"]
+    batch = None if stated is None else Batch.model_validate(stated, strict=False)
+    return Ingested(read_recordings(recordings_file), [Finding(**f) for f in summary["findings"]], batch)
+
+
 @dataclass(frozen=True)
 class Fitted:
     """Parameters that a batch is simulated with.
@@ -42,7 +51,7 @@ class Fitted:
     parameters : Parameters or None
         None for a refused batch, a failed fit or a batch that could not be diagnosed.
     sds : dict of str to float
-        Standard deviations of the fitted parameters; infinite for those of a diagnosis, which states none.
+        Standard deviations of the fitted parameters; infinite where the file of a model states none.
     recordings : list of str
         Names (batch/id) of the recordings that they were fitted to.
     """
@@ -59,9 +68,11 @@ def fitted(recordings_file: Path, fit_file: Path | None) -> Fitted:
         return Fitted(estimates)
     result = read_json(fit_file)
     if "parameters" in result:
-        model = read_model(fit_file)
+        file = read_model_file(fit_file)
+        model = file.parameters
         names = [f.name for f in fields(model) if getattr(model, f.name) != getattr(estimates, f.name)]
         sds = dict.fromkeys([name for name in names if name != "mechanisms"], inf)
+        sds |= {name: one["sd"] for name, one in file.intervals.items() if one["sd"] is not None}
         return Fitted(model, sds, [f"{r.batch}/{r.id}" for r in read_recordings(recordings_file)])
     if not result["succeeded"]:
         return Fitted(None)
@@ -82,5 +93,4 @@ def write_table(file: Path, table: pd.DataFrame, digits: int = 6) -> None:
 
 def write_channels(file: Path, recording: Recording) -> None:
     """Write all channels over time as CSV."""
-    channels = {c: recording[c] for c in CHANNELS if c in recording}
-    write_table(file, pd.DataFrame({"time_s": recording.time_s} | channels), digits=9)
+    write_table(file, recording.to_frame().reset_index(), digits=9)

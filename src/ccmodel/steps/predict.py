@@ -1,5 +1,7 @@
 """A model file -> predicted sensor readings: of a batch's recordings, or of any motion of the drive."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -8,43 +10,111 @@ import pandas as pd
 from ccmodel.channels import THETA_IN
 from ccmodel.errors import error_table
 from ccmodel.failure import ModelError
-from ccmodel.model.files import read_model
+from ccmodel.model.files import Model, read_model, read_model_file
+from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
+from ccmodel.progress import Progress, silent, within
 from ccmodel.recording import Recording
 from ccmodel.rig.ingest import ingest_batch
-from ccmodel.steps.files import write_channels
+from ccmodel.steps.files import Pair, write_channels
 from ccmodel.steps.simulate import simulate_each
 from ccmodel.typed import InputError
 
+# Share of reading the logs in the time of a prediction.
+READING = 0.5
 MOTION = ["time_s", THETA_IN]
 
 
-def predict(batch: Path, model_file: Path, out: Path) -> tuple[list[str], pd.DataFrame]:
-    """Write a CSV for each recording of a batch folder: the sensor readings by a model file, at the recording's times.
+@dataclass(frozen=True)
+class Predicted:
+    """Simulations of recordings by a model.
+
+    Attributes
+    ----------
+    pairs : list of (Recording, Recording)
+        Each recording with its simulation.
+    failures : list of str
+        A line on each recording on which the model cannot be run.
+    errors : DataFrame
+        Errors of the others (`ccmodel.errors.error_table`).
+    """
+
+    pairs: list[Pair]
+    failures: list[str]
+    errors: pd.DataFrame
+
+
+def predicted(
+    recordings: Sequence[Recording], parameters: Parameters, name: str = "model", progress: Progress = silent
+) -> Predicted:
+    """Predict the sensor readings of recordings, at their times.
 
     The model is given the drive angle, the readings at rest and, if it has no load law, the load torque.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    parameters : Parameters
+    name : str
+        Name of the parameters in the table of errors.
+    progress : Progress
+    """
+    pairs, failures = simulate_each(recordings, parameters, progress)
+    lines = [f"{recording.batch}/{recording.id}: {error}" for recording, error in failures]
+    return Predicted(pairs, lines, error_table(pairs, name))
+
+
+def predict(batch: Path, model_file: Path, out: Path, progress: Progress = silent) -> tuple[list[str], pd.DataFrame]:
+    """Write a CSV for each recording of a batch folder: the sensor readings by a model file (`predicted`).
 
     Returns
     -------
     list of str
         A line on each recording without a prediction.
     DataFrame
-        Errors of the others (`ccmodel.errors.error_table`).
+        Errors of the others.
     """
-    parameters, ingested = read_model(model_file), ingest_batch(batch)
+    parameters, ingested = read_model(model_file), ingest_batch(batch, within(progress, 0.0, READING))
     messages = [str(f) for f in ingested.findings if f.severity == "refused"]
-    pairs, failures = simulate_each(ingested.recordings, parameters)
-    messages += [f"{recording.batch}/{recording.id}: {error}" for recording, error in failures]
+    found = predicted(ingested.recordings, parameters, model_file.stem, within(progress, READING, 1.0))
     out.mkdir(parents=True, exist_ok=True)
-    for recording, simulated in pairs:
-        write_channels(out / f"{recording.id}.csv", simulated)
-    return messages, error_table(pairs, model_file.stem)
+    for _, simulated in found.pairs:
+        write_channels(out / f"{simulated.id}.csv", simulated)
+    return [*messages, *found.failures], found.errors
+
+
+def simulated_motion(
+    motion: pd.DataFrame, parameters: Parameters, like: Recording, pretension_N: float | None = None
+) -> Recording:
+    """Sensor readings of a rig for a motion of its drive that was not recorded, at the motion's times.
+
+    Parameters
+    ----------
+    motion : DataFrame
+        Columns time_s (s, increasing) and theta_in_rad (rad).
+    parameters : Parameters
+    like : Recording
+        Gives the conduits' path, the far end and the pretension; its samples are not used.
+    pretension_N : float, optional
+        Pretension of both cables, instead of the nominal one of `like` and of one that was fitted.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be run.
+    """
+    if pretension_N is None:
+        pretension_N = like.pretension_N
+    else:
+        parameters = replace(parameters, pretension_N=None)
+    time_s, theta_in = (motion[c].to_numpy(float) for c in MOTION)
+    return simulate(ModelInput.prescribed(like, time_s, theta_in, pretension_N), parameters)
 
 
 def simulate_motion(
     motion_file: Path,
     model_file: Path,
-    batch: Path,
+    batch: Path | None,
     out: Path,
     recording: str | None = None,
     pretension_N: float | None = None,
@@ -55,45 +125,102 @@ def simulate_motion(
     ----------
     motion_file : Path
         CSV with time_s (s, increasing) and theta_in_rad (rad).
-    model_file, batch, out : Path
-        The model, a batch of the rig, and the CSV to write.
+    model_file, out : Path
+        The model, and the CSV to write.
+    batch : Path, optional
+        A batch of the rig, whose conduits are used in place of those that the model file knows.
     recording : str, optional
-        Recording whose conduits and pretension are used; the first of the batch if none is named.
+        Recording whose conduits and pretension are used; the first if none is named.
     pretension_N : float, optional
         Pretension of both cables, instead of the nominal one of that recording.
 
     Raises
     ------
     InputError
-        If a file cannot be used, the batch has no such recording, or the model cannot be run.
+        If a file cannot be used, there is no such recording, or the model cannot be run.
     """
-    motion, parameters = _motion(motion_file), read_model(model_file)
-    like = _recording(batch, recording)
-    time_s, theta_in = (motion[c].to_numpy(float) for c in MOTION)
-    given = ModelInput.prescribed(like, time_s, theta_in, like.pretension_N if pretension_N is None else pretension_N)
+    motion, model = read_motion(motion_file), read_model_file(model_file)
+    like = conditions_of(model, recording, None if batch is None else ingest_batch(batch).recordings, str(batch))
     try:
-        simulated = simulate(given, parameters)
+        simulated = simulated_motion(motion, model.parameters, like, pretension_N)
     except (ModelError, ValueError) as error:
         raise InputError(f"{motion_file}: {error}") from None
     out.parent.mkdir(parents=True, exist_ok=True)
     write_channels(out, simulated)
 
 
-def _recording(batch: Path, name: str | None) -> Recording:
-    usable = {r.id: r for r in ingest_batch(batch).recordings}
+def conditions_of(
+    model: Model, name: str | None, recordings: Sequence[Recording] | None = None, batch: str = "batch"
+) -> Recording:
+    """The recording with the conduits and the pretension of a simulation, without its samples if the model gives it.
+
+    Parameters
+    ----------
+    model : Model
+    name : str, optional
+        Id of the recording; the first if there is none.
+    recordings : sequence of Recording, optional
+        Of a batch of the rig; otherwise what the model knows of its own.
+    batch : str
+        The batch in messages.
+
+    Raises
+    ------
+    InputError
+        If neither knows the conduits, or there is no such recording.
+    """
+    if recordings is None:
+        if model.rig is None:
+            raise InputError("the model does not state its rig's conduits (its file is an old one): state a batch too")
+        return model.rig.recording(name)
+    usable = {r.id: r for r in recordings}
     if not usable or (name is not None and name not in usable):
         raise InputError(f"{batch}: no recording {name or ''} that can be used; there is {', '.join(usable) or 'none'}")
     return next(iter(usable.values())) if name is None else usable[name]
 
 
-def _motion(file: Path) -> pd.DataFrame:
+def read_motion(file: Path) -> pd.DataFrame:
+    """A motion of the drive from a CSV file with the columns time_s and theta_in_rad.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used.
+    """
     try:
         table = pd.read_csv(file, usecols=MOTION, dtype=float)
     except (OSError, ValueError) as error:
         raise InputError(f"{file}: a motion is a CSV with the columns {' and '.join(MOTION)}; {error}") from None
-    bad = np.flatnonzero(~np.isfinite(table).all(axis=1) | (table["time_s"].diff() <= 0))
+    return checked_motion(table, str(file), "line", 2)
+
+
+def checked_motion(table: pd.DataFrame, source: str, row: str = "row", first: int = 0) -> pd.DataFrame:
+    """The columns of a motion, if they are numbers and time increases.
+
+    Parameters
+    ----------
+    table : DataFrame
+    source : str
+        What the table is, in messages.
+    row, first : str, int
+        Name of a row there, and number of the first one.
+
+    Raises
+    ------
+    InputError
+        With one line on the first fault.
+    """
+    if missing := [name for name in MOTION if name not in table]:
+        columns = ", ".join(map(str, table.columns)) or "none"
+        raise InputError(f"{source}: no column {' and no '.join(missing)}; the columns are {columns}")
+    try:
+        motion = table[MOTION].astype(float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{source}: {' and '.join(MOTION)} are numbers; {error}") from None
+    bad = np.flatnonzero(~np.isfinite(motion).all(axis=1) | (motion["time_s"].diff() <= 0))
     if bad.size:
-        raise InputError(f"{file}: line {bad[0] + 2}: both are numbers, and time_s increases from line to line")
-    if table.empty:
-        raise InputError(f"{file}: no samples")
-    return table
+        where = f"{source}: {row} {bad[0] + first}"
+        raise InputError(f"{where}: both are numbers, and time_s increases from {row} to {row}")
+    if motion.empty:
+        raise InputError(f"{source}: no samples")
+    return motion.reset_index(drop=True)

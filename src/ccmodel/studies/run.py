@@ -6,7 +6,6 @@ from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import pandas as pd
 from matplotlib.figure import Figure
 
@@ -109,4 +108,3 @@ def run_study(
     for files, figure in zip(figures, outcome.figures, strict=True):
         stamp_figure(figure, stamp)
         save_figure(figure, *files)
-        plt.close(figure)

@@ -1,11 +1,37 @@
 """What the settings of every study state: what it needs and which files it makes."""
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from ccmodel.typed import TypedModel
 
+if TYPE_CHECKING:
+    from ccmodel.studies.accuracy.settings import Accuracy
+    from ccmodel.studies.loops.settings import Study
+
 EACH = "each"
+
+
+class Configuration(Protocol):
+    """What studies read of the rest of the configuration (`ccmodel.config.Config`)."""
+
+    @property
+    def parameter_sets(self) -> list[str]:
+        """All parameter sets."""
+
+    @property
+    def rigs(self) -> Mapping[str, Sequence[str]]:
+        """Batches of one rig, by its name."""
+
+    @property
+    def studies(self) -> "Mapping[str, Study]":
+        """The studies that are drawn as figures, by name."""
+
+    def sets_of(self, batch: str) -> list[str]:
+        """Parameter sets of a batch."""
+
+    def parameters_of(self, study: "Study | Accuracy", batch: str) -> str:
+        """Name of the parameter set that a study takes for a batch."""
 
 
 class StudySettings(TypedModel):
@@ -26,14 +52,14 @@ class StudySettings(TypedModel):
         """Files that the study reads, apart from those of its runs."""
         return []
 
-    def check(self, where: str, config) -> None:
+    def check(self, where: str, config: Configuration) -> None:
         """Refuse settings that do not fit the rest of the configuration.
 
         Parameters
         ----------
         where : str
             What the configuration calls the study, for the message.
-        config : ccmodel.config.Config
+        config : Configuration
 
         Raises
         ------
@@ -47,12 +73,14 @@ class StudySettings(TypedModel):
         """What the study is, and what its figures show."""
         return f"{self.heading}. {self.shows}".strip()
 
-    def needs(self, config, studies: Mapping, batches: Sequence[str]) -> list[tuple[str, str, str]]:
+    def needs(
+        self, config: Configuration, studies: Mapping[str, "StudySettings"], batches: Sequence[str]
+    ) -> list[tuple[str, str, str]]:
         """Label, parameter set and batch of every run that the study looks at.
 
         Parameters
         ----------
-        config : ccmodel.config.Config
+        config : Configuration
         studies : mapping of str to Study
             The figures of the configuration, by name.
         batches : sequence of str

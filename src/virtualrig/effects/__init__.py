@@ -5,10 +5,11 @@ An effect that is not given is absent; `Effects()` is the ideal rig. The time lo
 """
 
 import hashlib
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from numba import njit
 from pydantic import create_model
@@ -31,23 +32,34 @@ def _found() -> dict[str, Twin]:
 TWINS = _found()
 
 
-def _fields(group: str) -> dict[str, tuple[Any, Any]]:
+def _fields(group: str) -> dict[str, Any]:
     """Every twin's fields of a group."""
     return {name: declared for twin in TWINS.values() for name, declared in twin.fields.get(group, {}).items()}
 
 
-PulleyEffects = create_model("PulleyEffects", __base__=Strict, __doc__="Effects of one pulley.", **_fields("pulley"))
-LoadEffects = create_model("LoadEffects", __base__=Strict, __doc__="The load beyond its spring.", **_fields("load"))
+class _Declared(Strict):
+    """Effects whose fields the twins declare; a type checker does not see them."""
+
+    if TYPE_CHECKING:
+
+        def __init__(self, **fields: Any) -> None: ...
+
+        def __getattr__(self, name: str) -> Any: ...
+
+
+PulleyEffects = create_model("PulleyEffects", __base__=_Declared, __doc__="Effects of one pulley.", **_fields("pulley"))
+LoadEffects = create_model("LoadEffects", __base__=_Declared, __doc__="The load beyond its spring.", **_fields("load"))
 SideSensors = create_model(
-    "SideSensors", __base__=Strict, __doc__="Faults of the sensors of one side.", **_fields("sensors")
+    "SideSensors", __base__=_Declared, __doc__="Faults of the sensors of one side.", **_fields("sensors")
 )
 
 
-class _Whole(Strict):
+class _Whole(_Declared):
     @property
     def are_in_the_motion(self) -> bool:
         """Whether any effect is present other than faults of sensors, which do not change the motion."""
-        return self != Effects(drive_sensors=self.drive_sensors, load_sensors=self.load_sensors)
+        sensors = {name: getattr(self, name) for name in ("drive_sensors", "load_sensors")}
+        return self != Effects(**sensors)
 
 
 Effects = create_model(
@@ -87,27 +99,30 @@ def laws(kind: str) -> list[Law]:
     return [law for twin in TWINS.values() if (law := getattr(twin, kind))]
 
 
-def chained(kind: str):
+def chained(kind: str) -> Callable[..., Any]:
     """One compiled function of every law of a kind, each applied to what the one before gives."""
-    chain = njit(_as_it_is)
+    chain: Callable[..., Any] = njit(_as_it_is)
     for law in laws(kind):
         chain = _then(chain, law.value)
     return chain
 
 
-def _as_it_is(p, value, *state):
+def _as_it_is(p: Any, value: Any, *state: Any) -> Any:
     return value
 
 
-def _then(first, second):
+def _then(first: Callable[..., Any], second: Callable[..., Any]) -> Callable[..., Any]:
     @njit
-    def both(p, value, *state):
+    def both(p: Any, value: Any, *state: Any) -> Any:
         return second(p, first(p, value, *state), *state)
 
     return both
 
 
-def cached(function):
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def cached(function: Function) -> Function:
     """Compile `function`, cached on disk until its own file or a twin's changes.
 
     numba checks the time stamp of the function's own file only, so its cached name carries a digest of the others.
@@ -116,4 +131,5 @@ def cached(function):
     for file in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(file.name.encode() + b"\0" + file.read_bytes())
     function.__qualname__ += f"_{digest.hexdigest()[:16]}"
-    return njit(cache=True, error_model="numpy")(function)
+    compiled: Any = njit(cache=True, error_model="numpy")(function)  # called like the function
+    return compiled

@@ -1,8 +1,10 @@
 """Cables that differ: friction and stiffness of cable B over those of cable A."""
 
+from collections.abc import Mapping
+
 from pydantic import PositiveFloat
 
-from virtualrig.effects.contract import Twin
+from virtualrig.effects.contract import Seeded, Twin
 from virtualrig.strict import Strict
 
 
@@ -13,7 +15,7 @@ class CableAsymmetry(Strict):
     stiffness_ratio: PositiveFloat = 1.0
 
 
-def _seed(size, also, place, spring):
+def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     return {"cable_asymmetry": {"friction_ratio": 1 + size}}, {"ratio": 1 + size, "K_ratio": 1.0}
 
 

@@ -30,6 +30,11 @@ class Side(NamedTuple):
     force_N: NDArray
 
 
+Read = Callable[[Side, Side, Any, NDArray, float], Side]
+# Settings of the rig's effects, and the answer.
+Seeded = tuple[dict, dict[str, float]]
+
+
 class Law(NamedTuple):
     """A law of friction.
 
@@ -90,13 +95,13 @@ class Twin:
     places: tuple[str, ...]
     size: Range
     unit: str
-    seed: Callable[[float, Mapping[str, float], str, float], tuple[dict, dict[str, float]]]
+    seed: Callable[[float, Mapping[str, float], str, float], Seeded]
     signed: bool = False
     also: Mapping[str, Range] = field(default_factory=dict)
     numbers: Callable[[Any], dict[str, Any]] = lambda effects: {}
     slow_friction: Law | None = None
     friction: Law | None = None
-    read: Callable[[Side, Side, Any, NDArray, float], Side] | None = None
+    read: Read | None = None
     in_rig: Callable[[dict[str, float], Any], dict[str, float]] | None = None
 
 

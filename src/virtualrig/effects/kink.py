@@ -1,6 +1,8 @@
 """A kink: a sharp bend of both conduits at a share of their length."""
 
-from virtualrig.effects.contract import OpenShare, Twin
+from collections.abc import Mapping
+
+from virtualrig.effects.contract import OpenShare, Seeded, Twin
 from virtualrig.strict import NonNegative, Strict
 
 
@@ -11,7 +13,7 @@ class Kink(Strict):
     place_share: OpenShare
 
 
-def _seed(size, also, place, spring):
+def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     return {"kinks": [{"bend_rad": size, "place_share": also["s"]}]}, {"beta": size, "s": also["s"]}
 
 

@@ -1,25 +1,29 @@
 """Faults of a load cell, which reads (1 + gain) F + offset + drift t + crosstalk tau / R."""
 
-from virtualrig.effects.contract import Twin, group_of
+from typing import Any
+
+from numpy.typing import NDArray
+
+from virtualrig.effects.contract import Range, Read, Side, Twin, group_of
 
 
-def _scale(reading, truth, faults, time_s, radius_m):
+def _scale(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: float) -> Side:
     return reading._replace(force_N=(1 + faults.load_cell_gain) * reading.force_N)
 
 
-def _offset(reading, truth, faults, time_s, radius_m):
+def _offset(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: float) -> Side:
     return reading._replace(force_N=reading.force_N + faults.load_cell_offset_N)
 
 
-def _drift(reading, truth, faults, time_s, radius_m):
+def _drift(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: float) -> Side:
     return reading._replace(force_N=reading.force_N + faults.load_cell_drift_N_per_s * (time_s - time_s[0]))
 
 
-def _crosstalk(reading, truth, faults, time_s, radius_m):
+def _crosstalk(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: float) -> Side:
     return reading._replace(force_N=reading.force_N + faults.load_cell_crosstalk * truth.torque_Nm / radius_m)
 
 
-def _twin(name, field, parameter, size, unit, read):
+def _twin(name: str, field: str, parameter: str, size: Range, unit: str, read: Read) -> Twin:
     return Twin(
         name=name,
         fields={"sensors": {field: (float, 0.0)}},

@@ -1,6 +1,6 @@
 """Load-dependent friction: the friction coefficient times (T / reference)^exponent, constant below `floor_N`."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from numba import njit
 from pydantic import Field, PositiveFloat
@@ -17,7 +17,7 @@ class LoadDependentFriction(Strict):
     floor_N: PositiveFloat = 0.1
 
 
-def _numbers(effects):
+def _numbers(effects: Any) -> dict[str, Any]:
     given = effects.load_dependent_friction
     return {
         "tension_exponent": given.exponent if given else 0.0,
@@ -27,7 +27,7 @@ def _numbers(effects):
 
 
 @njit
-def _value(p, y, tension, time, travel, position):
+def _value(p: Any, y: float, tension: float, time: float, travel: float, position: float) -> float:
     if p.tension_exponent == 0.0:
         return y
     return y * (max(tension, p.tension_floor) / p.tension_reference) ** p.tension_exponent

@@ -1,10 +1,12 @@
 """A load spring that stiffens with the cube of its angle beyond the gap."""
 
-from virtualrig.effects.contract import FULL_STROKE_RAD, Twin
+from collections.abc import Mapping
+
+from virtualrig.effects.contract import FULL_STROKE_RAD, Seeded, Twin
 from virtualrig.strict import NonNegative
 
 
-def _seed(size, also, place, spring):
+def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     cubic = size * spring / FULL_STROKE_RAD**2
     return {"load": {"cubic_Nm_per_rad3": cubic}}, {"K3": cubic}
 

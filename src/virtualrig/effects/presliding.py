@@ -1,10 +1,11 @@
 """Presliding: friction builds up over a length of one bristle, or of many that yield one after the other."""
 
+from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
-from virtualrig.effects.contract import Twin
+from virtualrig.effects.contract import Seeded, Twin
 from virtualrig.strict import Strict
 
 
@@ -34,7 +35,7 @@ class IwanPresliding(Strict):
         return self
 
 
-def _seed(size, also, place, spring):
+def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     root = also["spread"] ** 0.5
     return {"presliding": {"law": "iwan", "shortest_m": size / root, "longest_m": size * root}}, {}
 

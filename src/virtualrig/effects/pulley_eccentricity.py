@@ -1,10 +1,11 @@
 """Eccentricity: a pulley's radius times 1 + share sin(angle + phase)."""
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, Any
 
 from pydantic import Field
 
-from virtualrig.effects.contract import Twin, group_of
+from virtualrig.effects.contract import Seeded, Twin, group_of
 from virtualrig.strict import Strict
 
 
@@ -15,13 +16,13 @@ class Eccentricity(Strict):
     phase_rad: float = 0.0
 
 
-def _numbers(effects):
+def _numbers(effects: Any) -> dict[str, Any]:
     pulleys = {"drive": effects.drive_pulley.eccentricity, "load": effects.load_pulley.eccentricity}
     shares = {f"{side}_share": given.share if given else 0.0 for side, given in pulleys.items()}
     return shares | {f"{side}_phase": given.phase_rad if given else 0.0 for side, given in pulleys.items()}
 
 
-def _seed(size, also, place, spring):
+def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     eccentricity = {"share": size, "phase_rad": also["phase"]}
     return {group_of(place): {"eccentricity": eccentricity}}, {"e": size, "psi": also["phase"]}
 

@@ -1,8 +1,11 @@
 """A bearing: a torque against the motion of a pulley that builds up over a small angle."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from pydantic import PositiveFloat
 
-from virtualrig.effects.contract import Twin, group_of
+from virtualrig.effects.contract import Seeded, Twin, group_of
 from virtualrig.strict import NonNegative, Strict
 
 
@@ -13,7 +16,7 @@ class PulleyFriction(Strict):
     presliding_rad: PositiveFloat = 1e-3
 
 
-def _numbers(effects):
+def _numbers(effects: Any) -> dict[str, Any]:
     given = effects.load_pulley.friction
     return {
         "bearing_torque": given.torque_Nm if given else 0.0,
@@ -21,7 +24,7 @@ def _numbers(effects):
     }
 
 
-def _seed(size, also, place, spring):
+def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     friction = {"torque_Nm": size, "presliding_rad": also["presliding_rad"]}
     return {group_of(place): {"friction": friction}}, {"friction_torque": size}
 

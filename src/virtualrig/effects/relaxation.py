@@ -1,10 +1,11 @@
 """Relaxation: branches of the cable that each lose their share of the tension with a time constant."""
 
+from collections.abc import Mapping
 from typing import Annotated
 
 from pydantic import AfterValidator, PositiveFloat
 
-from virtualrig.effects.contract import OpenShare, Twin
+from virtualrig.effects.contract import OpenShare, Seeded, Twin
 from virtualrig.strict import Strict
 
 
@@ -22,7 +23,7 @@ def _not_all(branches: tuple[Relaxation, ...]) -> tuple[Relaxation, ...]:
     return branches
 
 
-def _seed(size, also, place, spring):
+def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     half, root = size / 2, 10**0.5
     return {"relaxation": [{"share": half, "time_constant_s": also["tau"] * f} for f in (1 / root, root)]}, {}
 

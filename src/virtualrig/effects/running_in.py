@@ -1,12 +1,13 @@
 """Running-in: the friction coefficient times 1 + change (1 - exp(-x / scale)), x the time or the drive's travel."""
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numba import njit
 from pydantic import Field, PositiveFloat
 
-from virtualrig.effects.contract import Law, Twin
+from virtualrig.effects.contract import Law, Seeded, Twin
 from virtualrig.strict import Strict
 
 
@@ -18,7 +19,7 @@ class RunningIn(Strict):
     scale: PositiveFloat
 
 
-def _numbers(effects):
+def _numbers(effects: Any) -> dict[str, Any]:
     given = effects.running_in
     return {
         "run_in_change": given.change if given else 0.0,
@@ -28,14 +29,14 @@ def _numbers(effects):
 
 
 @njit
-def _value(p, y, tension, time, travel, position):
+def _value(p: Any, y: float, tension: float, time: float, travel: float, position: float) -> float:
     if p.run_in_change == 0.0:
         return y
     age = travel if p.run_in_by_travel else time
     return y * (1.0 + p.run_in_change * -np.expm1(-age / p.run_in_scale))
 
 
-def _seed(size, also, place, spring):
+def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     # Running in over travel is a form of the rig's own; it is drawn where the time constant comes out short.
     if also["tau"] < 10:
         return {"running_in": {"change": size, "over": "travel_m", "scale": also["travel_m"]}}, {}

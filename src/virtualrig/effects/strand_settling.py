@@ -1,6 +1,6 @@
 """Strand settling: a cable that is soft near slack, until its strands bed in over a tension scale."""
 
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import PositiveFloat
 
@@ -19,7 +19,7 @@ class StrandSettling(Strict):
     tension_scale_N: PositiveFloat
 
 
-def _numbers(effects):
+def _numbers(effects: Any) -> dict[str, Any]:
     given = effects.strand_settling
     return {
         "has_settling": given is not None,

@@ -1,8 +1,11 @@
 """Stribeck friction: the friction coefficient times 1 + rise exp(-(|v| / speed)^exponent), v the sliding speed."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from pydantic import PositiveFloat
 
-from virtualrig.effects.contract import Twin
+from virtualrig.effects.contract import Seeded, Twin
 from virtualrig.strict import NonNegative, Strict
 
 
@@ -18,7 +21,7 @@ class Stribeck(Strict):
     renewal_m: PositiveFloat = 20e-6
 
 
-def _numbers(effects):
+def _numbers(effects: Any) -> dict[str, Any]:
     given = effects.stribeck or Stribeck(rise=0.0, speed_m_per_s=1.0, renewal_m=1.0)
     return {
         "stribeck_rise": given.rise,
@@ -28,7 +31,7 @@ def _numbers(effects):
     }
 
 
-def _seed(size, also, place, spring):
+def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     # Another curve over speed than the mechanism's, so that only the height of its peak can be compared.
     return {"stribeck": {"rise": size, "speed_m_per_s": also["vs"], "exponent": 1.0}}, {"a": size}
 

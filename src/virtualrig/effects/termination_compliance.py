@@ -1,6 +1,8 @@
 """Compliances without friction in series at either end of both cables."""
 
-from virtualrig.effects.contract import Twin
+from collections.abc import Mapping
+
+from virtualrig.effects.contract import Seeded, Twin
 from virtualrig.strict import NonNegative, Strict
 
 
@@ -11,7 +13,7 @@ class TerminationCompliance(Strict):
     load_m_per_N: NonNegative = 0.0
 
 
-def _seed(size, also, place, spring):
+def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     end = {"drive-end": "drive_m_per_N", "load-end": "load_m_per_N"}[place]
     return {"termination_compliance": {end: size}}, {"compliance": size}
 

@@ -1,11 +1,14 @@
 """A late clock: all channels of one side read at t what they would have read at t - delay."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from virtualrig.effects.contract import Side, Twin, group_of
 
 
-def _read(reading, truth, faults, time_s, radius_m):
+def _read(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: float) -> Side:
     return Side(*(np.interp(time_s - faults.delay_s, time_s, values) for values in reading))
 
 

@@ -1,9 +1,13 @@
 """A torque that reads (1 + torque_gain) times as much."""
 
-from virtualrig.effects.contract import Twin, group_of
+from typing import Any
+
+from numpy.typing import NDArray
+
+from virtualrig.effects.contract import Side, Twin, group_of
 
 
-def _read(reading, truth, faults, time_s, radius_m):
+def _read(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: float) -> Side:
     return reading._replace(torque_Nm=(1 + faults.torque_gain) * reading.torque_Nm)
 
 

@@ -1,6 +1,6 @@
 """Friction that is 1 + bias times as large where the cable slides towards the drive, 1 - bias where it slides back."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from numba import njit
 from pydantic import Field
@@ -16,7 +16,7 @@ class DirectionalFriction(Strict):
 
 
 @njit
-def _value(p, force, bristle, speed):
+def _value(p: Any, force: float, bristle: float, speed: float) -> float:
     return force * (1.0 + p.bias * bristle)
 
 

@@ -1,16 +1,20 @@
 """An encoder's disc off its axis: the angle reads theta + runout sin(theta + phase)."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
-from virtualrig.effects.contract import Twin, group_of
+from virtualrig.effects.contract import Seeded, Side, Twin, group_of
 
 
-def _read(reading, truth, faults, time_s, radius_m):
+def _read(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: float) -> Side:
     runout = faults.angle_runout_rad * np.sin(reading.angle_rad + faults.angle_runout_phase_rad)
     return reading._replace(angle_rad=reading.angle_rad + runout)
 
 
-def _seed(size, also, place, spring):
+def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     return {group_of(place): {"angle_runout_rad": size, "angle_runout_phase_rad": also["phase"]}}, {}
 
 

@@ -1,5 +1,7 @@
 """A load spring with inner friction, such as rubber, which the load's own torque shows, unlike a bearing's."""
 
+from typing import Any
+
 from pydantic import PositiveFloat
 
 from virtualrig.effects.contract import Twin
@@ -13,7 +15,7 @@ class HystereticLoad(Strict):
     angle_rad: PositiveFloat
 
 
-def _numbers(effects):
+def _numbers(effects: Any) -> dict[str, Any]:
     given = effects.hysteretic_load
     return {
         "hysteresis_torque": given.torque_Nm if given else 0.0,

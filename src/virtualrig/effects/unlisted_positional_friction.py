@@ -1,12 +1,13 @@
 """A cable that is worn unevenly along its length: friction 1 + rise sin(2 pi x / period + phase), x its position."""
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, Any
 
 import numpy as np
 from numba import njit
 from pydantic import Field, PositiveFloat
 
-from virtualrig.effects.contract import Law, Twin
+from virtualrig.effects.contract import Law, Seeded, Twin
 from virtualrig.strict import Strict
 
 
@@ -18,7 +19,7 @@ class PositionalFriction(Strict):
     phase_rad: float = 0.0
 
 
-def _numbers(effects):
+def _numbers(effects: Any) -> dict[str, Any]:
     given = effects.positional_friction
     return {
         "wear_rise": given.rise if given else 0.0,
@@ -28,11 +29,11 @@ def _numbers(effects):
 
 
 @njit
-def _value(p, y, tension, time, travel, position):
+def _value(p: Any, y: float, tension: float, time: float, travel: float, position: float) -> float:
     return y * (1.0 + p.wear_rise * np.sin(2 * np.pi * position / p.wear_period + p.wear_phase))
 
 
-def _seed(size, also, place, spring):
+def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     wear = {"rise": size, "period_m": also["period_m"], "phase_rad": also["phase"]}
     return {"positional_friction": wear}, {}
 

@@ -1,10 +1,12 @@
 """Viscous friction: a drag in proportion to the sliding speed, per length of cable."""
 
+from typing import Any
+
 from virtualrig.effects.contract import Twin
 from virtualrig.strict import NonNegative
 
 
-def _in_rig(values, campaign):
+def _in_rig(values: dict[str, float], campaign: Any) -> dict[str, float]:
     """With the drag on the rig's cables, of the same law, and the load's damping, taken as a drag on both cables.
 
     No recording separates these from the film.

@@ -5,11 +5,12 @@ from math import exp, log1p
 from ccmodel.kernel import kernel, small_kernel
 from ccmodel.model.exact import state as rows
 from ccmodel.model.exact.front import position, start_front
-from ccmodel.model.exact.state import elongation
+from ccmodel.model.exact.path import PathTables
+from ccmodel.model.exact.state import State, elongation
 
 
 @kernel
-def slide_whole(path, state, c, line):
+def slide_whole(path: PathTables, state: State, c: int, line: int) -> None:
     """Let cable `c` slide over its whole length, d ln T / dm = `line`."""
     state.kind[c, rows.MODE] = rows.WHOLE
     state.kind[c, rows.LINE] = line
@@ -17,14 +18,14 @@ def slide_whole(path, state, c, line):
 
 
 @small_kernel
-def line_stiffness(path, state, c):
+def line_stiffness(path: PathTables, state: State, c: int) -> tuple[float, float]:
     """Tension per elongation at the drive and at the load end of a cable that slides as a whole, N/m."""
     index = (state.kind[c, rows.LINE] + 1) // 2
     return state.value[c, rows.STIFFNESS + index], state.value[c, rows.STIFFNESS + index] * path.ratio[index]
 
 
 @small_kernel
-def pull_line(path, state, c):
+def pull_line(path: PathTables, state: State, c: int) -> None:
     """Set the end tensions of a cable that slides as a whole from its elongation; zero where it is slack."""
     stretch = max(0.0, elongation(state, c))
     drive, load = line_stiffness(path, state, c)
@@ -33,13 +34,13 @@ def pull_line(path, state, c):
 
 
 @small_kernel
-def is_slack(state, c):
+def is_slack(state: State, c: int) -> bool:
     """Whether a cable hangs without tension, and so without memory."""
     return state.kind[c, rows.MODE] == rows.WHOLE and elongation(state, c) <= 0.0
 
 
 @small_kernel
-def reverse(path, state, c, sigma):
+def reverse(path: PathTables, state: State, c: int, sigma: int) -> None:
     """Prepare cable `c` for a pull (`sigma` +1) or a release (-1) at the drive, and the opposite at the load.
 
     A part that slid in the other direction until now leaves corners in the stored profile.
@@ -51,7 +52,7 @@ def reverse(path, state, c, sigma):
 
 
 @kernel
-def _reverse(path, state, c, sigma):
+def _reverse(path: PathTables, state: State, c: int, sigma: int) -> None:
     """As `reverse`, where anything changes."""
     if state.kind[c, rows.MODE] == rows.WHOLE:
         if path.total == 0.0 or is_slack(state, c):
@@ -65,7 +66,7 @@ def _reverse(path, state, c, sigma):
 
 
 @kernel
-def _store_front(path, state, c, end):
+def _store_front(path: PathTables, state: State, c: int, end: int) -> None:
     """Store the sliding line behind the front of an end as corners."""
     sigma = state.kind[c, rows.SIGMA + 3 * end]
     front = state.front
@@ -96,7 +97,7 @@ def _store_front(path, state, c, end):
 
 
 @kernel
-def _store_line(path, state, c):
+def _store_line(path: PathTables, state: State, c: int) -> None:
     """Make the sliding line of a whole cable the stored profile."""
     kind = state.kind
     lo = state.corner.shape[2] // 2 - 1

@@ -7,15 +7,16 @@ from math import exp, expm1, log1p
 
 from ccmodel.kernel import kernel, small_kernel
 from ccmodel.model.exact import state as rows
-from ccmodel.model.exact.path import LUMP, NODE, PER_M
+from ccmodel.model.exact.path import LUMP, NODE, PER_M, PathTables
 from ccmodel.model.exact.segment import displacement_gain, solve_segment, tension_gain
+from ccmodel.model.exact.state import State
 
 # Two lines whose tensions differ by less than this share are one.
 ROUNDING = 1e-15
 
 
 @kernel
-def start_front(path, state, c, end, sigma):
+def start_front(path: PathTables, state: State, c: int, end: int, sigma: int) -> None:
     """Start a front at an end of cable `c`, from the present tension and displacement of that end."""
     sign = 1.0 - 2.0 * c
     front = state.front
@@ -35,7 +36,7 @@ def start_front(path, state, c, end, sigma):
 
 
 @kernel
-def aim(path, state, c, end):
+def aim(path: PathTables, state: State, c: int, end: int) -> None:
     """Set up the segment ahead of a front; segments that already have the sliding line's slope are passed at once."""
     front, kind = state.front, state.kind
     sigma = kind[c, rows.SIGMA + 3 * end]
@@ -72,7 +73,7 @@ def aim(path, state, c, end):
 
 
 @kernel
-def _pass_corner(path, state, c, end, corner, node):
+def _pass_corner(path: PathTables, state: State, c: int, end: int, corner: bool, node: bool) -> None:
     """Pass a corner of the stored profile, a node of the path, or both."""
     if corner:
         if end == 0:
@@ -87,7 +88,7 @@ def _pass_corner(path, state, c, end, corner, node):
 
 
 @small_kernel
-def walk(path, state, c, end, weight_P, weight_d, target):
+def walk(path: PathTables, state: State, c: int, end: int, weight_P: float, weight_d: float, target: float) -> None:
     """Advance a front until weight_P P + weight_d d = target, P the end's tension (N), d the end's displacement (m).
 
     It stops where the stored profile ends, with no segment ahead (OPEN = 0).
@@ -118,7 +119,7 @@ def walk(path, state, c, end, weight_P, weight_d, target):
 
 
 @kernel
-def _pass_segment(path, state, c, end, sigma, r):
+def _pass_segment(path: PathTables, state: State, c: int, end: int, sigma: int, r: float) -> None:
     """Take a front to the end of its segment and on into the next."""
     front = state.front
     slope = front[2 * c + end, rows.SLOPE]
@@ -138,7 +139,7 @@ def _pass_segment(path, state, c, end, sigma, r):
 
 
 @small_kernel
-def position(state, c, end):
+def position(state: State, c: int, end: int) -> float:
     """Position of a front, m = mu phi counted from its end."""
     return state.front[2 * c + end, rows.ME] + state.kind[c, rows.SIGMA + 3 * end] * log1p(
         state.front[2 * c + end, rows.R]
@@ -146,7 +147,7 @@ def position(state, c, end):
 
 
 @kernel
-def end_compliance(state, c, end):
+def end_compliance(state: State, c: int, end: int) -> float:
     """Displacement of an end per unit of its own tension while its front advances, m/N."""
     front = state.front
     sigma = state.kind[c, rows.SIGMA + 3 * end]
@@ -156,7 +157,7 @@ def end_compliance(state, c, end):
 
 
 @small_kernel
-def has_met(path, state, c):
+def has_met(path: PathTables, state: State, c: int) -> bool:
     """Whether two fronts that slide in the same direction have met: their sliding lines are then one line."""
     if state.kind[c, rows.OPEN] == 0 or state.kind[c, rows.OPEN + 3] == 0:
         return True

@@ -105,7 +105,7 @@ def simulate_pair(
         drive = theta_in[: stop + 1], R_i
         kernels.run(tables, state, saved, progress, drive, offset, stiffness, present, out, phase, balance)
         if stop in record_profiles_at:
-            profiles[stop] = tuple(cable_profile(state, tables, transmission, c) for c in np.flatnonzero(present))
+            profiles[stop] = tuple(cable_profile(state, tables, transmission, c) for c in range(2) if present[c])
 
     tensions, theta_out = dict(zip(TENSIONS, out[:4], strict=True)), out[4]
     if stiffness > 0:

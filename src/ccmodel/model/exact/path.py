@@ -46,38 +46,38 @@ class PathTables(NamedTuple):
 
 def tabulate(path: ConduitPath, friction_coefficient: float, axial_rigidity_N: float) -> PathTables:
     """Tables of `path` for a cable of axial rigidity EA (N) and friction mu."""
-    node, bend, x_start, x_per_m, straight = [0.0], [], [], [], [0.0]
+    nodes, bends, starts, lengths, straight = [0.0], [], [], [], [0.0]
     x = 0.0
     for length, angle in zip(path.piece_length_m, path.piece_bend_rad, strict=True):
         m = friction_coefficient * angle
         if m < STRAIGHT:
             straight[-1] += length
         else:
-            node.append(node[-1] + m)
-            bend.append(length / (m * axial_rigidity_N))
-            x_start.append(x)
-            x_per_m.append(length / m)
+            nodes.append(nodes[-1] + m)
+            bends.append(length / (m * axial_rigidity_N))
+            starts.append(x)
+            lengths.append(length / m)
             straight.append(0.0)
         x += length
-    node, bend, x_start, x_per_m = (np.array(a, dtype=float) for a in (node, bend, x_start, x_per_m))
+    node, bend, x_start, x_per_m = (np.array(a, dtype=float) for a in (nodes, bends, starts, lengths))
     lump = np.array(straight) / axial_rigidity_N
     total = float(node[-1])
     x_end = x_start + x_per_m * np.diff(node)
     table = np.zeros((2, LUMP + 1, node.size))
     _fill(table[0], node, bend, x_start, x_per_m, lump)
     _fill(table[1], total - node[::-1], bend[::-1], x - x_end[::-1], x_per_m[::-1], lump[::-1])
-    compliance = tuple(_line_compliance(node, bend, lump, slope) for slope in (-1, 1))
+    compliance = _line_compliance(node, bend, lump, -1), _line_compliance(node, bend, lump, 1)
     return PathTables(table, (math.exp(-total), math.exp(total)), compliance, total, float(x))
 
 
-def _fill(table, node, bend, x_start, x_per_m, lump):
+def _fill(table: NDArray, node: NDArray, bend: NDArray, x_start: NDArray, x_per_m: NDArray, lump: NDArray) -> None:
     """Write the rows of one end."""
     table[NODE], table[LUMP] = node, lump
     for row, values in ((PER_M, bend), (X_START, x_start), (X_PER_M, x_per_m)):
         table[row, :-1] = values
 
 
-def _line_compliance(node, bend, lump, slope) -> float:
+def _line_compliance(node: NDArray, bend: NDArray, lump: NDArray, slope: int) -> float:
     """Integral of exp(slope m) dx / EA over the path, m/N."""
     bends = bend * np.exp(slope * node[:-1]) * slope * np.expm1(slope * np.diff(node))
     return float(bends.sum() + (lump * np.exp(slope * node)).sum())

@@ -2,16 +2,31 @@
 
 from math import inf
 
+from numpy.typing import NDArray
+
 from ccmodel.kernel import borrowed, kernel, small_kernel
 from ccmodel.model.exact import state as rows
 from ccmodel.model.exact.cable import is_slack
 from ccmodel.model.exact.front import position
-from ccmodel.model.exact.path import NODE, X_PER_M, X_START
+from ccmodel.model.exact.path import NODE, X_PER_M, X_START, PathTables
+from ccmodel.model.exact.state import State
 from ccmodel.model.exact.step import excess, step
 
 
 @kernel
-def run(path, state, saved, progress, drive, offset, stiffness, present, out, phase, balance):
+def run(
+    path: PathTables,
+    state: State,
+    saved: State,
+    progress: NDArray,
+    drive: tuple[NDArray, float],
+    offset: float,
+    stiffness: float,
+    present: NDArray,
+    out: NDArray,
+    phase: NDArray,
+    balance: NDArray,
+) -> None:
     """Simulate from sample progress[0] on.
 
     Parameters
@@ -62,7 +77,7 @@ def run(path, state, saved, progress, drive, offset, stiffness, present, out, ph
 
 
 @kernel
-def settle(path, state, saved, offset, stiffness):
+def settle(path: PathTables, state: State, saved: State, offset: float, stiffness: float) -> None:
     """Let a load that does not hold the initial tensions find its balance while the drive rests."""
     if offset == state.value[rows.PAIR, rows.OFFSET]:
         return
@@ -71,7 +86,7 @@ def settle(path, state, saved, offset, stiffness):
 
 
 @small_kernel
-def _any_slack(state, present):
+def _any_slack(state: State, present: NDArray) -> int:
     for c in range(2):
         if present[c] and is_slack(state, c):
             return 1
@@ -79,7 +94,7 @@ def _any_slack(state, present):
 
 
 @small_kernel
-def _phase(state, present, progress):
+def _phase(state: State, present: NDArray, progress: NDArray) -> int:
     """0 to 2 for phases I to III, 3 for IVa, 4 for IVb."""
     if _any_slack(state, present):
         return 4 if progress[2] else 3
@@ -96,7 +111,7 @@ def _phase(state, present, progress):
 
 
 @small_kernel
-def _moving(path, state, c):
+def _moving(path: PathTables, state: State, c: int) -> tuple[float, float]:
     """Arc lengths up to which and from which on a cable has slid since the last reversal, m."""
     if state.kind[c, rows.MODE] == rows.WHOLE:
         return path.length, 0.0
@@ -104,7 +119,7 @@ def _moving(path, state, c):
 
 
 @small_kernel
-def _reach(path, state, c, end):
+def _reach(path: PathTables, state: State, c: int, end: int) -> float:
     """Arc length between an end and its front, m."""
     if state.front[2 * c + end, rows.D] == state.front[2 * c + end, rows.D_START]:
         return 0.0

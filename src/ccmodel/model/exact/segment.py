@@ -12,12 +12,14 @@ from the entry into the segment, not from the last sample: small steps and large
 
 from math import exp, expm1, log1p, sqrt
 
+from numpy.typing import NDArray
+
 from ccmodel.kernel import kernel, small_kernel
 from ccmodel.model.exact.state import BEND, EE, PE, R_STOP, SLOPE, TE
 
 
 @kernel
-def _segment_stretch(s, y):
+def _segment_stretch(s: float, y: float) -> float:
     """Displacement over a segment of relative slope s up to y, over tension at entry and c.
 
     exp((s + 1) y) - exp(s y) - (exp(s y) - 1) / s, summed as a series where these terms cancel.
@@ -37,7 +39,7 @@ def _segment_stretch(s, y):
 
 
 @small_kernel
-def tension_gain(slope, r):
+def tension_gain(slope: float, r: float) -> float:
     """Relative rise of the end's tension since the segment was entered."""
     if slope == 1.0:
         return r * (2.0 + r)
@@ -45,7 +47,7 @@ def tension_gain(slope, r):
 
 
 @small_kernel
-def displacement_gain(front, c, end, sigma, r):
+def displacement_gain(front: NDArray, c: int, end: int, sigma: int, r: float) -> float:
     """Displacement of the end since the segment was entered, m."""
     T_e, E, bend, slope = (
         front[2 * c + end, TE],
@@ -60,7 +62,9 @@ def displacement_gain(front, c, end, sigma, r):
 
 
 @small_kernel
-def solve_segment(front, c, end, sigma, weight_P, weight_d, residual):
+def solve_segment(
+    front: NDArray, c: int, end: int, sigma: int, weight_P: float, weight_d: float, residual: float
+) -> float:
     """Solve weight_P (P - P_e) + weight_d (d - d_e) = residual for r within the segment."""
     T_e, P_e, E, bend = front[2 * c + end, TE], front[2 * c + end, PE], front[2 * c + end, EE], front[2 * c + end, BEND]
     slope = front[2 * c + end, SLOPE]
@@ -72,7 +76,7 @@ def solve_segment(front, c, end, sigma, weight_P, weight_d, residual):
 
 
 @kernel
-def _solve_sloping(slope, b, k, residual, y_stop):
+def _solve_sloping(slope: float, b: float, k: float, residual: float, y_stop: float) -> float:
     """Solve b expm1((1 + slope) y) + k stretch(y) = residual for r = expm1(y), y between 0 and y_stop.
 
     Newton's method, bisecting where it leaves the bracket.

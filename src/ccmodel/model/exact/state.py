@@ -97,7 +97,7 @@ def blank_state(capacity: int) -> State:
 
 
 @small_kernel
-def copy_fronts(state, to, c):
+def copy_fronts(state: State, to: State, c: int) -> None:
     """Copy what advancing the fronts of cable `c` may change from `state` into `to`."""
     for i in range(FRONT_FIELDS):
         to.front[2 * c, i] = state.front[2 * c, i]
@@ -107,7 +107,7 @@ def copy_fronts(state, to, c):
 
 
 @kernel
-def copy_state(state, to):
+def copy_state(state: State, to: State) -> None:
     """Copy what moving the pulleys may change from `state` into `to`.
 
     Corners are not copied: fronts that advance pass them by their indices `LO` and `HI`, and only a reversal writes
@@ -121,7 +121,7 @@ def copy_state(state, to):
 
 
 @small_kernel
-def elongation(state, c):
+def elongation(state: State, c: int) -> float:
     """End-to-end elongation of cable `c` beyond its natural length, m."""
     sign = 1.0 - 2.0 * c
     return state.value[c, E0] + sign * (state.value[PAIR, DRIVE] - state.value[PAIR, LOAD])

@@ -18,11 +18,14 @@ from ccmodel.kernel import kernel, small_kernel
 from ccmodel.model.exact import state as rows
 from ccmodel.model.exact.cable import line_stiffness, pull_line, reverse, slide_whole
 from ccmodel.model.exact.front import end_compliance, has_met, walk
-from ccmodel.model.exact.state import copy_fronts, copy_state
+from ccmodel.model.exact.path import PathTables
+from ccmodel.model.exact.state import State, copy_fronts, copy_state
 
 
 @kernel
-def step(path, state, saved, direction, drive, offset, stiffness):
+def step(
+    path: PathTables, state: State, saved: State, direction: int, drive: float, offset: float, stiffness: float
+) -> None:
     """Move the drive's rim to `drive` (m) and the constant part of the load's law to `offset` (N).
 
     `direction` is +1 where the drive pulls cable A, -1 where it pulls B. A load that the cables do not move on in that
@@ -69,7 +72,7 @@ def step(path, state, saved, direction, drive, offset, stiffness):
 
 
 @small_kernel
-def excess(state, offset, stiffness):
+def excess(state: State, offset: float, stiffness: float) -> float:
     """Force out of balance at the rim of the load pulley, T2 - T4 - offset - stiffness Q, N."""
     return (
         state.value[0, rows.T_LOAD]
@@ -80,7 +83,7 @@ def excess(state, offset, stiffness):
 
 
 @small_kernel
-def _balance_lines(path, state, offset, stiffness):
+def _balance_lines(path: PathTables, state: State, offset: float, stiffness: float) -> None:
     """Balance the load where both cables slide as a whole, taut or slack."""
     k_A = line_stiffness(path, state, 0)[1]
     k_B = line_stiffness(path, state, 1)[1]
@@ -94,7 +97,9 @@ def _balance_lines(path, state, offset, stiffness):
 
 
 @small_kernel
-def _balanced_load(k_A, e_A, k_B, e_B, offset, stiffness, load):
+def _balanced_load(
+    k_A: float, e_A: float, k_B: float, e_B: float, offset: float, stiffness: float, load: float
+) -> float:
     """Solve k_A max(0, e_A - Q) - k_B max(0, e_B + Q) = offset + stiffness Q for Q; `load` where nothing holds it."""
     total = k_A + k_B + stiffness
     if total == 0.0:
@@ -108,7 +113,7 @@ def _balanced_load(k_A, e_A, k_B, e_B, offset, stiffness, load):
 
 
 @kernel
-def _balance_one_front(path, state, saved, c, offset, stiffness):
+def _balance_one_front(path: PathTables, state: State, saved: State, c: int, offset: float, stiffness: float) -> None:
     """Balance the load where cable `c` has fronts and the other slides as a whole, taut or slack.
 
     With P the load-end tension of cable `c`, d = -sign Q the displacement of that end, and k (stretch - d) the load-end
@@ -133,7 +138,9 @@ def _balance_one_front(path, state, saved, c, offset, stiffness):
 
 
 @kernel
-def _balance_both_fronts(path, state, saved, direction, offset, stiffness):
+def _balance_both_fronts(
+    path: PathTables, state: State, saved: State, direction: int, offset: float, stiffness: float
+) -> None:
     """Balance the load, moving in `direction`, between cables that both have fronts; whether these meet is ignored.
 
     The unknown of the Newton iteration is the load-end tension of the cable that is pulled at the load, not the load's
@@ -176,7 +183,7 @@ def _balance_both_fronts(path, state, saved, direction, offset, stiffness):
 
 
 @kernel
-def _first_to_slide_whole(path, state, saved, direction):
+def _first_to_slide_whole(path: PathTables, state: State, saved: State, direction: int) -> int:
     """Let the cable whose fronts meet first slide as a whole; returns the other cable.
 
     For each cable the load moves until the load-end tension is the drive-end tension times the capstan ratio, where

@@ -58,7 +58,7 @@ def _check(a: Active, known: Mechanism) -> None:
     if not np.isfinite(list(a.values.values())).all():
         raise ModelError(f"{a.name} has a parameter that is not finite: {dict(a.values)}")
     for p in known.parameters:
-        value = a.values.get(p.name, p.default)
+        value = a.values[p.name] if p.default is None else a.values.get(p.name, p.default)
         if not p.above < value < p.below:
             limit = f"above {p.above:g}" if value <= p.above else f"below {p.below:g}"
             raise ModelError(f"{a.name} has {p.name} = {value:g} ({p.meaning}), which must be {limit}")

@@ -9,6 +9,8 @@ so that a node that slides has the capstan's ratio T_i / T_{i+1} = exp(mu phi_i)
 the equations piecewise linear.
 """
 
+from numpy.typing import NDArray
+
 from ccmodel.elementary import quick_tanh
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.backlash import dead_zone
@@ -18,10 +20,11 @@ from ccmodel.mechanisms.pulley_eccentricity import winding, winding_change
 from ccmodel.mechanisms.strand_settling import settling_tension
 from ccmodel.mechanisms.stribeck import renewed
 from ccmodel.model.general import layout as rows
+from ccmodel.model.general.layout import Physics
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
-def _tensions(ph, piece, slide, mean, weights):
+def _tensions(ph: Physics, piece: NDArray, slide: NDArray, mean: NDArray, weights: tuple[float, float, float]) -> None:
     """Tension (N) and tangent stiffness (N/m) of each piece for the slides of this step."""
     n1 = piece.shape[2]
     for c in range(2):
@@ -60,7 +63,7 @@ def _tensions(ph, piece, slide, mean, weights):
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
-def _settle(piece, c):
+def _settle(piece: NDArray, c: int) -> None:
     """Pull and tangent stiffness of each piece of a cable whose strands settle, from its stretch in row `TENSION`.
 
     Loops that call elementary functions do nothing else, here and elsewhere, so that the compiler vectorises them.
@@ -80,7 +83,7 @@ def _settle(piece, c):
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
-def _set_hold(ph, piece, node, c):
+def _set_hold(ph: Physics, piece: NDArray, node: NDArray, c: int) -> None:
     """Tension-dependent friction of each node over the sum of its tensions, and half that sum times its derivative."""
     T, grip, now, slope = piece[rows.TENSION, c], node[rows.GRIP, c], node[rows.GRIP_NOW, c], node[rows.GRIP_SLOPE, c]
     for i in range(node.shape[2]):
@@ -92,7 +95,7 @@ def _set_hold(ph, piece, node, c):
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
-def _nodes(ph, piece, node, slide, dt, bristle):
+def _nodes(ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, dt: float, bristle: float) -> float:
     """Force out of balance at each node and its derivatives; returns the sum of its squares, N^2."""
     n = node.shape[2]
     total = 0.0
@@ -139,7 +142,9 @@ def _nodes(ph, piece, node, slide, dt, bristle):
 
 
 @kernel(error_model="numpy")
-def _load(ph, piece, load, rotation, torque, dt):
+def _load(
+    ph: Physics, piece: NDArray, load: NDArray, rotation: float, torque: float, dt: float
+) -> tuple[float, float, float]:
     """Torque out of balance at the load pulley (N m), its derivative by angle without the cables, and the radius."""
     n = piece.shape[2] - 1
     theta = load[rows.ANGLE] + rotation
@@ -166,7 +171,19 @@ def _load(ph, piece, load, rotation, torque, dt):
 
 
 @kernel(error_model="numpy")
-def imbalance(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle, weights):
+def imbalance(
+    ph: Physics,
+    piece: NDArray,
+    node: NDArray,
+    slide: NDArray,
+    mean: NDArray,
+    load: NDArray,
+    rotation: float,
+    torque: float,
+    dt: float,
+    bristle: float,
+    weights: tuple[float, float, float],
+) -> tuple[float, float, float, float, float]:
     """Imbalance of the whole chain: sum of squares (N^2), highest tension (N), and the terms of `_load`."""
     n = node.shape[2]
     pulled = ph.radius * winding_change(load[rows.ANGLE], rotation, ph.load_eccentricity, ph.load_eccentricity_rad)
@@ -186,7 +203,7 @@ def imbalance(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle,
 
 
 @kernel(error_model="numpy")
-def _mean_tension(piece, c):
+def _mean_tension(piece: NDArray, c: int) -> float:
     """Mean tension of a cable along its length, N."""
     total = 0.0
     for i in range(piece.shape[2]):
@@ -195,7 +212,7 @@ def _mean_tension(piece, c):
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
-def set_grip(ph, node, slide, friction_factor, dt):
+def set_grip(ph: Physics, node: NDArray, slide: NDArray, friction_factor: float, dt: float) -> float:
     """Set friction of each node over the sum of its tensions; with a power of tension, only its argument mu phi / 2.
 
     The contacts' memory of rest at the end of the step follows from the slides in `NOW`, the best estimate so far.
@@ -221,7 +238,7 @@ def set_grip(ph, node, slide, friction_factor, dt):
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
-def renew_contacts(ph, node, slide, c, dt, into):
+def renew_contacts(ph: Physics, node: NDArray, slide: NDArray, c: int, dt: float, into: int) -> None:
     """Write the contacts' memory of rest after the slides in `NOW` into row `into`."""
     rested, d, following = node[rows.RESTED, c], slide[rows.NOW, c], node[into, c]
     for i in range(node.shape[2]):

@@ -63,13 +63,12 @@ def make_grid(path: ConduitPath, elements: int, kinks: tuple[Kink, ...] = ()) ->
     kinks : tuple of Kink
     """
     length, bend = path.length_m, path.bend_rad
-    kinks = sorted(kinks)
     corners = np.concatenate([[0.0], np.cumsum(path.piece_length_m)])
     corners[-1] = length
     corners = np.union1d(corners, [kink.share * length for kink in kinks])
     weight = BEND_WEIGHT if bend > 0 else 0.0
 
-    def coordinate(x):
+    def coordinate(x: NDArray) -> NDArray:
         curved = path.bend_at(x) / bend if bend > 0 else 0.0
         return weight * curved + (1 - weight) * x / length
 
@@ -83,7 +82,7 @@ def make_grid(path: ConduitPath, elements: int, kinks: tuple[Kink, ...] = ()) ->
     x = np.union1d(x[keep], corners)
     phi = path.bend_at(x)
     held = phi.copy()
-    for kink in kinks:
+    for kink in sorted(kinks):
         i = int(np.searchsorted(x, kink.share * length)) + 1
         x, phi, held = (np.insert(values, i, values[i - 1]) for values in (x, phi, held))
         phi[i:] += kink.bend_rad

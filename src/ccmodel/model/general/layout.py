@@ -5,6 +5,7 @@ at every call.
 """
 
 from collections import namedtuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ccmodel import mechanisms as registry
 
@@ -58,10 +59,28 @@ ANGLE, ROTATION, DT, OMEGA, OMEGA_BEFORE, BEARING, OMEGA_NEXT, BEARING_NEXT, TOR
 PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10, 18, 5, 11, 9
 
 # Constants of a run: its own, and every setting of the mechanisms.
-Physics = namedtuple(
-    "Physics",
-    "has_settling has_relaxation bristle presliding radius stiffness_load load_damping kind general_friction "
-    + " ".join(registry.march_settings()),
-)
+if TYPE_CHECKING:
+
+    class Physics(NamedTuple):
+        """Of the fields of a mechanism, a type checker knows only that they are numbers."""
+
+        has_settling: bool
+        has_relaxation: bool
+        bristle: float
+        presliding: bool
+        radius: float
+        stiffness_load: float
+        load_damping: float
+        kind: int
+        general_friction: bool
+
+        def __getattr__(self, name: str) -> float: ...
+
+else:
+    Physics = namedtuple(
+        "Physics",
+        "has_settling has_relaxation bristle presliding radius stiffness_load load_damping kind general_friction "
+        + " ".join(registry.march_settings()),
+    )
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}  # not nnan: a NaN must be seen

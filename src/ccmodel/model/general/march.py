@@ -5,11 +5,14 @@ cable B. Displacements count towards the drive end. A step solves the equations 
 `ccmodel.model.general.newton`.
 """
 
+from numpy.typing import NDArray
+
 from ccmodel.kernel import borrowed, kernel
 from ccmodel.mechanisms.pulley_eccentricity import winding
 from ccmodel.mechanisms.relaxation import lag_weights
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.equations import renew_contacts, set_grip
+from ccmodel.model.general.layout import Physics
 from ccmodel.model.general.newton import copy_slides, solve_step
 
 # Coulomb friction has no bristle; this one is a ten-millionth of the stretch of any cable worth pulling.
@@ -29,7 +32,9 @@ ROUNDING = 1e-9
 
 
 @kernel(error_model="numpy")
-def _accept(ph, piece, node, slide, mean, load, rotation, dt):
+def _accept(
+    ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, mean: NDArray, load: NDArray, rotation: float, dt: float
+) -> None:
     """Make a solved step the state."""
     n = node.shape[2]
     weights = lag_weights(dt / ph.relaxing_time_s) if ph.has_relaxation and dt > 0.0 else (1.0, 0.0, 0.0)
@@ -64,7 +69,21 @@ def _accept(ph, piece, node, slide, mean, load, rotation, dt):
 
 
 @kernel(error_model="numpy")
-def march(ph, piece, node, slide, mean, load, time_s, theta_in, drive, friction_factor, series, steps, out):
+def march(
+    ph: Physics,
+    piece: NDArray,
+    node: NDArray,
+    slide: NDArray,
+    mean: NDArray,
+    load: NDArray,
+    time_s: NDArray,
+    theta_in: NDArray,
+    drive: tuple[float, float, float],
+    friction_factor: NDArray,
+    series: NDArray,
+    steps: int,
+    out: NDArray,
+) -> int:
     """Step through the samples.
 
     Parameters

@@ -5,11 +5,13 @@ from both drive ends at once. A compliant conduit adds the mean tension of its c
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.relaxation import lag_weights
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.equations import imbalance
+from ccmodel.model.general.layout import Physics
 
 # Out of balance by no more than this share of the highest tension.
 TOLERANCE = 1e-8
@@ -23,7 +25,7 @@ SMALLEST_SHARE = 1.0 / 128
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
-def solve(piece, node, slide, G, slope, R, free):
+def solve(piece: NDArray, node: NDArray, slide: NDArray, G: float, slope: float, R: float, free: bool) -> float:
     """Newton's step of the slides into `STEP`; returns that of the load pulley's rotation.
 
     Elimination from the drive ends: delta_i = alpha_i + beta_i delta_{i+1}. gamma = 1 - beta is carried along by
@@ -53,7 +55,17 @@ def solve(piece, node, slide, G, slope, R, free):
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
-def solve_with_conduits(ph, piece, node, slide, mean, G, slope, R, free):
+def solve_with_conduits(
+    ph: Physics,
+    piece: NDArray,
+    node: NDArray,
+    slide: NDArray,
+    mean: NDArray,
+    G: float,
+    slope: float,
+    R: float,
+    free: bool,
+) -> float:
     """The same with the cables' mean tensions unknown, for compliant conduits; their steps go into `MEAN_STEP`.
 
     Every slide is linear in the load end's slide and in the cable's mean tension. The conduit's equation gives the mean
@@ -115,7 +127,7 @@ def solve_with_conduits(ph, piece, node, slide, mean, G, slope, R, free):
 
 
 @kernel(error_model="numpy")
-def _move(ph, node, slide, share, bristle):
+def _move(ph: Physics, node: NDArray, slide: NDArray, share: float, bristle: float) -> None:
     """Add a share of Newton's step to the slides, but stop a node at the edge of sticking before it reverses.
 
     Between sliding in one direction and in the other lies the narrow range in which the node sticks. Newton's method
@@ -141,7 +153,7 @@ def _move(ph, node, slide, share, bristle):
 
 
 @kernel
-def copy_slides(slide, to, source):
+def copy_slides(slide: NDArray, to: int, source: int) -> None:
     """Copy a row of slides to another; slicing takes several times as long for so few."""
     for c in range(2):
         for i in range(slide.shape[2]):
@@ -149,13 +161,24 @@ def copy_slides(slide, to, source):
 
 
 @kernel
-def copy_means(mean, to, source):
+def copy_means(mean: NDArray, to: int, source: int) -> None:
     """Copy a row of mean tensions to another."""
     mean[to, 0], mean[to, 1] = mean[source, 0], mean[source, 1]
 
 
 @kernel(error_model="numpy")
-def solve_step(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle):
+def solve_step(
+    ph: Physics,
+    piece: NDArray,
+    node: NDArray,
+    slide: NDArray,
+    mean: NDArray,
+    load: NDArray,
+    rotation: float,
+    torque: float,
+    dt: float,
+    bristle: float,
+) -> tuple[bool, float]:
     """Solve a step, starting from the slides in `NOW` and a rotation of the load; (converged, rotation of the load)."""
     free = ph.kind == rows.IMPEDANCE
     weights = lag_weights(dt / ph.relaxing_time_s) if ph.has_relaxation and dt > 0.0 else (1.0, 0.0, 0.0)

@@ -1,8 +1,11 @@
 """The chain at rest before the drive moves: stretch and friction under the initial tension, and the load's angle."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.mechanisms.contract import Settings
 from ccmodel.mechanisms.load_dependent_friction import FLOOR_N, REFERENCE_N
 from ccmodel.mechanisms.pulley_eccentricity import winding
 from ccmodel.mechanisms.strand_settling import stretch_at
@@ -13,7 +16,14 @@ from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoa
 ABSENT_SLACK_M = 1e3
 
 
-def initial_state(physics, piece, node, settings, profiles, friction_factor) -> NDArray:
+def initial_state(
+    physics: rows.Physics,
+    piece: NDArray,
+    node: NDArray,
+    settings: Settings,
+    profiles: Sequence[NDArray],
+    friction_factor: float,
+) -> NDArray:
     """Write the state under the initial tension into `piece` and `node`; returns the tension of each piece (N)."""
     T = np.stack(profiles)
     if settings.drive_end_compliance > 0:

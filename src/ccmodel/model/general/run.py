@@ -110,7 +110,7 @@ def simulate(
     state[rows.ANGLE] = load_angle(physics, T, load, series)
     slide = np.zeros((rows.SLIDE_ROWS, 2, node.shape[2] + 2))
     eccentricity = settings.drive_eccentricity, settings.drive_eccentricity_rad
-    drive = tuple(map(float, (transmission.drive_radius_m, *eccentricity)))
+    drive = (float(transmission.drive_radius_m), float(eccentricity[0]), float(eccentricity[1]))
     out = np.empty((len(OUTPUTS), time_s.size))
     steps *= _steps(physics, transmission, time_s)
     solved = march(
@@ -123,7 +123,9 @@ def simulate(
     return _response(transmission, active, time_s[:solved], theta_in[:solved], out)
 
 
-def _response(transmission, active, time_s, theta_in, out) -> GeneralResponse:
+def _response(
+    transmission: Transmission, active: Sequence[Active], time_s: NDArray, theta_in: NDArray, out: NDArray
+) -> GeneralResponse:
     """Outputs of the march up to the last sample of `time_s`, and what the sensors read of them."""
     response = PairResponse(
         **dict(zip(OUTPUTS, out[:, : time_s.size], strict=True)),
@@ -154,7 +156,7 @@ def _series(load: Load) -> NDArray | None:
     return None
 
 
-def _check(time_s, theta_in, series, elements):
+def _check(time_s: NDArray, theta_in: NDArray, series: NDArray | None, elements: int) -> None:
     if elements < 1:
         raise ModelError(f"each cable needs at least one element; got {elements}")
     for name, values in {"time_s": time_s, "the load's series": series}.items():

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from math import inf
 from statistics import median
+from typing import Any
 
 from ccmodel.recording import ORIGIN
 from ccmodel.report.verdict import (
@@ -40,8 +41,8 @@ def cards(batches: Sequence[Mapping], diagnoses: Sequence[Mapping]) -> list[dict
 
 def _card(summary: Mapping, diagnoses: Mapping[str, Mapping]) -> dict:
     name = _name(summary)
-    origin = summary["batch"]["origin"] if summary["batch"] else None
-    card = {
+    origin = summary["batch"]["origin"] if summary["batch"] else ""
+    card: dict[str, Any] = {
         "batch": name,
         "origin": {"rig": "measured", "virtual-rig": "simulated"}.get(origin, "no usable recording"),
         "measured": origin == "rig",
@@ -141,7 +142,7 @@ def caution(diagnosis: Mapping) -> str | None:
     if diagnosis["verdict"] == "unexplained" or not above:
         return None
     if diagnosis["verdict"] != "agrees":
-        worst = max(above, key=above.get)
+        worst = max(above, key=above.__getitem__)
         return f"Not all is accounted for: up to {above[worst]:.1f} times the noise is left, in the {worst}."
     square = diagnosis["fit"]["mean_square"]["calibrated"]
     return (

@@ -84,19 +84,21 @@ def packed(recording: Recording, models: Mapping[str, Recording | None]) -> byte
     one refers to it.
     """
     every = slice(None, None, -(-recording.time_s.size // MOST_SAMPLES))
-    models = {name: model for name, model in models.items() if model is not None}
+    simulated = {name: model for name, model in models.items() if model is not None}
     series = [("", "time_s", recording.time_s)]
     series += [(RECORDED, c, recording[c]) for c in CHANNELS if c in recording]
     series += [
         (name, c, model[c])
-        for name, model in models.items()
+        for name, model in simulated.items()
         for c in CHANNELS
         if c in model and model.derived_from.get(c) != PRESCRIBED
     ]
-    rows, blocks, seen = [], [], {}
+    rows: list[dict[str, str | float]] = []
+    blocks: list[bytes] = []
+    seen: dict[bytes, int] = {}
     for set_name, channel, values in series:
         values = np.asarray(values, dtype=float)[every]
-        row = {"set": set_name, "channel": channel}
+        row: dict[str, str | float] = {"set": set_name, "channel": channel}
         key = values.tobytes()
         if key in seen:
             row["same_as"] = seen[key]
@@ -106,7 +108,7 @@ def packed(recording: Recording, models: Mapping[str, Recording | None]) -> byte
             row |= {"low": low, "step": step}
             blocks.append(block)
         rows.append(row)
-    model = next(reversed(models.values()), None) if models else None
+    model = next(reversed(simulated.values()), None)
     header = {"count": recording.time_s[every].size, "series": rows, "phases": phases(recording, model)}
     text = json.dumps(header, separators=(",", ":"), allow_nan=False).encode()
     return len(text).to_bytes(4, "little") + text + b"".join(blocks)

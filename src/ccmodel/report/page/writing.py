@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -69,7 +70,7 @@ class Content:
 
 
 def write_report(
-    page_file: Path, inputs: Mapping[str, Sequence[str]], parameters: Sequence[str], studies: Sequence[dict],
+    page_file: Path, inputs: Mapping[str, Any], parameters: Sequence[str], studies: Sequence[dict],
     raw: Path, unusable: Sequence[str],
 ) -> None:  # fmt: skip
     """Write the page, and next to it the messages on what was left out (left-out.json).
@@ -78,7 +79,7 @@ def write_report(
     ----------
     page_file : Path
         The page, in the folder of all results.
-    inputs : mapping of str to sequence of str
+    inputs : mapping of str to str or sequence of str
         JSON files: ``summaries`` of the ingested batches, ``fits``, ``simulations``, ``diagnoses``; ``reports``, the
         reports of the diagnoses (HTML) in the same order; ``recordings`` and ``simulated`` of every run (netCDF);
         ``errors``, the table of errors (Parquet); ``concealed``, what the simulated rigs have, if it is stated.
@@ -91,8 +92,8 @@ def write_report(
     unusable : sequence of str
         Messages on folders that cannot be a batch.
     """
-    batches, fits, simulations = ([read_json(f) for f in inputs[k]] for k in ("summaries", "fits", "simulations"))
-    diagnoses = [read_json(file) for file in inputs["diagnoses"]]
+    batches, fits, simulations = ([read_json(Path(f)) for f in inputs[k]] for k in ("summaries", "fits", "simulations"))
+    diagnoses = [read_json(Path(file)) for file in inputs["diagnoses"]]
     messages = _messages(raw, unusable, batches, fits, simulations, diagnoses)
     write_json(page_file.parent / LEFT_OUT, messages)
     reports = [Path(file).read_text(encoding="utf-8") for file in inputs["reports"]]

@@ -48,6 +48,8 @@ def check_consistency(recordings: list[Recording], batch: Batch) -> list[Finding
     """The contradictions of a batch as findings of severity "inconsistent"; see `contradictions`."""
     files = {entry.id: entry.file for entry in batch.recordings}
     return [
-        Finding(batch.batch, files.get(c.recording, "batch.yaml"), None, c.what, "inconsistent", c.text, c.confidence)
+        Finding(
+            batch.batch, files.get(c.recording or "", "batch.yaml"), None, c.what, "inconsistent", c.text, c.confidence
+        )
         for c in contradictions(recordings, batch)
     ]

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ccmodel.channels import THETA_IN, THETA_OUT
 from ccmodel.rig.consistency import limits
@@ -36,7 +37,7 @@ def drift_of(parity: Parity) -> tuple[float, float] | None:
     return (rate, change) if abs(change) > 4 * scatter else (0.0, 0.0)
 
 
-def _times(time_s, values, marks):
+def _times(time_s: NDArray, values: NDArray, marks: NDArray) -> NDArray:
     """Times of the crossings, s, between samples: the line through the samples near each."""
     middle = (values.max() + values.min()) / 2
     found = []
@@ -47,11 +48,11 @@ def _times(time_s, values, marks):
     return np.array(found)
 
 
-def _equal(values) -> bool:
+def _equal(values: NDArray) -> bool:
     return bool(np.ptp(values) <= limits.EQUAL_CYCLES * np.abs(values).mean())
 
 
-def _strokes(values, marks):
+def _strokes(values: NDArray, marks: NDArray) -> NDArray:
     """Greatest distance from the middle between crossings."""
     middle = (values.max() + values.min()) / 2
     return np.array([np.abs(values[a : b + 1] - middle).max() for a, b in pairwise(marks)])

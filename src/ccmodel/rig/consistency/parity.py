@@ -165,12 +165,12 @@ class Parity:
         if not all(name in x for name in (T1, T2, T3, T4, THETA_OUT)):
             return None
         stretch = rig.drive.pulley_radius_m * x[THETA_IN] - rig.load.pulley_radius_m * x[THETA_OUT]
-        tension, length = [], []
+        tensions, lengths = [], []
         for ends, sign in (((T1, T2), 1), ((T3, T4), -1)):
             taut = np.minimum(x[ends[0]], x[ends[1]]) > self._taut
-            tension.append((x[ends[0]] + x[ends[1]])[taut] / 2)
-            length.append(sign * stretch[taut])
-        tension, length = np.concatenate(tension), np.concatenate(length)
+            tensions.append((x[ends[0]] + x[ends[1]])[taut] / 2)
+            lengths.append(sign * stretch[taut])
+        tension, length = np.concatenate(tensions), np.concatenate(lengths)
         # Where the cables are often slack, the few taut samples show the friction front and not the stiffness.
         if (
             tension.size < limits.MOSTLY_TAUT * 2 * x[THETA_IN].size

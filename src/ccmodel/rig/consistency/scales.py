@@ -105,8 +105,8 @@ def _accuracies(parities: Sequence[Parity]) -> list[Contradiction]:
 
 def _exchanged(ratios: Mapping[str, float], batch: Batch) -> bool:
     """Whether exchanged columns of the two ends would explain the travel, also with encoders of unlike counts."""
-    counts = [end.side.encoder_counts_per_rev for end in batch.rig.ends]
-    unlike = (counts[1] / counts[0]) ** 2 if all(counts) else 1.0
+    drive, load = (end.side.encoder_counts_per_rev for end in batch.rig.ends)
+    unlike = (load / drive) ** 2 if drive and load else 1.0
     return 1 / limits.MOST_TRAVEL < 1 / (ratios.get("travel", 0.0) * unlike or np.inf) <= 1.05
 
 
@@ -172,10 +172,9 @@ def _load_torque(ratios: Mapping[str, float]) -> list[Contradiction]:
 
 def _spring(ratios: Mapping[str, float], batch: Batch) -> list[Contradiction]:
     key = "load.spring_stiffness_Nm_per_rad"
-    ratio = ratios.get("spring")
-    if not beyond(ratio, limits.STATED_FACTOR) or key in batch.rig.nominal:
+    ratio, stated = ratios.get("spring"), batch.rig.load.spring_stiffness_Nm_per_rad
+    if ratio is None or stated is None or not beyond(ratio, limits.STATED_FACTOR) or key in batch.rig.nominal:
         return []
-    stated = batch.rig.load.spring_stiffness_Nm_per_rad
     text = (
         f"rig.{key} is {stated:g}, and the recordings show {ratio * stated:.3g} N m/rad (load torque over load angle,"
         f" {ratio:.3g} times as much); correct it, or the scale of the load torque or load angle"
@@ -209,7 +208,7 @@ def _cable(ratios: Mapping[str, float], batch: Batch) -> list[Contradiction]:
         ("friction", "friction_coefficient", stated.friction_coefficient, "", "ratio of tensions in full slip"),
     ):
         ratio = ratios.get(relation)
-        if not beyond(ratio, limits.STATED_FACTOR) or f"cable.{key}" in batch.rig.nominal:
+        if ratio is None or not beyond(ratio, limits.STATED_FACTOR) or f"cable.{key}" in batch.rig.nominal:
             continue
         if ratio < -1 / limits.STATED_FACTOR:
             found.append(Contradiction(*_EXCHANGED[relation]))

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 
+from ccmodel.progress import Progress, each_of, silent
 from ccmodel.rig import readers
 from ccmodel.rig.batch import DRIVE_ANGLE_COLUMNS
 from ccmodel.rig.findings import LogError
@@ -51,7 +52,7 @@ class GuessedMap:
     remarks: list[str]
 
 
-def write_guess(files: Sequence[Path], out: Path) -> GuessedMap:
+def write_guess(files: Sequence[Path], out: Path, progress: Progress = silent) -> GuessedMap:
     """Guess a map for files and write it to a folder.
 
     Parameters
@@ -60,6 +61,7 @@ def write_guess(files: Sequence[Path], out: Path) -> GuessedMap:
         The files as the rig wrote them.
     out : Path
         Folder for `map.yaml`; no other file in it is touched.
+    progress : Progress
 
     Returns
     -------
@@ -80,7 +82,7 @@ def write_guess(files: Sequence[Path], out: Path) -> GuessedMap:
     if not files:
         raise InputError("no file to import: give the rig's logs")
     names = names_of([Path(f) for f in files])
-    kinds, roles, patterns, remarks = _sorted_files(_read_all(names), names)
+    kinds, roles, patterns, remarks = _sorted_files(_read_all(names, progress), names)
     ends = {role: read_name(role).end if patterns else None for role in roles}
     guessed = {role: guess_file(kinds[key][0][1], ends[role]) for role, key in roles.items()}
     questions = tuple(open_questions([guess for one in guessed.values() for guess in one.guesses]))
@@ -93,9 +95,9 @@ def write_guess(files: Sequence[Path], out: Path) -> GuessedMap:
     return GuessedMap(target, guessed, looked_at, remarks)
 
 
-def _read_all(names: Mapping[Path, str]) -> dict[Path, SignalFile]:
+def _read_all(names: Mapping[Path, str], progress: Progress) -> dict[Path, SignalFile]:
     read, problems = {}, []
-    for path, name in names.items():
+    for path, name in each_of(names.items(), progress, lambda one: f"reading {one[1]}"):
         try:
             read[path] = readers.read_signals(path)
         except LogError as error:
@@ -260,14 +262,14 @@ def _time_lines(one: GuessedFile, indent: str) -> list[str]:
 
 def time_text(time: TimeSource) -> str:
     """A time source as the map has it."""
-    return f"{{signal: {_quoted(time.signal)}, unit: {_quoted(time.unit)}}}"
+    return f"{{signal: {_quoted(time.signal or '')}, unit: {_quoted(time.unit or '')}}}"
 
 
 def _channel_line(guess: Guess, role: str | None) -> str:
     parts = [f"signal: {_quoted(guess.signal)}"]
     parts += [f"unit: {_quoted(guess.unit)}"] if guess.unit else []
     parts += ["sign: -1"] if guess.sign < 0 else []
-    if guess.unit and not guess.sure and guess.needs_gain:
+    if guess.column and guess.unit and not guess.sure and guess.needs_gain:
         parts.append(f'gain: "? {UNIT_OF[guess.column]}/{guess.unit}"')
     parts += [f"file: {role}"] if role else []
     line = f"{'' if guess.sure else '# '}{guess.column}: {{{', '.join(parts)}}}"

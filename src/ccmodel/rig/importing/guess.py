@@ -85,7 +85,7 @@ class Guess:
     @property
     def needs_gain(self) -> bool:
         """Whether its unit has another dimension than the column, so that a person must state a gain."""
-        return bool(self.column) and units.quantity_of(self.unit) != units.quantity_of(UNIT_OF[self.column])
+        return self.column is not None and units.quantity_of(self.unit) != units.quantity_of(UNIT_OF[self.column])
 
 
 @dataclass(frozen=True)
@@ -173,8 +173,8 @@ def _first_guess(signal: Signal, reading: Reading) -> Guess:
     """Quantity, end and unit of one signal by itself."""
     if signal.name in CHANNELS:
         column, unit = signal.name, signal.unit or UNIT_OF[signal.name]
-        why = "the name of a column of the format"
-        return Guess(signal.name, column, unit, 1, True, (why,), reading.quantity, reading.end, 9)
+        said = ("the name of a column of the format",)
+        return Guess(signal.name, column, unit, 1, True, said, reading.quantity, reading.end, 9)
     if shapes.is_constant(signal.values):
         return Guess(signal.name, None, signal.unit, why=("constant: not used",))
     stated = signal.unit if units.states_unit(signal.unit) else reading.unit
@@ -385,13 +385,13 @@ def _with_cables(guesses: list[Guess], readings: Mapping[str, Reading], aligned:
     angle = {g.end: aligned[g.signal] for g in guesses if g.quantity == ANGLE and g.end}
     result = {}
     for end in _ENDS:
-        pair = [at.get((end, cable)) for cable in ("a", "b")]
-        if None in pair or sum(g.end == end for g in forces) > 2:
+        a, b = at.get((end, "a")), at.get((end, "b"))
+        if a is None or b is None or sum(g.end == end for g in forces) > 2:
             continue
         rule = shapes.sign_of_drive_torque if end == DRIVE else shapes.sign_of_load_torque
-        difference = aligned[pair[0].signal] - aligned[pair[1].signal]
+        difference = aligned[a.signal] - aligned[b.signal]
         swapped = end in angle and rule(angle[end], difference) == -1
-        for g, number, cable in zip(pair, _TENSIONS[end], "AB", strict=True):
+        for g, number, cable in zip((a, b), _TENSIONS[end], "AB", strict=True):
             doubt = "but a positive angle pulls B: which cable is A, or which sign has the angle?" if swapped else ""
             why = (*g.why, f"cable {cable} at the {end}", doubt)
             result[g.signal] = replace(g, column=f"T{number}_N", sure=g.sure and not swapped, why=why)
@@ -439,7 +439,7 @@ def _without_rivals(guesses: list[Guess]) -> list[Guess]:
 
 def _with_signs(guesses: list[Guess], aligned: Mapping[str, NDArray]) -> list[Guess]:
     """Signs by the conventions of the format, where the samples show them."""
-    at = {}
+    at: dict[str | None, dict[str | None, NDArray]] = {}
     for g in guesses:
         if g.column and (g.sure or g.quantity not in at.get(g.end, {})):
             at.setdefault(g.end, {}).setdefault(g.quantity, aligned[g.signal])
@@ -461,8 +461,10 @@ def _with_signs(guesses: list[Guess], aligned: Mapping[str, NDArray]) -> list[Gu
         rule = rules.get((g.quantity, g.end))
         if g.quantity == FORCE and units.quantity_of(g.unit) == "a force":
             rule = shapes.sign_of_tension, "is negative, and cables only pull"
-        seen = rule[0](aligned[g.signal]) if g.column and rule else None
-        result.append(replace(g, sign=-1, why=(*g.why, f"sign -1, since it {rule[1]}")) if seen == -1 else g)
+        if g.column and rule and rule[0](aligned[g.signal]) == -1:
+            result.append(replace(g, sign=-1, why=(*g.why, f"sign -1, since it {rule[1]}")))
+        else:
+            result.append(g)
     return result
 
 

@@ -1,7 +1,7 @@
 """The map of an import: what each column of a log is made of (`map.yaml`, `docs/how-to/import-logs.md`)."""
 
 from pathlib import Path, PurePath
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -9,7 +9,7 @@ from ccmodel.rig.batch import DRIVE_ANGLE_COLUMNS, RAW_COLUMNS, Name, Sign
 from ccmodel.rig.importing import units
 from ccmodel.rig.importing.columns import CHANNELS, UNIT_OF
 from ccmodel.rig.readers.contract import TextLayout
-from ccmodel.typed import InputError, Positive, Problem, TypedModel, load_yaml_model
+from ccmodel.typed import InputError, OneOf, Positive, Problem, TypedModel, load_yaml_model
 
 # A drift of more than this is no drift of a clock but another unit.
 LARGEST_DRIFT = 0.01
@@ -36,7 +36,7 @@ class TimeSource(TypedModel):
     rate_Hz: Positive | None = None
 
     @model_validator(mode="after")
-    def _signal_or_rate(self):
+    def _signal_or_rate(self) -> Self:
         if (self.signal is None) == (self.rate_Hz is None):
             raise ValueError("time is either a signal or a rate_Hz: state one of the two")
         if self.rate_Hz is not None and self.unit is not None:
@@ -81,7 +81,7 @@ class Channel(TypedModel):
 
     @field_validator("gain")
     @classmethod
-    def _a_gain_is_not_zero(cls, gain):
+    def _a_gain_is_not_zero(cls, gain: float | str | None) -> float | str | None:
         if gain == 0:
             raise ValueError("must not be zero")
         return gain
@@ -131,7 +131,7 @@ class Clock(TypedModel):
     match: Annotated[tuple[Text, ...], Field(min_length=2, max_length=2)] | None = None
 
     @model_validator(mode="after")
-    def _stated_or_estimated(self):
+    def _stated_or_estimated(self) -> Self:
         if (self.offset_s is None) == (self.match is None):
             raise ValueError("a clock has either an offset_s or a match of two signals: state one of the two")
         if self.match is not None and self.drift:
@@ -158,7 +158,7 @@ class FileRule(TypedModel):
 
     @field_validator("pattern")
     @classmethod
-    def _one_star(cls, pattern):
+    def _one_star(cls, pattern: str) -> str:
         if pattern.count("*") != 1:
             raise ValueError("needs one * for the part that names the recording, as '*_load.csv'")
         return pattern
@@ -205,18 +205,18 @@ class ImportMap(TypedModel):
     note: str | None = None
     text: TextLayout | None = None
     time: TimeSource | None = None
-    channels: dict[Literal[CHANNELS], Channel]
+    channels: dict[Annotated[str, OneOf(CHANNELS)], Channel]
     files: dict[str, FileRule] = Field(default_factory=dict)
     recordings: tuple[RecordingFiles, ...] = ()
 
     @field_validator("channels", mode="before")
     @classmethod
-    def _lines_left_to_be_confirmed(cls, channels):
+    def _lines_left_to_be_confirmed(cls, channels: Any) -> Any:
         return {} if channels is None else channels
 
     @field_validator("recordings")
     @classmethod
-    def _each_once(cls, recordings):
+    def _each_once(cls, recordings: tuple[RecordingFiles, ...]) -> tuple[RecordingFiles, ...]:
         ids = [r.id for r in recordings]
         files = [file for r in recordings for file in r.files]
         for what, names in (("id", ids), ("file", files)):
@@ -225,7 +225,7 @@ class ImportMap(TypedModel):
         return recordings
 
     @model_validator(mode="after")
-    def _each_quantity_once(self):
+    def _each_quantity_once(self) -> Self:
         if not self.channels.keys() & set(DRIVE_ANGLE_COLUMNS):
             advice = "in a guessed map, take '# ' away from its line"
             columns = " or ".join(DRIVE_ANGLE_COLUMNS)
@@ -237,7 +237,7 @@ class ImportMap(TypedModel):
         return self
 
     @model_validator(mode="after")
-    def _files_exist(self):
+    def _files_exist(self) -> Self:
         known = [MAIN, *self.files]
         for column, channel in self.channels.items():
             if channel.file is not None and channel.file not in known:

@@ -95,13 +95,13 @@ def _fit(start: float, begin: float, here: NDArray, first_begin: float, there: N
         return None
     t, here = t[inside], here[inside]
 
-    def on_first(p):
+    def on_first(p: NDArray) -> NDArray:
         return t + p[0] + p[1] * (t - middle)
 
-    def residuals(p):
+    def residuals(p: NDArray) -> NDArray:
         return p[2] * np.interp(on_first(p), t_first, there) + p[3] - here
 
-    def jacobian(p):
+    def jacobian(p: NDArray) -> NDArray:
         at = on_first(p)
         value, rise = np.interp(at, t_first, there), p[2] * np.interp(at, t_first, slope)
         return np.column_stack([rise, rise * (t - middle), value, np.ones_like(value)])
@@ -170,7 +170,7 @@ def _lags(here: NDArray, there: NDArray, lobe: float) -> list[int]:
     power = correlate(there**2, ones[0]) * correlate(ones[1], here**2)
     likeness = np.abs(correlate(there, here)) / np.sqrt(np.maximum(power, power.max() * 1e-12))
     score = np.where(overlap < _LEAST_OVERLAP, 0.0, likeness * overlap**_OVERLAP_POWER)
-    found = []
+    found: list[int] = []
     while len(found) < _CANDIDATES and score.max() > 0:
         found.append(int(lags[np.argmax(score)]))
         score[np.abs(lags - found[-1]) <= lobe] = 0.0
@@ -181,7 +181,7 @@ def _highest_frequency(values: NDArray, step: float) -> float:
     """Frequency below which a signal has nearly all of its power, Hz."""
     power = np.abs(np.fft.rfft(values * np.hanning(values.size))) ** 2
     share = np.cumsum(power) / power.sum()
-    return float(max(np.searchsorted(share, _POWER_SHARE), 1) / (values.size * step))
+    return float(max(int(np.searchsorted(share, _POWER_SHARE)), 1) / (values.size * step))
 
 
 def _on_grid(time: NDArray, values: NDArray, step: float) -> NDArray:

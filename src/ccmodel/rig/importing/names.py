@@ -1,6 +1,7 @@
 """What the name of a signal says: quantity, end of the transmission, unit, number. English and German."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ccmodel.rig.importing import units
@@ -130,7 +131,7 @@ def _pieces(name: str) -> tuple[list[str], list[str]]:
     return raw, re.sub(r"\bload ?cell\b", LOADCELL, text).split()
 
 
-def _find(pieces: list[str], words: dict[str, str], parts: dict[str, tuple[str, ...]]) -> tuple[str | None, str]:
+def _find(pieces: list[str], words: Mapping[str, str], parts: Mapping[str, tuple[str, ...]]) -> tuple[str | None, str]:
     """Meaning of the first word that has one, and the word. Meanings that come first in the table win."""
     for meaning in dict.fromkeys((*words, *parts)):
         said = next((piece for piece in pieces if piece in words.get(meaning, "").split()), None)
@@ -145,7 +146,7 @@ def _end(pieces: list[str], name: str) -> tuple[str | None, str, bool]:
     said = {end: _find(pieces, {end: _ENDS[end]}, {end: _END_PARTS[end]})[1] for end in (DRIVE, LOAD)}
     if not all(said.values()):
         end = next((end for end, word in said.items() if word), None)
-        return end, said.get(end, ""), False
+        return end, said[end] if end else "", False
     group, _, own = (_pieces(part)[1] for part in name.rpartition("/"))
     device_only = said[DRIVE] in _DEVICES and said[DRIVE] in own and said[LOAD] in group
     return (LOAD, said[LOAD], False) if device_only else (None, "", True)
@@ -164,7 +165,7 @@ def _unit_at_end(name: str, raw: list[str], quantity: str | None) -> str:
         return ""
     word = _WORD_END.search(name)
     ends = (word[0] if word else "", raw[-1])
-    unit = next((end for end in ends if end and units.quantity_of(end) in MEASURES.get(quantity, ())), "")
+    unit = next((end for end in ends if end and units.quantity_of(end) in MEASURES.get(quantity or "", ())), "")
     before = name[: name.rfind(unit)][-1:] if unit else ""
     longer = before.isalpha() and units.quantity_of(before + unit) == units.quantity_of(unit)
     return "" if longer else unit

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -58,7 +59,7 @@ class Built:
 class FileError(LogError):
     """A file cannot be used; the arguments are those of `LogError`, and `file` is its name."""
 
-    def __init__(self, file: str, *arguments):
+    def __init__(self, file: str, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.file = file
 
@@ -94,7 +95,7 @@ class _File:
             return signal.time_s
         if source.rate_Hz is not None:
             return np.arange(signal.values.size) / source.rate_Hz
-        clock = self.signal(source.signal)
+        clock = self.signal(source.signal or "")  # a time has a signal or a rate
         if clock.values.size != signal.values.size:
             text = f"'{signal.name}' has {signal.values.size} samples and its time '{clock.name}' {clock.values.size}"
             raise FileError(self.name, None, None, f"{text}: state the channel's own 'time' in the map")
@@ -154,7 +155,7 @@ def _read(role: str, path: Path, stated: ImportMap, name: str) -> _File:
         read = readers.read_signals(path, (rule and rule.text) or stated.text)
     except LogError as error:
         raise FileError(name, *error.args) from None
-    time = rule and rule.time
+    time = rule.time if rule else None
     if time is None and stated.time is not None:
         here = {signal.name for signal in read.signals}
         # A time for all files of a recording is that of the files that have it; others store their own.
@@ -236,7 +237,7 @@ def _clock(file: _File, first: _File, stated: ImportMap, remarks: list[str]) -> 
             return match_clocks(file.times(here, None), here.values, first.times(there, None), there.values)
         except LogError as error:
             raise FileError(file.name, *error.args) from None
-    if rule and rule.clock:
+    if rule and rule.clock and rule.clock.offset_s is not None:
         return Clock(rule.clock.offset_s, rule.clock.drift, None, None, "stated in the map")
     if file.time is None and first.time is None and file.read.started and first.read.started:
         started = file.read.started, first.read.started

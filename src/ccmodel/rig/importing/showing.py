@@ -103,8 +103,8 @@ def _clock_table(costs: Sequence[tuple[str, Cost]]) -> Table:
     for (id_, *clock), joined in columns.items():
         alike.setdefault((_and_more(joined), *clock), []).append(id_)
     table = Table("recording", "joined", "offset", "drift", "clock", box=None, pad_edge=False)
-    for clock, ids in alike.items():
-        table.add_row(*_cells(_and_more(ids), *clock))
+    for cells, ids in alike.items():
+        table.add_row(*_cells(_and_more(ids), *cells))
     return table
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 import ccmodel
+from ccmodel.progress import Progress, each_of, silent, within
 from ccmodel.rig.batch import NAMES, valid_name
 from ccmodel.rig.drafting import draft_batch
 from ccmodel.rig.importing.columns import TIME
@@ -23,6 +24,8 @@ from ccmodel.typed import InputError, Problem
 
 MAP, PROVENANCE, BATCH = "map.yaml", "import.json", "batch.yaml"
 FORMAT = 1
+# Share of reading the files in the time of an import; the logs are then written.
+BUILDING = 0.5
 # Libraries whose versions can change what is read. Those that are not installed are left out.
 LIBRARIES = ("numpy", "pandas", "scipy", "pint", "asammdf", "npTDMS", "h5py", "pyarrow", "rosbags")
 # Significant digits of a value: more than any converter or encoder has.
@@ -51,7 +54,7 @@ class Written:
     drafted: bool = False
 
 
-def import_files(files: Sequence[Path], map_file: Path, out: Path) -> Written:
+def import_files(files: Sequence[Path], map_file: Path, out: Path, progress: Progress = silent) -> Written:
     """Write the logs of recordings in any format to a batch folder.
 
     Parameters
@@ -63,6 +66,7 @@ def import_files(files: Sequence[Path], map_file: Path, out: Path) -> Written:
     out : Path
         Folder of the batch. The result of an earlier import is replaced as a whole, and only if this import succeeds; a
         `batch.yaml` in it stays.
+    progress : Progress
 
     Returns
     -------
@@ -80,10 +84,11 @@ def import_files(files: Sequence[Path], map_file: Path, out: Path) -> Written:
     stated = load_map(map_file)
     sources, remarks = recordings_of([Path(f) for f in files], stated)
     names = names_of([file for source in sources for file in source.files.values()])
-    built = _build_all(sources, stated, names)
+    built = _build_all(sources, stated, names, within(progress, 0.0, BUILDING))
     with replacing(out) as fresh:
         fresh.mkdir()
-        for id_, one in built.items():
+        writing = each_of(built.items(), within(progress, BUILDING, 1.0), lambda one: f"writing {one[0]}")
+        for id_, one in writing:
             _write_log(fresh / f"{id_}.csv.gz", one.table)
         (fresh / MAP).write_bytes(map_content)
         text = json.dumps(_provenance(fresh, sources, built, names, remarks), indent=1, ensure_ascii=False)
@@ -132,9 +137,11 @@ def _content(file: Path) -> bytes:
         raise InputError(f"{file}: the map cannot be read ({error.strerror})") from None
 
 
-def _build_all(sources: Sequence[Source], stated: ImportMap, names: dict[Path, str]) -> dict[str, Built]:
+def _build_all(
+    sources: Sequence[Source], stated: ImportMap, names: dict[Path, str], progress: Progress
+) -> dict[str, Built]:
     built, problems = {}, []
-    for source in sources:
+    for source in each_of(sources, progress, lambda one: f"reading {one.id}"):
         try:
             built[source.id] = build(source, stated, names)
         except FileError as error:

@@ -47,7 +47,7 @@ def _write_log(path: Path, trial: Trial) -> None:
 
 def _recording(name: str, trial: Trial) -> dict:
     """An entry of `recordings`: the conditions are read from the columns, as the names of the files differ in code."""
-    excitation = {"wave": "sine", "trial": trial.file.stem}
+    excitation: dict[str, str | float] = {"wave": "sine", "trial": trial.file.stem}
     frequency = _frequency(*trial.settled[["time_s", "drive_encoder_counts"]].to_numpy().T)
     if frequency is not None:
         excitation["frequency_Hz"] = frequency
@@ -74,10 +74,10 @@ def _frequency(time: NDArray, angle: NDArray) -> float | None:
     if np.ptp(angle) <= 2 or time[-1] <= 0:
         return None
 
-    def misfit(frequency):
+    def misfit(frequency: float) -> float:
         phase = 2 * np.pi * frequency * time
         basis = np.column_stack([np.sin(phase), np.cos(phase), np.ones_like(phase)])
-        return np.sum((angle - basis @ np.linalg.solve(basis.T @ basis, basis.T @ angle)) ** 2)
+        return float(np.sum((angle - basis @ np.linalg.solve(basis.T @ basis, basis.T @ angle)) ** 2))
 
     # Over few cycles the maximum of the spectrum is coarse and biased, but it brackets the minimum.
     spectrum = np.abs(np.fft.rfft(angle * np.hanning(angle.size), 8 * angle.size))

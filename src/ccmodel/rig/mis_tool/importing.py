@@ -5,6 +5,7 @@ import re
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from ccmodel.progress import Progress, each_of, silent
 from ccmodel.rig.batch import valid_name
 from ccmodel.rig.findings import Finding, LogError
 from ccmodel.rig.importing.replacing import replacing
@@ -33,7 +34,7 @@ class Imported:
     findings: list[Finding]
 
 
-def import_mis_tool(source: Path, out: Path) -> Imported:
+def import_mis_tool(source: Path, out: Path, progress: Progress = silent) -> Imported:
     """Convert every folder of trials below `source` to a batch below `out`.
 
     Parameters
@@ -43,6 +44,7 @@ def import_mis_tool(source: Path, out: Path) -> Imported:
     out : Path
         Folder for the folders of the batches and `findings.json`. The result of an earlier import is replaced as a
         whole, and only if this import succeeds.
+    progress : Progress
 
     Returns
     -------
@@ -65,7 +67,7 @@ def import_mis_tool(source: Path, out: Path) -> Imported:
     files = _text_files(source)
     with replacing(out) as fresh:
         fresh.mkdir()
-        names, findings = _import_into(fresh, files)
+        names, findings = _import_into(fresh, files, progress)
         if not names:
             raise _no_trial(source, files)
         (fresh / FINDINGS).write_text(json.dumps([asdict(f) for f in findings], indent=1) + "\n", encoding="utf-8")
@@ -127,10 +129,12 @@ def _no_trial(source: Path, files: list[Path]) -> InputError:
     )
 
 
-def _import_into(out: Path, files: list[Path]) -> tuple[list[str], list[Finding]]:
+def _import_into(out: Path, files: list[Path], progress: Progress) -> tuple[list[str], list[Finding]]:
     """Write the batches; return their names and the findings."""
-    names, findings, taken = [], [], set()
-    for folder in sorted({f.parent for f in files}):
+    names, findings = [], []
+    taken: set[str] = set()
+    folders = sorted({f.parent for f in files})
+    for folder in each_of(folders, progress, lambda one: f"converting {one.name}"):
         name = _unique(_safe(folder.resolve().name), taken)
         findings += _import_folder([f for f in files if f.parent == folder], out / name, name)
         if (out / name).exists():
@@ -150,7 +154,8 @@ def _import_folder(files: list[Path], out: Path, batch: str) -> list[Finding]:
 
 def _read_folder(files: list[Path], batch: str) -> tuple[dict[str, Trial], list[Finding]]:
     """Trials of a folder by recording id, and the findings."""
-    trials, findings, taken = {}, [], set()
+    trials, findings = {}, []
+    taken: set[str] = set()
     for file in files:
         try:
             trial = read_trial(file)

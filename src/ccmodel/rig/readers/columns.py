@@ -48,7 +48,7 @@ class Columns:
         else:
             self.others.append(name)
 
-    def _append(self, name, unit, values, time):
+    def _append(self, name: str, unit: str, values: NDArray, time: NDArray | None) -> None:
         time = np.asarray(time, float) if time is not None and len(time) == len(values) else None
         self.signals.append(Signal(name, unit, np.asarray(values, float), time))
 

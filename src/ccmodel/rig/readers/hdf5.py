@@ -1,6 +1,8 @@
 """HDF5: every array of numbers in the file, with units in attributes; netCDF-4 is HDF5 too."""
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +37,7 @@ def read(path: Path) -> SignalFile:
 FORMAT = Format("HDF5 file", (".h5", ".hdf5", ".hdf", ".he5", ".nc"), read, extra="hdf5", apart=True)
 
 
-def _datasets(h5py, group, path: str = "", above: tuple = ()):
+def _datasets(h5py: Any, group: Any, path: str = "", above: tuple = ()) -> Iterator[tuple[str, Any]]:
     """Names and arrays of a group and the groups in it; a group that contains itself is entered once."""
     for key in group:
         if key.startswith("#"):  # what MATLAB keeps for itself
@@ -53,7 +55,7 @@ def _datasets(h5py, group, path: str = "", above: tuple = ()):
             yield from _datasets(h5py, item, name, (*above, item))
 
 
-def _add(columns: Columns, name: str, dataset) -> None:
+def _add(columns: Columns, name: str, dataset: Any) -> None:
     attributes = dict(dataset.attrs)
     if bytes(np.bytes_(attributes.get("NAME", b""))).startswith(_NO_ARRAY):
         return
@@ -72,7 +74,7 @@ def _unit(attributes: dict) -> str:
     return found.decode(errors="replace") if isinstance(found, bytes) else str(found) if isinstance(found, str) else ""
 
 
-def _time_axis(dataset) -> NDArray | None:
+def _time_axis(dataset: Any) -> NDArray | None:
     """Dimension scale of the samples, if it is in a unit of time."""
     if not dataset.ndim or dataset.is_scale or not len(dataset.dims[0]):
         return None

@@ -4,8 +4,9 @@ Both versions are read into plain data first: a struct is a dict, a struct array
 an object of a MATLAB class an `_Object`. Then signals are looked for in the same way.
 """
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
 
@@ -35,7 +36,8 @@ def read(path: Path) -> SignalFile:
     ControlDesk and a struct of time and data, each signal has the time axis beside it.
     """
     variables = _of_v73(path) if signatures.kind_of(path) is signatures.MAT73 else _of_v5(path)
-    columns, objects = Columns(), []
+    columns = Columns()
+    objects: list[tuple[str, str]] = []
     captures = sum(_is_capture(v) or _is_structure_with_time(v) for v in variables.values())
     for name, value in variables.items():
         if _is_capture(value):
@@ -85,14 +87,16 @@ def _add(columns: Columns, name: str, value: Any, unit: str, objects: list, dept
         columns.add(name, unit, value)
 
 
-def _add_struct(columns, name, struct, objects, depth):
+def _add_struct(
+    columns: Columns, name: str, struct: dict[str, Any], objects: list[tuple[str, str]], depth: int
+) -> None:
     time = next((struct[k] for k in _TIME_KEYS if _is_vector(struct.get(k))), None)
     data = next((k for k in _DATA_KEYS if _is_numbers(struct.get(k))), None)
     if data:
-        with_time = time is not None and time.size in struct[data].shape
-        columns.add(name, _text(struct, _UNIT_KEYS), struct[data], np.ravel(time) if with_time else None)
-        struct = {k: v for k, v in struct.items() if k != data and not (with_time and k in _TIME_KEYS)}
-    units = next((struct[k] for k in _UNIT_KEYS if isinstance(struct.get(k), dict)), {})
+        axis = np.ravel(time) if time is not None and time.size in struct[data].shape else None
+        columns.add(name, _text(struct, _UNIT_KEYS), struct[data], axis)
+        struct = {k: v for k, v in struct.items() if k != data and not (axis is not None and k in _TIME_KEYS)}
+    units: dict[str, Any] = next((struct[k] for k in _UNIT_KEYS if isinstance(struct.get(k), dict)), {})
     for key, value in struct.items():
         named = [f"{key}_{k}" for k in _UNIT_KEYS]
         unit = _text(units, (key,)) or _text(struct, named)
@@ -116,7 +120,7 @@ def _add_capture(columns: Columns, capture: dict, prefix: str) -> None:
         columns.add(prefix + name, _text(y, ("Unit",)), data, _axis_of_capture(axis, data))
 
 
-def _axis_of_capture(axis: Any, data) -> np.ndarray | None:
+def _axis_of_capture(axis: Any, data: Any) -> np.ndarray | None:
     """Times of a capture, s; a capture without times states their step."""
     if not isinstance(axis, dict) or data is None:
         return None
@@ -152,15 +156,15 @@ def _listed(value: Any) -> list:
     return value if isinstance(value, list) else [value]
 
 
-def _is_numbers(value: Any) -> bool:
+def _is_numbers(value: Any) -> TypeGuard[np.ndarray]:
     return isinstance(value, np.ndarray) and value.dtype.kind in "iufb"
 
 
-def _is_vector(value: Any) -> bool:
+def _is_vector(value: Any) -> TypeGuard[np.ndarray]:
     return _is_numbers(value) and value.size > 1 and value.size == max(value.shape)
 
 
-def _text(struct: Any, keys) -> str:
+def _text(struct: Any, keys: Iterable[str]) -> str:
     """The first text among these fields of a struct; "" if there is none."""
     if not isinstance(struct, dict):
         return ""
@@ -211,7 +215,7 @@ def _of_v73(path: Path) -> dict[str, Any]:
         return {name: _plain_v73(h5py, file, file[name]) for name in file if not name.startswith("#")}
 
 
-def _plain_v73(h5py, file, item, depth: int = 0) -> Any:
+def _plain_v73(h5py: Any, file: Any, item: Any, depth: int = 0) -> Any:
     kind = item.attrs.get("MATLAB_class", b"")
     kind = kind.decode(errors="replace") if isinstance(kind, bytes) else str(kind)
     if depth > _DEPTH:
@@ -236,5 +240,5 @@ def _plain_v73(h5py, file, item, depth: int = 0) -> Any:
     return np.asarray(value).T
 
 
-def _is_array_of_fields(item) -> bool:
+def _is_array_of_fields(item: Any) -> bool:
     return item.dtype.kind == "O" and "MATLAB_class" not in item.attrs

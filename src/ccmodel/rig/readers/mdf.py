@@ -2,6 +2,7 @@
 
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ def read(path: Path) -> SignalFile:
 FORMAT = Format("MDF file", (".mf4", ".mdf", ".dat", ".mf3"), read, extra="mdf", apart=True)
 
 
-def _add_group(columns: Columns, file, index: int, group) -> None:
+def _add_group(columns: Columns, file: Any, index: int, group: Any) -> None:
     master = file.masters_db.get(index)
     prefix = _group_name(group)
     wanted = [(None, index, i) for i in range(len(group.channels)) if i != master]
@@ -42,7 +43,7 @@ def _add_group(columns: Columns, file, index: int, group) -> None:
         columns.add(name, signal.unit, values, time)
 
 
-def _group_name(group) -> str:
+def _group_name(group: Any) -> str:
     """Name of a channel group with a "/"; "" if the file names none."""
     name = str(getattr(group.channel_group, "acq_name", "") or "").strip()
     return f"{name}/" if name else ""

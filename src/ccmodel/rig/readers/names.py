@@ -62,7 +62,8 @@ def bare_unit(text: str) -> str:
 def unique(names: Iterable[str]) -> list[str]:
     """Names of which none is there twice: a repeated one is numbered, "angle", "angle (2)"."""
     names = list(names)
-    seen, taken, result = Counter(), set(names), []
+    seen: Counter[str] = Counter()
+    taken, result = set(names), []
     for name in names:
         seen[name] += 1
         new, number = name, seen[name]

@@ -62,7 +62,8 @@ def read(path: Path) -> SignalFile:
         raise LogError(
             None, None, f"is {kind.text}, which is read only under its own ending: rename it to {kind.advice}"
         )
-    topics, unknown = {}, set()
+    topics: dict[str, dict[tuple[str, ...], _Series]] = {}
+    unknown: set[str] = set()
     with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as bag:
         known = {c.id: c.msgtype in bag.typestore.fielddefs for c in bag.connections}
         for connection, received, raw in bag.messages():

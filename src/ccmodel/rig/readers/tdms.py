@@ -1,12 +1,15 @@
 """TDMS, the format of LabVIEW: groups of channels, each with its properties."""
 
+from collections.abc import Mapping, Sequence
+from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers.columns import Columns
-from ccmodel.rig.readers.contract import Format, SignalFile
+from ccmodel.rig.readers.contract import Format, Signal, SignalFile
 from ccmodel.rig.readers.stamps import seconds_of_times
 
 _UNIT_KEYS = ("unit_string", "NI_UnitDescription", "Unit", "unit", "Units", "units")
@@ -16,7 +19,8 @@ def read(path: Path) -> SignalFile:
     """Read a TDMS file; a channel with a waveform's start and step has its own time axis."""
     from nptdms import TdmsFile
 
-    columns, starts = Columns(), {}
+    columns = Columns()
+    starts: dict[str, np.datetime64] = {}
     with TdmsFile.open(path) as file:
         if file.file_status.incomplete_final_segment:
             text = "the TDMS file is cut short: its last segment is incomplete; copy it again from the recorder"
@@ -26,13 +30,14 @@ def read(path: Path) -> SignalFile:
             _add(columns, channel, starts)
     if not starts:
         return SignalFile(tuple(columns.signals), None, columns.remarks())
-    return SignalFile(*_from_the_first(columns.signals, starts), columns.remarks())
+    signals, started = _from_the_first(columns.signals, starts)
+    return SignalFile(signals, started, columns.remarks())
 
 
 FORMAT = Format("TDMS file", (".tdms",), read, extra="tdms")
 
 
-def _add(columns: Columns, channel, starts: dict) -> None:
+def _add(columns: Columns, channel: Any, starts: dict[str, np.datetime64]) -> None:
     name, properties = f"{channel.group_name}/{channel.name}", channel.properties
     unit = next((str(properties[k]) for k in _UNIT_KEYS if properties.get(k)), "")
     values = channel[:]
@@ -50,7 +55,9 @@ def _add(columns: Columns, channel, starts: dict) -> None:
     columns.add(name, unit, values, time)
 
 
-def _from_the_first(signals, starts):
+def _from_the_first(
+    signals: Sequence[Signal], starts: Mapping[str, np.datetime64]
+) -> tuple[tuple[Signal, ...], datetime | None]:
     """Signals with their times from the earliest start of a waveform, and that start."""
     first = min(starts.values())
     zero = seconds_of_times(np.array([first]).astype("datetime64[ns]"))[1]

@@ -9,12 +9,15 @@ import io
 import re
 import zlib
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from charset_normalizer import from_bytes
+from numpy.typing import NDArray
 
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers import signatures
@@ -404,7 +407,9 @@ def _row(number: int, line: str, grid: _Grid) -> str:
     return line
 
 
-def _signals(table, names, units, grid):
+def _signals(
+    table: pd.DataFrame, names: Sequence[str], units: Sequence[str], grid: _Grid
+) -> tuple[tuple[Signal, ...], datetime | None, list[str]]:
     """Signals of the columns, the absolute time of the first time stamp, and remarks."""
     signals, remarks, started = [], [], None
     stamps = [i for i in range(grid.width) if grid.stamps[i]]
@@ -434,7 +439,7 @@ def _signals(table, names, units, grid):
     return tuple(signals), started, remarks
 
 
-def _floats(column: pd.Series, name: str, decimal: str):
+def _floats(column: pd.Series, name: str, decimal: str) -> tuple[NDArray, list[str]]:
     """A column as floats; cells without a number are nan, and said."""
     if column.dtype.kind in "iufb":
         return column.to_numpy(float), []

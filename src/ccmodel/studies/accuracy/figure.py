@@ -1,15 +1,16 @@
 """Scatter plots of simulated over recorded quantities, with the bands of model and recordings."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
-import matplotlib.pyplot as plt
+import matplotlib
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ccmodel.recording import ORIGIN
-from ccmodel.report.figures import COLOURS, MARKERS, STYLE, empty_figure, legend_below, title_figure
+from ccmodel.report.figures import COLOURS, MARKERS, STYLE, empty_figure, legend_below, subplots, title_figure
 from ccmodel.studies.variables import batches_by_origin
 
 COLUMNS = 4
@@ -35,12 +36,15 @@ def ratio_figure(table: pd.DataFrame, lines: Sequence[dict]) -> Figure:
     return _panels(table, lines, _ratio_panel, "Modelled values as a share of the recorded ones")
 
 
-def _panels(table: pd.DataFrame, lines: Sequence[dict], panel, title: str) -> Figure:
+_Panel = Callable[[Axes, pd.DataFrame, dict, Sequence[str]], None]
+
+
+def _panels(table: pd.DataFrame, lines: Sequence[dict], panel: _Panel, title: str) -> Figure:
     if not lines:
         return empty_figure("no recording that the model could be run on")
-    with plt.rc_context(STYLE):
+    with matplotlib.rc_context(STYLE):
         rows = -(-len(lines) // COLUMNS)
-        figure, axes = plt.subplots(rows, COLUMNS, figsize=(12, 0.9 + 2.7 * rows), squeeze=False)
+        figure, axes = subplots(rows, COLUMNS, figsize=(12, 0.9 + 2.7 * rows), squeeze=False)
         for ax in axes.flat[len(lines) :]:
             ax.set_axis_off()
         batches = sorted(set(table["batch"]))
@@ -62,7 +66,10 @@ def _points(ax: Axes, table: pd.DataFrame, values: pd.Series, batches: Sequence[
     for i, batch in enumerate(batches):
         mine = table["batch"] == batch
         if mine.any():
-            style = {"color": BATCH_COLOURS[i % len(BATCH_COLOURS)], "marker": MARKERS[i % len(MARKERS)]}
+            style: dict[str, Any] = {
+                "color": BATCH_COLOURS[i % len(BATCH_COLOURS)],
+                "marker": MARKERS[i % len(MARKERS)],
+            }
             ax.plot(table["recorded"][mine], values[mine], ls="", ms=4.5, mfc="none", label=f"batch {batch}", **style)
 
 
@@ -76,8 +83,8 @@ def _scatter_panel(ax: Axes, table: pd.DataFrame, line: dict, batches: Sequence[
     at = np.maximum(_range(np.r_[table["recorded"], table["modelled"]]), 0.0)
     _points(ax, table, table["modelled"], batches)
     _bands(ax, at, at, line)
-    ax.set_xlim(at)
-    ax.set_ylim(at)
+    ax.set_xlim(*at)
+    ax.set_ylim(*at)
     ax.set_aspect("equal")
     ax.set_ylabel(f"modelled ({line['unit']})")
 
@@ -86,7 +93,7 @@ def _ratio_panel(ax: Axes, table: pd.DataFrame, line: dict, batches: Sequence[st
     at = _range(table["recorded"].to_numpy())
     _points(ax, table, 100 * table["modelled"] / table["recorded"], batches)
     _bands(ax, at, np.full(2, 100.0), line)
-    ax.set_xlim(at)
+    ax.set_xlim(*at)
     ax.set_ylabel("modelled / recorded (%)")
 
 

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from ccmodel.studies.settings import StudySettings
+from ccmodel.studies.settings import Configuration, StudySettings
 
 
 class Accuracy(StudySettings):
@@ -26,7 +26,9 @@ class Accuracy(StudySettings):
         2.0, gt=0, description="a comparison error up to this many validation uncertainties u_val is not resolved"
     )
 
-    def needs(self, config, studies: Mapping, batches: Sequence[str]) -> list[tuple[str, str, str]]:
+    def needs(
+        self, config: Configuration, studies: Mapping[str, StudySettings], batches: Sequence[str]
+    ) -> list[tuple[str, str, str]]:
         """Label, parameter set and batch of every run: one run of each batch with the set, with an empty label."""
         named = [(config.parameters_of(self, batch), batch) for batch in batches]
         return [("", parameters, batch) for parameters, batch in named if parameters in config.sets_of(batch)]

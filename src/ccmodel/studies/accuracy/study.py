@@ -106,8 +106,8 @@ def bias_and_scatter(
     sigma_M = np.sqrt(variance - used**2)
     centre = mean + (sigma_M**2 - used**2) / 2
     reach = t.ppf(0.5 + coverage / 2, M.size - 1) * np.sqrt(variance / M.size)
-    interval = np.exp([centre, centre - reach, centre + reach]).tolist()
-    return BiasAndScatter(*interval, float(sigma_M), float(used), bool(sigma_E > limit), M.size)
+    delta, low, high = np.exp([centre, centre - reach, centre + reach]).tolist()
+    return BiasAndScatter(delta, low, high, float(sigma_M), float(used), bool(sigma_E > limit), M.size)
 
 
 @dataclass(frozen=True)
@@ -257,7 +257,7 @@ def _model_uncertainty(case: Case, names: Sequence[str], how: Measuring) -> tupl
 def _shifted(case: Case) -> dict[str, float]:
     """By parameter, its value plus one standard deviation."""
     shifted = {name: case.parameters.value_of(name) + sd for name, sd in case.input_sd.items()}
-    read = [case.recorded.accuracy.get(tension) for tension in TENSIONS]
+    read = [case.recorded.accuracy.get(tension, 0.0) for tension in TENSIONS]
     if case.parameters.pretension_N is None and all(read) and case.recorded.rest_s > 0:
         shifted["pretension_scale"] = case.parameters.pretension_scale * (1 + max(read) / case.recorded.pretension_N)
     return shifted

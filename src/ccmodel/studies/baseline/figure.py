@@ -1,15 +1,16 @@
 """Error of the model over the project's commits: a panel for each batch, a line for each parameter set."""
 
 from collections.abc import Mapping
+from typing import Any
 
-import matplotlib.pyplot as plt
+import matplotlib
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from ccmodel.report.figures import COLOURS, LINES, MARKERS, STYLE, empty_figure, legend_below, title_figure
+from ccmodel.report.figures import COLOURS, LINES, MARKERS, STYLE, empty_figure, legend_below, subplots, title_figure
 
 COLUMNS = 3
 # Commits that a panel has room to name.
@@ -33,8 +34,8 @@ def history_figure(history: pd.DataFrame, present: pd.DataFrame, origins: Mappin
     sets = list(dict.fromkeys(present["set"])) + sorted(set(table["set"]) - set(present["set"]))
     columns = min(COLUMNS, len(batches))
     rows = -(-len(batches) // columns)
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(
+    with matplotlib.rc_context(STYLE):
+        figure, axes = subplots(
             rows, columns, figsize=(4 * columns, 1.4 + 2.4 * rows), squeeze=False, sharey=True, sharex=True
         )
         for ax in axes.flat[len(batches) :]:
@@ -57,7 +58,8 @@ def _panel(ax: Axes, table: pd.DataFrame, commits: list[str], sets: list[str]) -
         errors = table[table["set"] == name].groupby("commit")["error"]
         if not errors.ngroups:
             continue
-        x, style = np.arange(len(commits)), {"color": COLOURS[k % len(COLOURS)], "ls": LINES[k % len(LINES)]}
+        x = np.arange(len(commits))
+        style: dict[str, Any] = {"color": COLOURS[k % len(COLOURS)], "ls": LINES[k % len(LINES)]}
         ax.plot(
             x, errors.median().reindex(commits), lw=1.4, marker=MARKERS[k % len(MARKERS)], ms=4, label=name, **style
         )

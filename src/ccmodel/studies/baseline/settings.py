@@ -7,7 +7,7 @@ from typing import ClassVar
 from pydantic import Field
 
 from ccmodel.accuracy.comparison import Limits
-from ccmodel.studies.settings import StudySettings
+from ccmodel.studies.settings import Configuration, StudySettings
 
 # A set that no verdict accepts is not watched.
 NOT_ACCEPTED = ("nearest",)
@@ -35,7 +35,9 @@ class AgainstBaseline(StudySettings, Limits):
         """Files that the study reads, as far as they exist."""
         return [name for name in (self.file, self.history) if Path(name).exists()]
 
-    def needs(self, config, studies: Mapping, batches: Sequence[str]) -> list[tuple[str, str, str]]:
+    def needs(
+        self, config: Configuration, studies: Mapping[str, StudySettings], batches: Sequence[str]
+    ) -> list[tuple[str, str, str]]:
         """Rig, parameter set and batch of every run."""
         return [
             (_rig_of(config, batch), parameters, batch)
@@ -45,6 +47,6 @@ class AgainstBaseline(StudySettings, Limits):
         ]
 
 
-def _rig_of(config, batch: str) -> str:
+def _rig_of(config: Configuration, batch: str) -> str:
     """Name of a batch's rig: the one that lists it, or its own; without rigs, all batches are one."""
     return next((name for name, of in config.rigs.items() if batch in of), batch if config.rigs else "all")

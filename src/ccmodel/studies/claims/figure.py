@@ -1,8 +1,9 @@
 """The figures of the claims: recordings and simulations over a study's variable, and the model alone."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
 
-import matplotlib.pyplot as plt
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -23,11 +24,13 @@ from ccmodel.report.figures import (
     name_axes,
     plot_channels,
     say_in_panel,
+    subplots,
     title_figure,
 )
 from ccmodel.studies.claims.claim import Claim, Row
 from ccmodel.studies.loops.measures import QUANTITIES
 
+D = TypeVar("D")
 # Panels: claim, quantities, y axis, x axis.
 PANELS = (
     ("backlash-and-bend", ("backlash", "width"), "drive torque (mN·m)", "number of half-loops"),
@@ -46,8 +49,8 @@ SHORT = {
     "IVa_share": "phase IVa",
     "IVb_share": "phase IVb",
 }
-MODELLED = {"ls": "", "marker": "_", "ms": 16, "mew": 1.2, "color": "black"}
-POINT = {"ls": "", "marker": "o", "ms": 4.5, "color": "0.5"}
+MODELLED: dict[str, Any] = {"ls": "", "marker": "_", "ms": 16, "mew": 1.2, "color": "black"}
+POINT: dict[str, Any] = {"ls": "", "marker": "o", "ms": 4.5, "color": "0.5"}
 
 
 def recordings_figure(claims: Sequence[Claim], origins: str) -> Figure:
@@ -60,8 +63,8 @@ def recordings_figure(claims: Sequence[Claim], origins: str) -> Figure:
         Which batches were measured and which simulated; empty without recordings.
     """
     rows_of = {claim.name: claim.rows for claim in claims}
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(2, 3, figsize=(12, 7.2))
+    with matplotlib.rc_context(STYLE):
+        figure, axes = subplots(2, 3, figsize=(12, 7.2))
         for ax, (name, quantities, ylabel, xlabel) in zip(axes.flat, PANELS, strict=True):
             rows = [row for row in rows_of[name] if np.isfinite(row.at)]
             ticks = list(dict.fromkeys(row.condition for row in rows))
@@ -87,14 +90,17 @@ def recordings_figure(claims: Sequence[Claim], origins: str) -> Figure:
 
 def _with_intervals(ax: Axes, at: Mapping[str, float], rows: Sequence[Row], style: Mapping) -> None:
     """One quantity of a panel; `at` is the place of each condition on the x axis."""
-    known = [row for row in rows if row.value is not None]
-    reach = [[0, 0] if row.low is None else [row.value - row.low, row.high - row.value] for row in known]
+    known = [(at[row.condition], row.value, _reach(row.value, row)) for row in rows if row.value is not None]
     if known:
-        x, y = [at[row.condition] for row in known], [row.value for row in known]
+        x, y, reach = zip(*known, strict=True)
         ax.errorbar(x, y, np.transpose(reach), ms=4.5, capsize=3, **style)
-    modelled = [row for row in rows if row.model is not None]
-    x, y = [at[row.condition] for row in modelled], [row.model for row in modelled]
-    ax.plot(x, y, **MODELLED)
+    modelled = [(at[row.condition], row.model) for row in rows if row.model is not None]
+    ax.plot([x for x, _ in modelled], [y for _, y in modelled], **MODELLED)
+
+
+def _reach(value: float, row: Row) -> tuple[float, float]:
+    """How far the interval reaches below and above its mean; nothing without an interval."""
+    return (0.0, 0.0) if row.low is None or row.high is None else (value - row.low, row.high - value)
 
 
 def model_figure(claims: Sequence[Claim], loops: Mapping[str, Recording]) -> Figure:
@@ -107,16 +113,13 @@ def model_figure(claims: Sequence[Claim], loops: Mapping[str, Recording]) -> Fig
         Runs by the place of the loop.
     """
     rows_of = {claim.name: [row for row in claim.rows if row.model is not None] for claim in claims}
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(2, 2, figsize=(10, 7.8))
+    with matplotlib.rc_context(STYLE):
+        figure, axes = subplots(2, 2, figsize=(10, 7.8))
         letter_panels(axes.flat)
-        for panel, ax, data in (
-            (_load_panel, axes[0, 0], rows_of.get("deadband-and-load")),
-            (_sections_panel, axes[0, 1], rows_of.get("sections")),
-            (_torque_panel, axes[1, 0], loops),
-            (_motion_panel, axes[1, 1], loops),
-        ):
-            panel(ax, data) if data else say_in_panel(ax, "the model could not be run")
+        _panel(axes[0, 0], _load_panel, rows_of.get("deadband-and-load"))
+        _panel(axes[0, 1], _sections_panel, rows_of.get("sections"))
+        _panel(axes[1, 0], _torque_panel, loops)
+        _panel(axes[1, 1], _motion_panel, loops)
         # The places of the loop, which (c) and (d) share; (b) has a legend of its own.
         legend_below(figure, axes[1])
         title_figure(
@@ -125,6 +128,14 @@ def model_figure(claims: Sequence[Claim], loops: Mapping[str, Recording]) -> Fig
             "simulated (no recording)",
         )
     return figure
+
+
+def _panel(ax: Axes, panel: Callable[[Axes, D], None], data: D | None) -> None:
+    """Draw a panel, or why it is empty."""
+    if data:
+        panel(ax, data)
+    else:
+        say_in_panel(ax, "the model could not be run")
 
 
 def _load_panel(ax: Axes, rows: Sequence[Row]) -> None:
@@ -141,10 +152,10 @@ def _load_panel(ax: Axes, rows: Sequence[Row]) -> None:
     ax.set_xlabel("stiffness of the load's spring (N·m/rad)")
 
 
-def _plot_model(ax: Axes, rows: Sequence[Row], number: int, **style) -> None:
+def _plot_model(ax: Axes, rows: Sequence[Row], number: int, **style: Any) -> None:
     """The model's values over the study's variable, in the style of the curve's number."""
     style |= {"color": COLOURS[number], "marker": MARKERS[number % 4], "ls": LINES[number % 4], "ms": 4.5}
-    ax.plot([row.at for row in rows], [row.model for row in rows], **style)
+    ax.plot([row.at for row in rows], [float("nan") if row.model is None else row.model for row in rows], **style)
 
 
 def _sections_panel(ax: Axes, rows: Sequence[Row]) -> None:

@@ -33,7 +33,9 @@ def _rows(quantities: tuple[str, ...], condition: str, at: float, values: dict, 
 def _load(parameters: Parameters, claims: Claims, how: Measuring) -> Claim:
     """Lost motion and backlash over the stiffness of the load's spring."""
     study, quantities = claims.model, ("lost_motion", "width", "backlash", "slack_share")
-    taut, slack, rows = [], [], []
+    taut: list[tuple[float, dict[str, float]]] = []
+    slack: list[tuple[float, dict[str, float]]] = []
+    rows = []
     for stiffness in study.load_stiffness_Nm_per_rad:
         simulated = model_runs.run(parameters, model_runs.even(study), study, stiffness)
         values, gaps = measure(simulated, quantities, how)
@@ -75,8 +77,10 @@ def _placement(parameters: Parameters, claims: Claims, how: Measuring) -> Claim:
     for i, (place, simulated) in enumerate(model_runs.loop_placements(parameters, study).items()):
         found[place], gaps = measure(simulated, quantities, how)
         rows += _rows(quantities, f"loop {place}", i, found[place], gaps)
-    profile = [spread_percent([v[q] for v in found.values() if q in v]) for q in ("lost_motion", "slope")]
-    verdict = Verdict.OPEN if None in profile else Verdict.YES if max(profile) > claims.small_percent else Verdict.NO
+    spreads = (spread_percent([v[q] for v in found.values() if q in v]) for q in ("lost_motion", "slope"))
+    profile = [spread for spread in spreads if spread is not None]
+    moves = Verdict.YES if max(profile, default=0.0) > claims.small_percent else Verdict.NO
+    verdict = moves if len(profile) == 2 else Verdict.OPEN
     parts = []
     for place, values in found.items():
         lost, width, slope = (three_digits(values.get(q)) for q in ("lost_motion", "width", "slope"))

@@ -51,12 +51,14 @@ def run(
     Raises
     ------
     ModelError
-        If the solver does not reach the last sample.
+        If the load has no stiffness, or the solver does not reach the last sample.
     """
     p, theta = parameters, drive(study)
     rigidity = p.stiffness_N_per_m * p.reference_length_m
     transmission = Transmission(path, rigidity, p.friction, p.drive_radius_m, p.load_radius_m)
-    load = SpringLoad(load_Nm_per_rad or p.load_stiffness_Nm_per_rad)
+    if (stiffness := load_Nm_per_rad or p.load_stiffness_Nm_per_rad) is None:
+        raise ModelError("the load of the model's rig is a measurement; a run of the model alone takes a spring")
+    load = SpringLoad(stiffness)
     initial = InitialTension.uniform(path, study.pretension_N)
     if sections:
         response = paper.simulate_pair(transmission, load, theta, initial, sections)
@@ -69,7 +71,7 @@ def run(
 
 def even(study: ModelStudies, bend_rad: float | None = None) -> ConduitPath:
     """The conduit, evenly bent."""
-    return ConduitPath([study.conduit_length_m], [study.bend_rad if bend_rad is None else bend_rad])
+    return ConduitPath(np.array([study.conduit_length_m]), np.array([study.bend_rad if bend_rad is None else bend_rad]))
 
 
 def placements(study: ModelStudies) -> Mapping[str, ConduitPath]:
@@ -85,9 +87,11 @@ def placements(study: ModelStudies) -> Mapping[str, ConduitPath]:
     if straight <= 0:
         raise ModelError(f"a loop of {loop:.3g} m does not go into a conduit of {study.conduit_length_m:.3g} m")
     return {
-        "at the drive end": ConduitPath([loop, straight], [study.bend_rad, 0.0]),
-        "in the middle": ConduitPath([straight / 2, loop, straight / 2], [0.0, study.bend_rad, 0.0]),
-        "at the load end": ConduitPath([straight, loop], [0.0, study.bend_rad]),
+        "at the drive end": ConduitPath(np.array([loop, straight]), np.array([study.bend_rad, 0.0])),
+        "in the middle": ConduitPath(
+            np.array([straight / 2, loop, straight / 2]), np.array([0.0, study.bend_rad, 0.0])
+        ),
+        "at the load end": ConduitPath(np.array([straight, loop]), np.array([0.0, study.bend_rad])),
     }
 
 

@@ -100,7 +100,8 @@ def _with_interval(row: Row, mean: Estimate, coverage: float) -> Row:
 
 def _numbers(recordings: Sequence[Recording], quantity: str, how: Measuring) -> tuple[list[float], str]:
     """A quantity of each recording that has it, and the reason of the last one that does not."""
-    values, gap = [], "no recording"
+    values: list[float] = []
+    gap = "no recording"
     for recording in recordings:
         found, gaps = measure(recording, [quantity], how)
         values += found.values()
@@ -112,22 +113,23 @@ def _trend(trend: _Trend, pairs: Sequence[Pair], claims: Claims, how: Measuring)
     series = {q: _series(pairs, trend.variable, q, claims, how) for q in trend.quantities + trend.shown}
     verdicts = [_has_sign(series[q], trend.sign, claims) for q in trend.quantities]
     by_model = _joint([_model_has_sign(series[q], trend.sign) for q in trend.quantities])
-    return Claim(trend.name, trend.section, trend.says, _joint(verdicts), *_sentence_and_rows(series), by_model)
+    sentence, rows = _sentence_and_rows(series)
+    return Claim(trend.name, trend.section, trend.says, _joint(verdicts), sentence, rows, by_model)
 
 
-def _has_sign(series: _Series, sign: int, claims: Claims) -> str:
+def _has_sign(series: _Series, sign: int, claims: Claims) -> Verdict:
     """Whether means rise (sign +1) or fall (-1) from one condition to the next."""
     if not series.is_repeated:
         return Verdict.OPEN
     means = series.estimates
-    if all(sign * s.value > s.reach(claims.coverage) for s in starmap(difference, pairwise(means))):
+    if all(sign * s.value > s.half_width(claims.coverage) for s in starmap(difference, pairwise(means))):
         return Verdict.YES
     whole = difference(means[0], means[-1])
     small = 0.01 * claims.small_percent * abs(np.mean([m.value for m in means]))
-    return Verdict.NO if sign * whole.value + whole.reach(claims.coverage) < small else Verdict.OPEN
+    return Verdict.NO if sign * whole.value + whole.half_width(claims.coverage) < small else Verdict.OPEN
 
 
-def _model_has_sign(series: _Series, sign: int) -> str:
+def _model_has_sign(series: _Series, sign: int) -> Verdict:
     """Whether the model rises (sign +1) or falls (-1) from one condition that has a value to the next."""
     values = [row.model for row in series.rows if row.model is not None]
     if len(values) < 2:
@@ -135,7 +137,7 @@ def _model_has_sign(series: _Series, sign: int) -> str:
     return Verdict.YES if all(sign * (b - a) > 0 for a, b in pairwise(values)) else Verdict.NO
 
 
-def _joint(verdicts: Sequence[str]) -> str:
+def _joint(verdicts: Sequence[Verdict]) -> Verdict:
     kinds = set(verdicts)
     if len(kinds) == 1:
         return kinds.pop()
@@ -145,13 +147,16 @@ def _joint(verdicts: Sequence[str]) -> str:
 def _phases(pairs: Sequence[Pair], claims: Claims, how: Measuring) -> Claim:
     """Phases IVa and IVb over pretension."""
     series = {q: _series(pairs, "pretension", q, claims, how) for q in ("IVa_share", "IVb_share")}
-    verdict = _phases_seen(*([e.value for e in s.estimates] for s in series.values()), claims)
-    by_model = _phases_seen(*([r.model for r in s.rows if r.model is not None] for s in series.values()), claims)
+    recorded_a, recorded_b = ([e.value for e in s.estimates] for s in series.values())
+    modelled_a, modelled_b = ([r.model for r in s.rows if r.model is not None] for s in series.values())
+    verdict = _phases_seen(recorded_a, recorded_b, claims)
+    by_model = _phases_seen(modelled_a, modelled_b, claims)
     says = "a high pretension shows no phase IV, a middling one IVa, a low one IVb as well"
-    return Claim("phases-and-pretension", "V-B", says, verdict, *_sentence_and_rows(series), by_model)
+    sentence, rows = _sentence_and_rows(series)
+    return Claim("phases-and-pretension", "V-B", says, verdict, sentence, rows, by_model)
 
 
-def _phases_seen(share_a: Sequence[float], share_b: Sequence[float], claims: Claims) -> str:
+def _phases_seen(share_a: Sequence[float], share_b: Sequence[float], claims: Claims) -> Verdict:
     """Whether IVa and IVb occur as claimed; shares (%) in rising order of pretension."""
     if len(share_a) < 3 or len(share_b) != len(share_a):
         return Verdict.OPEN
@@ -207,14 +212,16 @@ def _spread(series: _Series, claims: Claims) -> tuple[float, float] | None:
     means = sorted(series.estimates, key=lambda e: e.value)
     apart = difference(means[0], means[-1])
     scale = 100 / abs(np.mean([m.value for m in means]))
-    return float(scale * apart.value), float(scale * apart.reach(claims.coverage))
+    return float(scale * apart.value), float(scale * apart.half_width(claims.coverage))
 
 
 def _sentence_and_rows(series: Mapping[str, _Series]) -> tuple[str, list[Row]]:
     """All numbers of some quantities in a sentence, how many intervals hold the model, and the rows."""
     rows = [row for s in series.values() for row in s.rows]
-    known = [r for r in rows if r.low is not None and r.model is not None]
-    inside = sum(r.low <= r.model <= r.high for r in known)
+    known = [
+        r.low <= r.model <= r.high for r in rows if r.low is not None and r.high is not None and r.model is not None
+    ]
+    inside = sum(known)
     summary = f"The model lies within {inside} of {len(known)} intervals." if known else ""
     return " ".join(_quantity_sentence(q, s.rows) for q, s in series.items()) + " " + summary, rows
 

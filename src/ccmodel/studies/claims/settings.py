@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from ccmodel.studies.settings import EACH, StudySettings
+from ccmodel.studies.settings import EACH, Configuration, StudySettings
 from ccmodel.typed import TypedModel
 
 
@@ -50,7 +50,7 @@ class Claims(StudySettings):
         """Name of the study that each variable varies in."""
         return {"bend": self.bend, "pretension": self.pretension, "radius": self.radius}
 
-    def check(self, where: str, config) -> None:
+    def check(self, where: str, config: Configuration) -> None:
         """Refuse studies that do not exist, draw each batch by itself or vary something else."""
         for variable, name in self.studies.items():
             study = config.studies.get(name)
@@ -59,7 +59,9 @@ class Claims(StudySettings):
             if study.variable != variable:
                 raise ValueError(f"{where}.{variable}: study '{name}' varies {study.variable}")
 
-    def needs(self, config, studies: Mapping, batches: Sequence[str]) -> list[tuple[str, str, str]]:
+    def needs(
+        self, config: Configuration, studies: Mapping[str, StudySettings], batches: Sequence[str]
+    ) -> list[tuple[str, str, str]]:
         """Variable, parameter set and batch of every run of the three studies."""
         return [
             (variable, parameters, batch)

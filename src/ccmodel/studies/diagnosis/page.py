@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import jinja2
-import matplotlib.pyplot as plt
+import matplotlib
 import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
@@ -22,7 +22,7 @@ from ccmodel.mechanisms import catalogue
 from ccmodel.provenance import stamp
 from ccmodel.recording import ORIGIN, Recording
 from ccmodel.report.embedding import asset
-from ccmodel.report.figures import COLOURS, STYLE, legend_below, stamp_figure, title_figure
+from ccmodel.report.figures import COLOURS, STYLE, legend_below, stamp_figure, subplots, title_figure
 from ccmodel.report.verdict import (
     CONSPICUOUS,
     NOT_ACCEPTED,
@@ -61,7 +61,7 @@ def write_diagnosis(file: Path, found: Diagnosis, page: str | None = None) -> No
     nearest = report["nearest"] or {"mechanisms": []}
     named = [*report["mechanisms"], *report["likeliest"], *report["alternatives"], *nearest["mechanisms"]]
     errors = mismatch(found.judgement.whitened, found.judgement.calibrated)
-    with plt.rc_context(STYLE):
+    with matplotlib.rc_context(STYLE):
         text = _template("page.html.j2").render(
             report=report,
             page=page,
@@ -74,7 +74,7 @@ def write_diagnosis(file: Path, found: Diagnosis, page: str | None = None) -> No
             symbol=SYMBOL,
             baseline=_baseline(report),
             has_found=found.judgement.best is not found.judgement.calibrated,
-            candidates=_candidates(found),
+            candidates=candidates_of(found)[: 1 + CANDIDATES],
             listed=found.judgement.well_specified,
             mechanisms=[catalogue.parts(name) for name in sorted({m["name"] for m in named})],
             summaries={name: registry.get(name) for name in registry.names()},
@@ -142,8 +142,8 @@ def _caution(report: Mapping, errors: Mapping[str, Mapping[str, float]]) -> str 
     )
 
 
-def _candidates(found: Diagnosis) -> list[dict]:
-    """Baseline and the candidates with the smallest mean squares, a row each."""
+def candidates_of(found: Diagnosis) -> list[dict]:
+    """Baseline and all candidates, a row each, those with the smallest mean squares first."""
     j = found.judgement
     ranked = sorted(zip(j.candidates, j.probability, strict=True), key=lambda item: item[0].mean_square)
     return [
@@ -154,7 +154,7 @@ def _candidates(found: Diagnosis) -> list[dict]:
             "probability": p,
             "why": _why(fit, found),
         }
-        for fit, p in [(j.calibrated, None), *ranked[:CANDIDATES]]
+        for fit, p in [(j.calibrated, None), *ranked]
     ]
 
 
@@ -185,7 +185,7 @@ def _map(found: Diagnosis) -> Figure:
     shown = {_baseline(found.report): before}
     if j.best is not j.calibrated:
         shown[WITH_FOUND] = mismatch(j.whitened, j.best)
-    figure, axes = plt.subplots(1, len(shown), figsize=(4 * len(shown), 2.9), sharey=True, squeeze=False)
+    figure, axes = subplots(1, len(shown), figsize=(4 * len(shown), 2.9), sharey=True, squeeze=False)
     for ax, (title, table) in zip(axes[0], shown.items(), strict=True):
         values = np.array([[table[c][p] for p in PHASES] for c in table])
         ax.imshow(values, cmap="cividis", norm=LogNorm(0.7, highest), aspect="auto")
@@ -211,7 +211,7 @@ def _loops(found: Diagnosis) -> Figure:
     worst_first = np.argsort(j.calibrated.by_recording)[::-1]
     order = [i for i in worst_first if channel in j.whitened[i].observations.channels][:LOOPS]
     scale = TABLE[channel].scale
-    figure, axes = plt.subplots(1, len(order), figsize=(3.1 * len(order), 3.1), squeeze=False)
+    figure, axes = subplots(1, len(order), figsize=(3.1 * len(order), 3.1), squeeze=False)
     for ax, i in zip(axes[0], order, strict=True):
         w = j.whitened[i]
         observed = w.observations
@@ -221,7 +221,7 @@ def _loops(found: Diagnosis) -> Figure:
         models = [(j.calibrated, COLOURS[0], "--", _baseline(found.report))]
         if chosen[i] is not j.calibrated:
             models.append((chosen[i], COLOURS[1], "-", WITH_FOUND))
-        if found.report["nearest"]:
+        if j.nearest is not None:
             models.append((j.nearest, COLOURS[3], "-.", f"nearest model, {NOT_ACCEPTED}"))
         for fit, colour, line, label in models:
             model = observed.with_parameters(fit.held_out(i, w))
@@ -248,5 +248,4 @@ def _stamp(found: Diagnosis) -> str:
 def _encoded(figure: Figure) -> str:
     buffer = io.BytesIO()
     figure.savefig(buffer, dpi=130, format="png")
-    plt.close(figure)
     return base64.b64encode(buffer.getvalue()).decode()

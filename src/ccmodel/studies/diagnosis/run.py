@@ -1,6 +1,7 @@
 """A batch -> its diagnosis: diagnosis.json, a page, and the models that were compared."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from ccmodel import mechanisms as registry
@@ -8,13 +9,14 @@ from ccmodel import provenance
 from ccmodel.diagnosis.run import Diagnosis, Options
 from ccmodel.diagnosis.run import diagnose as run
 from ccmodel.failure import ModelError
-from ccmodel.model.files import model_as_dict, read_model
+from ccmodel.model.files import Model, RigConditions, read_model
 from ccmodel.model.parameters import Parameters
-from ccmodel.recording import Recording, read_recordings
+from ccmodel.progress import Progress, silent, within
+from ccmodel.recording import Recording
 from ccmodel.report.verdict import headline
 from ccmodel.rig.findings import Finding
-from ccmodel.rig.ingest import ingest_batch
-from ccmodel.steps.files import estimates_of, read_json, write_json
+from ccmodel.rig.ingest import Ingested, ingest_batch
+from ccmodel.steps.files import read_ingested, write_json
 from ccmodel.studies.diagnosis import inconsistent
 from ccmodel.studies.diagnosis.page import write_diagnosis, write_inconsistent, write_not_diagnosed
 from ccmodel.studies.diagnosis.settings import MODEL_FILES, Diagnosing
@@ -22,6 +24,108 @@ from ccmodel.typed import InputError
 
 # The page of a run of the pipeline, seen from the report of a diagnosis.
 PAGE_OF_RUN = "../../index.html"
+# Shares of the time at which the batch is read, and at which the page is written.
+INGEST, PAGE = 0.05, 0.95
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a diagnosis of a batch has found, and what its files are made of.
+
+    Attributes
+    ----------
+    content : dict
+        The content of diagnosis.json.
+    recordings : sequence of Recording
+        Of the batch.
+    found : Diagnosis or None
+        None if the inputs contradict one another, so that no model was fitted.
+    """
+
+    content: dict
+    recordings: Sequence[Recording]
+    found: Diagnosis | None = None
+
+    @property
+    def models(self) -> dict[str, Model]:
+        """The models, by the names of `MODEL_FILES`; without those that this verdict does not have."""
+        if self.found is None:
+            return {}
+        judged = self.found.judgement
+        candidates = {"calibrated": judged.calibrated, "extended": judged.best}
+        if self.content["nearest"]:
+            candidates["nearest"] = judged.nearest
+        rig, inputs = RigConditions.of(self.recordings), self.content["provenance"]
+        return {name: Model(self.found.model(one), rig, provenance=inputs) for name, one in candidates.items()}
+
+
+def diagnosed(
+    ingested: Ingested,
+    inputs: dict,
+    options: Options = Options(),  # noqa: B008
+    baseline: Parameters | None = None,
+    progress: Progress = silent,
+    trust_inputs: bool = False,
+) -> Outcome:
+    """Diagnose a batch that was read; nothing is written.
+
+    Parameters
+    ----------
+    ingested : Ingested
+        With recordings, or with contradictions that nobody trusts.
+    inputs : dict
+        Version and digests of its files (`ccmodel.provenance.of_inputs`).
+    options : Options
+    baseline : Parameters, optional
+        Model to start from, instead of the batch's own estimates.
+    progress : Progress
+    trust_inputs : bool
+        Whether to diagnose even if the inputs contradict one another.
+
+    Raises
+    ------
+    ModelError, ValueError
+        If the model cannot be run on any of the recordings.
+    """
+    findings = ingested.findings
+    if ingested.contradicts and not trust_inputs:
+        report = inconsistent.report(ingested.batch.batch, findings, options.freeze)
+        return Outcome(_complete(report, inputs), ingested.recordings)
+    estimates = Parameters.estimated(ingested.batch.rig)
+    found = run(ingested.recordings, estimates, options, baseline, _not_judged(findings), progress)
+    return Outcome(_complete(found.report, inputs), ingested.recordings, found)
+
+
+def _complete(report: dict, inputs: dict) -> dict:
+    """The content of diagnosis.json: a report with its headline and the digests of its inputs."""
+    return report | {"headline": headline(report), "provenance": inputs}
+
+
+def write(outcome: Outcome, out: Path, page: str | None = None) -> None:
+    """Write diagnosis.json, the page and the models; the file of a model that there is not states why.
+
+    Parameters
+    ----------
+    outcome : Outcome
+    out : Path
+        Folder of the files.
+    page : str, optional
+        Address of the page of the run, relative to `out`.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    write_json(out / "diagnosis.json", outcome.content)
+    _write_models(out, outcome.models, _without(outcome.content["verdict"]))
+    if outcome.found is None:
+        write_inconsistent(out / "report.html", outcome.content, outcome.recordings, page)
+    else:
+        write_diagnosis(out / "report.html", outcome.found, page)
+
+
+def write_alone(outcome: Outcome, out: Path) -> None:
+    """Write the files of a diagnosis that no run of the pipeline reads: without the file of a nearest model if none."""
+    write(outcome, out)
+    if not outcome.content["nearest"]:
+        (out / MODEL_FILES["nearest"]).unlink()
 
 
 def diagnose(
@@ -29,75 +133,63 @@ def diagnose(
     out: Path,
     options: Options = Options(),  # noqa: B008
     baseline: Path | None = None,
-    report: Callable[[str], None] = lambda text: None,
+    progress: Progress = silent,
     trust_inputs: bool = False,
 ) -> dict:
-    """Diagnose a batch folder and write the files of its diagnosis.
+    """Diagnose a batch folder, write the files of its diagnosis and return the content of diagnosis.json.
 
     Parameters
     ----------
     batch, out : Path
         Batch folder; folder of the files.
-    options : Options
+    options, progress, trust_inputs
+        As of `diagnosed`.
     baseline : Path, optional
         Model file to start from, instead of the batch's own estimates.
-    report : callable
-        Gets a line on each stage.
-    trust_inputs : bool
-        Whether to diagnose even if the inputs contradict one another.
-
-    Returns
-    -------
-    dict
-        The content of diagnosis.json.
 
     Raises
     ------
     InputError
         If the batch or the model file cannot be used, or an excluded name is no mechanism.
     """
+    check_options(options, baseline is not None, "--")
+    ingested = ingest_batch(batch, within(progress, 0.0, INGEST))
+    ingested.check_usable(batch, trust_inputs)
+    inputs = provenance.of_inputs(provenance.files_in(batch), batch)
+    known = read_model(baseline) if baseline else None
+    try:
+        outcome = diagnosed(ingested, inputs, options, known, within(progress, INGEST, PAGE), trust_inputs)
+    except (ModelError, ValueError) as error:
+        raise InputError(f"{batch}: {error}") from None
+    progress("writing the page", PAGE)
+    write_alone(outcome, out)
+    return outcome.content
+
+
+def check_options(options: Options, has_baseline: bool, prefix: str = "") -> None:
+    """Raise `InputError` if an excluded name is no mechanism, or a baseline is to be frozen that there is not.
+
+    `prefix` stands before the names of options in messages, "--" on the command line.
+    """
     try:
         for name in options.without:
             registry.get(name)
     except registry.UnknownMechanismError as error:
-        raise InputError(f"--without: {error}") from None
-    ingested = ingest_batch(batch)
-    contradict = not trust_inputs and any(f.is_inconsistent for f in ingested.findings)
-    if ingested.batch is None or not (ingested.recordings or contradict):
-        refused = [str(f) for f in ingested.findings if f.severity == "refused"]
-        raise InputError("\n".join(refused) or f"{batch}: no recording that can be used")
-    inputs = provenance.of_inputs(provenance.files_in(batch), batch)
-    known = read_model(baseline) if baseline else None
-    if options.freeze and known is None:
-        raise InputError("--freeze: there is no model to hold; name one with --baseline")
-    if contradict:
-        content = inconsistent.report(ingested.batch.batch, ingested.findings, options.freeze)
-        content = _write_inconsistent(content, ingested.recordings, inputs, out)
-    else:
-        try:
-            estimates, not_judged = Parameters.estimated(ingested.batch.rig), _not_judged(ingested.findings)
-            found = run(ingested.recordings, estimates, options, known, not_judged, report)
-        except (ModelError, ValueError) as error:
-            raise InputError(f"{batch}: {error}") from None
-        content = _write(found, inputs, out)
-    if not content["nearest"]:
-        (out / MODEL_FILES["nearest"]).unlink()
-    return content
+        raise InputError(f"{prefix}without: {error}") from None
+    if options.freeze and not has_baseline:
+        raise InputError(f"{prefix}freeze: there is no model to hold; name one with {prefix}baseline")
 
 
-def diagnose_recordings(recordings_file: Path, out: Path, settings: Diagnosing | None = None) -> None:
+def diagnose_recordings(
+    recordings_file: Path, out: Path, settings: Diagnosing | None = None, progress: Progress = silent
+) -> None:
     """Diagnose a batch that the pipeline has read; a batch that cannot be diagnosed has files with the reason."""
-    estimates, recordings = estimates_of(recordings_file), read_recordings(recordings_file)
     settings, inputs = settings or Diagnosing(), provenance.of_inputs([recordings_file])
-    findings = [Finding(**f) for f in read_json(recordings_file.with_suffix(".json"))["findings"]]
-    if estimates is not None and not settings.trust_inputs and any(f.is_inconsistent for f in findings):
-        content = inconsistent.report(recordings_file.stem, findings)
-        _write_inconsistent(content, recordings, inputs, out, PAGE_OF_RUN)
-        return
+    ingested = read_ingested(recordings_file)
     try:
-        if estimates is None or not recordings:
+        if ingested.batch is None or not (ingested.recordings or (ingested.contradicts and not settings.trust_inputs)):
             raise ModelError("no recording that can be used")
-        found = run(recordings, estimates, options_of(settings), not_judged=_not_judged(findings))
+        outcome = diagnosed(ingested, inputs, options_of(settings), None, progress, settings.trust_inputs)
     except (ModelError, ValueError) as error:
         name, reason = recordings_file.stem, str(error)
         out.mkdir(parents=True, exist_ok=True)
@@ -105,7 +197,7 @@ def diagnose_recordings(recordings_file: Path, out: Path, settings: Diagnosing |
         _write_models(out, {}, dict.fromkeys(MODEL_FILES, reason))
         write_not_diagnosed(out / "report.html", name, reason, PAGE_OF_RUN)
         return
-    _write(found, inputs, out, PAGE_OF_RUN)
+    write(outcome, out, PAGE_OF_RUN)
 
 
 def _not_judged(findings: Iterable[Finding]) -> list[dict]:
@@ -121,39 +213,13 @@ def options_of(settings: Diagnosing, without: Sequence[str] = (), freeze: bool =
     return Options(**stated, without=without, freeze=freeze)
 
 
-def _write_models(out: Path, models: Mapping[str, dict], reasons: Mapping[str, str]) -> None:
+def _write_models(out: Path, models: Mapping[str, Model], reasons: Mapping[str, str]) -> None:
     """Write the model files; one without a model states the reason."""
     for name, file in MODEL_FILES.items():
-        write_json(out / file, models.get(name) or {"succeeded": False, "message": reasons[name]})
+        none = {"succeeded": False, "message": reasons[name]}
+        write_json(out / file, models[name].as_dict() if name in models else none)
 
 
 def _without(verdict: str) -> dict[str, str]:
     """Why a verdict lacks a model, by the model's name."""
     return {name: f"verdict '{verdict}': the diagnosis has no {name} model" for name in MODEL_FILES}
-
-
-def _write_inconsistent(
-    report: dict, recordings: Sequence[Recording], inputs: dict, out: Path, page: str | None = None
-) -> dict:
-    """Write diagnosis.json and the page of inputs that contradict one another, and files that state no model."""
-    out.mkdir(parents=True, exist_ok=True)
-    content = report | {"headline": headline(report), "provenance": inputs}
-    write_json(out / "diagnosis.json", content)
-    _write_models(out, {}, _without(report["verdict"]))
-    write_inconsistent(out / "report.html", content, recordings, page)
-    return content
-
-
-def _write(found: Diagnosis, inputs: dict, out: Path, page: str | None = None) -> dict:
-    """Write diagnosis.json, the page and the models; without a nearest model, its file states why."""
-    out.mkdir(parents=True, exist_ok=True)
-    content = found.report | {"headline": headline(found.report), "provenance": inputs}
-    write_json(out / "diagnosis.json", content)
-    judged = found.judgement
-    models = {"calibrated": judged.calibrated, "extended": judged.best}
-    if found.report["nearest"]:
-        models["nearest"] = judged.nearest
-    written = {name: model_as_dict(found.model(candidate), inputs) for name, candidate in models.items()}
-    _write_models(out, written, _without(judged.verdict))
-    write_diagnosis(out / "report.html", found, page)
-    return content

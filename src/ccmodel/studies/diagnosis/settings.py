@@ -1,5 +1,7 @@
 """Settings of the diagnoses."""
 
+from typing import Self
+
 from pydantic import Field, model_validator
 
 from ccmodel import mechanisms
@@ -28,7 +30,7 @@ class Diagnosing(TypedModel):
     )
 
     @model_validator(mode="after")
-    def _candidates_known(self):
+    def _candidates_known(self) -> Self:
         for one in (one for candidate in self.forced_candidates for one in candidate):
             name, _, place = one.partition(" at ")
             if name not in mechanisms.names() or place not in mechanisms.get(name).places:

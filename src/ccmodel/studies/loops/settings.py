@@ -1,11 +1,11 @@
 """Settings of the figures of loops, and of how loops are measured."""
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ccmodel.studies.settings import StudySettings
+from ccmodel.studies.settings import Configuration, StudySettings
 from ccmodel.typed import TypedModel
 
 Variable = Literal["bend", "pretension", "radius", "frequency", "load_level", "recording"]
@@ -30,7 +30,7 @@ class Study(StudySettings):
     title: str = Field("", description="what the figure shows, in a few words")
 
     @model_validator(mode="after")
-    def _rows_are_drawn(self):
+    def _rows_are_drawn(self) -> Self:
         if self.rows is not None and self.figure not in ("torque-loops", "drive-loops"):
             raise ValueError(f"figure '{self.figure}' has no rows; leave 'rows' out")
         return self
@@ -39,7 +39,9 @@ class Study(StudySettings):
         """Title of the study, its batches, and what its figure shows."""
         return f"{self.title}: {', '.join(self.batches)}. {self.shows}"
 
-    def needs(self, config, studies: Mapping[str, "Study"], batches: Sequence[str]) -> list[tuple[str, str, str]]:
+    def needs(
+        self, config: Configuration, studies: Mapping[str, StudySettings], batches: Sequence[str]
+    ) -> list[tuple[str, str, str]]:
         """Label, parameter set and batch of every run in the figure."""
         return [("", config.parameters_of(self, batch), batch) for batch in self.batches]
 

@@ -3,8 +3,9 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
-import matplotlib.pyplot as plt
+import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -32,8 +33,8 @@ CONDITIONS_IN_A_PANEL = 6
 class Look:
     """Lines of one condition: the recording wide and pale, the model above it thin, so that both are seen."""
 
-    recording: Mapping
-    model: Mapping
+    recording: dict[str, Any]
+    model: dict[str, Any]
 
 
 ALONE = Look({"color": COLOURS[4], "linewidth": 3.5}, {"color": "black", "linewidth": 0.9})
@@ -49,7 +50,7 @@ def draw(pairs: Sequence[Pair], study: Study, measuring: Measuring) -> Figure:
     """Draw a study as its settings ask; a study without a usable recording has a figure that says so."""
     if not pairs:
         return figures.empty_figure(f"{study.title}: no usable recording (see what was left out)")
-    with plt.rc_context(figures.STYLE):
+    with matplotlib.rc_context(figures.STYLE):
         return _DRAW[study.figure](pairs, study, measuring.smoothing_share)
 
 
@@ -136,20 +137,20 @@ def _grid(cells: int, strips: int, columns: int, shared: bool = True) -> tuple[F
     `shared` loops have the same axes, and strips of the same channel the same y axis.
     """
     if cells == 1:
-        figure = plt.figure(figsize=(9, max(3.4, 1.9 * strips) + 0.9))
+        figure = Figure(figsize=(9, max(3.4, 1.9 * strips) + 0.9))
         grid = figure.add_gridspec(strips, 2, width_ratios=(1.1, 1))
         places = [(grid[:, 0], [grid[i, 1] for i in range(strips)])]
     else:
         rows, depth = -(-cells // columns), 1 + strips
-        figure = plt.figure(figsize=((4.5 if columns == 2 else 3.7) * columns, rows * (3 + 1.3 * strips) + 0.9))
+        figure = Figure(figsize=((4.5 if columns == 2 else 3.7) * columns, rows * (3 + 1.3 * strips) + 0.9))
         grid = figure.add_gridspec(rows * depth, columns, height_ratios=[3, *[1.2] * strips] * rows)
         corners = [(depth * (i // columns), i % columns) for i in range(cells)]
         places = [(grid[r, c], [grid[r + 1 + i, c] for i in range(strips)]) for r, c in corners]
-    made = []
-    for loop, below in places:
-        first = made[0] if made and shared else (None, [None] * strips)
-        loop = figure.add_subplot(loop, sharex=first[0], sharey=first[0])
-        drawn = [figure.add_subplot(place, sharey=other) for place, other in zip(below, first[1], strict=True)]
+    made: list[tuple[Axes, list[Axes]]] = []
+    for place, below in places:
+        first, others = made[0] if made and shared else (None, [None] * strips)
+        loop = figure.add_subplot(place, sharex=first, sharey=first)
+        drawn = [figure.add_subplot(strip, sharey=other) for strip, other in zip(below, others, strict=True)]
         for strip in drawn[:-1]:
             strip.sharex(drawn[-1])
             strip.tick_params(labelbottom=False)
@@ -175,7 +176,7 @@ def _residuals(ax: Axes, drawn: Mapping[Look, Sequence[Pair]], channel: str, smo
     """Model minus recording over the time of the loop: every sample pale, and the moving mean above."""
     for look, pairs in drawn.items():
         for recorded, simulated in pairs:
-            if is_compared(recorded, simulated, channel):
+            if simulated is not None and is_compared(recorded, simulated, channel):
                 window = last_cycle(recorded)
                 time = recorded.time_s[window] - recorded.time_s[window][0]
                 residual = (simulated[channel] - recorded[channel]) * TABLE[channel].scale
@@ -210,7 +211,10 @@ def _title_and_legend(
     origins = {ORIGIN[recorded.origin] for recorded, _ in pairs}
     # Of several origins, each condition's label says which is its own.
     recording = origins.pop() if len(origins) == 1 else "recording"
-    handles = {recording: Line2D([], [], **key.recording), _model_title(pairs): Line2D([], [], **key.model)}
+    handles: dict[str, Line2D | tuple[Line2D, Line2D]] = {
+        recording: Line2D([], [], **key.recording),
+        _model_title(pairs): Line2D([], [], **key.model),
+    }
     handles |= {
         label: (Line2D([], [], **look.recording), Line2D([], [], **look.model)) for label, look in conditions.items()
     }

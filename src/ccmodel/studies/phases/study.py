@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
-import matplotlib.pyplot as plt
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -15,7 +16,16 @@ from ccmodel.model.exact import CableProfile
 from ccmodel.model.load import SpringLoad
 from ccmodel.model.phases import PAPERS_PHASES, PhaseStudy, simulate_phases
 from ccmodel.model.transmission import Transmission
-from ccmodel.report.figures import COLOURS, STYLE, TRANSMISSION, legend_below, letter_panels, name_axes, plot_channels
+from ccmodel.report.figures import (
+    COLOURS,
+    STYLE,
+    TRANSMISSION,
+    legend_below,
+    letter_panels,
+    name_axes,
+    plot_channels,
+    subplots,
+)
 from ccmodel.studies.loops.settings import Measuring
 from ccmodel.studies.phases.settings import FIGURES, PhaseExample
 from ccmodel.studies.run import Outcome, Run
@@ -36,7 +46,7 @@ def judge(example: PhaseExample, runs: Sequence[Run] = (), measuring: Measuring 
 
 def study_of(example: PhaseExample) -> PhaseStudy:
     """Simulation of the example's motion with the exact solver."""
-    path = ConduitPath([example.conduit_length_m], [example.conduit_bend_rad])
+    path = ConduitPath(np.array([example.conduit_length_m]), np.array([example.conduit_bend_rad]))
     rigidity = example.cable_stiffness_N_per_m * example.conduit_length_m
     radius = example.pulley_radius_m
     return simulate_phases(
@@ -52,8 +62,8 @@ def study_of(example: PhaseExample) -> PhaseStudy:
 def response_figure(study: PhaseStudy) -> Figure:
     """The paper's Fig. 5, and the same over time: tensions, torques and angles with instants 1 to 8."""
     values = _values(study)
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(3, 2, figsize=(9, 10.4))
+    with matplotlib.rc_context(STYLE):
+        figure, axes = subplots(3, 2, figsize=(9, 10.4))
         for ax, (x, y) in zip(axes.flat, TRANSMISSION, strict=False):
             _loop(ax, study, values, x, y)
         _over_time(axes[2, 0], study, values, TENSIONS, "tension (N)")
@@ -68,8 +78,8 @@ def torque_loop_figure(study: PhaseStudy) -> Figure:
     """The paper's Fig. 6: load torque over drive torque, with the phases I to IV in colour and by name."""
     values = _values(study)
     curve = _curve(values, TAU_IN, TAU_OUT)
-    with plt.rc_context(STYLE):
-        figure, ax = plt.subplots(figsize=(7.2, 5.8))
+    with matplotlib.rc_context(STYLE):
+        figure, ax = subplots(figsize=(7.2, 5.8))
         start = slice(study.first_reversal + 1)
         plot_channels(ax, values, TAU_IN, TAU_OUT, start, color="0.6", lw=0.9, label="from rest")
         for first, last in _spells(study):
@@ -88,8 +98,8 @@ def torque_loop_figure(study: PhaseStudy) -> Figure:
 
 def profiles_figure(study: PhaseStudy) -> Figure:
     """The paper's Fig. 7: tension along both cables at instants 1 to 8, with a column for each stroke."""
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(2, 2, figsize=(9.4, 7.6), sharex=True, sharey=True)
+    with matplotlib.rc_context(STYLE):
+        figure, axes = subplots(2, 2, figsize=(9.4, 7.6), sharex=True, sharey=True)
         for column, stroke in enumerate(STROKES):
             for row, cable in enumerate("AB"):
                 ax = axes[row, column]
@@ -175,7 +185,7 @@ def _scaled(curve: NDArray) -> NDArray:
     return curve / np.where(extent > 0, extent, 1)
 
 
-def _label_sample(ax: Axes, curve: NDArray, sample: int, text: str, points: float = 11, **style) -> None:
+def _label_sample(ax: Axes, curve: NDArray, sample: int, text: str, points: float = 11, **style: Any) -> None:
     """Text next to a sample of a curve, in the direction with the largest clearance; of two equal ones the outer."""
     scaled = _scaled(curve)
     angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
@@ -184,7 +194,15 @@ def _label_sample(ax: Axes, curve: NDArray, sample: int, text: str, points: floa
     candidates = here[:, None] + 0.06 * direction
     clearance = np.hypot(*(candidates[:, :, None] - scaled[:, None, :])).min(axis=1)
     best = direction[:, np.argmax(clearance + 0.02 * (here - middle) @ direction)]
-    ax.annotate(text, curve[:, sample], points * best, textcoords="offset points", ha="center", va="center", **style)
+    ax.annotate(
+        text,
+        tuple(curve[:, sample]),
+        tuple(points * best),
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        **style,
+    )
 
 
 def _spells(study: PhaseStudy) -> list[tuple[int, int]]:

@@ -1,7 +1,6 @@
 """The cases of the study, a row each: errors after the fit, and the norms by which they can be divided."""
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import asdict
 from functools import partial
@@ -12,6 +11,8 @@ from numpy.typing import NDArray
 
 from ccmodel.channels import TABLE_ONE
 from ccmodel.failure import ModelError
+from ccmodel.inference.pool import processes
+from ccmodel.progress import Progress
 from ccmodel.studies.table_one.effects import Effect, all_effects, depends_on_time, scaled
 from ccmodel.studies.table_one.refit import NORMS, refit
 from ccmodel.studies.table_one.rigs import Condition, conditions, recorded, within_ranges
@@ -19,7 +20,6 @@ from ccmodel.studies.table_one.settings import NotStated, TableOne
 
 CONDITION = tuple(Condition.__annotations__)
 Case = tuple[Condition, tuple[Effect, ...]]
-Report = Callable[[str], None]
 
 
 def usable_conditions(study: TableOne, open_: NotStated) -> list[Condition]:
@@ -43,7 +43,7 @@ def pair_cases(study: TableOne, usable: Sequence[Condition], best: Sequence[Effe
     ]
 
 
-def run(study: TableOne, groups: Sequence[Sequence[Case]], cores: int, report: Report) -> pd.DataFrame:
+def run(study: TableOne, groups: Sequence[Sequence[Case]], cores: int, progress: Progress) -> pd.DataFrame:
     """Rows of all cases, in their order.
 
     Processes share the conditions: fits under one condition have the derivatives of the plain model in common.
@@ -54,11 +54,11 @@ def run(study: TableOne, groups: Sequence[Sequence[Case]], cores: int, report: R
         parts.setdefault(condition.without_fit, []).append(i)
     rows: dict[int, dict] = {}
     work = partial(_rows, study), [[cases[i] for i in part] for part in parts.values()]
-    with ProcessPoolExecutor(cores) if cores > 1 else nullcontext() as pool:
+    with processes(cores) if cores > 1 else nullcontext() as pool:
         results = (pool.map if pool else map)(*work)
         for done, (part, found) in enumerate(zip(parts.values(), results, strict=True), 1):
             rows |= zip(part, found, strict=True)
-            report(f"part {done} of {len(parts)}, {len(part)} cases")
+            progress(f"{done} of {len(parts)} conditions", done / len(parts))
     return pd.DataFrame([rows[i] for i in range(len(cases))])
 
 

@@ -1,6 +1,8 @@
 """The paper's Table I with the errors of the nearest effects, and the distance of every effect."""
 
-import matplotlib.pyplot as plt
+from typing import Any
+
+import matplotlib
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,7 +15,7 @@ from ccmodel.studies.table_one.settings import TableOne
 
 MARKERS = dict(zip(NORMS, "osD", strict=True))
 # Errors that are drawn: ranking, single effects or pairs, number, style.
-DRAWN = (
+DRAWN: tuple[tuple[str, str, int, dict[str, Any]], ...] = (
     ("errors", "single", 3, {"marker": "o", "linestyle": "-"}),
     ("errors and fit", "pair", 1, {"marker": "D", "linestyle": ":"}),
     ("errors at the paper's fit", "single", 1, {"marker": "s", "linestyle": "--"}),
@@ -24,9 +26,9 @@ CLOUDS = 6
 
 def table_one_figure(ranked: pd.DataFrame, singles: pd.DataFrame, study: TableOne) -> Figure:
     """Table I with the nearest errors by each norm, the fitted parameters, and the ranking."""
-    with plt.rc_context(STYLE):
-        figure = plt.figure(figsize=(13, 11))
-        above, below = figure.subfigures(2, 1, height_ratios=(1, 1.3))
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(13, 11))
+        above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=(1, 1.3)).flat
         for ax, norm in zip(above.subplots(1, len(NORMS)), NORMS, strict=True):
             _patterns(ax, ranked, norm, study)
         left, right = below.subplots(1, 2)

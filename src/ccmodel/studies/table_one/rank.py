@@ -6,6 +6,7 @@ an effect that is no nearer than that explains nothing of the pattern.
 """
 
 from collections.abc import Mapping
+from typing import TypeVar
 
 import numpy as np
 import pandas as pd
@@ -99,7 +100,10 @@ def nearest(table: pd.DataFrame, column: str) -> pd.DataFrame:
     return chosen.sort_values(column, kind="stable").drop_duplicates("effect")
 
 
-def torque_allowed(pattern: Mapping[str, float], sizes: Mapping[str, float], radius_m: float) -> float:
+Size = TypeVar("Size", float, pd.Series)
+
+
+def torque_allowed(pattern: Mapping[str, float], sizes: Mapping[str, Size], radius_m: float) -> Size:
     """Upper bound on the error of tau_in (% of its size) by the errors of T1 and T3.
 
     tau_in = (T1 - T3) R holds for the errors too; the root mean square of a difference is at most the sum of both.
@@ -112,7 +116,7 @@ def torque_allowed(pattern: Mapping[str, float], sizes: Mapping[str, float], rad
         Norms of T1_N, T3_N and tau_in_Nm, in the channels' units.
     radius_m : float
     """
-    return sum(pattern[c] * sizes[c] for c in (T1, T3)) * radius_m / sizes[TAU_IN]
+    return (pattern[T1] * sizes[T1] + pattern[T3] * sizes[T3]) * radius_m / sizes[TAU_IN]
 
 
 def room_for_torque(table: pd.DataFrame, study: TableOne) -> dict[str, dict[str, float]]:

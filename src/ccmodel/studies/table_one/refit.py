@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.inference.jacobian import jacobian
+from ccmodel.inference.jacobian import STEP, jacobian
 from ccmodel.inference.least_squares import Search, minimise
 from ccmodel.inference.problem import Block, Free, Problem
 from ccmodel.studies.table_one.rigs import Condition, plain
@@ -78,10 +78,10 @@ class _Recorded:
         return (_plain_at(self.rig, self.condition, **values) - self.measured) / self.span
 
 
-class _LatticeProblem(Problem):
+class _LatticeProblem(Problem[_Recorded]):
     """A fit whose derivatives are taken at the nearest point of the lattice."""
 
-    def blocks(self, x: NDArray, step: float, errors: Sequence[NDArray] | None = None) -> list[Block]:
+    def blocks(self, x: NDArray, step: float = STEP, errors: Sequence[NDArray] | None = None) -> list[Block]:
         """Errors at `x`, derivatives at the lattice."""
         (recorded,) = self.observations
         at = np.round(x / LATTICE).astype(int).tolist()

@@ -113,7 +113,7 @@ def _acting(rig: Rig, condition: Condition, effects: Sequence[Effect]) -> list[g
 
 
 def _path(rig: Rig) -> ConduitPath:
-    return ConduitPath([rig.conduit_length_m], [rig.bend_rad])
+    return ConduitPath(np.array([rig.conduit_length_m]), np.array([rig.bend_rad]))
 
 
 def _transmission(rig: Rig, stiffness: float, friction: float) -> Transmission:

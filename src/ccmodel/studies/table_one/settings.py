@@ -1,11 +1,11 @@
 """The typed content of config/table-one.yaml."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from ccmodel.channels import TABLE_ONE
-from ccmodel.typed import NotNegative, Positive, TypedModel
+from ccmodel.typed import NotNegative, OneOf, Positive, TypedModel
 
 Some = Annotated[list[Positive], Field(min_length=1)]
 RigName = Literal["measured", "measured-free", "fitted"]
@@ -45,7 +45,7 @@ class Rig(TypedModel):
     motion: Motion
 
     @model_validator(mode="after")
-    def _cable_reaches(self):
+    def _cable_reaches(self) -> Self:
         if self.cable_length_m < self.conduit_length_m:
             raise ValueError("a cable is at least as long as its conduit")
         return self
@@ -89,7 +89,7 @@ class Pairs(TypedModel):
 class TableOne(TypedModel):
     """The whole study."""
 
-    pattern_percent: dict[Literal[TABLE_ONE], Positive]
+    pattern_percent: dict[Annotated[str, OneOf(TABLE_ONE)], Positive]
     rounding_percent: Positive
     rig: Rig
     not_stated: NotStated
@@ -97,7 +97,7 @@ class TableOne(TypedModel):
     pairs: Pairs
 
     @model_validator(mode="after")
-    def _pattern_is_whole(self):
+    def _pattern_is_whole(self) -> Self:
         if missing := [c for c in TABLE_ONE if c not in self.pattern_percent]:
             raise ValueError(f"pattern_percent has no {', '.join(missing)}")
         return self

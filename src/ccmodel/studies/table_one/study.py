@@ -11,15 +11,19 @@ from pathlib import Path
 import pandas as pd
 
 from ccmodel import provenance
+from ccmodel.progress import Progress, silent, within
 from ccmodel.report.figures import FORMATS, save_figure, stamp_figure
 from ccmodel.steps.files import write_json, write_table
-from ccmodel.studies.table_one.cases import Case, Report, pair_cases, run, single_cases, usable_conditions
+from ccmodel.studies.table_one.cases import Case, pair_cases, run, single_cases, usable_conditions
 from ccmodel.studies.table_one.effects import Effect, finer
 from ccmodel.studies.table_one.figure import table_one_figure
 from ccmodel.studies.table_one.rank import RANKINGS, nearest, rankings, room_for_torque, scored
 from ccmodel.studies.table_one.rigs import conditions
 from ccmodel.studies.table_one.settings import TableOne
 from ccmodel.typed import load_yaml_model
+
+# Shares of the time at which the coarse and the finer cases of one effect are done.
+SINGLES, FINER = 0.4, 0.5
 
 
 @dataclass(frozen=True)
@@ -42,20 +46,22 @@ class Outcome:
     left_out: int
 
 
-def run_study(study: TableOne, cores: int = 1, report: Report = lambda text: None) -> Outcome:
+def run_study(study: TableOne, cores: int = 1, progress: Progress = silent) -> Outcome:
     """Run all cases; the tables do not depend on the number of processes."""
     every, usable = conditions(study.not_stated), usable_conditions(study, study.not_stated)
     coarse_cases = single_cases(study, usable)
-    coarse = _run(study, coarse_cases, cores, report, "effects")
+    coarse = _run(study, coarse_cases, cores, within(progress, 0.0, SINGLES), "effects")
     # `cases[i]` belongs to row i of the table; `scored` keeps the rows' numbers.
     cases = [case for group in coarse_cases for case in group]
     finer_cases = [_finer_cases(study, cases[i]) for i in _best_rows(scored(coarse, study))]
-    singles = pd.concat([coarse, _run(study, finer_cases, cores, report, "effects, finer")], ignore_index=True)
+    singles = pd.concat(
+        [coarse, _run(study, finer_cases, cores, within(progress, SINGLES, FINER), "effects, finer")], ignore_index=True
+    )
     cases += [case for group in finer_cases for case in group]
     scored_singles = scored(singles, study)
     leading = _leading(study, scored_singles, cases)
     cases_of_pairs = pair_cases(study, usable_conditions(study, study.pairs.not_stated), leading)
-    pairs = _run(study, cases_of_pairs, cores, report, "pairs")
+    pairs = _run(study, cases_of_pairs, cores, within(progress, FINER, 1.0), "pairs")
     scored_pairs = scored(pairs, study) if len(pairs) else scored_singles.iloc[:0]
     failed = pd.concat([singles, pairs], ignore_index=True)
     failed = failed[failed["failed"] != ""]
@@ -64,10 +70,10 @@ def run_study(study: TableOne, cores: int = 1, report: Report = lambda text: Non
     return Outcome(scored_singles, scored_pairs, failed, len(left_out))
 
 
-def _run(study: TableOne, groups: Sequence[Sequence[Case]], cores: int, report: Report, stage: str) -> pd.DataFrame:
+def _run(study: TableOne, groups: Sequence[Sequence[Case]], cores: int, progress: Progress, stage: str) -> pd.DataFrame:
     """Run groups of cases, with the stage's name in front of each line of progress."""
-    report(f"{stage}: {sum(map(len, groups))} cases")
-    return run(study, groups, cores, lambda text: report(f"{stage}: {text}"))
+    progress(f"{stage}: {sum(map(len, groups))} cases", 0.0)
+    return run(study, groups, cores, lambda text, done: progress(f"{stage}: {text}", done))
 
 
 def _best_rows(found: pd.DataFrame) -> list[int]:
@@ -91,7 +97,7 @@ def _leading(study: TableOne, found: pd.DataFrame, cases: Sequence[Case]) -> lis
     return list(leading.values())
 
 
-def table_one(settings: Path, out: Path, figure: Path, cores: int = 1, report: Report = lambda text: None) -> str:
+def table_one(settings: Path, out: Path, figure: Path, cores: int = 1, progress: Progress = silent) -> str:
     """Run the study and return a line on the number of cases.
 
     Writes cases.csv, pairs.csv, failed.csv, ranking.csv, summary.json and table-one.png, .svg and .pdf into `out`, and
@@ -103,7 +109,7 @@ def table_one(settings: Path, out: Path, figure: Path, cores: int = 1, report: R
         If the settings cannot be used.
     """
     study = load_yaml_model(settings, TableOne)
-    found = run_study(study, cores, report)
+    found = run_study(study, cores, progress)
     ranked = rankings(found.singles, found.pairs, study)
     out.mkdir(parents=True, exist_ok=True)
     tables = {"cases": found.singles, "pairs": found.pairs, "failed": found.failed, "ranking": ranked}

@@ -1,0 +1,165 @@
+"""Batches: a folder of recordings that was read."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ccmodel import provenance
+from ccmodel.api.recordings import Recordings
+from ccmodel.channels import THETA_IN
+from ccmodel.recording import ORIGIN, Recording
+from ccmodel.rig.batch import Batch as BatchFile
+from ccmodel.rig.findings import Finding
+from ccmodel.rig.ingest import Ingested, ingest_batch
+from ccmodel.typed import InputError
+
+# Findings that a short form shows.
+SHOWN_FINDINGS = 5
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Batch(Recordings):
+    """Recordings of one rig, as `load` reads them from a folder.
+
+    Attributes
+    ----------
+    folder : Path
+    recordings : tuple of Recording
+        Those that can be used, in the order of ``batch.yaml``; ``batch["id"]`` is one of them.
+    findings : tuple of Finding
+        Warnings, refused files and contradictions; ``str(finding)`` says where and what.
+    file : ccmodel.rig.batch.Batch
+        Content of ``batch.yaml``: the rig with its radii, its spring and the estimates of its cable.
+    provenance : mapping
+        Version of ccmodel, and digests of the folder's files as they were read.
+    """
+
+    folder: Path
+    recordings: tuple[Recording, ...]
+    findings: tuple[Finding, ...]
+    file: BatchFile
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """Name of the batch, which is its folder's."""
+        return self.file.batch
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether the inputs contradict one another, so that no verdict on the physics can be drawn from them."""
+        return self.ingested.contradicts
+
+    @property
+    def ingested(self) -> Ingested:
+        """The batch as the functions below this interface take it."""
+        return Ingested(list(self.recordings), list(self.findings), self.file)
+
+    @property
+    def summary(self) -> pd.DataFrame:
+        """A row for each recording, by its id.
+
+        Columns ``samples``, ``rate_Hz``, ``duration_s``, ``rest_s`` (the rest at the start), ``stroke_rad`` (peak to
+        peak of the drive angle), ``pretension_N``, ``channels`` and ``warnings`` (numbers of them).
+        """
+        rows = {
+            r.id: {
+                "samples": r.time_s.size,
+                "rate_Hz": r.rate_Hz,
+                "duration_s": float(np.ptp(r.time_s)),
+                "rest_s": r.rest_s,
+                "stroke_rad": float(np.ptp(r[THETA_IN])),
+                "pretension_N": r.pretension_N,
+                "channels": len(r.channels),
+                "warnings": len(r.warnings),
+            }
+            for r in self.recordings
+        }
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("recording")
+
+    def __repr__(self) -> str:
+        return "\n".join([self._title, *([_table(self.summary)] if len(self) else []), *self._shown_findings])
+
+    def _repr_html_(self) -> str:
+        table = self.summary.to_html(float_format=_number, border=0) if len(self) else ""
+        findings = "".join(f"<li>{escape(line)}</li>" for line in self._shown_findings)
+        return f"<p>{escape(self._title)}</p>{table}{f'<ul>{findings}</ul>' if findings else ''}"
+
+    @property
+    def _title(self) -> str:
+        recordings = f"{len(self)} recording{'' if len(self) == 1 else 's'}"
+        n = len(self.findings)
+        findings = f"{n or 'no'} finding{'' if n == 1 else 's'}"
+        return f"Batch {self.name}, {ORIGIN[self.file.origin]}: {recordings}, {findings}"
+
+    @property
+    def _shown_findings(self) -> list[str]:
+        """A line for each of the first findings, the gravest first."""
+        grave = sorted(self.findings, key=lambda f: (f.severity == "warning", -f.confidence))
+        words = {"refused": "left out", "inconsistent": "inconsistent", "warning": "warning"}
+        lines = [f"{words[f.severity]}: {f.place}: {f.text}" for f in grave[:SHOWN_FINDINGS]]
+        more = len(grave) - len(lines)
+        return [*lines, *([f"and {more} more in .findings"] if more else [])]
+
+
+def load(folder: str | Path) -> Batch:
+    """Read a folder of recordings.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder with a ``batch.yaml`` and the logs that it names (docs/rig-log-format.md); it is not changed.
+
+    Returns
+    -------
+    Batch
+        A log that cannot be used, or contradicts another, is one of its findings.
+
+    Raises
+    ------
+    InputError
+        If nothing in the folder can be used: one line for each problem.
+
+    Examples
+    --------
+    >>> import ccmodel as cc
+    >>> batch = cc.load("data/raw/half-loop")
+    >>> batch.summary[["samples", "rate_Hz", "pretension_N"]]
+                      samples  rate_Hz  pretension_N
+    recording
+    half-loop-7.3N-a     5250    250.0           7.3
+    half-loop-7.3N-b     5250    250.0           7.3
+    >>> batch["half-loop-7.3N-a"].to_frame()["tau_in_Nm"].max().round(4)
+    np.float64(0.0387)
+    """
+    folder = Path(folder)
+    ingested = ingest_batch(folder)
+    ingested.check_usable(folder, trust_inputs=False)
+    inputs = provenance.of_inputs(provenance.files_in(folder), folder)
+    return Batch(folder, tuple(ingested.recordings), tuple(ingested.findings), ingested.batch, inputs)
+
+
+def as_batch(batch: Batch | str | Path) -> Batch:
+    """A batch, or the one in a folder."""
+    return batch if isinstance(batch, Batch) else load(batch)
+
+
+def check_consistent(batch: Batch, trust_inputs: bool) -> None:
+    """Raise `InputError` if a batch's inputs contradict one another and are not trusted."""
+    if batch.contradicts and not trust_inputs:
+        lines = [str(f) for f in batch.findings if f.is_inconsistent]
+        raise InputError("\n".join([*lines, "if these inputs are right, state trust_inputs=True"]))
+
+
+def _table(frame: pd.DataFrame) -> str:
+    """A table as text, at most four digits of a number."""
+    return frame.reset_index().to_string(index=False, float_format=_number)
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}"

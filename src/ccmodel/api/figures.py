@@ -1,0 +1,131 @@
+"""Figures of batches, fits and diagnoses for a session of Python: they use the backend that the user has."""
+
+from collections.abc import Callable, Sequence
+from functools import wraps
+
+import matplotlib
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from ccmodel.api.batch import Batch
+from ccmodel.channels import CHANNELS, MEASURED, TABLE, THETA_IN
+from ccmodel.diagnosis.run import Calibration
+from ccmodel.recording import ORIGIN, Recording
+from ccmodel.report.figures import COLOURS, LINES, STYLE, legend_below, title_figure
+from ccmodel.report.verdict import NOT_ACCEPTED, SYMBOL
+from ccmodel.typed import InputError, nearest
+
+# Most recordings that have a column of their own.
+MOST_COLUMNS = 6
+
+
+def _figure(draw: Callable[..., Figure]) -> Callable[..., Figure]:
+    """Draw in the style of all figures; a notebook shows a figure that is returned, and must not show it twice."""
+
+    @wraps(draw)
+    def drawn(*arguments: object) -> Figure:
+        with plt.rc_context(STYLE):
+            figure = draw(*arguments)
+        if "inline" in matplotlib.get_backend():
+            plt.close(figure)
+        return figure
+
+    return drawn
+
+
+@_figure
+def channels(recordings: Sequence[Recording], channel: str | None = None) -> Figure:
+    """Channels over time, a panel for each, with all recordings that have it."""
+    recorded = [c for c in CHANNELS if any(c in r for r in recordings)]
+    if channel is not None and channel not in recorded:
+        guess = nearest(channel, recorded)
+        advice = f"did you mean '{guess}'?" if guess else f"there is {', '.join(recorded) or 'none'}"
+        raise InputError(f"no recording has the channel '{channel}'; {advice}")
+    shown = [channel] if channel else [c for c in recorded if c in (THETA_IN, *MEASURED)]
+    figure, axes = plt.subplots(
+        len(shown), 1, figsize=(9, 0.9 + (2.4 if channel else 1.5) * len(shown)), sharex=True, squeeze=False
+    )
+    for ax, name in zip(axes[:, 0], shown, strict=True):
+        for k, r in enumerate(r for r in recordings if name in r):
+            style = {"color": COLOURS[k % len(COLOURS)], "ls": LINES[k // len(COLOURS) % len(LINES)]}
+            ax.plot(r.time_s, TABLE[name].scale * r[name], lw=1.0, label=r.id, **style)
+        ax.set_ylabel(_label(name))
+    axes[-1, 0].set_xlabel("time (s)")
+    title_figure(figure, f"{recordings[0].batch}: {ORIGIN[recordings[0].origin]}")
+    legend_below(figure, axes)
+    return figure
+
+
+@_figure
+def residuals(calibration: Calibration, batch: Batch) -> Figure:
+    """Residuals of the calibrated model over the noise floor, by channel (rows) and recording (columns)."""
+    whitened = calibration.whitened
+    of = {w.observations.id: w.observations.errors(calibration.fit.values) for w in whitened}
+    floors = {w.observations.id: w for w in whitened}
+    size = {
+        id: float(np.mean((errors * w.observations.sigma) ** 2 / _floor(w)[:, None] ** 2))
+        for (id, errors), w in zip(of.items(), whitened, strict=True)
+    }
+    largest = sorted(size, key=lambda id: -size[id])[:MOST_COLUMNS]
+    columns = [id for id in of if id in largest]
+    rows = [c for c in MEASURED if any(c in floors[id].observations.channels for id in columns)]
+    figure, axes = plt.subplots(
+        len(rows), len(columns), figsize=(max(6.0, 2.9 * len(columns)), 0.9 + 1.5 * len(rows)),
+        sharex="col", sharey="row", squeeze=False,
+    )  # fmt: skip
+    for j, id in enumerate(columns):
+        w = floors[id]
+        o = w.observations
+        time_s = o.given.recording.time_s[o.judged]
+        for i, channel in enumerate(rows):
+            ax = axes[i, j]
+            ax.axhspan(-1, 1, color="#d9d9d9", lw=0, label="noise floor")
+            if channel in o.channels:
+                c = o.channels.index(channel)
+                ax.plot(time_s, of[id][c] * o.sigma[c] / w.noise_floor[channel], color=COLOURS[0], lw=0.7,
+                        label="model minus recording")  # fmt: skip
+        axes[0, j].set_title(id, fontsize=9)
+        axes[-1, j].set_xlabel("time (s)")
+    for ax, channel in zip(axes[:, 0], rows, strict=True):
+        ax.set_ylabel(f"{TABLE[channel].tex}\n(noise floors)")
+    some = f"; the {len(columns)} of {len(of)} with the largest" if len(columns) < len(of) else ""
+    title_figure(figure, f"{batch.name}: residuals over the noise floor{some}; {ORIGIN[batch.file.origin]}")
+    legend_below(figure, axes)
+    return figure
+
+
+def _floor(whitened) -> np.ndarray:
+    return np.array([whitened.noise_floor[channel] for channel in whitened.observations.channels])
+
+
+@_figure
+def errors(table: pd.DataFrame, batch: Batch, verdict: str) -> Figure:
+    """Held-out errors by channel over the noise floor: a bar for each model."""
+    models = {"before": "calibrated model"}
+    if (table["after"] != table["before"]).any():
+        models["after"] = "best model"
+    if "nearest" in table:
+        models["nearest"] = f"nearest model, {NOT_ACCEPTED}"
+    colours = {"before": COLOURS[0], "after": COLOURS[1], "nearest": COLOURS[3]}
+    figure, ax = plt.subplots(figsize=(7.5, 1.4 + 0.5 * len(table)))
+    height = 0.8 / len(models)
+    for k, (column, label) in enumerate(models.items()):
+        ratios = table[column] / table["noise"]
+        at = np.arange(len(table)) + (k - (len(models) - 1) / 2) * height
+        bars = ax.barh(at, ratios, 0.9 * height, color=colours[column], label=label)
+        ax.bar_label(bars, [f"{ratio:.1f}" for ratio in ratios], padding=3, fontsize=8)
+    ax.axvline(1.0, color="black", lw=1.0, ls="--", label="noise floor")
+    ax.set_yticks(range(len(table)), [SYMBOL[channel] for channel in table.index])
+    ax.invert_yaxis()
+    ax.grid(False, axis="y")
+    ax.set(xlabel="root mean square error on held-out recordings (noise floors)", ylabel="channel")
+    title_figure(figure, f"{batch.name}, verdict '{verdict}': {ORIGIN[batch.file.origin]}")
+    legend_below(figure, np.array([ax]))
+    return figure
+
+
+def _label(channel: str) -> str:
+    """Symbol and unit of a channel, for an axis with little room."""
+    return f"{TABLE[channel].tex} ({TABLE[channel].plot_unit or TABLE[channel].unit})"

@@ -1,0 +1,232 @@
+"""Fits: the calibrated model of a batch, its values with their intervals."""
+
+import json
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from ccmodel.api.batch import Batch, as_batch, check_consistent
+from ccmodel.api.options import Tolerance, progress_of, settings_of
+from ccmodel.diagnosis.run import Calibration, calibrate
+from ccmodel.failure import ModelError
+from ccmodel.inference.intervals import Interval
+from ccmodel.model.files import Model, RigConditions
+from ccmodel.model.parameters import Parameters, unit_of_parameter
+from ccmodel.studies.diagnosis.run import options_of
+from ccmodel.typed import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ccmodel.progress import Progress
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fit:
+    """The paper's model, calibrated to a batch.
+
+    Attributes
+    ----------
+    batch : Batch
+    calibration : Calibration
+        The result as `ccmodel.diagnosis` has it; private, as everything below this interface.
+    """
+
+    batch: Batch
+    calibration: Calibration
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Fitted values by parameter, SI units."""
+        return {name: self.calibration.fit.values[name] for name in self.intervals}
+
+    @property
+    def intervals(self) -> dict[str, Interval]:
+        """The 90 % interval (``low``, ``high``) and standard deviation (``sd``) of each value, SI units.
+
+        They follow from how the values change as each recording is left out (the jackknife), with Student's
+        distribution; of a single recording, from its noise.
+        """
+        return self.calibration.fit.intervals()
+
+    @property
+    def model(self) -> Model:
+        """The fitted model, for `ccmodel.simulate` and `ccmodel.predict`."""
+        intervals = {name: _finite(interval) for name, interval in self.intervals.items()}
+        rig = RigConditions.of(self.batch.recordings)
+        return Model(self.calibration.model, rig, intervals, dict(self.batch.provenance))
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the search came to a minimum."""
+        return self.calibration.fit.converged
+
+    @property
+    def message(self) -> str:
+        """Why the search stopped."""
+        return self.calibration.fit.message
+
+    @property
+    def mean_square(self) -> float:
+        """Mean square of the leave-one-out residuals over their noise: 1 is noise, more is a model that errs."""
+        return self.calibration.fit.mean_square
+
+    @property
+    def recordings(self) -> tuple[str, ...]:
+        """Ids of the recordings that were fitted."""
+        return tuple(w.observations.id for w in self.calibration.whitened)
+
+    @property
+    def at_bound(self) -> tuple[str, ...]:
+        """Parameters that stand at one of their bounds: no values to rely on."""
+        return tuple(self.calibration.fit.at_bounds())
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the recordings do not let the fit judge, a line each."""
+        return tuple(f"{one['what']}: {one['why']}" for one in self.calibration.not_judged)
+
+    def to_frame(self) -> pd.DataFrame:
+        """A row for each parameter: ``value``, ``sd``, ``low``, ``high`` (90 % interval), ``unit``, ``at_bound``."""
+        rows = {
+            name: {
+                "value": self.values[name],
+                "sd": interval.sd,
+                "low": interval.low,
+                "high": interval.high,
+                "unit": unit_of_parameter(name),
+                "at_bound": name in self.at_bound,
+            }
+            for name, interval in self.intervals.items()
+        }
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data: a model file with the intervals, and the fit's circumstances under the key ``fit``."""
+        about = {
+            "succeeded": self.succeeded,
+            "message": self.message,
+            "mean_square": self.mean_square,
+            "recordings": list(self.recordings),
+            "at_bound": list(self.at_bound),
+        }
+        return self.model.as_dict() | {"fit": about}
+
+    def save(self, file: str | Path) -> None:
+        """Write `to_dict` as JSON: a model file, which `ccmodel.read_model` and the commands of ``ccmodel`` read."""
+        Path(file).write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")
+
+    def plot_residuals(self) -> "Figure":
+        """Residuals (model minus recording) over the noise floor: a row for each channel, a column for each recording.
+
+        Of a batch with many recordings, those with the largest residuals.
+        """
+        from ccmodel.api import figures
+
+        return figures.residuals(self.calibration, self.batch)
+
+    def __repr__(self) -> str:
+        table = self._shown.to_string()
+        return f"{self._title}\n{table}\n{self._foot}"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{self._title}</p>{self._shown.to_html(border=0)}<p>{self._foot}</p>"
+
+    @property
+    def _title(self) -> str:
+        n = len(self.recordings)
+        return f"Fit of the paper's model to {self.batch.name}: {n} recording{'' if n == 1 else 's'}; {self.message}"
+
+    @property
+    def _foot(self) -> str:
+        return f"mean square of the held-out residuals over their noise: {self.mean_square:.3g} (1 is noise)"
+
+    @property
+    def _shown(self) -> pd.DataFrame:
+        """The table as text."""
+        frame = self.to_frame()
+        ends = zip(frame["low"], frame["high"], strict=True)
+        shown = {
+            "value": frame["value"].map("{:.5g}".format),
+            "standard deviation": frame["sd"].map("{:.2g}".format),
+            "90 % interval": [
+                f"{low:.5g} to {high:.5g}" for low, high in zip(frame["low"], frame["high"], strict=True)
+            ],
+            "unit": frame["unit"],
+            "at a bound": frame["at_bound"].map({True: "yes", False: ""}),
+        }
+        return pd.DataFrame(shown, index=frame.index).rename_axis(None)
+
+
+def _finite(interval: Interval) -> Mapping[str, float | None]:
+    """An interval as plain data; JSON has no infinite numbers."""
+    ends = {"low": interval.low, "high": interval.high, "sd": interval.sd}
+    return {name: value if isfinite(value) else None for name, value in ends.items()}
+
+
+def fit(
+    batch: Batch | str | Path,
+    free: Collection[str] | None = None,
+    *,
+    tolerance: Tolerance | None = None,
+    step_s: float | None = None,
+    cycles: int | None = None,
+    trust_inputs: bool = False,
+    progress: "bool | Progress" = False,
+) -> Fit:
+    """Calibrate the paper's model to a batch: values with 90 % intervals.
+
+    It is the calibration of a diagnosis. Shared by all recordings are stiffness, friction coefficient, the load's
+    spring, and whatever a rest does not show. What differs from recording to recording (friction by about 1 %, sensor
+    zeros, encoder offsets) has a prior and is marginalised.
+
+    Parameters
+    ----------
+    batch : Batch, str or Path
+        A batch, or its folder.
+    free : collection of str, optional
+        Parameters that are fitted; the others keep the estimates of ``batch.yaml``. Without it, all that the recordings
+        determine.
+    tolerance : float or mapping of str to float, optional
+        Standard deviation of a model error that counts as noise, as a share of a channel's peak to peak: one for all,
+        or by channel.
+    step_s : float, optional
+        Least time between compared samples, s; without it, 0.008 s.
+    cycles : int, optional
+        Cycles of a sine that are compared, counted from the end of its start-up transient; without it, all.
+    trust_inputs : bool
+        Whether to fit even if the inputs contradict one another.
+    progress : bool or callable
+        True shows progress; a callable gets ``(text, share of the work done)``.
+
+    Raises
+    ------
+    InputError
+        If the batch cannot be used, its inputs contradict one another, or `free` has a name that cannot be fitted.
+
+    Examples
+    --------
+    >>> import ccmodel as cc
+    >>> fit = cc.fit("data/raw/half-loop")
+    >>> round(fit.values["stiffness_N_per_m"], -2)
+    7700.0
+    >>> interval = fit.intervals["friction_coefficient"]
+    >>> interval.low < fit.values["friction_coefficient"] < interval.high
+    True
+    """
+    batch = as_batch(batch)
+    check_consistent(batch, trust_inputs)
+    batch.ingested.check_usable(batch.folder)
+    options = options_of(settings_of(tolerance, step_s, cycles))
+    names = [free] if isinstance(free, str) else free
+    with progress_of(progress) as report:
+        try:
+            estimates = Parameters.estimated(batch.file.rig)
+            found = calibrate(batch.recordings, estimates, options, progress=report, only=names)
+        except (ModelError, ValueError) as error:
+            raise InputError(f"{batch.folder}: {error}") from None
+    return Fit(batch, found)

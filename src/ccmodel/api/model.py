@@ -1,0 +1,159 @@
+"""Models in use: simulations of motions, predictions of recordings."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+
+import pandas as pd
+import xarray as xr
+
+from ccmodel.api.batch import Batch, as_batch
+from ccmodel.api.recordings import Recordings
+from ccmodel.failure import ModelError
+from ccmodel.model.files import Model, read_model_file
+from ccmodel.recording import Recording
+from ccmodel.steps.predict import MOTION, checked_motion, conditions_of, predicted, read_motion, simulated_motion
+from ccmodel.typed import InputError
+
+__all__ = ["Model", "Motion", "Prediction", "predict", "read_model", "simulate"]
+
+Motion = pd.DataFrame | xr.Dataset | str | Path
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Prediction(Recordings):
+    """Sensor readings of a batch's recordings, predicted by a model.
+
+    Attributes
+    ----------
+    recordings : tuple of Recording
+        The simulations; ``prediction["id"]`` is that of one recording.
+    errors : DataFrame
+        A row for each recording and channel: ``bias`` (mean of simulated minus recorded) and ``rmse`` over the last
+        cycle in ``unit``, ``nrmse_percent`` over the recording's peak to peak in that cycle.
+    left_out : tuple of str
+        A line on each recording without a prediction.
+    """
+
+    recordings: tuple[Recording, ...]
+    errors: pd.DataFrame
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """Root mean square error over the last cycle in % of peak to peak: recordings by channels."""
+        by_channel = self.errors.pivot(index="recording", columns="channel", values="nrmse_percent")
+        return by_channel[self.errors["channel"].unique()].rename_axis(columns=None)
+
+    def __repr__(self) -> str:
+        return "\n".join([self._title, self.table.to_string(float_format="{:.2f}".format), *self.left_out])
+
+    def _repr_html_(self) -> str:
+        table = self.table.to_html(float_format="{:.2f}".format, border=0)
+        lines = "".join(f"<li>{escape(line)}</li>" for line in self.left_out)
+        return f"<p>{self._title}</p>{table}{f'<ul>{lines}</ul>' if lines else ''}"
+
+    @property
+    def _title(self) -> str:
+        n = len(self)
+        return f"Prediction of {n} recording{'' if n == 1 else 's'}: error over the last cycle, % of peak to peak"
+
+
+def read_model(file: str | Path) -> Model:
+    """Read a model file, as a fit, a diagnosis or the pipeline writes it.
+
+    Raises
+    ------
+    InputError
+        With one line on the file's fault.
+    """
+    return read_model_file(Path(file))
+
+
+def predict(model: Model | str | Path, batch: Batch | str | Path) -> Prediction:
+    """Predict the sensor readings of a batch's recordings by a model.
+
+    The model is given the drive angle, the readings at rest and, if it has no load law, the load torque.
+
+    Parameters
+    ----------
+    model : Model, str or Path
+        A model, or its file.
+    batch : Batch, str or Path
+        A batch, or its folder.
+
+    Raises
+    ------
+    InputError
+        If the model file or the batch cannot be used.
+    """
+    model, batch = _model(model), as_batch(batch)
+    batch.ingested.check_usable(batch.folder)
+    found = predicted(batch.recordings, model.parameters)
+    refused = [str(f) for f in batch.findings if f.severity == "refused"]
+    simulations = tuple(simulated for _, simulated in found.pairs)
+    return Prediction(simulations, found.errors, (*refused, *found.failures))
+
+
+def simulate(
+    model: Model | str | Path,
+    motion: Motion,
+    *,
+    recording: str | None = None,
+    batch: Batch | str | Path | None = None,
+    pretension_N: float | None = None,
+) -> Recording:
+    """Simulate the sensor readings of a rig for a motion of its drive, by a model.
+
+    Parameters
+    ----------
+    model : Model, str or Path
+        A model, or its file. The load of the rig has to be a spring.
+    motion : DataFrame, xarray Dataset, str or Path
+        ``time_s`` (s, increasing) and ``theta_in_rad`` (rad), as columns, as the index, or in a CSV file.
+    recording : str, optional
+        Id of the recording whose conduits and pretension are used; without it, the first that the model was fitted to.
+    batch : Batch, str or Path, optional
+        Batch with that recording. A model file that was written before models knew their rig needs it.
+    pretension_N : float, optional
+        Pretension of both cables, N, instead of that recording's.
+
+    Returns
+    -------
+    Recording
+        Of origin "model", at the motion's times; ``to_frame()`` gives its channels.
+
+    Raises
+    ------
+    InputError
+        If an input cannot be used, or the model cannot be run on it.
+    """
+    model = _model(model)
+    table, source = _motion(motion)
+    if pretension_N is not None and not pretension_N >= 0:
+        raise InputError(f"pretension_N: is not negative, N; got {pretension_N}")
+    recordings: Sequence[Recording] | None = None if batch is None else as_batch(batch).recordings
+    like = conditions_of(model, recording, recordings)
+    try:
+        return simulated_motion(table, model.parameters, like, pretension_N)
+    except (ModelError, ValueError) as error:
+        raise InputError(f"{source}: {error}") from None
+
+
+def _model(model: Model | str | Path) -> Model:
+    return model if isinstance(model, Model) else read_model(model)
+
+
+def _motion(motion: Motion) -> tuple[pd.DataFrame, str]:
+    """A motion as a checked table, and what it is called in messages."""
+    if isinstance(motion, str | Path):
+        return read_motion(Path(motion)), str(motion)
+    if isinstance(motion, xr.Dataset):
+        found = [name for name in MOTION if name in motion]
+        motion = motion[found].to_dataframe() if found else pd.DataFrame(columns=list(map(str, motion)))
+    if not isinstance(motion, pd.DataFrame):
+        raise InputError(f"motion: a DataFrame, a Dataset or a CSV file; got {type(motion).__name__}")
+    if motion.index.name in MOTION and motion.index.name not in motion:
+        motion = motion.reset_index()
+    return checked_motion(motion, "motion"), "motion"

@@ -1,0 +1,5 @@
+"""``python -m ccmodel.cli``."""
+
+from ccmodel.cli import main
+
+main()

@@ -1,0 +1,103 @@
+"""Commands on the folder of a batch: draft its batch.yaml, check it."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ccmodel.cli.group import PREPARE, command
+from ccmodel.cli.options import Batch, Json, Quiet, input_folder
+from ccmodel.cli.output import Output
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from ccmodel.rig.overview import Overview
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the commands."""
+    command(app, "init", PREPARE, ["ccmodel init data/raw/my-batch"])(init)
+    command(app, "check", PREPARE, ["ccmodel check data/raw/loops", "ccmodel check data/raw/loops --json"])(check)
+
+
+def init(
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="Folder of logs.", callback=input_folder, show_default=False)
+    ],
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a commented batch.yaml for a folder of logs, and print what to fill in; keeps an existing one."""
+    from ccmodel.rig.batch import load_batch
+    from ccmodel.rig.drafting import draft_batch
+    from ccmodel.typed import InputError
+
+    output = Output(as_json, quiet)
+    file = draft_batch(folder)
+    try:
+        load_batch(folder)
+        problems = ()
+    except InputError as error:
+        problems = error.problems
+    output.result(
+        {"batch_file": file, "fill_in": [{"line": p.line, "text": p.text} for p in problems]},
+        f"{file}: fill in what is empty, then run: ccmodel check {folder}",
+        *(f"  line {p.line}: {p.text}" for p in problems),
+    )
+
+
+def check(batch: Batch, as_json: Json = False, quiet: Quiet = False) -> None:
+    """Check a batch folder: a table for each recording and all findings.
+
+    Exits with 1 if a file cannot be used or the inputs contradict one another.
+    """
+    from ccmodel.rig.ingest import ingest_batch
+    from ccmodel.rig.overview import overview_of
+
+    output = Output(as_json, quiet)
+    with output.progress() as progress:
+        ingested = ingest_batch(batch, progress)
+        seen = {recording.id: overview_of(recording) for recording in ingested.recordings}
+    findings = [asdict(f) | {"line": str(f)} for f in ingested.findings]
+    is_usable = not any(f.severity != "warning" for f in ingested.findings)
+    output.result(
+        {
+            "usable": is_usable,
+            "recordings": {name: asdict(one) for name, one in seen.items()},
+            "findings": findings,
+        },
+        *(one for name, overview in seen.items() for one in _lines(name, overview)),
+    )
+    for finding in ingested.findings:
+        output.finding(str(finding), finding.severity)
+    if not is_usable:
+        raise typer.Exit(1)
+    if not any(recording.shows_tensions for recording in ingested.recordings):
+        output.hint(
+            "the logs do not show the tensions at both ends, as load cells and torques do: a diagnosis will take the"
+            " initial tension from pretension_N, and identify nothing with certainty"
+        )
+    output.hint(f"nothing contradicts another value. Next: ccmodel diagnose {batch} --out DIR")
+
+
+def _lines(name: str, seen: "Overview") -> "list[RenderableType]":
+    """A line on the recording and a line on each channel."""
+    from rich.table import Table
+
+    from ccmodel.channels import unit_of
+
+    rest = f"rest {seen.rest_s:.3g} s" if seen.rest_s else "no rest at the start"
+    motion = f"{seen.cycles:.1f} cycles at {seen.frequency_Hz:.4g} Hz" if seen.frequency_Hz else "no single frequency"
+    text = (
+        f"{name}: {seen.samples} samples at {seen.rate_Hz:.5g} Hz, {seen.duration_s:.4g} s; {rest};"
+        f" stroke {seen.stroke:.4g} rad; {motion}{f' ({seen.wave})' if seen.wave else ''}"
+    )
+    table = Table("channel", box=None, pad_edge=False)
+    for title in ("lowest", "highest", "unit", "noise at rest", "resolution"):
+        table.add_column(title, justify="left" if title == "unit" else "right", no_wrap=True)
+    for c in seen.channels:
+        noise, step = ("none" if value is None else f"{value:.3g}" for value in (c.noise, c.step))
+        table.add_row(c.name, f"{c.low:.4g}", f"{c.high:.4g}", unit_of(c.name), noise, step)
+    return [text, table, ""]

@@ -1,0 +1,102 @@
+"""The application and its entry point."""
+
+import sys
+from typing import Annotated
+
+import typer
+
+from ccmodel import __version__
+from ccmodel.cli import (
+    accuracy,
+    batches,
+    diagnose,
+    fit,
+    importing,
+    mechanisms,
+    predict,
+    project,
+    report,
+    simulate,
+)
+from ccmodel.cli.group import Commands
+from ccmodel.cli.interruption import Interrupted, Terminated, exit_code, signals
+from ccmodel.cli.output import as_json, say
+
+CODES = """\
+Exit codes: 0 done; 1 a finding, or something was left out (diagnose: only with --strict); 2 the input cannot be used; \
+130 interrupted."""
+INTERRUPTED = "nothing was written"
+
+app = typer.Typer(
+    cls=Commands,
+    epilog=CODES,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["--help", "-h"]},
+    pretty_exceptions_enable=False,
+)
+for module in (batches, importing, fit, simulate, predict, diagnose, accuracy, mechanisms, report, project):
+    module.add_to(app)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"ccmodel {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def describe(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Cable-conduit transmissions: recordings beside a distributed friction model, and the physics of what differs."""
+
+
+def main() -> None:
+    """Entry point: an error of the user is one line for each problem, without a traceback, and exits with 2."""
+    try:
+        with signals():
+            code = app(prog_name="ccmodel", standalone_mode=False)
+        # Typer turns an interruption that no command answers into this code.
+        lines = [f"interrupted: {INTERRUPTED}"] if code == 130 else []
+    except Interrupted as interrupted:
+        lines, code = [f"interrupted: {interrupted}"], interrupted.exit_code
+    except Terminated as terminated:
+        lines, code = [f"interrupted: {INTERRUPTED}"], exit_code(terminated)
+    except Exception as error:
+        lines, code = _lines_on(error), 2
+        if not lines:
+            raise
+    if lines:
+        _print_error(lines)
+    sys.exit(code or 0)
+
+
+def _lines_on(error: Exception) -> list[str]:
+    """Lines on an error of the user; none for an error of the program."""
+    from ccmodel.typed import InputError
+
+    if isinstance(error, InputError):
+        return str(error).splitlines()
+    if isinstance(error, typer.BadParameter.__base__):  # wrong usage; Typer does not export its base class
+        command = error.ctx.command_path if error.ctx else "ccmodel"
+        return [f"{_text_of(error)} {command} --help shows what there is."]
+    if isinstance(error, OSError) and error.filename is not None:
+        return [f"{error.filename}: {error.strerror}"]
+    return []
+
+
+def _text_of(error: Exception) -> str:
+    """What is wrong with a command line, and the nearest option to one that there is not."""
+    if nearest := getattr(error, "possibilities", None):
+        return f"No such option: {error.option_name}. Did you mean {' or '.join(nearest)}?"
+    return error.format_message()
+
+
+def _print_error(lines: list[str]) -> None:
+    if "--json" in sys.argv:
+        typer.echo(as_json({"error": lines}))
+    else:
+        for line in lines:
+            say(line)

@@ -1,0 +1,86 @@
+"""The page ``docs/command-line.md``: conventions, and each command with its arguments and options."""
+
+import re
+
+import typer
+from typer.cli import get_docs_for_click
+from typer.main import get_command
+
+HEAD = """\
+# Command line
+
+The part from [Commands](#commands) on is made from the help of the commands: `ccmodel reference > docs/command-line.md`
+writes this page again.
+
+## Conventions
+
+- A batch is named by its folder or by its `batch.yaml`.
+- An option has the same name, meaning and type in every command. `--out` is what a command writes: a folder, or a file
+  for a command that writes a single one. It is tried before the work begins, and a command that cannot write it ends
+  at once. `--model` is a model file, as `diagnose` and `fit` write it. `--cores` is a number of processes.
+- A former name of an option or command still works; a message gives the present one.
+- A misspelt command, option, mechanism, folder or file is answered with the nearest one that there is.
+- `ccmodel COMMAND --help` has an example of each command, `ccmodel --version` prints the version.
+
+## What is printed where
+
+Results go to standard output; messages, findings and progress go to standard error. A command that lasts shows a bar
+with the elapsed time and an estimate of the remaining time on a terminal. In a pipe or a file there is no bar and no
+colour, and each row of a table is one line, whatever its width. The estimate knows the shares of the stages on the
+batches of this repository; on a machine that has never run the model, the first command also compiles it, which takes
+about a minute and is not foreseen. The jobs of the pipeline write the same lines into `results/logs`.
+
+`--quiet` leaves out progress, hints and warnings.
+
+`--json` prints one JSON document on standard output and nothing else there. A number that is not finite is `null`. An
+error is `{"error": [...]}`, a line for each problem, with the exit code that it has without `--json`:
+
+```sh
+ccmodel check data/raw/loops --json | jq '.findings[].text'
+ccmodel diagnose data/raw/loops --out out --json | jq '.verdict'
+```
+
+## Exit codes
+
+| code | meaning |
+|---|---|
+| 0 | Done. `diagnose` ends with 0 at any verdict. |
+| 1 | Done, with a finding, or something was left out. `diagnose`: only with `--strict`, if the model does not agree. |
+| 2 | The input cannot be used: a file, a folder, an option. Standard error has a line for each problem. |
+| 130 | Interrupted by Ctrl-C (143: by the request to end, SIGTERM). |
+
+An interrupted command says in one line what it has written and how to go on. A diagnosis, a fit and a simulation write
+their files at the end, and an import replaces its folder as a whole. So an earlier result stays until then.
+
+## Completion
+
+`ccmodel --install-completion` makes the shell (bash, zsh, fish, PowerShell) complete commands, options, folders of
+batches and names of mechanisms; it takes effect in the next shell. `ccmodel --show-completion` prints the script
+instead.
+
+## Commands
+
+"""
+
+
+def page() -> str:
+    """The page, Markdown."""
+    from ccmodel.cli.entry import app
+
+    group = get_command(app)
+    context = typer.Context(group, info_name="ccmodel")
+    commands = [group.get_command(context, name) for name in group.list_commands(context)]
+    sections = [
+        get_docs_for_click(obj=command, ctx=context, indent=2, call_prefix="ccmodel")
+        for command in commands
+        if not command.hidden
+    ]
+    text = re.sub(r"^\* `--help`.*\n", "", "".join(sections), flags=re.MULTILINE)
+    examples = re.compile(r"^Examples?:\n\n((?:  ccmodel .*\n\n)+)", re.MULTILINE)
+    return HEAD + examples.sub(_block, text).rstrip("\n") + "\n"
+
+
+def _block(found: re.Match) -> str:
+    """Examples as a block of code."""
+    lines = found[1].split("\n\n")[:-1]
+    return "**Examples**:\n\n```sh\n" + "\n".join(line.strip() for line in lines) + "\n```\n\n"

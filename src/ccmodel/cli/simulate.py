@@ -1,0 +1,54 @@
+"""Simulation of a motion by a model."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ccmodel.cli.group import MODEL, command
+from ccmodel.cli.interruption import leaving
+from ccmodel.cli.options import BatchOption, Json, Model, Quiet, input_file, out_file
+from ccmodel.cli.output import Output
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command."""
+    example = "ccmodel simulate motion.csv --model out/model.json --out simulated.csv"
+    command(app, "simulate", MODEL, [example])(simulate)
+
+
+def simulate(
+    motion: Annotated[
+        Path,
+        typer.Argument(
+            metavar="MOTION",
+            help="CSV with the columns time_s and theta_in_rad.",
+            callback=input_file,
+            show_default=False,
+        ),
+    ],
+    model: Model,
+    out: Annotated[Path, out_file("File for the sensor readings, CSV.")],
+    batch: BatchOption = None,
+    recording: Annotated[
+        str | None,
+        typer.Option(
+            help="Recording whose conduits are used; else the first that the model was fitted to.", show_default=False
+        ),
+    ] = None,
+    pretension: Annotated[
+        float | None, typer.Option(min=0.0, help="Pretension, N; else that recording's.", show_default=False)
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Simulate the sensor readings of a rig for a motion of its drive, by a fitted model.
+
+    A model file of an earlier version does not know the conduits of its rig: name a batch of it with --batch.
+    """
+    from ccmodel.steps.predict import simulate_motion as run
+
+    output = Output(as_json, quiet)
+    with leaving(out):
+        run(motion, model, batch, out, recording, pretension)
+    output.result({"out": out})

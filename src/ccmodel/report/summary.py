@@ -1,0 +1,121 @@
+"""The outcome of a run, or of one diagnosis: verdicts, held-out errors, what was left out, where the page is."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+from ccmodel.report.page.writing import left_out_of
+from ccmodel.report.verdict import INPUTS_INCONSISTENT, SYMBOL, sentence
+from ccmodel.steps.files import read_json
+from ccmodel.typed import InputError
+
+DIAGNOSIS = "diagnosis.json"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Verdict on a batch.
+
+    Attributes
+    ----------
+    batch : str
+    verdict : str or None
+        None if the batch could not be diagnosed.
+    sentence : str
+    held_out_error : dict of str to dict
+        By channel: ``before``, ``after``, ``noise``, in the ``unit`` that is stated there.
+    page : Path or None
+        Report of the diagnosis.
+    """
+
+    batch: str
+    verdict: str | None
+    sentence: str
+    held_out_error: dict[str, dict]
+    page: Path | None
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Outcome of a run or of a diagnosis.
+
+    Attributes
+    ----------
+    verdicts : sequence of Verdict
+    left_out, inconsistent, warnings : sequence of str
+        Lines, as in `ccmodel.report.page.writing.left_out_of`.
+    page : Path or None
+        Page of the run or of the diagnosis.
+    """
+
+    verdicts: Sequence[Verdict]
+    left_out: Sequence[str] = ()
+    inconsistent: Sequence[str] = ()
+    warnings: Sequence[str] = field(default=())
+    page: Path | None = None
+
+    def as_dict(self) -> dict:
+        """Plain data."""
+        return asdict(self)
+
+    def lines(self) -> list[str]:
+        """The verdicts with their held-out errors, and where the page is."""
+        lines = []
+        for one in self.verdicts:
+            lines.append(f"{one.batch}: {one.verdict or 'not diagnosed'}. {one.sentence}")
+            if one.held_out_error:
+                errors = ", ".join(map(_fall, one.held_out_error.items()))
+                lines.append(f"  held-out error over the noise floor: {errors}")
+        return lines + ([f"page: {self.page}"] if self.page else [])
+
+
+def summary_of(folder: Path) -> Summary:
+    """Outcome of the run, or of the diagnosis, that wrote a folder.
+
+    Raises
+    ------
+    InputError
+        If the folder is of neither, or the run did not come to its end.
+    """
+    if (folder / DIAGNOSIS).exists():
+        return _of_diagnosis(folder)
+    messages = left_out_of(folder)
+    verdicts = [_verdict(file) for file in sorted(folder.glob(f"diagnoses/*/{DIAGNOSIS}"))]
+    return Summary(verdicts, **messages, page=_if_there(folder / "index.html"))
+
+
+def _of_diagnosis(folder: Path) -> Summary:
+    verdict, content = _verdict(folder / DIAGNOSIS), _content(folder / DIAGNOSIS)
+    lines = [f"{one['what']}: {one['why']}" for one in content.get("not_judged", ())]
+    if verdict.verdict == INPUTS_INCONSISTENT:
+        return Summary([verdict], inconsistent=lines, page=verdict.page)
+    left_out = [] if verdict.verdict else [f"{verdict.batch}: {verdict.sentence}"]
+    return Summary([verdict], left_out=left_out, warnings=[f"not judged: {line}" for line in lines], page=verdict.page)
+
+
+def _verdict(file: Path) -> Verdict:
+    content = _content(file)
+    try:
+        error = (content.get("fit") or {}).get("error") or {}
+        page = _if_there(file.parent / "report.html")
+        return Verdict(content["batch"], content["verdict"], sentence(content), error, page)
+    except (KeyError, TypeError, AttributeError, ValueError):
+        raise InputError(f"{file}: is not what a diagnosis wrote") from None
+
+
+def _content(file: Path) -> dict:
+    try:
+        return read_json(file)
+    except (OSError, ValueError) as error:
+        raise InputError(f"{file}: cannot be read ({error})") from None
+
+
+def _fall(channel_and_error: tuple[str, dict]) -> str:
+    """As in ``tau_in 12.1 -> 1.3``; a single number where no mechanism was added."""
+    channel, error = channel_and_error
+    before, after = (f"{error[when] / error['noise']:.1f}" for when in ("before", "after"))
+    return f"{SYMBOL[channel]} {before}" if before == after else f"{SYMBOL[channel]} {before} -> {after}"
+
+
+def _if_there(file: Path) -> Path | None:
+    return file if file.exists() else None
