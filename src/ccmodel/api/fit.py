@@ -34,7 +34,7 @@ class Fit:
     ----------
     batch : Batch
     calibration : Calibration
-        The result as `ccmodel.diagnosis` has it; private, as everything below this interface.
+        The result as ``ccmodel.diagnosis`` has it; private, as everything below this interface.
     """
 
     batch: Batch
