@@ -51,8 +51,7 @@ class RepositoryLinks(SphinxTransform):
         return str(target.relative_to(ROOT)) if outside and target.exists() else None
 
     def _lead_to(self, link: nodes.Element, page: str) -> nodes.reference:
-        builder = self.app.builder
-        uri = builder.get_relative_uri(self.env.docname, page)
+        uri = f"{'../' * self.env.docname.count('/')}{page}.html"
         reference = nodes.reference("", "", *link.children, internal=True, refuri=uri)
         link.replace_self(reference)
         return reference

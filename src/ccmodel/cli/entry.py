@@ -25,9 +25,9 @@ from ccmodel.cli.output import as_json, say
 CODES = """\
 Exit codes: 0 done; 1 a finding, or something was left out (diagnose: only with --strict); 2 the input cannot be used; \
 130 interrupted."""
+# Typer does not export this class.
+_WRONG_USAGE: Any = typer.BadParameter.__base__
 INTERRUPTED = "nothing was written"
-# Wrong usage; Typer does not export this class.
-UsageError: Any = typer.BadParameter.__base__
 
 app = typer.Typer(
     cls=Commands,
@@ -81,7 +81,7 @@ def _lines_on(error: Exception) -> list[str]:
 
     if isinstance(error, InputError):
         return str(error).splitlines()
-    if isinstance(error, UsageError):
+    if isinstance(error, _WRONG_USAGE):
         command = error.ctx.command_path if error.ctx else "ccmodel"
         return [f"{_text_of(error)} {command} --help shows what there is."]
     if isinstance(error, OSError) and error.filename is not None:

@@ -23,6 +23,7 @@ class FormerOptions(TyperGroup):
     # Former names of one command's options, by the name of the command.
     renamed_in: ClassVar[dict[str, dict[str, str]]] = {}
 
+    # Typer does not export the class of a command's context.
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse with every option under its current name; without arguments, print the help."""
         if not args and not ctx.resilient_parsing:
