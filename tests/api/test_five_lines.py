@@ -1,5 +1,6 @@
 """From a folder to a simulation in five lines, on a batch whose truth is known."""
 
+import gzip
 import json
 
 import numpy as np
@@ -9,7 +10,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 import ccmodel as cc
-from builders import write_batch
+from builders import spoil, write_batch
 from ccmodel import cli
 from ccmodel.model.files import read_model as parameters_of
 
@@ -64,6 +65,20 @@ def test_a_fit_shows_values_with_intervals_and_units(fitted):
     said = repr(fitted)
     assert all(word in said for word in ("value", "standard deviation", "90 % interval", "at a bound?", "N m/rad"))
     assert "friction_coefficient" in fitted._repr_html_()
+
+
+def test_a_fit_tells_recordings_apart(tmp_path):
+    """A load cell whose zero has moved in one recording by half its accuracy, 0.05 N."""
+    folder = spoil(write_batch(tmp_path / "moved", pretensions=(7.0, 6.0, 5.0)))
+    file = folder / "t-6N.csv.gz"
+    table = pd.read_csv(file)
+    moving = table["time_s"] > 0.5  # at rest, the reading stands for the initial tension
+    table.loc[moving, "drive_load_cell_V"] += 0.005
+    with gzip.open(file, "wt") as f:
+        table.to_csv(f, index=False)
+    own = cc.fit(folder, trust_inputs=True).by_recording
+    assert own.loc["t-6N", "F_drive_zero_N"] - own.loc["t-7N", "F_drive_zero_N"] == pytest.approx(0.05, rel=0.2)
+    assert own["friction_coefficient"].to_numpy() == pytest.approx(0.156, rel=0.02)
 
 
 def test_the_diagnosis_has_the_same_calibrated_model(fitted, found):
