@@ -1,4 +1,4 @@
-"""README's example of a mismatch found: ``python benchmarks/seeded_fault.py``, two minutes on two cores.
+"""A mismatch found, for docs/diagnosis.md: ``python benchmarks/seeded_fault.py``, two minutes on two cores.
 
 The virtual rig records two batches with backlash at the load pulley (``seeded_fault.yaml``): one is diagnosed, the
 other one is predicted with the calibrated model and with the model that the diagnosis found. All recordings are

@@ -1,8 +1,10 @@
 """Recordings and batches made by hand, for tests."""
 
 import gzip
+import io
 
 import numpy as np
+import pandas as pd
 import yaml
 
 from ccmodel.geometry import ConduitPath
@@ -29,6 +31,10 @@ RIG = {
     "cable": {"stiffness_N_per_m": 13880.0, "length_m": 1.2, "friction_coefficient": 0.147},
     "accuracy": {"encoder_rad": 0.00314, "torque_Nm": 0.0001, "load_cell_N": 0.1},
 }
+
+# As the paper's sensors: the noise that makes the recordings ones.
+NOISE = {"drive_current_A": 1e-4 / 0.0234, "load_current_A": 1e-4 / 0.0234}
+NOISE |= {"drive_load_cell_V": 0.005, "load_load_cell_V": 0.005}
 
 
 def recording(duration=3.0, pretension_N=7.0, id="r", settled_s=0.0, **channels) -> Recording:
@@ -92,3 +98,17 @@ def log(T: float, k: float, mu: float) -> str:
         for a, b, c, *rest in zip(*columns.values(), strict=True)
     )
     return ",".join(columns) + "\n" + rows + "\n"
+
+
+def spoil(folder, change=lambda table: table, seed=0):
+    """Give the logs of a batch noise, and change them."""
+    random = np.random.default_rng(seed)
+    for file in sorted(folder.glob("*.csv.gz")):
+        table = pd.read_csv(file)
+        for column, sd in NOISE.items():
+            table[column] += sd * random.standard_normal(len(table))
+        text = io.StringIO()
+        change(table).to_csv(text, index=False, float_format="%.7g")
+        with gzip.open(file, "wt") as f:
+            f.write(text.getvalue())
+    return folder

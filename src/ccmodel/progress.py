@@ -76,7 +76,7 @@ class Stopwatch:
     began_s: float = field(init=False)
     at_stage_s: float = field(init=False)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         self.began_s = self.at_stage_s = self.now()
 
     def stage(self, done: float | None) -> None:
@@ -115,7 +115,7 @@ def shown(console: "Console | None" = None) -> Iterator[Progress]:
         yield silent
         return
     from rich.console import Console
-    from rich.progress import BarColumn, ProgressColumn, TextColumn
+    from rich.progress import BarColumn, ProgressColumn, Task, TextColumn
     from rich.progress import Progress as Bar
     from rich.table import Column
     from rich.text import Text
@@ -131,7 +131,7 @@ def shown(console: "Console | None" = None) -> Iterator[Progress]:
 
         max_refresh = 0.5
 
-        def render(self, task) -> Text:
+        def render(self, task: Task) -> Text:
             return Text(f"{clock(watch.elapsed_s)}, {clock(watch.remaining_s)} left", style="cyan")
 
     description = Column(ratio=1, no_wrap=True, overflow="ellipsis")

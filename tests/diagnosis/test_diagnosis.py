@@ -1,7 +1,6 @@
 """The command on small batches: what it writes, and what it does with bad ones."""
 
 import gzip
-import io
 import json
 from types import SimpleNamespace
 
@@ -12,7 +11,7 @@ import yaml
 from threadpoolctl import threadpool_limits
 from typer.testing import CliRunner
 
-from builders import write_batch
+from builders import spoil, write_batch
 from ccmodel import cli
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.hypothesis import Hypothesis
@@ -26,23 +25,6 @@ from ccmodel.studies.diagnosis import run as stage
 from ccmodel.typed import InputError
 
 RUBBING_NM = 4e-3
-# As the paper's sensors: the noise that makes the recordings ones.
-NOISE = {"drive_current_A": 1e-4 / 0.0234, "load_current_A": 1e-4 / 0.0234}
-NOISE |= {"drive_load_cell_V": 0.005, "load_load_cell_V": 0.005}
-
-
-def spoil(folder, change=lambda table: table, seed=0):
-    """Give the logs of a batch noise, and change them."""
-    random = np.random.default_rng(seed)
-    for file in sorted(folder.glob("*.csv.gz")):
-        table = pd.read_csv(file)
-        for column, sd in NOISE.items():
-            table[column] += sd * random.standard_normal(len(table))
-        text = io.StringIO()
-        change(table).to_csv(text, index=False, float_format="%.7g")
-        with gzip.open(file, "wt") as f:
-            f.write(text.getvalue())
-    return folder
 
 
 def rubbing(table):

@@ -47,15 +47,18 @@ class Guide:
         if source:
             self.environment["PYTHONPATH"] = str(source)
 
-    def follow(self) -> None:
-        """Run every block."""
+    def follow(self, **names) -> dict:
+        """Run every block; Python blocks know these names, and theirs are returned."""
         evaluators = {"sh": self._run, "text": self._compare, "python": self._python, "yaml": self._yaml}
         parsers = [CodeBlockParser(language, evaluator) for language, evaluator in evaluators.items()]
-        for example in Document.parse(str(self.page), *parsers, SkipParser(), self._expected_exits).examples():
+        document = Document.parse(str(self.page), *parsers, SkipParser(), self._expected_exits)
+        document.namespace.update(names)
+        for example in document.examples():
             try:
                 example.evaluate()
             except SkipTest as reason:
                 self.skipped.append(str(reason))
+        return document.namespace
 
     def _expected_exits(self, document):
         lexer = DirectiveInHTMLCommentLexer("exits", arguments=r"\d+")

@@ -140,8 +140,9 @@ def load(folder: str | Path) -> Batch:
     folder = Path(folder)
     ingested = ingest_batch(folder)
     ingested.check_usable(folder, trust_inputs=False)
+    assert ingested.batch is not None
     inputs = provenance.of_inputs(provenance.files_in(folder), folder)
-    return Batch(folder, tuple(ingested.recordings), tuple(ingested.findings), ingested.batch, inputs)
+    return Batch(folder, tuple(ingested.recordings), tuple(ingested.findings), ingested.stated, inputs)
 
 
 def as_batch(batch: Batch | str | Path) -> Batch:

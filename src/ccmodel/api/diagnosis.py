@@ -13,6 +13,7 @@ from ccmodel.api.model import read_model
 from ccmodel.api.options import Tolerance, progress_of, settings_of
 from ccmodel.failure import ModelError
 from ccmodel.model.files import Model
+from ccmodel.progress import Progress
 from ccmodel.report.verdict import SYMBOL, nearest_sentence, sentence
 from ccmodel.studies.diagnosis.page import candidates_of
 from ccmodel.studies.diagnosis.run import Outcome, check_options, diagnosed, options_of, write_alone
@@ -20,8 +21,6 @@ from ccmodel.typed import InputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from ccmodel.progress import Progress
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -183,7 +182,7 @@ def diagnose(
     cycles: int | None = None,
     candidates: Sequence[str | Sequence[str]] = (),
     trust_inputs: bool = False,
-    progress: "bool | Progress" = False,
+    progress: bool | Progress = False,
 ) -> Diagnosis:
     """Decide whether the calibrated model explains a batch; if not, locate and name the physics left out.
 
@@ -211,6 +210,17 @@ def diagnose(
     ------
     InputError
         If the batch, the baseline or an option cannot be used, or `out` cannot be written.
+
+    Examples
+    --------
+    >>> import ccmodel as cc
+    >>> found = cc.diagnose("data/raw/half-loop", step_s=0.04)
+    >>> found.verdict
+    'unexplained'
+    >>> found.report["location"]["place"]
+    'conduit'
+    >>> found.nearest
+    Model: ...; pulley-friction at drive-pulley, fitted to half-loop, recording (virtual rig, simulated)
     """
     batch = as_batch(batch)
     if out is not None:

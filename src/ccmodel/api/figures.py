@@ -8,10 +8,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from ccmodel.api.batch import Batch
 from ccmodel.channels import CHANNELS, MEASURED, TABLE, THETA_IN
 from ccmodel.diagnosis.run import Calibration
+from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.recording import ORIGIN, Recording
 from ccmodel.report.figures import COLOURS, LINES, STYLE, legend_below, title_figure
 from ccmodel.report.verdict import NOT_ACCEPTED, SYMBOL
@@ -96,7 +98,7 @@ def residuals(calibration: Calibration, batch: Batch) -> Figure:
     return figure
 
 
-def _floor(whitened) -> np.ndarray:
+def _floor(whitened: Whitened) -> NDArray:
     return np.array([whitened.noise_floor[channel] for channel in whitened.observations.channels])
 
 

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from html import escape
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,17 +13,17 @@ import pandas as pd
 from ccmodel.api.batch import Batch, as_batch, check_consistent
 from ccmodel.api.options import Tolerance, progress_of, settings_of
 from ccmodel.diagnosis.run import Calibration, calibrate
+from ccmodel.diagnosis.settings import ADEQUATE
 from ccmodel.failure import ModelError
 from ccmodel.inference.intervals import Interval
 from ccmodel.model.files import Model, RigConditions
 from ccmodel.model.parameters import Parameters, unit_of_parameter
+from ccmodel.progress import Progress
 from ccmodel.studies.diagnosis.run import options_of
 from ccmodel.typed import InputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from ccmodel.progress import Progress
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -86,8 +87,25 @@ class Fit:
         return tuple(self.calibration.fit.at_bounds())
 
     @property
+    def warnings(self) -> tuple[str, ...]:
+        """What speaks against relying on the values, a line each."""
+        found = [] if self.succeeded else [f"no minimum was found: {self.message}"]
+        if self.mean_square > ADEQUATE:
+            found.append(
+                f"the model does not reproduce the recordings (mean square {self.mean_square:.3g}, 1 is noise): its"
+                " values depend on how its errors are weighted, which no interval contains; diagnose() finds what is"
+                " missing"
+            )
+        found += [f"{name} stands at one of its bounds" for name in self.at_bound]
+        if len(self.recordings) == 1:
+            found.append(
+                "a single recording: intervals contain its noise alone, and not what differs between recordings"
+            )
+        return tuple(found)
+
+    @property
     def notes(self) -> tuple[str, ...]:
-        """What the recordings do not let the fit judge, a line each."""
+        """What the recordings do not let a fit judge, a line each."""
         return tuple(f"{one['what']}: {one['why']}" for one in self.calibration.not_judged)
 
     def to_frame(self) -> pd.DataFrame:
@@ -130,11 +148,16 @@ class Fit:
         return figures.residuals(self.calibration, self.batch)
 
     def __repr__(self) -> str:
-        table = self._shown.to_string()
-        return f"{self._title}\n{table}\n{self._foot}"
+        return "\n".join([self._title, self._shown.to_string(), self._foot, *self._shown_warnings])
 
     def _repr_html_(self) -> str:
-        return f"<p>{self._title}</p>{self._shown.to_html(border=0)}<p>{self._foot}</p>"
+        lines = "".join(f"<li>{escape(line)}</li>" for line in self._shown_warnings)
+        foot = f"<p>{self._foot}</p>{f'<ul>{lines}</ul>' if lines else ''}"
+        return f"<p>{escape(self._title)}</p>{self._shown.to_html(border=0)}{foot}"
+
+    @property
+    def _shown_warnings(self) -> list[str]:
+        return [f"warning: {line}" for line in self.warnings]
 
     @property
     def _title(self) -> str:
@@ -153,11 +176,9 @@ class Fit:
         shown = {
             "value": frame["value"].map("{:.5g}".format),
             "standard deviation": frame["sd"].map("{:.2g}".format),
-            "90 % interval": [
-                f"{low:.5g} to {high:.5g}" for low, high in zip(frame["low"], frame["high"], strict=True)
-            ],
+            "90 % interval": [f"{low:.5g} to {high:.5g}" for low, high in ends],
             "unit": frame["unit"],
-            "at a bound": frame["at_bound"].map({True: "yes", False: ""}),
+            "at a bound?": frame["at_bound"].map({True: "yes", False: "no"}),
         }
         return pd.DataFrame(shown, index=frame.index).rename_axis(None)
 
@@ -176,13 +197,15 @@ def fit(
     step_s: float | None = None,
     cycles: int | None = None,
     trust_inputs: bool = False,
-    progress: "bool | Progress" = False,
+    progress: bool | Progress = False,
 ) -> Fit:
     """Calibrate the paper's model to a batch: values with 90 % intervals.
 
-    It is the calibration of a diagnosis. Shared by all recordings are stiffness, friction coefficient, the load's
-    spring, and whatever a rest does not show. What differs from recording to recording (friction by about 1 %, sensor
-    zeros, encoder offsets) has a prior and is marginalised.
+    It is the calibration that a diagnosis begins with. Shared by all recordings are stiffness, friction coefficient,
+    the load's spring, and whatever a rest does not show. What differs from recording to recording (friction by about
+    1 %, sensor zeros, encoder offsets) has a prior and is marginalised. Where the model reproduces the recordings, the
+    calibrated model of a diagnosis has the same values. Otherwise the diagnosis weights the errors anew about the best
+    candidate, and its calibrated model has others; the fit then warns.
 
     Parameters
     ----------

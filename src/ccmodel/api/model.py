@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
+from typing import TypeAlias
 
 import pandas as pd
 import xarray as xr
@@ -18,7 +19,7 @@ from ccmodel.typed import InputError
 
 __all__ = ["Model", "Motion", "Prediction", "predict", "read_model", "simulate"]
 
-Motion = pd.DataFrame | xr.Dataset | str | Path
+Motion: TypeAlias = pd.DataFrame | xr.Dataset | str | Path
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -67,6 +68,17 @@ def read_model(file: str | Path) -> Model:
     ------
     InputError
         With one line on the file's fault.
+
+    Examples
+    --------
+    >>> import ccmodel as cc
+    >>> fit = cc.fit("data/raw/half-loop")
+    >>> fit.save(folder / "fit.json")
+    >>> model = cc.read_model(folder / "fit.json")
+    >>> model.parameters == fit.model.parameters
+    True
+    >>> model.rig.batch, [condition.recording for condition in model.rig.conditions]
+    ('half-loop', ['half-loop-7.3N-a', 'half-loop-7.3N-b'])
     """
     return read_model_file(Path(file))
 
@@ -87,12 +99,23 @@ def predict(model: Model | str | Path, batch: Batch | str | Path) -> Prediction:
     ------
     InputError
         If the model file or the batch cannot be used.
+
+    Examples
+    --------
+    >>> import ccmodel as cc
+    >>> batch = cc.load("data/raw/half-loop")
+    >>> prediction = cc.predict(cc.fit(batch).model, batch)
+    >>> prediction.table[["theta_out_rad", "tau_out_Nm"]]
+                      theta_out_rad  tau_out_Nm
+    recording
+    half-loop-7.3N-a           ...          ...
+    half-loop-7.3N-b           ...          ...
     """
     model, batch = _model(model), as_batch(batch)
     batch.ingested.check_usable(batch.folder)
     found = predicted(batch.recordings, model.parameters)
     refused = [str(f) for f in batch.findings if f.severity == "refused"]
-    simulations = tuple(simulated for _, simulated in found.pairs)
+    simulations = tuple(simulated for _, simulated in found.pairs if simulated is not None)
     return Prediction(simulations, found.errors, (*refused, *found.failures))
 
 
@@ -128,6 +151,17 @@ def simulate(
     ------
     InputError
         If an input cannot be used, or the model cannot be run on it.
+
+    Examples
+    --------
+    >>> import ccmodel as cc
+    >>> import numpy as np, pandas as pd
+    >>> time_s = np.arange(0, 2, 0.004)
+    >>> motion = pd.DataFrame({"time_s": time_s, "theta_in_rad": 0.5 * np.sin(2 * np.pi * time_s)})
+    >>> model = cc.fit("data/raw/half-loop").model
+    >>> readings = cc.simulate(model, motion, pretension_N=7.0)
+    >>> readings.to_frame().loc[0.0, ["T1_N", "T2_N", "T3_N", "T4_N"]].tolist()
+    [7.0, 7.0, 7.0, 7.0]
     """
     model = _model(model)
     table, source = _motion(motion)

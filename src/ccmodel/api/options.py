@@ -1,12 +1,13 @@
 """Options that several functions take: what is compared, and how progress is shown."""
 
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 from pydantic import ValidationError
 
-from ccmodel.progress import Progress, shown, silent
+from ccmodel.progress import Progress, log_lines, shown, silent
 from ccmodel.studies.diagnosis.settings import Diagnosing
 from ccmodel.typed import InputError
 
@@ -46,9 +47,14 @@ def _line(error: Mapping[str, Any]) -> str:
 
 @contextmanager
 def progress_of(progress: bool | Progress) -> Iterator[Progress]:
-    """How progress is shown: not at all, by a bar (True), or by a function of the user's."""
-    if progress is True:
+    """How progress is shown: not at all, on standard error (True), or by a function of the user's.
+
+    Standard error is a bar on a terminal, and a line for each stage anywhere else, as in a notebook.
+    """
+    if progress is True and sys.stderr.isatty():
         with shown() as bar:
             yield bar
+    elif progress is True:
+        yield log_lines(sys.stderr)
     else:
         yield progress or silent

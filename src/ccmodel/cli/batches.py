@@ -32,13 +32,13 @@ def init(
     """Write a commented batch.yaml for a folder of logs, and print what to fill in; keeps an existing one."""
     from ccmodel.rig.batch import load_batch
     from ccmodel.rig.drafting import draft_batch
-    from ccmodel.typed import InputError
+    from ccmodel.typed import InputError, Problem
 
     output = Output(as_json, quiet)
     file = draft_batch(folder)
     try:
         load_batch(folder)
-        problems = ()
+        problems: tuple[Problem, ...] = ()
     except InputError as error:
         problems = error.problems
     output.result(

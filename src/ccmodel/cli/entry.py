@@ -1,7 +1,7 @@
 """The application and its entry point."""
 
 import sys
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -25,6 +25,8 @@ from ccmodel.cli.output import as_json, say
 CODES = """\
 Exit codes: 0 done; 1 a finding, or something was left out (diagnose: only with --strict); 2 the input cannot be used; \
 130 interrupted."""
+# Typer does not export this class.
+_WRONG_USAGE: Any = typer.BadParameter.__base__
 INTERRUPTED = "nothing was written"
 
 app = typer.Typer(
@@ -79,7 +81,7 @@ def _lines_on(error: Exception) -> list[str]:
 
     if isinstance(error, InputError):
         return str(error).splitlines()
-    if isinstance(error, typer.BadParameter.__base__):  # wrong usage; Typer does not export its base class
+    if isinstance(error, _WRONG_USAGE):
         command = error.ctx.command_path if error.ctx else "ccmodel"
         return [f"{_text_of(error)} {command} --help shows what there is."]
     if isinstance(error, OSError) and error.filename is not None:
@@ -87,7 +89,7 @@ def _lines_on(error: Exception) -> list[str]:
     return []
 
 
-def _text_of(error: Exception) -> str:
+def _text_of(error: Any) -> str:
     """What is wrong with a command line, and the nearest option to one that there is not."""
     if nearest := getattr(error, "possibilities", None):
         return f"No such option: {error.option_name}. Did you mean {' or '.join(nearest)}?"

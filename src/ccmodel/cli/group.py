@@ -1,7 +1,7 @@
 """Groups of commands: former names of options and commands, examples in the help."""
 
 from collections.abc import Callable, Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import typer
 from typer.core import TyperGroup
@@ -23,7 +23,8 @@ class FormerOptions(TyperGroup):
     # Former names of one command's options, by the name of the command.
     renamed_in: ClassVar[dict[str, dict[str, str]]] = {}
 
-    def parse_args(self, ctx, args):
+    # Typer does not export the class of a command's context.
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse with every option under its current name; without arguments, print the help."""
         if not args and not ctx.resilient_parsing:
             typer.echo(ctx.get_help())
@@ -45,7 +46,7 @@ class Commands(FormerOptions):
     # The way of a batch from logs to a verdict, and then everything else.
     order = ("init", "import", "check", "fit", "simulate", "predict", "diagnose", "accuracy", "mechanisms", "report")
 
-    def list_commands(self, ctx):
+    def list_commands(self, ctx: Any) -> list[str]:
         """Names of the commands, in the order of the help."""
         known = {name: k for k, name in enumerate(self.order)}
         return sorted(super().list_commands(ctx), key=lambda name: known.get(name, len(known)))

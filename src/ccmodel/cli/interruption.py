@@ -5,6 +5,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 
 AGAIN = "the same command starts again"
 # Names of files in the message, at most.
@@ -40,7 +41,7 @@ def signals() -> Iterator[None]:
         signal.signal(signal.SIGTERM, former)
 
 
-def _terminate(signum, frame) -> None:
+def _terminate(signum: int, frame: FrameType | None) -> None:
     raise Terminated
 
 

@@ -45,11 +45,12 @@ def mechanisms(
         return
     try:
         entries = [catalogue.parts(one) for one in ([name] if name else names())] if as_json else []
-        text = catalogue.entry(name) if name else None
+        shown: str | Table = (
+            catalogue.entry(name) if name else Table("name", "places", "parameters", "what it is", box=None)
+        )
     except UnknownMechanismError as error:
         raise InputError(str(error)) from None
-    if text is None:
-        text = Table("name", "places", "parameters", "what it is", box=None)
+    if isinstance(shown, Table):
         for row in catalogue.rows():
-            text.add_row(*row)
-    output.result(entries[0] if name and entries else entries, text)
+            shown.add_row(*row)
+    output.result(entries[0] if name and entries else entries, shown)

@@ -1,6 +1,7 @@
 """The page ``docs/command-line.md``: conventions, and each command with its arguments and options."""
 
 import re
+from typing import Any
 
 import typer
 from typer.cli import get_docs_for_click
@@ -67,7 +68,7 @@ def page() -> str:
     """The page, Markdown."""
     from ccmodel.cli.entry import app
 
-    group = get_command(app)
+    group: Any = get_command(app)  # a group; Typer does not export its class
     context = typer.Context(group, info_name="ccmodel")
     commands = [group.get_command(context, name) for name in group.list_commands(context)]
     sections = [

@@ -1,10 +1,10 @@
-"""A model as a file: parameters, mechanisms and the rig's conditions, as JSON (docs/model-file.md)."""
+"""A model as a file: parameters, mechanisms and the rig's conditions, as JSON (docs/diagnosis.md, Model files)."""
 
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -14,7 +14,7 @@ from ccmodel.geometry import ConduitPath
 from ccmodel.model.general.run import Active
 from ccmodel.model.parameters import FORMER_NAMES, Parameters
 from ccmodel.recording import FAR_ENDS, ORIGIN, Recording
-from ccmodel.typed import InputError, NotNegative, Positive, TypedModel
+from ccmodel.typed import InputError, NotNegative, OneOf, Positive, TypedModel
 
 FORMAT = 1
 
@@ -39,7 +39,7 @@ class _ConditionEntry(TypedModel):
 class _RigEntry(TypedModel):
     batch: str
     origin: Literal["rig", "virtual-rig"]
-    far_end: Literal[FAR_ENDS] | None = None
+    far_end: Annotated[str, OneOf(FAR_ENDS)] | None = None
     conditions: list[_ConditionEntry] = Field(min_length=1)
 
 
@@ -260,7 +260,7 @@ def _parameters(path: Path, stated: _ModelFile) -> Parameters:
         Active(m.name, m.place, registry.get(m.name).default | dict(m.values)) for m in stated.mechanisms
     )
     try:
-        parameters = {FORMER_NAMES.get(name, name): value for name, value in stated.parameters.items()}
+        parameters: dict[str, Any] = {FORMER_NAMES.get(name, name): value for name, value in stated.parameters.items()}
         return Parameters(**parameters, mechanisms=mechanisms)
     except TypeError as error:
         raise InputError(f"{path}: {error}") from None

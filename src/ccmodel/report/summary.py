@@ -62,7 +62,8 @@ class Summary:
         """The verdicts with their held-out errors, and where the page is."""
         lines = []
         for one in self.verdicts:
-            lines.append(f"{one.batch}: {one.verdict or 'not diagnosed'}. {one.sentence}")
+            verdict = f"{one.verdict}. " if one.verdict else ""
+            lines.append(f"{one.batch}: {verdict}{one.sentence}")
             if one.held_out_error:
                 errors = ", ".join(map(_fall, one.held_out_error.items()))
                 lines.append(f"  held-out error over the noise floor: {errors}")

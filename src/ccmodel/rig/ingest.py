@@ -43,6 +43,13 @@ class Ingested:
     batch: Batch | None = None
 
     @property
+    def stated(self) -> Batch:
+        """The content of `batch.yaml`; `InputError` if the batch is refused as a whole."""
+        if self.batch is None:
+            raise InputError("\n".join(map(str, self.findings)) or "the batch is refused")
+        return self.batch
+
+    @property
     def contradicts(self) -> bool:
         """Whether the inputs contradict one another, so that no verdict on the physics can be drawn from them."""
         return any(finding.is_inconsistent for finding in self.findings)

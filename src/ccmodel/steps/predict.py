@@ -16,7 +16,7 @@ from ccmodel.model.run import ModelInput, simulate
 from ccmodel.progress import Progress, silent, within
 from ccmodel.recording import Recording
 from ccmodel.rig.ingest import ingest_batch
-from ccmodel.steps.files import Pair, write_channels
+from ccmodel.steps.files import write_channels
 from ccmodel.steps.simulate import simulate_each
 from ccmodel.typed import InputError
 
@@ -39,7 +39,7 @@ class Predicted:
         Errors of the others (`ccmodel.errors.error_table`).
     """
 
-    pairs: list[Pair]
+    pairs: list[tuple[Recording, Recording]]
     failures: list[str]
     errors: pd.DataFrame
 

@@ -1,16 +1,18 @@
 """Settings of the steps before the studies: how parameters are fitted."""
 
 from math import inf
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from ccmodel.channels import MEASURED
 from ccmodel.model.parameters import FREE, OWN
-from ccmodel.typed import TypedModel
+from ccmodel.typed import OneOf, TypedModel
 
 Share = Annotated[float, Field(ge=0, lt=0.5)]
-Tolerance = Share | dict[Literal[MEASURED], Share]
+Measured = Annotated[str, OneOf(MEASURED)]
+Freed = Annotated[str, OneOf(FREE)]
+Tolerance = Share | dict[Measured, Share]
 
 
 class FreeParameter(TypedModel):
@@ -20,7 +22,7 @@ class FreeParameter(TypedModel):
     bounds: tuple[float, float] = Field(description="lowest and highest value, SI units")
 
     @model_validator(mode="after")
-    def _ordered(self):
+    def _ordered(self) -> Self:
         low, high = self.bounds
         if not low < high:
             raise ValueError(f"bounds must be lowest then highest; got {low} and {high}")
@@ -37,7 +39,7 @@ class OwnParameter(TypedModel):
     bounds: tuple[float, float] | None = Field(None, description="lowest and highest value, SI units; absent: any")
 
     @model_validator(mode="after")
-    def _ordered(self):
+    def _ordered(self) -> Self:
         low, high = self.bounds or (-inf, inf)
         if not low < high:
             raise ValueError(f"bounds must be lowest then highest; got {low} and {high}")
@@ -50,11 +52,11 @@ class Fit(TypedModel):
     batches: list[str] | Literal["each"] = Field(
         description="batches fitted together and then carried over to all others; or 'each': every batch by itself"
     )
-    free: dict[Literal[FREE], FreeParameter] = Field(min_length=1, description="what is fitted")
-    per_recording: dict[Literal[OWN], OwnParameter] = Field(
+    free: dict[Freed, FreeParameter] = Field(min_length=1, description="what is fitted")
+    per_recording: dict[Annotated[str, OneOf(OWN)], OwnParameter] = Field(
         default_factory=dict, description="what each recording has a value of its own of"
     )
-    channels: list[Literal[MEASURED]] = Field(
+    channels: list[Measured] = Field(
         list(MEASURED), min_length=1, description="what is compared; those recorded are used"
     )
     tolerance: Tolerance = Field(
@@ -63,12 +65,12 @@ class Fit(TypedModel):
     )
     starts: int = Field(1, ge=1, description="starts of the search, the configured one and others about it")
     step_s: float | None = Field(None, gt=0, description="take a sample every so often, s; absent: every sample")
-    profile: list[Literal[FREE]] = Field(
+    profile: list[Freed] = Field(
         default_factory=list, description="what the interval of is also taken from its profile likelihood"
     )
 
     @model_validator(mode="after")
-    def _each_has_one_part(self):
+    def _each_has_one_part(self) -> Self:
         if both := self.free.keys() & self.per_recording.keys():
             raise ValueError(f"{', '.join(sorted(both))}: either shared (free) or each recording's own (per_recording)")
         if unknown := set(self.profile) - self.free.keys():

@@ -9,7 +9,7 @@ from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import simulate_recording
 from ccmodel.progress import Progress, each_of, silent
 from ccmodel.recording import Recording, read_recordings, write_recordings
-from ccmodel.steps.files import Pair, fitted, write_json
+from ccmodel.steps.files import fitted, write_json
 
 
 def simulate(
@@ -24,18 +24,21 @@ def simulate(
     A recording on which the model cannot be run has no simulation, and a line in the summary.
     """
     parameters = fitted(recordings_file, fit_file).parameters
-    recordings = read_recordings(recordings_file) if parameters is not None else []
-    pairs, failures = simulate_each(recordings, parameters, progress)
+    pairs: list[tuple[Recording, Recording]] = []
+    failures: list[tuple[Recording, Exception]] = []
+    if parameters is not None:
+        pairs, failures = simulate_each(read_recordings(recordings_file), parameters, progress)
     inputs = [recordings_file] + ([] if fit_file is None else [fit_file])
     write_recordings(simulated_file, [simulated for _, simulated in pairs], provenance.of_inputs(inputs))
     write_json(summary_file, {"failures": [str(error) for _, error in failures]})
 
 
 def simulate_each(
-    recordings: Sequence[Recording], parameters: Parameters | None, progress: Progress = silent
-) -> tuple[list[Pair], list[tuple[Recording, Exception]]]:
+    recordings: Sequence[Recording], parameters: Parameters, progress: Progress = silent
+) -> tuple[list[tuple[Recording, Recording]], list[tuple[Recording, Exception]]]:
     """Recordings with their simulations, and those on which the model cannot be run, with the reason."""
-    pairs, failures = [], []
+    pairs: list[tuple[Recording, Recording]] = []
+    failures: list[tuple[Recording, Exception]] = []
     for recording in each_of(recordings, progress, lambda one: f"simulating {one.batch}/{one.id}"):
         try:
             pairs.append((recording, simulate_recording(recording, parameters)))

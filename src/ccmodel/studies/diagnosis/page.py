@@ -221,7 +221,7 @@ def _loops(found: Diagnosis) -> Figure:
         models = [(j.calibrated, COLOURS[0], "--", _baseline(found.report))]
         if chosen[i] is not j.calibrated:
             models.append((chosen[i], COLOURS[1], "-", WITH_FOUND))
-        if j.nearest is not None:
+        if found.report["nearest"] and j.nearest is not None:
             models.append((j.nearest, COLOURS[3], "-.", f"nearest model, {NOT_ACCEPTED}"))
         for fit, colour, line, label in models:
             model = observed.with_parameters(fit.held_out(i, w))

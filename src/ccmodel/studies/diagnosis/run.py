@@ -53,7 +53,7 @@ class Outcome:
             return {}
         judged = self.found.judgement
         candidates = {"calibrated": judged.calibrated, "extended": judged.best}
-        if self.content["nearest"]:
+        if self.content["nearest"] and judged.nearest is not None:
             candidates["nearest"] = judged.nearest
         rig, inputs = RigConditions.of(self.recordings), self.content["provenance"]
         return {name: Model(self.found.model(one), rig, provenance=inputs) for name, one in candidates.items()}
@@ -89,9 +89,9 @@ def diagnosed(
     """
     findings = ingested.findings
     if ingested.contradicts and not trust_inputs:
-        report = inconsistent.report(ingested.batch.batch, findings, options.freeze)
+        report = inconsistent.report(ingested.stated.batch, findings, options.freeze)
         return Outcome(_complete(report, inputs), ingested.recordings)
-    estimates = Parameters.estimated(ingested.batch.rig)
+    estimates = Parameters.estimated(ingested.stated.rig)
     found = run(ingested.recordings, estimates, options, baseline, _not_judged(findings), progress)
     return Outcome(_complete(found.report, inputs), ingested.recordings, found)
 

@@ -73,7 +73,11 @@ def run_study(study: TableOne, cores: int = 1, progress: Progress = silent) -> O
 def _run(study: TableOne, groups: Sequence[Sequence[Case]], cores: int, progress: Progress, stage: str) -> pd.DataFrame:
     """Run groups of cases, with the stage's name in front of each line of progress."""
     progress(f"{stage}: {sum(map(len, groups))} cases", 0.0)
-    return run(study, groups, cores, lambda text, done: progress(f"{stage}: {text}", done))
+
+    def of_stage(text: str, done: float | None = None) -> None:
+        progress(f"{stage}: {text}", done)
+
+    return run(study, groups, cores, of_stage)
 
 
 def _best_rows(found: pd.DataFrame) -> list[int]:

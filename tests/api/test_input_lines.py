@@ -1,0 +1,125 @@
+"""Inputs that cannot be used are refused in a line that says what is wrong."""
+
+import gzip
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import ccmodel as cc
+from builders import write_batch
+
+MOTION = pd.DataFrame({"time_s": [0.0, 0.1, 0.2], "theta_in_rad": [0.0, 0.1, 0.2]})
+
+
+def spoilt(**columns):
+    return MOTION.assign(**columns)
+
+
+@pytest.mark.parametrize(
+    "motion, line",
+    [
+        (MOTION.drop(columns="theta_in_rad"), "motion: no column theta_in_rad; the columns are time_s"),
+        (MOTION.rename(columns={"time_s": "t"}), "motion: no column time_s; the columns are t, theta_in_rad"),
+        (spoilt(time_s=[0.0, 0.2, 0.1]), "motion: row 2: .* time_s increases"),
+        (spoilt(theta_in_rad=[0.0, np.nan, 0.1]), "motion: row 1: both are numbers"),
+        (spoilt(theta_in_rad=["a", "b", "c"]), "motion: time_s and theta_in_rad are numbers"),
+        (MOTION[:0], "motion: no samples"),
+        (xr.Dataset({"angle": ("time_s", [0.0, 1.0])}, {"time_s": [0.0, 1.0]}), "motion: no column theta_in_rad"),
+        ([0.0, 1.0], "motion: a DataFrame, a Dataset or a CSV file; got list"),
+    ],
+)
+def test_a_motion_that_cannot_be_simulated_is_refused_by_name(fitted, motion, line):
+    with pytest.raises(cc.InputError, match=line):
+        cc.simulate(fitted.model, motion)
+
+
+def test_an_old_model_file_needs_the_batch(fitted, batch, tmp_path):
+    content = fitted.model.as_dict()
+    del content["rig"]
+    file = tmp_path / "old.json"
+    file.write_text(json.dumps(content))
+    with pytest.raises(cc.InputError, match="state a batch too"):
+        cc.simulate(file, MOTION)
+    by_batch = cc.simulate(file, MOTION, batch=batch)
+    assert np.array_equal(by_batch["T1_N"], cc.simulate(fitted.model, MOTION)["T1_N"])
+
+
+def test_what_is_not_there_is_named(fitted, batch, tmp_path):
+    with pytest.raises(cc.InputError, match="did you mean 't-7N'"):
+        batch["t-7"]
+    with pytest.raises(cc.InputError, match="recording: the model knows t-7N, t-6N, t-5N; got x"):
+        cc.simulate(fitted.model, MOTION, recording="x")
+    with pytest.raises(cc.InputError, match="there is no such file"):
+        cc.load(tmp_path / "nothing")
+    with pytest.raises(cc.InputError, match="cannot be read"):
+        cc.read_model(tmp_path / "nothing.json")
+
+
+@pytest.mark.parametrize(
+    "options, line",
+    [
+        ({"free": ["stifness"]}, "stifness cannot be fitted to these recordings; stiffness_N_per_m, friction"),
+        ({"free": []}, "nothing to fit"),
+        ({"tolerance": 2.0}, "tolerance: Input should be less than 0.5"),
+        ({"tolerance": {"torque": 0.1}}, "tolerance: "),
+        ({"step_s": -1.0}, "step_s: Input should be greater than 0"),
+        ({"cycles": 0}, "cycles: Input should be greater than or equal to 1"),
+    ],
+)
+def test_options_of_a_fit_that_cannot_be_used_are_named(batch, options, line):
+    with pytest.raises(cc.InputError, match=line):
+        cc.fit(batch, **options)
+
+
+@pytest.mark.parametrize(
+    "options, line",
+    [
+        ({"without": ["rust"]}, "without: .*rust"),
+        ({"candidates": ["kink at nowhere"]}, "there is no mechanism 'kink at nowhere'"),
+        ({"freeze": True}, "freeze: there is no model to hold"),
+    ],
+)
+def test_options_of_a_diagnosis_that_cannot_be_used_are_named(batch, options, line):
+    with pytest.raises(cc.InputError, match=line):
+        cc.diagnose(batch, **options)
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_the_work(batch, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(cc.InputError, match="cannot be made a folder"):
+        cc.diagnose(batch, tmp_path / "file" / "out")
+
+
+@pytest.fixture(scope="module")
+def contradictory(tmp_path_factory):
+    """A batch of which one recording's load torque reads the same throughout."""
+    folder = write_batch(tmp_path_factory.mktemp("raw") / "dead", pretensions=(7.0, 6.0))
+    file = folder / "t-6N.csv.gz"
+    table = pd.read_csv(file).assign(load_current_A=1.0)
+    with gzip.open(file, "wt") as f:
+        table.to_csv(f, index=False)
+    return cc.load(folder)
+
+
+def test_inputs_that_contradict_one_another_are_not_fitted(contradictory):
+    assert contradictory.contradicts
+    assert "inconsistent: " in repr(contradictory)
+    with pytest.raises(cc.InputError, match="load_current_A.*\n.*trust_inputs=True"):
+        cc.fit(contradictory)
+    assert cc.fit(contradictory, trust_inputs=True).succeeded
+
+
+def test_inputs_that_contradict_one_another_have_a_verdict_of_their_own(contradictory, tmp_path):
+    found = cc.diagnose(contradictory, tmp_path / "out")
+    assert found.verdict == "inputs-inconsistent"
+    assert found.confidence == pytest.approx(1.0, abs=0.1)
+    assert found.model is found.calibrated is found.nearest is None
+    assert found.to_frame().empty
+    assert "contradict" in found._repr_html_()
+    with pytest.raises(cc.InputError, match="no model was fitted"):
+        found.plot()
+    with pytest.raises(cc.InputError, match="holds no model"):
+        cc.read_model(tmp_path / "out" / "model.json")

@@ -1,0 +1,127 @@
+"""What a person may type by mistake: one clear line for each problem, no traceback, the exit code 2; as JSON too."""
+
+import json
+
+import pytest
+from example_folder import noisy_batch
+
+CHECKS = {
+    "no such folder": (["check", "raw/loopss"], "raw/loopss: there is no such folder; did you mean raw/loops?"),
+    "a file in place of a folder": (["check", "a-file"], "a-file: is a file; a folder is expected"),
+    "an empty folder": (["check", "empty"], "empty: has no batch.yaml; "),
+    "a folder of batches": (["check", "raw"], "it holds the batches loops"),
+    "a command": (["chek", "raw/loops"], "Did you mean 'check'"),
+    "an option": (["check", "raw/loops", "--jsn"], "No such option: --jsn. Did you mean --json?"),
+    "no argument": (["check"], "Missing argument"),
+    "an argument too many": (["check", "raw/loops", "raw/loops"], "unexpected extra argument"),
+    "a mechanism": (["mechanisms", "backlsh"], "backlash"),
+    "an excluded mechanism": (["diagnose", "raw/loops", "--out", "out", "--without", "kinck"], "--without: "),
+    "a candidate": (["diagnose", "raw/loops", "--out", "out", "--candidate", "kink at moon"], "--candidate: "),
+    "a tolerance that is no number": (["diagnose", "raw/loops", "--out", "out", "--tolerance", "abc"], "--tolerance: "),
+    "a step that is no number": (["diagnose", "raw/loops", "--out", "out", "--step", "abc"], "'--step'"),
+    "a step too small": (["diagnose", "raw/loops", "--out", "out", "--step", "0"], "'--step'"),
+    "no --out": (["diagnose", "raw/loops"], "Missing option '--out'"),
+    "--freeze alone": (["diagnose", "raw/loops", "--out", "out", "--freeze"], "--freeze: "),
+    "no baseline": (
+        ["diagnose", "raw/loops", "--out", "out", "--baseline", "no.json"],
+        "no.json: there is no such file",
+    ),
+    "a model that is text": (["predict", "raw/loops", "--model", "a-file", "--out", "out"], "a-file: "),
+    "a model that is a folder": (["predict", "raw/loops", "--model", "raw", "--out", "out"], "raw: is a folder"),
+    "other JSON as a model": (["predict", "raw/loops", "--model", "other.json", "--out", "out"], "other.json: "),
+    "no motion": (["simulate", "no.csv", "--model", "other.json", "--out", "s.csv"], "no.csv: there is no such file"),
+    "logs that are not there": (["import", "no.csv", "--out", "new"], "no.csv"),
+    "no map": (["import", "a-file", "--map", "no.yaml", "--out", "new"], "no.yaml: there is no such map"),
+    "no results": (["report", "nowhere"], "nowhere: there is no such folder"),
+    "results of nothing": (["report", "empty"], "no run came to its end"),
+    "a broken diagnosis": (["report", "broken"], "broken/diagnosis.json: "),
+    "no accepted run": (["accuracy", "check", "empty"], "tables/baseline.json: "),
+    "no reason": (["accuracy", "accept", "empty", "--reason", " "], "--reason: "),
+    "a commit": (["accuracy", "history", "--rev", "no-such-commit"], "git rev-list"),
+    "no settings": (["table-one", "no.yaml", "--out", "t", "--figure", "t.png"], "no.yaml: there is no such file"),
+    "cores": (["table-one", "a-file", "--out", "t", "--figure", "t.png", "--cores", "0"], "'--cores'"),
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("mistakes")
+    noisy_batch(folder / "raw/loops", pretensions=(7.0,))
+    for name in ("empty", "broken"):
+        (folder / name).mkdir()
+    (folder / "a-file").write_text("a text\n")
+    (folder / "other.json").write_text('{"colour": "red"}')
+    (folder / "broken/diagnosis.json").write_text('{"batch": "b", "verdict": "explained"}')
+    return folder
+
+
+@pytest.mark.parametrize("words, message", CHECKS.values(), ids=CHECKS)
+def test_a_mistake_is_answered_in_a_line(words, message, folder, run, monkeypatch):
+    monkeypatch.chdir(folder)
+    ended = run(*words)
+    assert (ended.code, ended.out) == (2, "")
+    assert message in ended.err
+    assert "Traceback" not in ended.err
+    assert ended.err.count("\n") == 1
+    assert not (folder / "out").exists()
+    as_json = run(*words, "--json")
+    assert (as_json.code, as_json.err) == (2, "")
+    assert message in json.loads(as_json.out)["error"][0]
+
+
+def test_a_batch_may_be_named_by_its_file(folder, run):
+    assert run("check", folder / "raw/loops/batch.yaml").out == run("check", folder / "raw/loops").out
+
+
+def test_an_error_of_the_program_has_its_traceback(folder, run, monkeypatch):
+    monkeypatch.setattr("ccmodel.rig.ingest.ingest_batch", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        run("check", folder / "raw/loops")
+
+
+def test_a_full_disk_is_one_line(folder, run, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device", "out/diagnosis.json")
+
+    monkeypatch.setattr("ccmodel.studies.diagnosis.run.diagnose", full)
+    ended = run("diagnose", folder / "raw/loops", "--out", folder / "out")
+    assert (ended.code, ended.err) == (2, "out/diagnosis.json: No space left on device\n")
+
+
+@pytest.mark.parametrize(
+    "out, message",
+    [
+        ("a-file", "is a file; name a folder"),
+        ("a-file/below/it", "cannot be made: {folder}/a-file is a file"),
+        ("/proc/none/below", "cannot be written"),
+    ],
+)
+def test_a_folder_is_tried_before_the_work(out, message, folder, run, monkeypatch):
+    monkeypatch.setattr("ccmodel.studies.diagnosis.run.diagnose", lambda *_: pytest.fail("worked"))
+    ended = run("diagnose", folder / "raw/loops", "--out", folder / out)
+    assert ended.code == 2
+    assert f"--out: {folder / out}: {message.format(folder=folder)}" in ended.err
+
+
+@pytest.mark.parametrize("out, message", [("raw", "is a folder; name a file"), ("a-file/below", "is a file")])
+def test_a_file_is_tried_before_the_work(out, message, folder, run, monkeypatch):
+    monkeypatch.setattr("ccmodel.steps.predict.simulate_motion", lambda *_: pytest.fail("worked"))
+    ended = run("simulate", folder / "a-file", "--model", folder / "other.json", "--out", folder / out)
+    assert ended.code == 2
+    assert message in ended.err
+
+
+def test_the_trial_leaves_nothing(folder, run, monkeypatch):
+    verdict = {"verdict": "explained", "headline": "it is as it is"}
+    monkeypatch.setattr("ccmodel.studies.diagnosis.run.diagnose", lambda *_: verdict)
+    ended = run("diagnose", folder / "raw/loops", "--out", folder / "new/below/it")
+    assert ended == (0, "it is as it is\n", "")
+    assert not (folder / "new").exists()
+
+
+@pytest.mark.parametrize("strict, code", [([], 0), (["--strict"], 1)])
+@pytest.mark.parametrize("verdict", ["explained", "undecided", "unexplained", "inputs-inconsistent"])
+def test_a_verdict_is_no_failure_unless_asked_for(verdict, strict, code, folder, run, monkeypatch):
+    said = {"verdict": verdict, "headline": "it is as it is"}
+    monkeypatch.setattr("ccmodel.studies.diagnosis.run.diagnose", lambda *_: said)
+    assert run("diagnose", folder / "raw/loops", "--out", folder / "out", *strict).code == code

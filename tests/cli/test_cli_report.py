@@ -1,0 +1,57 @@
+"""The summary of a run and of a diagnosis."""
+
+import json
+
+import pytest
+
+from ccmodel.report.verdict import sentence
+
+ERROR = {"tau_in": {"before": 0.012, "after": 0.002, "noise": 0.001, "unit": "N*m"}}
+AGREES = {"batch": "loops", "verdict": "agrees", "is_held": False, "fit": {"error": ERROR}, "not_judged": []}
+
+
+def write(file, content):
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(json.dumps(content))
+
+
+def test_a_run(run, tmp_path):
+    write(tmp_path / "left-out.json", {"left_out": ["a.csv: is empty"], "warnings": ["b.csv: has a gap"]})
+    write(tmp_path / "diagnoses/loops/diagnosis.json", AGREES)
+    write(tmp_path / "diagnoses/bad/diagnosis.json", {"batch": "bad", "verdict": None, "why": "no recording"})
+    (tmp_path / "index.html").touch()
+    ended = run("report", tmp_path)
+    assert ended.code == 1
+    assert ended.out.splitlines() == [
+        "bad: Not diagnosed: no recording.",
+        f"loops: agrees. {sentence(AGREES)}",
+        "  held-out error over the noise floor: τ_in 12.0 -> 2.0",
+        f"page: {tmp_path / 'index.html'}",
+    ]
+    assert ended.err.splitlines() == ["warning: b.csv: has a gap", "left out: a.csv: is empty"]
+    content = json.loads(run("report", tmp_path, "--json").out)
+    assert content["left_out"] == ["a.csv: is empty"]
+    assert [v["verdict"] for v in content["verdicts"]] == [None, "agrees"]
+
+
+def test_a_diagnosis(run, tmp_path):
+    write(tmp_path / "diagnosis.json", AGREES)
+    ended = run("report", tmp_path)
+    assert ended.code == 0
+    assert ended.out.startswith("loops: agrees.")
+
+
+@pytest.mark.parametrize("quiet, warned", [([], True), (["--quiet"], False)])
+def test_inputs_that_contradict_one_another(quiet, warned, run, tmp_path):
+    contradiction = {"what": "a.csv, drive_current_A", "why": "is 0 throughout"}
+    write(
+        tmp_path / "diagnosis.json",
+        AGREES | {"verdict": "inputs-inconsistent", "fit": None, "not_judged": [contradiction]},
+    )
+    ended = run("report", tmp_path, *quiet)
+    assert ended.code == 1
+    assert "inconsistent: a.csv, drive_current_A: is 0 throughout" in ended.err
+    write(tmp_path / "diagnosis.json", AGREES | {"not_judged": [contradiction]})
+    ended = run("report", tmp_path, *quiet)
+    assert ended.code == 0
+    assert bool(ended.err) == warned
