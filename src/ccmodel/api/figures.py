@@ -28,8 +28,13 @@ def _figure(draw: Callable[..., Figure]) -> Callable[..., Figure]:
 
     @wraps(draw)
     def drawn(*arguments: object) -> Figure:
+        # A notebook's backend makes figures interactive as it loads; the end of the style would take that back.
+        plt.draw_if_interactive()
         with plt.rc_context(STYLE):
             figure = draw(*arguments)
+            is_interactive = matplotlib.is_interactive()
+        # The first figure of a session starts its backend; what that sets must outlive the style.
+        matplotlib.interactive(is_interactive)
         if "inline" in matplotlib.get_backend():
             plt.close(figure)
         return figure
