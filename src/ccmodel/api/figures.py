@@ -28,8 +28,6 @@ def _figure(draw: Callable[..., Figure]) -> Callable[..., Figure]:
 
     @wraps(draw)
     def drawn(*arguments: object) -> Figure:
-        # A notebook's backend makes figures interactive as it loads; the end of the style would take that back.
-        plt.draw_if_interactive()
         with plt.rc_context(STYLE):
             figure = draw(*arguments)
             is_interactive = matplotlib.is_interactive()
