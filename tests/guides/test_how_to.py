@@ -42,7 +42,7 @@ def followed(page: str, folder: Path, **options) -> Guide:
 def test_import_logs(tmp_path):
     shutil.copytree(TUTORIAL / "logs", tmp_path / "measurements")
     copy_of(["docs/tutorial"], tmp_path)
-    assert len(followed("import-logs", tmp_path).skipped) == 1
+    assert len(followed("import-logs", tmp_path).skipped) == 2
 
 
 def test_add_a_batch(tmp_path):
@@ -61,12 +61,12 @@ def test_add_a_study(tmp_path):
 
 
 def test_add_a_reader(tmp_path):
-    copy_of(["src"], tmp_path)
+    copy_of(["src", "pyproject.toml"], tmp_path)
     assert followed("add-a-reader", tmp_path, source=tmp_path / "src").skipped == []
 
 
 def test_add_a_mechanism(tmp_path):
-    copy_of(["src", "docs/mechanisms.md", "docs/mechanisms"], tmp_path)
+    copy_of(["src", "pyproject.toml", "docs/mechanisms.md", "docs/mechanisms"], tmp_path)
     guide = followed("add-a-mechanism", tmp_path, source=tmp_path / "src")
     assert len(guide.skipped) == 1
     assert "load cell" in (tmp_path / "docs/mechanisms/load-cell-nonlinearity.md").read_text(encoding="utf-8")

@@ -123,6 +123,15 @@ class Fit:
         }
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")
 
+    @property
+    def by_recording(self) -> pd.DataFrame:
+        """What differs from recording to recording, a row for each: posterior means about the shared values, SI units.
+
+        Columns are the recording's own ``friction_coefficient``, and the zeros of its sensors.
+        """
+        rows = {w.observations.id: w.own_values(self.values) for w in self.calibration.whitened}
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("recording")
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data: a model file with the intervals, and the fit's circumstances under the key ``fit``."""
         about = {
