@@ -1,8 +1,9 @@
 """Settings of the site that `make docs` builds. Nothing is fetched, neither by the build nor by a reader's browser."""
 
 import sys
-from importlib.metadata import version as installed_version
 from pathlib import Path
+
+import ccmodel
 
 HERE = Path(__file__).parent
 # Extensions of this folder's own.
@@ -11,11 +12,12 @@ sys.path.insert(0, str(HERE / "_extensions"))
 project = "ccmodel"
 author = "ccmodel developers"
 project_copyright = "ccmodel developers"
-version = release = installed_version("ccmodel")
+version = release = ccmodel.__version__
 
 extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
     "sphinx.ext.viewcode",
     "numpydoc",
     "sphinx_copybutton",
@@ -38,6 +40,9 @@ nb_execution_timeout = 300
 nb_execution_raise_on_error = True
 nb_execution_show_tb = True
 
+# Names in backticks in docstrings are links where they are public.
+default_role = "autolink"
+autosummary_generate = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 numpydoc_class_members_toctree = False

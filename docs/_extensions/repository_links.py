@@ -15,50 +15,43 @@ from sphinx.application import Sphinx
 from sphinx.transforms import SphinxTransform
 
 ROOT = Path(__file__).parents[2]
-# Documents outside `docs`, each included by a page of the site.
-PAGES = {
-    "CHANGELOG.md": "changelog",
-    "CONTRIBUTING.md": "contributing",
-    "README.md": "index",
-    "config/README.md": "configuration",
-}
+# Pages that include a document outside `docs`. Their links are relative to that document.
+INCLUDED = {"changelog": "CHANGELOG.md", "configuration": "config/README.md", "contributing": "CONTRIBUTING.md"}
+PAGES = {file: page for page, file in INCLUDED.items()} | {"README.md": "index"}
+LINKS = (addnodes.download_reference, addnodes.pending_xref)
 
 
 class RepositoryLinks(SphinxTransform):
-    """Replace links that lead out of ``docs``."""
+    """Replace links that lead out of ``docs``, and those of documents that are included from outside."""
 
     default_priority = 500
 
     def apply(self) -> None:
         """Point each such link to the page that shows its file."""
         for link in list(self.document.findall(lambda node: isinstance(node, LINKS))):
-            path = self._path(link)
-            if path in PAGES and PAGES[path] in self.env.found_docs:
-                self._lead_to(link, PAGES[path])
-            elif path:
-                self._lead_to(link, f"repository/{path}")["repository_path"] = path
+            name, _, anchor = link["reftarget"].partition("#")
+            if link.get("reftype") == "myst" and name and (path := self._path(link, name)):
+                link.replace_self(self._reference(link, path, link.get("reftargetid") or anchor))
 
-    def _path(self, link: nodes.Element) -> str | None:
-        """Path of the link's target below the repository's root, if it is a file or folder outside ``docs``."""
-        if link.get("reftype") != "myst":
-            return None
-        name = link["reftarget"].partition("#")[0]
-        # MyST takes every Markdown file for a page of the site and removes its ending.
-        target = (Path(self.env.doc2path(self.env.docname)).parent / name).resolve()
+    def _path(self, link: nodes.Element, name: str) -> Path | None:
+        """The link's target below the repository's root, if it is outside ``docs`` or the link itself is."""
+        page = self.env.docname
+        file = ROOT / INCLUDED[page] if page in INCLUDED else Path(self.env.doc2path(page))
+        target = (file.parent / name).resolve()
+        # MyST takes every Markdown file that exists for a page of the site and removes its ending.
         if link.get("refdomain") == "doc":
             target = target.with_name(f"{target.name}.md")
-        outside = target.is_relative_to(ROOT) and not target.is_relative_to(self.env.srcdir)
-        return str(target.relative_to(ROOT)) if outside and target.exists() else None
+        is_here = target.is_relative_to(self.env.srcdir) and page not in INCLUDED
+        return target.relative_to(ROOT) if target.is_relative_to(ROOT) and target.exists() and not is_here else None
 
-    def _lead_to(self, link: nodes.Element, page: str) -> nodes.reference:
-        builder = self.app.builder
-        uri = builder.get_relative_uri(self.env.docname, page)
-        reference = nodes.reference("", "", *link.children, internal=True, refuri=uri)
-        link.replace_self(reference)
-        return reference
-
-
-LINKS = (addnodes.download_reference, addnodes.pending_xref)
+    def _reference(self, link: nodes.Element, path: Path, anchor: str) -> nodes.Element:
+        page = PAGES.get(str(path)) or self.env.path2doc(ROOT / path)
+        if page in self.env.found_docs:
+            anchor = anchor if page != "index" else ""
+            target = {"refdomain": "doc", "reftarget": page, "reftargetid": anchor or None, "reftype": "myst"}
+            return addnodes.pending_xref("", *link.children, refdoc=self.env.docname, refexplicit=True, **target)
+        uri = f"{'../' * self.env.docname.count('/')}repository/{path}.html"
+        return nodes.reference("", "", *link.children, internal=True, refuri=uri, repository_path=str(path))
 
 
 def pages(app: Sphinx) -> Iterator[tuple[str, dict, str]]:

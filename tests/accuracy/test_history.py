@@ -56,7 +56,7 @@ def test_past_commits_are_run_and_measured_and_failures_are_lines(repository, me
     first, good = git(repository, "rev-parse", "HEAD"), commit(repository, SNAKEFILE, "0.5.0")
     bad = commit(repository, FAILING, "0.5.1")
     said, file = [], repository / "history.csv"
-    fill_history(file, [f"{first}..HEAD", first], 1, said.append)
+    fill_history(file, [f"{first}..HEAD", first], 1, lambda text, done=None: said.append(text))
     assert said[0] == f"{good}: 1 batches"
     assert said[1].startswith(f"{bad}: skipped: its run failed")
     assert "this commit has a fault" in said[1]

@@ -1,5 +1,6 @@
 """From a folder to a simulation in five lines, on a batch whose truth is known."""
 
+import gzip
 import json
 
 import numpy as np
@@ -9,7 +10,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 import ccmodel as cc
-from builders import write_batch
+from builders import spoil, write_batch
 from ccmodel import cli
 from ccmodel.model.files import read_model as parameters_of
 
@@ -64,6 +65,20 @@ def test_a_fit_shows_values_with_intervals_and_units(fitted):
     said = repr(fitted)
     assert all(word in said for word in ("value", "standard deviation", "90 % interval", "at a bound?", "N m/rad"))
     assert "friction_coefficient" in fitted._repr_html_()
+
+
+def test_a_fit_tells_recordings_apart(fitted, tmp_path):
+    """The zero of the load cell at the drive has moved in one recording by 0.1 N, as its accuracy allows."""
+    folder = spoil(write_batch(tmp_path / "known", pretensions=(7.0, 6.0, 5.0)))
+    file = folder / "t-6N.csv.gz"
+    table = pd.read_csv(file)
+    table["drive_load_cell_V"] += 0.1 * 0.1
+    with gzip.open(file, "wt") as f:
+        table.to_csv(f, index=False)
+    moved = cc.fit(folder, trust_inputs=True).by_recording - fitted.by_recording
+    assert moved.loc["t-6N", "F_drive_zero_N"] == pytest.approx(0.1, rel=0.2)
+    assert moved.loc["t-7N", "F_drive_zero_N"] == pytest.approx(0.0, abs=0.005)
+    assert fitted.by_recording["friction_coefficient"].to_numpy() == pytest.approx(0.156, rel=0.01)
 
 
 def test_the_diagnosis_has_the_same_calibrated_model(fitted, found):

@@ -82,7 +82,7 @@ def _write_table_one(file: Path) -> None:
     settings = yaml.safe_load(file.read_text())
     open_ = {"load_stiffness_Nm_per_rad": [0.05], "amplitude_rad": [1.0], "frequency_Hz": [1.0], "rigs": ["measured"]}
     settings["not_stated"] |= open_ | {"fit_over": ["rms"]}
-    settings["grid"] |= {"strengths": 1, "finer": 1, "beyond": 1.0, "shapes": [0.5], "set_up_differences": [0.1]}
+    settings["grid"] |= {"strengths": 2, "finer": 1, "beyond": 1.0, "shapes": [0.5], "set_up_differences": [0.1]}
     settings["rig"]["motion"] = {"cycles": 2, "samples_per_cycle": 40}
     settings["pairs"] = {"singles": 1, "shares": [1.0], "not_stated": open_ | {"fit_over": ["rms"]}}
     file.write_text(yaml.safe_dump(settings))

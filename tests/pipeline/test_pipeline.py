@@ -115,7 +115,7 @@ def test_it_makes_figures_tables_and_the_page(finished):
     csv, parquet = pd.read_csv(results / "tables/errors.csv"), pd.read_parquet(results / "tables/errors.parquet")
     assert csv["rmse"].to_numpy() == pytest.approx(parquet["rmse"].to_numpy(), rel=1e-4)
     assert set(parquet["parameters"]) == {"estimated", "fitted"}
-    assert ccmodel("left-out", str(results)).returncode == 0
+    assert ccmodel("report", str(results)).returncode == 0
 
 
 def test_every_link_of_the_page_leads_somewhere(finished):
@@ -186,7 +186,7 @@ def test_inputs_that_contradict_one_another_are_named_and_get_no_model(diagnosed
     dead = "t-7N.csv.gz, drive_current_A: is 0 throughout"
     page = (results / "index.html").read_text()
     assert page.index('id="contradictory"') < page.index(dead) < page.index('<article class="card inputs-inconsistent"')
-    said = ccmodel("left-out", str(results))
+    said = ccmodel("report", str(results))
     assert said.returncode == 1
     assert [line for line in said.stderr.splitlines() if line.startswith("inconsistent: ") and dead in line]
     config = yaml.safe_load((folder / "config.yaml").read_text())
@@ -195,7 +195,7 @@ def test_inputs_that_contradict_one_another_are_named_and_get_no_model(diagnosed
     assert snakemake(folder).returncode == 0
     trusted = json.loads((results / "diagnoses/tiny/diagnosis.json").read_text())
     assert "t-7N.csv.gz, drive_current_A" in [n["what"] for n in trusted["not_judged"]]
-    said = ccmodel("left-out", str(results))
+    said = ccmodel("report", str(results))
     assert said.returncode == 0
     assert [line for line in said.stderr.splitlines() if line.startswith("warning: ") and dead in line]
 
@@ -349,7 +349,7 @@ def test_bad_input_is_a_line_each_and_nothing_else_is_lost(copy):
 
     run = snakemake(copy)
     assert run.returncode == 0, run.stdout + run.stderr
-    said = ccmodel("left-out", str(copy / "results"))
+    said = ccmodel("report", str(copy / "results"))
     assert said.returncode == 1
     lines = [line for line in said.stderr.splitlines() if line.startswith("left out")]
     assert len(lines) == 4, said.stderr
@@ -377,7 +377,7 @@ def test_a_refused_batch_takes_only_its_own_with_it(copy):
     write_config(copy, added={"batches": ["other"], "variable": "pretension"})
     run = snakemake(copy)
     assert run.returncode == 0, run.stdout + run.stderr
-    lines = ccmodel("left-out", str(copy / "results")).stderr
+    lines = ccmodel("report", str(copy / "results")).stderr
     for said in ("did you mean 'format'", "not a batch: a batch's name", "empty/batch.yaml", "fit fitted: no usable"):
         assert said in lines
     assert "not simulated" in (copy / "results/figures/added.svg").read_text()
@@ -385,7 +385,7 @@ def test_a_refused_batch_takes_only_its_own_with_it(copy):
 
 
 def test_left_out_of_a_run_that_did_not_end_says_so(tmp_path):
-    said = ccmodel("left-out", str(tmp_path))
+    said = ccmodel("report", str(tmp_path))
     assert said.returncode == 2
     assert "no run came to its end" in said.stderr
     assert "Traceback" not in said.stderr

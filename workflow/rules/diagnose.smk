@@ -21,7 +21,7 @@ rule diagnose:
     threads: 2
     resources:
         mem_mb=2000,
-        runtime=240,
+        runtime=60,
     params:
         settings=lambda wildcards: CONFIG.diagnosing_of(
             wildcards.batch

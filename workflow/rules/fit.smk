@@ -18,8 +18,8 @@ rule fit:
         "../envs/ccmodel.yaml"
     threads: 2
     resources:
-        mem_mb=2000,
-        runtime=60,
+        mem_mb=1000,
+        runtime=30,
     params:
         problem=lambda wildcards: CONFIG.fits[wildcards.parameters].model_dump_json(),
         sources=source_digest("ccmodel.steps.fit"),

@@ -30,8 +30,8 @@ for name, study in STUDIES.items():
             "../envs/ccmodel.yaml"
         threads: 1
         resources:
-            mem_mb=2000,
-            runtime=60,
+            mem_mb=1000,
+            runtime=30,
         params:
             kind=study.kind,
             caption=study.caption(),

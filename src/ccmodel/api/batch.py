@@ -132,10 +132,10 @@ def load(folder: str | Path) -> Batch:
     >>> batch.summary[["samples", "rate_Hz", "pretension_N"]]
                       samples  rate_Hz  pretension_N
     recording
-    half-loop-7.3N-a     5250    250.0           7.3
-    half-loop-7.3N-b     5250    250.0           7.3
-    >>> batch["half-loop-7.3N-a"].to_frame()["tau_in_Nm"].max().round(4)
-    np.float64(0.0387)
+    half-loop-7.3N-a     4801    500.0           7.3
+    half-loop-7.3N-b     4801    500.0           7.3
+    >>> float(batch["half-loop-7.3N-a"].to_frame()["tau_in_Nm"].max().round(4))
+    0.0988
     """
     folder = Path(folder)
     ingested = ingest_batch(folder)

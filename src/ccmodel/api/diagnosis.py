@@ -31,7 +31,7 @@ class Diagnosis:
     ----------
     batch : Batch
     outcome : Outcome
-        The result as `ccmodel.studies.diagnosis` has it; private, as everything below this interface.
+        The result as ``ccmodel.studies.diagnosis`` has it; private, as everything below this interface.
     """
 
     batch: Batch

@@ -30,6 +30,9 @@ def _figure(draw: Callable[..., Figure]) -> Callable[..., Figure]:
     def drawn(*arguments: object) -> Figure:
         with plt.rc_context(STYLE):
             figure = draw(*arguments)
+            is_interactive = matplotlib.is_interactive()
+        # The first figure of a session starts its backend; what that sets must outlive the style.
+        matplotlib.interactive(is_interactive)
         if "inline" in matplotlib.get_backend():
             plt.close(figure)
         return figure

@@ -34,7 +34,7 @@ class Fit:
     ----------
     batch : Batch
     calibration : Calibration
-        The result as `ccmodel.diagnosis` has it; private, as everything below this interface.
+        The result as ``ccmodel.diagnosis`` has it; private, as everything below this interface.
     """
 
     batch: Batch
@@ -122,6 +122,15 @@ class Fit:
             for name, interval in self.intervals.items()
         }
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")
+
+    @property
+    def by_recording(self) -> pd.DataFrame:
+        """What differs from recording to recording, a row for each: posterior means about the shared values, SI units.
+
+        Columns are the recording's own ``friction_coefficient``, and the zeros of its sensors.
+        """
+        rows = {w.observations.id: w.own_values(self.values) for w in self.calibration.whitened}
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("recording")
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data: a model file with the intervals, and the fit's circumstances under the key ``fit``."""

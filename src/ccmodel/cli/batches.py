@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def add_to(app: typer.Typer) -> None:
     """Add the commands."""
-    command(app, "init", PREPARE, ["ccmodel init data/raw/my-batch"])(init)
+    command(app, "init", PREPARE, ["ccmodel init data/raw/bench"])(init)
     command(app, "check", PREPARE, ["ccmodel check data/raw/loops", "ccmodel check data/raw/loops --json"])(check)
 
 

@@ -44,13 +44,12 @@ def mechanisms(
         output.result({"out": markdown})
         return
     try:
-        entries = [catalogue.parts(one) for one in ([name] if name else names())] if as_json else []
-        shown: str | Table = (
-            catalogue.entry(name) if name else Table("name", "places", "parameters", "what it is", box=None)
-        )
+        if name is not None:
+            output.result(catalogue.parts(name), catalogue.entry(name))
+            return
     except UnknownMechanismError as error:
         raise InputError(str(error)) from None
-    if isinstance(shown, Table):
-        for row in catalogue.rows():
-            shown.add_row(*row)
-    output.result(entries[0] if name and entries else entries, shown)
+    table = Table("name", "places", "parameters", "what it is", box=None)
+    for row in catalogue.rows():
+        table.add_row(*row)
+    output.result(list(map(catalogue.parts, names())) if as_json else [], table)

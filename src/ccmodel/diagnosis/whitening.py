@@ -43,6 +43,8 @@ class Whitened:
         deviation.
     noise_floor : dict of str to float
         Root mean square error of a correct model by channel, in its unit: sensor noise and repeatability.
+    scalar_nuisances : sequence of (str, float, float)
+        Parameter, value and prior standard deviation of each scalar nuisance.
     """
 
     observations: Observations
@@ -50,6 +52,7 @@ class Whitened:
     shrinkage: NDArray
     nuisance_mean: NDArray
     noise_floor: Mapping[str, float]
+    scalar_nuisances: Sequence[tuple[str, float, float]] = ()
 
     @property
     def name(self) -> str:
@@ -74,6 +77,13 @@ class Whitened:
         """Whitened errors of the model with some parameters replaced, and nuisances; shape (rows + nuisances,)."""
         return self.with_nuisances(self.observations.errors(values).ravel())
 
+    def own_values(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Posterior mean of each scalar nuisance in this recording, by parameter, for shared values of a fit."""
+        # Errors are model minus recording: a recording that has a nuisance has the opposite error.
+        means = -self.nuisance_mean @ self.observations.errors(values).ravel()
+        pairs = zip(self.scalar_nuisances, means.tolist(), strict=True)
+        return {name: values.get(name, value) + spread * mean for (name, value, spread), mean in pairs}
+
     def with_parameters(self, parameters: Parameters) -> "Whitened":
         """The same for a model with other parameters, under the same covariance."""
         return replace(self, observations=self.observations.with_parameters(parameters))
@@ -87,7 +97,8 @@ def whiten(observations: Observations, model: Parameters) -> Whitened:
     floor = np.sqrt((o.sigma**2).mean(axis=1) + (friction**2).mean(axis=1))
     U, s, Vt = np.linalg.svd(N, full_matrices=False)
     nuisance_mean = (Vt.T[:scalars] * (s / (1 + s**2))) @ U.T
-    return Whitened(o, U, shrinkage_of(s), nuisance_mean, dict(zip(o.channels, floor.tolist(), strict=True)))
+    by_channel = dict(zip(o.channels, floor.tolist(), strict=True))
+    return Whitened(o, U, shrinkage_of(s), nuisance_mean, by_channel, _scalar_nuisances(o))
 
 
 def nuisances(o: Observations) -> tuple[NDArray, int]:

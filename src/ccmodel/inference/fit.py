@@ -22,12 +22,15 @@ from ccmodel.inference.intervals import (
 )
 from ccmodel.inference.least_squares import Solution, solve
 from ccmodel.inference.problem import Problem
+from ccmodel.progress import Progress, silent
 
 # Optima of several starts count as one if no unknown differs by more than this share of its size.
 SAME = 1e-3
 # Half-width of the range from which further starts are drawn, as a share of each unknown's size.
 START_SPREAD = 0.3
 SEED = 1
+# Share of the searches in the time of a fit; the rest is the intervals'.
+SEARCHED = 0.7
 # Fewest recordings for a bootstrap over recordings.
 ENOUGH_RECORDINGS = 6
 # Ratio of the bootstrap's standard deviation to the interval's from which a warning is given.
@@ -88,7 +91,7 @@ class FitResult:
         return json.loads(json.dumps(asdict(self)), parse_constant=lambda infinite: None)
 
 
-def fit(problem: Problem, starts: int = 1, profiled: Sequence[str] = ()) -> FitResult:
+def fit(problem: Problem, starts: int = 1, profiled: Sequence[str] = (), progress: Progress = silent) -> FitResult:
     """Fit a problem from several starts and estimate the uncertainty of the values.
 
     Parameters
@@ -98,6 +101,7 @@ def fit(problem: Problem, starts: int = 1, profiled: Sequence[str] = ()) -> FitR
         Number of starts: the configured one, and others drawn within 30 % of each unknown's size, from a fixed seed.
     profiled : sequence of str
         Shared unknowns whose intervals are also taken from their profile likelihood.
+    progress : Progress
 
     Returns
     -------
@@ -113,7 +117,8 @@ def fit(problem: Problem, starts: int = 1, profiled: Sequence[str] = ()) -> FitR
         text = f"{problem.names[k]} starts at {problem.start[k]:.4g}, outside its bounds {low[k]:.4g} to {high[k]:.4g}"
         return FitResult(False, text, recordings=names)
     solutions, failures = [], []
-    for x in _starts(problem, starts):
+    for k, x in enumerate(_starts(problem, starts)):
+        progress(f"search {k + 1} of {starts}", SEARCHED * k / starts)
         try:
             solutions.append(solve(problem, x))
         except (ModelError, ValueError) as error:
@@ -123,6 +128,7 @@ def fit(problem: Problem, starts: int = 1, profiled: Sequence[str] = ()) -> FitR
     best = min(solutions, key=lambda s: s.cost)
     if not best.converged:
         return FitResult(False, best.message, evaluations=best.evaluations, recordings=names)
+    progress("intervals of the values", SEARCHED)
     return _result(problem, best, _warnings(problem, best, solutions, failures), profiled)
 
 

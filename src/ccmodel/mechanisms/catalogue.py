@@ -93,7 +93,7 @@ def _sentence(text: str) -> str:
 
 def _linked(source: str) -> str:
     """A source with its DOIs as links."""
-    return re.sub(r"doi:(10\.\d{4,}/[^\s,;]+)", r"[doi:\1](https://doi.org/\1)", source)
+    return re.sub(r"doi:(10\.\d{4,}/[^\s,;]*[^\s,;:.])", r"[doi:\1](https://doi.org/\1)", source)
 
 
 def _where(mechanism: Mechanism) -> str:

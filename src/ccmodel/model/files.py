@@ -195,7 +195,7 @@ class Model:
         return content | {"provenance": provenance}
 
     def save(self, file: Path | str) -> None:
-        """Write the model file (JSON), which `read_model` and the commands of `ccmodel` read."""
+        """Write the model file (JSON), which `read_model` and the commands of ``ccmodel`` read."""
         Path(file).write_text(json.dumps(self.as_dict(), indent=1) + "\n")
 
 

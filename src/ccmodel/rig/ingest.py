@@ -19,8 +19,8 @@ from ccmodel.rig.sensor_checks import check_sensors, drive_travel
 from ccmodel.typed import InputError
 
 T = TypeVar("T")
-# Share of reading the logs in the time of an ingest; the rest is checked as a whole.
-READING = 0.5
+# Shares of the time of an ingest at which the logs are read, and at which each of them is checked by itself.
+READ, CHECKED = 0.2, 0.8
 
 
 @dataclass(frozen=True)
@@ -96,8 +96,7 @@ def ingest_batch(folder: Path, progress: Progress = silent) -> Ingested:
     if batch is None:
         return Ingested([], refusals)
     files = [str(folder / entry.file) for entry in batch.recordings]
-    # Reading takes most of the time.
-    reading = each_of(files, within(progress, 0.0, READING), lambda file: f"reading {Path(file).name}")
+    reading = each_of(files, within(progress, 0.0, READ), lambda file: f"reading {Path(file).name}")
     logs = [_attempt(name, file, read_log, Path(file)) for file in reading]
     # All logs are read before any is checked: a column is judged by how many logs of the batch have it.
     tables = [log[0] if log else None for log, _ in logs]
@@ -107,7 +106,8 @@ def ingest_batch(folder: Path, progress: Progress = silent) -> Ingested:
     travel = max((drive_travel(table, batch.rig) for table in tables if table is not None), default=0.0)
     findings = [_finding(name, batch_file, "warning", defect) for defect in columns.warnings]
     recordings, used_files = [], []
-    for entry, file, (log, refusals) in zip(batch.recordings, files, logs, strict=True):
+    checking = each_of(files, within(progress, READ, CHECKED), lambda file: f"checking {Path(file).name}")
+    for entry, file, (log, refusals) in zip(batch.recordings, checking, logs, strict=True):
         if log is not None:
             used, refusals = _attempt(name, file, _recording, batch, entry, file, log, columns, travel)
             if used is not None:
@@ -119,6 +119,7 @@ def ingest_batch(folder: Path, progress: Progress = silent) -> Ingested:
     # What a faulty sensor reads contradicts everything else too: it is named once.
     faulty = {finding.file for finding in findings if finding.severity == "inconsistent"}
     sound = [r for r, file in zip(recordings, used_files, strict=True) if file not in faulty]
+    progress("comparing the logs with one another", CHECKED)
     contradictions, errors = _attempt(name, batch_file, check_consistency, sound, batch)
     findings += [replace(f, file=str(folder / f.file)) for f in contradictions or []] + errors
     return Ingested(recordings, findings, batch)

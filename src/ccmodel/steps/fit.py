@@ -10,18 +10,22 @@ from ccmodel.inference.fit import FitResult, fit
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.problem import Free, Problem
 from ccmodel.model.parameters import Parameters
+from ccmodel.progress import Progress, silent
 from ccmodel.recording import read_recordings
 from ccmodel.steps.files import estimates_of, write_json
 from ccmodel.steps.settings import Fit, FreeParameter, OwnParameter
 
 
-def fit_parameters(name: str, stated: Fit, recordings_files: Sequence[Path], result_file: Path) -> None:
+def fit_parameters(
+    name: str, stated: Fit, recordings_files: Sequence[Path], result_file: Path, progress: Progress = silent
+) -> None:
     """Fit a parameter set and write the result as JSON; a failed fit is written too, with its reason."""
-    result = _fit(stated, recordings_files)
+    result = _fit(stated, recordings_files, progress)
     write_json(result_file, {"fit": name, **result.as_dict(), "provenance": provenance.of_inputs(recordings_files)})
 
 
-def _fit(stated: Fit, recordings_files: Sequence[Path]) -> FitResult:
+def _fit(stated: Fit, recordings_files: Sequence[Path], progress: Progress) -> FitResult:
+    progress("reading the recordings", 0.0)
     pairs = [
         (recording, estimates)
         for file in recordings_files
@@ -43,7 +47,7 @@ def _fit(stated: Fit, recordings_files: Sequence[Path]) -> FitResult:
     except (ModelError, ValueError) as error:
         return FitResult(False, str(error), recordings=[f"{r.batch}/{r.id}" for r, _ in pairs])
     own = {name: _start(name, one, pairs[0][1], one.spread) for name, one in stated.per_recording.items()}
-    return fit(Problem(observations, shared, own), stated.starts, stated.profile)
+    return fit(Problem(observations, shared, own), stated.starts, stated.profile, progress)
 
 
 def _start(name: str, free: FreeParameter | OwnParameter, estimates: Parameters, spread: float | None = None) -> Free:
