@@ -11,12 +11,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, ClassVar, Self, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationError
 from pydantic.fields import FieldInfo
-from pydantic_core import CoreSchema, ErrorDetails
-from pydantic_core.core_schema import literal_schema
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
 from ruamel.yaml.composer import Composer
@@ -31,6 +29,8 @@ M = TypeVar("M", bound=BaseModel)
 # Path of a value: keys and indices from the top of a file. `Borrowed` gives the file's own path of a value.
 Loc = tuple[str | int, ...]
 Borrowed = Mapping[Loc, Loc]
+# An entry of `ValidationError.errors()`.
+ErrorEntry = Mapping[str, Any]
 
 # Lists and mappings within each other that a file may hold; our own formats need 6.
 MAX_DEPTH = 50
@@ -55,8 +55,8 @@ class OneOf:
 
     names: tuple[str, ...]
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return literal_schema(list(self.names))
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> Any:
+        return handler.generate_schema(Literal[self.names])
 
 
 class TypedModel(BaseModel):
@@ -288,7 +288,7 @@ _EXPECTED = {
 }
 
 
-def _located(error: ValidationError, borrowed: Borrowed, gaps: Iterable[Loc]) -> list[ErrorDetails]:
+def _located(error: ValidationError, borrowed: Borrowed, gaps: Iterable[Loc]) -> Sequence[ErrorEntry]:
     """Errors where the file has their values, without those that follow from a gap."""
     located = []
     for e in error.errors(include_url=False):
@@ -300,7 +300,7 @@ def _located(error: ValidationError, borrowed: Borrowed, gaps: Iterable[Loc]) ->
     return located
 
 
-def _explain(errors: Sequence[ErrorDetails], model: type[BaseModel]) -> list[tuple[tuple, str]]:
+def _explain(errors: Sequence[ErrorEntry], model: type[BaseModel]) -> list[tuple[tuple, str]]:
     """Place and text of every problem; a misspelt key is one problem, not also a missing key or a short list."""
     explained, meant = [], set()
     for e in errors:
@@ -320,16 +320,16 @@ def _explain(errors: Sequence[ErrorDetails], model: type[BaseModel]) -> list[tup
     return list(dict.fromkeys(explained))
 
 
-def _is_follow_on(e: ErrorDetails) -> bool:
+def _is_follow_on(e: ErrorEntry) -> bool:
     """Whether a list is too short only because pydantic does not count the entries that have problems themselves."""
     return e["type"] == "too_short" and len(e["input"]) >= e["ctx"]["min_length"]
 
 
-def _is_unknown_key(e: ErrorDetails) -> bool:
+def _is_unknown_key(e: ErrorEntry) -> bool:
     return e["type"] == "extra_forbidden" or e["loc"][-1:] == ("[key]",)
 
 
-def _wrong_value(e: ErrorDetails) -> str:
+def _wrong_value(e: ErrorEntry) -> str:
     context = e.get("ctx", {})
     if e["type"] == "value_error":
         text = str(context["error"])

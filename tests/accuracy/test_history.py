@@ -55,12 +55,12 @@ def repository(measured, tmp_path, monkeypatch):
 def test_past_commits_are_run_and_measured_and_failures_are_lines(repository, measured):
     first, good = git(repository, "rev-parse", "HEAD"), commit(repository, SNAKEFILE, "0.5.0")
     bad = commit(repository, FAILING, "0.5.1")
-    said, file = [], repository / "history.csv"
-    fill_history(file, [f"{first}..HEAD", first], 1, lambda text, done=None: said.append(text))
-    assert said[0] == f"{good}: 1 batches"
-    assert said[1].startswith(f"{bad}: skipped: its run failed")
-    assert "this commit has a fault" in said[1]
-    assert "it has no pipeline" in said[2]
+    heard, file = [], repository / "history.csv"
+    said = fill_history(file, [f"{first}..HEAD", first], 1, lambda text, done=None: heard.append(text))
+    assert heard[0] == f"running commit {good}"
+    assert said[0].startswith(f"{bad}: skipped: its run failed")
+    assert "this commit has a fault" in said[0]
+    assert "it has no pipeline" in said[1]
     table = read_history(file)
     assert set(table["commit"]) == {good}
     assert set(table["version"]) == {"0.5.0"}
