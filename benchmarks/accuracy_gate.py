@@ -88,8 +88,8 @@ def flipped(channel: str):
 def without_last_cycle():
     """A reading of the logs that drops the last cycle of every recording."""
 
-    def changed(folder):
-        read = ingest_batch(folder)
+    def changed(folder, progress):
+        read = ingest_batch(folder, progress)
         return replace(read, recordings=[r[: last_cycle(r).start + 1] for r in read.recordings])
 
     return patch("ccmodel.steps.ingest.ingest_batch", changed)

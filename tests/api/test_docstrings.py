@@ -14,7 +14,7 @@ FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
 MODULES = sorted(f"ccmodel.api.{module.name}" for module in pkgutil.iter_modules(api.__path__))
 
 
-def tests_of(module: str, **names) -> list[doctest.DocTest]:
+def examples_of(module: str, **names) -> list[doctest.DocTest]:
     """Examples of a module's own docstrings; `names` are what they use without making it."""
     found = doctest.DocTestFinder(exclude_empty=True).find(importlib.import_module(module), extraglobs=names)
     return [one for one in found if one.examples]
@@ -24,11 +24,11 @@ def tests_of(module: str, **names) -> list[doctest.DocTest]:
 def test_examples_in_docstrings_run(module, monkeypatch, tmp_path):
     monkeypatch.chdir(ROOT)
     runner, said = doctest.DocTestRunner(optionflags=FLAGS), []
-    for one in tests_of(module, folder=tmp_path):
+    for one in examples_of(module, folder=tmp_path):
         runner.run(one, out=said.append)
     assert not said, "".join(said)
 
 
 def test_every_function_has_an_example():
-    named = {one.name.rpartition(".")[2] for module in MODULES for one in tests_of(module)}
+    named = {one.name.rpartition(".")[2] for module in MODULES for one in examples_of(module)}
     assert {"load", "fit", "diagnose", "simulate", "predict", "read_model"} <= named

@@ -30,9 +30,9 @@ from ccmodel.studies.table_one import study
 
 def work(*others):
     with processes(2) as pool:
+        # Both workers are up when each has taken one of these.
+        list(pool.map(time.sleep, [0.5] * 4))
         started = [pool.submit(time.sleep, 1000) for _ in range(8)]
-        while not any(one.running() for one in started):
-            time.sleep(0.01)
         print("working", flush=True)
         started[0].result()
 

@@ -40,8 +40,7 @@ def each(items: Sequence, work: Callable) -> list:
 @contextmanager
 def processes(count: int) -> Iterator[ProcessPoolExecutor]:
     """Processes for independent work; if the work is broken off, by Ctrl-C or an error, they end at once."""
-    # The terminal sends Ctrl-C to the workers too; this process alone answers it.
-    pool = ProcessPoolExecutor(count, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN))
+    pool = ProcessPoolExecutor(count, initializer=_leave_signals_to_parent)
     try:
         yield pool
     except BaseException:
@@ -51,3 +50,9 @@ def processes(count: int) -> Iterator[ProcessPoolExecutor]:
         raise
     finally:
         pool.shutdown()
+
+
+def _leave_signals_to_parent() -> None:
+    """A worker ignores Ctrl-C, which the terminal sends to it too, and ends without a word when it is asked to."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
