@@ -46,9 +46,11 @@ def simulate(
 
     A model file of an earlier version does not know the conduits of its rig: name a batch of it with --batch.
     """
-    from ccmodel.steps.predict import simulate_motion as run
+    import ccmodel
 
     output = Output(as_json, quiet)
-    with leaving(out):
-        run(motion, model, batch, out, recording, pretension)
+    with leaving(out), output.progress() as progress:
+        ccmodel.simulate(
+            model, motion, recording=recording, batch=batch, pretension_N=pretension, out=out, progress=progress
+        )
     output.result({"out": out})
