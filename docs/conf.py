@@ -35,7 +35,8 @@ myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "
 # Anchors as Markdown viewers make them, so that the same links work in the repository.
 myst_heading_anchors = 4
 
-nb_execution_mode = "cache"
+# Always: the notebooks must show what the present sources compute.
+nb_execution_mode = "force"
 nb_execution_timeout = 300
 nb_execution_raise_on_error = True
 nb_execution_show_tb = True
