@@ -3,6 +3,8 @@
 import sys
 from pathlib import Path
 
+from jupyter_client import KernelManager
+
 import ccmodel
 
 HERE = Path(__file__).parent
@@ -38,6 +40,8 @@ myst_heading_anchors = 4
 # Always: the notebooks must show what the present sources compute.
 nb_execution_mode = "force"
 nb_execution_timeout = 300
+# Without it, each kernel warns that it talks to the build in plain text.
+KernelManager.transport_encryption.default_value = "auto"
 nb_execution_raise_on_error = True
 nb_execution_show_tb = True
 
