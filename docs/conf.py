@@ -1,5 +1,6 @@
 """Settings of the site that `make docs` builds. Nothing is fetched, neither by the build nor by a reader's browser."""
 
+import logging
 import sys
 from pathlib import Path
 
@@ -10,6 +11,9 @@ import ccmodel
 HERE = Path(__file__).parent
 # Extensions of this folder's own.
 sys.path.insert(0, str(HERE / "_extensions"))
+
+# Otherwise the theme's styles set up logging, and libraries tell the build what they do.
+logging.basicConfig(level=logging.WARNING)
 
 project = "ccmodel"
 author = "ccmodel developers"

@@ -72,16 +72,13 @@ def test_add_a_mechanism(tmp_path):
     assert "load cell" in (tmp_path / "docs/mechanisms/load-cell-nonlinearity.md").read_text(encoding="utf-8")
 
 
-def test_the_five_lines_of_python_in_the_readme(tmp_path):
+def test_the_lines_of_python_in_the_readme(tmp_path):
     import_batch("logs", "batch.yaml", tmp_path / "my-batch")
-    pd.DataFrame({"time_s": [0.0, 0.5, 1.0], "theta_in_rad": [0.0, 0.0, 0.2]}).to_csv(
-        tmp_path / "motion.csv", index=False
-    )
     guide = Guide(ROOT / "README.md", tmp_path)
-    names = guide.follow(motion=str(tmp_path / "motion.csv"))
+    names = guide.follow()
     assert len(guide.skipped) == 3
     assert names["found"].verdict == "explained"
-    assert len(names["run"].to_frame()) == 3
+    assert len(names["run"].to_frame()) == len(names["motion"]) > 1000
 
 
 def test_watch(tmp_path):
