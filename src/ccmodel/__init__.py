@@ -23,7 +23,10 @@ if TYPE_CHECKING:
     from ccmodel.api.fit import Fit, fit
     from ccmodel.api.model import Model, Prediction, predict, read_model, simulate
     from ccmodel.inference.intervals import Interval
+    from ccmodel.model.parameters import Parameters
+    from ccmodel.progress import Progress
     from ccmodel.recording import Recording
+    from ccmodel.rig.findings import Finding
     from ccmodel.typed import InputError
 
     __version__: str
@@ -32,11 +35,14 @@ if TYPE_CHECKING:
 _PLACES = {
     "Batch": "api.batch",
     "Diagnosis": "api.diagnosis",
+    "Finding": "rig.findings",
     "Fit": "api.fit",
     "InputError": "typed",
     "Interval": "inference.intervals",
     "Model": "api.model",
+    "Parameters": "model.parameters",
     "Prediction": "api.model",
+    "Progress": "progress",
     "Recording": "recording",
     "diagnose": "api.diagnosis",
     "fit": "api.fit",
@@ -49,11 +55,14 @@ _PLACES = {
 __all__ = [
     "Batch",
     "Diagnosis",
+    "Finding",
     "Fit",
     "InputError",
     "Interval",
     "Model",
+    "Parameters",
     "Prediction",
+    "Progress",
     "Recording",
     "__version__",
     "diagnose",

@@ -91,7 +91,7 @@ def test_the_diagnosis_has_the_same_calibrated_model(fitted, found):
 def test_a_fit_of_fewer_parameters_keeps_the_estimates_of_the_others(batch):
     alone = cc.fit(batch, free=["friction_coefficient"])
     assert list(alone.values) == ["friction_coefficient"]
-    assert alone.model.parameters.stiffness_N_per_m == batch.file.rig.cable.stiffness_N_per_m
+    assert alone.model.parameters.stiffness_N_per_m == batch._file.rig.cable.stiffness_N_per_m
     assert any("does not reproduce" in line for line in alone.warnings)
     assert "warning: the model does not reproduce" in repr(alone)
 

@@ -52,9 +52,9 @@ def test_what_is_not_there_is_named(fitted, batch, tmp_path):
         batch["t-7"]
     with pytest.raises(cc.InputError, match="recording: the model knows t-7N, t-6N, t-5N; got x"):
         cc.simulate(fitted.model, MOTION, recording="x")
-    with pytest.raises(cc.InputError, match="there is no such file"):
+    with pytest.raises(cc.InputError, match="there is no such folder"):
         cc.load(tmp_path / "nothing")
-    with pytest.raises(cc.InputError, match="cannot be read"):
+    with pytest.raises(cc.InputError, match="there is no such file"):
         cc.read_model(tmp_path / "nothing.json")
 
 
@@ -78,7 +78,12 @@ def test_options_of_a_fit_that_cannot_be_used_are_named(batch, options, line):
     "options, line",
     [
         ({"without": ["rust"]}, "without: .*rust"),
-        ({"candidates": ["kink at nowhere"]}, "there is no mechanism 'kink at nowhere'"),
+        (
+            {"candidates": ["kink at nowhere"]},
+            "candidates: 'kink at nowhere' is at none of its places; state 'kink at conduit'",
+        ),
+        ({"candidates": "kink"}, "candidates: 'kink' is at none of its places; state 'kink at conduit'"),
+        ({"candidates": "rust at conduit"}, "candidates: there is no mechanism 'rust at conduit'"),
         ({"freeze": True}, "freeze: there is no model to hold"),
     ],
 )
@@ -89,8 +94,29 @@ def test_options_of_a_diagnosis_that_cannot_be_used_are_named(batch, options, li
 
 def test_a_folder_that_cannot_be_written_is_refused_before_the_work(batch, tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(cc.InputError, match="cannot be made a folder"):
+    with pytest.raises(cc.InputError, match="cannot be made: .* is a file"):
         cc.diagnose(batch, tmp_path / "file" / "out")
+
+
+def test_a_refused_diagnosis_leaves_no_folder(batch, tmp_path):
+    with pytest.raises(cc.InputError, match="freeze"):
+        cc.diagnose(batch, tmp_path / "out", freeze=True)
+    with pytest.raises(cc.InputError, match="there is no such file"):
+        cc.diagnose(batch, tmp_path / "out", baseline=tmp_path / "nothing.json")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_file_is_written_into_folders_that_are_made(fitted, tmp_path):
+    fitted.save(tmp_path / "a" / "b" / "fit.json")
+    fitted.model.save(tmp_path / "c" / "model.json")
+    assert cc.read_model(tmp_path / "a/b/fit.json").parameters == cc.read_model(tmp_path / "c/model.json").parameters
+
+
+def test_a_place_that_cannot_be_written_is_an_input_error(fitted, found, tmp_path):
+    (tmp_path / "file").write_text("")
+    for one in (fitted, fitted.model, found, cc.predict(fitted.model, fitted.batch)):
+        with pytest.raises(cc.InputError, match="file.*: cannot be written"):
+            one.save(tmp_path / "file" / "out")
 
 
 @pytest.fixture(scope="module")

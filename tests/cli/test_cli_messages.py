@@ -1,6 +1,8 @@
 """What a person may type by mistake: one clear line for each problem, no traceback, the exit code 2; as JSON too."""
 
 import json
+import subprocess
+import sys
 
 import pytest
 from example_folder import noisy_batch
@@ -73,10 +75,23 @@ def test_a_batch_may_be_named_by_its_file(folder, run):
     assert run("check", folder / "raw/loops/batch.yaml").out == run("check", folder / "raw/loops").out
 
 
-def test_an_error_of_the_program_has_its_traceback(folder, run, monkeypatch):
+def test_an_error_of_the_program_has_its_traceback_and_its_exit_code(folder, run, monkeypatch):
     monkeypatch.setattr("ccmodel.rig.ingest.ingest_batch", lambda *_: 1 / 0)
-    with pytest.raises(ZeroDivisionError):
-        run("check", folder / "raw/loops")
+    ended = run("check", folder / "raw/loops")
+    assert (ended.code, ended.out) == (70, "")
+    assert ended.err.startswith("Traceback") and ended.err.splitlines()[-1].endswith(
+        "ZeroDivisionError: division by zero"
+    )
+    as_json = run("check", folder / "raw/loops", "--json")
+    assert as_json.code == 70 and "Traceback" in as_json.err
+    assert "ZeroDivisionError: division by zero" in json.loads(as_json.out)["error"][0]
+
+
+def test_a_reader_that_leaves_is_no_finding(folder):
+    command = [sys.executable, "-m", "ccmodel.cli", "check", folder / "raw/loops"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process.stdout.close()
+    assert (process.stderr.read(), process.wait()) == ("", 141)
 
 
 def test_a_full_disk_is_one_line(folder, run, monkeypatch):

@@ -100,11 +100,11 @@ def test_the_documentation_is_up_to_date():
     assert {page.relative_to(DOCS).as_posix(): page.read_text(encoding="utf-8") for page in found} == catalogue.pages()
 
 
-def test_pages_of_mechanisms_that_no_longer_exist_are_removed(tmp_path):
+def test_pages_are_written_beside_what_is_there(tmp_path):
     (tmp_path / "mechanisms").mkdir()
-    (tmp_path / "mechanisms" / "phlogiston.md").write_text("# phlogiston")
+    (tmp_path / "mechanisms" / "of-a-person.md").write_text("# mine")
     assert CliRunner().invoke(app, ["mechanisms", "--markdown", str(tmp_path)]).exit_code == 0
-    assert {page.stem for page in (tmp_path / "mechanisms").glob("*.md")} == set(mechanisms.names())
+    assert {page.stem for page in (tmp_path / "mechanisms").glob("*.md")} == {*mechanisms.names(), "of-a-person"}
 
 
 @pytest.mark.parametrize("name", mechanisms.names())

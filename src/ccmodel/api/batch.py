@@ -1,7 +1,7 @@
 """Batches: a folder of recordings that was read."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -10,11 +10,14 @@ import numpy as np
 import pandas as pd
 
 from ccmodel import provenance
+from ccmodel.api.options import progress_of
 from ccmodel.api.recordings import Recordings
 from ccmodel.channels import THETA_IN
+from ccmodel.paths import batch_folder
+from ccmodel.progress import Progress, silent
 from ccmodel.recording import ORIGIN, Recording
 from ccmodel.rig.batch import Batch as BatchFile
-from ccmodel.rig.findings import Finding
+from ccmodel.rig.findings import WORD, Finding
 from ccmodel.rig.ingest import Ingested, ingest_batch
 from ccmodel.typed import InputError
 
@@ -33,8 +36,6 @@ class Batch(Recordings):
         Those that can be used, in the order of ``batch.yaml``; ``batch["id"]`` is one of them.
     findings : tuple of Finding
         Warnings, refused files and contradictions; ``str(finding)`` says where and what.
-    file : ccmodel.rig.batch.Batch
-        Content of ``batch.yaml``: the rig with its radii, its spring and the estimates of its cable.
     provenance : mapping
         Version of ccmodel, and digests of the folder's files as they were read.
     """
@@ -42,23 +43,29 @@ class Batch(Recordings):
     folder: Path
     recordings: tuple[Recording, ...]
     findings: tuple[Finding, ...]
-    file: BatchFile
-    provenance: Mapping[str, Any] = field(default_factory=dict)
+    provenance: Mapping[str, Any]
+    # Content of batch.yaml.
+    _file: BatchFile
 
     @property
     def name(self) -> str:
         """Name of the batch, which is its folder's."""
-        return self.file.batch
+        return self._file.batch
+
+    @property
+    def origin(self) -> str:
+        """Origin of the recordings: "rig" (measured) or "virtual-rig" (a simulated rig)."""
+        return self._file.origin
 
     @property
     def contradicts(self) -> bool:
         """Whether the inputs contradict one another, so that no verdict on the physics can be drawn from them."""
-        return self.ingested.contradicts
+        return self._ingested.contradicts
 
     @property
-    def ingested(self) -> Ingested:
+    def _ingested(self) -> Ingested:
         """The batch as the functions below this interface take it."""
-        return Ingested(list(self.recordings), list(self.findings), self.file)
+        return Ingested(list(self.recordings), list(self.findings), self._file)
 
     @property
     def summary(self) -> pd.DataFrame:
@@ -95,25 +102,27 @@ class Batch(Recordings):
         recordings = f"{len(self)} recording{'' if len(self) == 1 else 's'}"
         n = len(self.findings)
         findings = f"{n or 'no'} finding{'' if n == 1 else 's'}"
-        return f"Batch {self.name}, {ORIGIN[self.file.origin]}: {recordings}, {findings}"
+        return f"Batch {self.name}, {ORIGIN[self.origin]}: {recordings}, {findings}"
 
     @property
     def _shown_findings(self) -> list[str]:
         """A line for each of the first findings, the gravest first."""
         grave = sorted(self.findings, key=lambda f: (f.severity == "warning", -f.confidence))
-        words = {"refused": "left out", "inconsistent": "inconsistent", "warning": "warning"}
-        lines = [f"{words[f.severity]}: {f.place}: {f.text}" for f in grave[:SHOWN_FINDINGS]]
+        lines = [f"{WORD[f.severity]}: {f.place}: {f.text}" for f in grave[:SHOWN_FINDINGS]]
         more = len(grave) - len(lines)
         return [*lines, *([f"and {more} more in .findings"] if more else [])]
 
 
-def load(folder: str | Path) -> Batch:
+def load(folder: str | Path, *, progress: bool | Progress = False) -> Batch:
     """Read a folder of recordings.
 
     Parameters
     ----------
     folder : str or Path
-        Folder with a ``batch.yaml`` and the logs that it names (docs/rig-log-format.md); it is not changed.
+        Folder with a ``batch.yaml`` and the logs that it names (docs/rig-log-format.md), or that file; nothing in it is
+        changed.
+    progress : bool or callable
+        True shows progress; a callable gets ``(text, share of the work done)``.
 
     Returns
     -------
@@ -123,7 +132,7 @@ def load(folder: str | Path) -> Batch:
     Raises
     ------
     InputError
-        If nothing in the folder can be used: one line for each problem.
+        If there is no such folder, or nothing in it can be used: one line for each problem.
 
     Examples
     --------
@@ -137,17 +146,28 @@ def load(folder: str | Path) -> Batch:
     >>> float(batch["half-loop-7.3N-a"].to_frame()["tau_in_Nm"].max().round(4))
     0.0988
     """
-    folder = Path(folder)
-    ingested = ingest_batch(folder)
+    folder = batch_folder(folder)
+    with progress_of(progress) as report:
+        ingested = ingest_batch(folder, report)
     ingested.check_usable(folder, trust_inputs=False)
-    assert ingested.batch is not None
     inputs = provenance.of_inputs(provenance.files_in(folder), folder)
-    return Batch(folder, tuple(ingested.recordings), tuple(ingested.findings), ingested.stated, inputs)
+    return Batch(folder, tuple(ingested.recordings), tuple(ingested.findings), inputs, ingested.stated)
 
 
-def as_batch(batch: Batch | str | Path) -> Batch:
-    """A batch, or the one in a folder."""
-    return batch if isinstance(batch, Batch) else load(batch)
+def as_batch(batch: Batch | str | Path, progress: Progress = silent) -> Batch:
+    """A batch, or the one in a folder.
+
+    Raises
+    ------
+    InputError
+        If it is neither, or the folder cannot be used.
+    """
+    if isinstance(batch, Batch):
+        return batch
+    if isinstance(batch, str | Path):
+        return load(batch, progress=progress)
+    what = {Recording: "a Recording; load() reads its batch"}.get(type(batch), type(batch).__name__)
+    raise InputError(f"batch: a Batch or its folder; got {what}")
 
 
 def check_consistent(batch: Batch, trust_inputs: bool) -> None:

@@ -1,6 +1,6 @@
 """Diagnoses: whether the calibrated model explains a batch, and which physics is missing."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from ccmodel.api.batch import Batch, as_batch
-from ccmodel.api.model import read_model
-from ccmodel.api.options import Tolerance, progress_of, settings_of
+from ccmodel.api.model import as_model
+from ccmodel.api.options import Candidates, Tolerance, diagnosis_options, progress_of
 from ccmodel.failure import ModelError
 from ccmodel.model.files import Model
-from ccmodel.progress import Progress
-from ccmodel.report.verdict import SYMBOL, nearest_sentence, sentence
+from ccmodel.paths import try_folder, writing
+from ccmodel.progress import Progress, within
+from ccmodel.report.verdict import SYMBOL, held_out_errors, nearest_sentence, sentence
 from ccmodel.studies.diagnosis.page import candidates_of
-from ccmodel.studies.diagnosis.run import Outcome, check_options, diagnosed, options_of, write_alone
+from ccmodel.studies.diagnosis.run import INGEST, PAGE, Outcome, diagnosed, write_alone
 from ccmodel.typed import InputError
 
 if TYPE_CHECKING:
@@ -30,17 +31,15 @@ class Diagnosis:
     Attributes
     ----------
     batch : Batch
-    outcome : Outcome
-        The result as ``ccmodel.studies.diagnosis`` has it; private, as everything below this interface.
     """
 
     batch: Batch
-    outcome: Outcome
+    _outcome: Outcome
 
     @property
     def report(self) -> dict[str, Any]:
         """The content of diagnosis.json (docs/diagnosis.md)."""
-        return self.outcome.content
+        return self._outcome.content
 
     @property
     def verdict(self) -> str:
@@ -72,17 +71,17 @@ class Diagnosis:
 
         None if no model was fitted.
         """
-        return self.outcome.models.get("extended")
+        return self._outcome.models.get("extended")
 
     @property
     def calibrated(self) -> Model | None:
         """The paper's model (or the baseline), calibrated to the batch; None if no model was fitted."""
-        return self.outcome.models.get("calibrated")
+        return self._outcome.models.get("calibrated")
 
     @property
     def nearest(self) -> Model | None:
         """The best candidate of an ``unexplained`` batch, which was not accepted; None with another verdict."""
-        return self.outcome.models.get("nearest")
+        return self._outcome.models.get("nearest")
 
     def to_frame(self) -> pd.DataFrame:
         """Candidate models, a row each, those with the smallest mean square first.
@@ -91,7 +90,7 @@ class Diagnosis:
         these residuals that a regression predicts from the other recordings), ``probability`` (among the candidates)
         and ``why`` it was selected or not.
         """
-        rows = [] if self.outcome.found is None else candidates_of(self.outcome.found)
+        rows = [] if self._outcome.found is None else candidates_of(self._outcome.found)
         columns = ["candidate", "mean_square", "lack_of_fit", "probability", "why"]
         return pd.DataFrame(rows, columns=columns).set_index("candidate").astype({"lack_of_fit": float})
 
@@ -117,25 +116,29 @@ class Diagnosis:
         """
         from ccmodel.api import figures
 
-        if self.outcome.found is None:
+        if self._outcome.found is None:
             raise InputError(
                 f"{self.batch.name}: verdict '{self.verdict}': no model was fitted, so there are no errors"
             )
         return figures.errors(self.errors(), self.batch, self.verdict)
 
     def save(self, folder: str | Path) -> None:
-        """Write diagnosis.json, report.html and the models, as ``ccmodel diagnose --out`` does."""
-        try:
-            write_alone(self.outcome, Path(folder))
-        except OSError as error:
-            raise InputError(f"{folder}: cannot be written ({error.strerror})") from None
+        """Write diagnosis.json, report.html and the models, as ``ccmodel diagnose --out`` does.
+
+        Raises
+        ------
+        InputError
+            If the folder cannot be made or written to.
+        """
+        with writing(folder) as path:
+            write_alone(self._outcome, path)
 
     def __repr__(self) -> str:
         parts = [f"Diagnosis of {self.headline}", f"verdict: {self.verdict}{self._with_confidence}"]
         if nearest := nearest_sentence(self.report):
             parts.append(nearest)
-        if self.outcome.found is not None:
-            parts.append("held-out error over the noise floor: " + "; ".join(self._falls))
+        if self._outcome.found is not None:
+            parts.append(held_out_errors(self.report["fit"]["error"]))
         return "\n".join(parts)
 
     def _repr_html_(self) -> str:
@@ -144,7 +147,7 @@ class Diagnosis:
         if nearest := nearest_sentence(self.report):
             said.append(escape(nearest))
         paragraphs = "".join(f"<p>{line}</p>" for line in said)
-        if self.outcome.found is None:
+        if self._outcome.found is None:
             return paragraphs
         errors = self.errors()
         ratios = errors.drop(columns=["noise", "unit"]).div(errors["noise"], axis=0).rename(index=SYMBOL)
@@ -154,20 +157,11 @@ class Diagnosis:
     @property
     def _recorded(self) -> str:
         n = len(self.batch)
-        return f"{n} recording{'' if n == 1 else 's'}, {'measured' if self.batch.file.origin == 'rig' else 'simulated'}"
+        return f"{n} recording{'' if n == 1 else 's'}, {'measured' if self.batch.origin == 'rig' else 'simulated'}"
 
     @property
     def _with_confidence(self) -> str:
         return "" if self.confidence is None else f", confidence {self.confidence:.2f}"
-
-    @property
-    def _falls(self) -> list[str]:
-        """Error over the noise floor by channel, before and after."""
-        return [
-            f"{SYMBOL[channel]} {e['before'] / e['noise']:.1f}"
-            + (f" to {e['after'] / e['noise']:.1f}" if e["after"] != e["before"] else "")
-            for channel, e in self.report["fit"]["error"].items()
-        ]
 
 
 def diagnose(
@@ -176,11 +170,11 @@ def diagnose(
     *,
     baseline: Model | str | Path | None = None,
     freeze: bool = False,
-    without: Collection[str] = (),
+    without: str | Collection[str] = (),
     tolerance: Tolerance | None = None,
     step_s: float | None = None,
     cycles: int | None = None,
-    candidates: Sequence[str | Sequence[str]] = (),
+    candidates: Candidates = (),
     trust_inputs: bool = False,
     progress: bool | Progress = False,
 ) -> Diagnosis:
@@ -198,13 +192,19 @@ def diagnose(
         Model to start from, or its file, instead of the estimates of ``batch.yaml``.
     freeze : bool
         Whether the baseline keeps all its values: finds what has changed since it was fitted.
-    without : collection of str
+    without : str or collection of str
         Mechanisms that are no candidates.
     tolerance, step_s, cycles, trust_inputs, progress
         As of `ccmodel.fit`. A batch whose inputs contradict one another has the verdict ``inputs-inconsistent`` unless
         they are trusted.
-    candidates : sequence of str or of sequence of str
-        As ``"kink at conduit"``, or two of these together: fitted in full whatever the screening says.
+    candidates : str or sequence
+        Mechanisms at their places, which are fitted in full whatever the screening says: ``"kink at conduit"``, or two
+        together, as ``"kink at conduit, backlash at drive-train"`` or as a sequence of the two; or a sequence of these.
+
+    Returns
+    -------
+    Diagnosis
+        With the verdict, the best model and its errors.
 
     Raises
     ------
@@ -222,27 +222,20 @@ def diagnose(
     >>> found.nearest
     Model: ...; pulley-friction at drive-pulley, fitted to half-loop, recording (virtual rig, simulated)
     """
-    batch = as_batch(batch)
+    options = diagnosis_options(tolerance, step_s, cycles, candidates, without, freeze, baseline is not None)
+    known = None if baseline is None else as_model(baseline).parameters
     if out is not None:
-        _try_folder(Path(out))
-    options = options_of(settings_of(tolerance, step_s, cycles, candidates), tuple(without), freeze)
-    check_options(options, baseline is not None)
-    known = None if baseline is None else (baseline if isinstance(baseline, Model) else read_model(baseline)).parameters
-    batch.ingested.check_usable(batch.folder, trust_inputs)
+        try_folder(out)
     with progress_of(progress) as report:
+        batch = as_batch(batch, within(report, 0.0, INGEST))
+        batch._ingested.check_usable(batch.folder, trust_inputs)
+        part = within(report, INGEST, PAGE)
         try:
-            outcome = diagnosed(batch.ingested, dict(batch.provenance), options, known, report, trust_inputs)
+            outcome = diagnosed(batch._ingested, dict(batch.provenance), options, known, part, trust_inputs)
         except (ModelError, ValueError) as error:
             raise InputError(f"{batch.folder}: {error}") from None
         found = Diagnosis(batch, outcome)
         if out is not None:
+            report("writing the page", PAGE)
             found.save(out)
     return found
-
-
-def _try_folder(folder: Path) -> None:
-    """Make a folder before the work whose results it takes."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made a folder ({error.strerror})") from None

@@ -96,7 +96,7 @@ def residuals(calibration: Calibration, batch: Batch) -> Figure:
     for ax, channel in zip(axes[:, 0], rows, strict=True):
         ax.set_ylabel(f"{TABLE[channel].tex}\n(noise floors)")
     some = f"; the {len(columns)} of {len(of)} with the largest" if len(columns) < len(of) else ""
-    title_figure(figure, f"{batch.name}: residuals over the noise floor{some}; {ORIGIN[batch.file.origin]}")
+    title_figure(figure, f"{batch.name}: residuals over the noise floor{some}; {ORIGIN[batch.origin]}")
     legend_below(figure, axes)
     return figure
 
@@ -126,7 +126,7 @@ def errors(table: pd.DataFrame, batch: Batch, verdict: str) -> Figure:
     ax.invert_yaxis()
     ax.grid(False, axis="y")
     ax.set(xlabel="root mean square error on held-out recordings (noise floors)", ylabel="channel")
-    title_figure(figure, f"{batch.name}, verdict '{verdict}': {ORIGIN[batch.file.origin]}")
+    title_figure(figure, f"{batch.name}, verdict '{verdict}': {ORIGIN[batch.origin]}")
     legend_below(figure, np.array([ax]))
     return figure
 

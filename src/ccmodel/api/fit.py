@@ -18,8 +18,9 @@ from ccmodel.failure import ModelError
 from ccmodel.inference.intervals import Interval
 from ccmodel.model.files import Model, RigConditions
 from ccmodel.model.parameters import Parameters, unit_of_parameter
-from ccmodel.progress import Progress
-from ccmodel.studies.diagnosis.run import options_of
+from ccmodel.paths import writing
+from ccmodel.progress import Progress, within
+from ccmodel.studies.diagnosis.run import INGEST, options_of
 from ccmodel.typed import InputError
 
 if TYPE_CHECKING:
@@ -33,17 +34,15 @@ class Fit:
     Attributes
     ----------
     batch : Batch
-    calibration : Calibration
-        The result as ``ccmodel.diagnosis`` has it; private, as everything below this interface.
     """
 
     batch: Batch
-    calibration: Calibration
+    _calibration: Calibration
 
     @property
     def values(self) -> dict[str, float]:
         """Fitted values by parameter, SI units."""
-        return {name: self.calibration.fit.values[name] for name in self.intervals}
+        return {name: self._calibration.fit.values[name] for name in self.intervals}
 
     @property
     def intervals(self) -> dict[str, Interval]:
@@ -52,39 +51,39 @@ class Fit:
         They follow from how the values change as each recording is left out (the jackknife), with Student's
         distribution; of a single recording, from its noise.
         """
-        return self.calibration.fit.intervals()
+        return self._calibration.fit.intervals()
 
     @property
     def model(self) -> Model:
         """The fitted model, for `ccmodel.simulate` and `ccmodel.predict`."""
         intervals = {name: _finite(interval) for name, interval in self.intervals.items()}
         rig = RigConditions.of(self.batch.recordings)
-        return Model(self.calibration.model, rig, intervals, dict(self.batch.provenance))
+        return Model(self._calibration.model, rig, intervals, dict(self.batch.provenance))
 
     @property
     def succeeded(self) -> bool:
         """Whether the search came to a minimum."""
-        return self.calibration.fit.converged
+        return self._calibration.fit.converged
 
     @property
     def message(self) -> str:
         """Why the search stopped."""
-        return self.calibration.fit.message
+        return self._calibration.fit.message
 
     @property
     def mean_square(self) -> float:
         """Mean square of the leave-one-out residuals over their noise: 1 is noise, more is a model that errs."""
-        return self.calibration.fit.mean_square
+        return self._calibration.fit.mean_square
 
     @property
     def recordings(self) -> tuple[str, ...]:
         """Ids of the recordings that were fitted."""
-        return tuple(w.observations.id for w in self.calibration.whitened)
+        return tuple(w.observations.id for w in self._calibration.whitened)
 
     @property
     def at_bound(self) -> tuple[str, ...]:
         """Parameters that stand at one of their bounds: no values to rely on."""
-        return tuple(self.calibration.fit.at_bounds())
+        return tuple(self._calibration.fit.at_bounds())
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -106,7 +105,7 @@ class Fit:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the recordings do not let a fit judge, a line each."""
-        return tuple(f"{one['what']}: {one['why']}" for one in self.calibration.not_judged)
+        return tuple(f"{one['what']}: {one['why']}" for one in self._calibration.not_judged)
 
     def to_frame(self) -> pd.DataFrame:
         """A row for each parameter: ``value``, ``sd``, ``low``, ``high`` (90 % interval), ``unit``, ``at_bound``."""
@@ -129,7 +128,7 @@ class Fit:
 
         Columns are the recording's own ``friction_coefficient``, and the zeros of its sensors.
         """
-        rows = {w.observations.id: w.own_values(self.values) for w in self.calibration.whitened}
+        rows = {w.observations.id: w.own_values(self.values) for w in self._calibration.whitened}
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("recording")
 
     def to_dict(self) -> dict[str, Any]:
@@ -144,8 +143,17 @@ class Fit:
         return self.model.as_dict() | {"fit": about}
 
     def save(self, file: str | Path) -> None:
-        """Write `to_dict` as JSON: a model file, which `ccmodel.read_model` and the commands of ``ccmodel`` read."""
-        Path(file).write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")
+        """Write `to_dict` as JSON: a model file, which `ccmodel.read_model` and the commands of ``ccmodel`` read.
+
+        Missing folders above it are made.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        with writing(file) as path:
+            path.write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")
 
     def plot_residuals(self) -> "Figure":
         """Residuals (model minus recording) over the noise floor: a row for each channel, a column for each recording.
@@ -154,7 +162,7 @@ class Fit:
         """
         from ccmodel.api import figures
 
-        return figures.residuals(self.calibration, self.batch)
+        return figures.residuals(self._calibration, self.batch)
 
     def __repr__(self) -> str:
         return "\n".join([self._title, self._shown.to_string(), self._foot, *self._shown_warnings])
@@ -235,6 +243,11 @@ def fit(
     progress : bool or callable
         True shows progress; a callable gets ``(text, share of the work done)``.
 
+    Returns
+    -------
+    Fit
+        Its table shows the values with their intervals.
+
     Raises
     ------
     InputError
@@ -250,15 +263,15 @@ def fit(
     >>> interval.low < fit.values["friction_coefficient"] < interval.high
     True
     """
-    batch = as_batch(batch)
-    check_consistent(batch, trust_inputs)
-    batch.ingested.check_usable(batch.folder)
     options = options_of(settings_of(tolerance, step_s, cycles))
     names = [free] if isinstance(free, str) else free
     with progress_of(progress) as report:
+        batch = as_batch(batch, within(report, 0.0, INGEST))
+        check_consistent(batch, trust_inputs)
+        batch._ingested.check_usable(batch.folder)
         try:
-            estimates = Parameters.estimated(batch.file.rig)
-            found = calibrate(batch.recordings, estimates, options, progress=report, only=names)
+            estimates = Parameters.estimated(batch._file.rig)
+            found = calibrate(batch.recordings, estimates, options, progress=within(report, INGEST, 1.0), only=names)
         except (ModelError, ValueError) as error:
             raise InputError(f"{batch.folder}: {error}") from None
     return Fit(batch, found)

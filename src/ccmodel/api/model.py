@@ -1,6 +1,5 @@
 """Models in use: simulations of motions, predictions of recordings."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -10,11 +9,23 @@ import pandas as pd
 import xarray as xr
 
 from ccmodel.api.batch import Batch, as_batch
+from ccmodel.api.options import progress_of
 from ccmodel.api.recordings import Recordings
 from ccmodel.failure import ModelError
 from ccmodel.model.files import Model, read_model_file
+from ccmodel.paths import existing_file, try_file, try_folder, writing
+from ccmodel.progress import Progress, within
 from ccmodel.recording import Recording
-from ccmodel.steps.predict import MOTION, checked_motion, conditions_of, predicted, read_motion, simulated_motion
+from ccmodel.steps.files import write_channels
+from ccmodel.steps.predict import (
+    MOTION,
+    READING,
+    checked_motion,
+    conditions_of,
+    predicted,
+    read_motion,
+    simulated_motion,
+)
 from ccmodel.typed import InputError
 
 __all__ = ["Model", "Motion", "Prediction", "predict", "read_model", "simulate"]
@@ -47,6 +58,19 @@ class Prediction(Recordings):
         by_channel = self.errors.pivot(index="recording", columns="channel", values="nrmse_percent")
         return by_channel[self.errors["channel"].unique()].rename_axis(columns=None)
 
+    def save(self, folder: str | Path) -> None:
+        """Write a CSV for each recording, as ``ccmodel predict --out`` does: its id, all channels over time.
+
+        Raises
+        ------
+        InputError
+            If the folder cannot be made or written to.
+        """
+        with writing(folder) as path:
+            path.mkdir(exist_ok=True)
+            for recording in self.recordings:
+                write_channels(path / f"{recording.id}.csv", recording)
+
     def __repr__(self) -> str:
         return "\n".join([self._title, self.table.to_string(float_format="{:.2f}".format), *self.left_out])
 
@@ -64,6 +88,14 @@ class Prediction(Recordings):
 def read_model(file: str | Path) -> Model:
     """Read a model file, as a fit, a diagnosis or the pipeline writes it.
 
+    Parameters
+    ----------
+    file : str or Path
+
+    Returns
+    -------
+    Model
+
     Raises
     ------
     InputError
@@ -80,10 +112,16 @@ def read_model(file: str | Path) -> Model:
     >>> model.rig.batch, [condition.recording for condition in model.rig.conditions]
     ('half-loop', ['half-loop-7.3N-a', 'half-loop-7.3N-b'])
     """
-    return read_model_file(Path(file))
+    return read_model_file(existing_file(file))
 
 
-def predict(model: Model | str | Path, batch: Batch | str | Path) -> Prediction:
+def predict(
+    model: Model | str | Path,
+    batch: Batch | str | Path,
+    out: str | Path | None = None,
+    *,
+    progress: bool | Progress = False,
+) -> Prediction:
     """Predict the sensor readings of a batch's recordings by a model.
 
     The model is given the drive angle, the readings at rest and, if it has no load law, the load torque.
@@ -94,11 +132,20 @@ def predict(model: Model | str | Path, batch: Batch | str | Path) -> Prediction:
         A model, or its file.
     batch : Batch, str or Path
         A batch, or its folder.
+    out : str or Path, optional
+        Folder for the predictions, a CSV for each recording; `Prediction.save` writes them later.
+    progress : bool or callable
+        True shows progress; a callable gets ``(text, share of the work done)``.
+
+    Returns
+    -------
+    Prediction
+        The simulations with their errors.
 
     Raises
     ------
     InputError
-        If the model file or the batch cannot be used.
+        If the model file or the batch cannot be used, or `out` cannot be written.
 
     Examples
     --------
@@ -111,12 +158,20 @@ def predict(model: Model | str | Path, batch: Batch | str | Path) -> Prediction:
     half-loop-7.3N-a           ...          ...
     half-loop-7.3N-b           ...          ...
     """
-    model, batch = _model(model), as_batch(batch)
-    batch.ingested.check_usable(batch.folder)
-    found = predicted(batch.recordings, model.parameters)
+    known = as_model(model)
+    if out is not None:
+        try_folder(out)
+    with progress_of(progress) as report:
+        batch = as_batch(batch, within(report, 0.0, READING))
+        batch._ingested.check_usable(batch.folder)
+        name = Path(model).stem if isinstance(model, str | Path) else "model"
+        found = predicted(batch.recordings, known.parameters, name, within(report, READING, 1.0))
     refused = [str(f) for f in batch.findings if f.severity == "refused"]
-    simulations = tuple(simulated for _, simulated in found.pairs if simulated is not None)
-    return Prediction(simulations, found.errors, (*refused, *found.failures))
+    simulations = tuple(simulated for _, simulated in found.pairs)
+    prediction = Prediction(simulations, found.errors, (*refused, *found.failures))
+    if out is not None:
+        prediction.save(out)
+    return prediction
 
 
 def simulate(
@@ -126,6 +181,8 @@ def simulate(
     recording: str | None = None,
     batch: Batch | str | Path | None = None,
     pretension_N: float | None = None,
+    out: str | Path | None = None,
+    progress: bool | Progress = False,
 ) -> Recording:
     """Simulate the sensor readings of a rig for a motion of its drive, by a model.
 
@@ -141,6 +198,10 @@ def simulate(
         Batch with that recording. A model file that was written before models knew their rig needs it.
     pretension_N : float, optional
         Pretension of both cables, N, instead of that recording's.
+    out : str or Path, optional
+        CSV file for the readings.
+    progress : bool or callable
+        True shows progress; a callable gets ``(text, share of the work done)``.
 
     Returns
     -------
@@ -150,7 +211,7 @@ def simulate(
     Raises
     ------
     InputError
-        If an input cannot be used, or the model cannot be run on it.
+        If an input cannot be used, the model cannot be run on it, or `out` cannot be written.
 
     Examples
     --------
@@ -163,19 +224,31 @@ def simulate(
     >>> readings.to_frame().loc[0.0, ["T1_N", "T2_N", "T3_N", "T4_N"]].tolist()
     [7.0, 7.0, 7.0, 7.0]
     """
-    model = _model(model)
+    known = as_model(model)
     table, source = _motion(motion)
     if pretension_N is not None and not pretension_N >= 0:
         raise InputError(f"pretension_N: is not negative, N; got {pretension_N}")
-    recordings: Sequence[Recording] | None = None if batch is None else as_batch(batch).recordings
-    like = conditions_of(model, recording, recordings)
-    try:
-        return simulated_motion(table, model.parameters, like, pretension_N)
-    except (ModelError, ValueError) as error:
-        raise InputError(f"{source}: {error}") from None
+    if out is not None:
+        try_file(out)
+    with progress_of(progress) as report:
+        of_rig = None if batch is None else as_batch(batch, within(report, 0.0, READING))
+        if of_rig is None:
+            like = conditions_of(known, recording)
+        else:
+            like = conditions_of(known, recording, of_rig.recordings, of_rig.name)
+        report("simulating the motion", READING)
+        try:
+            simulated = simulated_motion(table, known.parameters, like, pretension_N)
+        except (ModelError, ValueError) as error:
+            raise InputError(f"{source}: {error}") from None
+    if out is not None:
+        with writing(out) as path:
+            write_channels(path, simulated)
+    return simulated
 
 
-def _model(model: Model | str | Path) -> Model:
+def as_model(model: Model | str | Path) -> Model:
+    """A model, or the one in a file."""
     return model if isinstance(model, Model) else read_model(model)
 
 

@@ -1,48 +1,98 @@
 """Options that several functions take: what is compared, and how progress is shown."""
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 from pydantic import ValidationError
 
+from ccmodel.channels import MEASURED
+from ccmodel.diagnosis.run import Options
 from ccmodel.progress import Progress, log_lines, shown, silent
+from ccmodel.studies.diagnosis.run import check_options, options_of
 from ccmodel.studies.diagnosis.settings import Diagnosing
 from ccmodel.typed import InputError
 
 # Standard deviation of the model discrepancy that counts as noise, as a share of a channel's peak to peak.
 Tolerance = float | Mapping[str, float]
+# Candidates that are fitted whatever the screening says: one, or several, each of them one mechanism or two together.
+Candidates = str | Sequence[str | Sequence[str]]
+# Name of an option on the command line, where it has another one.
+_ON_COMMAND_LINE = {"step_s": "step", "candidates": "candidate"}
+
+
+def diagnosis_options(
+    tolerance: Tolerance | None = None,
+    step_s: float | None = None,
+    cycles: int | None = None,
+    candidates: Candidates = (),
+    without: str | Collection[str] = (),
+    freeze: bool = False,
+    has_baseline: bool = False,
+    prefix: str = "",
+) -> Options:
+    """Checked options of a diagnosis; `prefix` as of `settings_of`.
+
+    Raises
+    ------
+    InputError
+        A line for each option that cannot be used.
+    """
+    names = (without,) if isinstance(without, str) else tuple(without)
+    options = options_of(settings_of(tolerance, step_s, cycles, candidates, prefix), names, freeze)
+    check_options(options, has_baseline, prefix)
+    return options
 
 
 def settings_of(
     tolerance: Tolerance | None = None,
     step_s: float | None = None,
     cycles: int | None = None,
-    candidates: Sequence[str | Sequence[str]] = (),
+    candidates: Candidates = (),
+    prefix: str = "",
 ) -> Diagnosing:
     """Checked settings of a fit or a diagnosis.
+
+    Parameters
+    ----------
+    tolerance, step_s, cycles, candidates
+        As of `ccmodel.diagnose`.
+    prefix : str
+        What stands before the names of options in messages, "--" on the command line.
 
     Raises
     ------
     InputError
         A line for each setting that cannot be used.
     """
-    forced = [[one] if isinstance(one, str) else list(one) for one in candidates]
+    stated_candidates = [candidates] if isinstance(candidates, str) else candidates
+    forced = [_together(one) if isinstance(one, str) else list(one) for one in stated_candidates]
     stated: dict[str, Any] = {"step_s": step_s, "cycles": cycles, "forced_candidates": forced}
-    if tolerance is not None:
-        stated["tolerance"] = dict(tolerance) if isinstance(tolerance, Mapping) else tolerance
+    if isinstance(tolerance, Mapping):
+        if unknown := [repr(name) for name in tolerance if name not in MEASURED]:
+            text = f"a channel is one of {', '.join(MEASURED)}; got {', '.join(unknown)}"
+            raise InputError(f"{prefix}tolerance: {text}")
+        stated["tolerance"] = dict(tolerance)
+    elif tolerance is not None:
+        stated["tolerance"] = tolerance
     try:
         return Diagnosing(**stated)
     except ValidationError as error:
         # A tolerance is a number or a mapping; the error on the form that was not used is of no interest.
         wrong = [e for e in error.errors() if e["type"] not in ("float_type", "dict_type")] or error.errors()[:1]
-        raise InputError("\n".join(map(_line, wrong))) from None
+        raise InputError("\n".join(_line(one, prefix) for one in wrong)) from None
 
 
-def _line(error: Mapping[str, Any]) -> str:
+def _together(candidate: str) -> list[str]:
+    """One mechanism, or two with a comma between them."""
+    return [one.strip() for one in candidate.split(",")]
+
+
+def _line(error: Mapping[str, Any], prefix: str) -> str:
     name = str(error["loc"][0]) if error["loc"] else "candidates"
-    return f"{name}: {error['msg'].removeprefix('Value error, ').removeprefix('forced_candidates: ')}"
+    shown_name = _ON_COMMAND_LINE.get(name, name) if prefix else name
+    return f"{prefix}{shown_name}: {error['msg'].removeprefix('Value error, ').removeprefix('forced_candidates: ')}"
 
 
 @contextmanager

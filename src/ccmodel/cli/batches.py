@@ -41,11 +41,9 @@ def init(
         problems: tuple[Problem, ...] = ()
     except InputError as error:
         problems = error.problems
-    output.result(
-        {"batch_file": file, "fill_in": [{"line": p.line, "text": p.text} for p in problems]},
-        f"{file}: fill in what is empty, then run: ccmodel check {folder}",
-        *(f"  line {p.line}: {p.text}" for p in problems),
-    )
+    output.hint(f"{file}: fill in what is empty, then run: ccmodel check {folder}")
+    fill_in = [{"line": p.line, "text": p.text} for p in problems]
+    output.result({"batch_file": file, "fill_in": fill_in}, *(f"  line {p.line}: {p.text}" for p in problems))
 
 
 def check(batch: Batch, as_json: Json = False, quiet: Quiet = False) -> None:
@@ -65,7 +63,7 @@ def check(batch: Batch, as_json: Json = False, quiet: Quiet = False) -> None:
     output.result(
         {
             "usable": is_usable,
-            "recordings": {name: asdict(one) for name, one in seen.items()},
+            "recordings": {name: _as_data(one) for name, one in seen.items()},
             "findings": findings,
         },
         *(one for name, overview in seen.items() for one in _lines(name, overview)),
@@ -80,6 +78,15 @@ def check(batch: Batch, as_json: Json = False, quiet: Quiet = False) -> None:
             " initial tension from pretension_N, and identify nothing with certainty"
         )
     output.hint(f"nothing contradicts another value. Next: ccmodel diagnose {batch} --out DIR")
+
+
+def _as_data(seen: "Overview") -> dict:
+    """An overview in SI units as plain data, with the units in it."""
+    from ccmodel.channels import unit_of
+
+    data = asdict(seen)
+    channels = [{**channel, "unit": unit_of(channel["name"])} for channel in data.pop("channels")]
+    return {("stroke_rad" if key == "stroke" else key): value for key, value in data.items()} | {"channels": channels}
 
 
 def _lines(name: str, seen: "Overview") -> "list[RenderableType]":

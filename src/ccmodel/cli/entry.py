@@ -1,6 +1,8 @@
 """The application and its entry point."""
 
+import signal
 import sys
+import traceback
 from typing import Annotated, Any
 
 import typer
@@ -24,10 +26,12 @@ from ccmodel.cli.output import as_json, say
 
 CODES = """\
 Exit codes: 0 done; 1 a finding, or something was left out (diagnose: only with --strict); 2 the input cannot be used; \
-130 interrupted."""
+70 an error of the program; 130 interrupted."""
 # Typer does not export this class.
 _WRONG_USAGE: Any = typer.BadParameter.__base__
 INTERRUPTED = "nothing was written"
+# EX_SOFTWARE of sysexits.h; and what a shell has for a command that SIGPIPE ended.
+PROGRAM_ERROR, CLOSED_PIPE = 70, 128 + signal.SIGPIPE
 
 app = typer.Typer(
     cls=Commands,
@@ -56,7 +60,10 @@ def describe(
 
 
 def main() -> None:
-    """Entry point: an error of the user is one line for each problem, without a traceback, and exits with 2."""
+    """Entry point: an error of the user is one line for each problem, without a traceback, and exits with 2.
+
+    An error of the program has its traceback, and exits with a code of its own.
+    """
     try:
         with signals():
             code = app(prog_name="ccmodel", standalone_mode=False)
@@ -66,10 +73,15 @@ def main() -> None:
         lines, code = [f"interrupted: {interrupted}"], interrupted.exit_code
     except Terminated as terminated:
         lines, code = [f"interrupted: {INTERRUPTED}"], exit_code(terminated)
+    except SystemExit as ended:
+        # Typer and rich answer a closed pipe by the code of a finding.
+        closed = isinstance(ended.__context__, BrokenPipeError)
+        lines, code = [], CLOSED_PIPE if closed else ended.code
     except Exception as error:
         lines, code = _lines_on(error), 2
         if not lines:
-            raise
+            traceback.print_exc()
+            lines, code = [f"error of the program, please report it: {type(error).__name__}: {error}"], PROGRAM_ERROR
     if lines:
         _print_error(lines)
     sys.exit(code or 0)
@@ -93,7 +105,8 @@ def _text_of(error: Any) -> str:
     """What is wrong with a command line, and the nearest option to one that there is not."""
     if nearest := getattr(error, "possibilities", None):
         return f"No such option: {error.option_name}. Did you mean {' or '.join(nearest)}?"
-    return error.format_message()
+    text = error.format_message()
+    return text if text.endswith((".", "?")) else f"{text}."
 
 
 def _print_error(lines: list[str]) -> None:

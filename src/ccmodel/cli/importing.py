@@ -51,7 +51,8 @@ def import_(
             imported = writing.import_files(files, map_file, out, progress)
             shown, next_ = showing.import_tables(imported), showing.next_of_import(imported, out)
             data, left_out = _import_as_data(imported), bool(imported.remarks)
-    output.result(data, *shown, next_)
+    output.result(data, *shown)
+    output.hint(next_)
     if left_out:
         raise typer.Exit(1)
 

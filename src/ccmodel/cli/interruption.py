@@ -1,6 +1,8 @@
 """Ctrl-C and the request to end (SIGTERM): what a command leaves, and how to go on."""
 
+import os
 import signal
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,6 +12,9 @@ from types import FrameType
 AGAIN = "the same command starts again"
 # Names of files in the message, at most.
 _MOST_NAMED = 5
+# Module that runs the compiler of kernels, and the time after which a signal is sent again meanwhile, s.
+COMPILER = "llvmlite.binding.executionengine"
+REPEAT_S = 0.1
 
 
 class Terminated(BaseException):
@@ -34,15 +39,34 @@ class Interrupted(Exception):  # noqa: N818
 @contextmanager
 def signals() -> Iterator[None]:
     """Answer to SIGTERM by `Terminated`, so that files and processes are cleared up as after Ctrl-C."""
-    former = signal.signal(signal.SIGTERM, _terminate)
+    former = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
+        for number, handler in former.items():
+            # A command that runs in the background of a script ignores Ctrl-C.
+            if handler is not signal.SIG_IGN:
+                signal.signal(number, _answer)
         yield
     finally:
-        signal.signal(signal.SIGTERM, former)
+        for number, handler in former.items():
+            signal.signal(number, handler)
 
 
-def _terminate(signum: int, frame: FrameType | None) -> None:
-    raise Terminated
+def _answer(number: int, frame: FrameType | None) -> None:
+    """Raise the exception of a signal; while a kernel is being compiled, wait and send the signal again.
+
+    The compiler calls functions of Python, and an exception in them is dropped.
+    """
+    if any(one.f_globals.get("__name__") == COMPILER for one in _outwards(frame)):
+        threading.Timer(REPEAT_S, os.kill, (os.getpid(), number)).start()
+    else:
+        raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
+
+
+def _outwards(frame: FrameType | None) -> Iterator[FrameType]:
+    """A frame, and those that called it."""
+    while frame is not None:
+        yield frame
+        frame = frame.f_back
 
 
 @contextmanager

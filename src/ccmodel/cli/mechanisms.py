@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ccmodel.cli import completion
+from ccmodel.cli import completion, destination
 from ccmodel.cli.group import RESULTS, command
 from ccmodel.cli.options import Json, Quiet
 from ccmodel.cli.output import Output
@@ -27,7 +27,12 @@ def mechanisms(
         ),
     ] = None,
     markdown: Annotated[
-        Path | None, typer.Option(help="Write the pages of all mechanisms into this folder.", show_default=False)
+        Path | None,
+        typer.Option(
+            help="Write the pages of all mechanisms into this folder.",
+            callback=destination.try_folder,
+            show_default=False,
+        ),
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -45,11 +50,11 @@ def mechanisms(
         return
     try:
         if name is not None:
-            output.result(catalogue.parts(name), catalogue.entry(name))
+            output.result(catalogue.data(name), catalogue.entry(name))
             return
     except UnknownMechanismError as error:
         raise InputError(str(error)) from None
     table = Table("name", "places", "parameters", "what it is", box=None)
     for row in catalogue.rows():
         table.add_row(*row)
-    output.result(list(map(catalogue.parts, names())) if as_json else [], table)
+    output.result(list(map(catalogue.data, names())), table)

@@ -48,7 +48,9 @@ ccmodel diagnose data/raw/loops --out out --json | jq '.verdict'
 | 0 | Done. `diagnose` ends with 0 at any verdict. |
 | 1 | Done, with a finding, or something was left out. `diagnose`: only with `--strict`, if the model does not agree. |
 | 2 | The input cannot be used: a file, a folder, an option. Standard error has a line for each problem. |
+| 70 | An error of the program: its traceback is on standard error. Please report it. |
 | 130 | Interrupted by Ctrl-C (143: by the request to end, SIGTERM). |
+| 141 | The reader of standard output has gone, as in `ccmodel check BATCH \\| head -1`. Nothing is printed about it. |
 
 An interrupted command says in one line what it has written and how to go on. A diagnosis, a fit and a simulation write
 their files at the end, and an import replaces its folder as a whole. So an earlier result stays until then.

@@ -24,7 +24,7 @@ from ccmodel.progress import Progress, silent, within
 from ccmodel.recording import Recording
 
 # Shares of the time at which the model is calibrated, the mechanisms are selected and the verdict is decided; and share
-# of the first fit in the time of a calibration. Measured on the batches of data/raw.
+# of the first fit in the time of a calibration. Measured on two batches, data/raw/loops and half-loop.
 CALIBRATED, SELECTED, JUDGED = 0.04, 0.88, 0.95
 FIRST_FIT = 0.5
 

@@ -17,7 +17,7 @@ from ccmodel.progress import Progress, silent, within
 
 # Shares of a whole selection at which the mechanisms are screened, the single ones fitted and the covariance linearised
 # anew; the rest is the pairs'. Of the pairs' share, that of the screening for a second mechanism, and that at which all
-# are fitted. Measured on the batches of data/raw; they only serve the estimate of the time that is left.
+# are fitted. Measured on two batches, data/raw/loops and half-loop; they only serve the estimate of the time left.
 SCREENED, FITTED, RELINEARISED = 0.15, 0.35, 0.5
 PARTNERS_SCREENED, PAIRS_FITTED = 0.5, 0.8
 

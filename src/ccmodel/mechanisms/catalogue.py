@@ -55,19 +55,46 @@ def parts(name: str) -> dict:
     return {"name": name, "summary": mechanism.summary, "facts": _facts(mechanism), "parameters": rows}
 
 
+def data(name: str) -> dict:
+    """All that is known of a mechanism, as plain data: ranges and defaults as numbers in the parameter's unit."""
+    mechanism, text = get(name), get(name).paragraphs
+    parameters = [
+        {
+            "name": p.name,
+            "meaning": p.meaning,
+            "unit": p.unit,
+            "low": p.low,
+            "high": p.high,
+            "signed": p.signed,
+            "start": p.start,
+            "default": p.default,
+        }
+        for p in mechanism.parameters
+    ]
+    return {
+        "name": name,
+        "summary": mechanism.summary,
+        "places": list(mechanism.places),
+        "equation": text["Equation"],
+        "tex": mechanism.tex,
+        "signature": text["Signature"],
+        "look_alikes": list(mechanism.mistaken_for),
+        "separating_experiment": mechanism.separated_by,
+        "depends_on_rate": mechanism.depends_on_time,
+        "source": text["Source"],
+        "parameters": parameters,
+    }
+
+
 def pages() -> dict[str, str]:
     """Markdown pages by their paths within ``docs``: an index, and a page for each mechanism."""
     return {INDEX: _INDEX + "\n" + _index() + _CONTENTS} | {f"mechanisms/{name}.md": _page(name) for name in names()}
 
 
 def write_pages(folder: Path) -> None:
-    """Write `pages` into a folder, and remove pages of mechanisms that no longer exist."""
-    made = pages()
+    """Write `pages` into a folder; the page of a mechanism that no longer exists stays."""
     (folder / "mechanisms").mkdir(parents=True, exist_ok=True)
-    for stale in (folder / "mechanisms").glob("*.md"):
-        if f"mechanisms/{stale.name}" not in made:
-            stale.unlink()
-    for path, text in made.items():
+    for path, text in pages().items():
         (folder / path).write_text(text, encoding="utf-8")
 
 
@@ -148,8 +175,8 @@ def _facts(mechanism: Mechanism) -> list[tuple[str, str]]:
         ("Places", ", ".join(mechanism.places)),
         ("Equation", f"{text['Equation']}."),
         ("Signature", f"{text['Signature']}."),
-        ("Mistaken for", ", ".join(mechanism.mistaken_for)),
-        ("Separated by", mechanism.separated_by),
+        ("Look-alikes", ", ".join(mechanism.mistaken_for)),
+        ("Separating experiment", mechanism.separated_by),
         ("Depends on the rate of the motion", "yes" if mechanism.depends_on_time else "no"),
         ("Source", text["Source"]),
     ]

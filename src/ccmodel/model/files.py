@@ -13,6 +13,7 @@ from ccmodel import mechanisms as registry
 from ccmodel.geometry import ConduitPath
 from ccmodel.model.general.run import Active
 from ccmodel.model.parameters import FORMER_NAMES, Parameters
+from ccmodel.paths import writing
 from ccmodel.recording import FAR_ENDS, ORIGIN, Recording
 from ccmodel.typed import InputError, NotNegative, OneOf, Positive, TypedModel
 
@@ -195,8 +196,17 @@ class Model:
         return content | {"provenance": provenance}
 
     def save(self, file: Path | str) -> None:
-        """Write the model file (JSON), which `read_model` and the commands of ``ccmodel`` read."""
-        Path(file).write_text(json.dumps(self.as_dict(), indent=1) + "\n")
+        """Write the model file (JSON), which `ccmodel.read_model` and the commands of ``ccmodel`` read.
+
+        Missing folders above it are made.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        with writing(file) as path:
+            path.write_text(json.dumps(self.as_dict(), indent=1) + "\n")
 
 
 def model_as_dict(parameters: Parameters, provenance: dict) -> dict:

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from ccmodel.report.page.writing import left_out_of
-from ccmodel.report.verdict import INPUTS_INCONSISTENT, SYMBOL, sentence
+from ccmodel.report.verdict import INPUTS_INCONSISTENT, held_out_errors, sentence
 from ccmodel.steps.files import read_json
 from ccmodel.typed import InputError
 
@@ -65,8 +65,7 @@ class Summary:
             verdict = f"{one.verdict}. " if one.verdict else ""
             lines.append(f"{one.batch}: {verdict}{one.sentence}")
             if one.held_out_error:
-                errors = ", ".join(map(_fall, one.held_out_error.items()))
-                lines.append(f"  held-out error over the noise floor: {errors}")
+                lines.append(f"  {held_out_errors(one.held_out_error)}")
         return lines + ([f"page: {self.page}"] if self.page else [])
 
 
@@ -109,13 +108,6 @@ def _content(file: Path) -> dict:
         return read_json(file)
     except (OSError, ValueError) as error:
         raise InputError(f"{file}: cannot be read ({error})") from None
-
-
-def _fall(channel_and_error: tuple[str, dict]) -> str:
-    """As in ``tau_in 12.1 -> 1.3``; a single number where no mechanism was added."""
-    channel, error = channel_and_error
-    before, after = (f"{error[when] / error['noise']:.1f}" for when in ("before", "after"))
-    return f"{SYMBOL[channel]} {before}" if before == after else f"{SYMBOL[channel]} {before} -> {after}"
 
 
 def _if_there(file: Path) -> Path | None:

@@ -106,6 +106,16 @@ def nearest_sentence(diagnosis: Mapping) -> str | None:
     return f"Nearest model, {NOT_ACCEPTED}: {'; and '.join(map(claim, nearest['mechanisms']))}."
 
 
+def held_out_errors(error: Mapping[str, Mapping]) -> str:
+    """Held-out errors over the noise floor, as ``τ_in 12.1 -> 1.3``; one number where no mechanism was added."""
+
+    def fall(channel: str) -> str:
+        before, after = (f"{error[channel][when] / error[channel]['noise']:.1f}" for when in ("before", "after"))
+        return f"{SYMBOL[channel]} {before}" if before == after else f"{SYMBOL[channel]} {before} -> {after}"
+
+    return f"held-out error over the noise floor: {', '.join(map(fall, error))}"
+
+
 def worst_channel(error: Mapping[str, Mapping]) -> str:
     """Short name of the channel whose error before is largest over its noise."""
     return max(error, key=lambda c: error[c]["before"] / error[c]["noise"])

@@ -32,6 +32,8 @@ class LogError(Exception):
 
 
 Severity = Literal["warning", "refused", "inconsistent"]
+# Word before a line on a finding.
+WORD: dict[Severity, str] = {"warning": "warning", "refused": "left out", "inconsistent": "inconsistent"}
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from ccmodel.typed import InputError
 
 # The page of a run of the pipeline, seen from the report of a diagnosis.
 PAGE_OF_RUN = "../../index.html"
-# Shares of the time at which the batch is read, and at which the page is written.
+# Shares of the time at which the batch is read, and at which the page is written; measured as in `ccmodel.diagnosis`.
 INGEST, PAGE = 0.05, 0.95
 
 

@@ -33,8 +33,11 @@ class Diagnosing(TypedModel):
     def _candidates_known(self) -> Self:
         for one in (one for candidate in self.forced_candidates for one in candidate):
             name, _, place = one.partition(" at ")
-            if name not in mechanisms.names() or place not in mechanisms.get(name).places:
+            if name not in mechanisms.names():
                 raise ValueError(f"forced_candidates: there is no mechanism '{one}'; one is stated as 'name at place'")
+            if place not in (places := mechanisms.get(name).places):
+                stated = " or ".join(f"'{name} at {possible}'" for possible in places)
+                raise ValueError(f"forced_candidates: '{one}' is at none of its places; state {stated}")
         if any(len(candidate) not in (1, 2) for candidate in self.forced_candidates):
             raise ValueError("forced_candidates: each is a list of one mechanism or of two")
         return self

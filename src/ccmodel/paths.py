@@ -1,0 +1,155 @@
+"""Folders and files that a user names: those that are read, and those that results are written to.
+
+The command line and the Python interface check them here, before the work. A destination is tried, and nothing remains
+of the trial.
+"""
+
+import difflib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import NoReturn
+
+BATCH_FILE = "batch.yaml"
+
+
+def batch_folder(path: str | Path) -> Path:
+    """The folder of a batch that is named by its folder or by its `batch.yaml`.
+
+    Raises
+    ------
+    InputError
+        If there is no such folder, or it holds no `batch.yaml`.
+    """
+    path = Path(path).expanduser()
+    folder = path.parent if path.name == BATCH_FILE and path.is_file() else existing_folder(path)
+    if not (folder / BATCH_FILE).exists():
+        inside = batches_in(folder)
+        advice = (
+            f"it holds the batches {', '.join(inside)}"
+            if inside
+            else f"if it has the logs of a rig, draft one with: ccmodel init {folder}"
+        )
+        _refuse(f"{folder}: has no {BATCH_FILE}; {advice}")
+    return folder
+
+
+def batches_in(folder: Path) -> list[str]:
+    """Folders of batches in a folder, by name."""
+    return sorted(f.parent.name for f in folder.glob(f"*/{BATCH_FILE}"))
+
+
+def existing_folder(path: str | Path) -> Path:
+    """A folder that is read.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    path = Path(path).expanduser()
+    return path if path.is_dir() else _missing(path, "folder", "file")
+
+
+def existing_file(path: str | Path) -> Path:
+    """A file that is read.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    path = Path(path).expanduser()
+    return path if path.exists() and not path.is_dir() else _missing(path, "file", "folder")
+
+
+def _missing(path: Path, wanted: str, other: str) -> NoReturn:
+    """Say what stands in the place of a folder or file that is wanted, or which is there with a similar name."""
+    if path.exists():
+        _refuse(f"{path}: is a {other}; a {wanted} is expected")
+    around = path.parent.iterdir() if path.parent.is_dir() else ()
+    beside = [f.name for f in around if f.is_dir() == (wanted == "folder")]
+    guess = difflib.get_close_matches(path.name, beside, n=1, cutoff=0.75)
+    advice = f"; did you mean {path.parent / guess[0]}?" if guess else ""
+    _refuse(f"{path}: there is no such {wanted}{advice}")
+
+
+def try_folder(path: str | Path, option: str = "out") -> Path:
+    """A folder that can be written to, or made.
+
+    Parameters
+    ----------
+    path : str or Path
+    option : str
+        Option that names it, in the message.
+
+    Raises
+    ------
+    InputError
+        If it cannot.
+    """
+    path = Path(path).expanduser()
+    _try(path, path, option)
+    return path
+
+
+def try_file(path: str | Path, option: str = "out") -> Path:
+    """A file that can be written; parameters as of `try_folder`.
+
+    Raises
+    ------
+    InputError
+        If it cannot.
+    """
+    path = Path(path).expanduser()
+    if path.is_dir():
+        _refuse(f"{option}: {path}: is a folder; name a file")
+    _try(path.parent, path, option)
+    if path.exists():
+        try:
+            path.open("ab").close()
+        except OSError as error:
+            _refuse(f"{option}: {path}: cannot be written ({error.strerror})")
+    return path
+
+
+def _try(folder: Path, named: Path, option: str) -> None:
+    """Write a nameless file into a folder, or make the first of its missing folders and remove it again."""
+    try:
+        missing = [f for f in (folder, *folder.parents) if not f.exists()]
+        existing = missing[-1].parent if missing else folder
+        if not existing.is_dir():
+            text = "is a file; name a folder" if existing == named else f"cannot be made: {existing} is a file"
+            _refuse(f"{option}: {named}: {text}")
+        if missing:
+            missing[-1].mkdir()
+            missing[-1].rmdir()
+        else:
+            TemporaryFile(dir=folder).close()
+    except OSError as error:
+        _refuse(f"{option}: {named}: cannot be written ({error.strerror})")
+
+
+@contextmanager
+def writing(path: str | Path) -> Iterator[Path]:
+    """The path of a file or folder to write, in a folder that is made if it is missing.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    path = Path(path).expanduser()
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield path
+    except OSError as error:
+        _refuse(f"{path}: cannot be written ({error.strerror})")
+
+
+def _refuse(line: str) -> NoReturn:
+    # The command line starts in a moment: what reads settings is loaded only for a message.
+    from ccmodel.typed import InputError
+
+    raise InputError(line) from None
