@@ -101,7 +101,7 @@ def main() -> None:
     print("|---" * (len(GROUPS) + 1) + "|")
     for nodes in NODES:
         hours = [estimate(case_s, Cluster(nodes), size) / 3600 for size in GROUPS]
-        print(f"| {nodes} | " + " | ".join(f"{60 * h:.0f} min ({alone_h / h:.0f} x)" for h in hours) + " |")
+        print(f"| {nodes} | " + " | ".join(f"{60 * h:.0f} min ({alone_h / h:.1f} x)" for h in hours) + " |")
 
 
 if __name__ == "__main__":

@@ -1,13 +1,19 @@
 """Settings of the site that `make docs` builds. Nothing is fetched, neither by the build nor by a reader's browser."""
 
+import logging
 import sys
 from pathlib import Path
+
+from jupyter_client import KernelManager
 
 import ccmodel
 
 HERE = Path(__file__).parent
 # Extensions of this folder's own.
 sys.path.insert(0, str(HERE / "_extensions"))
+
+# Otherwise the theme's styles set up logging, and libraries tell the build what they do.
+logging.basicConfig(level=logging.WARNING)
 
 project = "ccmodel"
 author = "ccmodel developers"
@@ -35,8 +41,11 @@ myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "
 # Anchors as Markdown viewers make them, so that the same links work in the repository.
 myst_heading_anchors = 4
 
-nb_execution_mode = "cache"
+# Always: the notebooks must show what the present sources compute.
+nb_execution_mode = "force"
 nb_execution_timeout = 300
+# Without it, each kernel warns that it talks to the build in plain text.
+KernelManager.transport_encryption.default_value = "auto"
 nb_execution_raise_on_error = True
 nb_execution_show_tb = True
 

@@ -32,7 +32,7 @@ RIG = {
     "accuracy": {"encoder_rad": 0.00314, "torque_Nm": 0.0001, "load_cell_N": 0.1},
 }
 
-# As the paper's sensors: the noise that makes the recordings ones.
+# Noise as of the paper's sensors.
 NOISE = {"drive_current_A": 1e-4 / 0.0234, "load_current_A": 1e-4 / 0.0234}
 NOISE |= {"drive_load_cell_V": 0.005, "load_load_cell_V": 0.005}
 

@@ -47,12 +47,11 @@ class Guide:
         if source:
             self.environment["PYTHONPATH"] = str(source)
 
-    def follow(self, **names) -> dict:
-        """Run every block; Python blocks know these names, and theirs are returned."""
+    def follow(self) -> dict:
+        """Run every block, and return the names of the Python blocks."""
         evaluators = {"sh": self._run, "text": self._compare, "python": self._python, "yaml": self._yaml}
         parsers = [CodeBlockParser(language, evaluator) for language, evaluator in evaluators.items()]
         document = Document.parse(str(self.page), *parsers, SkipParser(), self._expected_exits)
-        document.namespace.update(names)
         for example in document.examples():
             try:
                 example.evaluate()

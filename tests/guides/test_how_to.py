@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -11,6 +12,9 @@ from following import ROOT, Guide, first_missing
 from ccmodel.rig.importing import import_files
 
 TUTORIAL = ROOT / "docs/tutorial"
+# Of one bend and motion, with two pretensions: enough for a diagnosis.
+RUNS = ("logs/run1", "logs/run3")
+LATER = ("later/run5", "later/run6")
 PAGES = sorted((ROOT / "docs/how-to").glob("*.md"))
 PIPELINE = ("Snakefile", "workflow", "profiles", "config", "docs/tutorial")
 
@@ -25,12 +29,19 @@ def copy_of(names, folder: Path) -> Path:
     return folder
 
 
-def import_batch(logs: str, batch_file: str, out: Path) -> Path:
-    """A batch of the tutorial's logs, under the name of the folder `out`."""
-    import_files(sorted((TUTORIAL / logs).glob("*.csv")), TUTORIAL / "map.yaml", out)
-    text = (TUTORIAL / batch_file).read_text(encoding="utf-8")
-    (out / "batch.yaml").write_text(re.sub("^batch: .*", f"batch: {out.name}", text, flags=re.MULTILINE))
+def import_batch(runs: Sequence[str], batch_file: str, out: Path) -> Path:
+    """A batch of some of the tutorial's logs, under the name of the folder `out`."""
+    import_files([TUTORIAL / f"{run}.csv" for run in runs], TUTORIAL / "map.yaml", out)
+    text = re.sub("^batch: .*", f"batch: {out.name}", (TUTORIAL / batch_file).read_text("utf-8"), flags=re.MULTILINE)
+    (out / "batch.yaml").write_text(only(runs, text))
     return out
+
+
+def only(runs: Sequence[str], batch_yaml: str) -> str:
+    """The text of a `batch.yaml` without recordings other than these."""
+    kept = {Path(run).name for run in runs}
+    entries = re.compile(r"^- \{id: (\w+),.*\n", re.MULTILINE)
+    return entries.sub(lambda entry: entry[0] if entry[1] in kept else "", batch_yaml)
 
 
 def followed(page: str, folder: Path, **options) -> Guide:
@@ -47,7 +58,9 @@ def test_import_logs(tmp_path):
 
 def test_add_a_batch(tmp_path):
     copy_of(PIPELINE, tmp_path)
-    batch = import_batch("logs", "batch.yaml", tmp_path / "data/raw/my-batch")
+    copied = tmp_path / "docs/tutorial/batch.yaml"
+    copied.write_text(only(RUNS, copied.read_text("utf-8")))
+    batch = import_batch(RUNS, "batch.yaml", tmp_path / "data/raw/my-batch")
     for other in ("batch.yaml", "map.yaml", "import.json"):
         (batch / other).unlink()
     assert len(followed("add-a-batch", tmp_path).skipped) == 2
@@ -56,7 +69,7 @@ def test_add_a_batch(tmp_path):
 
 def test_add_a_study(tmp_path):
     copy_of(PIPELINE, tmp_path)
-    import_batch("logs", "batch.yaml", tmp_path / "data/mine/my-batch")
+    import_batch(RUNS, "batch.yaml", tmp_path / "data/mine/my-batch")
     assert followed("add-a-study", tmp_path).skipped == []
 
 
@@ -72,22 +85,19 @@ def test_add_a_mechanism(tmp_path):
     assert "load cell" in (tmp_path / "docs/mechanisms/load-cell-nonlinearity.md").read_text(encoding="utf-8")
 
 
-def test_the_five_lines_of_python_in_the_readme(tmp_path):
-    import_batch("logs", "batch.yaml", tmp_path / "my-batch")
-    pd.DataFrame({"time_s": [0.0, 0.5, 1.0], "theta_in_rad": [0.0, 0.0, 0.2]}).to_csv(
-        tmp_path / "motion.csv", index=False
-    )
+def test_the_lines_of_python_in_the_readme(tmp_path):
+    import_batch(RUNS, "batch.yaml", tmp_path / "my-batch")
     guide = Guide(ROOT / "README.md", tmp_path)
-    names = guide.follow(motion=str(tmp_path / "motion.csv"))
+    names = guide.follow()
     assert len(guide.skipped) == 3
     assert names["found"].verdict == "explained"
-    assert len(names["run"].to_frame()) == 3
+    assert len(names["run"].to_frame()) == len(names["motion"]) > 1000
 
 
 def test_watch(tmp_path):
-    import_batch("logs", "batch.yaml", tmp_path / "data/raw/trusted")
-    import_batch("later", "later.yaml", tmp_path / "data/raw/monday")
-    changed = import_batch("later", "later.yaml", tmp_path / "data/raw/changed")
+    import_batch(RUNS, "batch.yaml", tmp_path / "data/raw/trusted")
+    import_batch(LATER, "later.yaml", tmp_path / "data/raw/monday")
+    changed = import_batch(LATER, "later.yaml", tmp_path / "data/raw/changed")
     for file in changed.glob("*.csv.gz"):
         log = pd.read_csv(file)
         log.assign(drive_current_A=1.1 * log["drive_current_A"]).to_csv(file, index=False)

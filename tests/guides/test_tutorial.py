@@ -44,7 +44,7 @@ def test_it_ends_with_a_page_on_both_batches(followed):
     assert {"first", "later"} <= set(errors["batch"])
 
 
-def test_the_diagnosis_names_the_flaw_of_the_rig_and_its_size(followed):
+def test_the_diagnosis_names_the_seeded_fault_and_its_size(followed):
     found = json.loads((followed.folder / "my-rig/diagnosis/diagnosis.json").read_text())
     (mechanism,) = found["mechanisms"]
     torque = next(p for p in mechanism["parameters"] if p["name"] == "friction_torque")

@@ -88,5 +88,6 @@ def diagnose(
             progress=progress,
         )
     output.result({**found.report, "out": out}, found.headline)
+    output.hint(f"wrote {out}: diagnosis.json, report.html and the models. Next: ccmodel report {out}")
     if strict and found.verdict != "agrees":
         raise typer.Exit(1)

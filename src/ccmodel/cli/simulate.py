@@ -50,7 +50,10 @@ def simulate(
 
     output = Output(as_json, quiet)
     with leaving(out), output.progress() as progress:
-        ccmodel.simulate(
+        simulated = ccmodel.simulate(
             model, motion, recording=recording, batch=batch, pretension_N=pretension, out=out, progress=progress
         )
-    output.result({"out": out})
+    samples = simulated.time_s.size
+    data = {"out": out, "recording": simulated.id, "samples": samples, "pretension_N": simulated.pretension_N}
+    output.result(data)
+    output.hint(f"wrote {out}: {samples} samples, pretension {simulated.pretension_N:.4g} N")
