@@ -135,7 +135,8 @@ def said(verdict):
 def test_the_trial_leaves_nothing(folder, run, monkeypatch):
     monkeypatch.setattr("ccmodel.diagnose", said("explained"))
     ended = run("diagnose", folder / "raw/loops", "--out", folder / "new/below/it")
-    assert ended == (0, "it is as it is\n", "")
+    assert (ended.code, ended.out.splitlines()[0], ended.err) == (0, "it is as it is", "")
+    assert run("diagnose", folder / "raw/loops", "--out", folder / "new", "--quiet").out == "it is as it is\n"
     assert not (folder / "new").exists()
 
 
