@@ -15,6 +15,8 @@ CHECKS = {
     "a folder of batches": (["check", "raw"], "it holds the batches loops"),
     "a command": (["chek", "raw/loops"], "Did you mean 'check'"),
     "an option": (["check", "raw/loops", "--jsn"], "No such option: --jsn. Did you mean --json?"),
+    "an option without its stop": (["check", "raw/loops", "--x"], "No such option: --x. ccmodel check --help shows"),
+    "an option before the command": (["--quiet", "check"], "--quiet stands after the name of the command."),
     "no argument": (["check"], "Missing argument"),
     "an argument too many": (["check", "raw/loops", "raw/loops"], "unexpected extra argument"),
     "a mechanism": (["mechanisms", "backlsh"], "backlash"),
