@@ -2,6 +2,7 @@
 
 import glob
 import json
+import re
 import shlex
 import shutil
 
@@ -11,6 +12,7 @@ from example_folder import prepare
 from typer.main import get_command
 
 from ccmodel.cli import app
+from ccmodel.cli.reference import HEAD
 
 # Their result is a text of another kind.
 WITHOUT_JSON = {"schema", "reference"}
@@ -50,6 +52,16 @@ def shell(folder, monkeypatch, run):
     return call
 
 
+def keys_of(document):
+    """Names of the keys at the top of a document, or of a list of them."""
+    return {key for one in (document if isinstance(document, list) else [document]) for key in one}
+
+
+def keys_in_documentation():
+    table = HEAD.partition("## Keys of the JSON documents")[2].partition("##")[0]
+    return set(re.findall("`([a-z_A-Z]+)`", table))
+
+
 def test_every_command_has_an_example():
     assert [name for name, lines in EXAMPLES.items() if not lines] == []
 
@@ -73,4 +85,6 @@ def test_the_results_of_examples_are_one_json_document_each(shell, folder):
             continue
         ended = shell(line, "--json")
         assert (ended.code, ended.err) == (0, "") or "import-mis-tool" in line, (line, ended)
-        json.loads(ended.out)
+        document = json.loads(ended.out)
+        undocumented = keys_of(document) - keys_in_documentation()
+        assert "table-one" in line or not undocumented, (line, undocumented)

@@ -15,6 +15,8 @@ CHECKS = {
     "a folder of batches": (["check", "raw"], "it holds the batches loops"),
     "a command": (["chek", "raw/loops"], "Did you mean 'check'"),
     "an option": (["check", "raw/loops", "--jsn"], "No such option: --jsn. Did you mean --json?"),
+    "an option without its stop": (["check", "raw/loops", "--x"], "No such option: --x. ccmodel check --help shows"),
+    "an option before the command": (["--quiet", "check"], "--quiet stands after the name of the command."),
     "no argument": (["check"], "Missing argument"),
     "an argument too many": (["check", "raw/loops", "raw/loops"], "unexpected extra argument"),
     "a mechanism": (["mechanisms", "backlsh"], "backlash"),
@@ -135,7 +137,8 @@ def said(verdict):
 def test_the_trial_leaves_nothing(folder, run, monkeypatch):
     monkeypatch.setattr("ccmodel.diagnose", said("explained"))
     ended = run("diagnose", folder / "raw/loops", "--out", folder / "new/below/it")
-    assert ended == (0, "it is as it is\n", "")
+    assert (ended.code, ended.out.splitlines()[0], ended.err) == (0, "it is as it is", "")
+    assert run("diagnose", folder / "raw/loops", "--out", folder / "new", "--quiet").out == "it is as it is\n"
     assert not (folder / "new").exists()
 
 

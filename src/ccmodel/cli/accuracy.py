@@ -7,7 +7,7 @@ import typer
 
 from ccmodel.cli.group import RESULTS, Commands, command
 from ccmodel.cli.interruption import leaving
-from ccmodel.cli.options import Cores, Json, Quiet, Results
+from ccmodel.cli.options import Cores, Json, Quiet, RunResults
 from ccmodel.cli.output import Output
 
 
@@ -20,7 +20,7 @@ def add_to(app: typer.Typer) -> None:
     app.add_typer(group, name="accuracy", rich_help_panel=RESULTS)
 
 
-def check(results: Results = Path("results"), as_json: Json = False, quiet: Quiet = False) -> None:
+def check(results: RunResults = Path("results"), as_json: Json = False, quiet: Quiet = False) -> None:
     """Compare the last run with the accepted accuracy.
 
     Exits with 0 if everything was compared and nothing was lost, with 1 on a loss or something that could not be
@@ -57,7 +57,7 @@ def accept(
     reason: Annotated[
         str, typer.Option(help="Why this accuracy is right, for the reader of the baseline.", show_default=False)
     ],
-    results: Results = Path("results"),
+    results: RunResults = Path("results"),
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:

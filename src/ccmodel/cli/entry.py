@@ -103,6 +103,9 @@ def _lines_on(error: Exception) -> list[str]:
 
 def _text_of(error: Any) -> str:
     """What is wrong with a command line, and the nearest option to one that there is not."""
+    option = getattr(error, "option_name", None)
+    if option in ("--json", "--quiet") and not error.ctx.parent:
+        return f"{option} stands after the name of the command."
     if nearest := getattr(error, "possibilities", None):
         return f"No such option: {error.option_name}. Did you mean {' or '.join(nearest)}?"
     text = error.format_message()

@@ -50,6 +50,7 @@ def mechanisms(
         return
     try:
         if name is not None:
+            name = name.lower().replace("_", "-")
             output.result(catalogue.data(name), catalogue.entry(name))
             return
     except UnknownMechanismError as error:

@@ -37,6 +37,9 @@ Model = Annotated[
 Results = Annotated[
     Path, typer.Argument(metavar="RESULTS", help="Folder of a run's results, or of a diagnosis.", callback=input_folder)
 ]
+RunResults = Annotated[
+    Path, typer.Argument(metavar="RESULTS", help="Folder of a run's results.", callback=input_folder)
+]
 Cores = Annotated[int, typer.Option("--cores", min=1, help="Number of processes.")]
 Tolerance = Annotated[
     list[str],

@@ -35,7 +35,7 @@ def predict(
         predicted = ccmodel.predict(model, batch, out, progress=progress)
     lines = []
     if len(predicted):
-        table = predicted.table.to_string(float_format="%.2f")
+        table = predicted.table.reset_index().to_string(index=False, float_format="%.2f")
         lines = ["root mean square error over the last cycle, % of peak to peak", table]
     errors = predicted.errors.to_dict("records")
     output.result({"out": out, "errors": errors, "left_out": predicted.left_out}, *lines)

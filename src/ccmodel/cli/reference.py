@@ -7,6 +7,8 @@ import typer
 from typer.cli import get_docs_for_click
 from typer.main import get_command
 
+# Rows of a table are long lines.
+# ruff: noqa: E501
 HEAD = """\
 # Command line
 
@@ -40,6 +42,29 @@ error is `{"error": [...]}`, a line for each problem, with the exit code that it
 ccmodel check data/raw/loops --json | jq '.findings[].text'
 ccmodel diagnose data/raw/loops --out out --json | jq '.verdict'
 ```
+
+## Keys of the JSON documents
+
+Keys are added in later versions, and never renamed or removed. A key has its unit at its end (`stroke_rad`), or the
+unit is a value beside it (`unit`). A value that there is not is `null`. `out` is what the command has written.
+
+| command | keys |
+|---|---|
+| `init` | `batch_file`; `fill_in`: a list of `line` and `text` |
+| `import` | without a map `map`, `files` (by file a list of `column`, `signal`, `unit`, `sign`, `sure`, `why`), `missing`, `remarks`; with one `folder`, `recordings` (by id `samples`, `columns`, `remarks`), `left_out`, `batch_file_drafted` |
+| `check` | `usable`; `recordings`: by id `samples`, `rate_Hz`, `duration_s`, `rest_s`, `stroke_rad`, `frequency_Hz`, `cycles`, `wave`, and `channels`, a list of `name`, `low`, `high`, `noise`, `step`, `unit`; `findings`: a list of `batch`, `file`, `row`, `column`, `severity` ("warning", "refused" or "inconsistent"), `text`, `confidence`, `contradicts`, and `line`, where and what in one line |
+| `fit` | the model file: `format`, `parameters` (by name, which ends with the unit), `mechanisms`, `rig`, `intervals` (90 %, by parameter `low`, `high`, `sd`), `provenance`; `fit`: `succeeded`, `message`, `mean_square`, `recordings`, `at_bound`; `out`, `warnings`, `notes`, `left_out` |
+| `simulate` | `out`, `recording`, `samples`, `pretension_N` |
+| `predict` | `out`; `errors`: a list with a row for each recording and channel, as in the table of errors of a run; `left_out` |
+| `diagnose` | [diagnosis.json](diagnosis.md): `format`, `batch`, `verdict`, `is_held`, `location`, `mechanisms`, `alternatives`, `likeliest`, `nearest`, `fit`, `next_experiment`, `not_judged`, `headline`, `provenance`; `out` |
+| `check` of `accuracy` | `summary`, `lost`, `gained`, `not_compared` |
+| `accept` of `accuracy` | `baseline`, `history`, `batches` |
+| `history` of `accuracy` | `history`: a list of its rows; `left_out` |
+| `mechanisms` | a list of mechanisms, or with NAME one: `name`, `summary`, `places`, `equation`, `tex`, `signature`, `look_alikes`, `separating_experiment`, `depends_on_rate`, `source`; `parameters`: a list of `name`, `meaning`, `unit` ("1" for a pure number), `low`, `high`, `signed` (both signs are possible), `start`, `default` (`null` if it must be given) |
+| `report` | `verdicts`: a list of `batch`, `verdict`, `sentence`, `held_out_error` (by channel `before`, `after`, `noise`, `unit`), `page`; `left_out`, `inconsistent`, `warnings`, `page` |
+| `import-mis-tool` | `batches`; `findings`, as of `check` |
+
+`table-one` prints its `summary.json`.
 
 ## Exit codes
 
