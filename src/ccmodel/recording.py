@@ -3,8 +3,9 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from pathlib import Path
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 import pandas as pd
@@ -13,6 +14,10 @@ from numpy.typing import NDArray
 
 from ccmodel.channels import CABLES, CHANNELS, TENSIONS, unit_of
 from ccmodel.geometry import ConduitPath
+from ccmodel.typed import InputError, advice
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # What holds the far end of a single cable.
 FAR_ENDS = ("spring", "fixed", "measured-tension", "measured-motion")
@@ -99,8 +104,16 @@ class Recording:
     def __getitem__(self, wanted: slice) -> "Recording": ...
 
     def __getitem__(self, wanted: str | slice) -> "NDArray | Recording":
-        """A channel by its name, or by a slice the recording with these samples of all channels."""
+        """A channel by its name, or by a slice the recording with these samples of all channels.
+
+        Raises
+        ------
+        InputError
+            If the recording has no such channel.
+        """
         if isinstance(wanted, str):
+            if wanted not in self.channels:
+                raise InputError(f"{self.batch}/{self.id}: no channel '{wanted}'; {advice(wanted, self.channels)}")
             return self.channels[wanted]
         channels = {name: values[wanted] for name, values in self.channels.items()}
         return replace(self, time_s=self.time_s[wanted], channels=channels)
@@ -118,6 +131,22 @@ class Recording:
     def to_xarray(self) -> xr.Dataset:
         """Channels over ``time_s`` and the conduit's pieces; units and sources are attributes of the variables."""
         return _to_dataset(self)
+
+    def plot(self, channel: str | None = None) -> "Figure":
+        """Channels over time, a panel for each.
+
+        Parameters
+        ----------
+        channel : str, optional
+            One channel alone, as ``tau_in_Nm``; without it, every angle, torque and sum of tensions.
+
+        Raises
+        ------
+        InputError
+            If the recording does not have the channel.
+        """
+        # By name: no computation on recordings depends on how they are drawn.
+        return import_module("ccmodel.api.figures").channels([self], channel)
 
     @property
     def tensions(self) -> tuple[str, ...]:

@@ -166,6 +166,13 @@ def nearest(name: str, known: Iterable[str], cutoff: float = 0.75) -> str | None
     return by_lower[matches[0]] if matches else None
 
 
+def advice(name: str, known: Iterable[str]) -> str:
+    """What to state in place of an unknown name: the known one it misspells, otherwise the known ones."""
+    names = list(known)
+    guess = nearest(name, names)
+    return f"did you mean '{guess}'?" if guess else f"there is {', '.join(names) or 'none'}"
+
+
 class _Empty:
     """The value of a key that has none; `null` is a value."""
 

@@ -38,6 +38,26 @@ def test_one_channel_can_be_chosen(batch):
         batch.plot("tau_in")
 
 
+def test_a_recording_is_drawn_alone(batch):
+    figure = batch["t-7N"].plot("F_drive_N")
+    assert labels(figure) == ([r"$F_{drive}$ (N)"], ["time (s)"])
+    assert figure.axes[0].lines[0].get_ydata() == pytest.approx(batch["t-7N"]["F_drive_N"])
+
+
+def test_a_prediction_is_drawn_over_its_recording(fitted, batch):
+    prediction = cc.predict(fitted, batch)
+    figure = prediction.plot()
+    assert len(figure.axes) == 5 * 3
+    assert "simulated" in figure.get_suptitle()
+    assert [t.get_text() for t in figure.legends[0].get_texts()] == ["recorded", "predicted"]
+    (ax,) = prediction.plot("tau_in_Nm", recording="t-6N").axes
+    assert ax.get_ylabel() == r"$\tau_{in}$ (mN·m)"
+    for line, of in zip(ax.lines, (batch, prediction), strict=True):
+        assert line.get_ydata() == pytest.approx(1e3 * of["t-6N"]["tau_in_Nm"])
+    with pytest.raises(cc.InputError, match="did you mean 'tau_in_Nm'"):
+        prediction.plot("tau_in")
+
+
 def test_residuals_have_a_panel_for_each_channel_and_recording(fitted):
     figure = fitted.plot_residuals()
     assert len(figure.axes) == 5 * 3
@@ -55,7 +75,7 @@ def test_errors_of_a_diagnosis_are_over_the_noise_floor(found):
     (ax,) = found.plot().axes
     assert ax.get_xlabel() == "root mean square error on held-out recordings (noise floors)"
     assert [t.get_text() for t in ax.get_yticklabels()] == ["θ_out", "τ_in", "τ_out", "F_drive", "F_load"]
-    ratios = found.errors()["before"] / found.errors()["noise"]
+    ratios = found.errors["before"] / found.errors["noise"]
     assert [bar.get_width() for bar in ax.patches] == pytest.approx(list(ratios))
 
 

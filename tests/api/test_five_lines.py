@@ -2,6 +2,8 @@
 
 import gzip
 import json
+import re
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -13,6 +15,7 @@ import ccmodel as cc
 from builders import spoil, write_batch
 from ccmodel import cli
 from ccmodel.model.files import read_model as parameters_of
+from ccmodel.model.general.run import Active
 
 TIMES = np.arange(0, 2, 0.004)
 MOTION = pd.DataFrame({"time_s": TIMES, "theta_in_rad": 0.5 * np.sin(2 * np.pi * TIMES)})
@@ -123,7 +126,7 @@ def test_a_diagnosis_shows_its_verdict_and_its_candidates(found, truth):
     candidates = found.to_frame()
     assert candidates.index[0] == "the calibrated model"
     assert candidates.loc["the calibrated model", "mean_square"] == pytest.approx(1, abs=0.5)
-    assert (found.errors()["after"] == found.errors()["before"]).all()
+    assert list(found.errors.columns) == ["before", "noise", "unit"]
     assert found.nearest is None
     assert found.model.parameters.stiffness_N_per_m == pytest.approx(truth["stiffness_N_per_m"], rel=5e-3)
 
@@ -137,6 +140,71 @@ def test_a_model_simulates_a_motion_without_its_batch(fitted, batch):
     first, last = (cc.simulate(fitted.model, MOTION, recording=f"t-{T}N")["F_drive_N"][0] for T in (7, 5))
     assert (first, last) == (pytest.approx(14.0), pytest.approx(10.0))
     assert cc.simulate(fitted.model, MOTION, pretension_N=3.0)["F_drive_N"][0] == pytest.approx(6.0)
+
+
+def test_a_fit_or_a_diagnosis_stands_for_its_model(fitted, found, batch):
+    tau_in = cc.simulate(fitted.model, MOTION)["tau_in_Nm"]
+    assert np.array_equal(cc.simulate(fitted, MOTION)["tau_in_Nm"], tau_in)
+    assert np.array_equal(cc.simulate(found, MOTION)["tau_in_Nm"], tau_in)
+    assert cc.predict(fitted, batch).errors.equals(cc.predict(fitted.model, batch).errors)
+
+
+def test_a_recording_is_a_motion(fitted, batch):
+    recording = batch["t-6N"]
+    simulated = cc.simulate(fitted, recording)
+    assert np.array_equal(simulated.time_s, recording.time_s)
+    assert np.array_equal(simulated["theta_in_rad"], recording["theta_in_rad"])
+
+
+def test_friction_of_the_drive_pulley_is_in_the_derived_tensions_alone(fitted):
+    """The drive's motion is prescribed: the cables do not feel the bearing, the torque and what follows from it do."""
+    friction = Active("pulley-friction", "drive-pulley", {"friction_torque": 5e-3, "presliding": 2e-3})
+    model = cc.Model(replace(fitted.model.parameters, mechanisms=(friction,)), fitted.model.rig)
+    with_it, alone = cc.simulate(model, MOTION), cc.simulate(model.without("pulley-friction"), MOTION)
+    assert max(abs(with_it["T1_N"] - alone["T1_N"])) == pytest.approx(
+        5e-3 / 2 / model.parameters.drive_radius_m, rel=0.02
+    )
+    # The two solvers differ by as much as their grids do.
+    for channel in ("F_drive_N", "T2_N"):
+        np.testing.assert_allclose(with_it[channel], alone[channel], atol=0.02)
+
+
+def test_a_prediction_is_written_as_the_command_writes_it(fitted, folder, tmp_path):
+    fitted.save(tmp_path / "fit.json")
+    cc.predict(tmp_path / "fit.json", folder, tmp_path / "mine")
+    words = ["predict", folder, "--model", tmp_path / "fit.json", "--out", tmp_path / "command"]
+    assert CliRunner().invoke(cli.app, list(map(str, words))).exit_code == 0
+    written = sorted(file.name for file in (tmp_path / "mine").iterdir())
+    assert written == ["t-5N.csv", "t-6N.csv", "t-7N.csv"]
+    for name in written:
+        assert (tmp_path / "mine" / name).read_bytes() == (tmp_path / "command" / name).read_bytes()
+
+
+def test_a_simulation_is_written_as_the_command_writes_it(fitted, tmp_path):
+    fitted.save(tmp_path / "fit.json")
+    MOTION.to_csv(tmp_path / "motion.csv", index=False)
+    cc.simulate(fitted, tmp_path / "motion.csv", out=tmp_path / "new" / "mine.csv")
+    words = ["simulate", tmp_path / "motion.csv", "--model", tmp_path / "fit.json", "--out", tmp_path / "command.csv"]
+    assert CliRunner().invoke(cli.app, list(map(str, words))).exit_code == 0
+    assert (tmp_path / "new" / "mine.csv").read_bytes() == (tmp_path / "command.csv").read_bytes()
+
+
+def test_a_batch_is_named_by_its_folder_or_its_file(folder, batch, monkeypatch):
+    assert cc.load(folder / "batch.yaml").folder == batch.folder
+    monkeypatch.setenv("HOME", str(folder.parent))
+    assert cc.load(f"~/{folder.name}").name == batch.name
+
+
+def test_a_fit_says_where_its_intervals_come_from_and_what_it_cannot_judge(fitted):
+    source = (
+        r"90 % intervals: Student's t of the jackknife over 3 recordings, (.*) degrees of freedom: up to (.*) standard"
+    )
+    freedom, reach = map(float, re.search(source, repr(fitted)).groups())
+    # No more than recordings less one; Student's t of two degrees of freedom has 90 % within 2.92.
+    assert 1 <= freedom <= 2
+    assert reach >= 2.9
+    assert "note: friction apart from bend: one bend angle" in repr(fitted)
+    assert "note: friction apart from bend" in fitted._repr_html_()
 
 
 def test_a_motion_may_be_a_frame_a_dataset_or_a_file(fitted, tmp_path):
@@ -171,3 +239,26 @@ def test_progress_goes_to_a_function(batch):
     heard = []
     cc.fit(batch, progress=lambda text, done=None: heard.append(text))
     assert any("calibrating" in text for text in heard)
+
+
+def test_all_long_work_reports_progress(fitted, folder):
+    heard = []
+
+    def hear(text, done=None):
+        heard.append((text, done))
+
+    def shares(work):
+        heard.clear()
+        work()
+        return [done for _, done in heard if done is not None]
+
+    for work in (
+        lambda: cc.load(folder, progress=hear),
+        lambda: cc.predict(fitted, folder, progress=hear),
+        lambda: cc.simulate(fitted, MOTION, batch=folder, progress=hear),
+        lambda: cc.fit(folder, progress=hear),
+    ):
+        found = shares(work)
+        assert found == sorted(found)
+        assert found[0] == 0.0
+        assert found[-1] <= 1.0

@@ -23,17 +23,85 @@ def spoilt(**columns):
     [
         (MOTION.drop(columns="theta_in_rad"), "motion: no column theta_in_rad; the columns are time_s"),
         (MOTION.rename(columns={"time_s": "t"}), "motion: no column time_s; the columns are t, theta_in_rad"),
-        (spoilt(time_s=[0.0, 0.2, 0.1]), "motion: row 2: .* time_s increases"),
-        (spoilt(theta_in_rad=[0.0, np.nan, 0.1]), "motion: row 1: both are numbers"),
-        (spoilt(theta_in_rad=["a", "b", "c"]), "motion: time_s and theta_in_rad are numbers"),
+        (spoilt(time_s=[0.0, 0.2, 0.1]), "motion: row 2: time_s does not increase: 0.1 after 0.2"),
+        (spoilt(theta_in_rad=[0.0, np.nan, 0.1]), "motion: row 1: theta_in_rad is empty"),
+        (spoilt(theta_in_rad=["a", "b", "c"]), "motion: row 0: theta_in_rad is no finite number: 'a'"),
         (MOTION[:0], "motion: no samples"),
         (xr.Dataset({"angle": ("time_s", [0.0, 1.0])}, {"time_s": [0.0, 1.0]}), "motion: no column theta_in_rad"),
-        ([0.0, 1.0], "motion: a DataFrame, a Dataset or a CSV file; got list"),
+        ([0.0, 1.0], "motion: a DataFrame, a Dataset, a Recording or a CSV file; got list"),
     ],
 )
 def test_a_motion_that_cannot_be_simulated_is_refused_by_name(fitted, motion, line):
     with pytest.raises(cc.InputError, match=line):
         cc.simulate(fitted.model, motion)
+
+
+@pytest.mark.parametrize(
+    "text, line",
+    [
+        ("time_s;theta_in_rad\n0;0\n1;1\n", "the separator is ';'; a comma is expected"),
+        ("time_s,theta_in_rad\n0,0\n1,\n2,1\n", "row 3: theta_in_rad is empty"),
+        ("time_s,theta_in_rad\n0,0\n\n2,1\n", "row 3: time_s is empty"),
+        ("time_s,theta_in_rad\n0,0\n1,inf\n", "row 3: theta_in_rad is no finite number: 'inf'"),
+        ("time_s,theta_in_rad\n0,0\n1,one\n", "row 3: theta_in_rad is no finite number: 'one'"),
+        ("time_s,theta_in_rad\n0,0\n0,1\n", "row 3: time_s does not increase: 0 after 0"),
+        ("time_s,theta_in_rad\n", "no samples"),
+        ("", "is empty; a motion is a CSV with the columns time_s and theta_in_rad"),
+        ("t,angle\n0,0\n", "no column time_s and no theta_in_rad; the columns are t, angle"),
+    ],
+)
+def test_a_file_of_a_motion_is_refused_with_its_row(fitted, tmp_path, text, line):
+    file = tmp_path / "motion.csv"
+    file.write_text(text)
+    with pytest.raises(cc.InputError) as refused:
+        cc.simulate(fitted, file)
+    assert str(refused.value) == f"{file}: {line}"
+
+
+def test_blank_lines_at_the_end_of_a_motion_do_not_matter(fitted, tmp_path):
+    file = tmp_path / "motion.csv"
+    file.write_text(MOTION.to_csv(index=False) + "\n\n")
+    assert cc.simulate(fitted, file).time_s.size == len(MOTION)
+
+
+@pytest.mark.parametrize("given, line", [(None, "got None"), ("first", "got a Recording alone"), (3, "got int")])
+def test_what_is_no_batch_is_named(batch, given, line):
+    given = batch.recordings[0] if given == "first" else given
+    with pytest.raises(cc.InputError, match=f"batch: a Batch or its folder; {line}"):
+        cc.fit(given)
+
+
+def test_swapped_arguments_are_recognised(fitted, batch):
+    with pytest.raises(cc.InputError, match="model: a Model, .* comes first; got Batch"):
+        cc.predict(batch, fitted.model)
+    with pytest.raises(cc.InputError, match="model: .* comes first; got DataFrame"):
+        cc.simulate(MOTION, fitted.model)
+    with pytest.raises(cc.InputError, match="batch: a Batch or its folder; got Model"):
+        cc.predict(fitted.model, fitted.model)
+
+
+@pytest.mark.parametrize("pretension_N", ["x", -1.0, float("nan"), float("inf")])
+def test_a_pretension_that_is_none_is_refused(fitted, pretension_N):
+    with pytest.raises(cc.InputError, match="pretension_N: a tension that is not negative, N; got"):
+        cc.simulate(fitted, MOTION, pretension_N=pretension_N)
+
+
+def test_a_step_that_leaves_few_samples_is_refused(batch):
+    for work in (cc.fit, cc.diagnose):
+        with pytest.raises(cc.InputError, match="step_s: 100 s leaves 1 of the 625 samples of t-7N; 20 are needed"):
+            work(batch, step_s=100.0)
+
+
+def test_a_channel_that_is_not_there_is_named(batch):
+    with pytest.raises(cc.InputError, match="known/t-7N: no channel 'tau_in'; did you mean 'tau_in_Nm'"):
+        batch["t-7N"]["tau_in"]
+    with pytest.raises(cc.InputError, match="no channel 'x'; there is theta_in_rad, "):
+        batch["t-7N"]["x"]
+
+
+def test_a_mechanism_that_a_model_does_not_have_is_named(fitted):
+    with pytest.raises(cc.InputError, match="no mechanism 'kink'; there is none"):
+        fitted.model.without("kink")
 
 
 def test_an_old_model_file_needs_the_batch(fitted, batch, tmp_path):
@@ -147,5 +215,7 @@ def test_inputs_that_contradict_one_another_have_a_verdict_of_their_own(contradi
     assert "contradict" in found._repr_html_()
     with pytest.raises(cc.InputError, match="no model was fitted"):
         found.plot()
+    with pytest.raises(cc.InputError, match="no model was fitted.*; verdict: inputs-inconsistent"):
+        cc.simulate(found, MOTION)
     with pytest.raises(cc.InputError, match="holds no model"):
         cc.read_model(tmp_path / "out" / "model.json")

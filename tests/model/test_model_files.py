@@ -5,7 +5,7 @@ from dataclasses import fields
 
 import pytest
 
-from ccmodel.model.files import model_as_dict, read_model
+from ccmodel.model.files import model_as_dict, read_model_file
 from ccmodel.model.general.run import Active
 from ccmodel.model.parameters import Parameters
 from ccmodel.typed import InputError
@@ -32,7 +32,7 @@ def write(path, model=MODEL, **changed):
 
 
 def test_a_model_comes_back_as_it_was_written(tmp_path):
-    assert read_model(write(tmp_path / "model.json")) == MODEL
+    assert read_model_file(write(tmp_path / "model.json")).parameters == MODEL
 
 
 def test_keys_of_the_format_stay(tmp_path):
@@ -45,4 +45,18 @@ def test_keys_of_the_format_stay(tmp_path):
 
 def test_an_unknown_key_is_refused_by_name(tmp_path):
     with pytest.raises(InputError, match="stifness"):
-        read_model(write(tmp_path / "model.json", stifness=1.0))
+        read_model_file(write(tmp_path / "model.json", stifness=1.0))
+
+
+def test_a_required_value_is_not_null(tmp_path):
+    with pytest.raises(InputError, match=r"parameters\.stiffness_N_per_m: null; a number is needed"):
+        read_model_file(write(tmp_path / "model.json", stiffness_N_per_m=None))
+    assert read_model_file(write(tmp_path / "model.json", pretension_N=None)).parameters == MODEL
+
+
+def test_a_value_that_is_missing_is_named(tmp_path):
+    content = json.loads(write(tmp_path / "model.json").read_text())
+    del content["parameters"]["friction_coefficient"]
+    (tmp_path / "model.json").write_text(json.dumps(content))
+    with pytest.raises(InputError, match="parameters: no friction_coefficient; a model needs it"):
+        read_model_file(tmp_path / "model.json")

@@ -166,8 +166,8 @@ def as_batch(batch: Batch | str | Path, progress: Progress = silent) -> Batch:
         return batch
     if isinstance(batch, str | Path):
         return load(batch, progress=progress)
-    what = {Recording: "a Recording; load() reads its batch"}.get(type(batch), type(batch).__name__)
-    raise InputError(f"batch: a Batch or its folder; got {what}")
+    what = "a Recording alone" if isinstance(batch, Recording) else type(batch).__name__
+    raise InputError(f"batch: a Batch or its folder; got {'None' if batch is None else what}")
 
 
 def check_consistent(batch: Batch, trust_inputs: bool) -> None:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from ccmodel.api.batch import Batch, as_batch
-from ccmodel.api.model import as_model
-from ccmodel.api.options import Candidates, Tolerance, diagnosis_options, progress_of
+from ccmodel.api.model import HasModel, as_model
+from ccmodel.api.options import Candidates, Tolerance, check_step, diagnosis_options, progress_of
 from ccmodel.failure import ModelError
 from ccmodel.model.files import Model
 from ccmodel.paths import try_folder, writing
@@ -94,16 +94,19 @@ class Diagnosis:
         columns = ["candidate", "mean_square", "lack_of_fit", "probability", "why"]
         return pd.DataFrame(rows, columns=columns).set_index("candidate").astype({"lack_of_fit": float})
 
+    @property
     def errors(self) -> pd.DataFrame:
         """Root mean square error on held-out recordings, a row for each channel.
 
-        Columns ``before`` (calibrated model), ``after`` (best model), with an unexplained batch ``nearest`` (the model
-        that was not accepted), and ``noise`` (the noise floor), all in ``unit``.
+        Columns ``before`` (calibrated model), ``after`` (best model, if it has further mechanisms), with an unexplained
+        batch ``nearest`` (the model that was not accepted), and ``noise`` (the noise floor), all in ``unit``.
         """
         frame = pd.DataFrame.from_dict(self.report["fit"]["error"], orient="index").rename_axis("channel")
-        nearest = (self.report["nearest"] or {}).get("error")
-        if nearest:
-            frame.insert(2, "nearest", pd.Series({channel: one["after"] for channel, one in nearest.items()}))
+        if "after" in frame and (frame["after"] == frame["before"]).all():
+            del frame["after"]
+        if nearest := (self.report["nearest"] or {}).get("error"):
+            of_nearest = pd.Series({channel: one["after"] for channel, one in nearest.items()})
+            frame.insert(frame.columns.get_loc("noise"), "nearest", of_nearest)
         return frame
 
     def plot(self) -> "Figure":
@@ -120,7 +123,7 @@ class Diagnosis:
             raise InputError(
                 f"{self.batch.name}: verdict '{self.verdict}': no model was fitted, so there are no errors"
             )
-        return figures.errors(self.errors(), self.batch, self.verdict)
+        return figures.errors(self.errors, self.batch, self.verdict)
 
     def save(self, folder: str | Path) -> None:
         """Write diagnosis.json, report.html and the models, as ``ccmodel diagnose --out`` does.
@@ -149,7 +152,7 @@ class Diagnosis:
         paragraphs = "".join(f"<p>{line}</p>" for line in said)
         if self._outcome.found is None:
             return paragraphs
-        errors = self.errors()
+        errors = self.errors
         ratios = errors.drop(columns=["noise", "unit"]).div(errors["noise"], axis=0).rename(index=SYMBOL)
         caption = f"<p>held-out error over the noise floor, {self._recorded}</p>"
         return paragraphs + caption + ratios.to_html(float_format="{:.1f}".format, border=0)
@@ -168,7 +171,7 @@ def diagnose(
     batch: Batch | str | Path,
     out: str | Path | None = None,
     *,
-    baseline: Model | str | Path | None = None,
+    baseline: Model | HasModel | str | Path | None = None,
     freeze: bool = False,
     without: str | Collection[str] = (),
     tolerance: Tolerance | None = None,
@@ -188,8 +191,8 @@ def diagnose(
         A batch, or its folder.
     out : str or Path, optional
         Folder for diagnosis.json, the page and the models; `Diagnosis.save` writes them later.
-    baseline : Model, str or Path, optional
-        Model to start from, or its file, instead of the estimates of ``batch.yaml``.
+    baseline : Model, Fit, Diagnosis, str or Path, optional
+        Model to start from, what has one, or its file, instead of the estimates of ``batch.yaml``.
     freeze : bool
         Whether the baseline keeps all its values: finds what has changed since it was fitted.
     without : str or collection of str
@@ -228,6 +231,7 @@ def diagnose(
         try_folder(out)
     with progress_of(progress) as report:
         batch = as_batch(batch, within(report, 0.0, INGEST))
+        check_step(batch.recordings, step_s)
         batch._ingested.check_usable(batch.folder, trust_inputs)
         part = within(report, INGEST, PAGE)
         try:

@@ -14,10 +14,11 @@ from ccmodel.api.batch import Batch
 from ccmodel.channels import CHANNELS, MEASURED, TABLE, THETA_IN
 from ccmodel.diagnosis.run import Calibration
 from ccmodel.diagnosis.whitening import Whitened
+from ccmodel.errors import is_compared
 from ccmodel.recording import ORIGIN, Recording
 from ccmodel.report.figures import COLOURS, LINES, STYLE, legend_below, title_figure
 from ccmodel.report.verdict import NOT_ACCEPTED, SYMBOL
-from ccmodel.typed import InputError, nearest
+from ccmodel.typed import InputError, advice
 
 # Most recordings that have a column of their own.
 MOST_COLUMNS = 6
@@ -45,9 +46,7 @@ def channels(recordings: Sequence[Recording], channel: str | None = None) -> Fig
     """Channels over time, a panel for each, with all recordings that have it."""
     recorded = [c for c in CHANNELS if any(c in r for r in recordings)]
     if channel is not None and channel not in recorded:
-        guess = nearest(channel, recorded)
-        advice = f"did you mean '{guess}'?" if guess else f"there is {', '.join(recorded) or 'none'}"
-        raise InputError(f"no recording has the channel '{channel}'; {advice}")
+        raise InputError(f"no recording has the channel '{channel}'; {advice(channel, recorded)}")
     shown = [channel] if channel else [c for c in recorded if c in (THETA_IN, *MEASURED)]
     figure, axes = plt.subplots(
         len(shown), 1, figsize=(9, 0.9 + (2.4 if channel else 1.5) * len(shown)), sharex=True, squeeze=False
@@ -59,6 +58,34 @@ def channels(recordings: Sequence[Recording], channel: str | None = None) -> Fig
         ax.set_ylabel(_label(name))
     axes[-1, 0].set_xlabel("time (s)")
     title_figure(figure, f"{recordings[0].batch}: {ORIGIN[recordings[0].origin]}")
+    legend_below(figure, axes)
+    return figure
+
+
+@_figure
+def compared(pairs: Sequence[tuple[Recording, Recording]], channel: str | None = None) -> Figure:
+    """Recorded and predicted channels over time, by channel (rows) and recording (columns)."""
+    common = [c for c in CHANNELS if any(is_compared(*pair, c) for pair in pairs)]
+    if channel is not None and channel not in common:
+        raise InputError(f"no recording and its prediction have the channel '{channel}'; {advice(channel, common)}")
+    rows = [channel] if channel else [c for c in common if c in MEASURED]
+    columns = pairs[:MOST_COLUMNS]
+    figure, axes = plt.subplots(
+        len(rows), len(columns), figsize=(max(7.5, 3.2 * len(columns)), 0.9 + (2.6 if channel else 1.6) * len(rows)),
+        sharex="col", sharey="row", squeeze=False,
+    )  # fmt: skip
+    for j, (recorded, predicted) in enumerate(columns):
+        for ax, name in zip(axes[:, j], rows, strict=True):
+            if is_compared(recorded, predicted, name):
+                scale = TABLE[name].scale
+                ax.plot(recorded.time_s, scale * recorded[name], lw=1.6, color="#8c8c8c", label="recorded")
+                ax.plot(predicted.time_s, scale * predicted[name], lw=0.9, color=COLOURS[1], label="predicted")
+        axes[0, j].set_title(recorded.id, fontsize=9)
+        axes[-1, j].set_xlabel("time (s)")
+    for ax, name in zip(axes[:, 0], rows, strict=True):
+        ax.set_ylabel(_label(name))
+    some = f"; the first {len(columns)} of {len(pairs)}" if len(columns) < len(pairs) else ""
+    title_figure(figure, f"{pairs[0][0].batch}: {ORIGIN[pairs[0][0].origin]} and prediction{some}")
     legend_below(figure, axes)
     return figure
 
@@ -109,7 +136,7 @@ def _floor(whitened: Whitened) -> NDArray:
 def errors(table: pd.DataFrame, batch: Batch, verdict: str) -> Figure:
     """Held-out errors by channel over the noise floor: a bar for each model."""
     models = {"before": "calibrated model"}
-    if (table["after"] != table["before"]).any():
+    if "after" in table:
         models["after"] = "best model"
     if "nearest" in table:
         models["nearest"] = f"nearest model, {NOT_ACCEPTED}"

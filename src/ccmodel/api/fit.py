@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
+from scipy.stats import t as student
 
 from ccmodel.api.batch import Batch, as_batch, check_consistent
-from ccmodel.api.options import Tolerance, progress_of, settings_of
+from ccmodel.api.options import Tolerance, check_step, progress_of, settings_of
 from ccmodel.diagnosis.run import Calibration, calibrate
 from ccmodel.diagnosis.settings import ADEQUATE
 from ccmodel.failure import ModelError
-from ccmodel.inference.intervals import Interval
+from ccmodel.inference.intervals import COVERAGE, Interval
 from ccmodel.model.files import Model, RigConditions
 from ccmodel.model.parameters import Parameters, unit_of_parameter
 from ccmodel.paths import writing
@@ -48,8 +49,9 @@ class Fit:
     def intervals(self) -> dict[str, Interval]:
         """The 90 % interval (``low``, ``high``) and standard deviation (``sd``) of each value, SI units.
 
-        They follow from how the values change as each recording is left out (the jackknife), with Student's
-        distribution; of a single recording, from its noise.
+        They follow from how the values change as each recording is left out (the jackknife), with Student's t of at
+        most one degree of freedom less than recordings: 6.3 standard deviations to each side for two recordings. Of a
+        single recording they follow from its noise.
         """
         return self._calibration.fit.intervals()
 
@@ -165,16 +167,16 @@ class Fit:
         return figures.residuals(self._calibration, self.batch)
 
     def __repr__(self) -> str:
-        return "\n".join([self._title, self._shown.to_string(), self._foot, *self._shown_warnings])
+        return "\n".join([self._title, self._shown.to_string(), *self._foot, *self._shown_warnings])
 
     def _repr_html_(self) -> str:
         lines = "".join(f"<li>{escape(line)}</li>" for line in self._shown_warnings)
-        foot = f"<p>{self._foot}</p>{f'<ul>{lines}</ul>' if lines else ''}"
+        foot = f"<p>{'<br>'.join(self._foot)}</p>{f'<ul>{lines}</ul>' if lines else ''}"
         return f"<p>{escape(self._title)}</p>{self._shown.to_html(border=0)}{foot}"
 
     @property
     def _shown_warnings(self) -> list[str]:
-        return [f"warning: {line}" for line in self.warnings]
+        return [*(f"warning: {line}" for line in self.warnings), *(f"note: {line}" for line in self.notes)]
 
     @property
     def _title(self) -> str:
@@ -182,8 +184,20 @@ class Fit:
         return f"Fit of the paper's model to {self.batch.name}: {n} recording{'' if n == 1 else 's'}; {self.message}"
 
     @property
-    def _foot(self) -> str:
-        return f"mean square of the held-out residuals over their noise: {self.mean_square:.3g} (1 is noise)"
+    def _foot(self) -> list[str]:
+        mean_square = f"mean square of the held-out residuals over their noise: {self.mean_square:.3g} (1 is noise)"
+        return [self._source_of_intervals, mean_square]
+
+    @property
+    def _source_of_intervals(self) -> str:
+        """Where the intervals come from, and how far they reach at most."""
+        fewest = float(self._calibration.fit.degrees_of_freedom.min())
+        reach = f"{student.ppf(0.5 + COVERAGE / 2, fewest):.1f} standard deviations to each side"
+        n = len(self.recordings)
+        if n == 1:
+            return f"90 % intervals: from the noise of the single recording, {reach}"
+        freedom = f"{fewest:.2g} degree{'' if fewest == 1 else 's'} of freedom"
+        return f"90 % intervals: Student's t of the jackknife over {n} recordings, {freedom}: up to {reach}"
 
     @property
     def _shown(self) -> pd.DataFrame:
@@ -267,6 +281,7 @@ def fit(
     names = [free] if isinstance(free, str) else free
     with progress_of(progress) as report:
         batch = as_batch(batch, within(report, 0.0, INGEST))
+        check_step(batch.recordings, step_s)
         check_consistent(batch, trust_inputs)
         batch._ingested.check_usable(batch.folder)
         try:

@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass
 from html import escape
+from math import inf
+from numbers import Real
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
 
 import pandas as pd
 import xarray as xr
@@ -28,9 +30,21 @@ from ccmodel.steps.predict import (
 )
 from ccmodel.typed import InputError
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 __all__ = ["Model", "Motion", "Prediction", "predict", "read_model", "simulate"]
 
-Motion: TypeAlias = pd.DataFrame | xr.Dataset | str | Path
+Motion: TypeAlias = pd.DataFrame | xr.Dataset | Recording | str | Path
+
+
+@runtime_checkable
+class HasModel(Protocol):
+    """A fit or a diagnosis, which stands for its model."""
+
+    @property
+    def model(self) -> Model | None:
+        """Its model, if there is one."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,13 +64,39 @@ class Prediction(Recordings):
 
     recordings: tuple[Recording, ...]
     errors: pd.DataFrame
-    left_out: tuple[str, ...] = ()
+    left_out: tuple[str, ...]
+    # What was predicted, in the order of `recordings`.
+    _recorded: tuple[Recording, ...]
 
     @property
     def table(self) -> pd.DataFrame:
         """Root mean square error over the last cycle in % of peak to peak: recordings by channels."""
         by_channel = self.errors.pivot(index="recording", columns="channel", values="nrmse_percent")
         return by_channel[self.errors["channel"].unique()].rename_axis(columns=None)
+
+    def plot(self, channel: str | None = None, recording: str | None = None) -> "Figure":
+        """Recorded and predicted channels over time: a row for each channel, a column for each recording.
+
+        Parameters
+        ----------
+        channel : str, optional
+            One channel alone, as ``tau_in_Nm``; without it, every angle, torque and sum of tensions that was not given
+            to the model.
+        recording : str, optional
+            Id of one recording alone; without it, the first six.
+
+        Raises
+        ------
+        InputError
+            If there is no such recording, or it has no such channel.
+        """
+        from ccmodel.api import figures
+
+        shown = self.recordings if recording is None else (self[recording],)
+        if not shown:
+            raise InputError("no recording has a prediction")
+        pairs = [pair for pair in zip(self._recorded, self.recordings, strict=True) if pair[1] in shown]
+        return figures.compared(pairs, channel)
 
     def save(self, folder: str | Path) -> None:
         """Write a CSV for each recording, as ``ccmodel predict --out`` does: its id, all channels over time.
@@ -116,7 +156,7 @@ def read_model(file: str | Path) -> Model:
 
 
 def predict(
-    model: Model | str | Path,
+    model: Model | HasModel | str | Path,
     batch: Batch | str | Path,
     out: str | Path | None = None,
     *,
@@ -128,8 +168,8 @@ def predict(
 
     Parameters
     ----------
-    model : Model, str or Path
-        A model, or its file.
+    model : Model, Fit, Diagnosis, str or Path
+        A model, what has one, or its file.
     batch : Batch, str or Path
         A batch, or its folder.
     out : str or Path, optional
@@ -167,15 +207,15 @@ def predict(
         name = Path(model).stem if isinstance(model, str | Path) else "model"
         found = predicted(batch.recordings, known.parameters, name, within(report, READING, 1.0))
     refused = [str(f) for f in batch.findings if f.severity == "refused"]
-    simulations = tuple(simulated for _, simulated in found.pairs)
-    prediction = Prediction(simulations, found.errors, (*refused, *found.failures))
+    recorded, simulations = (tuple(pair[i] for pair in found.pairs) for i in (0, 1))
+    prediction = Prediction(simulations, found.errors, (*refused, *found.failures), recorded)
     if out is not None:
         prediction.save(out)
     return prediction
 
 
 def simulate(
-    model: Model | str | Path,
+    model: Model | HasModel | str | Path,
     motion: Motion,
     *,
     recording: str | None = None,
@@ -186,12 +226,20 @@ def simulate(
 ) -> Recording:
     """Simulate the sensor readings of a rig for a motion of its drive, by a model.
 
+    The drive angle is zero where both cables have the pretension, evenly along their length. A motion that begins
+    elsewhere begins with a step from zero to its first angle. The load angle is zero at the first sample.
+
+    All channels are readings of sensors. As in a recording, ``T1_N`` to ``T4_N`` follow from torques and sums of
+    tensions: T1 and T3 are ``F_drive_N`` / 2 plus and minus ``tau_in_Nm`` over twice the pulley's radius, T2 and T4 the
+    same at the load. Where the model has friction of a drive pulley, the torque contains it, and T1 and T3 are not the
+    cables' tensions; those are seen with ``model.without("pulley-friction")``, since the drive's motion is prescribed.
+
     Parameters
     ----------
-    model : Model, str or Path
-        A model, or its file. The load of the rig has to be a spring.
-    motion : DataFrame, xarray Dataset, str or Path
-        ``time_s`` (s, increasing) and ``theta_in_rad`` (rad), as columns, as the index, or in a CSV file.
+    model : Model, Fit, Diagnosis, str or Path
+        A model, what has one, or its file. The load of the rig has to be a spring.
+    motion : DataFrame, xarray Dataset, Recording, str or Path
+        ``time_s`` (s, increasing) and ``theta_in_rad`` (rad), as columns, as the index, in a CSV file, or as recorded.
     recording : str, optional
         Id of the recording whose conduits and pretension are used; without it, the first that the model was fitted to.
     batch : Batch, str or Path, optional
@@ -226,8 +274,8 @@ def simulate(
     """
     known = as_model(model)
     table, source = _motion(motion)
-    if pretension_N is not None and not pretension_N >= 0:
-        raise InputError(f"pretension_N: is not negative, N; got {pretension_N}")
+    if pretension_N is not None and not (isinstance(pretension_N, Real) and 0 <= pretension_N < inf):
+        raise InputError(f"pretension_N: a tension that is not negative, N; got {pretension_N!r}")
     if out is not None:
         try_file(out)
     with progress_of(progress) as report:
@@ -247,20 +295,38 @@ def simulate(
     return simulated
 
 
-def as_model(model: Model | str | Path) -> Model:
-    """A model, or the one in a file."""
-    return model if isinstance(model, Model) else read_model(model)
+def as_model(given: Model | HasModel | str | Path) -> Model:
+    """A model, that of a fit or a diagnosis, or the one in a file.
+
+    Raises
+    ------
+    InputError
+        If it is none of these, or the diagnosis has no model.
+    """
+    if isinstance(given, Model):
+        return given
+    if isinstance(given, str | Path):
+        return read_model(given)
+    if not isinstance(given, HasModel):
+        expected = "a Model, a Fit, a Diagnosis or a model file comes first"
+        raise InputError(f"model: {expected}; got {'None' if given is None else type(given).__name__}")
+    if given.model is None:
+        raise InputError(f"model: no model was fitted. {'; '.join(repr(given).splitlines()[:2])}")
+    return given.model
 
 
 def _motion(motion: Motion) -> tuple[pd.DataFrame, str]:
     """A motion as a checked table, and what it is called in messages."""
     if isinstance(motion, str | Path):
-        return read_motion(Path(motion)), str(motion)
+        return read_motion(existing_file(motion)), str(motion)
+    if isinstance(motion, Recording):
+        motion = motion.to_frame()
     if isinstance(motion, xr.Dataset):
         found = [name for name in MOTION if name in motion]
         motion = motion[found].to_dataframe() if found else pd.DataFrame(columns=list(map(str, motion)))
     if not isinstance(motion, pd.DataFrame):
-        raise InputError(f"motion: a DataFrame, a Dataset or a CSV file; got {type(motion).__name__}")
+        expected = "a DataFrame, a Dataset, a Recording or a CSV file"
+        raise InputError(f"motion: {expected}; got {'None' if motion is None else type(motion).__name__}")
     if motion.index.name in MOTION and motion.index.name not in motion:
         motion = motion.reset_index()
     return checked_motion(motion, "motion"), "motion"

@@ -10,10 +10,13 @@ from pydantic import ValidationError
 from ccmodel.channels import MEASURED
 from ccmodel.diagnosis.run import Options
 from ccmodel.progress import Progress, log_lines, shown, silent
+from ccmodel.recording import Recording, stride
 from ccmodel.studies.diagnosis.run import check_options, options_of
 from ccmodel.studies.diagnosis.settings import Diagnosing
 from ccmodel.typed import InputError
 
+# Samples of a recording that a fit needs at least: a motion there and back again, coarsely.
+FEWEST_SAMPLES = 20
 # Standard deviation of the model discrepancy that counts as noise, as a share of a channel's peak to peak.
 Tolerance = float | Mapping[str, float]
 # Candidates that are fitted whatever the screening says: one, or several, each of them one mechanism or two together.
@@ -93,6 +96,15 @@ def _line(error: Mapping[str, Any], prefix: str) -> str:
     name = str(error["loc"][0]) if error["loc"] else "candidates"
     shown_name = _ON_COMMAND_LINE.get(name, name) if prefix else name
     return f"{prefix}{shown_name}: {error['msg'].removeprefix('Value error, ').removeprefix('forced_candidates: ')}"
+
+
+def check_step(recordings: Sequence[Recording], step_s: float | None) -> None:
+    """Raise `InputError` if a step between compared samples leaves too few of a recording."""
+    for recording in recordings:
+        left = -(-recording.time_s.size // stride(recording, step_s))
+        if step_s is not None and left < FEWEST_SAMPLES:
+            text = f"{step_s:g} s leaves {left} of the {recording.time_s.size} samples of {recording.id}"
+            raise InputError(f"step_s: {text}; {FEWEST_SAMPLES} are needed")
 
 
 @contextmanager

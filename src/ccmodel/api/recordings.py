@@ -7,7 +7,7 @@ import pandas as pd
 import xarray as xr
 
 from ccmodel.recording import Recording
-from ccmodel.typed import InputError, nearest
+from ccmodel.typed import InputError, advice
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,9 +37,7 @@ class Recordings:
         """
         found = {recording.id: recording for recording in self.recordings}
         if id not in found:
-            guess = nearest(str(id), found)
-            advice = f"did you mean '{guess}'?" if guess else f"there is {', '.join(found) or 'none'}"
-            raise InputError(f"no recording '{id}'; {advice}")
+            raise InputError(f"no recording '{id}'; {advice(str(id), found)}")
         return found[id]
 
     def to_frame(self) -> pd.DataFrame:

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import MISSING, asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -15,9 +15,14 @@ from ccmodel.model.general.run import Active
 from ccmodel.model.parameters import FORMER_NAMES, Parameters
 from ccmodel.paths import writing
 from ccmodel.recording import FAR_ENDS, ORIGIN, Recording
-from ccmodel.typed import InputError, NotNegative, OneOf, Positive, TypedModel
+from ccmodel.typed import InputError, NotNegative, OneOf, Positive, TypedModel, advice
 
 FORMAT = 1
+
+# Parameters that a file may state, must state, and may state as null.
+_KNOWN = {f.name: f for f in fields(Parameters) if f.name not in ("mechanisms", "refinement")}
+_REQUIRED = [name for name, f in _KNOWN.items() if f.default is MISSING]
+_OPTIONAL = [name for name, f in _KNOWN.items() if "None" in str(f.type)]
 
 
 class _ActiveEntry(TypedModel):
@@ -185,6 +190,20 @@ class Model:
         """Mechanisms that act beside the paper's model: `name`, `place` and `values` of each."""
         return self.parameters.mechanisms
 
+    def without(self, *names: str) -> "Model":
+        """The same model without the mechanisms of these names.
+
+        Raises
+        ------
+        InputError
+            If it has no such mechanism.
+        """
+        acting = {m.name for m in self.mechanisms}
+        if unknown := [name for name in names if name not in acting]:
+            raise InputError(f"the model has no mechanism '{unknown[0]}'; {advice(unknown[0], sorted(acting))}")
+        left = tuple(m for m in self.mechanisms if m.name not in names)
+        return replace(self, parameters=replace(self.parameters, mechanisms=left))
+
     def as_dict(self) -> dict:
         """Content of its file, plain data."""
         content = model_as_dict(self.parameters, dict(self.provenance))
@@ -269,11 +288,15 @@ def _parameters(path: Path, stated: _ModelFile) -> Parameters:
     mechanisms = tuple(
         Active(m.name, m.place, registry.get(m.name).default | dict(m.values)) for m in stated.mechanisms
     )
-    try:
-        parameters: dict[str, Any] = {FORMER_NAMES.get(name, name): value for name, value in stated.parameters.items()}
-        return Parameters(**parameters, mechanisms=mechanisms)
-    except TypeError as error:
-        raise InputError(f"{path}: {error}") from None
+    values: dict[str, Any] = {FORMER_NAMES.get(name, name): value for name, value in stated.parameters.items()}
+    for name, value in values.items():
+        if name not in _KNOWN:
+            raise InputError(f"{path}: parameters: no parameter is called '{name}'; {advice(name, _KNOWN)}")
+        if value is None and name not in _OPTIONAL:
+            raise InputError(f"{path}: parameters.{name}: null; a number is needed")
+    if missing := [name for name in _REQUIRED if name not in values]:
+        raise InputError(f"{path}: parameters: no {', '.join(missing)}; a model needs it")
+    return Parameters(**values, mechanisms=mechanisms)
 
 
 def _rig(stated: _RigEntry | None) -> RigConditions | None:

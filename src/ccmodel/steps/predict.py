@@ -23,6 +23,7 @@ from ccmodel.typed import InputError
 # Share of reading the logs in the time of a prediction.
 READING = 0.5
 MOTION = ["time_s", THETA_IN]
+_EXPECTED = f"a motion is a CSV with the columns {' and '.join(MOTION)}"
 
 
 @dataclass(frozen=True)
@@ -188,13 +189,21 @@ def read_motion(file: Path) -> pd.DataFrame:
         If the file cannot be used.
     """
     try:
-        table = pd.read_csv(file, usecols=MOTION, dtype=float)
+        table = pd.read_csv(file, skipinitialspace=True, skip_blank_lines=False, low_memory=False)
+    except pd.errors.EmptyDataError:
+        raise InputError(f"{file}: is empty; {_EXPECTED}") from None
     except (OSError, ValueError) as error:
-        raise InputError(f"{file}: a motion is a CSV with the columns {' and '.join(MOTION)}; {error}") from None
-    return checked_motion(table, str(file), "line", 2)
+        raise InputError(f"{file}: {_EXPECTED}; {' '.join(str(error).split())}") from None
+    head = " ".join(map(str, table.columns))
+    for separator, name in ((";", "';'"), ("\t", "a tab")):
+        if separator in head and set(MOTION) & set(head.replace(separator, " ").split()):
+            raise InputError(f"{file}: the separator is {name}; a comma is expected")
+    # Blank lines at the end are none of the motion.
+    filled = np.flatnonzero(table.notna().any(axis=1))
+    return checked_motion(table[: filled[-1] + 1 if filled.size else 0], str(file), first=2)
 
 
-def checked_motion(table: pd.DataFrame, source: str, row: str = "row", first: int = 0) -> pd.DataFrame:
+def checked_motion(table: pd.DataFrame, source: str, first: int = 0) -> pd.DataFrame:
     """The columns of a motion, if they are numbers and time increases.
 
     Parameters
@@ -202,8 +211,8 @@ def checked_motion(table: pd.DataFrame, source: str, row: str = "row", first: in
     table : DataFrame
     source : str
         What the table is, in messages.
-    row, first : str, int
-        Name of a row there, and number of the first one.
+    first : int
+        Number of its first row there; the header of a file is row 1.
 
     Raises
     ------
@@ -213,14 +222,21 @@ def checked_motion(table: pd.DataFrame, source: str, row: str = "row", first: in
     if missing := [name for name in MOTION if name not in table]:
         columns = ", ".join(map(str, table.columns)) or "none"
         raise InputError(f"{source}: no column {' and no '.join(missing)}; the columns are {columns}")
-    try:
-        motion = table[MOTION].astype(float)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{source}: {' and '.join(MOTION)} are numbers; {error}") from None
-    bad = np.flatnonzero(~np.isfinite(motion).all(axis=1) | (motion["time_s"].diff() <= 0))
-    if bad.size:
-        where = f"{source}: {row} {bad[0] + first}"
-        raise InputError(f"{where}: both are numbers, and time_s increases from {row} to {row}")
-    if motion.empty:
+    if table.empty:
         raise InputError(f"{source}: no samples")
-    return motion.reset_index(drop=True)
+    table = table[MOTION].reset_index(drop=True)
+    motion = table.apply(pd.to_numeric, errors="coerce").astype(float)
+    faults = {name: np.flatnonzero(~np.isfinite(motion[name])) for name in MOTION}
+    faulty = [(rows[0], name) for name, rows in faults.items() if rows.size]
+    if faulty:
+        row, name = min(faulty, key=lambda one: one[0])
+        value = table[name].iloc[row]
+        fault = "is empty" if pd.isna(value) else f"is no finite number: {str(value)!r}"
+        raise InputError(f"{source}: row {row + first}: {name} {fault}")
+    time_s = motion["time_s"].to_numpy()
+    back = np.flatnonzero(np.diff(time_s) <= 0) + 1
+    if back.size:
+        row = back[0]
+        text = f"time_s does not increase: {time_s[row]:g} after {time_s[row - 1]:g}"
+        raise InputError(f"{source}: row {row + first}: {text}")
+    return motion
