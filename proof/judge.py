@@ -35,7 +35,7 @@ def judge(
     sources : Path
         The diagnosis's package.
     report : callable
-        Called with one line on the outcome.
+        Called with a line on each stage and on the outcome.
     with_regressors : bool
         Whether the reference regressors (`proof.regressors`) are fitted to the same recordings.
 
@@ -49,9 +49,12 @@ def judge(
     out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="case-") as folder:
         batch = Path(folder) / "batch" / case.name
+        report(f"{case.name}: recording")
         record(case, case.recordings, batch)
+        report(f"{case.name}: diagnosing, {conceal.core_s() - started:.0f} s of one core so far")
         digest = folder_digest(batch)
         completed = conceal.diagnose(batch, out, case.without, sources)
+        report(f"{case.name}: predicting held-out recordings, {conceal.core_s() - started:.0f} s of one core so far")
         diagnosis = _read_diagnosis(out / "diagnosis.json") if completed.is_usable else None
         held_out = _compare_with_held_out(case, batch, out, sources, with_regressors) if diagnosis else _HeldOut()
     result = {

@@ -11,15 +11,15 @@ from example_folder import noisy_batch
 THREADS = """
 import time
 from ccmodel.inference.pool import each, set_threads
-from ccmodel.studies.diagnosis import run
+import ccmodel
 
-def work(batch, out, *others):
+def work(batch, out, **others):
     set_threads(2)
     {before}
     print("working", flush=True)
     each(range(10_000), lambda i, item: time.sleep(0.05))
 
-run.diagnose = work
+ccmodel.diagnose = work
 from ccmodel.cli import main
 main()
 """

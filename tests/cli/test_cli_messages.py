@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 from example_folder import noisy_batch
@@ -95,10 +96,10 @@ def test_a_reader_that_leaves_is_no_finding(folder):
 
 
 def test_a_full_disk_is_one_line(folder, run, monkeypatch):
-    def full(*_):
+    def full(*_, **__):
         raise OSError(28, "No space left on device", "out/diagnosis.json")
 
-    monkeypatch.setattr("ccmodel.studies.diagnosis.run.diagnose", full)
+    monkeypatch.setattr("ccmodel.diagnose", full)
     ended = run("diagnose", folder / "raw/loops", "--out", folder / "out")
     assert (ended.code, ended.err) == (2, "out/diagnosis.json: No space left on device\n")
 
@@ -112,7 +113,7 @@ def test_a_full_disk_is_one_line(folder, run, monkeypatch):
     ],
 )
 def test_a_folder_is_tried_before_the_work(out, message, folder, run, monkeypatch):
-    monkeypatch.setattr("ccmodel.studies.diagnosis.run.diagnose", lambda *_: pytest.fail("worked"))
+    monkeypatch.setattr("ccmodel.diagnose", lambda *_, **__: pytest.fail("worked"))
     ended = run("diagnose", folder / "raw/loops", "--out", folder / out)
     assert ended.code == 2
     assert f"--out: {folder / out}: {message.format(folder=folder)}" in ended.err
@@ -120,15 +121,19 @@ def test_a_folder_is_tried_before_the_work(out, message, folder, run, monkeypatc
 
 @pytest.mark.parametrize("out, message", [("raw", "is a folder; name a file"), ("a-file/below", "is a file")])
 def test_a_file_is_tried_before_the_work(out, message, folder, run, monkeypatch):
-    monkeypatch.setattr("ccmodel.steps.predict.simulate_motion", lambda *_: pytest.fail("worked"))
+    monkeypatch.setattr("ccmodel.simulate", lambda *_, **__: pytest.fail("worked"))
     ended = run("simulate", folder / "a-file", "--model", folder / "other.json", "--out", folder / out)
     assert ended.code == 2
     assert message in ended.err
 
 
+def said(verdict):
+    """A diagnosis that takes no time and writes nothing."""
+    return lambda *_, **__: SimpleNamespace(verdict=verdict, headline="it is as it is", report={"verdict": verdict})
+
+
 def test_the_trial_leaves_nothing(folder, run, monkeypatch):
-    verdict = {"verdict": "explained", "headline": "it is as it is"}
-    monkeypatch.setattr("ccmodel.studies.diagnosis.run.diagnose", lambda *_: verdict)
+    monkeypatch.setattr("ccmodel.diagnose", said("explained"))
     ended = run("diagnose", folder / "raw/loops", "--out", folder / "new/below/it")
     assert ended == (0, "it is as it is\n", "")
     assert not (folder / "new").exists()
@@ -137,6 +142,5 @@ def test_the_trial_leaves_nothing(folder, run, monkeypatch):
 @pytest.mark.parametrize("strict, code", [([], 0), (["--strict"], 1)])
 @pytest.mark.parametrize("verdict", ["explained", "undecided", "unexplained", "inputs-inconsistent"])
 def test_a_verdict_is_no_failure_unless_asked_for(verdict, strict, code, folder, run, monkeypatch):
-    said = {"verdict": verdict, "headline": "it is as it is"}
-    monkeypatch.setattr("ccmodel.studies.diagnosis.run.diagnose", lambda *_: said)
+    monkeypatch.setattr("ccmodel.diagnose", said(verdict))
     assert run("diagnose", folder / "raw/loops", "--out", folder / "out", *strict).code == code

@@ -82,14 +82,17 @@ def test_a_terminal_shows_a_bar_and_a_pipe_nothing():
 
 
 def test_a_diagnosis_reports_shares_that_only_grow(tmp_path):
-    from ccmodel.diagnosis.run import Options
-    from ccmodel.studies.diagnosis.run import diagnose
+    import ccmodel
 
     seen = []
     folder = noisy_batch(tmp_path / "loops", pretensions=(7.0, 5.0))
     # One candidate is fitted whatever the screening says, so that the stage of the fits is reached.
-    options = Options(forced_candidates=[["pulley-friction at drive-pulley"]])
-    diagnose(folder, tmp_path / "out", options, progress=lambda text, done=None: seen.append((text, done)))
+    ccmodel.diagnose(
+        folder,
+        tmp_path / "out",
+        candidates="pulley-friction at drive-pulley",
+        progress=lambda text, done=None: seen.append((text, done)),
+    )
     shares = [done for _, done in seen if done is not None]
     assert shares == sorted(shares)
     assert shares[0] == 0.0 and shares[-1] <= 1.0

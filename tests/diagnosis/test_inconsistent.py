@@ -7,12 +7,14 @@ import pytest
 from test_diagnosis import run, spoil
 
 from builders import write_batch
+from ccmodel.model.files import read_model
 from ccmodel.rig import ingest as rig
 from ccmodel.rig.findings import Finding
 from ccmodel.steps import ingest as step
 from ccmodel.studies.diagnosis import run as stage
 from ccmodel.studies.diagnosis.inconsistent import report
 from ccmodel.studies.diagnosis.settings import Diagnosing
+from ccmodel.typed import InputError
 
 KEYS = {
     "format", "batch", "verdict", "is_held", "location", "mechanisms", "alternatives", "likeliest", "nearest", "fit",
@@ -68,8 +70,8 @@ def test_the_model_files_state_that_there_is_no_model(dead, tmp_path):
     run("diagnose", dead, "--out", tmp_path / "out")
     for name in ("calibrated", "model"):
         file = tmp_path / f"out/{name}.json"
-        with pytest.raises(stage.InputError) as error:
-            stage.read_model(file)
+        with pytest.raises(InputError) as error:
+            read_model(file)
         reason = "verdict 'inputs-inconsistent': the diagnosis has no "
         assert str(error.value).startswith(f"{file}: holds no model: {reason}")
         assert "\n" not in str(error.value)

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from builders import recording
-from ccmodel.cli.diagnose import settings_of
+from ccmodel.api.options import diagnosis_options
+from ccmodel.cli.options import tolerance_of
 from ccmodel.config import Config, load_config
 from ccmodel.diagnosis import candidate
 from ccmodel.diagnosis.calibration import calibration
@@ -128,14 +129,14 @@ def test_a_tolerance_may_differ_by_channel():
     [
         (["0.9"], "less than 0.5"),
         (["much"], "a share is a number"),
-        (["tau=0.1"], "a channel is one of .* got tau"),
+        (["tau=0.1"], "a channel is one of .* got 'tau'"),
         (["0.1", "tau_in_Nm=0.1"], "a share without a channel"),
         (["tau_in_Nm=0.9"], "less than 0.5"),
     ],
 )
 def test_a_tolerance_that_cannot_be_used_is_refused(stated, said):
     with pytest.raises(InputError, match=f"--tolerance: .*{said}"):
-        settings_of(stated, None, None, [])
+        diagnosis_options(tolerance_of(stated), prefix="--")
 
 
 def test_the_configuration_for_the_public_recordings_says_how_they_would_be_diagnosed():

@@ -202,7 +202,7 @@ def test_inputs_that_contradict_one_another_are_named_and_get_no_model(diagnosed
 
 def planned(folder: Path) -> set[str]:
     """Messages of the jobs that would run for a batch."""
-    lines = snakemake(folder, "--dry-run").stdout.splitlines()
+    lines = [line.strip() for line in snakemake(folder, "--dry-run").stdout.splitlines()]
     return {line.split(": ", 1)[1] for line in lines if line.startswith("Job ") and " batch " in line}
 
 

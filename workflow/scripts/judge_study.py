@@ -3,7 +3,7 @@
 from ccmodel.jobs import logged
 from ccmodel.studies.run import run_study, runs_of
 
-with logged(snakemake.log[0], snakemake.threads):
+with logged(snakemake.log[0], snakemake.threads) as progress:
     given, made, params = snakemake.input, snakemake.output, snakemake.params
     run_study(
         params.kind,
@@ -12,4 +12,5 @@ with logged(snakemake.log[0], snakemake.threads):
         runs_of(params.labels, given.recordings, given.simulated, params.fits),
         [*made.csv, *made.summary],
         list(zip(made.png, made.svg, made.pdf, strict=True)),
+        progress,
     )

@@ -5,9 +5,10 @@ from pathlib import Path
 from ccmodel.jobs import logged
 from ccmodel.report.tables import tabulate_errors
 
-with logged(snakemake.log[0], snakemake.threads):
+with logged(snakemake.log[0], snakemake.threads) as progress:
     tabulate_errors(
         zip(snakemake.params.parameters, snakemake.input.recordings, snakemake.input.simulated, strict=True),
         Path(snakemake.output.csv),
         Path(snakemake.output.parquet),
+        progress,
     )

@@ -5,7 +5,7 @@ from pathlib import Path
 from ccmodel.jobs import logged
 from ccmodel.report.page import write_report
 
-with logged(snakemake.log[0], snakemake.threads):
+with logged(snakemake.log[0], snakemake.threads) as progress:
     write_report(
         Path(snakemake.output.page),
         dict(snakemake.input.items()),
@@ -13,4 +13,5 @@ with logged(snakemake.log[0], snakemake.threads):
         snakemake.params.studies,
         Path(snakemake.params.raw),
         snakemake.params.unusable,
+        progress,
     )

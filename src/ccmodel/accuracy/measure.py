@@ -178,7 +178,7 @@ def _fit_sds(pairs: Sequence[Pair], known: Fitted, table: pd.DataFrame) -> dict[
     """By channel, the relative change of the error if a fitted parameter is larger by its standard deviation.
 
     The changes of several parameters are added in squares. A parameter that the recordings do not determine, or with
-    which the model cannot be run, is left out.
+    which the model cannot be run, is left out, and so is a channel's change to or from an error of zero.
     """
     sds = {name: sd for name, sd in known.sds.items() if sd is not None and np.isfinite(sd)}
     if not sds or known.parameters is None:

@@ -170,11 +170,11 @@ def as_batch(batch: Batch | str | Path, progress: Progress = silent) -> Batch:
     raise InputError(f"batch: a Batch or its folder; got {'None' if batch is None else what}")
 
 
-def check_consistent(batch: Batch, trust_inputs: bool) -> None:
-    """Raise `InputError` if a batch's inputs contradict one another and are not trusted."""
+def check_consistent(batch: Batch, trust_inputs: bool, option: str = "trust_inputs=True") -> None:
+    """Raise `InputError` if a batch's inputs contradict one another and are not trusted; `option` is how to."""
     if batch.contradicts and not trust_inputs:
         lines = [str(f) for f in batch.findings if f.is_inconsistent]
-        raise InputError("\n".join([*lines, "if these inputs are right, state trust_inputs=True"]))
+        raise InputError("\n".join([*lines, f"if these inputs are right, state {option}"]))
 
 
 def _table(frame: pd.DataFrame) -> str:

@@ -133,6 +133,11 @@ class Fit:
         rows = {w.observations.id: w.own_values(self.values) for w in self._calibration.whitened}
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("recording")
 
+    @property
+    def text(self) -> str:
+        """The values with their intervals as text, without the warnings."""
+        return "\n".join([self._title, self._shown.to_string(), *self._foot])
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data: a model file with the intervals, and the fit's circumstances under the key ``fit``."""
         about = {
@@ -167,7 +172,7 @@ class Fit:
         return figures.residuals(self._calibration, self.batch)
 
     def __repr__(self) -> str:
-        return "\n".join([self._title, self._shown.to_string(), *self._foot, *self._shown_warnings])
+        return "\n".join([self.text, *self._shown_warnings])
 
     def _repr_html_(self) -> str:
         lines = "".join(f"<li>{escape(line)}</li>" for line in self._shown_warnings)

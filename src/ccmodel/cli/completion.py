@@ -3,11 +3,6 @@
 from pathlib import Path
 
 
-def batches_in(folder: Path) -> list[str]:
-    """Folders of batches in a folder, by name."""
-    return sorted(f.parent.name for f in folder.glob("*/batch.yaml"))
-
-
 def batch_folders(incomplete: str) -> list[str]:
     """Folders of batches that begin like this; otherwise folders to look into."""
     head, slash, begin = incomplete.rpartition("/")

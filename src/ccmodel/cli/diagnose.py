@@ -1,18 +1,26 @@
 """Diagnosis of a batch."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from ccmodel.cli import completion
 from ccmodel.cli.group import MODEL, command
 from ccmodel.cli.interruption import leaving
-from ccmodel.cli.options import Batch, Json, Quiet, input_file, out_folder
+from ccmodel.cli.options import (
+    Batch,
+    Cycles,
+    Json,
+    Quiet,
+    Step,
+    Tolerance,
+    TrustInputs,
+    input_file,
+    out_folder,
+    tolerance_of,
+)
 from ccmodel.cli.output import Output
-
-if TYPE_CHECKING:
-    from ccmodel.studies.diagnosis.settings import Diagnosing
 
 
 def add_to(app: typer.Typer) -> None:
@@ -32,19 +40,9 @@ def diagnose(
             show_default=False,
         ),
     ] = [],  # noqa: B006
-    tolerance: Annotated[
-        list[str],
-        typer.Option(
-            help="Tolerance as a SHARE of peak to peak, or by channel as tau_in_Nm=0.02, repeated.",
-            show_default=False,
-        ),
-    ] = [],  # noqa: B006
-    step: Annotated[
-        float | None, typer.Option(min=1e-4, help="Time between compared samples, s.", show_default=False)
-    ] = None,
-    cycles: Annotated[
-        int | None, typer.Option(min=1, help="Number of compared cycles of a sine.", show_default=False)
-    ] = None,
+    tolerance: Tolerance = [],  # noqa: B006
+    step: Step = None,
+    cycles: Cycles = None,
     baseline: Annotated[
         Path | None,
         typer.Option(
@@ -60,9 +58,7 @@ def diagnose(
             show_default=False,
         ),
     ] = [],  # noqa: B006
-    trust_inputs: Annotated[
-        bool, typer.Option("--trust-inputs", help="Diagnose even if the inputs contradict one another.")
-    ] = False,
+    trust_inputs: TrustInputs = False,
     strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 unless the model agrees.")] = False,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -71,54 +67,27 @@ def diagnose(
 
     Exits with 0 at any verdict, unless --strict is given.
     """
-    from ccmodel.studies.diagnosis.run import diagnose as run
-    from ccmodel.studies.diagnosis.run import options_of
+    import ccmodel
+    from ccmodel.api.options import diagnosis_options
 
-    options = options_of(settings_of(tolerance, step, cycles, candidate), without, freeze)
-    output = Output(as_json, quiet)
+    output, shares = Output(as_json, quiet), tolerance_of(tolerance)
+    # The same check as below, with the names that options have here.
+    diagnosis_options(shares, step, cycles, candidate, without, freeze, baseline is not None, prefix="--")
     with leaving(out), output.progress() as progress:
-        diagnosis = run(batch, out, options, baseline, progress, trust_inputs)
-    output.result({**diagnosis, "out": out}, diagnosis["headline"])
-    if strict and diagnosis["verdict"] != "agrees":
+        found = ccmodel.diagnose(
+            batch,
+            out,
+            baseline=baseline,
+            freeze=freeze,
+            without=without,
+            tolerance=shares,
+            step_s=step,
+            cycles=cycles,
+            candidates=candidate,
+            trust_inputs=trust_inputs,
+            progress=progress,
+        )
+    output.result({**found.report, "out": out}, found.headline)
+    output.hint(f"wrote {out}: diagnosis.json, report.html and the models. Next: ccmodel report {out}")
+    if strict and found.verdict != "agrees":
         raise typer.Exit(1)
-
-
-def settings_of(tolerance: list[str], step: float | None, cycles: int | None, candidate: list[str]) -> "Diagnosing":
-    """Settings of a diagnosis from the words of the command line.
-
-    Raises
-    ------
-    InputError
-        That names the option which cannot be used.
-    """
-    from pydantic import ValidationError
-
-    from ccmodel.studies.diagnosis.settings import Diagnosing
-    from ccmodel.typed import InputError
-
-    forced = [[one.strip() for one in stated.split(",")] for stated in candidate]
-    shares = _tolerance(tolerance)
-    try:
-        return Diagnosing(tolerance=shares, step_s=step, cycles=cycles, forced_candidates=forced)
-    except ValidationError as error:
-        # A tolerance is a number or a dict; the error on the form that was not used is of no interest.
-        first = next(e for e in error.errors() if e["type"] not in ("float_type", "dict_type"))
-        option = "--tolerance" if first["loc"] else "--candidate"
-        raise InputError(f"{option}: {first['msg'].removeprefix('Value error, ')}") from None
-
-
-def _tolerance(stated: list[str]) -> float | dict[str, float]:
-    """One share for all channels, or one for each channel."""
-    from ccmodel.channels import MEASURED
-    from ccmodel.typed import InputError
-
-    try:
-        shares = {channel: float(share) for channel, _, share in (one.rpartition("=") for one in stated)}
-    except ValueError:
-        raise InputError(f"--tolerance: a share is a number, as 0.02; got {', '.join(stated)}") from None
-    if list(shares) == [""]:
-        return shares[""]
-    if unknown := shares.keys() - set(MEASURED):
-        got = ", ".join(name or "a share without a channel" for name in sorted(unknown))
-        raise InputError(f"--tolerance: a channel is one of {', '.join(MEASURED)}; got {got}")
-    return shares

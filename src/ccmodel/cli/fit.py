@@ -7,18 +7,45 @@ import typer
 
 from ccmodel.cli.group import MODEL, command
 from ccmodel.cli.interruption import leaving
-from ccmodel.cli.options import Batch, Json, Quiet, out_file
+from ccmodel.cli.options import (
+    Batch,
+    Cycles,
+    Json,
+    Quiet,
+    Step,
+    Tolerance,
+    TrustInputs,
+    out_file,
+    tolerance_of,
+)
 from ccmodel.cli.output import Output
+from ccmodel.progress import within
+
+# Share of reading the logs in the time of a fit.
+READING = 0.05
 
 
 def add_to(app: typer.Typer) -> None:
     """Add the command."""
-    command(app, "fit", MODEL, ["ccmodel fit data/raw/loops --out fit.json"])(fit)
+    partly = "ccmodel fit data/raw/loops --free stiffness_N_per_m --free friction_coefficient --out partly.json"
+    command(app, "fit", MODEL, ["ccmodel fit data/raw/loops --out fit.json", partly])(fit)
 
 
 def fit(
     batch: Batch,
     out: Annotated[Path, out_file("File for the fitted model, JSON.")],
+    free: Annotated[
+        list[str],
+        typer.Option(
+            help="Parameter that is fitted, the others keep their estimates; may be repeated. Without it, all that the"
+            " recordings determine.",
+            show_default=False,
+        ),
+    ] = [],  # noqa: B006
+    tolerance: Tolerance = [],  # noqa: B006
+    step: Step = None,
+    cycles: Cycles = None,
+    trust_inputs: TrustInputs = False,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -27,15 +54,33 @@ def fit(
     Exits with 1 if the fit did not succeed or a recording was left out.
     """
     import ccmodel
+    from ccmodel.api.batch import check_consistent
+    from ccmodel.api.options import diagnosis_options
 
-    output = Output(as_json, quiet)
+    output, shares = Output(as_json, quiet), tolerance_of(tolerance)
+    # The same check as below, with the names that options have here.
+    diagnosis_options(shares, step, cycles, prefix="--")
     with leaving(out), output.progress() as progress:
-        loaded = ccmodel.load(batch)
-        fitted = ccmodel.fit(loaded, progress=progress)
+        loaded = ccmodel.load(batch, progress=within(progress, 0.0, READING))
+        check_consistent(loaded, trust_inputs, "--trust-inputs")
+        fitted = ccmodel.fit(
+            loaded,
+            free or None,
+            tolerance=shares,
+            step_s=step,
+            cycles=cycles,
+            trust_inputs=trust_inputs,
+            progress=progress,
+        )
         fitted.save(out)
-    output.result(fitted.to_dict(), repr(fitted), f"wrote {out}")
-    refused = [finding for finding in loaded.findings if finding.severity != "warning"]
+    refused = [finding for finding in fitted.batch.findings if finding.severity != "warning"]
+    left_out = list(map(str, refused))
+    data = {**fitted.to_dict(), "out": out, "warnings": fitted.warnings, "notes": fitted.notes, "left_out": left_out}
+    output.result(data, fitted.text)
+    for line in fitted.warnings:
+        output.finding(line, "warning")
     for finding in refused:
         output.finding(str(finding), finding.severity)
+    output.hint(f"wrote {out}")
     if refused or not fitted.succeeded:
         raise typer.Exit(1)

@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
-from ccmodel.cli import completion, destination
+from ccmodel.cli import completion
 from ccmodel.cli.group import RESULTS, command
-from ccmodel.cli.options import Json, Quiet
+from ccmodel.cli.options import Json, Quiet, new_folder
 from ccmodel.cli.output import Output
 
 
@@ -30,7 +30,7 @@ def mechanisms(
         Path | None,
         typer.Option(
             help="Write the pages of all mechanisms into this folder.",
-            callback=destination.try_folder,
+            callback=new_folder,
             show_default=False,
         ),
     ] = None,

@@ -1,87 +1,28 @@
 """Arguments and options that commands share; each has one name, meaning and type."""
 
-import difflib
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated
 
 import typer
 
-from ccmodel.cli import completion, destination
-
-BATCH_FILE = "batch.yaml"
-
-
-def batch_folder(ctx: typer.Context, value: Path | None) -> Path | None:
-    """The folder of a batch that was named by its folder or by its `batch.yaml`.
-
-    Raises
-    ------
-    InputError
-        If there is no such folder, or it holds no `batch.yaml`.
-    """
-    if value is None or ctx.resilient_parsing:
-        return value
-    folder = value.parent if value.name == BATCH_FILE and value.is_file() else existing_folder(value)
-    if not (folder / BATCH_FILE).exists():
-        from ccmodel.typed import InputError
-
-        inside = completion.batches_in(folder)
-        advice = (
-            f"it holds the batches {', '.join(inside)}"
-            if inside
-            else f"if it has the logs of a rig, draft one with: ccmodel init {folder}"
-        )
-        raise InputError(f"{folder}: has no {BATCH_FILE}; {advice}")
-    return folder
+from ccmodel import paths
+from ccmodel.cli import completion
 
 
-def existing_folder(path: Path) -> Path:
-    """The folder.
+def _checked(check: Callable[..., Path], *, says: bool = False) -> Callable:
+    """A check of `ccmodel.paths` as the callback of an option; with `says`, its message names the option."""
 
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
-    return path if path.is_dir() else _refuse(path, "folder", "file")
+    def callback(ctx: typer.Context, param: typer.CallbackParam, value: Path | None) -> Path | None:
+        if value is None or ctx.resilient_parsing:
+            return value
+        return check(value, param.opts[0]) if says else check(value)
 
-
-def _refuse(path: Path, wanted: str, other: str) -> NoReturn:
-    """Say what stands in the place of a folder or file that is wanted, or which is there with a similar name."""
-    from ccmodel.typed import InputError
-
-    if path.exists():
-        raise InputError(f"{path}: is a {other}; a {wanted} is expected")
-    around = path.parent.iterdir() if path.parent.is_dir() else ()
-    beside = [f.name for f in around if f.is_dir() == (wanted == "folder")]
-    guess = difflib.get_close_matches(path.name, beside, n=1, cutoff=0.75)
-    advice = f"; did you mean {path.parent / guess[0]}?" if guess else ""
-    raise InputError(f"{path}: there is no such {wanted}{advice}")
+    return callback
 
 
-def input_folder(ctx: typer.Context, value: Path | None) -> Path | None:
-    """A folder that is read.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
-    return value if value is None or ctx.resilient_parsing else existing_folder(value)
-
-
-def input_file(ctx: typer.Context, value: Path | None) -> Path | None:
-    """A file that is read.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
-    if value is None or ctx.resilient_parsing or value.is_file():
-        return value
-    _refuse(value, "file", "folder")
-
+batch_folder, input_folder, input_file = map(_checked, (paths.batch_folder, paths.existing_folder, paths.existing_file))
+new_folder, new_file = _checked(paths.try_folder, says=True), _checked(paths.try_file, says=True)
 
 _BATCH = {"callback": batch_folder, "autocompletion": completion.batch_folders, "show_default": False}
 
@@ -97,15 +38,51 @@ Results = Annotated[
     Path, typer.Argument(metavar="RESULTS", help="Folder of a run's results, or of a diagnosis.", callback=input_folder)
 ]
 Cores = Annotated[int, typer.Option("--cores", min=1, help="Number of processes.")]
+Tolerance = Annotated[
+    list[str],
+    typer.Option(
+        "--tolerance",
+        help="Tolerance as a SHARE of peak to peak, or by channel as tau_in_Nm=0.02, repeated.",
+        show_default=False,
+    ),
+]
+Step = Annotated[
+    float | None, typer.Option("--step", min=1e-4, help="Time between compared samples, s.", show_default=False)
+]
+Cycles = Annotated[
+    int | None, typer.Option("--cycles", min=1, help="Number of compared cycles of a sine.", show_default=False)
+]
+TrustInputs = Annotated[bool, typer.Option("--trust-inputs", help="Go on even if the inputs contradict one another.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document; errors too.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print the result alone: no progress, hints or warnings.")]
 
 
 def out_folder(text: str) -> typer.models.OptionInfo:
     """`--out` of a command that writes a folder."""
-    return typer.Option("--out", help=text, callback=destination.try_folder, show_default=False)
+    return typer.Option("--out", help=text, callback=new_folder, show_default=False)
 
 
 def out_file(text: str) -> typer.models.OptionInfo:
     """`--out` of a command that writes a file."""
-    return typer.Option("--out", help=text, callback=destination.try_file, show_default=False)
+    return typer.Option("--out", help=text, callback=new_file, show_default=False)
+
+
+def tolerance_of(stated: list[str]) -> float | dict[str, float] | None:
+    """One tolerance for all channels, or one for each channel, from the words of the command line.
+
+    Raises
+    ------
+    InputError
+        If they are not shares, or one of several has no channel.
+    """
+    from ccmodel.typed import InputError
+
+    try:
+        shares = {channel: float(share) for channel, _, share in (one.rpartition("=") for one in stated)}
+    except ValueError:
+        raise InputError(f"--tolerance: a share is a number, as 0.02; got {', '.join(stated)}") from None
+    if "" not in shares:
+        return shares or None
+    if len(stated) > 1:
+        raise InputError(f"--tolerance: got {', '.join(stated)}: a share without a channel is that of all")
+    return shares[""]

@@ -15,12 +15,10 @@ from ccmodel.progress import Progress, shown, silent
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-# Style and word before a line on a finding, by its severity.
-_SEVERITIES = {
-    "warning": ("yellow", "warning"),
-    "refused": ("red", "left out"),
-    "inconsistent": ("red", "inconsistent"),
-}
+    from ccmodel.rig.findings import Severity
+
+# Style of the word before a line on a finding, by its severity.
+_STYLE: "dict[Severity, str]" = {"warning": "yellow", "refused": "red", "inconsistent": "red"}
 # Columns of a table that no terminal shows, so that none of its lines is broken.
 _WIDE = 10_000
 
@@ -53,12 +51,13 @@ class Output:
         if not (self.as_json or self.quiet):
             typer.echo(text)
 
-    def finding(self, line: str, severity: str) -> None:
+    def finding(self, line: str, severity: "Severity") -> None:
         """Print a line on a finding; JSON has the findings in its document."""
         if self.as_json or (self.quiet and severity == "warning"):
             return
-        style, word = _SEVERITIES[severity]
-        say(f"{word}: ", style, end="")
+        from ccmodel.rig.findings import WORD
+
+        say(f"{WORD[severity]}: ", _STYLE[severity], end="")
         say(line)
 
     def message(self, text: str, style: str | None = None) -> None:

@@ -28,18 +28,18 @@ def predict(
 
     Exits with 1 if a recording has no prediction.
     """
-    from ccmodel.steps.predict import predict as run
+    import ccmodel
 
     output = Output(as_json, quiet)
     with leaving(out), output.progress() as progress:
-        messages, errors = run(batch, model, out, progress)
+        predicted = ccmodel.predict(model, batch, out, progress=progress)
     lines = []
-    if len(errors):
-        by_channel = errors.pivot(index="recording", columns="channel", values="nrmse_percent")
-        table = by_channel[errors["channel"].unique()].to_string(float_format="%.2f")
+    if len(predicted):
+        table = predicted.table.to_string(float_format="%.2f")
         lines = ["root mean square error over the last cycle, % of peak to peak", table]
-    output.result({"out": out, "errors": errors.to_dict("records"), "left_out": messages}, *lines)
-    for line in messages:
+    errors = predicted.errors.to_dict("records")
+    output.result({"out": out, "errors": errors, "left_out": predicted.left_out}, *lines)
+    for line in predicted.left_out:
         output.finding(line, "refused")
-    if messages:
+    if predicted.left_out:
         raise typer.Exit(1)

@@ -46,9 +46,14 @@ def simulate(
 
     A model file of an earlier version does not know the conduits of its rig: name a batch of it with --batch.
     """
-    from ccmodel.steps.predict import simulate_motion as run
+    import ccmodel
 
     output = Output(as_json, quiet)
-    with leaving(out):
-        run(motion, model, batch, out, recording, pretension)
-    output.result({"out": out})
+    with leaving(out), output.progress() as progress:
+        simulated = ccmodel.simulate(
+            model, motion, recording=recording, batch=batch, pretension_N=pretension, out=out, progress=progress
+        )
+    samples = simulated.time_s.size
+    data = {"out": out, "recording": simulated.id, "samples": samples, "pretension_N": simulated.pretension_N}
+    output.result(data)
+    output.hint(f"wrote {out}: {samples} samples, pretension {simulated.pretension_N:.4g} N")

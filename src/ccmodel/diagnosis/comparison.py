@@ -97,18 +97,21 @@ class Comparison:
     def is_adequate(self, candidate: CandidateFit) -> bool:
         """Whether the mean square and the lack of fit of a candidate are as low as the true physics could leave them.
 
-        The limits allow for noise and for the model-form error of the added mechanisms, a share of the excess. The
-        calibrated model, to which none is added, gets no such allowance.
+        The limits allow for noise and for the model-form error of the added mechanisms, a share of the excess.
         """
         lack = self.lack_of_fit.get(candidate.hypothesis)
-        form = candidate.hypothesis.model_form_error
         if lack is None or not candidate.is_plausible:
             return False
-        if candidate is self.base and candidate.mean_square > settings.ADEQUATE:
-            return False
+        highest_lack = settings.ADEQUATE_LACK_OF_FIT + candidate.hypothesis.model_form_error * self.excess
+        return candidate.mean_square <= self.adequate_mean_square(candidate) and lack.lower_bound <= highest_lack
+
+    def adequate_mean_square(self, candidate: CandidateFit) -> float:
+        """Highest mean square of an adequate candidate; the calibrated model gets no allowance for its form."""
+        if candidate is self.base:
+            return settings.ADEQUATE
         limit = settings.ADEQUATE_PAIR if candidate.hypothesis.is_pair else settings.ADEQUATE
-        limit += max(settings.ADEQUATE_SHARE / _imitations(candidate), form) * self.excess
-        return candidate.mean_square <= limit and lack.lower_bound <= settings.ADEQUATE_LACK_OF_FIT + form * self.excess
+        form = candidate.hypothesis.model_form_error
+        return limit + max(settings.ADEQUATE_SHARE / _imitations(candidate), form) * self.excess
 
     @property
     def has_adequate(self) -> bool:

@@ -103,7 +103,9 @@ def nearest_sentence(diagnosis: Mapping) -> str | None:
     nearest = diagnosis.get("nearest")
     if not nearest or not nearest["mechanisms"]:
         return None
-    return f"Nearest model, {NOT_ACCEPTED}: {'; and '.join(map(claim, nearest['mechanisms']))}."
+    elsewhere = {m["place"] for m in nearest["mechanisms"]}.isdisjoint(possible_places(diagnosis))
+    where = " and at another place than the mismatch" if elsewhere else ""
+    return f"Nearest model, {NOT_ACCEPTED}{where}: {'; and '.join(map(claim, nearest['mechanisms']))}."
 
 
 def held_out_errors(error: Mapping[str, Mapping]) -> str:

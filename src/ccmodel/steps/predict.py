@@ -9,14 +9,11 @@ import pandas as pd
 
 from ccmodel.channels import THETA_IN
 from ccmodel.errors import error_table
-from ccmodel.failure import ModelError
-from ccmodel.model.files import Model, read_model, read_model_file
+from ccmodel.model.files import Model
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
-from ccmodel.progress import Progress, silent, within
+from ccmodel.progress import Progress, silent
 from ccmodel.recording import Recording
-from ccmodel.rig.ingest import ingest_batch
-from ccmodel.steps.files import write_channels
 from ccmodel.steps.simulate import simulate_each
 from ccmodel.typed import InputError
 
@@ -65,25 +62,6 @@ def predicted(
     return Predicted(pairs, lines, error_table(pairs, name))
 
 
-def predict(batch: Path, model_file: Path, out: Path, progress: Progress = silent) -> tuple[list[str], pd.DataFrame]:
-    """Write a CSV for each recording of a batch folder: the sensor readings by a model file (`predicted`).
-
-    Returns
-    -------
-    list of str
-        A line on each recording without a prediction.
-    DataFrame
-        Errors of the others.
-    """
-    parameters, ingested = read_model(model_file), ingest_batch(batch, within(progress, 0.0, READING))
-    messages = [str(f) for f in ingested.findings if f.severity == "refused"]
-    found = predicted(ingested.recordings, parameters, model_file.stem, within(progress, READING, 1.0))
-    out.mkdir(parents=True, exist_ok=True)
-    for _, simulated in found.pairs:
-        write_channels(out / f"{simulated.id}.csv", simulated)
-    return [*messages, *found.failures], found.errors
-
-
 def simulated_motion(
     motion: pd.DataFrame, parameters: Parameters, like: Recording, pretension_N: float | None = None
 ) -> Recording:
@@ -110,44 +88,6 @@ def simulated_motion(
         parameters = replace(parameters, pretension_N=None)
     time_s, theta_in = (motion[c].to_numpy(float) for c in MOTION)
     return simulate(ModelInput.prescribed(like, time_s, theta_in, pretension_N), parameters)
-
-
-def simulate_motion(
-    motion_file: Path,
-    model_file: Path,
-    batch: Path | None,
-    out: Path,
-    recording: str | None = None,
-    pretension_N: float | None = None,
-) -> None:
-    """Write the sensor readings for a given motion of the drive, at the motion's times.
-
-    Parameters
-    ----------
-    motion_file : Path
-        CSV with time_s (s, increasing) and theta_in_rad (rad).
-    model_file, out : Path
-        The model, and the CSV to write.
-    batch : Path, optional
-        A batch of the rig, whose conduits are used in place of those that the model file knows.
-    recording : str, optional
-        Recording whose conduits and pretension are used; the first if none is named.
-    pretension_N : float, optional
-        Pretension of both cables, instead of the nominal one of that recording.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be used, there is no such recording, or the model cannot be run.
-    """
-    motion, model = read_motion(motion_file), read_model_file(model_file)
-    like = conditions_of(model, recording, None if batch is None else ingest_batch(batch).recordings, str(batch))
-    try:
-        simulated = simulated_motion(motion, model.parameters, like, pretension_N)
-    except (ModelError, ValueError) as error:
-        raise InputError(f"{motion_file}: {error}") from None
-    out.parent.mkdir(parents=True, exist_ok=True)
-    write_channels(out, simulated)
 
 
 def conditions_of(

@@ -10,9 +10,13 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from ccmodel import provenance
+from ccmodel.progress import Progress, each_of, silent, within
 from ccmodel.report.figures import save_figure, stamp_figure
 from ccmodel.steps.files import Fitted, Pair, fitted, read_json, read_pairs, write_json, write_table
 from ccmodel.studies.loops.settings import Measuring
+
+# Share of the judgement in the time of a study. Estimated.
+JUDGED = 0.6
 
 
 @dataclass(frozen=True)
@@ -78,7 +82,7 @@ class Outcome:
 
 def run_study(
     kind: str, settings: str, measuring: str, runs: Sequence[Run], tables: Sequence[Path],
-    figures: Sequence[Sequence[Path]],
+    figures: Sequence[Sequence[Path]], progress: Progress = silent,
 ) -> None:  # fmt: skip
     """Judge a study and write its tables and figures.
 
@@ -93,9 +97,11 @@ def run_study(
         The CSV files in the order of the settings, then the JSON file; empty for a study without tables.
     figures : sequence of sequence of Path
         The files of each figure in the order of the settings, one for each of its formats.
+    progress : Progress
     """
     study = import_module(f"ccmodel.studies.{kind}.study")
     stated = study.SETTINGS.model_validate_json(settings)
+    progress(f"judging {kind} on {len(runs)} runs", 0.0)
     outcome = study.judge(stated, runs, Measuring.model_validate_json(measuring))
     for file, table in zip(tables[:-1], outcome.tables, strict=True):
         write_table(file, table)
@@ -105,6 +111,7 @@ def run_study(
         write_json(tables[-1], outcome.summary | {"provenance": provenance.of_inputs(sorted(inputs))})
     read = [Path(file).read_text() for file in stated.files]
     stamp = provenance.stamp(study.__name__, settings, measuring, [run.content for run in runs], *read)
-    for files, figure in zip(figures, outcome.figures, strict=True):
+    pairs = list(zip(figures, outcome.figures, strict=True))
+    for files, figure in each_of(pairs, within(progress, JUDGED, 1.0), lambda pair: f"drawing {Path(pair[0][0]).stem}"):
         stamp_figure(figure, stamp)
         save_figure(figure, *files)

@@ -13,6 +13,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ccmodel.channels import CHANNELS, TABLE_ONE, symbol_of
 from ccmodel.mechanisms import catalogue, names
+from ccmodel.progress import Progress, each_of, silent, within
 from ccmodel.recording import ORIGIN, read_recordings
 from ccmodel.report.embedding import as_json, asset, with_figures
 from ccmodel.report.page import cards, viewer
@@ -24,6 +25,8 @@ from ccmodel.steps.files import read_json, write_json
 from ccmodel.typed import InputError
 
 LEFT_OUT = "left-out.json"
+# Shares of the time at which the results are read and the readings collected. Estimated.
+READ, COLLECTED = 0.1, 0.7
 # Kinds of studies in the order of the page.
 ORDER = ("baseline", "accuracy", "loops", "claims", "phases")
 # Table I of the paper, %: its fitted model against its own half-loop recording.
@@ -71,7 +74,7 @@ class Content:
 
 def write_report(
     page_file: Path, inputs: Mapping[str, Any], parameters: Sequence[str], studies: Sequence[dict],
-    raw: Path, unusable: Sequence[str],
+    raw: Path, unusable: Sequence[str], progress: Progress = silent,
 ) -> None:  # fmt: skip
     """Write the page, and next to it the messages on what was left out (left-out.json).
 
@@ -91,7 +94,9 @@ def write_report(
         Folder of the batches, with an importer's findings.json if any.
     unusable : sequence of str
         Messages on folders that cannot be a batch.
+    progress : Progress
     """
+    progress("reading the results", 0.0)
     batches, fits, simulations = ([read_json(Path(f)) for f in inputs[k]] for k in ("summaries", "fits", "simulations"))
     diagnoses = [read_json(Path(file)) for file in inputs["diagnoses"]]
     messages = _messages(raw, unusable, batches, fits, simulations, diagnoses)
@@ -104,21 +109,26 @@ def write_report(
         studies=[s | {"summary": read_json(s["summary"])} if "summary" in s else s for s in studies],
         diagnoses=diagnoses,
         reports={d["batch"]: report for d, report in zip(diagnoses, reports, strict=True)},
-        runs=_runs(parameters, inputs["recordings"], inputs["simulated"]),
+        runs=_runs(parameters, inputs["recordings"], inputs["simulated"], within(progress, READ, COLLECTED)),
         concealed=read_concealed(Path(inputs["concealed"])) if inputs.get("concealed") else None,
         **messages,
     )
+    progress("writing the page", COLLECTED)
     write_page(page_file, content)
 
 
-def _runs(parameters: Sequence[str], recordings: Sequence[str], simulated: Sequence[str]) -> list[dict]:
+def _runs(
+    parameters: Sequence[str], recordings: Sequence[str], simulated: Sequence[str], progress: Progress
+) -> list[dict]:
     """Every recording with its simulations by parameter set, for the viewer."""
     models: dict[str, dict] = defaultdict(dict)
     for name, recorded, file in zip(parameters, recordings, simulated, strict=True):
         models[recorded][name] = {s.id: s for s in read_recordings(Path(file))}
     return [
         viewer.entry(recording, {name: by_id.get(recording.id) for name, by_id in sets.items()})
-        for file, sets in models.items()
+        for file, sets in each_of(
+            models.items(), progress, lambda one: f"collecting the readings of {Path(one[0]).stem}"
+        )
         for recording in read_recordings(Path(file))
     ]
 

@@ -170,7 +170,12 @@ def _why(fit: CandidateFit, found: Diagnosis) -> str:
     if not j.comparison.is_adequate(fit):
         lack = j.lack_of_fit.get(fit.hypothesis)
         excessive = lack is not None and lack.lower_bound > ADEQUATE_LACK_OF_FIT
-        return "lack of fit" if excessive else "others have a smaller mean square"
+        if excessive:
+            return "lack of fit"
+        limit = j.comparison.adequate_mean_square(fit)
+        # The lack of fit of a candidate that others surpass is not computed.
+        above = fit.mean_square > limit
+        return f"mean square above {limit:.3g}, the limit" if above else "others have a smaller mean square"
     if j.single_fault_places and fit.hypothesis.is_pair:
         return f"adequate, but one fault at the {' or '.join(j.single_fault_places)} is as adequate"
     ratio = fit.mean_square / j.best.mean_square
@@ -195,8 +200,9 @@ def _map(found: Diagnosis) -> Figure:
         ax.grid(False)
         for (row, column), value in np.ndenumerate(values):
             dark = value < np.sqrt(0.7 * highest)
-            ax.text(column, row, f"{value:.1f}", ha="center", va="center", color="white" if dark else "black")
-    title_figure(figure, "held-out rms error, in units of the noise", _origin(found))
+            text, colour = (f"{value:.1f}", "white" if dark else "black") if np.isfinite(value) else ("none", "black")
+            ax.text(column, row, text, ha="center", va="center", color=colour)
+    title_figure(figure, "held-out rms error, each recording's over its own noise floor", _origin(found))
     stamp_figure(figure, _stamp(found))
     return figure
 

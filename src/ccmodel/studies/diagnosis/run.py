@@ -9,13 +9,13 @@ from ccmodel import provenance
 from ccmodel.diagnosis.run import Diagnosis, Options
 from ccmodel.diagnosis.run import diagnose as run
 from ccmodel.failure import ModelError
-from ccmodel.model.files import Model, RigConditions, read_model
+from ccmodel.model.files import Model, RigConditions
 from ccmodel.model.parameters import Parameters
-from ccmodel.progress import Progress, silent, within
+from ccmodel.progress import Progress, silent
 from ccmodel.recording import Recording
 from ccmodel.report.verdict import headline
 from ccmodel.rig.findings import Finding
-from ccmodel.rig.ingest import Ingested, ingest_batch
+from ccmodel.rig.ingest import Ingested
 from ccmodel.steps.files import read_ingested, write_json
 from ccmodel.studies.diagnosis import inconsistent
 from ccmodel.studies.diagnosis.page import write_diagnosis, write_inconsistent, write_not_diagnosed
@@ -126,44 +126,6 @@ def write_alone(outcome: Outcome, out: Path) -> None:
     write(outcome, out)
     if not outcome.content["nearest"]:
         (out / MODEL_FILES["nearest"]).unlink()
-
-
-def diagnose(
-    batch: Path,
-    out: Path,
-    options: Options = Options(),  # noqa: B008
-    baseline: Path | None = None,
-    progress: Progress = silent,
-    trust_inputs: bool = False,
-) -> dict:
-    """Diagnose a batch folder, write the files of its diagnosis and return the content of diagnosis.json.
-
-    Parameters
-    ----------
-    batch, out : Path
-        Batch folder; folder of the files.
-    options, progress, trust_inputs
-        As of `diagnosed`.
-    baseline : Path, optional
-        Model file to start from, instead of the batch's own estimates.
-
-    Raises
-    ------
-    InputError
-        If the batch or the model file cannot be used, or an excluded name is no mechanism.
-    """
-    check_options(options, baseline is not None, "--")
-    ingested = ingest_batch(batch, within(progress, 0.0, INGEST))
-    ingested.check_usable(batch, trust_inputs)
-    inputs = provenance.of_inputs(provenance.files_in(batch), batch)
-    known = read_model(baseline) if baseline else None
-    try:
-        outcome = diagnosed(ingested, inputs, options, known, within(progress, INGEST, PAGE), trust_inputs)
-    except (ModelError, ValueError) as error:
-        raise InputError(f"{batch}: {error}") from None
-    progress("writing the page", PAGE)
-    write_alone(outcome, out)
-    return outcome.content
 
 
 def check_options(options: Options, has_baseline: bool, prefix: str = "") -> None:
