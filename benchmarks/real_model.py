@@ -31,7 +31,7 @@ from ccmodel.diagnosis.observations import first_cycles
 from ccmodel.diagnosis.whitening import whiten
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.pool import each
-from ccmodel.model.files import read_model
+from ccmodel.model.files import read_model_file
 from ccmodel.model.parameters import Parameters
 from ccmodel.rig.ingest import ingest_batch
 
@@ -79,7 +79,7 @@ def rows(batch: Path, model_file: Path) -> tuple[list[dict], list[Observations],
     """One row for each channel and held-out condition, as in `real_regressor`; then the observations and errors."""
     ingested = ingest_batch(batch)
     stated = load_config(CONFIG).diagnosing
-    model = read_model(model_file)
+    model = read_model_file(model_file).parameters
     estimates = Parameters.estimated(ingested.batch.rig)
     observations = [Observations.of(r, estimates, step_s=STEP_S) for r in ingested.recordings]
     short = [first_cycles(r, stated.cycles) for r in ingested.recordings]

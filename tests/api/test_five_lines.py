@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import ccmodel as cc
 from builders import spoil, write_batch
 from ccmodel import cli
-from ccmodel.model.files import read_model as parameters_of
+from ccmodel.model.files import read_model_file
 from ccmodel.model.general.run import Active
 
 TIMES = np.arange(0, 2, 0.004)
@@ -102,7 +102,7 @@ def test_a_fit_of_fewer_parameters_keeps_the_estimates_of_the_others(batch):
 def test_what_is_saved_is_read_and_simulates_the_same(fitted, tmp_path):
     fitted.save(tmp_path / "fit.json")
     model = cc.read_model(tmp_path / "fit.json")
-    assert model.parameters == fitted.model.parameters == parameters_of(tmp_path / "fit.json")
+    assert model.parameters == fitted.model.parameters == read_model_file(tmp_path / "fit.json").parameters
     assert model.intervals == fitted.model.intervals
     mine, read = (cc.simulate(one, MOTION)["tau_in_Nm"] for one in (fitted.model, tmp_path / "fit.json"))
     assert np.array_equal(mine, read)

@@ -18,7 +18,7 @@ from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.result import alternatives_of, mechanism_of
 from ccmodel.failure import ModelError
 from ccmodel.inference import pool
-from ccmodel.model.files import read_model
+from ccmodel.model.files import read_model_file
 from ccmodel.report.verdict import headline
 from ccmodel.steps.ingest import ingest
 from ccmodel.studies.diagnosis import run as stage
@@ -54,7 +54,7 @@ def test_recordings_of_the_model_itself_agree_with_it(clean):
     said = json.loads((clean[1] / "diagnosis.json").read_text())
     assert said["verdict"] == "agrees"
     assert said["mechanisms"] == []
-    found = read_model(clean[1] / "calibrated.json")
+    found = read_model_file(clean[1] / "calibrated.json").parameters
     assert found.stiffness_N_per_m == pytest.approx(7750, rel=0.01)
     assert found.friction_coefficient == pytest.approx(0.156, rel=0.01)
     assert "agrees" in (clean[1] / "report.html").read_text()
@@ -120,9 +120,9 @@ def test_beside_a_model_that_has_it_nothing_else_is_missing(rubbed, tmp_path):
         assert run("diagnose", batch, "--out", tmp_path, "--baseline", known / "model.json", *hold).exit_code == 0
         said = json.loads((tmp_path / "diagnosis.json").read_text())
         assert said["verdict"] == "agrees"
-        assert {"pulley-friction"} == {m.name for m in read_model(tmp_path / "model.json").mechanisms}
+        assert {"pulley-friction"} == {m.name for m in read_model_file(tmp_path / "model.json").parameters.mechanisms}
     assert any("frozen" in n["why"] for n in said["not_judged"])
-    held, given = read_model(tmp_path / "model.json"), read_model(known / "model.json")
+    held, given = read_model_file(tmp_path / "model.json").parameters, read_model_file(known / "model.json").parameters
     assert held.stiffness_N_per_m == given.stiffness_N_per_m
     assert held.mechanisms == given.mechanisms
 

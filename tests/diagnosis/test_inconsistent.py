@@ -7,7 +7,7 @@ import pytest
 from test_diagnosis import run, spoil
 
 from builders import write_batch
-from ccmodel.model.files import read_model
+from ccmodel.model.files import read_model_file
 from ccmodel.rig import ingest as rig
 from ccmodel.rig.findings import Finding
 from ccmodel.steps import ingest as step
@@ -71,7 +71,7 @@ def test_the_model_files_state_that_there_is_no_model(dead, tmp_path):
     for name in ("calibrated", "model"):
         file = tmp_path / f"out/{name}.json"
         with pytest.raises(InputError) as error:
-            read_model(file)
+            read_model_file(file)
         reason = "verdict 'inputs-inconsistent': the diagnosis has no "
         assert str(error.value).startswith(f"{file}: holds no model: {reason}")
         assert "\n" not in str(error.value)

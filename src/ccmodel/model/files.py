@@ -246,17 +246,6 @@ def _reason_for_none(text: str) -> str | None:
         return None
 
 
-def read_model(path: Path) -> Parameters:
-    """Parameters from a model file.
-
-    Raises
-    ------
-    InputError
-        With one line on the file's fault.
-    """
-    return read_model_file(path).parameters
-
-
 def read_model_file(path: Path) -> Model:
     """A model from its file.
 
