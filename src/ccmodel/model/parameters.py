@@ -48,7 +48,7 @@ class Parameters:
         Friction of one recording over that of all, and initial tension over that observed at its rest.
     tension_curvature_A, tension_curvature_B : float
         Curvature of each cable's initial tension between its ends, over the largest that friction can hold, -1 to 1
-        (`ccmodel.model.initial.InitialTension.between_ends`).
+        (``ccmodel.model.initial.InitialTension.between_ends``).
     mechanisms : tuple of Active
         Effects beyond the paper's physics.
     refinement : int
@@ -86,7 +86,7 @@ class Parameters:
 
     @classmethod
     def estimated(cls, rig: Rig) -> "Parameters":
-        """Estimates made beforehand, as a batch file states them (`ccmodel.rig.batch.Rig`)."""
+        """Estimates made beforehand, as a batch file states them (``ccmodel.rig.batch.Rig``)."""
         return cls(
             stiffness_N_per_m=rig.cable.stiffness_N_per_m,
             reference_length_m=rig.cable.length_m,
