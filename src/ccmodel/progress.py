@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 T = TypeVar("T")
+# Shown until the first stage begins.
+START = "starting; the first run of an installation compiles the solvers, which takes a minute or two"
 
 
 class Progress(Protocol):
@@ -142,7 +144,7 @@ def shown(console: "Console | None" = None) -> Iterator[Progress]:
         Times(),
     )
     with Bar(*columns, console=console, transient=True, expand=True) as bar:
-        task = bar.add_task("", total=1.0)
+        task = bar.add_task(START, total=1.0)
 
         def stage(text: str, done: float | None = None) -> None:
             watch.stage(done)

@@ -71,6 +71,7 @@ def check(batch: Batch, as_json: Json = False, quiet: Quiet = False) -> None:
     for finding in ingested.findings:
         output.finding(str(finding), finding.severity)
     if not is_usable:
+        output.hint(f"mend this, then run again: ccmodel check {batch}")
         raise typer.Exit(1)
     if not any(recording.shows_tensions for recording in ingested.recordings):
         output.hint(
