@@ -10,6 +10,8 @@ from pathlib import Path
 
 NOT_RESULTS = ("logs", "benchmarks")
 TIMES = {"took_s"}
+# A line of the score on such times, by its first words.
+TIME_IN_SCORE = "processor time "
 
 
 def results(folder: Path) -> dict[str, Path]:
@@ -21,6 +23,8 @@ def results(folder: Path) -> dict[str, Path]:
 def without_times(content: object) -> object:
     """Content of a JSON file without measured times."""
     if isinstance(content, dict):
+        if str(content.get("what", "")).startswith(TIME_IN_SCORE):
+            return content["what"]
         return {key: without_times(value) for key, value in content.items() if key not in TIMES}
     return [without_times(value) for value in content] if isinstance(content, list) else content
 
@@ -36,6 +40,8 @@ def compare(folder: Path, other: Path) -> int:
     """Print which results are the same; the number of results that are not."""
     one, two = results(folder), results(other)
     common = sorted(one.keys() & two.keys())
+    if not common:
+        sys.exit(f"{folder} and {other} have no result in common")
     changed = [name for name in common if one[name].read_bytes() != two[name].read_bytes()]
     different = [name for name in changed if not are_equal(one[name], two[name])]
     different += sorted(one.keys() ^ two.keys())
