@@ -142,6 +142,11 @@ def test_the_trial_leaves_nothing(folder, run, monkeypatch):
     assert not (folder / "new").exists()
 
 
+def test_agreement_is_no_failure_if_asked_for(folder, run, monkeypatch):
+    monkeypatch.setattr("ccmodel.diagnose", said("agrees"))
+    assert run("diagnose", folder / "raw/loops", "--out", folder / "out", "--strict").code == 0
+
+
 @pytest.mark.parametrize("strict, code", [([], 0), (["--strict"], 1)])
 @pytest.mark.parametrize("verdict", ["explained", "undecided", "unexplained", "inputs-inconsistent"])
 def test_a_verdict_is_no_failure_unless_asked_for(verdict, strict, code, folder, run, monkeypatch):

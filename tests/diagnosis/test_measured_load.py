@@ -100,7 +100,7 @@ def test_a_forced_candidate_is_fitted_whatever_its_screening_score():
     "forced_candidates, said",
     [
         ([["friction"]], "there is no mechanism 'friction'"),
-        ([["presliding at load"]], "there is no mechanism 'presliding at load'"),
+        ([["presliding at load"]], "'presliding at load' is at none of its places; state 'presliding at conduit'"),
         ([[]], "one mechanism or of two"),
     ],
 )

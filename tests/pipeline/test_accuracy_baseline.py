@@ -81,6 +81,8 @@ def test_from_no_baseline_to_a_loss(finished):
 
 
 def test_a_folder_without_a_run_is_one_line(tmp_path):
+    assert accuracy(tmp_path, "check").stderr == "results: there is no such folder\n"
+    (tmp_path / "results").mkdir()
     said = accuracy(tmp_path, "check")
     assert said.returncode == 2
     assert "no run with the key 'baseline'" in said.stderr

@@ -11,8 +11,6 @@ from ccmodel.model.files import read_model_file
 from ccmodel.model.parameters import Parameters
 from ccmodel.recording import Recording, read_recordings
 from ccmodel.rig.batch import Batch
-from ccmodel.rig.findings import Finding
-from ccmodel.rig.ingest import Ingested
 
 # A recording and its simulation; None where the model could not be run.
 Pair = tuple[Recording, Recording | None]
@@ -32,14 +30,6 @@ def estimates_of(recordings_file: Path) -> Parameters | None:
     """The batch's own estimates, from the summary next to its recordings; None for a refused batch."""
     batch = read_json(recordings_file.with_suffix(".json"))["batch"]
     return None if batch is None else Parameters.estimated(Batch.model_validate(batch, strict=False).rig)
-
-
-def read_ingested(recordings_file: Path) -> Ingested:
-    """A batch that the pipeline has read, from its recordings and the summary next to them."""
-    summary = read_json(recordings_file.with_suffix(".json"))
-    stated = summary["batch"]
-    batch = None if stated is None else Batch.model_validate(stated, strict=False)
-    return Ingested(read_recordings(recordings_file), [Finding(**f) for f in summary["findings"]], batch)
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,11 @@ from pathlib import Path
 
 from ccmodel import provenance
 from ccmodel.progress import Progress, silent
-from ccmodel.recording import write_recordings
-from ccmodel.rig.ingest import ingest_batch
-from ccmodel.steps.files import write_json
+from ccmodel.recording import read_recordings, write_recordings
+from ccmodel.rig.batch import Batch
+from ccmodel.rig.findings import Finding
+from ccmodel.rig.ingest import Ingested, ingest_batch
+from ccmodel.steps.files import read_json, write_json
 
 
 def ingest(folder: Path, recordings_file: Path, summary_file: Path, progress: Progress = silent) -> None:
@@ -21,3 +23,11 @@ def ingest(folder: Path, recordings_file: Path, summary_file: Path, progress: Pr
         "findings": [asdict(f) for f in ingested.findings],
     }
     write_json(summary_file, summary)
+
+
+def read_ingested(recordings_file: Path) -> Ingested:
+    """A batch that the pipeline has read, from its recordings and the summary next to them."""
+    summary = read_json(recordings_file.with_suffix(".json"))
+    stated = summary["batch"]
+    batch = None if stated is None else Batch.model_validate(stated, strict=False)
+    return Ingested(read_recordings(recordings_file), [Finding(**f) for f in summary["findings"]], batch)

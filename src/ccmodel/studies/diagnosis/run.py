@@ -16,7 +16,8 @@ from ccmodel.recording import Recording
 from ccmodel.report.verdict import headline
 from ccmodel.rig.findings import Finding
 from ccmodel.rig.ingest import Ingested
-from ccmodel.steps.files import read_ingested, write_json
+from ccmodel.steps.files import write_json
+from ccmodel.steps.ingest import read_ingested
 from ccmodel.studies.diagnosis import inconsistent
 from ccmodel.studies.diagnosis.page import write_diagnosis, write_inconsistent, write_not_diagnosed
 from ccmodel.studies.diagnosis.settings import MODEL_FILES, Diagnosing
