@@ -11,7 +11,7 @@ import pandas as pd
 
 from ccmodel import provenance
 from ccmodel.api.options import progress_of
-from ccmodel.api.recordings import Recordings
+from ccmodel.api.recordings import Recordings, counted
 from ccmodel.channels import THETA_IN
 from ccmodel.paths import batch_folder
 from ccmodel.progress import Progress, silent
@@ -99,10 +99,8 @@ class Batch(Recordings):
 
     @property
     def _title(self) -> str:
-        recordings = f"{len(self)} recording{'' if len(self) == 1 else 's'}"
-        n = len(self.findings)
-        findings = f"{n or 'no'} finding{'' if n == 1 else 's'}"
-        return f"Batch {self.name}, {ORIGIN[self.origin]}: {recordings}, {findings}"
+        findings = counted(len(self.findings), "finding") if self.findings else "no findings"
+        return f"Batch {self.name}, {ORIGIN[self.origin]}: {counted(len(self))}, {findings}"
 
     @property
     def _shown_findings(self) -> list[str]:

@@ -11,6 +11,7 @@ import pandas as pd
 from ccmodel.api.batch import Batch, as_batch
 from ccmodel.api.model import HasModel, as_model
 from ccmodel.api.options import Candidates, Tolerance, check_step, diagnosis_options, progress_of
+from ccmodel.api.recordings import counted
 from ccmodel.failure import ModelError
 from ccmodel.model.files import Model
 from ccmodel.paths import try_folder, writing
@@ -159,8 +160,7 @@ class Diagnosis:
 
     @property
     def _recorded(self) -> str:
-        n = len(self.batch)
-        return f"{n} recording{'' if n == 1 else 's'}, {'measured' if self.batch.origin == 'rig' else 'simulated'}"
+        return f"{counted(len(self.batch))}, {'measured' if self.batch.origin == 'rig' else 'simulated'}"
 
     @property
     def _with_confidence(self) -> str:

@@ -13,6 +13,7 @@ from scipy.stats import t as student
 
 from ccmodel.api.batch import Batch, as_batch, check_consistent
 from ccmodel.api.options import Tolerance, check_step, progress_of, settings_of
+from ccmodel.api.recordings import counted
 from ccmodel.diagnosis.run import Calibration, calibrate
 from ccmodel.diagnosis.settings import ADEQUATE
 from ccmodel.failure import ModelError
@@ -185,8 +186,7 @@ class Fit:
 
     @property
     def _title(self) -> str:
-        n = len(self.recordings)
-        return f"Fit of the paper's model to {self.batch.name}: {n} recording{'' if n == 1 else 's'}; {self.message}"
+        return f"Fit of the paper's model to {self.batch.name}: {counted(len(self.recordings))}; {self.message}"
 
     @property
     def _foot(self) -> list[str]:

@@ -12,7 +12,7 @@ import xarray as xr
 
 from ccmodel.api.batch import Batch, as_batch
 from ccmodel.api.options import progress_of
-from ccmodel.api.recordings import Recordings
+from ccmodel.api.recordings import Recordings, counted
 from ccmodel.failure import ModelError
 from ccmodel.model.files import Model, read_model_file
 from ccmodel.paths import existing_file, try_file, try_folder, writing
@@ -121,8 +121,7 @@ class Prediction(Recordings):
 
     @property
     def _title(self) -> str:
-        n = len(self)
-        return f"Prediction of {n} recording{'' if n == 1 else 's'}: error over the last cycle, % of peak to peak"
+        return f"Prediction of {counted(len(self))}: error over the last cycle, % of peak to peak"
 
 
 def read_model(file: str | Path) -> Model:

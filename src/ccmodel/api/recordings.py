@@ -13,6 +13,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+def counted(count: int, what: str = "recording") -> str:
+    """A number of things in words, as ``2 recordings``."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
 class Recordings:
     """Recordings of one rig, by their ids and in their order; what derives from it has them as `recordings`."""
 

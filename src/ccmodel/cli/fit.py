@@ -21,9 +21,6 @@ from ccmodel.cli.options import (
 from ccmodel.cli.output import Output
 from ccmodel.progress import within
 
-# Share of reading the logs in the time of a fit.
-READING = 0.05
-
 
 def add_to(app: typer.Typer) -> None:
     """Add the command."""
@@ -56,12 +53,13 @@ def fit(
     import ccmodel
     from ccmodel.api.batch import check_consistent
     from ccmodel.api.options import diagnosis_options
+    from ccmodel.studies.diagnosis.run import INGEST
 
     output, shares = Output(as_json, quiet), tolerance_of(tolerance)
     # The same check as below, with the names that options have here.
     diagnosis_options(shares, step, cycles, prefix="--")
     with leaving(out), output.progress() as progress:
-        loaded = ccmodel.load(batch, progress=within(progress, 0.0, READING))
+        loaded = ccmodel.load(batch, progress=within(progress, 0.0, INGEST))
         check_consistent(loaded, trust_inputs, "--trust-inputs")
         fitted = ccmodel.fit(
             loaded,
