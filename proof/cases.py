@@ -16,6 +16,8 @@ from virtualrig.effects.contract import Twin
 
 CLEAN = "none"
 SEVERITIES = 3
+# Kinds of cases with several effects, and their number.
+SEVERAL = {"pair": 2, "triple": 3}
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ class Case:
     requested : dict
         Requested kind and effect; None where they were drawn.
     kind : str
-        clean, single, pair, unlisted, removed or poor.
+        clean, single, pair, triple, unlisted, removed or poor.
     protocol : str
         Name of the protocol in the plan.
     truth : tuple of Truth
@@ -177,9 +179,9 @@ def _chosen(kind: str, effect: str | None, plan: Plan, random: Generator) -> lis
     if kind == "unlisted":
         name = effect or str(random.choice(list(plan.unlisted)))
         return [(plan.unlisted[name], random.uniform())]
-    if kind == "pair":
-        both = random.choice(list(plan.effects), 2, replace=False)
-        return [(plan.effects[name], random.uniform(*plan.pair_strength)) for name in both]
+    if kind in SEVERAL:
+        several = random.choice(list(plan.effects), SEVERAL[kind], replace=False)
+        return [(plan.effects[name], random.uniform(*plan.pair_strength)) for name in several]
     name = effect or str(random.choice(list(plan.effects)))
     return [(plan.effects[name], random.uniform())]
 
