@@ -22,12 +22,12 @@ def test_the_discretisation_shift_is_that_of_a_fit_on_the_finer_solver(monkeypat
     hypothesis = Hypothesis((("conduit-compliance", "conduit"),))
     found = fit(recordings, hypothesis, base.free, base.values | {KEY: 1e-5})
     k = list(found.values).index(KEY)
-    moved = discretisation_shift(recordings, found)
+    moved = discretisation_shift(found)
     finer = [w.with_parameters(replace(w.observations.parameters, refinement=settings.REFINEMENT)) for w in recordings]
     there = fit(finer, hypothesis, base.free, found.values)
     assert found.values[KEY] + moved[k] == pytest.approx(there.values[KEY], abs=0.3 * abs(moved[k]))
     monkeypatch.setattr(settings, "REFINEMENT", 1)
-    assert discretisation_shift(recordings, found) == pytest.approx(np.zeros(moved.size), abs=1e-12)
+    assert discretisation_shift(found) == pytest.approx(np.zeros(moved.size), abs=1e-12)
 
 
 def test_the_papers_model_has_no_solver_to_refine():

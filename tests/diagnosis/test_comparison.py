@@ -44,7 +44,7 @@ def fitted(mean_square, *acting, **values):
     mean_squares = np.broadcast_to(np.asarray(mean_square, float), 8)
     residuals = list(np.sqrt(mean_squares)[:, None])
     return CandidateFit(
-        Hypothesis(acting), {}, BASE_VALUES | own, [], [], np.eye(1), np.ones(1), [BASE_VALUES] * 8, residuals
+        Hypothesis(acting), WHITENED, {}, BASE_VALUES | own, [], [], np.eye(1), np.ones(1), [BASE_VALUES] * 8, residuals
     )
 
 

@@ -8,18 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from ccmodel import mechanisms as registry
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.hypothesis import Hypothesis, plausible
-from ccmodel.diagnosis.whitening import Whitened
+from ccmodel.diagnosis.whitening import Whitened, with_states_of
 from ccmodel.failure import ModelError
 from ccmodel.inference.cross_validation import inverse_of, leave_one_out
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS, mean_weight
 from ccmodel.inference.intervals import COVERAGE, Interval
 from ccmodel.inference.jacobian import size_of
 from ccmodel.inference.least_squares import Search, Solution, minimise
+from ccmodel.inference.observations import Observations
 from ccmodel.inference.pool import each
 from ccmodel.inference.problem import Free, Problem
-from ccmodel.model.parameters import Parameters
+from ccmodel.model.parameters import Parameters, mechanism_key
 
 SEARCH = Search(
     tolerance=settings.FIT_TOLERANCE,
@@ -39,6 +41,8 @@ class CandidateFit:
     Attributes
     ----------
     hypothesis : Hypothesis
+    whitened : list of Whitened
+        The observations that it was fitted to, with its own mechanisms' states as nuisances.
     free : dict of str to Free
         Unknowns of the calibration, without those of mechanisms.
     values : dict of str to float
@@ -62,6 +66,7 @@ class CandidateFit:
     """
 
     hypothesis: Hypothesis
+    whitened: Sequence[Whitened]
     free: Mapping[str, Free]
     values: dict[str, float]
     residuals: list[NDArray]
@@ -118,9 +123,10 @@ class CandidateFit:
         """The fitted model, with estimates of everything that is not fitted."""
         return self.hypothesis.of(estimates).with_values(self.values)
 
-    def held_out(self, i: int, whitened: Whitened) -> Parameters:
-        """The model of one of the recordings, fitted to all others."""
-        return self.hypothesis.of(whitened.observations.parameters).with_values(self.loo_values[i])
+    def held_out(self, i: int) -> Observations:
+        """One of the recordings with the model that was fitted to all others."""
+        o = self.whitened[i].observations
+        return o.with_parameters(self.hypothesis.of(o.parameters).with_values(self.loo_values[i]))
 
 
 def fit(
@@ -143,9 +149,15 @@ def fit(
         If the model cannot be run at a point of the search.
     """
     unknowns = {n: Free(start[n], f.low, f.high) for n, f in free.items()} | hypothesis.free(start)
-    modelled = [w.with_parameters(hypothesis.of(w.observations.parameters)) for w in whitened]
+    modelled = _with_states(whitened, hypothesis, {n: f.start for n, f in unknowns.items()})
     problem = Problem(modelled, unknowns, weight=mean_weight)
     solution = _search(problem, hypothesis)
+    if _states_depend_on(hypothesis, problem.start, solution.x, problem.names):
+        # The states' effects were those at the start, which the fit has left.
+        values = problem.values_of(solution.x, 0)
+        modelled = _with_states(whitened, hypothesis, values)
+        problem = Problem(modelled, {n: replace(f, start=values[n]) for n, f in unknowns.items()}, weight=mean_weight)
+        solution = minimise(problem, inside_bounds(problem, problem.start), SEARCH)
     left_out = leave_one_out(problem, solution)
     covariance = left_out.covariance
     if len(modelled) == 1:
@@ -153,6 +165,7 @@ def fit(
     roots = [np.sqrt(w.measured.size) for w in modelled]
     return CandidateFit(
         hypothesis,
+        modelled,
         free,
         problem.values_of(solution.x, 0),
         [block.errors * root for block, root in zip(solution.blocks, roots, strict=True)],
@@ -166,16 +179,45 @@ def fit(
     )
 
 
+def _with_states(whitened: Sequence[Whitened], hypothesis: Hypothesis, values: Mapping[str, float]) -> list[Whitened]:
+    """Observations for a hypothesis, with the states of its mechanisms as nuisances, linearised about values."""
+
+    def of(w: Whitened) -> Whitened:
+        model = hypothesis.of(w.observations.parameters)
+        return with_states_of(w, model.with_values(values)).with_parameters(model)
+
+    return each(whitened, lambda i, w: of(w))
+
+
+def _states_depend_on(hypothesis: Hypothesis, start: NDArray, found: NDArray, names: Sequence[str]) -> bool:
+    """Whether a fit has moved the values of mechanisms with states so far that the states have other effects."""
+    moved = dict(zip(names, np.abs(found - start) > settings.STATES_MOVED * np.abs(found), strict=True))
+    return any(
+        moved.get(mechanism_key(name, place, p.name), False)
+        for name, place in hypothesis.baseline + hypothesis.acting
+        if registry.get(name).states
+        for p in registry.get(name).parameters
+        if not p.spread
+    )
+
+
 def _search(problem: Problem, hypothesis: Hypothesis) -> Solution:
-    low, high = problem.bounds
-    inside = 1e-9 * (high - low)
-    starts = [np.clip(x, low + inside, high - inside) for x in starting_points(problem)]
+    starts = [inside_bounds(problem, x) for x in starting_points(problem)]
     if len(starts) > 1:
         starts = [best_start(problem, starts).x]
     solution = minimise(problem, starts[0], SEARCH)
     for name in hypothesis.continuation:
-        solution = continued(lambda x: minimise(problem, x, SEARCH), solution, problem.names.index(name), low)
+        solution = continued(
+            lambda x: minimise(problem, x, SEARCH), solution, problem.names.index(name), problem.bounds[0]
+        )
     return solution
+
+
+def inside_bounds(problem: Problem, x: NDArray) -> NDArray:
+    """A point off the bounds of the unknowns, from which a search can start; all of shape (unknowns,)."""
+    low, high = problem.bounds
+    inside = 1e-9 * (high - low)
+    return np.clip(x, low + inside, high - inside)
 
 
 def starting_points(problem: Problem) -> list[NDArray]:
@@ -214,7 +256,7 @@ def continued(search: Callable[[NDArray], Solution], solution: Solution, k: int,
     return solution
 
 
-def discretisation_shift(whitened: Sequence[Whitened], candidate: CandidateFit) -> NDArray:
+def discretisation_shift(candidate: CandidateFit) -> NDArray:
     """Values on a finer solver minus values on the usual one, to first order; shape (unknowns,).
 
     Raises
@@ -224,10 +266,10 @@ def discretisation_shift(whitened: Sequence[Whitened], candidate: CandidateFit) 
     """
     finer = [
         w.with_parameters(replace(candidate.hypothesis.of(w.observations.parameters), refinement=settings.REFINEMENT))
-        for w in whitened
+        for w in candidate.whitened
     ]
     changes = each(finer, lambda i, w: w.errors(candidate.values) - candidate.residuals[i])
-    weights = [mean_weight(w.observations) for w in whitened]
+    weights = [mean_weight(w.observations) for w in candidate.whitened]
     sizes = np.array([size_of(n, v) for n, v in candidate.values.items()])
     information = sum(c * J.T @ J for J, c in zip(candidate.jacobian, weights, strict=True))
     score = sum(c * J.T @ e for J, e, c in zip(candidate.jacobian, changes, weights, strict=True))

@@ -56,7 +56,7 @@ class Comparison:
         ordered = sorted(candidates, key=lambda c: (not c.is_plausible, c.mean_square))
         found = cls(whitened, base, ordered, {}, screened)
         contenders = {c.hypothesis: c for c in [base, *ordered[: settings.CONTENDERS], found.most_probable]}
-        lacks = {hypothesis: lack_of_fit(whitened, c) for hypothesis, c in contenders.items()}
+        lacks = {hypothesis: lack_of_fit(c) for hypothesis, c in contenders.items()}
         return replace(found, lack_of_fit=lacks)
 
     @cached_property

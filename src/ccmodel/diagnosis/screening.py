@@ -38,11 +38,11 @@ class Score:
     values: dict[str, float]
 
 
-def screen(whitened: Sequence[Whitened], base: CandidateFit, hypotheses: Sequence[Hypothesis]) -> list[Score]:
+def screen(base: CandidateFit, hypotheses: Sequence[Hypothesis]) -> list[Score]:
     """Score tests of mechanisms against a fitted model that they extend, the largest gain first."""
-    absorbed, _ = np.linalg.qr(_stacked(whitened, base.jacobian))
-    residuals = _stacked(whitened, base.residuals)
-    test = _Test(whitened, base, absorbed, residuals - absorbed @ (absorbed.T @ residuals))
+    absorbed, _ = np.linalg.qr(_stacked(base.whitened, base.jacobian))
+    residuals = _stacked(base.whitened, base.residuals)
+    test = _Test(base, absorbed, residuals - absorbed @ (absorbed.T @ residuals))
     return sorted((test.score(h) for h in hypotheses), key=lambda s: -s.gain)
 
 
@@ -58,7 +58,6 @@ class _Test:
         Residuals outside of it, each recording weighted by its mean square.
     """
 
-    whitened: Sequence[Whitened]
     base: CandidateFit
     absorbed: NDArray
     residuals: NDArray
@@ -91,20 +90,20 @@ class _Test:
     def _direction(self, hypothesis: Hypothesis, values: Mapping[str, float]) -> NDArray | None:
         """Change of the weighted errors that a recalibration does not absorb."""
         extended = self.base.hypothesis.and_also(hypothesis)
-        modelled = [w.with_parameters(extended.of(w.observations.parameters)) for w in self.whitened]
+        modelled = [w.with_parameters(extended.of(w.observations.parameters)) for w in self.base.whitened]
         every = {**self.base.values, **values}
         try:
             moved = each(modelled, lambda i, w: w.errors(every) - self.base.residuals[i])
         except ModelError:
             return None
-        d = _stacked(self.whitened, moved)
+        d = _stacked(self.base.whitened, moved)
         return d - self.absorbed @ (self.absorbed.T @ d)
 
     def _baseline_values(self, hypothesis: Hypothesis) -> dict[str, float] | None:
         """Values of a mechanism that a frozen baseline has already; None for any other."""
         if hypothesis.acting[0] not in self.base.hypothesis.baseline:
             return None
-        model = self.base.hypothesis.of(self.whitened[0].observations.parameters)
+        model = self.base.hypothesis.of(self.base.whitened[0].observations.parameters)
         return {key: model.value_of(key) for key in hypothesis.start}
 
 

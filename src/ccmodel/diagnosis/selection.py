@@ -46,7 +46,7 @@ class Selection:
         """Select from all mechanisms; the comparison of what was fitted, and the screening scores."""
         text = f"calibrated model: leave-one-out mean square {base.mean_square:.2f} (1: noise); screening"
         self.progress(f"{text} {len(self.mechanisms)} mechanisms", 0.0)
-        scores = screen(whitened, base, self.mechanisms)
+        scores = screen(base, self.mechanisms)
         fewest = settings.FEWEST_FITTED if base.mean_square > settings.ADEQUATE else 0
         worth = [s for k, s in enumerate(scores) if s.values and (s.gain > settings.WORTH_FITTING or k < fewest)]
         leading = worth[: settings.MOST_FITTED]
@@ -102,7 +102,7 @@ class Selection:
             part.progress(f"screening mechanisms beside {first.hypothesis}", 0.0)
             partners = [h for h in self.mechanisms if h.acting[0] not in first.hypothesis.acting]
             chosen: list[Score] = []
-            for s in screen(whitened, first, partners):
+            for s in screen(first, partners):
                 pair = frozenset(first.hypothesis.acting + s.hypothesis.acting)
                 if s.gain > settings.WORTH_FITTING and pair not in seen and len(chosen) < settings.PARTNERS:
                     seen.add(pair)

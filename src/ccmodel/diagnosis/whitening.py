@@ -15,13 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel import mechanisms as registry
 from ccmodel.channels import THETA_OUT, ZERO_OF
 from ccmodel.diagnosis import settings
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS
 from ccmodel.inference.jacobian import STEP, jacobian, size_of
 from ccmodel.inference.observations import Observations
 from ccmodel.model.general.run import settings_of
-from ccmodel.model.parameters import Parameters
+from ccmodel.model.parameters import Parameters, mechanism_key, mechanism_parameter
 
 # Step of the differences by a nuisance, relative to its size.
 NUISANCE_STEP = 10 * STEP
@@ -45,6 +46,8 @@ class Whitened:
         Root mean square error of a correct model by channel, in its unit: sensor noise and repeatability.
     scalar_nuisances : sequence of (str, float, float)
         Parameter, value and prior standard deviation of each scalar nuisance.
+    effects : ndarray, shape (rows, nuisances and draws)
+        Effects of the nuisances on the errors (`nuisances`), of which directions and shrinkage follow.
     """
 
     observations: Observations
@@ -52,7 +55,8 @@ class Whitened:
     shrinkage: NDArray
     nuisance_mean: NDArray
     noise_floor: Mapping[str, float]
-    scalar_nuisances: Sequence[tuple[str, float, float]] = ()
+    scalar_nuisances: Sequence[tuple[str, float, float]]
+    effects: NDArray
 
     @property
     def name(self) -> str:
@@ -92,39 +96,81 @@ class Whitened:
 def whiten(observations: Observations, model: Parameters) -> Whitened:
     """Observations with the covariance of their errors, linearised about a fitted model."""
     o = observations.with_parameters(model)
-    N, scalars = nuisances(o)
+    N = nuisances(o)
     friction = N[:, 0].reshape(o.sigma.shape) * o.sigma
     floor = np.sqrt((o.sigma**2).mean(axis=1) + (friction**2).mean(axis=1))
-    U, s, Vt = np.linalg.svd(N, full_matrices=False)
-    nuisance_mean = (Vt.T[:scalars] * (s / (1 + s**2))) @ U.T
     by_channel = dict(zip(o.channels, floor.tolist(), strict=True))
-    return Whitened(o, U, shrinkage_of(s), nuisance_mean, by_channel, _scalar_nuisances(o))
+    return _whitened(o, N, _scalar_nuisances(o), by_channel)
 
 
-def nuisances(o: Observations) -> tuple[NDArray, int]:
+def with_states_of(one: Whitened, model: Parameters) -> Whitened:
+    """Observations with the states of a model's mechanisms as nuisances, linearised about it, and no other states.
+
+    All other nuisances stay linearised as they are: candidate models are compared under one covariance, apart from the
+    states that only some of them have.
+    """
+    o = one.observations.with_parameters(model)
+    states = _states(model)
+    is_state = [mechanism_parameter(name) is not None for name, _, _ in one.scalar_nuisances]
+    if not states and not any(is_state):
+        return one
+    kept = [k for k, state in enumerate(is_state) if not state]
+    scalars = [*(one.scalar_nuisances[k] for k in kept), *states]
+    N = np.column_stack([one.effects[:, kept], *_effects(o, states), one.effects[:, len(is_state) :]])
+    return _whitened(one.observations, N, scalars, one.noise_floor)
+
+
+def _whitened(
+    o: Observations, effects: NDArray, scalars: Sequence[tuple[str, float, float]], noise_floor: Mapping[str, float]
+) -> Whitened:
+    U, s, Vt = np.linalg.svd(effects, full_matrices=False)
+    nuisance_mean = (Vt.T[: len(scalars)] * (s / (1 + s**2))) @ U.T
+    return Whitened(o, U, shrinkage_of(s), nuisance_mean, noise_floor, scalars, effects)
+
+
+def nuisances(o: Observations) -> NDArray:
     """Effects of the nuisances on the errors, a prior standard deviation of each, in units of the noise.
 
     Returns
     -------
     ndarray, shape (rows, k)
         Scalar nuisances first, friction before all others; then draws of the drive motion's error.
-    int
-        Number of scalar nuisances.
     """
-    simulated, scalars = o.modelled({}), _scalar_nuisances(o)
-    effects = []
-    for name, value, spread in scalars:
-        step = NUISANCE_STEP * size_of(name, value)
-        derivative = _derivative(o, name, value, step, simulated)
-        effects.append(spread * derivative / o.sigma)
+    scalars = _scalar_nuisances(o)
     drawn = o.drive_errors({})
-    columns = [*effects, *(d / np.sqrt(len(drawn)) for d in drawn)]
-    return np.stack([c.ravel() for c in columns], axis=1), len(scalars)
+    columns = [*_effects(o, scalars), *((d / np.sqrt(len(drawn))).ravel() for d in drawn)]
+    return np.stack(columns, axis=1)
+
+
+def _effects(o: Observations, scalars: Sequence[tuple[str, float, float]]) -> list[NDArray]:
+    """Effect on the errors of a prior standard deviation of each scalar nuisance, shape (rows,)."""
+    simulated, found = o.modelled({}), []
+    for name, value, spread in scalars:
+        derivative = _derivative(o, name, value, _step(name, value), simulated)
+        found.append((spread * derivative / o.sigma).ravel())
+    return found
+
+
+def _step(name: str, value: float) -> float:
+    """Step of the difference by a nuisance; for a state of a mechanism, into its range."""
+    if (parts := mechanism_parameter(name)) is None:
+        return NUISANCE_STEP * size_of(name, value)
+    state = registry.get(parts[0]).parameter(parts[2])
+    return NUISANCE_STEP * (1 if value < (state.low + state.high) / 2 else -1)
 
 
 def _derivative(o: Observations, name: str, value: float, step: float, simulated: NDArray) -> NDArray:
     """Of the simulated channels by one nuisance, shape (channels, samples)."""
     return jacobian(lambda x: o.modelled({name: x[0]}), np.array([value]), np.array([step]), simulated)[..., 0]
+
+
+def _states(model: Parameters) -> list[tuple[str, float, float]]:
+    """States of the model's mechanisms that differ between recordings, as scalar nuisances."""
+    return [
+        (mechanism_key(m.name, m.place, p.name), m.values[p.name], p.spread)
+        for m in model.mechanisms
+        for p in registry.get(m.name).states
+    ]
 
 
 def shrinkage_of(s: NDArray) -> NDArray:
@@ -161,4 +207,4 @@ def _scalar_nuisances(o: Observations) -> Sequence[tuple[str, float, float]]:
         found.append(("load_gap_position", parameters.load_gap_position, settings.GAP_SPREAD))
     if THETA_OUT in o.channels and (step := recording.encoder_step_rad.get(THETA_OUT)):
         found.append(("theta_out_zero_rad", parameters.theta_out_zero_rad, step / np.sqrt(12)))
-    return found
+    return [*found, *_states(parameters)]

@@ -60,7 +60,7 @@ def write_diagnosis(file: Path, found: Diagnosis, page: str | None = None) -> No
     report = found.report
     nearest = report["nearest"] or {"mechanisms": []}
     named = [*report["mechanisms"], *report["likeliest"], *report["alternatives"], *nearest["mechanisms"]]
-    errors = mismatch(found.judgement.whitened, found.judgement.calibrated)
+    errors = mismatch(found.judgement.calibrated)
     with matplotlib.rc_context(STYLE):
         text = _template("page.html.j2").render(
             report=report,
@@ -185,11 +185,11 @@ def _why(fit: CandidateFit, found: Diagnosis) -> str:
 def _map(found: Diagnosis) -> Figure:
     """Errors over the noise by channel and part of the motion: baseline and, if any, with the mechanisms found."""
     j = found.judgement
-    before = mismatch(j.whitened, j.calibrated)
+    before = mismatch(j.calibrated)
     highest = max(np.nanmax([list(v.values()) for v in before.values()]), 3.0)
     shown = {_baseline(found.report): before}
     if j.best is not j.calibrated:
-        shown[WITH_FOUND] = mismatch(j.whitened, j.best)
+        shown[WITH_FOUND] = mismatch(j.best)
     figure, axes = subplots(1, len(shown), figsize=(4 * len(shown), 2.9), sharey=True, squeeze=False)
     for ax, (title, table) in zip(axes[0], shown.items(), strict=True):
         values = np.array([[table[c][p] for p in PHASES] for c in table])
@@ -219,8 +219,7 @@ def _loops(found: Diagnosis) -> Figure:
     scale = TABLE[channel].scale
     figure, axes = subplots(1, len(order), figsize=(3.1 * len(order), 3.1), squeeze=False)
     for ax, i in zip(axes[0], order, strict=True):
-        w = j.whitened[i]
-        observed = w.observations
+        observed = j.whitened[i].observations
         c = observed.channels.index(channel)
         theta = observed.given.theta_in[observed.judged]
         ax.plot(theta, scale * observed.measured[c], color=FAINT, lw=2.2, label=_origin(found))
@@ -230,8 +229,7 @@ def _loops(found: Diagnosis) -> Figure:
         if found.report["nearest"] and j.nearest is not None:
             models.append((j.nearest, COLOURS[3], "-.", f"nearest model, {NOT_ACCEPTED}"))
         for fit, colour, line, label in models:
-            model = observed.with_parameters(fit.held_out(i, w))
-            ax.plot(theta, scale * model.modelled({})[c], color=colour, lw=1.0, ls=line, label=label)
+            ax.plot(theta, scale * fit.held_out(i).modelled({})[c], color=colour, lw=1.0, ls=line, label=label)
         ax.set_title(observed.given.recording.id, fontsize=9)
         ax.set_xlabel(TABLE[THETA_IN].axis)
     axes[0][0].set_ylabel(TABLE[channel].axis)
