@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from ccmodel import mechanisms as registry
+from ccmodel.deadline import UNLIMITED, Deadline
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.hypothesis import Hypothesis, plausible
 from ccmodel.diagnosis.whitening import Whitened, with_states_of
@@ -130,7 +131,11 @@ class CandidateFit:
 
 
 def fit(
-    whitened: Sequence[Whitened], hypothesis: Hypothesis, free: Mapping[str, Free], start: Mapping[str, float]
+    whitened: Sequence[Whitened],
+    hypothesis: Hypothesis,
+    free: Mapping[str, Free],
+    start: Mapping[str, float],
+    deadline: Deadline = UNLIMITED,
 ) -> CandidateFit:
     """Fit a candidate model from given values and cross-validate it.
 
@@ -142,22 +147,25 @@ def fit(
         Unknowns of the calibration.
     start : mapping of str to float
         Starting values of these and of the mechanisms' unknowns.
+    deadline : Deadline
+        When the fit is given up.
 
     Raises
     ------
     ModelError
-        If the model cannot be run at a point of the search.
+        If the model cannot be run at a point of the search, or the deadline has passed (`ccmodel.deadline.OutOfTimeError`).
     """
     unknowns = {n: Free(start[n], f.low, f.high) for n, f in free.items()} | hypothesis.free(start)
     modelled = _with_states(whitened, hypothesis, {n: f.start for n, f in unknowns.items()})
     problem = Problem(modelled, unknowns, weight=mean_weight)
-    solution = _search(problem, hypothesis)
+    search = replace(SEARCH, deadline=deadline)
+    solution = _search(problem, hypothesis, search)
     if _states_depend_on(hypothesis, problem.start, solution.x, problem.names):
         # The states' effects were those at the start, which the fit has left.
         values = problem.values_of(solution.x, 0)
         modelled = _with_states(whitened, hypothesis, values)
         problem = Problem(modelled, {n: replace(f, start=values[n]) for n, f in unknowns.items()}, weight=mean_weight)
-        solution = minimise(problem, inside_bounds(problem, problem.start), SEARCH)
+        solution = minimise(problem, inside_bounds(problem, problem.start), search)
     left_out = leave_one_out(problem, solution)
     covariance = left_out.covariance
     if len(modelled) == 1:
@@ -201,14 +209,14 @@ def _states_depend_on(hypothesis: Hypothesis, start: NDArray, found: NDArray, na
     )
 
 
-def _search(problem: Problem, hypothesis: Hypothesis) -> Solution:
+def _search(problem: Problem, hypothesis: Hypothesis, search: Search) -> Solution:
     starts = [inside_bounds(problem, x) for x in starting_points(problem)]
     if len(starts) > 1:
-        starts = [best_start(problem, starts).x]
-    solution = minimise(problem, starts[0], SEARCH)
+        starts = [best_start(problem, starts, search).x]
+    solution = minimise(problem, starts[0], search)
     for name in hypothesis.continuation:
         solution = continued(
-            lambda x: minimise(problem, x, SEARCH), solution, problem.names.index(name), problem.bounds[0]
+            lambda x: minimise(problem, x, search), solution, problem.names.index(name), problem.bounds[0]
         )
     return solution
 
@@ -228,12 +236,12 @@ def starting_points(problem: Problem) -> list[NDArray]:
     return [np.where(is_pretension, share * problem.start, problem.start) for share in settings.PRETENSION_STARTS]
 
 
-def best_start(problem: Problem, starts: Sequence[NDArray]) -> Solution:
+def best_start(problem: Problem, starts: Sequence[NDArray], search: Search = SEARCH) -> Solution:
     """The best of short searches; a start at which the model cannot be run counts only if it can at none."""
     found, failures = [], []
     for x in starts:
         try:
-            found.append(minimise(problem, x, replace(SEARCH, most_evaluations=settings.START_EVALUATIONS)))
+            found.append(minimise(problem, x, replace(search, most_evaluations=settings.START_EVALUATIONS)))
         except ModelError as error:
             failures.append(error)
     if not found:

@@ -34,12 +34,14 @@ class Comparison:
     base : CandidateFit
         The calibrated model.
     candidates : list of CandidateFit
-        The calibrated model with one mechanism or two, by ascending leave-one-out mean square; those with a strength
+        The calibrated model with mechanisms, by ascending leave-one-out mean square; those with a strength
         outside its plausible range last.
     lack_of_fit : mapping of Hypothesis to LackOfFit
         Of the calibrated model, the candidates with the lowest mean squares and the most probable one.
     screened : int
         Number of hypotheses that were screened, among which the prior probability is shared.
+    linearised_about : Hypothesis or None
+        The candidate about which the covariance is linearised; None for the model of the first fit.
     """
 
     whitened: Sequence[Whitened]
@@ -47,14 +49,20 @@ class Comparison:
     candidates: list[CandidateFit]
     lack_of_fit: Mapping[Hypothesis, LackOfFit]
     screened: int = 0
+    linearised_about: Hypothesis | None = None
 
     @classmethod
     def of(
-        cls, whitened: Sequence[Whitened], base: CandidateFit, candidates: Sequence[CandidateFit], screened: int = 0
+        cls,
+        whitened: Sequence[Whitened],
+        base: CandidateFit,
+        candidates: Sequence[CandidateFit],
+        screened: int = 0,
+        linearised_about: Hypothesis | None = None,
     ) -> "Comparison":
         """Order the candidates, and compute the lack of fit of those that may be named."""
         ordered = sorted(candidates, key=lambda c: (not c.is_plausible, c.mean_square))
-        found = cls(whitened, base, ordered, {}, screened)
+        found = cls(whitened, base, ordered, {}, screened, linearised_about)
         contenders = {c.hypothesis: c for c in [base, *ordered[: settings.CONTENDERS], found.most_probable]}
         lacks = {hypothesis: lack_of_fit(c) for hypothesis, c in contenders.items()}
         return replace(found, lack_of_fit=lacks)
@@ -109,7 +117,7 @@ class Comparison:
         """Highest mean square of an adequate candidate; the calibrated model gets no allowance for its form."""
         if candidate is self.base:
             return settings.ADEQUATE
-        limit = settings.ADEQUATE_PAIR if candidate.hypothesis.is_pair else settings.ADEQUATE
+        limit = settings.ADEQUATE_SET if candidate.hypothesis.size > 1 else settings.ADEQUATE
         form = candidate.hypothesis.model_form_error
         return limit + max(settings.ADEQUATE_SHARE / _imitations(candidate), form) * self.excess
 
@@ -120,9 +128,9 @@ class Comparison:
 
     @property
     def is_sufficient(self) -> bool:
-        """Whether no second mechanism is needed: the best candidate is adequate and close to the noise.
+        """Whether no further mechanism is needed: the best candidate is adequate and close to the noise.
 
-        Also true without candidates, since a second mechanism is only added to a first.
+        Also true without candidates, since a further mechanism is only added to a first.
         """
         if not self.has_adequate:
             return not self.candidates
@@ -156,7 +164,7 @@ def well_specified(candidate: CandidateFit, base: CandidateFit) -> float:
     - of a correct candidate: normal about zero. In every second case a half-normal model-form error is added, because
       the real effect does not follow the mechanism's equation exactly;
     - of an imitation: uniform from zero to the excess of the calibrated model. A pair is taken for the best of several
-      imitations, with the density of the smallest of as many uniform variables.
+      imitations, with the density of the smallest of as many uniform variables; likewise a larger set.
     """
     excess = max(base.mean_square - settings.CORRECT_LEVEL, settings.CORRECT_SPREAD)
     above = candidate.mean_square - settings.CORRECT_LEVEL
@@ -174,5 +182,5 @@ def well_specified(candidate: CandidateFit, base: CandidateFit) -> float:
 
 
 def _imitations(candidate: CandidateFit) -> int:
-    """Number of imitations of which a candidate may be the best: for a pair the partners that were fitted, else one."""
-    return settings.PARTNERS if candidate.hypothesis.is_pair else 1
+    """Number of imitations of which a candidate may be the best: the partners that were fitted at each further one."""
+    return settings.PARTNERS ** max(candidate.hypothesis.size - 1, 0)

@@ -1,4 +1,4 @@
-"""Candidate models: the tested model, with one mechanism at one of its places, or with two of them."""
+"""Candidate models: the tested model with mechanisms at some of their places."""
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -39,9 +39,9 @@ class Hypothesis:
         return replace(self, acting=self.acting + other.acting)
 
     @property
-    def is_pair(self) -> bool:
-        """Whether more than one mechanism acts."""
-        return len(self.acting) > 1
+    def size(self) -> int:
+        """Number of mechanisms that act."""
+        return len(self.acting)
 
     @property
     def names(self) -> tuple[str, ...]:

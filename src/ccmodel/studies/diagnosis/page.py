@@ -176,7 +176,7 @@ def _why(fit: CandidateFit, found: Diagnosis) -> str:
         # The lack of fit of a candidate that others surpass is not computed.
         above = fit.mean_square > limit
         return f"mean square above {limit:.3g}, the limit" if above else "others have a smaller mean square"
-    if j.single_fault_places and fit.hypothesis.is_pair:
+    if j.single_fault_places and fit.hypothesis.size > 1:
         return f"adequate, but one fault at the {' or '.join(j.single_fault_places)} is as adequate"
     ratio = fit.mean_square / j.best.mean_square
     return f"adequate, with {ratio:.3g} times the mean square" if ratio > 1 else "adequate, with more parameters"
