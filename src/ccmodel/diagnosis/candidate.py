@@ -153,7 +153,9 @@ def fit(
     Raises
     ------
     ModelError
-        If the model cannot be run at a point of the search, or the deadline has passed (`ccmodel.deadline.OutOfTimeError`).
+        If the model cannot be run at a point of the search.
+    ccmodel.deadline.OutOfTimeError
+        If the deadline has passed.
     """
     unknowns = {n: Free(start[n], f.low, f.high) for n, f in free.items()} | hypothesis.free(start)
     modelled = _with_states(whitened, hypothesis, {n: f.start for n, f in unknowns.items()})
