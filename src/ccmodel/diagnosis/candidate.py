@@ -22,7 +22,7 @@ from ccmodel.inference.least_squares import Search, Solution, minimise
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.pool import each
 from ccmodel.inference.problem import Free, Problem
-from ccmodel.model.parameters import Parameters, mechanism_key
+from ccmodel.model.parameters import Parameters
 
 SEARCH = Search(
     tolerance=settings.FIT_TOLERANCE,
@@ -162,8 +162,8 @@ def fit(
     problem = Problem(modelled, unknowns, weight=mean_weight)
     search = replace(SEARCH, deadline=deadline)
     solution = _search(problem, hypothesis, search)
-    if _states_depend_on(hypothesis, problem.start, solution.x, problem.names):
-        # The states' effects were those at the start, which the fit has left.
+    if any(registry.get(name).states for name, _ in hypothesis.baseline + hypothesis.acting):
+        # The states' effects were those of the values at the start, which the fit has left.
         values = problem.values_of(solution.x, 0)
         modelled = _with_states(whitened, hypothesis, values)
         problem = Problem(modelled, {n: replace(f, start=values[n]) for n, f in unknowns.items()}, weight=mean_weight)
@@ -197,18 +197,6 @@ def _with_states(whitened: Sequence[Whitened], hypothesis: Hypothesis, values: M
         return with_states_of(w, model.with_values(values)).with_parameters(model)
 
     return each(whitened, lambda i, w: of(w))
-
-
-def _states_depend_on(hypothesis: Hypothesis, start: NDArray, found: NDArray, names: Sequence[str]) -> bool:
-    """Whether a fit has moved the values of mechanisms with states so far that the states have other effects."""
-    moved = dict(zip(names, np.abs(found - start) > settings.STATES_MOVED * np.abs(found), strict=True))
-    return any(
-        moved.get(mechanism_key(name, place, p.name), False)
-        for name, place in hypothesis.baseline + hypothesis.acting
-        if registry.get(name).states
-        for p in registry.get(name).parameters
-        if not p.spread
-    )
 
 
 def _search(problem: Problem, hypothesis: Hypothesis, search: Search) -> Solution:

@@ -48,9 +48,6 @@ FIT_TOLERANCE = 1e-4
 # velocity-weakening friction are not smooth on a smaller scale.
 FIT_DIFFERENCE = 3e-4
 FIT_EVALUATIONS = 25
-# Relative change of a mechanism's values in a fit from which on the effects of its states, which are proportional to
-# its strength, are linearised again. Chosen.
-STATES_MOVED = 0.2
 # Factor by which an unknown is lowered at each step of a continuation (`Parameter.continuation`). Chosen.
 CONTINUATION_FACTOR = 4.0
 # Shares of the pretension from which a fit starts where the initial tension is not observed, and the evaluations after

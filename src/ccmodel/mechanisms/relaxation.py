@@ -1,10 +1,10 @@
 """Tension decays at rest and over cycles.
 
 Equation: Standard linear solid: the tension is T = T_e - r q with the elastic tension T_e and dq/dt = (T_e - q) /
-tau. A recording starts with q = relaxed T_e: the cable is fresh at relaxed = 0, so that its initial tension decays as
-well, and settled at 1. A cable tensioned a time t before has relaxed = 1 - exp(-t / tau). r is the share of a fresh
-cable's tension that is lost in all, before the recording and in it. Between samples T_e is taken as linear in time,
-for which q is exact.
+tau. A recording starts at rest with the tension T and q = relaxed T / (1 - r): held, its cables would lose
+r (1 - relaxed) of that tension. They are fresh at relaxed = 0 and settled at 1; a time t after the tensioning,
+1 - relaxed = e / (1 - r (1 - e)) with e = exp(-t / tau). r is the share that a fresh cable loses in all. Between
+samples T_e is taken as linear in time, for which q is exact.
 
 Signature: Tension decays at rest and over cycles while the angles stay. The paper measured 10.5 % with 30 s on its
 rig and neglected it.
@@ -19,6 +19,17 @@ import numpy as np
 
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
+
+
+def relaxed_after(seconds: float, r: float, tau: float) -> float:
+    """The state `relaxed` at a time after the cables were tensioned."""
+    over = -np.expm1(-seconds / tau)
+    return float((1 - r) * over / (1 - r * over))
+
+
+def kept_at_rest(seconds: float, r: float, tau: float, relaxed: float) -> float:
+    """Tension at a time into the rest that a recording starts with, over the tension at its first sample."""
+    return float(1 - r * (1 - relaxed) * -np.expm1(-seconds / tau))
 
 
 @kernel
@@ -36,7 +47,8 @@ def lag_weights(step_over_tau: float) -> tuple[float, float, float]:
 MECHANISM = Mechanism(
     name="relaxation",
     text=__doc__,
-    tex=r"T = T_e - r\,q, \qquad \frac{dq}{dt} = \frac{T_e - q}{\tau}, \qquad q(0) = \mathrm{relaxed}\,T_e(0)",
+    tex=r"T = T_e - r\,q, \qquad \frac{dq}{dt} = \frac{T_e - q}{\tau}, \qquad "
+    r"q(0) = \frac{\mathrm{relaxed}}{1 - r}\,T(0)",
     sentence="the cables lose {r:%} of their tension as time passes",
     places=("cable",),
     parameters=(
@@ -48,7 +60,7 @@ MECHANISM = Mechanism(
             0.0,
             1.0,
             0.5,
-            "share of the loss that is over when a recording starts",
+            "share of the loss r that is over when a recording starts",
             scale="linear",
             screening_grid=(0.0, 0.8),
             default=0.0,
