@@ -20,6 +20,7 @@ from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
+from ccmodel.diagnosis.repeatability import FRICTION, friction_repeats
 from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.inference.effective_samples import in_comparison
 
@@ -105,10 +106,13 @@ class Comparison:
     def is_adequate(self, candidate: CandidateFit) -> bool:
         """Whether the mean square and the lack of fit of a candidate are as low as the true physics could leave them.
 
-        The limits allow for noise and for the model-form error of the added mechanisms, a share of the excess.
+        The limits allow for noise and for the model-form error of the added mechanisms, a share of the excess. Friction
+        must differ between recordings by no more than from run to run.
         """
         lack = self.lack_of_fit.get(candidate.hypothesis)
         if lack is None or not candidate.is_plausible:
+            return False
+        if not friction_repeats(candidate.whitened, candidate.residuals, FRICTION in candidate.values):
             return False
         highest_lack = settings.ADEQUATE_LACK_OF_FIT + candidate.hypothesis.model_form_error * self.excess
         return candidate.mean_square <= self.adequate_mean_square(candidate) and lack.lower_bound <= highest_lack

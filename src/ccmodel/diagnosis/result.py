@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
 from ccmodel.channels import short_name, unit_of
-from ccmodel.diagnosis import experiment, location, settings
+from ccmodel.diagnosis import experiment, location, repeatability, settings
 from ccmodel.diagnosis.candidate import CandidateFit, discretisation_shift, fit
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.observations import NotJudged
@@ -43,6 +43,7 @@ def report(batch: str, judgement: Judgement, estimates: Parameters, not_judged: 
             "mean_square": {"calibrated": base.mean_square, "extended": best.mean_square},
             "error": held_out_errors(judgement, nested_choice(judgement)),
         },
+        "repeatability": repeatability.report(whitened),
         "next_experiment": experiment.proposed(judgement, estimates) if open_question else None,
         "not_judged": [*not_judged, *contradicting_recording(judgement), *_at_bounds(best), *failures],
     }

@@ -14,10 +14,11 @@ from ccmodel.diagnosis.calibration import TestedModel, tested_model
 from ccmodel.diagnosis.candidate import CandidateFit, fit
 from ccmodel.diagnosis.hypothesis import single_mechanisms, stated_hypothesis
 from ccmodel.diagnosis.observations import NotJudged, observations_of
+from ccmodel.diagnosis.repeatability import estimated
 from ccmodel.diagnosis.result import report
 from ccmodel.diagnosis.selection import Selection
 from ccmodel.diagnosis.verdict import Judgement, judge
-from ccmodel.diagnosis.whitening import Whitened, whiten
+from ccmodel.diagnosis.whitening import Whitened, relinearised, whiten
 from ccmodel.inference.observations import Tolerance
 from ccmodel.inference.pool import each
 from ccmodel.model.parameters import Parameters
@@ -71,7 +72,7 @@ class Calibration:
     tested : TestedModel
         The model that is tested, with its unknowns and their values from a first fit.
     whitened : list of Whitened
-        The observations, their errors whitened about that first fit.
+        The observations, their errors whitened with the spreads that they show.
     fit : CandidateFit
         The calibrated model.
     not_judged : list of {"what", "why"}
@@ -128,8 +129,9 @@ def calibrate(
 ) -> Calibration:
     """Fit the paper's model, or a baseline, to recordings; parameters as of `diagnose`.
 
-    Two fits: a first one gives the model about which the errors are linearised and whitened, and the fit of the
-    whitened errors is the calibrated model.
+    Three fits: a first one gives the model about which the errors are linearised and whitened. A fit of the whitened
+    errors shows how much friction and zeros differ from run to run; whitened with these spreads, about each recording's
+    own friction, they give the calibrated model.
 
     Parameters
     ----------
@@ -148,7 +150,10 @@ def calibrate(
     at_estimates = [o.with_parameters(tested.estimates) for o in observations]
     progress("calibrating with whitened errors", FIRST_FIT)
     whitened = each(at_estimates, lambda i, o: whiten(o, tested.model))
-    return Calibration(tested, whitened, fit(whitened, tested.hypothesis, tested.free, tested.start), missing)
+    first = fit(whitened, tested.hypothesis, tested.free, tested.start)
+    repeatability, model = estimated(first.whitened, first.residuals), first.model(tested.estimates)
+    whitened = each(whitened, lambda i, w: relinearised(w, model, repeatability))
+    return Calibration(tested, whitened, fit(whitened, tested.hypothesis, tested.free, first.values), missing)
 
 
 @_one_thread

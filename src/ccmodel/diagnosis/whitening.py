@@ -7,10 +7,12 @@ standard deviation. They are marginalised, so that no fit needs unknowns for the
 A nuisance far outside its prior, such as friction that is 10 % higher in every recording, is one number among
 thousands of samples. The posterior means of the nuisances are therefore appended to the whitened errors, each with the
 weight of one effective sample.
+
+Errors are linear in a nuisance only nearby. Each recording is therefore linearised about its own friction.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,7 @@ from numpy.typing import NDArray
 from ccmodel import mechanisms as registry
 from ccmodel.channels import THETA_OUT, ZERO_OF
 from ccmodel.diagnosis import settings
+from ccmodel.diagnosis.repeatability import FRICTION, STATED, Repeatability
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS
 from ccmodel.inference.jacobian import STEP, jacobian, size_of
 from ccmodel.inference.observations import Observations
@@ -42,21 +45,33 @@ class Whitened:
     nuisance_mean : ndarray, shape (nuisances, rows)
         Maps errors over the sensors' noise to the posterior mean of each scalar nuisance over its prior standard
         deviation.
+    determined : ndarray, shape (nuisances,)
+        One minus the posterior variance of each scalar nuisance over its prior variance.
     noise_floor : dict of str to float
         Root mean square error of a correct model by channel, in its unit: sensor noise and repeatability.
     scalar_nuisances : sequence of (str, float, float)
         Parameter, value and prior standard deviation of each scalar nuisance.
     effects : ndarray, shape (rows, nuisances and draws)
         Effects of the nuisances on the errors (`nuisances`), of which directions and shrinkage follow.
+    repeatability : Repeatability
+        Where the prior standard deviations come from.
+    own : mapping of str to float
+        Parameters of this recording alone about which its errors are linearised.
+    own_errors : ndarray, shape (rows,)
+        Change of the errors by these, to first order.
     """
 
     observations: Observations
     directions: NDArray
     shrinkage: NDArray
     nuisance_mean: NDArray
+    determined: NDArray
     noise_floor: Mapping[str, float]
     scalar_nuisances: Sequence[tuple[str, float, float]]
     effects: NDArray
+    repeatability: Repeatability = STATED
+    own: Mapping[str, float] = field(default_factory=dict)
+    own_errors: NDArray | float = 0.0
 
     @property
     def name(self) -> str:
@@ -74,17 +89,38 @@ class Whitened:
 
     def with_nuisances(self, errors: NDArray) -> NDArray:
         """Whitened errors, followed by the nuisances' posterior means; shape (rows + nuisances,)."""
-        rows_per_sample = self.measured.shape[1] / IN_DIAGNOSIS
-        return np.concatenate([self.whiten(errors), np.sqrt(rows_per_sample) * (self.nuisance_mean @ errors)])
+        return np.concatenate([self.whiten(errors), self._nuisance_weight * (self.nuisance_mean @ errors)])
 
     def errors(self, values: Mapping[str, float]) -> NDArray:
         """Whitened errors of the model with some parameters replaced, and nuisances; shape (rows + nuisances,)."""
-        return self.with_nuisances(self.observations.errors(values).ravel())
+        return self.with_nuisances(self.linearised_errors(values))
+
+    def linearised_errors(self, values: Mapping[str, float]) -> NDArray:
+        """Errors over the noise, extrapolated from the recording's own friction to that of all; shape (rows,)."""
+        return self.observations.errors({**values, **self.own}).ravel() - self.own_errors
+
+    @property
+    def _nuisance_weight(self) -> float:
+        """Weight of a nuisance's posterior mean among the errors: that of one effective sample."""
+        return float(np.sqrt(self.measured.shape[1] / IN_DIAGNOSIS))
+
+    def deviation(self, nuisance: str, residuals: NDArray) -> tuple[float, float]:
+        """Deviation of a nuisance, in stated standard deviations, and the variance of its error, from `errors`.
+
+        NaN if the recording determines less than half of its variance.
+        """
+        names = [name for name, _, _ in self.scalar_nuisances]
+        if nuisance not in names or self.determined[k := names.index(nuisance)] < 0.5:
+            return np.nan, np.nan
+        # Errors are model minus recording: a recording that has a nuisance has the opposite error.
+        mean = -float(residuals[self.measured.size + k]) / self._nuisance_weight
+        share, ratio = float(self.determined[k]), self.repeatability.ratio(nuisance)
+        return ratio * mean / share, ratio**2 * (1 - share) / share
 
     def own_values(self, values: Mapping[str, float]) -> dict[str, float]:
         """Posterior mean of each scalar nuisance in this recording, by parameter, for shared values of a fit."""
         # Errors are model minus recording: a recording that has a nuisance has the opposite error.
-        means = -self.nuisance_mean @ self.observations.errors(values).ravel()
+        means = -self.nuisance_mean @ self.linearised_errors(values)
         pairs = zip(self.scalar_nuisances, means.tolist(), strict=True)
         return {name: values.get(name, value) + spread * mean for (name, value, spread), mean in pairs}
 
@@ -93,14 +129,30 @@ class Whitened:
         return replace(self, observations=self.observations.with_parameters(parameters))
 
 
-def whiten(observations: Observations, model: Parameters) -> Whitened:
-    """Observations with the covariance of their errors, linearised about a fitted model."""
+def whiten(
+    observations: Observations, model: Parameters, repeatability: Repeatability = STATED, friction_ratio: float = 1.0
+) -> Whitened:
+    """Observations with the covariance of their errors, linearised about a fitted model.
+
+    Parameters
+    ----------
+    observations : Observations
+    model : Parameters
+    repeatability : Repeatability
+        Estimated spreads of the nuisances.
+    friction_ratio : float
+        Friction of the recording over the model's, about which the errors are linearised.
+    """
     o = observations.with_parameters(model)
-    N = nuisances(o)
+    own = {} if friction_ratio == 1.0 else {"friction_scale": friction_ratio}
+    at = o.with_parameters(model.with_values(own))
+    N, known = nuisances(at, repeatability), repeatability.applied(_scalar_nuisances(at))
     friction = N[:, 0].reshape(o.sigma.shape) * o.sigma
     floor = np.sqrt((o.sigma**2).mean(axis=1) + (friction**2).mean(axis=1))
     by_channel = dict(zip(o.channels, floor.tolist(), strict=True))
-    return _whitened(o, N, _scalar_nuisances(o), by_channel)
+    spread = known[0][2] / known[0][1]
+    own_errors = N[:, 0] * (1 - 1 / friction_ratio) / spread
+    return Whitened(o, *_moments(N, len(known)), by_channel, known, N, repeatability, own, own_errors)
 
 
 def with_states_of(one: Whitened, model: Parameters) -> Whitened:
@@ -109,26 +161,30 @@ def with_states_of(one: Whitened, model: Parameters) -> Whitened:
     All other nuisances stay linearised as they are: candidate models are compared under one covariance, apart from the
     states that only some of them have.
     """
-    o = one.observations.with_parameters(model)
     states = _states(model)
     is_state = [mechanism_parameter(name) is not None for name, _, _ in one.scalar_nuisances]
     if not states and not any(is_state):
         return one
     kept = [k for k, state in enumerate(is_state) if not state]
     scalars = [*(one.scalar_nuisances[k] for k in kept), *states]
-    N = np.column_stack([one.effects[:, kept], *_effects(o, states), one.effects[:, len(is_state) :]])
-    return _whitened(one.observations, N, scalars, one.noise_floor)
+    by_state = _effects(one.observations.with_parameters(model.with_values(one.own)), states)
+    N = np.column_stack([one.effects[:, kept], *by_state, one.effects[:, len(is_state) :]])
+    directions, shrinkage, nuisance_mean, determined = _moments(N, len(scalars))
+    return replace(
+        one, directions=directions, shrinkage=shrinkage, nuisance_mean=nuisance_mean, determined=determined,
+        scalar_nuisances=scalars, effects=N,
+    )  # fmt: skip
 
 
-def _whitened(
-    o: Observations, effects: NDArray, scalars: Sequence[tuple[str, float, float]], noise_floor: Mapping[str, float]
-) -> Whitened:
+def _moments(effects: NDArray, scalars: int) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """Directions, shrinkage, and the posterior mean and determination of the scalar nuisances (`Whitened`)."""
     U, s, Vt = np.linalg.svd(effects, full_matrices=False)
-    nuisance_mean = (Vt.T[: len(scalars)] * (s / (1 + s**2))) @ U.T
-    return Whitened(o, U, shrinkage_of(s), nuisance_mean, noise_floor, scalars, effects)
+    nuisance_mean = (Vt.T[:scalars] * (s / (1 + s**2))) @ U.T
+    determined = (Vt.T[:scalars] ** 2) @ (s**2 / (1 + s**2))
+    return U, shrinkage_of(s), nuisance_mean, determined
 
 
-def nuisances(o: Observations) -> NDArray:
+def nuisances(o: Observations, repeatability: Repeatability = STATED) -> NDArray:
     """Effects of the nuisances on the errors, a prior standard deviation of each, in units of the noise.
 
     Returns
@@ -136,7 +192,7 @@ def nuisances(o: Observations) -> NDArray:
     ndarray, shape (rows, k)
         Scalar nuisances first, friction before all others; then draws of the drive motion's error.
     """
-    scalars = _scalar_nuisances(o)
+    scalars = repeatability.applied(_scalar_nuisances(o))
     drawn = o.drive_errors({})
     columns = [*_effects(o, scalars), *((d / np.sqrt(len(drawn))).ravel() for d in drawn)]
     return np.stack(columns, axis=1)
@@ -178,21 +234,30 @@ def shrinkage_of(s: NDArray) -> NDArray:
     return 1 - 1 / np.hypot(1, s)
 
 
-def relinearised(one: Whitened, model: Parameters) -> Whitened:
-    """Observations with the covariance linearised about another model.
+def relinearised(one: Whitened, model: Parameters, repeatability: Repeatability | None = None) -> Whitened:
+    """Observations with the covariance linearised about another model and the recording's own friction.
 
     The load's position in a gap of that model is the most likely one of a few: a load with mass rings differently on
     either side of its gap, and no linearisation leads from one to the other.
+
+    Parameters
+    ----------
+    one : Whitened
+    model : Parameters
+    repeatability : Repeatability, optional
+        Spreads of the nuisances, instead of the present ones.
     """
 
     def mean_square(position: float) -> float:
-        at = one.observations.with_parameters(replace(model, load_gap_position=position))
-        return float(np.mean(one.whiten(at.errors({}).ravel()) ** 2))
+        at = one.with_parameters(replace(model, load_gap_position=position))
+        return float(np.mean(one.whiten(at.linearised_errors({})) ** 2))
 
     has_gap = settings_of(model.mechanisms).half_gap
     position = min(settings.GAP_POSITIONS, key=mean_square) if has_gap else model.load_gap_position
-    about = whiten(one.observations, replace(model, load_gap_position=position))
-    return about.with_parameters(replace(one.observations.parameters, load_gap_position=position))
+    friction = one.with_parameters(model).own_values({})[FRICTION] / one.scalar_nuisances[0][1]
+    about = replace(model, load_gap_position=position)
+    found = whiten(one.observations, about, repeatability or one.repeatability, friction)
+    return found.with_parameters(replace(one.observations.parameters, load_gap_position=position))
 
 
 def _scalar_nuisances(o: Observations) -> Sequence[tuple[str, float, float]]:

@@ -42,6 +42,7 @@ def report(batch: str, findings: Sequence[Finding], is_held: bool = False) -> di
             "mean_square": {"calibrated": None, "extended": None},
             "error": {},
         },
+        "repeatability": [],
         "next_experiment": {"text": _correction(contradictions), "separates": []},
         "not_judged": [
             {"what": f.place, "why": f.text, "confidence": round(f.confidence, 4)} for f in [*contradictions, *damaged]

@@ -81,6 +81,7 @@ def write_diagnosis(file: Path, found: Diagnosis, page: str | None = None) -> No
             map=_encoded(_map(found)),
             map_in_words=_map_in_words(errors),
             caution=_caution(report, errors),
+            repeatability=repeatability_in_words(report["repeatability"]),
             loops=_encoded(_loops(found)),
             recordings=[w.observations.given.recording.id for w in found.judgement.whitened],
         )
@@ -121,6 +122,20 @@ def _map_in_words(errors: Mapping[str, Mapping[str, float]]) -> str:
         for channel, phases in errors.items()
     )
     return "Residuals over the noise floor: " + "; ".join(rows)
+
+
+def repeatability_in_words(rows: Sequence[Mapping]) -> str:
+    """What differs from run to run by how much: what the recordings show, and what was assumed."""
+    shown, assumed = [], []
+    for row in rows:
+        size = f"{100 * row['value']:.2g} %" if row["unit"] == "1" else f"{row['value']:.2g} {row['unit']}"
+        if row["from"] == "assumed":
+            assumed.append(f"{row['what']} {size}")
+        else:
+            source = "that repeat a condition" if row["from"] == "repeats" else "none of which repeats another"
+            shown.append(f"{row['what']} {size} (from {row['recordings']} recordings {source})")
+    parts = [f"estimated: {', '.join(shown)}"] * bool(shown) + [f"assumed: {', '.join(assumed)}"] * bool(assumed)
+    return f"Standard deviations from run to run, {'; '.join(parts)}."
 
 
 def _caution(report: Mapping, errors: Mapping[str, Mapping[str, float]]) -> str | None:
