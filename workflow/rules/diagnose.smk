@@ -1,6 +1,10 @@
+# A batch, or all batches of a rig together; the wildcard is the name of either.
 rule diagnose:
     input:
-        recordings=lambda wildcards: recordings_of(wildcards.batch),
+        lambda wildcards: [
+            recordings_of(batch)
+            for batch in CONFIG.diagnosed_rigs.get(wildcards.batch, [wildcards.batch])
+        ],
     output:
         f"{RESULTS}/diagnoses/{{batch}}/diagnosis.json",
         in_report(
@@ -28,6 +32,6 @@ rule diagnose:
         ).model_dump_json(),
         sources=source_digest("ccmodel.studies.diagnosis.run"),
     message:
-        "Diagnosing batch {wildcards.batch}"
+        "Diagnosing {wildcards.batch}"
     script:
         "../scripts/diagnose_batch.py"

@@ -83,6 +83,17 @@ class CandidateFit:
         """Mean of `by_recording`."""
         return float(self.by_recording.mean())
 
+    @cached_property
+    def prior(self) -> tuple[NDArray, NDArray]:
+        """Distances of unknowns from their prior's means over its standard deviations, and derivatives of these.
+
+        Rows of the cost beside those of the recordings; shapes (priors,) and (priors, unknowns).
+        """
+        stated = [(name, one) for name, one in self.free.items() if one.prior_precision]
+        distances = np.array([f.prior_precision * (self.values[name] - f.prior_mean) for name, f in stated])
+        derivatives = np.array([[f.prior_precision * (name == other) for other in self.values] for name, f in stated])
+        return distances, derivatives.reshape(len(stated), len(self.values))
+
     @property
     def is_plausible(self) -> bool:
         """Whether its mechanisms' strengths lie within their plausible ranges."""
@@ -120,7 +131,8 @@ class CandidateFit:
 
     def held_out(self, i: int, whitened: Whitened) -> Parameters:
         """The model of one of the recordings, fitted to all others."""
-        return self.hypothesis.of(whitened.observations.parameters).with_values(self.loo_values[i])
+        observations = whitened.observations
+        return self.hypothesis.of(observations.parameters).with_values(self.loo_values[i], observations.session)
 
 
 def fit(
@@ -142,7 +154,7 @@ def fit(
     ModelError
         If the model cannot be run at a point of the search.
     """
-    unknowns = {n: Free(start[n], f.low, f.high) for n, f in free.items()} | hypothesis.free(start)
+    unknowns = {n: replace(f, start=start[n]) for n, f in free.items()} | hypothesis.free(start)
     modelled = [w.with_parameters(hypothesis.of(w.observations.parameters)) for w in whitened]
     problem = Problem(modelled, unknowns, weight=mean_weight)
     solution = _search(problem, hypothesis)
@@ -230,5 +242,6 @@ def discretisation_shift(whitened: Sequence[Whitened], candidate: CandidateFit) 
     weights = [mean_weight(w.observations) for w in whitened]
     sizes = np.array([size_of(n, v) for n, v in candidate.values.items()])
     information = sum(c * J.T @ J for J, c in zip(candidate.jacobian, weights, strict=True))
+    information += candidate.prior[1].T @ candidate.prior[1]
     score = sum(c * J.T @ e for J, e, c in zip(candidate.jacobian, changes, weights, strict=True))
     return -inverse_of(information, sizes) @ score

@@ -40,8 +40,9 @@ class Score:
 
 def screen(whitened: Sequence[Whitened], base: CandidateFit, hypotheses: Sequence[Hypothesis]) -> list[Score]:
     """Score tests of mechanisms against a fitted model that they extend, the largest gain first."""
-    absorbed, _ = np.linalg.qr(_stacked(whitened, base.jacobian))
-    residuals = _stacked(whitened, base.residuals)
+    distances, derivatives = base.prior
+    absorbed, _ = np.linalg.qr(np.concatenate([_stacked(whitened, base.jacobian), derivatives]))
+    residuals = np.concatenate([_stacked(whitened, base.residuals), distances])
     test = _Test(whitened, base, absorbed, residuals - absorbed @ (absorbed.T @ residuals))
     return sorted((test.score(h) for h in hypotheses), key=lambda s: -s.gain)
 
@@ -97,7 +98,7 @@ class _Test:
             moved = each(modelled, lambda i, w: w.errors(every) - self.base.residuals[i])
         except ModelError:
             return None
-        d = _stacked(self.whitened, moved)
+        d = np.concatenate([_stacked(self.whitened, moved), np.zeros(self.base.prior[0].size)])
         return d - self.absorbed @ (self.absorbed.T @ d)
 
     def _baseline_values(self, hypothesis: Hypothesis) -> dict[str, float] | None:

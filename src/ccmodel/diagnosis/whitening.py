@@ -60,6 +60,11 @@ class Whitened:
         return self.observations.name
 
     @property
+    def session(self) -> str:
+        """Batch among several that are taken together; empty for a batch by itself."""
+        return self.observations.session
+
+    @property
     def measured(self) -> NDArray:
         """Values of the observations, shape (channels, samples)."""
         return self.observations.measured
