@@ -31,7 +31,10 @@ rule diagnose:
             wildcards.batch
         ).model_dump_json(),
         sources=source_digest("ccmodel.studies.diagnosis.run"),
+        what=lambda wildcards: (
+            "rig" if wildcards.batch in CONFIG.diagnosed_rigs else "batch"
+        ),
     message:
-        "Diagnosing {wildcards.batch}"
+        "Diagnosing {params.what} {wildcards.batch}"
     script:
         "../scripts/diagnose_batch.py"

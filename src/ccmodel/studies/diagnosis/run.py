@@ -91,17 +91,23 @@ def diagnosed(
     findings = ingested.findings
     if ingested.contradicts and not trust_inputs:
         report = inconsistent.report(ingested.stated.batch, findings, options.freeze, bool(ingested.parts))
-        return Outcome(_complete(report, inputs, ingested), ingested.recordings)
+        return Outcome(_complete(_with_batches(report, ingested), inputs), ingested.recordings)
     estimates = Parameters.estimated(ingested.stated.rig)
     found = run(ingested.recordings, estimates, options, baseline, _not_judged(ingested), progress)
-    return Outcome(_complete(found.report, inputs, ingested), ingested.recordings, found)
+    found = replace(found, report=_with_batches(found.report, ingested))
+    return Outcome(_complete(found.report, inputs), ingested.recordings, found)
 
 
-def _complete(report: dict, inputs: dict, ingested: Ingested) -> dict:
-    """The content of diagnosis.json: a report with its headline, its batches if several, and its inputs' digests."""
-    batches = {"batches": list(ingested.parts)} if ingested.parts else {}
-    first = {key: report[key] for key in ("format", "batch")}
-    return first | batches | report | {"headline": headline(report), "provenance": inputs}
+def _with_batches(report: dict, ingested: Ingested) -> dict:
+    """A report that names its batches after its name, if there are several."""
+    if not ingested.parts:
+        return report
+    return {"format": report["format"], "batch": report["batch"], "batches": list(ingested.parts)} | report
+
+
+def _complete(report: dict, inputs: dict) -> dict:
+    """The content of diagnosis.json: a report with its headline and the digests of its inputs."""
+    return report | {"headline": headline(report), "provenance": inputs}
 
 
 def write(outcome: Outcome, out: Path, page: str | None = None) -> None:
