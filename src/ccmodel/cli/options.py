@@ -39,7 +39,7 @@ Batch = Annotated[Path, typer.Argument(metavar="BATCH", help="Folder of a batch,
 Batches = Annotated[
     list[Path],
     typer.Argument(
-        metavar="BATCH...",
+        metavar="BATCH",
         help="Folder of a batch, or its batch.yaml; or those of all batches of one rig, to diagnose them together.",
         **(_BATCH | {"callback": _each(batch_folder)}),
     ),
