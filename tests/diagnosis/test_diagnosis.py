@@ -333,5 +333,5 @@ def test_the_pipeline_says_which_recordings_it_had_to_do_without(tmp_path, monke
         raise ModelError("what comes after is not asked here")
 
     monkeypatch.setattr(stage, "run", run)
-    stage.diagnose_recordings(tmp_path / "cut.nc", tmp_path / "out")
+    stage.diagnose_recordings([tmp_path / "cut.nc"], tmp_path / "out")
     assert [one["what"] for one in told] == ["t-5N.csv.gz"]

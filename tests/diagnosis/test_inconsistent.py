@@ -107,7 +107,7 @@ def test_the_pipelines_diagnosis_does_the_same(dead, tmp_path, monkeypatch, trus
     out = tmp_path / "out"
     given = []
     monkeypatch.setattr(stage, "run", lambda _r, _e, _o, _b, not_judged, _p: given.extend(not_judged) or stop())
-    stage.diagnose_recordings(tmp_path / "bench.nc", out, Diagnosing(trust_inputs=trust))
+    stage.diagnose_recordings([tmp_path / "bench.nc"], out, Diagnosing(trust_inputs=trust))
     said = json.loads((out / "diagnosis.json").read_text())
     if trust:
         assert said["verdict"] is None

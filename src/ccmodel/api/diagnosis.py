@@ -1,6 +1,6 @@
 """Diagnoses: whether the calibrated model explains a batch, and which physics is missing."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from ccmodel.api.batch import Batch, as_batch
+from ccmodel.api.batch import Batch, joint_batch
 from ccmodel.api.model import HasModel, as_model
 from ccmodel.api.options import Candidates, Tolerance, check_step, diagnosis_options, progress_of
 from ccmodel.api.recordings import counted
@@ -27,11 +27,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis:
-    """The diagnosis of a batch.
+    """The diagnosis of a batch, or of several of one rig.
 
     Attributes
     ----------
     batch : Batch
+        The batch; of several, all their recordings, with ids such as ``loops/loops-1-a``.
     """
 
     batch: Batch
@@ -168,7 +169,7 @@ class Diagnosis:
 
 
 def diagnose(
-    batch: Batch | str | Path,
+    batch: Batch | str | Path | Sequence[Batch | str | Path],
     out: str | Path | None = None,
     *,
     baseline: Model | HasModel | str | Path | None = None,
@@ -187,8 +188,9 @@ def diagnose(
 
     Parameters
     ----------
-    batch : Batch, str or Path
-        A batch, or its folder.
+    batch : Batch, str, Path or sequence of these
+        A batch, or its folder; or all batches of one rig, which are diagnosed together: stiffness, friction, load and
+        mechanisms are the rig's, while zeros, initial tensions and a few per cent of friction differ between batches.
     out : str or Path, optional
         Folder for diagnosis.json, the page and the models; `Diagnosis.save` writes them later.
     baseline : Model, Fit, Diagnosis, str or Path, optional
@@ -230,14 +232,15 @@ def diagnose(
     if out is not None:
         try_folder(out)
     with progress_of(progress) as report:
-        batch = as_batch(batch, within(report, 0.0, INGEST))
+        several = batch if isinstance(batch, Sequence) and not isinstance(batch, str) else [batch]
+        batch = joint_batch(several, within(report, 0.0, INGEST))
         check_step(batch.recordings, step_s)
         batch._ingested.check_usable(batch.folder, trust_inputs)
         part = within(report, INGEST, PAGE)
         try:
             outcome = diagnosed(batch._ingested, dict(batch.provenance), options, known, part, trust_inputs)
         except (ModelError, ValueError) as error:
-            raise InputError(f"{batch.folder}: {error}") from None
+            raise InputError(f"{batch.name if len(several) > 1 else batch.folder}: {error}") from None
         found = Diagnosis(batch, outcome)
         if out is not None:
             report("writing the page", PAGE)

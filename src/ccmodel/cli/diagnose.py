@@ -1,4 +1,4 @@
-"""Diagnosis of a batch."""
+"""Diagnosis of a batch, or of several batches of one rig."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +9,7 @@ from ccmodel.cli import completion
 from ccmodel.cli.group import MODEL, command
 from ccmodel.cli.interruption import leaving
 from ccmodel.cli.options import (
-    Batch,
+    Batches,
     Cycles,
     Json,
     Quiet,
@@ -25,12 +25,13 @@ from ccmodel.cli.output import Output
 
 def add_to(app: typer.Typer) -> None:
     """Add the command."""
+    of_a_rig = "ccmodel diagnose data/raw/loops data/raw/pretension --out out"
     later = "ccmodel diagnose data/raw/later --baseline out/model.json --freeze --out later"
-    command(app, "diagnose", MODEL, ["ccmodel diagnose data/raw/loops --out out", later])(diagnose)
+    command(app, "diagnose", MODEL, ["ccmodel diagnose data/raw/loops --out out", of_a_rig, later])(diagnose)
 
 
 def diagnose(
-    batch: Batch,
+    batches: Batches,
     out: Annotated[Path, out_folder("Folder for diagnosis.json, the page and the models.")],
     without: Annotated[
         list[str],
@@ -65,6 +66,7 @@ def diagnose(
 ) -> None:
     """Decide whether the calibrated model explains a batch; if not, locate and name the physics left out.
 
+    Several batches of one rig are diagnosed together, with one stiffness, one friction and one set of mechanisms.
     Exits with 0 at any verdict, unless --strict is given.
     """
     import ccmodel
@@ -75,7 +77,7 @@ def diagnose(
     diagnosis_options(shares, step, cycles, candidate, without, freeze, baseline is not None, prefix="--")
     with leaving(out), output.progress() as progress:
         found = ccmodel.diagnose(
-            batch,
+            batches,
             out,
             baseline=baseline,
             freeze=freeze,

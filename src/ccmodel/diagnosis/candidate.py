@@ -89,6 +89,17 @@ class CandidateFit:
         """Mean of `by_recording`."""
         return float(self.by_recording.mean())
 
+    @cached_property
+    def prior(self) -> tuple[NDArray, NDArray]:
+        """Distances of unknowns from their prior's means over its standard deviations, and derivatives of these.
+
+        Rows of the cost beside those of the recordings; shapes (priors,) and (priors, unknowns).
+        """
+        stated = [(name, one) for name, one in self.free.items() if one.prior_precision]
+        distances = np.array([f.prior_precision * (self.values[name] - f.prior_mean) for name, f in stated])
+        derivatives = np.array([[f.prior_precision * (name == other) for other in self.values] for name, f in stated])
+        return distances, derivatives.reshape(len(stated), len(self.values))
+
     @property
     def is_plausible(self) -> bool:
         """Whether its mechanisms' strengths lie within their plausible ranges."""
@@ -127,7 +138,7 @@ class CandidateFit:
     def held_out(self, i: int) -> Observations:
         """One of the recordings with the model that was fitted to all others."""
         o = self.whitened[i].observations
-        return o.with_parameters(self.hypothesis.of(o.parameters).with_values(self.loo_values[i]))
+        return o.with_parameters(self.hypothesis.of(o.parameters).with_values(self.loo_values[i], o.session))
 
 
 def fit(
@@ -157,7 +168,7 @@ def fit(
     ccmodel.deadline.OutOfTimeError
         If the deadline has passed.
     """
-    unknowns = {n: Free(start[n], f.low, f.high) for n, f in free.items()} | hypothesis.free(start)
+    unknowns = {n: replace(f, start=start[n]) for n, f in free.items()} | hypothesis.free(start)
     modelled = _with_states(whitened, hypothesis, {n: f.start for n, f in unknowns.items()})
     problem = Problem(modelled, unknowns, weight=mean_weight)
     search = replace(SEARCH, deadline=deadline)
@@ -194,7 +205,7 @@ def _with_states(whitened: Sequence[Whitened], hypothesis: Hypothesis, values: M
 
     def of(w: Whitened) -> Whitened:
         model = hypothesis.of(w.observations.parameters)
-        return with_states_of(w, model.with_values(values)).with_parameters(model)
+        return with_states_of(w, model.with_values(values, w.session)).with_parameters(model)
 
     return each(whitened, lambda i, w: of(w))
 
@@ -270,5 +281,6 @@ def discretisation_shift(candidate: CandidateFit) -> NDArray:
     weights = [mean_weight(w.observations) for w in candidate.whitened]
     sizes = np.array([size_of(n, v) for n, v in candidate.values.items()])
     information = sum(c * J.T @ J for J, c in zip(candidate.jacobian, weights, strict=True))
+    information += candidate.prior[1].T @ candidate.prior[1]
     score = sum(c * J.T @ e for J, e, c in zip(candidate.jacobian, changes, weights, strict=True))
     return -inverse_of(information, sizes) @ score

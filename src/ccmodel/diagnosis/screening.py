@@ -206,9 +206,9 @@ def screen(
     deadline : Deadline
         When the screening ends with the trials that were run until then.
     """
-    whitened = base.whitened
-    absorbed, _ = np.linalg.qr(_stacked(whitened, base.jacobian))
-    residuals = _stacked(whitened, base.residuals)
+    distances, derivatives = base.prior
+    absorbed, _ = np.linalg.qr(np.concatenate([_stacked(base.whitened, base.jacobian), derivatives]))
+    residuals = np.concatenate([_stacked(base.whitened, base.residuals), distances])
     residuals = residuals - absorbed @ (absorbed.T @ residuals)
     square = float(residuals @ residuals)
     every = [t for h in hypotheses for t in trials_of(base, h)] if trials is None else trials
@@ -251,7 +251,7 @@ def _direction(base: CandidateFit, trial: Trial) -> NDArray | None:
         moved = each(modelled, lambda i, w: w.errors(every) - base.residuals[i])
     except ModelError:
         return None
-    return _stacked(base.whitened, moved)
+    return np.concatenate([_stacked(base.whitened, moved), np.zeros(base.prior[0].size)])
 
 
 def _stacked(whitened: Sequence[Whitened], by_recording: Sequence[NDArray]) -> NDArray:

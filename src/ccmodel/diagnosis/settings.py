@@ -46,6 +46,14 @@ FEWEST_FOR_SCATTER, MOST_SCATTER = 4, 2.0
 # Probability below which friction scatters more than from run to run, and below which it has a trend. Chosen: one clean
 # batch in five hundred has such a trend; a scatter of the stated size never fails.
 SCATTER_LEVEL, TREND_LEVEL = 0.01, 0.002
+# The same from batch to batch of a rig, besides that from run to run, of the batch's friction over the rig's. Chosen:
+# twice that of runs; between two days the cable settles anew in its conduit, and its temperature differs.
+FRICTION_BETWEEN = 0.02
+# Standard deviation of a batch's initial tension over its stated one, relative to that of the rig, where it is not
+# observed at rest. Chosen: what a scale or a mark on a tensioner repeats to.
+PRETENSION_BETWEEN = 0.05
+# Bounds of both ratios. Chosen: far outside.
+BETWEEN_BOUNDS = (0.2, 5.0)
 # Standard deviation of the load's position in its gap: uniform from -1 to 1.
 GAP_SPREAD = 1 / np.sqrt(3)
 # Positions in the gap about which the covariance is linearised, the first where nothing speaks for another. Chosen.

@@ -25,7 +25,7 @@ from ccmodel.inference.effective_samples import IN_DIAGNOSIS
 from ccmodel.inference.jacobian import STEP, jacobian, size_of
 from ccmodel.inference.observations import Observations
 from ccmodel.model.general.run import settings_of
-from ccmodel.model.parameters import Parameters, mechanism_key, mechanism_parameter
+from ccmodel.model.parameters import Parameters, mechanism_key, mechanism_parameter, of_batch
 
 # Step of the differences by a nuisance, relative to its size.
 NUISANCE_STEP = 10 * STEP
@@ -56,7 +56,7 @@ class Whitened:
     repeatability : Repeatability
         Where the prior standard deviations come from.
     own : mapping of str to float
-        Parameters of this recording alone about which its errors are linearised.
+        Parameters of this recording alone, over those of its batch, about which its errors are linearised.
     own_errors : ndarray, shape (rows,)
         Change of the errors by these, to first order.
     """
@@ -79,6 +79,11 @@ class Whitened:
         return self.observations.name
 
     @property
+    def session(self) -> str:
+        """Batch among several that are taken together; empty for a batch by itself."""
+        return self.observations.session
+
+    @property
     def measured(self) -> NDArray:
         """Values of the observations, shape (channels, samples)."""
         return self.observations.measured
@@ -97,7 +102,9 @@ class Whitened:
 
     def linearised_errors(self, values: Mapping[str, float]) -> NDArray:
         """Errors over the noise, extrapolated from the recording's own friction to that of all; shape (rows,)."""
-        return self.observations.errors({**values, **self.own}).ravel() - self.own_errors
+        shared = of_batch(values, self.session)
+        own = {name: ratio * shared.get(name, 1.0) for name, ratio in self.own.items()}
+        return self.observations.errors(shared | own).ravel() - self.own_errors
 
     @property
     def _nuisance_weight(self) -> float:

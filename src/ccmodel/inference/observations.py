@@ -112,9 +112,14 @@ class Observations:
         """Batch and recording."""
         return f"{self.given.recording.batch}/{self.given.recording.id}"
 
+    @property
+    def session(self) -> str:
+        """The recording's batch among several that are taken together; empty for a batch by itself."""
+        return self.given.recording.session
+
     def modelled(self, values: Mapping[str, float]) -> NDArray:
         """The model's channels with some parameters replaced, shape (channels, judged samples)."""
-        simulated = simulate(self.given, self.parameters.with_values(values), self.load_from)
+        simulated = simulate(self.given, self.parameters.with_values(values, self.session), self.load_from)
         return np.stack([simulated[c][self.judged] for c in self.channels])
 
     def errors(self, values: Mapping[str, float]) -> NDArray:
@@ -123,7 +128,7 @@ class Observations:
 
     def drive_errors(self, values: Mapping[str, float]) -> NDArray:
         """Draws of the error over the noise that the uncertain drive motion causes; (draws, channels, samples)."""
-        found = drive_errors(self.given, self.parameters.with_values(values), self.offset_is_free)
+        found = drive_errors(self.given, self.parameters.with_values(values, self.session), self.offset_is_free)
         return np.stack([found[c][:, self.judged] for c in self.channels], axis=1) / self.sigma
 
     def rounding_errors(self, values: Mapping[str, float]) -> NDArray:

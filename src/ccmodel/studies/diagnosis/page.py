@@ -19,6 +19,7 @@ from ccmodel.diagnosis.run import Diagnosis
 from ccmodel.diagnosis.settings import ADEQUATE_LACK_OF_FIT
 from ccmodel.diagnosis.verdict import nested_choice
 from ccmodel.mechanisms import catalogue
+from ccmodel.model.parameters import batch_key
 from ccmodel.provenance import stamp
 from ccmodel.recording import ORIGIN, Recording
 from ccmodel.report.embedding import asset
@@ -83,9 +84,20 @@ def write_diagnosis(file: Path, found: Diagnosis, page: str | None = None) -> No
             caution=_caution(report, errors),
             repeatability=repeatability_in_words(report["repeatability"]),
             loops=_encoded(_loops(found)),
+            between=_between(found.judgement.best),
             recordings=[w.observations.given.recording.id for w in found.judgement.whitened],
         )
     file.write_text(text, encoding="utf-8")
+
+
+def _between(fit: CandidateFit) -> list[str]:
+    """The friction of each batch over the rig's, of several batches, in words."""
+    start = batch_key("friction_scale", "")
+    return [
+        f"{key.removeprefix(start)} {fit.values[key]:.3f} ({one.low:.3f} to {one.high:.3f})"
+        for key, one in fit.intervals().items()
+        if key.startswith(start)
+    ]
 
 
 def write_inconsistent(file: Path, report: Mapping, recordings: Sequence[Recording], page: str | None = None) -> None:
