@@ -9,11 +9,11 @@ import pytest
 
 from ccmodel.diagnosis import verdict as verdicts
 from ccmodel.diagnosis.candidate import CandidateFit
-from ccmodel.diagnosis.comparison import Comparison, well_specified
+from ccmodel.diagnosis.comparison import Comparison, improves_on_members, well_specified
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.lack_of_fit import LackOfFit
 from ccmodel.diagnosis.screening import Score
-from ccmodel.diagnosis.selection import Selection, improves_on_members
+from ccmodel.diagnosis.selection import Selection
 from ccmodel.diagnosis.settings import RIVAL, SUFFICIENT, SURE
 from ccmodel.diagnosis.verdict import judge, nested_choice
 from ccmodel.inference.effective_samples import in_comparison

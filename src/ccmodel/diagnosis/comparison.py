@@ -37,6 +37,8 @@ class Comparison:
     candidates : list of CandidateFit
         The calibrated model with mechanisms, by ascending leave-one-out mean square; those with a strength
         outside its plausible range last.
+    passed_over : list of CandidateFit
+        Fitted sets of mechanisms that do not improve enough on a part of theirs (`improves_on_members`), likewise.
     lack_of_fit : mapping of Hypothesis to LackOfFit
         Of the calibrated model, the candidates with the lowest mean squares and the most probable one.
     screened : int
@@ -51,6 +53,7 @@ class Comparison:
     lack_of_fit: Mapping[Hypothesis, LackOfFit]
     screened: int = 0
     linearised_about: Hypothesis | None = None
+    passed_over: Sequence[CandidateFit] = ()
 
     @classmethod
     def of(
@@ -62,11 +65,18 @@ class Comparison:
         linearised_about: Hypothesis | None = None,
     ) -> "Comparison":
         """Order the candidates, and compute the lack of fit of those that may be named."""
-        ordered = sorted(candidates, key=lambda c: (not c.is_plausible, c.mean_square))
-        found = cls(whitened, base, ordered, {}, screened, linearised_about)
+        every = sorted(candidates, key=lambda c: (not c.is_plausible, c.mean_square))
+        ordered = [c for c in every if improves_on_members(c, every)]
+        others = [c for c in every if c not in ordered]
+        found = cls(whitened, base, ordered, {}, screened, linearised_about, others)
         contenders = {c.hypothesis: c for c in [base, *ordered[: settings.CONTENDERS], found.most_probable]}
         lacks = {hypothesis: lack_of_fit(c) for hypothesis, c in contenders.items()}
         return replace(found, lack_of_fit=lacks)
+
+    @property
+    def fitted(self) -> list[CandidateFit]:
+        """All that were fitted, by ascending mean square; those with a strength outside its plausible range last."""
+        return sorted([*self.candidates, *self.passed_over], key=lambda c: (not c.is_plausible, c.mean_square))
 
     @cached_property
     def posterior(self) -> list[float]:
@@ -82,16 +92,20 @@ class Comparison:
         not they were fitted: the best of many is good by chance. An implausible candidate has probability zero.
         """
         every = [self.base, *self.candidates]
-        samples = in_comparison([w.observations for w in self.whitened])
         mean_squares = np.array([c.mean_square for c in every])
-        unknowns = np.array([len(c.values) - len(self.base.values) for c in every])
-        bic = samples * mean_squares / max(1.0, mean_squares.min()) + unknowns * np.log(samples)
+        bic = np.array([self.bic(c, max(1.0, mean_squares.min())) for c in every])
         count = len(self.candidates)
         prior_of_each = (1 - settings.PRIOR_AGREES) / max(self.screened, count, 1)
         log_posterior = -bic / 2 + np.log([settings.PRIOR_AGREES, *[prior_of_each] * count])
         log_posterior[1:][[not c.is_plausible for c in self.candidates]] = -np.inf
         weight = np.exp(log_posterior - log_posterior.max())
         return (weight / weight.sum())[1:].tolist()
+
+    def bic(self, candidate: CandidateFit, noise: float) -> float:
+        """Bayesian information criterion of a candidate at a mean square of the noise, up to a constant."""
+        samples = in_comparison([w.observations for w in self.whitened])
+        unknowns = len(candidate.values) - len(self.base.values)
+        return float(samples * candidate.mean_square / noise + unknowns * np.log(samples))
 
     @property
     def most_probable(self) -> CandidateFit:
@@ -158,6 +172,18 @@ class Comparison:
         is_weak = len(self.whitened) == 1 or "pretension_share" in self.base.free
         share = 1.0 if is_weak else np.mean([w.observations.tolerance_share for w in self.whitened])
         return float(settings.UNTESTED**share)
+
+
+def is_part_of(candidate: CandidateFit, other: CandidateFit) -> bool:
+    """Whether another candidate has all of its mechanisms and more."""
+    return set(candidate.hypothesis.acting) < set(other.hypothesis.acting)
+
+
+def improves_on_members(candidate: CandidateFit, candidates: Sequence[CandidateFit]) -> bool:
+    """Whether a set halves the excess mean square of each candidate with fewer of its members; true of a single."""
+    lowest = candidate.mean_square
+    parts = [c.mean_square for c in candidates if is_part_of(c, candidate)]
+    return all(lowest - 1 < settings.SET_SHARE * (part - 1) and lowest < part for part in parts)
 
 
 def well_specified(candidate: CandidateFit, base: CandidateFit) -> float:

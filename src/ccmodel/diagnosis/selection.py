@@ -5,10 +5,12 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Self
 
+import numpy as np
+
 from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit, fit
-from ccmodel.diagnosis.comparison import Comparison
+from ccmodel.diagnosis.comparison import Comparison, improves_on_members, is_part_of
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.screening import Score, Screening, screen
 from ccmodel.diagnosis.whitening import Whitened, relinearised
@@ -60,19 +62,22 @@ class Selection:
         forced = [Score(h, 0.0, h.start) for h in self.forced if h not in chosen]
         singles = self._part(SCREENED, FITTED).fit_all(whitened, base, [*leading, *forced])
         found = Comparison.of(whitened, base, singles, len(self.mechanisms))
-        step = (1.0 - FITTED) / (settings.MOST_MECHANISMS - 1)
+        step, adequate = (1.0 - FITTED) / (settings.MOST_MECHANISMS - 1), None
         for size in range(2, settings.MOST_MECHANISMS + 1):
             part = self._part(FITTED + (size - 2) * step, FITTED + (size - 1) * step)
-            if found.is_sufficient or self.deadline.has_passed:
-                break
-            found = part._part(0.0, RELINEARISED).relinearise(found)
+            if not found.is_sufficient:
+                found = part._part(0.0, RELINEARISED).relinearise(found)
+            # An inadequate set does not displace an adequate candidate.
+            adequate = found if found.has_adequate else adequate
             if found.is_sufficient or self.deadline.has_passed:
                 break
             extended = part._part(RELINEARISED, 1.0).extended(found, screening, size)
-            if extended is found:
+            if not grows(extended, size):
                 break
             found = extended
-        return found, scores
+        if not found.is_sufficient:
+            found = self.relinearise(found)
+        return (found if found.has_adequate else adequate or found), scores
 
     def _part(self, low: float, high: float) -> Self:
         """The same, whose work takes these shares of the whole."""
@@ -97,32 +102,21 @@ class Selection:
         return fitted
 
     def extended(self, found: Comparison, screening: Screening, size: int) -> Comparison:
-        """The same with sets of `size` mechanisms that improve on all smaller ones of their members.
-
-        It is the comparison `found` itself if there are no such sets, or if they do not give an adequate candidate
-        where there is one without them.
-        """
+        """The same with sets of `size` mechanisms, and with the parts of the best of them that lack a member."""
         sets = self._part(0.0, 0.8)._sets(found, screening, size)
-        every = [*found.candidates, *sets]
-        if sets:
-            best = min(sets, key=lambda c: (not c.is_plausible, c.mean_square))
-            every += self._part(0.8, 0.9)._subsets(found, best, every)
-        improving = [c for c in every if improves_on_members(c, every)]
-        if not any(c.hypothesis.size == size for c in improving):
+        if not sets:
             return found
-        extended = Comparison.of(found.whitened, found.base, improving, found.screened, found.linearised_about)
-        if not extended.has_adequate and extended.candidates[0].hypothesis.size == size:
-            extended = self._part(0.9, 1.0).relinearise(extended)
-            improving = [c for c in extended.candidates if improves_on_members(c, extended.candidates)]
-            extended = replace(extended, candidates=improving)
-        # An inadequate set does not displace an adequate candidate.
-        return found if found.has_adequate and not extended.has_adequate else extended
+        every = [*found.fitted, *sets]
+        best = min(sets, key=lambda c: (not c.is_plausible, c.mean_square))
+        if improves_on_members(best, every):
+            every += self._part(0.8, 1.0)._subsets(found, best, every)
+        return Comparison.of(found.whitened, found.base, every, found.screened, found.linearised_about)
 
     def _sets(self, found: Comparison, screening: Screening, size: int) -> list[CandidateFit]:
         """Fitted sets: the leading smaller ones with the best partner each, and those that lead the first screening."""
-        smaller = [c for c in found.candidates if c.hypothesis.size == size - 1]
+        smaller = [c for c in found.fitted if c.hypothesis.size == size - 1]
         firsts = ([c for c in smaller if found.is_adequate(c)] or smaller)[: settings.FIRSTS]
-        fitted, seen = [], {frozenset(c.hypothesis.acting) for c in found.candidates}
+        fitted, seen = [], {frozenset(c.hypothesis.acting) for c in found.fitted}
         for k, first in enumerate(firsts):
             part = self._part(k / (len(firsts) + 1), (k + 1) / (len(firsts) + 1))
             part.progress(f"screening mechanisms beside {first.hypothesis}", 0.0)
@@ -151,7 +145,7 @@ class Selection:
         Where the initial tension is not observed, every candidate is fitted from the best one's calibration too: the
         cost has several minima there.
         """
-        best = found.candidates[0]
+        best = found.fitted[0]
         if best.hypothesis == found.linearised_about:
             return found
         self.progress(f"linearising the covariance about {best.hypothesis}", 0.0)
@@ -171,7 +165,8 @@ class Selection:
         except ModelError as error:
             self.progress(f"the covariance stays as it is ({error})")
             return found
-        leading = [c for k, c in enumerate(found.candidates) if k < settings.CONTENDERS or is_part_of(c, best)]
+        most = settings.CONTENDERS if best.hypothesis.size > 1 else len(found.fitted)
+        leading = [c for k, c in enumerate(found.fitted) if k < most or is_part_of(c, best)]
         again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in leading for s in starts(c)])
         if not any(c.hypothesis == best.hypothesis for c in again):
             return found
@@ -192,13 +187,9 @@ def unseen(
     return chosen
 
 
-def is_part_of(candidate: CandidateFit, other: CandidateFit) -> bool:
-    """Whether another candidate has all of its mechanisms and more."""
-    return set(candidate.hypothesis.acting) < set(other.hypothesis.acting)
-
-
-def improves_on_members(candidate: CandidateFit, candidates: Sequence[CandidateFit]) -> bool:
-    """Whether a set halves the excess mean square of each candidate with fewer of its members; true of a single."""
-    lowest = candidate.mean_square
-    parts = [c.mean_square for c in candidates if is_part_of(c, candidate)]
-    return all(lowest - 1 < settings.SET_SHARE * (part - 1) and lowest < part for part in parts)
+def grows(found: Comparison, size: int) -> bool:
+    """Whether the best set of `size` mechanisms has more evidence than every smaller candidate, by their BIC."""
+    noise = max(1.0, min(c.mean_square for c in [found.base, *found.fitted]))
+    sets = [found.bic(c, noise) for c in found.fitted if c.hypothesis.size == size and c.is_plausible]
+    smaller = [found.bic(c, noise) for c in found.fitted if c.hypothesis.size < size and c.is_plausible]
+    return bool(sets) and min(sets) < min(smaller, default=np.inf)
