@@ -73,6 +73,8 @@ class Case:
         The batch that is diagnosed.
     kept_back : tuple of RecordingPlan
         Held-out recordings, made after the diagnosis has ended.
+    effects : tuple of Effects
+        Each concealed effect as a rig has it that has no other.
     """
 
     name: str
@@ -85,6 +87,13 @@ class Case:
     campaign: Campaign
     recordings: tuple[RecordingPlan, ...]
     kept_back: tuple[RecordingPlan, ...]
+    effects: tuple[Effects, ...] = ()
+
+    def alone(self, k: int) -> "Case":
+        """The same rig and recordings with one of the concealed effects."""
+        rig = self.campaign.rig.model_copy(update={"effects": self.effects[k]})
+        campaign = self.campaign.model_copy(update={"rig": rig})
+        return replace(self, name=f"{self.name}-{k}", truth=self.truth[k : k + 1], campaign=campaign)
 
     @property
     def key(self) -> dict:
@@ -155,6 +164,7 @@ def draw(seed: int, kind: str | None = None, effect: str | None = None) -> Case:
         campaign=campaign,
         recordings=draw_recordings(protocol, plan, conditions, random),
         kept_back=draw_held_out(protocol, plan, conditions, random),
+        effects=tuple(Effects.model_validate(merged([e])) for _, e in drawn),
     )
 
 
