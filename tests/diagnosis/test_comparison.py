@@ -32,6 +32,7 @@ VALUES = {
     "pulley-friction/drive-pulley/friction_torque": 4e-3,
     "torque-scale/drive-sensor/gain": 0.05,
     "kink/conduit/beta": 0.5,
+    "presliding/conduit/z0": 5e-5,
 }
 CHANNELS = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N")
 WHITENED = [SimpleNamespace(observations=SimpleNamespace(channels=CHANNELS, tolerance_share=0.0))] * 8
@@ -145,11 +146,11 @@ def test_a_tolerance_lowers_the_confidence_in_proportion_to_its_share():
 
 def test_misspecification_is_more_likely_the_higher_the_mean_square_and_the_more_was_tried():
     base, mean_squares = fitted(10.0), (0.95, 1.1, 1.4, 2.0, 5.0)
-    odds = [well_specified(fitted(mean_square, FRICTION), base) for mean_square in mean_squares]
+    odds = [well_specified(fitted(mean_square, FRICTION), base, 0.0) for mean_square in mean_squares]
     assert all(a > b for a, b in itertools.pairwise(odds))
     assert odds[0] > 0.98
     assert odds[-1] < 0.2
-    pairs = [well_specified(fitted(mean_square, FRICTION, SCALE), base) for mean_square in mean_squares[:3]]
+    pairs = [well_specified(fitted(mean_square, FRICTION, SCALE), base, 0.0) for mean_square in mean_squares[:3]]
     assert all(pair < single for pair, single in zip(pairs, odds, strict=False))
 
 
@@ -220,6 +221,16 @@ def test_a_set_of_three_must_halve_the_excess_of_each_part_of_it():
     pairs = [fitted(3.0, FRICTION, SCALE), fitted(2.6, FRICTION, KINK), fitted(1.5, SCALE, KINK)]
     assert improves_on_members(fitted(1.2, FRICTION, SCALE, KINK), pairs)
     assert not improves_on_members(fitted(1.3, FRICTION, SCALE, KINK), pairs)
+
+
+def test_the_form_error_of_a_set_is_a_share_of_the_effect_of_each_member():
+    presliding = ("presliding", "conduit")
+    singles = [fitted(50.0, presliding), fitted(20.0, KINK)]
+    both = fitted(4.0, presliding, KINK)
+    found = Comparison(WHITENED, fitted(100.0), [both, *singles], {})
+    assert found.form_error(both) == pytest.approx(0.08 * 16.0 + 0.001 * 46.0)
+    assert found.form_error(singles[0]) == pytest.approx(0.08 * 50.0)
+    assert found.form_error(found.base) == 0.0
 
 
 def test_sets_grow_as_long_as_they_gain_evidence():

@@ -47,7 +47,8 @@ def whitened(recorded, sigma=(1e-3, 1e-4)):
     rows = e.measured.size
     floor = dict(zip(e.channels, sigma, strict=True))
     none = np.zeros((rows, 1))
-    return Whitened(e, none, np.zeros(1), np.zeros((0, rows)), np.zeros(0), floor, (), none)
+    friction = (("friction_coefficient", TRUE.friction_coefficient, 0.01 * TRUE.friction_coefficient),)
+    return Whitened(e, none, np.zeros(1), np.zeros((1, rows)), np.zeros(1), floor, friction, none)
 
 
 def test_a_fit_finds_pretension_friction_and_spring_without_a_rest():

@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import norm
 
+from ccmodel import mechanisms as registry
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.hypothesis import Hypothesis
@@ -120,15 +121,15 @@ class Comparison:
     def is_adequate(self, candidate: CandidateFit) -> bool:
         """Whether the mean square and the lack of fit of a candidate are as low as the true physics could leave them.
 
-        The limits allow for noise and for the model-form error of the added mechanisms, a share of the excess. Friction
-        must differ between recordings by no more than from run to run.
+        The limits allow for noise and for the model-form error of the added mechanisms. Friction must differ between
+        recordings by no more than from run to run.
         """
         lack = self.lack_of_fit.get(candidate.hypothesis)
         if lack is None or not candidate.is_plausible:
             return False
         if not friction_repeats(candidate.whitened, candidate.residuals, FRICTION in candidate.values):
             return False
-        highest_lack = settings.ADEQUATE_LACK_OF_FIT + candidate.hypothesis.model_form_error * self.excess
+        highest_lack = settings.ADEQUATE_LACK_OF_FIT + self.form_error(candidate)
         return candidate.mean_square <= self.adequate_mean_square(candidate) and lack.lower_bound <= highest_lack
 
     def adequate_mean_square(self, candidate: CandidateFit) -> float:
@@ -136,8 +137,21 @@ class Comparison:
         if candidate is self.base:
             return settings.ADEQUATE
         limit = settings.ADEQUATE_SET if candidate.hypothesis.size > 1 else settings.ADEQUATE
-        form = candidate.hypothesis.model_form_error
-        return limit + max(settings.ADEQUATE_SHARE / _imitations(candidate), form) * self.excess
+        return limit + max(settings.ADEQUATE_SHARE / _imitations(candidate) * self.excess, self.form_error(candidate))
+
+    def form_error(self, candidate: CandidateFit) -> float:
+        """Mean square that the equations of a candidate's mechanisms may leave: of each, a share of its own effect.
+
+        The effect of a mechanism is the decrease of the mean square from the candidate without it, where that was
+        fitted, and otherwise from the calibrated model.
+        """
+        fitted = {frozenset(c.hypothesis.acting): c.mean_square for c in [self.base, *self.fitted]}
+        members = frozenset(candidate.hypothesis.acting)
+        return sum(
+            registry.get(one[0]).model_form_error
+            * max(fitted.get(members - {one}, self.base.mean_square) - max(candidate.mean_square, 1.0), 0.0)
+            for one in members
+        )
 
     @property
     def has_adequate(self) -> bool:
@@ -153,14 +167,15 @@ class Comparison:
         if not self.has_adequate:
             return not self.candidates
         best = self.candidates[0]
-        return best.mean_square <= settings.SUFFICIENT + best.hypothesis.model_form_error * self.excess
+        return best.mean_square <= settings.SUFFICIENT + self.form_error(best)
 
     @property
     def well_specified(self) -> float:
         """Probability that the most probable candidate is correct and no imitation, times `_discount`."""
         if not self.candidates:
             return self._discount
-        return self._discount * well_specified(self.most_probable, self.base)
+        best = self.most_probable
+        return self._discount * well_specified(best, self.base, self.form_error(best))
 
     @property
     def _discount(self) -> float:
@@ -186,10 +201,11 @@ def improves_on_members(candidate: CandidateFit, candidates: Sequence[CandidateF
     return all(lowest - 1 < settings.SET_SHARE * (part - 1) and lowest < part for part in parts)
 
 
-def well_specified(candidate: CandidateFit, base: CandidateFit) -> float:
+def well_specified(candidate: CandidateFit, base: CandidateFit, form_error: float) -> float:
     """Probability that a candidate is the missing physics and no imitation of it, given the candidate's mean square.
 
-    Bayes' rule with the prior `PRIOR_MISSPECIFIED` and two densities of the mean square above `CORRECT_LEVEL`:
+    Bayes' rule with the prior `PRIOR_MISSPECIFIED` and two densities of the mean square above `CORRECT_LEVEL`
+    (`form_error`: as of `Comparison.form_error`):
 
     - of a correct candidate: normal about zero. In every second case a half-normal model-form error is added, because
       the real effect does not follow the mechanism's equation exactly;
@@ -198,7 +214,7 @@ def well_specified(candidate: CandidateFit, base: CandidateFit) -> float:
     """
     excess = max(base.mean_square - settings.CORRECT_LEVEL, settings.CORRECT_SPREAD)
     above = candidate.mean_square - settings.CORRECT_LEVEL
-    form = max(settings.FORM_SHARE, candidate.hypothesis.model_form_error) * excess
+    form = max(settings.FORM_SHARE * excess, form_error)
     width = np.hypot(settings.CORRECT_SPREAD, form)
     exact = norm.pdf(above, scale=settings.CORRECT_SPREAD)
     # The half-normal form error convolved with the normal scatter of correct models.
@@ -212,5 +228,5 @@ def well_specified(candidate: CandidateFit, base: CandidateFit) -> float:
 
 
 def _imitations(candidate: CandidateFit) -> int:
-    """Number of imitations of which a candidate may be the best: the partners that were fitted at each further one."""
-    return settings.PARTNERS ** max(candidate.hypothesis.size - 1, 0)
+    """Number of imitations of which a candidate may be the best: for a set the partners that were fitted, else one."""
+    return settings.PARTNERS if candidate.hypothesis.size > 1 else 1

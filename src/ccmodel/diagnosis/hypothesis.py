@@ -53,11 +53,6 @@ class Hypothesis:
         """Places of its mechanisms, each once."""
         return list(dict.fromkeys(place for _, place in self.acting))
 
-    @property
-    def model_form_error(self) -> float:
-        """Largest model-form error of its mechanisms, as a share of their effect's mean square."""
-        return max((registry.get(name).model_form_error for name, _ in self.acting), default=0.0)
-
     def of(self, parameters: Parameters) -> Parameters:
         """Parameters with the mechanisms added, at their values in `parameters` or else at their starting values."""
         known = {(m.name, m.place): m.values for m in parameters.mechanisms}
