@@ -62,7 +62,7 @@ def diagnose(
     time_limit: Annotated[
         float | None,
         typer.Option(
-            "--time-limit", help="Fit no further candidate after so long, s. [default: 140]", show_default=False
+            "--time-limit", help="Time for fitting candidates, s; 140 if not given.", show_default=False
         ),
     ] = None,
     trust_inputs: TrustInputs = False,
