@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ccmodel.channels import MEASURED, TAU_OUT
 from ccmodel.failure import ModelError
+from ccmodel.inference.cycles import cycle_noise
 from ccmodel.inference.noise import PHASES, drive_errors, rounding_errors, sensor_noise, size_over_time
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import PRESCRIBED, LoadFrom, ModelInput, simulate
@@ -59,8 +60,11 @@ class Observations:
         step_s: float | None = None,
         tolerance: Tolerance = 0.0,
         offset_is_free: bool = False,
+        whole: Recording | None = None,
     ) -> "Observations":
         """Observations from a recording, one sample every `step_s`.
+
+        `whole` is the recording with all its cycles, if `recording` is a part of it: consecutive cycles show the noise.
 
         Raises
         ------
@@ -74,7 +78,8 @@ class Observations:
             raise ModelError(f"{recording.batch}/{recording.id}: none of {', '.join(channels)} was recorded")
         time_s = given.recording.time_s
         judged = time_s >= max(recording.rest_s, recording.settled_s)
-        sensors, drive = sensor_noise(given), drive_errors(given, parameters, offset_is_free)
+        sensors = sensor_noise(given, cycle_noise(whole or recording))
+        drive = drive_errors(given, parameters, offset_is_free)
         measured = np.stack([given.recording[c][judged] for c in used])
         sigma = np.stack([np.hypot(sensors[c], size_over_time(drive[c], time_s)[judged]) for c in used])
         by_channel = tolerance if isinstance(tolerance, Mapping) else dict.fromkeys(used, tolerance)
