@@ -7,7 +7,7 @@ import pytest
 
 from builders import recording
 from ccmodel.inference.cycles import cycle_noise
-from ccmodel.inference.noise import REST_FREEDOM, repeated, sensor_noise
+from ccmodel.inference.noise import REST_FREEDOM, SensorNoise, repeated, sensor_noise
 from ccmodel.model.run import ModelInput
 
 RATE_HZ, NOISE = 250.0, 1e-3
@@ -71,11 +71,12 @@ def test_a_motion_that_does_not_repeat_shows_no_cycles():
 
 
 def test_the_noise_in_motion_is_never_below_that_at_rest():
-    assert repeated(1e-3, 1e-8, 2.0) == 1e-3
-    assert repeated(1e-3, None, 0.0) == 1e-3
+    rest = SensorNoise(1e-3, "rest")
+    assert repeated(rest, 1e-8, 2.0) == repeated(rest, None, 0.0) == rest
     freedom = 20 * 2.0
     expected = np.sqrt((REST_FREEDOM + freedom * 9.0) / (REST_FREEDOM + freedom)) * 1e-3
-    assert repeated(1e-3, 9e-6, 2.0) == pytest.approx(expected)
+    found = repeated(rest, 9e-6, 2.0)
+    assert (found.sd, found.source) == (pytest.approx(expected), "cycles")
 
 
 def test_a_drive_that_moves_before_its_first_count_is_no_noise():
@@ -83,4 +84,4 @@ def test_a_drive_that_moves_before_its_first_count_is_no_noise():
     made = sine(cycles=1.5)
     rise = np.where(made.time_s < 0.5, np.clip(made.time_s - 0.4, 0, None) / 0.1, 0.0) * 30 * NOISE
     made = replace(made, channels=dict(made.channels, tau_in_Nm=made["tau_in_Nm"] + rise))
-    assert sensor_noise(ModelInput.of(made))["tau_in_Nm"] == pytest.approx(NOISE, rel=0.25)
+    assert sensor_noise(ModelInput.of(made))["tau_in_Nm"].sd == pytest.approx(NOISE, rel=0.25)

@@ -1,6 +1,6 @@
 """Noise of a recording under the correct model: sensor noise, encoder steps, and the uncertain drive motion."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,24 @@ ALIKE_S = 0.05
 PHASES = (np.arange(16) + 0.5) / 16 - 0.5
 
 
-def sensor_noise(given: ModelInput, cycles: CycleNoise = NONE) -> dict[str, float]:
-    """Standard deviation of each channel's noise, in its unit.
+@dataclass(frozen=True)
+class SensorNoise:
+    """Noise of a channel.
+
+    Attributes
+    ----------
+    sd : float
+        Standard deviation, in the channel's unit.
+    source : {"cycles", "rest", "count", "assumed"}
+        Consecutive cycles, scatter at rest, the step of a counted angle, or the stated accuracy.
+    """
+
+    sd: float
+    source: str
+
+
+def sensor_noise(given: ModelInput, cycles: CycleNoise = NONE) -> dict[str, SensorNoise]:
+    """Noise of each channel.
 
     The scatter about a straight line through the first half of the rest at the recording's start (before the drive's
     first count, friction already gives way in the second half), or the stated accuracy if the rest is too short. A
@@ -36,25 +52,26 @@ def sensor_noise(given: ModelInput, cycles: CycleNoise = NONE) -> dict[str, floa
         stated = recording.accuracy.get(channel)
         rest = given.resting[channel]
         if (step := recording.encoder_step_rad.get(channel)) is not None:
-            prior = step / np.sqrt(12)
+            prior = SensorNoise(step / np.sqrt(12), "count")
         elif rest.size >= FEWEST_AT_REST:
             best = BEST_SHARE * stated if stated else 1e-6 * max(float(np.abs(values).max()), 1e-9)
-            prior = max(_scatter(rest[: max(FEWEST_AT_REST, rest.size // 2)]), best)
+            prior = SensorNoise(max(_scatter(rest[: max(FEWEST_AT_REST, rest.size // 2)]), best), "rest")
         else:
-            prior = stated or 0.01 * max(float(np.ptp(values)), 1e-9)
+            prior = SensorNoise(stated or 0.01 * max(float(np.ptp(values)), 1e-9), "assumed")
         found[channel] = repeated(prior, cycles.variance.get(channel), cycles.cycles)
     return found
 
 
-def repeated(prior: float, variance: float | None, cycles: float) -> float:
-    """Standard deviation of the noise from a prior and the variance between so many consecutive cycles.
+def repeated(prior: SensorNoise, variance: float | None, cycles: float) -> SensorNoise:
+    """Noise from a prior and the variance between so many consecutive cycles.
 
     A channel may repeat less well in motion than at rest, and never better.
     """
-    if variance is None or variance <= prior**2:
+    if variance is None or variance <= prior.sd**2:
         return prior
     freedom = IN_DIAGNOSIS * cycles
-    return float(np.sqrt((REST_FREEDOM * prior**2 + freedom * variance) / (REST_FREEDOM + freedom)))
+    square = (REST_FREEDOM * prior.sd**2 + freedom * variance) / (REST_FREEDOM + freedom)
+    return SensorNoise(float(np.sqrt(square)), "cycles")
 
 
 def drive_errors(given: ModelInput, parameters: Parameters, offset_is_free: bool = False) -> dict[str, NDArray]:
