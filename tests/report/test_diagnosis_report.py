@@ -26,13 +26,13 @@ def test_the_map_is_told_to_readers_who_do_not_see_it():
 
 
 def test_the_page_says_what_repeats_show_and_what_was_assumed():
-    friction = {"what": "friction", "value": 0.0123, "unit": "1", "from": "repeats", "recordings": 2}
-    zero = {"what": "zero of F_load", "value": 0.1, "unit": "N", "from": "assumed", "recordings": 0}
+    friction = {"what": "friction from run to run", "value": 0.0123, "unit": "1", "from": "repeats", "recordings": 2}
+    zero = {"what": "zero of F_load from run to run", "value": 0.1, "unit": "N", "from": "assumed", "recordings": 0}
     assert repeatability_in_words([friction, zero]) == (
-        "Standard deviations from run to run, estimated: friction 1.2 % (from 2 recordings that repeat a condition);"
-        " assumed: zero of F_load 0.1 N."
+        "Standard deviations that count as noise, estimated: friction from run to run 1.2 % (2 recordings that repeat a"
+        " condition); assumed: zero of F_load from run to run 0.1 N."
     )
-    assert repeatability_in_words([zero]).endswith("run to run, assumed: zero of F_load 0.1 N.")
+    assert repeatability_in_words([zero]).endswith("as noise, assumed: zero of F_load from run to run 0.1 N.")
 
 
 def test_a_batch_that_was_not_diagnosed_has_a_report_with_a_way_back(tmp_path):

@@ -18,6 +18,7 @@ Deviations are in standard deviations as stated, and not shrunk: a posterior mea
 a standard normal prior is an observation m / (1 - v) with the variance v / (1 - v).
 """
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -255,18 +256,42 @@ def _slope(values: NDArray) -> float:
 
 
 def report(whitened: Sequence["Whitened"]) -> list[dict]:
-    """The spreads as plain data, for diagnosis.json: what was estimated, from how many recordings, what was assumed."""
+    """Standard deviations that count as noise, as plain data for diagnosis.json: estimated from what, or assumed."""
+    return [*_spreads(whitened), *_sensors(whitened)]
+
+
+def _spreads(whitened: Sequence["Whitened"]) -> list[dict]:
     applied: dict[str, tuple[float, str]] = {}
     for w in whitened:
         for name, value, sd in w.scalar_nuisances:
             if name == FRICTION:
                 applied[name] = sd / value, "1"
             elif name in _CHANNEL_OF:
-                applied[name] = sd, unit_of(_CHANNEL_OF[name]).replace(" ", "*")
+                applied[name] = sd, _unit(_CHANNEL_OF[name])
     found = []
     for name, (size, unit) in applied.items():
         spread = whitened[0].repeatability.spreads.get(name, Spread(name))
         what = "friction" if name == FRICTION else f"zero of {short_name(_CHANNEL_OF[name])}"
-        row = {"what": what, "value": size, "unit": unit, "from": spread.source, "recordings": spread.recordings}
-        found.append(row)
+        found.append(_row(f"{what} from run to run", size, unit, spread.source, spread.recordings))
     return found
+
+
+def _sensors(whitened: Sequence["Whitened"]) -> list[dict]:
+    """The noise of each channel: its root mean square over all recordings, and where most of them have it from."""
+    found = []
+    for channel in dict.fromkeys(c for w in whitened for c in w.observations.channels):
+        noises = [w.observations.noise[channel] for w in whitened if channel in w.observations.noise]
+        if noises:
+            (source, count), *_ = Counter(n.source for n in noises).most_common(1)
+            size = float(np.sqrt(np.mean([n.sd**2 for n in noises])))
+            number = 0 if source == "assumed" else count
+            found.append(_row(f"noise of {short_name(channel)}", size, _unit(channel), source, number))
+    return found
+
+
+def _unit(channel: str) -> str:
+    return unit_of(channel).replace(" ", "*")
+
+
+def _row(what: str, value: float, unit: str, source: str, recordings: int) -> dict:
+    return {"what": what, "value": value, "unit": unit, "from": source, "recordings": recordings}

@@ -131,6 +131,12 @@ class Whitened:
         pairs = zip(self.scalar_nuisances, means.tolist(), strict=True)
         return {name: values.get(name, value) + spread * mean for (name, value, spread), mean in pairs}
 
+    @property
+    def friction_ratio(self) -> float:
+        """Posterior mean of the friction in this recording over that of the model."""
+        stated = {name: value for name, value, _ in self.scalar_nuisances}
+        return self.own_values({})[FRICTION] / stated[FRICTION] if FRICTION in stated else 1.0
+
     def with_parameters(self, parameters: Parameters) -> "Whitened":
         """The same for a model with other parameters, under the same covariance."""
         return replace(self, observations=self.observations.with_parameters(parameters))
@@ -261,7 +267,7 @@ def relinearised(one: Whitened, model: Parameters, repeatability: Repeatability 
 
     has_gap = settings_of(model.mechanisms).half_gap
     position = min(settings.GAP_POSITIONS, key=mean_square) if has_gap else model.load_gap_position
-    friction = one.with_parameters(model).own_values({})[FRICTION] / one.scalar_nuisances[0][1]
+    friction = one.with_parameters(model).friction_ratio
     about = replace(model, load_gap_position=position)
     found = whiten(one.observations, about, repeatability or one.repeatability, friction)
     return found.with_parameters(replace(one.observations.parameters, load_gap_position=position))

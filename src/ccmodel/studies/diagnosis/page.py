@@ -136,18 +136,27 @@ def _map_in_words(errors: Mapping[str, Mapping[str, float]]) -> str:
     return "Residuals over the noise floor: " + "; ".join(rows)
 
 
+# Where a standard deviation comes from, after the number of recordings.
+SOURCES = {
+    "repeats": "that repeat a condition",
+    "scatter": "none of which repeats another",
+    "cycles": "with consecutive cycles",
+    "rest": "at rest",
+    "count": "with encoder counts",
+}
+
+
 def repeatability_in_words(rows: Sequence[Mapping]) -> str:
-    """What differs from run to run by how much: what the recordings show, and what was assumed."""
+    """The standard deviations that count as noise: what the recordings show, and what was assumed."""
     shown, assumed = [], []
     for row in rows:
         size = f"{100 * row['value']:.2g} %" if row["unit"] == "1" else f"{row['value']:.2g} {row['unit']}"
         if row["from"] == "assumed":
             assumed.append(f"{row['what']} {size}")
         else:
-            source = "that repeat a condition" if row["from"] == "repeats" else "none of which repeats another"
-            shown.append(f"{row['what']} {size} (from {row['recordings']} recordings {source})")
+            shown.append(f"{row['what']} {size} ({row['recordings']} recordings {SOURCES[row['from']]})")
     parts = [f"estimated: {', '.join(shown)}"] * bool(shown) + [f"assumed: {', '.join(assumed)}"] * bool(assumed)
-    return f"Standard deviations from run to run, {'; '.join(parts)}."
+    return f"Standard deviations that count as noise, {'; '.join(parts)}."
 
 
 def _caution(report: Mapping, errors: Mapping[str, Mapping[str, float]]) -> str | None:
