@@ -104,11 +104,11 @@ def _clean_paper(rig: Mapping[str, float], random: Generator) -> Seeded:
 
 
 def _load_inertia(rig: Mapping[str, float], random: Generator) -> Seeded:
-    """A load that rings at 3 to 15 Hz on its spring and both cables, damped at 0.5 to 5 % of critical."""
+    """A load that rings at 3 to 15 Hz on its spring and both cables; its damper is 1 to 5 % of critical on the spring."""
     rings = 2 * np.pi * log_uniform((3.0, 15.0), random)
     total = rig["spring"] + 2 * rig["stiffness"] * rig["radius"] ** 2
     inertia = total / rings**2
-    damping = 2 * log_uniform((0.005, 0.05), random) * np.sqrt(total * inertia)
+    damping = 2 * log_uniform((0.01, 0.05), random) * np.sqrt(rig["spring"] * inertia)
     effects = {"load": {"inertia_kg_m2": inertia}, "damping": damping}
     return Seeded([_truth("load-inertia", "load", J=inertia)], effects)
 
@@ -236,8 +236,7 @@ def _campaign(
     stiffness = drawn.rig.cable.stiffness_N_per_m
     error = drawn.rig.estimates.stiffness_N_per_m / stiffness
     inertia = log_uniform((1e-7, 1e-6), random)
-    total = rig["spring"] + 2 * rig["stiffness"] * rig["radius"] ** 2
-    own_damping = 2 * log_uniform((0.01, 0.1), random) * np.sqrt(inertia * total)
+    own_damping = 2 * log_uniform((0.01, 0.1), random) * np.sqrt(inertia * rig["spring"])
     counts, rate = int(random.integers(20, 101)) * 100, float(random.choice([200.0, 250.0, 400.0, 500.0, 1000.0]))
     load = drawn.rig.load.model_copy(
         update={"inertia_kg_m2": inertia, "damping_Nms_per_rad": own_damping if damping is None else damping}
