@@ -173,9 +173,17 @@ def _search(problem: Problem, hypothesis: Hypothesis) -> Solution:
     if len(starts) > 1:
         starts = [best_start(problem, starts).x]
     solution = minimise(problem, starts[0], SEARCH)
+    if hypothesis.continuation and solution.cost > _cost_without(problem, hypothesis):
+        return solution  # a minimum that is worse than no mechanism at all leads nowhere
     for name in hypothesis.continuation:
         solution = continued(lambda x: minimise(problem, x, SEARCH), solution, problem.names.index(name), low)
     return solution
+
+
+def _cost_without(problem: Problem, hypothesis: Hypothesis) -> float:
+    """Cost at the start with no effect of the candidate's mechanisms."""
+    values = zip(problem.names, problem.start, strict=True)
+    return problem.cost(np.array([hypothesis.neutral.get(name, value) for name, value in values]))
 
 
 def starting_points(problem: Problem) -> list[NDArray]:
