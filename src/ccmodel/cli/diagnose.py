@@ -61,9 +61,7 @@ def diagnose(
     ] = [],  # noqa: B006
     time_limit: Annotated[
         float | None,
-        typer.Option(
-            "--time-limit", help="Time for fitting candidates, s; 140 if not given.", show_default=False
-        ),
+        typer.Option("--time-limit", help="Time for fitting candidates, s; 140 if not given.", show_default=False),
     ] = None,
     trust_inputs: TrustInputs = False,
     strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 unless the model agrees.")] = False,

@@ -215,6 +215,8 @@ def _search(problem: Problem, hypothesis: Hypothesis, search: Search) -> Solutio
     if len(starts) > 1:
         starts = [best_start(problem, starts, search).x]
     solution = minimise(problem, starts[0], search)
+    if hypothesis.continuation and solution.cost > _cost_without(problem, hypothesis):
+        return solution  # a minimum that is worse than no mechanism at all leads nowhere
     for name in hypothesis.continuation:
         solution = continued(
             lambda x: minimise(problem, x, search), solution, problem.names.index(name), problem.bounds[0]
@@ -227,6 +229,12 @@ def inside_bounds(problem: Problem, x: NDArray) -> NDArray:
     low, high = problem.bounds
     inside = 1e-9 * (high - low)
     return np.clip(x, low + inside, high - inside)
+
+
+def _cost_without(problem: Problem, hypothesis: Hypothesis) -> float:
+    """Cost at the start with no effect of the candidate's mechanisms."""
+    values = zip(problem.names, problem.start, strict=True)
+    return problem.cost(np.array([hypothesis.neutral.get(name, value) for name, value in values]))
 
 
 def starting_points(problem: Problem) -> list[NDArray]:

@@ -65,6 +65,11 @@ class Hypothesis:
         """Starting values of the mechanisms' unknowns."""
         return {key: parameter.start for key, parameter, _ in self._unknowns()}
 
+    @property
+    def neutral(self) -> dict[str, float]:
+        """Values of the mechanisms' strengths at which they have no effect."""
+        return {key: parameter.neutral for key, parameter, is_strength in self._unknowns() if is_strength}
+
     def free(self, start: Mapping[str, float]) -> dict[str, Free]:
         """The mechanisms' parameters as unknowns, from `start`."""
         unknowns = self._unknowns()
