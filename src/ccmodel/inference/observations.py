@@ -38,6 +38,9 @@ class Observations:
         Whether the sub-count offset of the drive encoder is an unknown of the fit. Otherwise it is part of the noise.
     load_from : {"law", "torque"}
         Whether the load's law or the measured load torque acts at the cables' far end.
+    friction_between : float
+        Standard deviation of friction between batches, over its mean, that this recording has besides the one between
+        runs: of the only recording of a batch among several. Otherwise 0.
     """
 
     given: ModelInput
@@ -49,6 +52,7 @@ class Observations:
     tolerance: NDArray
     offset_is_free: bool = False
     load_from: LoadFrom = "law"
+    friction_between: float = 0.0
 
     @classmethod
     def of(
