@@ -1,10 +1,10 @@
 """Rigs whose effect no single study decides: how often their studies decide it when they are diagnosed together.
 
-Each rig has one concealed effect, drawn as in the proof, and is recorded in three studies on three days. A study is one
-recording; the studies differ in bend, pretension and motion. From day to day friction differs by a further 2 %
-(`BETWEEN`), which no batch file states, and every recording has zeros and a pretension of its own. A rig counts if each
-of its studies, diagnosed by itself, is `undecided`. It is decided if all three together are `explained`, with the true
-effect named first.
+Each rig has one concealed effect, drawn as in the proof but without the largest and the smallest ones, and is recorded
+in three studies on three days. A study is one recording, or several of the same (`--repeats`); the studies differ in
+bend, pretension and motion. From day to day friction differs by a further 2 % (`BETWEEN`), which no batch file states,
+and every recording has zeros and a pretension of its own. A rig counts if each of its studies, diagnosed by itself, is
+`undecided`. It is decided if all three together are `explained`, with the true effect named first.
 
 A single recording is `undecided` at most, because nothing can be held out. Rigs are therefore counted a second time:
 those of whose studies none reaches the confidence `AMBIGUOUS`, from which more recordings like it would be `explained`.
@@ -19,6 +19,7 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import partial
 from itertools import count, islice
 from pathlib import Path
 
@@ -36,17 +37,20 @@ from proof.plan import PlannedRecording, Protocol, read_plan
 from proof.recording_draw import Conditions, draw_recordings
 
 FIRST_SEED = 8_000_000  # far from the seeds of tests, proofs and other benchmarks
+# Strengths of the effects, from 0 (barely visible) to 1 (large), as in `proof.cases.Truth`. Weaker ones no study shows;
+# stronger ones leave no doubt even in a single recording.
+STRENGTHS = (0.1, 0.6)
 # Standard deviation of a day's friction over the rig's, besides the 1 % from run to run.
 BETWEEN = 0.02
 # By study, factors of the rig's pretension and bend, and amplitude (rad) and frequency (Hz) of the drive's sine.
-STUDIES = {"loops": (1.0, 2.0, 0.6, 0.5), "pretension": (0.45, 1.0, 0.6, 0.5), "speed": (1.0, 1.0, 0.4, 0.8)}
+STUDIES = {"loops": (1.0, 2.0, 0.3, 0.5), "pretension": (0.45, 1.0, 0.3, 0.5), "speed": (1.0, 1.0, 0.3, 0.8)}
 SINE = {"wave": "sine", "rest_s": 0.5, "start_up_cycles": 0.5, "cycles": 3.0}
 # Confidence of a single recording from which more of the same would be `explained`.
 AMBIGUOUS = settings.UNTESTED * settings.SURE
 WANTED = 0.8
 
 
-def studies(seed: int) -> dict[str, Case]:
+def studies(seed: int, repeats: int = 1) -> dict[str, Case]:
     """The batches of a rig with one effect, by study, each as a case whose name is the batch's."""
     plan, rig = read_plan(), draw(seed, "single")
     random = np.random.default_rng([seed, 0x10E7])
@@ -55,18 +59,20 @@ def studies(seed: int) -> dict[str, Case]:
         bend_rad=random.uniform(*plan.rig.bend_rad),
         length_m=rig.campaign.rig.cable.length_m,
     )
-    return {name: _study(rig, name, own, random) for name in STUDIES}
+    return {name: _study(rig, name, own, repeats, random) for name in STUDIES}
 
 
-def _study(rig: Case, name: str, own: Conditions, random: np.random.Generator) -> Case:
-    """The batch of one study, recorded on a day of its own."""
+def _study(rig: Case, name: str, own: Conditions, repeats: int, random: np.random.Generator) -> Case:
+    """The batch of one study, one condition that is recorded `repeats` times on a day of its own."""
     pretension, bend, amplitude_rad, frequency_Hz = STUDIES[name]
     motion = SINE | {"amplitude_rad": amplitude_rad, "frequency_Hz": frequency_Hz}
-    planned = {"id": f"{name}-1", "pretension": pretension, "bend": bend, "motion": motion}
-    protocol = Protocol(
-        recordings=(PlannedRecording.model_validate(planned),),
-        kept_back=Factors(pretension=(1.0, 1.0), bend=(1.0, 1.0)),
-    )
+    planned = [
+        {"id": f"{name}-{k}", "pretension": pretension, "bend": bend, "motion": motion}
+        | ({"again": f"{name}-0"} if k else {})
+        for k in range(repeats)
+    ]
+    whole = Factors(pretension=(1.0, 1.0), bend=(1.0, 1.0))
+    protocol = Protocol(recordings=tuple(map(PlannedRecording.model_validate, planned)), kept_back=whole)
     cable = rig.campaign.rig.cable
     friction = cable.friction_coefficient * (1 + BETWEEN * random.standard_normal())
     of_day = rig.campaign.rig.model_copy(update={"cable": cable.model_copy(update={"friction_coefficient": friction})})
@@ -75,10 +81,10 @@ def _study(rig: Case, name: str, own: Conditions, random: np.random.Generator) -
     return replace(rig, name=name, campaign=campaign, recordings=plans)
 
 
-def row(seed: int) -> dict:
+def row(seed: int, repeats: int = 1) -> dict:
     """Verdicts on a rig's studies, and, if each is `undecided`, on all of them together."""
     set_threads(1)
-    started, cases = time.process_time(), studies(seed)
+    started, cases = time.process_time(), studies(seed, repeats)
     (truth,) = next(iter(cases.values())).truth
     found: dict = {"seed": seed, "truth": truth.name, "place": truth.place, "strength": round(truth.strength, 3)}
     with tempfile.TemporaryDirectory() as folder:
@@ -107,12 +113,13 @@ def _together(batches: list[Path], truth: str) -> dict:
     }
 
 
-def rows(first: int, rigs: int, most: int, cores: int) -> Iterator[dict]:
+def rows(first: int, rigs: int, most: int, repeats: int, cores: int) -> Iterator[dict]:
     """Rows of rigs from the seed `first` on, until so many count, or the `most` were drawn."""
-    seeds, counted = islice(count(first), most), 0
+    low, high = STRENGTHS
+    seeds, counted = islice((s for s in count(first) if low < draw(s, "single").truth[0].strength < high), most), 0
     with ProcessPoolExecutor(cores) as pool:
         while counted < rigs and (chunk := list(islice(seeds, cores))):
-            for one in pool.map(row, chunk):
+            for one in pool.map(partial(row, repeats=repeats), chunk):
                 counted += "decided" in one
                 yield one
 
@@ -147,13 +154,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--first", type=int, default=FIRST_SEED, help="seed of the first rig")
     parser.add_argument("--rigs", type=int, default=25, help="rigs that count")
-    parser.add_argument("--most", type=int, default=400, help="rigs that are drawn at most")
+    parser.add_argument("--most", type=int, default=400, help="rigs that are recorded at most")
+    parser.add_argument("--repeats", type=int, default=1, help="recordings of each study")
     parser.add_argument("--cores", type=int, default=1, help="processes")
     parser.add_argument("--out", type=Path, required=True, help="CSV with a row for each rig")
     asked = parser.parse_args()
     asked.out.parent.mkdir(parents=True, exist_ok=True)
     found: list[dict] = []
-    for one in rows(asked.first, asked.rigs, asked.most, asked.cores):
+    for one in rows(asked.first, asked.rigs, asked.most, asked.repeats, asked.cores):
         found.append(one)
         print(" ".join(f"{key}={value}" for key, value in one.items()), flush=True)
         # An interrupted run leaves what it has.

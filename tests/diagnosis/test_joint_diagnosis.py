@@ -15,6 +15,8 @@ from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.calibration import calibration
 from ccmodel.diagnosis.candidate import fit
 from ccmodel.diagnosis.hypothesis import PAPER
+from ccmodel.diagnosis.observations import observations_of
+from ccmodel.diagnosis.whitening import _scalar_nuisances
 from ccmodel.inference.problem import Problem
 from ccmodel.model.files import read_model_file
 from ccmodel.model.parameters import acts_on, batch_key, of_batch
@@ -136,10 +138,18 @@ def test_no_run_is_spent_on_values_of_other_batches_and_their_derivatives_are_ze
         assert ((moved > 0) == acting).all()
 
 
+def test_the_friction_of_a_batch_with_one_recording_is_that_recordings_nuisance():
+    made = [w.observations.given.recording for w in of_sessions(["monday", "monday", "monday", "tuesday"])]
+    observations, _ = observations_of(made, PARAMETERS)
+    spreads = [dict((n, s / v) for n, v, s in _scalar_nuisances(o) if v)["friction_coefficient"] for o in observations]
+    assert spreads == pytest.approx([0.01] * 3 + [np.hypot(0.01, 0.02)])
+    assert KEYS[0] in (free := calibration(PARAMETERS, observations)) and KEYS[1] not in free
+
+
 def test_a_batch_that_is_left_out_returns_to_the_prior():
-    """Of a batch with one recording, nothing but the prior says what its friction is without that recording."""
+    """The prior is never left out: nothing else says what the friction of a batch is without its recordings."""
     recordings = of_sessions(["monday", "monday", "monday", "tuesday"])
-    free = calibration(PARAMETERS, [w.observations for w in recordings])
+    free = calibration(PARAMETERS, [w.observations for w in of_sessions(["monday", "monday", "tuesday", "tuesday"])])
     start = {name: one.start for name, one in free.items()}
     found = fit(recordings, PAPER, free, start)
     assert found.loo_values[3][KEYS[1]] == pytest.approx(1.0, abs=1e-3)

@@ -103,7 +103,7 @@ def calibration(estimates: Parameters, observations: Sequence[Observations]) -> 
 
 
 def sessions_of(observations: Sequence[Observations]) -> list[str]:
-    """Batches of a rig that are taken together; one that is empty for a batch by itself."""
+    """Batches of these observations that are taken together; one that is empty for a batch by itself."""
     return list(dict.fromkeys(o.session for o in observations))
 
 
@@ -116,21 +116,23 @@ def _by_session(name: str, observations: Sequence[Observations]) -> list[str]:
 def _between_batches(observations: Sequence[Observations]) -> dict[str, Free]:
     """What differs from batch to batch of a rig, with priors about the rig's value; nothing of a batch by itself.
 
+    The friction of a batch with one recording is a nuisance of that recording (`Observations.friction_between`): left
+    out, nothing would determine an unknown.
+
     In the cost of a fit, where a recording counts by its mean square, an error of one standard deviation has the weight
     of one effective sample.
     """
     if len(sessions_of(observations)) == 1:
         return {}
-    spreads = {"friction_scale": settings.FRICTION_BETWEEN}
+    spreads = {
+        batch_key("friction_scale", session): settings.FRICTION_BETWEEN
+        for session in sessions_of([o for o in observations if not o.friction_between])
+    }
     if not all(o.given.initial_tension_observed for o in observations):
-        spreads["pretension_scale"] = settings.PRETENSION_BETWEEN
+        spreads |= dict.fromkeys(_by_session("pretension_scale", observations), settings.PRETENSION_BETWEEN)
     samples = IN_DIAGNOSIS * float(np.mean([len(o.channels) for o in observations]))
     low, high = settings.BETWEEN_BOUNDS
-    return {
-        name: Free(1.0, low, high, spread * np.sqrt(samples), mean=1.0)
-        for parameter, spread in spreads.items()
-        for name in _by_session(parameter, observations)
-    }
+    return {name: Free(1.0, low, high, spread * np.sqrt(samples), mean=1.0) for name, spread in spreads.items()}
 
 
 def _chosen(free: Mapping[str, Free], names: Collection[str]) -> dict[str, Free]:

@@ -13,6 +13,7 @@ Errors are linear in a nuisance only nearby. Each recording is therefore lineari
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
@@ -277,7 +278,7 @@ def _scalar_nuisances(o: Observations) -> Sequence[tuple[str, float, float]]:
     """Name, value and prior standard deviation of each; friction first."""
     recording, parameters = o.given.recording, o.parameters
     mu = parameters.friction_coefficient
-    found = [("friction_coefficient", mu, settings.FRICTION_SPREAD * mu)]
+    found = [("friction_coefficient", mu, hypot(settings.FRICTION_SPREAD, o.friction_between) * mu)]
     for channel, name in ZERO_OF.items():
         if channel in o.channels and channel in recording.accuracy:
             found.append((name, getattr(parameters, name), recording.accuracy[channel]))

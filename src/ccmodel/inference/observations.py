@@ -41,6 +41,9 @@ class Observations:
         Whether the load's law or the measured load torque acts at the cables' far end.
     noise : mapping of str to SensorNoise
         Noise of each channel's sensor.
+    friction_between : float
+        Standard deviation of friction between batches, over its mean, that this recording has besides the one between
+        runs: of the only recording of a batch among several. Otherwise 0.
     """
 
     given: ModelInput
@@ -53,6 +56,7 @@ class Observations:
     offset_is_free: bool = False
     load_from: LoadFrom = "law"
     noise: Mapping[str, SensorNoise] = field(default_factory=dict)
+    friction_between: float = 0.0
 
     @classmethod
     def of(
