@@ -112,8 +112,9 @@ def noise_floor(
 
     The recording is simulated again with friction 1 % higher, the drive offset by one standard deviation of its
     sub-count position, and a past in the middle of its range. The difference is added in quadrature to the sensors'
-    noise and to the uncertainty of their zeros. The load's sub-count position counts twice, because its zero is read at the same rest. Both load cells give
-    the pretension at rest, so that each is off by half the difference of their zeros.
+    noise and to the uncertainty of their zeros. The load's sub-count position counts twice, because its zero is read at
+    the same rest. Both load cells give the pretension at rest, so that each is off by half the difference of their
+    zeros.
 
     Parameters
     ----------

@@ -35,6 +35,9 @@ FIRST_FIT_EVALUATIONS, FIRST_FIT_TOLERANCE = 20, 1e-4
 # Standard deviation of the friction coefficient from run to run, over its mean. Stated: recordings of one
 # condition repeat to about 1 % in friction (docs/rig-log-format.md).
 FRICTION_SPREAD = 0.01
+# Standard deviation of the curvature of a cable's initial tension between its ends, over the largest that friction can
+# hold. Chosen: earlier motions leave a profile that the rest shows at the ends only.
+CURVATURE_SPREAD = 0.15
 # Standard deviation of the load's position in its gap: uniform from -1 to 1.
 GAP_SPREAD = 1 / np.sqrt(3)
 # Positions in the gap about which the covariance is linearised, the first where nothing speaks for another. Chosen.
