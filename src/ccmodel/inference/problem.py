@@ -21,7 +21,7 @@ from ccmodel.inference.pool import each
 
 @dataclass(frozen=True)
 class Free:
-    """An unknown: its start, its bounds, and its prior if each recording has a value of its own.
+    """An unknown: its start, its bounds, and its prior if it has one, as those that differ between recordings do.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class Free:
         Also the prior's mean.
     low, high : float
     spread : float or None
-        The prior's standard deviation, from recording to recording; None: no prior.
+        The prior's standard deviation; of an own unknown, from recording to recording. None: no prior.
     """
 
     start: float
