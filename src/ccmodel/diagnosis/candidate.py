@@ -154,11 +154,14 @@ def fit(
     modelled = _with_states(whitened, hypothesis, {n: f.start for n, f in unknowns.items()})
     problem = Problem(modelled, unknowns, weight=mean_weight)
     solution = _search(problem, hypothesis)
-    if any(registry.get(name).states for name, _ in hypothesis.baseline + hypothesis.acting):
+    has_states = any(registry.get(name).states for name, _ in hypothesis.baseline + hypothesis.acting)
+    for _ in range(settings.STATE_PASSES if has_states else 0):
         # The states' effects were those of the values at the start, which the fit has left.
-        modelled = _with_states(whitened, hypothesis, problem.values_of(solution.x, 0))
+        before, modelled = solution.cost, _with_states(whitened, hypothesis, problem.values_of(solution.x, 0))
         problem = replace(problem, observations=modelled)
         solution = minimise(problem, inside_bounds(problem, solution.x), SEARCH)
+        if abs(solution.cost - before) < settings.STATE_TOLERANCE * before:
+            break
     left_out = leave_one_out(problem, solution)
     covariance, degrees = left_out.covariance, left_out.degrees_of_freedom
     if any(free.spread for free in unknowns.values()):
