@@ -122,9 +122,10 @@ class Whitened:
 
     @property
     def friction_ratio(self) -> float:
-        """Posterior mean of the friction in this recording over that of the model."""
+        """Posterior mean of the friction in this recording over that of the model, as far as it may be linearised."""
         stated = {name: value for name, value, _ in self.scalar_nuisances}
-        return self.own_values({})[FRICTION] / stated[FRICTION] if FRICTION in stated else 1.0
+        ratio = self.own_values({})[FRICTION] / stated[FRICTION] if FRICTION in stated else 1.0
+        return float(np.clip(ratio, *settings.OWN_FRICTION))
 
     def with_parameters(self, parameters: Parameters) -> "Whitened":
         """The same for a model with other parameters, under the same covariance."""
