@@ -6,7 +6,7 @@ SS, the sum of squares about the means of the conditions, updates to
 
     s^2 = (nu0 s0^2 + SS) / (nu0 + nu).
 
-Where no condition repeats, friction's spread comes from its scatter over all recordings by the same formula, up to
+Where no condition repeats, the spread of friction comes from its scatter over all recordings by the same formula, up to
 `settings.MOST_SCATTER` times the stated one: that scatter may be physics too.
 
 Whitening marginalises friction's deviation, so that no mean square shows a deviation that no repeat would have.
@@ -35,7 +35,8 @@ from ccmodel.recording import Recording
 if TYPE_CHECKING:
     from ccmodel.diagnosis.whitening import Whitened
 
-FRICTION = "friction_coefficient"
+FRICTION, PRETENSION = "friction_coefficient", "pretension_scale"
+_WORDS = {FRICTION: "friction", PRETENSION: "initial tension"}
 _CHANNEL_OF = {zero: channel for channel, zero in ZERO_OF.items()}
 
 
@@ -154,23 +155,23 @@ def estimated(whitened: Sequence["Whitened"], residuals: Sequence[NDArray]) -> R
     found = {}
     for name in names:
         of_name = deviations(whitened, residuals, name)
-        if name == FRICTION:
-            found[name] = friction_spread(without_trend(of_name), groups)
+        if name in _WORDS:
+            found[name] = relative_spread(name, without_trend(of_name), groups)
         elif name in _CHANNEL_OF:
             found[name] = zero_spread(name, of_name, groups)
     return Repeatability(found, groups)
 
 
-def friction_spread(found: Deviations, groups: Sequence[Sequence[int]]) -> Spread:
-    """Spread of friction from repeats; without repeats from the scatter of all recordings."""
+def relative_spread(name: str, found: Deviations, groups: Sequence[Sequence[int]]) -> Spread:
+    """Spread of friction or initial tension from repeats; without repeats from the scatter of all recordings."""
     square, freedom, count = found.sum_of_squares(groups)
     if freedom:
-        return Spread(FRICTION, _posterior(square, freedom), "repeats", count)
+        return Spread(name, _posterior(square, freedom), "repeats", count)
     square, freedom, count = found.sum_of_squares([range(found.values.size)])
     if freedom + 1 < settings.FEWEST_FOR_SCATTER:
-        return Spread(FRICTION)
+        return Spread(name)
     ratio = float(np.clip(_posterior(square, freedom), 1.0, settings.MOST_SCATTER))
-    return Spread(FRICTION, ratio, "scatter", count) if ratio > 1 else Spread(FRICTION)
+    return Spread(name, ratio, "scatter", count) if ratio > 1 else Spread(name)
 
 
 def zero_spread(name: str, found: Deviations, groups: Sequence[Sequence[int]]) -> Spread:
@@ -264,14 +265,14 @@ def _spreads(whitened: Sequence["Whitened"]) -> list[dict]:
     applied: dict[str, tuple[float, str]] = {}
     for w in whitened:
         for name, value, sd in w.scalar_nuisances:
-            if name == FRICTION:
+            if name in _WORDS:
                 applied[name] = sd / value, "1"
             elif name in _CHANNEL_OF:
                 applied[name] = sd, _unit(_CHANNEL_OF[name])
     found = []
     for name, (size, unit) in applied.items():
         spread = whitened[0].repeatability.spreads.get(name, Spread(name))
-        what = "friction" if name == FRICTION else f"zero of {short_name(_CHANNEL_OF[name])}"
+        what = _WORDS.get(name) or f"zero of {short_name(_CHANNEL_OF[name])}"
         found.append(_row(f"{what} from run to run", size, unit, spread.source, spread.recordings))
     return found
 

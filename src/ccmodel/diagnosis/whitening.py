@@ -1,8 +1,8 @@
 """Whitened observations: errors of a recording divided by the square root of their covariance.
 
-The covariance has two parts: the sensors' noise, and nuisances that differ from run to run. Nuisances are friction,
-sensor zeros, encoder offsets and the uncertain drive motion, each a direction in the space of errors with a prior
-standard deviation. They are marginalised, so that no fit needs unknowns for them.
+The covariance has two parts: the sensors' noise, and nuisances that differ from run to run. Nuisances are friction, an
+initial tension that is not observed, sensor zeros, encoder offsets and the uncertain drive motion, each a direction in
+the space of errors with a prior standard deviation. They are marginalised, so that no fit needs unknowns for them.
 
 A nuisance far outside its prior, such as friction that is 10 % higher in every recording, is one number among
 thousands of samples. The posterior means of the nuisances are therefore appended to the whitened errors, each with the
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ccmodel import mechanisms as registry
 from ccmodel.channels import THETA_OUT, ZERO_OF
 from ccmodel.diagnosis import settings
-from ccmodel.diagnosis.repeatability import FRICTION, STATED, Repeatability
+from ccmodel.diagnosis.repeatability import FRICTION, PRETENSION, STATED, Repeatability
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS
 from ccmodel.inference.jacobian import STEP, jacobian, size_of
 from ccmodel.inference.observations import Observations
@@ -135,9 +135,10 @@ class Whitened:
 
     @property
     def friction_ratio(self) -> float:
-        """Posterior mean of the friction in this recording over that of the model."""
+        """Posterior mean of the friction in this recording over that of the model, as far as it may be linearised."""
         stated = {name: value for name, value, _ in self.scalar_nuisances}
-        return self.own_values({})[FRICTION] / stated[FRICTION] if FRICTION in stated else 1.0
+        ratio = self.own_values({})[FRICTION] / stated[FRICTION] if FRICTION in stated else 1.0
+        return float(np.clip(ratio, *settings.OWN_FRICTION))
 
     def with_parameters(self, parameters: Parameters) -> "Whitened":
         """The same for a model with other parameters, under the same covariance."""
@@ -285,6 +286,8 @@ def _scalar_nuisances(o: Observations) -> Sequence[tuple[str, float, float]]:
     for channel, name in ZERO_OF.items():
         if channel in o.channels and channel in recording.accuracy:
             found.append((name, getattr(parameters, name), recording.accuracy[channel]))
+    if not o.given.initial_tension_observed:
+        found.append((PRETENSION, parameters.pretension_scale, settings.PRETENSION_SPREAD))
     if settings_of(parameters.mechanisms).half_gap:
         found.append(("load_gap_position", parameters.load_gap_position, settings.GAP_SPREAD))
     if THETA_OUT in o.channels and (step := recording.encoder_step_rad.get(THETA_OUT)):
