@@ -147,9 +147,9 @@ FORM_SHARE = 0.04
 
 # Most mechanisms of a candidate, as the format says.
 MOST_MECHANISMS = 4
-# Candidates to which a further mechanism is added, further ones that are fitted with each, and sets of the first
-# screening that are fitted. Chosen for time.
-FIRSTS, PARTNERS, LINEAR_SETS = 2, 3, 2
+# Candidates to which a further mechanism is added, by the size of the set; further ones that are fitted with each; and
+# sets of the first screening that are fitted. Chosen for time.
+FIRSTS, PARTNERS, LINEAR_SETS = {2: 2, 3: 1, 4: 1}, 3, 2
 # Time after which no further candidate is fitted, s. Chosen: the verdict and its report take some 20 s more, and the
 # whole less than three minutes.
 TIME_LIMIT_S = 140.0
