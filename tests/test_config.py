@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from ccmodel.config import Config, batches_in, expand_studies, load_config
+from ccmodel.studies.diagnosis.settings import Diagnosing
 from ccmodel.typed import InputError
 
 ROOT = Path(__file__).parents[1]
@@ -125,6 +126,11 @@ def test_a_study_takes_the_first_fit_of_the_rig_or_else_the_calibrated_model():
         ({"diagnosing_by_batch": {"b": {"cycles": 2}}}, "diagnosing_by_batch: 'b' is not diagnosed"),
         ({"diagnose": ["d"], "diagnosing_by_batch": {"d": {}}}, "diagnose: there is no batch 'd'"),
         ({"diagnose": "each", "diagnosing_by_batch": {"d": {}}}, "diagnosing_by_batch: there is no batch 'd'"),
+        ({"diagnose_rigs": ["three"]}, "diagnose_rigs: there is no rig 'three'"),
+        ({"diagnose_rigs": ["two"]}, "diagnose_rigs: rig 'two' has one batch; name that batch in 'diagnose'"),
+        ({"rigs": {"a b": ["a", "b"]}, "diagnose_rigs": "each"}, "rigs.a b: cannot be a folder of results"),
+        ({"rigs": {"c": ["a", "b"]}, "diagnose_rigs": "each"}, "rigs.c: is the name of a batch too"),
+        ({"diagnosing_by_batch": {"one": {"cycles": 2}}}, "diagnosing_by_batch: 'one' is not diagnosed"),
         ({"fits": {"f": TWO_RIGS["fits"]["fitted"] | {"batches": ["a", "c"]}}}, "fits.f: a, c are not of one rig"),
         (
             {"studies": {"s": {"batches": ["a", "c"], "parameters": "fitted"}}},
@@ -139,6 +145,14 @@ def test_a_study_takes_the_first_fit_of_the_rig_or_else_the_calibrated_model():
 def test_rigs_and_names_that_do_not_fit_are_refused(changes, text):
     with pytest.raises((ValueError, InputError), match=text):
         expand_studies(two_rigs(**changes), BATCHES)
+
+
+def test_rigs_of_several_batches_are_diagnosed_together_if_they_ask_for_it():
+    assert two_rigs().diagnosed_rigs == {}
+    assert two_rigs(diagnose_rigs="each").diagnosed_rigs == {"one": ["a", "b"]}
+    config = two_rigs(diagnose_rigs=["one"], diagnosing={"cycles": 2}, diagnosing_by_batch={"one": {"step_s": 0.04}})
+    assert config.diagnosing_of("one") == Diagnosing(cycles=2, step_s=0.04)
+    assert expand_studies(config, BATCHES) == {}
 
 
 def test_a_batch_has_the_settings_of_all_but_for_its_own():

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from ccmodel.model.parameters import FORMER_NAMES
-from ccmodel.rig.batch import valid_name
+from ccmodel.rig.batch import NAMES, valid_name
 from ccmodel.steps.settings import Fit
 from ccmodel.studies.accuracy.settings import Accuracy
 from ccmodel.studies.baseline.settings import AgainstBaseline
@@ -35,9 +35,15 @@ class Config(TypedModel):
     diagnose: list[str] | Literal["each"] = Field(
         default_factory=list, description="batches to diagnose: what differs from the model, and why; or 'each'"
     )
+    diagnose_rigs: list[str] | Literal["each"] = Field(
+        default_factory=list,
+        description="rigs of several batches (see 'rigs') whose batches are diagnosed together as well; or 'each'",
+    )
     diagnosing: Diagnosing = Field(default_factory=Diagnosing, description="how finely these are looked at")
     diagnosing_by_batch: dict[str, Diagnosing] = Field(
-        default_factory=dict, description="settings of a batch that differ from 'diagnosing'"
+        default_factory=dict,
+        description="settings of a batch, or of a rig whose batches are diagnosed together, that differ from"
+        " 'diagnosing'",
     )
     concealed: str | None = Field(
         None, description="file with what simulated rigs have, which the page alone reads, after all verdicts"
@@ -62,8 +68,20 @@ class Config(TypedModel):
             if fit.batches != EACH and not all(self.same_rig(fit.batches[0], batch) for batch in fit.batches):
                 raise ValueError(f"fits.{name}: {', '.join(fit.batches)} are not of one rig (see 'rigs')")
         for batch in self.diagnosing_by_batch:
-            if not self.diagnosed([batch]):
+            if not self.diagnosed([batch]) and batch not in self.diagnosed_rigs:
                 raise ValueError(f"diagnosing_by_batch: '{batch}' is not diagnosed; name it in 'diagnose'")
+        return self
+
+    @model_validator(mode="after")
+    def _rigs_can_be_diagnosed(self) -> Self:
+        for rig in [] if self.diagnose_rigs == EACH else self.diagnose_rigs:
+            if rig not in self.rigs:
+                raise ValueError(f"diagnose_rigs: there is no rig '{rig}'; state its batches in 'rigs'")
+            if len(self.rigs[rig]) == 1:
+                raise ValueError(f"diagnose_rigs: rig '{rig}' has one batch; name that batch in 'diagnose'")
+        for rig in self.diagnosed_rigs:
+            if not valid_name(rig):
+                raise ValueError(f"rigs.{rig}: cannot be a folder of results; {NAMES}")
         return self
 
     @model_validator(mode="after")
@@ -111,8 +129,14 @@ class Config(TypedModel):
         """Batches that are diagnosed, out of these."""
         return [batch for batch in batches if self.diagnose == EACH or batch in self.diagnose]
 
+    @property
+    def diagnosed_rigs(self) -> dict[str, list[str]]:
+        """Batches of each rig whose batches are diagnosed together, by the rig's name."""
+        several = {rig: batches for rig, batches in self.rigs.items() if len(batches) > 1}
+        return {rig: of for rig, of in several.items() if self.diagnose_rigs == EACH or rig in self.diagnose_rigs}
+
     def diagnosing_of(self, batch: str) -> Diagnosing:
-        """Settings of a batch's diagnosis."""
+        """Settings of the diagnosis of a batch, or of a rig."""
         own = self.diagnosing_by_batch.get(batch, Diagnosing())
         return self.diagnosing.model_copy(update={name: getattr(own, name) for name in own.model_fields_set})
 
@@ -156,13 +180,16 @@ def expand_studies(config: Config, batches: list[str]) -> dict[str, Study]:
     stated = {f"studies.{name}": study.batches for name, study in config.studies.items()}
     stated |= {f"fits.{name}": fit.batches for name, fit in config.fits.items()}
     stated |= {f"rigs.{name}": named for name, named in config.rigs.items()}
-    stated |= {"diagnose": config.diagnose, "diagnosing_by_batch": list(config.diagnosing_by_batch)}
+    of_batches = [name for name in config.diagnosing_by_batch if name not in config.diagnosed_rigs]
+    stated |= {"diagnose": config.diagnose, "diagnosing_by_batch": of_batches}
     for where, named in stated.items():
         for batch in [] if named == EACH else named:
             if batch not in batches:
                 raise InputError(
                     f"{where}: there is no batch '{batch}' in {config.raw}; there are {', '.join(batches)}"
                 )
+    if taken := config.diagnosed_rigs.keys() & set(batches):
+        raise InputError(f"rigs.{min(taken)}: is the name of a batch too; give the rig another one to diagnose it")
     expanded: dict[str, Study] = {}
     for name, study in config.studies.items():
         wanted = batches if study.batches == EACH else study.batches

@@ -37,7 +37,8 @@ class Recording:
     Attributes
     ----------
     batch, id : str
-        Name of the batch, and of the recording within it.
+        Name of the batch, and of the recording within it. If several batches of a rig are taken together
+        (`ccmodel.rig.joint`), the name of all, and batch and recording as ``loops/loops-1-a``.
     origin : str
         "rig" (measured), "virtual-rig" (a simulated rig) or "model".
     time_s : ndarray, shape (n,)
@@ -147,6 +148,11 @@ class Recording:
         """
         # By name: no computation on recordings depends on how they are drawn.
         return import_module("ccmodel.api.figures").channels([self], channel)
+
+    @property
+    def session(self) -> str:
+        """Batch of the recording among several that are taken together; empty for a batch by itself."""
+        return self.id.rpartition("/")[0]
 
     @property
     def tensions(self) -> tuple[str, ...]:

@@ -300,7 +300,16 @@ def test_a_number_stands_where_a_finer_solver_would_have_it():
     key, found = "constant-drag/conduit/f0", {}
     for moved in (0.0, 0.03):
         candidate = CandidateFit(
-            Hypothesis((("constant-drag", "conduit"),)), {}, {key: 0.5}, [], [], np.array([[0.04**2]]), np.inf, [], []
+            Hypothesis((("constant-drag", "conduit"),)),
+            [],
+            {},
+            {key: 0.5},
+            [],
+            [],
+            np.array([[0.04**2]]),
+            np.inf,
+            [],
+            [],
         )
         found[moved] = mechanism_of(candidate, 0, 0.9, np.array([moved]))["parameters"][0]
     plain, corrected = found[0.0], found[0.03]
@@ -324,5 +333,5 @@ def test_the_pipeline_says_which_recordings_it_had_to_do_without(tmp_path, monke
         raise ModelError("what comes after is not asked here")
 
     monkeypatch.setattr(stage, "run", run)
-    stage.diagnose_recordings(tmp_path / "cut.nc", tmp_path / "out")
+    stage.diagnose_recordings([tmp_path / "cut.nc"], tmp_path / "out")
     assert [one["what"] for one in told] == ["t-5N.csv.gz"]

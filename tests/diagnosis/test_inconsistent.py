@@ -18,7 +18,7 @@ from ccmodel.typed import InputError
 
 KEYS = {
     "format", "batch", "verdict", "is_held", "location", "mechanisms", "alternatives", "likeliest", "nearest", "fit",
-    "next_experiment", "not_judged", "headline", "provenance",
+    "repeatability", "next_experiment", "not_judged", "headline", "provenance",
 }  # fmt: skip
 DEAD = "is 0 throughout: a sensor that is dead or was never connected: column not used"
 
@@ -107,7 +107,7 @@ def test_the_pipelines_diagnosis_does_the_same(dead, tmp_path, monkeypatch, trus
     out = tmp_path / "out"
     given = []
     monkeypatch.setattr(stage, "run", lambda _r, _e, _o, _b, not_judged, _p: given.extend(not_judged) or stop())
-    stage.diagnose_recordings(tmp_path / "bench.nc", out, Diagnosing(trust_inputs=trust))
+    stage.diagnose_recordings([tmp_path / "bench.nc"], out, Diagnosing(trust_inputs=trust))
     said = json.loads((out / "diagnosis.json").read_text())
     if trust:
         assert said["verdict"] is None

@@ -251,6 +251,30 @@ def test_snakemakes_report_has_page_diagnoses_tables_and_figures_with_their_capt
     assert len(set(labels)) == len(labels), "every entry can be told from the others"
 
 
+def test_batches_of_a_rig_are_diagnosed_together(diagnosed, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(diagnosed, folder, copy_function=shutil.copy2)
+    write_batch(folder / "data/raw/other", pretensions=(7.0, 5.0))
+    config = yaml.safe_load((folder / "config.yaml").read_text())
+    config |= {"rigs": {"bench": ["tiny", "other"]}, "diagnose": ["tiny"], "diagnose_rigs": "each"}
+    config["diagnosing_by_batch"] = {"bench": {"step_s": 0.02}}
+    (folder / "config.yaml").write_text(yaml.safe_dump(config))
+    run = snakemake(folder)
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert "Diagnosing rig bench" in run.stdout + run.stderr
+    results = folder / "results"
+    said = json.loads((results / "diagnoses/bench/diagnosis.json").read_text())
+    assert (said["batch"], said["batches"], said["verdict"]) == ("bench", ["tiny", "other"], "agrees")
+    assert not (results / "diagnoses/other").exists()
+    page = (results / "index.html").read_text()
+    card = page[page.index('id="card-bench"') :].partition("</article>")[0]
+    assert "The batches tiny, other together" in card and "4 recordings" in card
+    assert 'id="diagnosis-bench"' in page
+    assert "Rig bench, its 2 batches together: agrees." in page
+    summary = ccmodel("report", str(results))
+    assert summary.returncode == 0 and "bench: agrees." in summary.stdout
+
+
 def test_the_papers_simulated_figures_stand_under_a_heading_of_their_own(finished):
     page = (finished / "results/index.html").read_text()
     section = page[page.index('<h2 id="phases">Simulated') : page.index('<h2 id="fits">')]

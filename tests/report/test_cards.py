@@ -112,3 +112,18 @@ def test_every_mechanism_that_anything_names_is_listed():
         diagnosis("c", None),
     ]
     assert mechanisms_named(asked) == ["backlash", "torque-scale"]
+
+
+def test_batches_that_are_diagnosed_together_have_a_card_of_their_rig():
+    batches = [summary("a"), summary("b"), summary("other")]
+    found = [diagnosis("a", "undecided"), diagnosis("b", "undecided")]
+    rig = diagnosis("bench", "explained", batches=["a", "b"])
+    rig["fit"] = rig["fit"] | {"error": larger(3.0)}
+    every = cards(batches, [*found, rig])
+    assert [c["batch"] for c in every] == ["bench", "a", "b", "other"]
+    assert (every[0]["recordings"], every[0]["together"]) == (2, ["a", "b"])
+    said = overview(every)
+    assert said[0].startswith("Simulated, 2 batches: 2 undecided.")
+    assert said[1].startswith("Rig bench, its 2 batches together: explained")
+    failed = {"batch": "bench", "batches": ["a", "b"], "verdict": None, "why": "they are not of one rig"}
+    assert "they are not of one rig" in next(c for c in cards(batches, [failed]) if c["together"])["sentence"]

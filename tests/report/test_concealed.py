@@ -85,3 +85,10 @@ def test_a_file_of_another_format_is_one_line(concealed):
     with pytest.raises(InputError, match=r"concealed\.json, line 1: format: must be at most 1") as error:
         concealed(format=2)
     assert "\n" not in str(error.value)
+
+
+def test_what_was_said_of_all_batches_together_is_a_column_of_its_own(concealed):
+    said = [diagnosis("b", "undecided"), diagnosis("bench", "explained", batches=["b", "c"])]
+    (table,) = beside(concealed(batches=("b", "c")), said)
+    assert table["columns"] == ["b", "c", "bench (2 batches together)"]
+    assert table["effects"][0]["said"][2] == NAMED

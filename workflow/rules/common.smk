@@ -28,6 +28,9 @@ except InputError as error:
     print(error, file=sys.stderr)
     sys.exit(2)
 
+# Names of all diagnoses: batches by themselves, and rigs whose batches are diagnosed together.
+DIAGNOSES = [*CONFIG.diagnosed(BATCHES), *CONFIG.diagnosed_rigs]
+
 # Every study by its name, in the order of the page.
 STUDIES = LOOPS | CONFIG.judgements
 

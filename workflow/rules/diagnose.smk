@@ -1,6 +1,10 @@
+# A batch, or all batches of a rig together; the wildcard is the name of either.
 rule diagnose:
     input:
-        recordings=lambda wildcards: recordings_of(wildcards.batch),
+        lambda wildcards: [
+            recordings_of(batch)
+            for batch in CONFIG.diagnosed_rigs.get(wildcards.batch, [wildcards.batch])
+        ],
     output:
         f"{RESULTS}/diagnoses/{{batch}}/diagnosis.json",
         in_report(
@@ -27,7 +31,10 @@ rule diagnose:
             wildcards.batch
         ).model_dump_json(),
         sources=source_digest("ccmodel.studies.diagnosis.run"),
+        what=lambda wildcards: (
+            "rig" if wildcards.batch in CONFIG.diagnosed_rigs else "batch"
+        ),
     message:
-        "Diagnosing batch {wildcards.batch}"
+        "Diagnosing {params.what} {wildcards.batch}"
     script:
         "../scripts/diagnose_batch.py"

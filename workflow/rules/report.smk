@@ -36,14 +36,8 @@ rule write_report:
         ],
         recordings=[recordings_of(batch) for _, batch in runs()],
         simulated=[simulated_of(parameters, batch) for parameters, batch in runs()],
-        diagnoses=[
-            f"{RESULTS}/diagnoses/{batch}/diagnosis.json"
-            for batch in CONFIG.diagnosed(BATCHES)
-        ],
-        reports=[
-            f"{RESULTS}/diagnoses/{batch}/report.html"
-            for batch in CONFIG.diagnosed(BATCHES)
-        ],
+        diagnoses=[f"{RESULTS}/diagnoses/{name}/diagnosis.json" for name in DIAGNOSES],
+        reports=[f"{RESULTS}/diagnoses/{name}/report.html" for name in DIAGNOSES],
         # Read here alone, after all verdicts.
         concealed=CONFIG.concealed or [],
         figures=[figure for name in STUDIES for figure in figures(name, "png")],

@@ -1,4 +1,4 @@
-"""Recordings of a batch -> diagnosis.json, its page (HTML), the calibrated, best and nearest model (JSON)."""
+"""Recordings of a batch, or of all batches of a rig -> diagnosis.json, its page (HTML), the calibrated, best and nearest model (JSON)."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from ccmodel.studies.diagnosis.settings import Diagnosing
 
 with logged(snakemake.log[0], snakemake.threads) as progress:
     diagnose_recordings(
-        Path(snakemake.input.recordings),
+        [Path(file) for file in snakemake.input],
         Path(snakemake.output[0]).parent,
         Diagnosing.model_validate_json(snakemake.params.settings),
         progress,

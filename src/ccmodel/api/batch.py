@@ -1,6 +1,6 @@
 """Batches: a folder of recordings that was read."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -13,12 +13,13 @@ from ccmodel import provenance
 from ccmodel.api.options import progress_of
 from ccmodel.api.recordings import Recordings, counted
 from ccmodel.channels import THETA_IN
-from ccmodel.paths import batch_folder
-from ccmodel.progress import Progress, silent
+from ccmodel.paths import BATCH_FILE, batch_folder
+from ccmodel.progress import Progress, silent, within
 from ccmodel.recording import ORIGIN, Recording
 from ccmodel.rig.batch import Batch as BatchFile
 from ccmodel.rig.findings import WORD, Finding
 from ccmodel.rig.ingest import Ingested, ingest_batch
+from ccmodel.rig.joint import together
 from ccmodel.typed import InputError
 
 # Findings that a short form shows.
@@ -27,11 +28,12 @@ SHOWN_FINDINGS = 5
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Batch(Recordings):
-    """Recordings of one rig, as `load` reads them from a folder.
+    """Recordings of one rig, as `load` reads them from a folder; or several batches that are diagnosed together.
 
     Attributes
     ----------
     folder : Path
+        Of several batches, the first one's.
     recordings : tuple of Recording
         Those that can be used, in the order of ``batch.yaml``; ``batch["id"]`` is one of them.
     findings : tuple of Finding
@@ -46,10 +48,12 @@ class Batch(Recordings):
     provenance: Mapping[str, Any]
     # Content of batch.yaml.
     _file: BatchFile
+    # Names of several batches.
+    _parts: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
-        """Name of the batch, which is its folder's."""
+        """Name of the batch, which is its folder's; of several batches, their names."""
         return self._file.batch
 
     @property
@@ -65,7 +69,7 @@ class Batch(Recordings):
     @property
     def _ingested(self) -> Ingested:
         """The batch as the functions below this interface take it."""
-        return Ingested(list(self.recordings), list(self.findings), self._file)
+        return Ingested(list(self.recordings), list(self.findings), self._file, self._parts)
 
     @property
     def summary(self) -> pd.DataFrame:
@@ -166,6 +170,29 @@ def as_batch(batch: Batch | str | Path, progress: Progress = silent) -> Batch:
         return load(batch, progress=progress)
     what = "a Recording alone" if isinstance(batch, Recording) else type(batch).__name__
     raise InputError(f"batch: a Batch or its folder; got {'None' if batch is None else what}")
+
+
+def joint_batch(batches: Sequence[Batch | str | Path], progress: Progress = silent) -> Batch:
+    """Batches of one rig, or their folders, as one batch; one of them as it is.
+
+    Raises
+    ------
+    InputError
+        If there are none, one of them cannot be used, or they are not of one rig.
+    """
+    if not batches:
+        raise InputError("batch: a Batch or its folder, or a list of those of one rig; got an empty list")
+    shares = [k / len(batches) for k in range(len(batches) + 1)]
+    parts = zip(batches, shares[:-1], shares[1:], strict=True)
+    every = [as_batch(batch, within(progress, low, high)) for batch, low, high in parts]
+    if len(every) == 1:
+        return every[0]
+    found = together([(str(batch.folder / BATCH_FILE), batch._ingested) for batch in every])
+    digests = {f"{b.name}/{file}": digest for b in every for file, digest in b.provenance["sha256"].items()}
+    inputs = {**every[0].provenance, "sha256": digests}
+    return Batch(
+        every[0].folder, tuple(found.recordings), tuple(found.findings), inputs, found.stated, tuple(found.parts)
+    )
 
 
 def check_consistent(batch: Batch, trust_inputs: bool, option: str = "trust_inputs=True") -> None:

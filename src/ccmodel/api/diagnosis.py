@@ -1,6 +1,6 @@
 """Diagnoses: whether the calibrated model explains a batch, and which physics is missing."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from ccmodel.api.batch import Batch, as_batch
+from ccmodel.api.batch import Batch, joint_batch
 from ccmodel.api.model import HasModel, as_model
 from ccmodel.api.options import Candidates, Tolerance, check_step, diagnosis_options, progress_of
 from ccmodel.api.recordings import counted
@@ -27,11 +27,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis:
-    """The diagnosis of a batch.
+    """The diagnosis of a batch, or of several of one rig.
 
     Attributes
     ----------
     batch : Batch
+        The batch; of several, all their recordings, with ids such as ``loops/loops-1-a``.
     """
 
     batch: Batch
@@ -168,7 +169,7 @@ class Diagnosis:
 
 
 def diagnose(
-    batch: Batch | str | Path,
+    batch: Batch | str | Path | Sequence[Batch | str | Path],
     out: str | Path | None = None,
     *,
     baseline: Model | HasModel | str | Path | None = None,
@@ -178,6 +179,7 @@ def diagnose(
     step_s: float | None = None,
     cycles: int | None = None,
     candidates: Candidates = (),
+    time_limit_s: float | None = None,
     trust_inputs: bool = False,
     progress: bool | Progress = False,
 ) -> Diagnosis:
@@ -187,8 +189,9 @@ def diagnose(
 
     Parameters
     ----------
-    batch : Batch, str or Path
-        A batch, or its folder.
+    batch : Batch, str, Path or sequence of these
+        A batch, or its folder; or all batches of one rig, which are diagnosed together: stiffness, friction, load and
+        mechanisms are the rig's, while zeros, initial tensions and a few per cent of friction differ between batches.
     out : str or Path, optional
         Folder for diagnosis.json, the page and the models; `Diagnosis.save` writes them later.
     baseline : Model, Fit, Diagnosis, str or Path, optional
@@ -201,8 +204,10 @@ def diagnose(
         As of `ccmodel.fit`. A batch whose inputs contradict one another has the verdict ``inputs-inconsistent`` unless
         they are trusted.
     candidates : str or sequence
-        Mechanisms at their places, which are fitted in full whatever the screening says: ``"kink at conduit"``, or two
-        together, as ``"kink at conduit, backlash at drive-train"`` or as a sequence of the two; or a sequence of these.
+        Mechanisms at their places, which are fitted in full whatever the screening says: ``"kink at conduit"``; or up
+        to four together, as ``"kink at conduit, backlash at load-pulley"`` or as a sequence; or a sequence of these.
+    time_limit_s : float, optional
+        Time after which no further candidate is fitted, s, by default 140; the report says so.
 
     Returns
     -------
@@ -225,19 +230,22 @@ def diagnose(
     >>> found.nearest
     Model: ...; pulley-friction at drive-pulley, fitted to half-loop, recording (virtual rig, simulated)
     """
-    options = diagnosis_options(tolerance, step_s, cycles, candidates, without, freeze, baseline is not None)
+    options = diagnosis_options(
+        tolerance, step_s, cycles, candidates, without, freeze, baseline is not None, time_limit_s=time_limit_s
+    )
     known = None if baseline is None else as_model(baseline).parameters
     if out is not None:
         try_folder(out)
     with progress_of(progress) as report:
-        batch = as_batch(batch, within(report, 0.0, INGEST))
+        several = batch if isinstance(batch, Sequence) and not isinstance(batch, str) else [batch]
+        batch = joint_batch(several, within(report, 0.0, INGEST))
         check_step(batch.recordings, step_s)
         batch._ingested.check_usable(batch.folder, trust_inputs)
         part = within(report, INGEST, PAGE)
         try:
             outcome = diagnosed(batch._ingested, dict(batch.provenance), options, known, part, trust_inputs)
         except (ModelError, ValueError) as error:
-            raise InputError(f"{batch.folder}: {error}") from None
+            raise InputError(f"{batch.name if len(several) > 1 else batch.folder}: {error}") from None
         found = Diagnosis(batch, outcome)
         if out is not None:
             report("writing the page", PAGE)

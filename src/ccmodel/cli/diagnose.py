@@ -1,4 +1,4 @@
-"""Diagnosis of a batch."""
+"""Diagnosis of a batch, or of several batches of one rig."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +9,7 @@ from ccmodel.cli import completion
 from ccmodel.cli.group import MODEL, command
 from ccmodel.cli.interruption import leaving
 from ccmodel.cli.options import (
-    Batch,
+    Batches,
     Cycles,
     Json,
     Quiet,
@@ -25,12 +25,13 @@ from ccmodel.cli.output import Output
 
 def add_to(app: typer.Typer) -> None:
     """Add the command."""
+    of_a_rig = "ccmodel diagnose data/raw/loops data/raw/pretension --out out"
     later = "ccmodel diagnose data/raw/later --baseline out/model.json --freeze --out later"
-    command(app, "diagnose", MODEL, ["ccmodel diagnose data/raw/loops --out out", later])(diagnose)
+    command(app, "diagnose", MODEL, ["ccmodel diagnose data/raw/loops --out out", of_a_rig, later])(diagnose)
 
 
 def diagnose(
-    batch: Batch,
+    batches: Batches,
     out: Annotated[Path, out_folder("Folder for diagnosis.json, the page and the models.")],
     without: Annotated[
         list[str],
@@ -53,11 +54,15 @@ def diagnose(
     candidate: Annotated[
         list[str],
         typer.Option(
-            help="As 'kink at conduit', or two with a comma: fit it in full whatever the screening says.",
+            help="As 'kink at conduit', or up to four with commas: fit it in full whatever the screening says.",
             autocompletion=completion.candidates,
             show_default=False,
         ),
     ] = [],  # noqa: B006
+    time_limit: Annotated[
+        float | None,
+        typer.Option("--time-limit", help="Time for fitting candidates, s; 140 if not given.", show_default=False),
+    ] = None,
     trust_inputs: TrustInputs = False,
     strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 unless the model agrees.")] = False,
     as_json: Json = False,
@@ -65,6 +70,7 @@ def diagnose(
 ) -> None:
     """Decide whether the calibrated model explains a batch; if not, locate and name the physics left out.
 
+    Several batches of one rig are diagnosed together, with one stiffness, one friction and one set of mechanisms.
     Exits with 0 at any verdict, unless --strict is given.
     """
     import ccmodel
@@ -72,10 +78,12 @@ def diagnose(
 
     output, shares = Output(as_json, quiet), tolerance_of(tolerance)
     # The same check as below, with the names that options have here.
-    diagnosis_options(shares, step, cycles, candidate, without, freeze, baseline is not None, prefix="--")
+    diagnosis_options(
+        shares, step, cycles, candidate, without, freeze, baseline is not None, prefix="--", time_limit_s=time_limit
+    )
     with leaving(out), output.progress() as progress:
         found = ccmodel.diagnose(
-            batch,
+            batches,
             out,
             baseline=baseline,
             freeze=freeze,
@@ -84,6 +92,7 @@ def diagnose(
             step_s=step,
             cycles=cycles,
             candidates=candidate,
+            time_limit_s=time_limit,
             trust_inputs=trust_inputs,
             progress=progress,
         )

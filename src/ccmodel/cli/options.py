@@ -10,6 +10,15 @@ from ccmodel import paths
 from ccmodel.cli import completion
 
 
+def _each(callback: Callable) -> Callable:
+    """A callback of one value as that of a list of them."""
+
+    def of_all(ctx: typer.Context, param: typer.CallbackParam, values: list[Path]) -> list[Path]:
+        return [callback(ctx, param, value) for value in values]
+
+    return of_all
+
+
 def _checked(check: Callable[..., Path], *, says: bool = False) -> Callable:
     """A check of `ccmodel.paths` as the callback of an option; with `says`, its message names the option."""
 
@@ -27,6 +36,14 @@ new_folder, new_file = _checked(paths.try_folder, says=True), _checked(paths.try
 _BATCH = {"callback": batch_folder, "autocompletion": completion.batch_folders, "show_default": False}
 
 Batch = Annotated[Path, typer.Argument(metavar="BATCH", help="Folder of a batch, or its batch.yaml.", **_BATCH)]
+Batches = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="BATCH",
+        help="Folder of a batch, or its batch.yaml; or those of all batches of one rig, to diagnose them together.",
+        **(_BATCH | {"callback": _each(batch_folder)}),
+    ),
+]
 BatchOption = Annotated[Path | None, typer.Option("--batch", help="Folder of a batch, or its batch.yaml.", **_BATCH)]
 Model = Annotated[
     Path,

@@ -9,10 +9,11 @@ from ccmodel.channels import TAU_IN, TAU_OUT, ZERO_OF
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.hypothesis import PAPER, Hypothesis
 from ccmodel.failure import ModelError
+from ccmodel.inference.effective_samples import IN_DIAGNOSIS
 from ccmodel.inference.least_squares import Search, solve
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.problem import Free, Problem
-from ccmodel.model.parameters import Parameters
+from ccmodel.model.parameters import Parameters, batch_key, parameter_of
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ def tested_model(
     if freeze:
         estimates = hypothesis.of(estimates).with_values(start)
         # The zero of a sensor may change without any change of the rig.
-        free = {name: one for name, one in free.items() if name in ZERO_OF.values()}
+        free = {name: one for name, one in free.items() if parameter_of(name) in ZERO_OF.values()}
         hypothesis = replace(hypothesis, is_frozen=True)
     return TestedModel(hypothesis, estimates, free, start)
 
@@ -96,8 +97,42 @@ def calibration(estimates: Parameters, observations: Sequence[Observations]) -> 
             free["load_radius_m"] = Free(radius, *(ratio * radius for ratio in settings.RADIUS_RATIO))
         if has_torque:
             reach = max(float(np.ptp(o.given.recording[TAU_IN])) for o in has_torque)
-            free |= {name: Free(0.0, -reach, reach) for name in (ZERO_OF[TAU_IN], ZERO_OF[TAU_OUT])}
-    return free
+            zeros = (ZERO_OF[TAU_IN], ZERO_OF[TAU_OUT])
+            free |= {name: Free(0.0, -reach, reach) for zero in zeros for name in _by_session(zero, has_torque)}
+    return free | _between_batches(observations)
+
+
+def sessions_of(observations: Sequence[Observations]) -> list[str]:
+    """Batches of these observations that are taken together; one that is empty for a batch by itself."""
+    return list(dict.fromkeys(o.session for o in observations))
+
+
+def _by_session(name: str, observations: Sequence[Observations]) -> list[str]:
+    """Names of a parameter that each batch has a value of its own for."""
+    sessions = sessions_of(observations)
+    return [name] if len(sessions) == 1 else [batch_key(name, session) for session in sessions]
+
+
+def _between_batches(observations: Sequence[Observations]) -> dict[str, Free]:
+    """What differs from batch to batch of a rig, with priors about the rig's value; nothing of a batch by itself.
+
+    The friction of a batch with one recording is a nuisance of that recording (`Observations.friction_between`): left
+    out, nothing would determine an unknown.
+
+    In the cost of a fit, where a recording counts by its mean square, an error of one standard deviation has the weight
+    of one effective sample.
+    """
+    if len(sessions_of(observations)) == 1:
+        return {}
+    spreads = {
+        batch_key("friction_scale", session): settings.FRICTION_BETWEEN
+        for session in sessions_of([o for o in observations if not o.friction_between])
+    }
+    if not all(o.given.initial_tension_observed for o in observations):
+        spreads |= dict.fromkeys(_by_session("pretension_scale", observations), settings.PRETENSION_BETWEEN)
+    samples = IN_DIAGNOSIS * float(np.mean([len(o.channels) for o in observations]))
+    low, high = settings.BETWEEN_BOUNDS
+    return {name: Free(1.0, low, high, spread * np.sqrt(samples), mean=1.0) for name, spread in spreads.items()}
 
 
 def _chosen(free: Mapping[str, Free], names: Collection[str]) -> dict[str, Free]:
@@ -123,13 +158,19 @@ def _values_of(
 
     A baseline with one initial tension for all recordings has it as a share of their mean stated pretension.
     """
-    values = {name: baseline.value_of(name) for name in [*free, *hypothesis.start]}
+    values = {name: baseline.value_of(parameter_of(name)) for name in [*free, *hypothesis.start]}
     if baseline.pretension_N is not None and "pretension_share" in values:
         values["pretension_share"] *= baseline.pretension_N / pretension_N
     return {name: free[name].start if value is None else value for name, value in values.items()}
 
 
 def _first_fit(observations: Sequence[Observations], free: Mapping[str, Free]) -> dict[str, float]:
-    problem = Problem(observations, free, {"friction_scale": Free(1.0, 0.2, 5.0, settings.FRICTION_SPREAD)})
+    shared = {name: one for name, one in free.items() if one.spread is None}
+    # What differs between batches differs between their recordings too.
+    spread = settings.FRICTION_SPREAD
+    if len(sessions_of(observations)) > 1:
+        spread = float(np.hypot(spread, settings.FRICTION_BETWEEN))
+    problem = Problem(observations, shared, {"friction_scale": Free(1.0, 0.2, 5.0, spread)})
     how = Search(most_evaluations=settings.FIRST_FIT_EVALUATIONS, tolerance=settings.FIRST_FIT_TOLERANCE)
-    return dict(zip(free, solve(problem, problem.start, how).x.tolist(), strict=False))
+    found = dict(zip(shared, solve(problem, problem.start, how).x.tolist(), strict=False))
+    return {name: found.get(name, one.start) for name, one in free.items()}

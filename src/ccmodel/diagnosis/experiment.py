@@ -80,7 +80,7 @@ def experiments(whitened: Sequence[Whitened]) -> list[Experiment]:
     bends = {round(g.recording.path.bend_rad, 3): g.recording for g in given}
     found = []
     for bend in dict.fromkeys((max(bends), min(bends))):
-        like = replace(bends[bend], pretension_N=highest_N)
+        like = replace(bends[bend], id="experiment", pretension_N=highest_N)
         for size, pretension in settings.EXPERIMENT_SIZES:
             at = f"pretension {pretension:.0%} of the highest recorded"
             at += f", bend {bend:.2g} rad" if len(bends) > 1 else ""
@@ -160,4 +160,4 @@ def _absorbed(o: Observations, predicted: NDArray, candidate: CandidateFit) -> N
     steps = inward(settings.FIT_DIFFERENCE * sizes, x, np.array([free[name].high for name in names]))
     effects = jacobian(lambda at: o.errors(dict(zip(names, at, strict=True))).ravel(), x, steps, predicted)
     variances, axes = np.linalg.eigh(candidate.covariance)
-    return np.hstack([effects @ (axes * np.sqrt(variances.clip(0.0))), nuisances(o)[0]])
+    return np.hstack([effects @ (axes * np.sqrt(variances.clip(0.0))), nuisances(o)])

@@ -1,6 +1,8 @@
 """First stage: the recordings of a batch as observations, and a list of what could not be judged."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -45,8 +47,20 @@ def observations_of(
     if observed:
         why = "its tensions are not observed at rest by load cells and torques, as those of the others are"
         not_judged += [_entry(o.id, why) for o in usable if o not in observed]
-    usable = observed or usable
+    usable = _with_lone_batches(observed or usable)
     return usable, [*not_judged, *_missing(usable), *_tolerated(tolerance)]
+
+
+def _with_lone_batches(observations: Sequence[Observations]) -> list[Observations]:
+    """Observations in which the only recording of a batch among several has the friction between batches as its own.
+
+    Where a batch has more recordings, its friction is an unknown (`ccmodel.diagnosis.calibration`).
+    """
+    counts = Counter(o.session for o in observations)
+    if len(counts) == 1:
+        return list(observations)
+    between = {1: settings.FRICTION_BETWEEN}
+    return [replace(o, friction_between=between.get(counts[o.session], 0.0)) for o in observations]
 
 
 def first_cycles(recording: Recording, cycles: int | None) -> Recording:

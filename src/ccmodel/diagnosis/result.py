@@ -89,7 +89,7 @@ def _place_probability(acting: tuple[str, str], confidence: Mapping[Hypothesis, 
 def _discretisation(judgement: Judgement) -> tuple[NDArray | None, NotJudged]:
     """Shift of the best candidate's values on a finer solver, or the reason why there is none."""
     try:
-        return discretisation_shift(judgement.whitened, judgement.best), []
+        return discretisation_shift(judgement.best), []
     except ModelError as error:
         return None, [{"what": "discretisation error of the values", "why": str(error)}]
 
@@ -122,7 +122,7 @@ def held_out_errors(judgement: Judgement, chosen: Sequence[CandidateFit]) -> dic
     squares: dict[str, list[tuple[float, float, float]]] = {}
     for i, w in enumerate(judgement.whitened):
         o = w.observations
-        before, after = (o.with_parameters(c.held_out(i, w)).errors({}) for c in (judgement.calibrated, chosen[i]))
+        before, after = (c.held_out(i).errors({}) for c in (judgement.calibrated, chosen[i]))
         for c, channel in enumerate(o.channels):
             row = *(np.mean((e[c] * o.sigma[c]) ** 2) for e in (before, after)), w.noise_floor[channel] ** 2
             squares.setdefault(channel, []).append(row)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from threadpoolctl import threadpool_limits
 
+from ccmodel.deadline import Deadline
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.calibration import TestedModel, tested_model
 from ccmodel.diagnosis.candidate import CandidateFit, fit
@@ -49,6 +50,8 @@ class Options:
     freeze : bool
         Whether a baseline keeps its values, except for sensor zeros that are not observed at rest. The diagnosis then
         finds what has changed on the rig since the baseline was fitted.
+    time_limit_s : float
+        Time after which no further candidate is fitted, s: the verdict is on what was fitted until then.
     """
 
     tolerance: Tolerance = 0.0
@@ -57,6 +60,7 @@ class Options:
     forced_candidates: Sequence[Sequence[str]] = ()
     without: Collection[str] = ()
     freeze: bool = False
+    time_limit_s: float = settings.TIME_LIMIT_S
 
 
 @dataclass(frozen=True)
@@ -147,7 +151,7 @@ def calibrate(
     progress("calibrating with whitened errors", FIRST_FIT)
     whitened = each(at_estimates, lambda i, o: whiten(o, tested.model))
     first = fit(whitened, tested.hypothesis, tested.free, tested.start)
-    repeatability, model = estimated(whitened, first.residuals), first.model(tested.estimates)
+    repeatability, model = estimated(first.whitened, first.residuals), first.model(tested.estimates)
     whitened = each(whitened, lambda i, w: relinearised(w, model, repeatability))
     return Calibration(tested, whitened, fit(whitened, tested.hypothesis, tested.free, first.values), missing)
 
@@ -182,6 +186,7 @@ def diagnose(
     ModelError
         If the model cannot be run on any of the recordings.
     """
+    deadline = Deadline.after(options.time_limit_s)
     found = calibrate(recordings, estimates, options, baseline, within(progress, 0.0, CALIBRATED))
     tested, whitened = found.tested, found.whitened
     unjudged = [*map(dict, not_judged), *found.not_judged]
@@ -190,8 +195,11 @@ def diagnose(
         unjudged.append({"what": "stiffness, friction and everything else that a calibration would fit", "why": why})
     mechanisms = single_mechanisms(options.without, tested.hypothesis)
     forced = [stated_hypothesis(stated) for stated in options.forced_candidates]
-    selection = Selection(tested.free, mechanisms, forced, within(progress, CALIBRATED, SELECTED))
+    selection = Selection(tested.free, mechanisms, forced, within(progress, CALIBRATED, SELECTED), deadline)
     comparison, scores = selection.run(whitened, found.fit)
+    if deadline.has_passed:
+        why = f"the time limit of {options.time_limit_s:g} s was reached before all of them were fitted"
+        unjudged.append({"what": "further candidates", "why": why})
     progress("deciding the verdict", SELECTED)
     judgement = judge(comparison, scores)
     progress("correcting the values for the discretisation, designing an experiment", JUDGED)

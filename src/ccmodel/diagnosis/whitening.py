@@ -13,10 +13,12 @@ Errors are linear in a nuisance only nearby. Each recording is therefore lineari
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel import mechanisms as registry
 from ccmodel.channels import THETA_OUT, ZERO_OF
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.repeatability import FRICTION, PRETENSION, STATED, Repeatability
@@ -24,7 +26,7 @@ from ccmodel.inference.effective_samples import IN_DIAGNOSIS
 from ccmodel.inference.jacobian import STEP, jacobian, size_of
 from ccmodel.inference.observations import Observations
 from ccmodel.model.general.run import settings_of
-from ccmodel.model.parameters import Parameters
+from ccmodel.model.parameters import Parameters, mechanism_key, mechanism_parameter, of_batch
 
 # Step of the differences by a nuisance, relative to its size.
 NUISANCE_STEP = 10 * STEP
@@ -44,16 +46,18 @@ class Whitened:
     nuisance_mean : ndarray, shape (nuisances, rows)
         Maps errors over the sensors' noise to the posterior mean of each scalar nuisance over its prior standard
         deviation.
+    determined : ndarray, shape (nuisances,)
+        One minus the posterior variance of each scalar nuisance over its prior variance.
     noise_floor : dict of str to float
         Root mean square error of a correct model by channel, in its unit: sensor noise and repeatability.
     scalar_nuisances : sequence of (str, float, float)
         Parameter, value and prior standard deviation of each scalar nuisance.
-    determined : ndarray, shape (nuisances,)
-        One minus the posterior variance of each scalar nuisance over its prior variance.
+    effects : ndarray, shape (rows, nuisances and draws)
+        Effects of the nuisances on the errors (`nuisances`), of which directions and shrinkage follow.
     repeatability : Repeatability
         Where the prior standard deviations come from.
     own : mapping of str to float
-        Parameters of this recording alone about which its errors are linearised.
+        Parameters of this recording alone, over those of its batch, about which its errors are linearised.
     own_errors : ndarray, shape (rows,)
         Change of the errors by these, to first order.
     """
@@ -62,9 +66,10 @@ class Whitened:
     directions: NDArray
     shrinkage: NDArray
     nuisance_mean: NDArray
+    determined: NDArray
     noise_floor: Mapping[str, float]
-    scalar_nuisances: Sequence[tuple[str, float, float]] = ()
-    determined: NDArray = field(default_factory=lambda: np.zeros(0))
+    scalar_nuisances: Sequence[tuple[str, float, float]]
+    effects: NDArray
     repeatability: Repeatability = STATED
     own: Mapping[str, float] = field(default_factory=dict)
     own_errors: NDArray | float = 0.0
@@ -73,6 +78,11 @@ class Whitened:
     def name(self) -> str:
         """Batch and recording."""
         return self.observations.name
+
+    @property
+    def session(self) -> str:
+        """Batch among several that are taken together; empty for a batch by itself."""
+        return self.observations.session
 
     @property
     def measured(self) -> NDArray:
@@ -93,7 +103,9 @@ class Whitened:
 
     def linearised_errors(self, values: Mapping[str, float]) -> NDArray:
         """Errors over the noise, extrapolated from the recording's own friction to that of all; shape (rows,)."""
-        return self.observations.errors({**values, **self.own}).ravel() - self.own_errors
+        shared = of_batch(values, self.session)
+        own = {name: ratio * shared.get(name, 1.0) for name, ratio in self.own.items()}
+        return self.observations.errors(shared | own).ravel() - self.own_errors
 
     @property
     def _nuisance_weight(self) -> float:
@@ -149,43 +161,87 @@ def whiten(
     o = observations.with_parameters(model)
     own = {} if friction_ratio == 1.0 else {"friction_scale": friction_ratio}
     at = o.with_parameters(model.with_values(own))
-    N, scalars = nuisances(at, repeatability)
+    N, known = nuisances(at, repeatability), repeatability.applied(_scalar_nuisances(at))
     friction = N[:, 0].reshape(o.sigma.shape) * o.sigma
     floor = np.sqrt((o.sigma**2).mean(axis=1) + (friction**2).mean(axis=1))
-    U, s, Vt = np.linalg.svd(N, full_matrices=False)
-    nuisance_mean = (Vt.T[:scalars] * (s / (1 + s**2))) @ U.T
-    determined = (Vt.T[:scalars] ** 2) @ (s**2 / (1 + s**2))
     by_channel = dict(zip(o.channels, floor.tolist(), strict=True))
-    known = repeatability.applied(_scalar_nuisances(at))
     spread = known[0][2] / known[0][1]
     own_errors = N[:, 0] * (1 - 1 / friction_ratio) / spread
-    return Whitened(o, U, shrinkage_of(s), nuisance_mean, by_channel, known, determined, repeatability, own, own_errors)
+    return Whitened(o, *_moments(N, len(known)), by_channel, known, N, repeatability, own, own_errors)
 
 
-def nuisances(o: Observations, repeatability: Repeatability = STATED) -> tuple[NDArray, int]:
+def with_states_of(one: Whitened, model: Parameters) -> Whitened:
+    """Observations with the states of a model's mechanisms as nuisances, linearised about it, and no other states.
+
+    All other nuisances stay linearised as they are: candidate models are compared under one covariance, apart from the
+    states that only some of them have.
+    """
+    states = _states(model)
+    is_state = [mechanism_parameter(name) is not None for name, _, _ in one.scalar_nuisances]
+    if not states and not any(is_state):
+        return one
+    kept = [k for k, state in enumerate(is_state) if not state]
+    scalars = [*(one.scalar_nuisances[k] for k in kept), *states]
+    by_state = _effects(one.observations.with_parameters(model.with_values(one.own)), states)
+    N = np.column_stack([one.effects[:, kept], *by_state, one.effects[:, len(is_state) :]])
+    directions, shrinkage, nuisance_mean, determined = _moments(N, len(scalars))
+    return replace(
+        one, directions=directions, shrinkage=shrinkage, nuisance_mean=nuisance_mean, determined=determined,
+        scalar_nuisances=scalars, effects=N,
+    )  # fmt: skip
+
+
+def _moments(effects: NDArray, scalars: int) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """Directions, shrinkage, and the posterior mean and determination of the scalar nuisances (`Whitened`)."""
+    U, s, Vt = np.linalg.svd(effects, full_matrices=False)
+    nuisance_mean = (Vt.T[:scalars] * (s / (1 + s**2))) @ U.T
+    determined = (Vt.T[:scalars] ** 2) @ (s**2 / (1 + s**2))
+    return U, shrinkage_of(s), nuisance_mean, determined
+
+
+def nuisances(o: Observations, repeatability: Repeatability = STATED) -> NDArray:
     """Effects of the nuisances on the errors, a prior standard deviation of each, in units of the noise.
 
     Returns
     -------
     ndarray, shape (rows, k)
         Scalar nuisances first, friction before all others; then draws of the drive motion's error.
-    int
-        Number of scalar nuisances.
     """
-    simulated, scalars = o.modelled({}), repeatability.applied(_scalar_nuisances(o))
-    effects = []
-    for name, value, spread in scalars:
-        step = NUISANCE_STEP * size_of(name, value)
-        derivative = _derivative(o, name, value, step, simulated)
-        effects.append(spread * derivative / o.sigma)
+    scalars = repeatability.applied(_scalar_nuisances(o))
     drawn = o.drive_errors({})
-    columns = [*effects, *(d / np.sqrt(len(drawn)) for d in drawn)]
-    return np.stack([c.ravel() for c in columns], axis=1), len(scalars)
+    columns = [*_effects(o, scalars), *((d / np.sqrt(len(drawn))).ravel() for d in drawn)]
+    return np.stack(columns, axis=1)
+
+
+def _effects(o: Observations, scalars: Sequence[tuple[str, float, float]]) -> list[NDArray]:
+    """Effect on the errors of a prior standard deviation of each scalar nuisance, shape (rows,)."""
+    simulated, found = o.modelled({}), []
+    for name, value, spread in scalars:
+        derivative = _derivative(o, name, value, _step(name, value), simulated)
+        found.append((spread * derivative / o.sigma).ravel())
+    return found
+
+
+def _step(name: str, value: float) -> float:
+    """Step of the difference by a nuisance; for a state of a mechanism, into its range."""
+    if (parts := mechanism_parameter(name)) is None:
+        return NUISANCE_STEP * size_of(name, value)
+    state = registry.get(parts[0]).parameter(parts[2])
+    return NUISANCE_STEP * (1 if value < (state.low + state.high) / 2 else -1)
 
 
 def _derivative(o: Observations, name: str, value: float, step: float, simulated: NDArray) -> NDArray:
     """Of the simulated channels by one nuisance, shape (channels, samples)."""
     return jacobian(lambda x: o.modelled({name: x[0]}), np.array([value]), np.array([step]), simulated)[..., 0]
+
+
+def _states(model: Parameters) -> list[tuple[str, float, float]]:
+    """States of the model's mechanisms that differ between recordings, as scalar nuisances."""
+    return [
+        (mechanism_key(m.name, m.place, p.name), m.values[p.name], p.spread)
+        for m in model.mechanisms
+        for p in registry.get(m.name).states
+    ]
 
 
 def shrinkage_of(s: NDArray) -> NDArray:
@@ -223,7 +279,7 @@ def _scalar_nuisances(o: Observations) -> Sequence[tuple[str, float, float]]:
     """Name, value and prior standard deviation of each; friction first."""
     recording, parameters = o.given.recording, o.parameters
     mu = parameters.friction_coefficient
-    found = [("friction_coefficient", mu, settings.FRICTION_SPREAD * mu)]
+    found = [("friction_coefficient", mu, hypot(settings.FRICTION_SPREAD, o.friction_between) * mu)]
     for channel, name in ZERO_OF.items():
         if channel in o.channels and channel in recording.accuracy:
             found.append((name, getattr(parameters, name), recording.accuracy[channel]))
@@ -233,4 +289,4 @@ def _scalar_nuisances(o: Observations) -> Sequence[tuple[str, float, float]]:
         found.append(("load_gap_position", parameters.load_gap_position, settings.GAP_SPREAD))
     if THETA_OUT in o.channels and (step := recording.encoder_step_rad.get(THETA_OUT)):
         found.append(("theta_out_zero_rad", parameters.theta_out_zero_rad, step / np.sqrt(12)))
-    return found
+    return [*found, *_states(parameters)]

@@ -43,13 +43,13 @@ class LeaveOneOut:
 
 
 def leave_one_out(problem: Problem, solution: Solution) -> LeaveOneOut:
-    """Cross-validate a fit that has shared unknowns only.
+    """Cross-validate a fit that has shared unknowns only; their priors are never left out.
 
     Where the model cannot be run at a recording's left-out optimum, the joint optimum stands for it.
     """
     low, high = problem.bounds
     information = [block.information for block in solution.blocks]
-    total = sum(information, np.zeros_like(information[0]))
+    total = sum(information, np.diag(problem.prior_precision**2))
     inverse, without = inverse_of(total, problem.sizes), [inverse_of(total - H, problem.sizes) for H in information]
     values = [
         np.clip(solution.x + V @ block.score, low, high) for V, block in zip(without, solution.blocks, strict=True)

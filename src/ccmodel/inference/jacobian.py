@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
-from ccmodel.model.parameters import mechanism_parameter
+from ccmodel.model.parameters import mechanism_parameter, parameter_of
 
 # Step of a difference, as a share of a parameter's size.
 STEP = 1e-5
@@ -27,7 +27,7 @@ def size_of(name: str, value: float) -> float:
     if (parts := mechanism_parameter(name)) is not None:
         mechanism, _, parameter = parts
         return next(p.start for p in registry.get(mechanism).parameters if p.name == parameter) or 1.0
-    return next((size for end, size in SIZE_AT_ZERO.items() if name.endswith(end)), 1.0)
+    return next((size for end, size in SIZE_AT_ZERO.items() if parameter_of(name).endswith(end)), 1.0)
 
 
 def inward(steps: NDArray, x: NDArray, high: NDArray) -> NDArray:

@@ -41,6 +41,9 @@ class Observations:
         Whether the load's law or the measured load torque acts at the cables' far end.
     noise : mapping of str to SensorNoise
         Noise of each channel's sensor.
+    friction_between : float
+        Standard deviation of friction between batches, over its mean, that this recording has besides the one between
+        runs: of the only recording of a batch among several. Otherwise 0.
     """
 
     given: ModelInput
@@ -53,6 +56,7 @@ class Observations:
     offset_is_free: bool = False
     load_from: LoadFrom = "law"
     noise: Mapping[str, SensorNoise] = field(default_factory=dict)
+    friction_between: float = 0.0
 
     @classmethod
     def of(
@@ -120,9 +124,14 @@ class Observations:
         """Batch and recording."""
         return f"{self.given.recording.batch}/{self.given.recording.id}"
 
+    @property
+    def session(self) -> str:
+        """The recording's batch among several that are taken together; empty for a batch by itself."""
+        return self.given.recording.session
+
     def modelled(self, values: Mapping[str, float]) -> NDArray:
         """The model's channels with some parameters replaced, shape (channels, judged samples)."""
-        simulated = simulate(self.given, self.parameters.with_values(values), self.load_from)
+        simulated = simulate(self.given, self.parameters.with_values(values, self.session), self.load_from)
         return np.stack([simulated[c][self.judged] for c in self.channels])
 
     def errors(self, values: Mapping[str, float]) -> NDArray:
@@ -131,7 +140,7 @@ class Observations:
 
     def drive_errors(self, values: Mapping[str, float]) -> NDArray:
         """Draws of the error over the noise that the uncertain drive motion causes; (draws, channels, samples)."""
-        found = drive_errors(self.given, self.parameters.with_values(values), self.offset_is_free)
+        found = drive_errors(self.given, self.parameters.with_values(values, self.session), self.offset_is_free)
         return np.stack([found[c][:, self.judged] for c in self.channels], axis=1) / self.sigma
 
     def rounding_errors(self, values: Mapping[str, float]) -> NDArray:

@@ -1,8 +1,8 @@
 """A fit as a stated problem: what is unknown, what it is compared with, and the prior of each unknown.
 
-Shared unknowns have one value for all recordings, own unknowns one value for each. An own unknown may have a prior, a
-mean and a standard deviation: friction varies by about 1 % from run to run, zeros are as good as the sensors' stated
-accuracy. A prior is one more residual.
+Shared unknowns have one value for all recordings, or for all of one batch (`ccmodel.model.parameters.batch_key`); own
+unknowns have one value for each. An unknown may have a prior, a mean and a standard deviation: friction varies by about
+1 % from run to run, zeros are as good as the sensors' stated accuracy. A prior is one more residual.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -17,25 +17,38 @@ from ccmodel.inference.effective_samples import Measured, fit_weight
 from ccmodel.inference.jacobian import STEP, inward, jacobian, size_of
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.pool import each
+from ccmodel.model.parameters import acts_on
 
 
 @dataclass(frozen=True)
 class Free:
-    """An unknown: its start, its bounds, and its prior if each recording has a value of its own.
+    """An unknown: its start, its bounds, and its prior if recordings or batches have values of their own.
 
     Attributes
     ----------
     start : float
-        Also the prior's mean.
     low, high : float
     spread : float or None
-        The prior's standard deviation, from recording to recording; None: no prior.
+        The prior's standard deviation, from recording to recording or from batch to batch; None: no prior.
+    mean : float or None
+        The prior's mean; None: the start.
     """
 
     start: float
     low: float = -np.inf
     high: float = np.inf
     spread: float | None = None
+    mean: float | None = None
+
+    @property
+    def prior_mean(self) -> float:
+        """Mean of the prior, the start where nothing else is stated."""
+        return self.start if self.mean is None else self.mean
+
+    @property
+    def prior_precision(self) -> float:
+        """Reciprocal standard deviation of the prior; 0 without one."""
+        return 0.0 if self.spread is None else 1 / self.spread
 
     @classmethod
     def within(cls, start: float, low: float, high: float) -> "Free":
@@ -80,6 +93,10 @@ class HasErrors(Measured, Protocol):
     @property
     def name(self) -> str:
         """Batch and recording."""
+
+    @property
+    def session(self) -> str:
+        """Batch among several that are taken together; empty for a batch by itself."""
 
     def errors(self, values: Mapping[str, float]) -> NDArray:
         """Errors of the model with some parameters replaced, over the noise."""
@@ -136,11 +153,16 @@ class Problem(Generic[R]):
     @cached_property
     def prior_precision(self) -> NDArray:
         """Reciprocal standard deviation of each unknown's prior, 0 without one; shape (unknowns,)."""
-        return np.array([0.0 if f.spread is None else 1 / f.spread for _, f in self.unknowns])
+        return np.array([f.prior_precision for _, f in self.unknowns])
+
+    @cached_property
+    def prior_mean(self) -> NDArray:
+        """Mean of each unknown's prior, shape (unknowns,)."""
+        return np.array([f.prior_mean for _, f in self.unknowns], dtype=float)
 
     def prior_errors(self, x: NDArray) -> NDArray:
         """Distance of each unknown from its prior's mean over the prior's standard deviation; shape (unknowns,)."""
-        return (x - self.start) * self.prior_precision
+        return (x - self.prior_mean) * self.prior_precision
 
     def own_columns(self, i: int) -> slice:
         """Positions of one recording's own unknowns."""
@@ -199,14 +221,22 @@ class Problem(Generic[R]):
     def _block(self, x: NDArray, i: int, relative: float, base: NDArray | None) -> Block:
         columns = np.r_[0 : len(self.shared), self.own_columns(i)].astype(int)
         base = self._weighted(x, i) if base is None else base
-        steps = inward(relative * self.sizes[columns], x[columns], self.bounds[1][columns])
+        # The values of other batches do not act on this recording: no run is spent on them.
+        acting = np.array([acts_on(self.unknowns[k][0], self.observations[i].session) for k in columns], bool)
+        varied = columns[acting]
+        steps = inward(relative * self.sizes[varied], x[varied], self.bounds[1][varied])
 
         def run(of_recording: NDArray) -> NDArray:
             everywhere = x.copy()
-            everywhere[columns] = of_recording
+            everywhere[varied] = of_recording
             return self._weighted(everywhere, i)
 
-        return Block(columns, base, jacobian(run, x[columns], steps, base))
+        derivatives = jacobian(run, x[varied], steps, base)
+        if not acting.all():
+            every = np.zeros((*base.shape, columns.size))
+            every[..., acting] = derivatives
+            derivatives = every
+        return Block(columns, base, derivatives)
 
     def _weighted(self, x: NDArray, i: int) -> NDArray:
         return self.observations[i].errors(self.values_of(x, i)) * self._root_weight(i)

@@ -75,6 +75,9 @@ class Parameter:
         Value in a model that omits it; None if a model must give it.
     above, below : float
         Physical limits, both excluded.
+    spread : float
+        Of a state at the recording's start: its standard deviation from recording to recording about the value of the
+        model. The range is then that of the state, both ends included. 0: the same in all recordings.
     """
 
     name: str
@@ -92,6 +95,7 @@ class Parameter:
     default: float | None = None
     above: float = -inf
     below: float = inf
+    spread: float = 0.0
 
     def at(self, share: float) -> float:
         """Value at a share of the range, on the parameter's scale."""
@@ -230,6 +234,15 @@ class Mechanism:
     def shapes(self) -> tuple[Parameter, ...]:
         """The other parameters."""
         return tuple(p for p in self.parameters if p not in self.strengths)
+
+    def parameter(self, name: str) -> Parameter:
+        """Its parameter of that name."""
+        return next(p for p in self.parameters if p.name == name)
+
+    @property
+    def states(self) -> tuple[Parameter, ...]:
+        """Parameters that are states at a recording's start, which differ from recording to recording."""
+        return tuple(p for p in self.parameters if p.spread)
 
     @property
     def neutral(self) -> dict[str, float]:

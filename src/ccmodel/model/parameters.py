@@ -96,19 +96,23 @@ class Parameters:
             load_stiffness_Nm_per_rad=rig.load.spring_stiffness_Nm_per_rad,
         )
 
-    def with_values(self, values: Mapping[str, float]) -> "Parameters":
+    def with_values(self, values: Mapping[str, float], batch: str = "") -> "Parameters":
         """The same parameters with some values replaced.
 
         Parameters
         ----------
         values : mapping of str to float
-            By attribute name, for a mechanism's parameter by `mechanism_key`.
+            By attribute name, for a mechanism's parameter by `mechanism_key`, for what differs between batches of a rig
+            by `batch_key`.
+        batch : str
+            Batch whose own values are taken; without it, no batch's own values are.
 
         Raises
         ------
         ValueError
             If no active mechanism has such a parameter.
         """
+        values = of_batch(values, batch)
         own: dict[str, Any] = {name: value for name, value in values.items() if mechanism_parameter(name) is None}
         active = {(m.name, m.place): dict(m.values) for m in self.mechanisms}
         for key in values.keys() - own.keys():
@@ -136,6 +140,27 @@ def mechanism_parameter(key: str) -> tuple[str, str, str] | None:
     """Mechanism, place and parameter of a name made by `mechanism_key`; None for any other name."""
     parts = key.split("/")
     return (parts[0], parts[1], parts[2]) if len(parts) == 3 else None
+
+
+def batch_key(name: str, batch: str) -> str:
+    """Name, among the unknowns of several batches, of a parameter that this batch has a value of its own for."""
+    return f"{name}@{batch}"
+
+
+def parameter_of(key: str) -> str:
+    """The parameter's name in a name made by `batch_key`; any other name as it is."""
+    return key.partition("@")[0]
+
+
+def acts_on(key: str, batch: str) -> bool:
+    """Whether a value is one for all batches, or that of this one."""
+    _, mark, of = key.partition("@")
+    return not mark or of == batch
+
+
+def of_batch(values: Mapping[str, float], batch: str) -> dict[str, float]:
+    """Values of the recordings of one batch by parameter: those of all batches, and its own (`batch_key`)."""
+    return {parameter_of(key): value for key, value in values.items() if acts_on(key, batch)}
 
 
 # Printed units by the ending of a parameter's name.

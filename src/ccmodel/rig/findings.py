@@ -74,6 +74,10 @@ class Finding:
         """File, row and column without the folder, as ``one.csv, row 3, drive_current_A``."""
         return self._place(Path(self.file).name)
 
+    def place_in(self, several: bool) -> str:
+        """The place, with the batch where `several` are taken together: ``loops/one.csv, row 3``."""
+        return f"{self.batch}/{self.place}" if several else self.place
+
     @property
     def is_inconsistent(self) -> bool:
         """Whether no verdict on the physics can be drawn from the batch: its inputs contradict one another."""

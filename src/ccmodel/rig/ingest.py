@@ -36,11 +36,14 @@ class Ingested:
         several warnings and contradictions.
     batch : Batch or None
         Content of `batch.yaml`: radii, spring, estimates of the cable. None if the batch is refused as a whole.
+    parts : tuple of str
+        Names of the batches, if several of one rig are taken together (`ccmodel.rig.joint`); otherwise empty.
     """
 
     recordings: list[Recording]
     findings: list[Finding]
     batch: Batch | None = None
+    parts: tuple[str, ...] = ()
 
     @property
     def stated(self) -> Batch:

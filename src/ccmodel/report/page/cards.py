@@ -27,6 +27,8 @@ SHOWN = ("explained", IN_PART, "undecided", "unexplained", CONTRADICTORY, "agree
 def cards(batches: Sequence[Mapping], diagnoses: Sequence[Mapping]) -> list[dict]:
     """A card for each batch: measured batches first, then contradictory inputs, then those with the largest mismatch.
 
+    Batches of one rig that were diagnosed together have a further card for the rig.
+
     Parameters
     ----------
     batches : sequence of mapping
@@ -35,8 +37,17 @@ def cards(batches: Sequence[Mapping], diagnoses: Sequence[Mapping]) -> list[dict
         Contents of diagnosis.json.
     """
     of_batch = {d["batch"]: d for d in diagnoses}
-    made = [_card(summary, of_batch) for summary in batches]
+    rigs = [_summary_of_rig(d, batches) for d in diagnoses if d.get("batches")]
+    made = [_card(summary, of_batch) for summary in [*batches, *rigs]]
     return sorted(made, key=lambda card: (not card["measured"], -card["mismatch"]))
+
+
+def _summary_of_rig(diagnosis: Mapping, batches: Sequence[Mapping]) -> dict:
+    """A summary, as of a batch, of all batches that were diagnosed together."""
+    parts = [summary for summary in batches if _name(summary) in diagnosis["batches"]]
+    stated = next((summary["batch"] for summary in parts if summary["batch"]), {"origin": "", "rig": {}})
+    recordings = [recording for summary in parts for recording in summary["recordings"]]
+    return {"batch": stated | {"batch": diagnosis["batch"]}, "recordings": recordings, "together": diagnosis["batches"]}
 
 
 def _card(summary: Mapping, diagnoses: Mapping[str, Mapping]) -> dict:
@@ -44,6 +55,7 @@ def _card(summary: Mapping, diagnoses: Mapping[str, Mapping]) -> dict:
     origin = summary["batch"]["origin"] if summary["batch"] else ""
     card: dict[str, Any] = {
         "batch": name,
+        "together": summary.get("together", []),
         "origin": {"rig": "measured", "virtual-rig": "simulated"}.get(origin, "no usable recording"),
         "measured": origin == "rig",
         "origin_in_full": ORIGIN.get(origin, ""),
@@ -156,8 +168,12 @@ def overview(made: Sequence[Mapping]) -> list[str]:
     judged = [card for card in made if card["verdict"]]
     if made and not judged:
         return ["No batch has been diagnosed."]
-    groups = [(origin, [card for card in judged if card["origin"] == origin]) for origin in ("measured", "simulated")]
-    return [_summary(origin, of) for origin, of in groups if of]
+    alone, rigs = ([card for card in judged if bool(card["together"]) == joint] for joint in (False, True))
+    groups = [(origin, [card for card in alone if card["origin"] == origin]) for origin in ("measured", "simulated")]
+    of_rigs = [
+        f"Rig {card['batch']}, its {len(card['together'])} batches together: {card['shown_verdict']}." for card in rigs
+    ]
+    return [*(_summary(origin, of) for origin, of in groups if of), *of_rigs]
 
 
 def _summary(origin: str, of: Sequence[Mapping]) -> str:

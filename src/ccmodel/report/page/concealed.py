@@ -57,6 +57,9 @@ def beside(concealed: Concealed, diagnoses: Sequence[Mapping]) -> list[dict]:
     tables = []
     for rig in concealed.rigs:
         said = [of_batch.get(batch) or {"batch": batch, "verdict": None} for batch in rig.batches]
+        joint = [d for d in diagnoses if d.get("batches") and set(d["batches"]) <= set(rig.batches)]
+        columns = [*rig.batches, *(f"{d['batch']} ({len(d['batches'])} batches together)" for d in joint)]
+        said += joint
         effects = [
             {
                 "text": e.text,
@@ -70,6 +73,7 @@ def beside(concealed: Concealed, diagnoses: Sequence[Mapping]) -> list[dict]:
         tables.append(
             {
                 "batches": rig.batches,
+                "columns": columns,
                 "effects": effects,
                 "besides": [_besides(rig, d) for d in said],
                 "verdicts": [d["verdict"] or "not diagnosed" for d in said],

@@ -12,7 +12,7 @@ from ccmodel.rig.findings import Finding
 MOST_LISTED = 5
 
 
-def report(batch: str, findings: Sequence[Finding], is_held: bool = False) -> dict:
+def report(batch: str, findings: Sequence[Finding], is_held: bool = False, several: bool = False) -> dict:
     """The content of diagnosis.json; no model is run.
 
     Parameters
@@ -23,6 +23,8 @@ def report(batch: str, findings: Sequence[Finding], is_held: bool = False) -> di
         All findings of its ingest, at least one of them inconsistent.
     is_held : bool
         Whether a frozen baseline was to be tested.
+    several : bool
+        Whether the findings are of several batches of one rig.
     """
     contradictions = sorted((f for f in findings if f.is_inconsistent), key=lambda f: -f.confidence)
     damaged = [f for f in findings if f.severity == "refused" and not f.is_inconsistent]
@@ -43,9 +45,10 @@ def report(batch: str, findings: Sequence[Finding], is_held: bool = False) -> di
             "error": {},
         },
         "repeatability": [],
-        "next_experiment": {"text": _correction(contradictions), "separates": []},
+        "next_experiment": {"text": _correction(contradictions, several), "separates": []},
         "not_judged": [
-            {"what": f.place, "why": f.text, "confidence": round(f.confidence, 4)} for f in [*contradictions, *damaged]
+            {"what": f.place_in(several), "why": f.text, "confidence": round(f.confidence, 4)}
+            for f in [*contradictions, *damaged]
         ],
     }
 
@@ -67,9 +70,9 @@ def _end_of(column: str | None) -> str | None:
     return prefix if prefix in ("drive", "load") else None
 
 
-def _correction(contradictions: Sequence[Finding]) -> str:
+def _correction(contradictions: Sequence[Finding], several: bool) -> str:
     """What to correct, in a sentence."""
-    places = list(dict.fromkeys(f.place for f in contradictions))
+    places = list(dict.fromkeys(f.place_in(several) for f in contradictions))
     more = f" and {len(places) - MOST_LISTED} more" if len(places) > MOST_LISTED else ""
     return (
         f"Correct batch.yaml, or record again: {'; '.join(places[:MOST_LISTED])}{more}. Then diagnose again. If these"

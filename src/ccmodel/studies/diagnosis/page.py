@@ -19,6 +19,7 @@ from ccmodel.diagnosis.run import Diagnosis
 from ccmodel.diagnosis.settings import ADEQUATE_LACK_OF_FIT
 from ccmodel.diagnosis.verdict import nested_choice
 from ccmodel.mechanisms import catalogue
+from ccmodel.model.parameters import batch_key
 from ccmodel.provenance import stamp
 from ccmodel.recording import ORIGIN, Recording
 from ccmodel.report.embedding import asset
@@ -60,7 +61,7 @@ def write_diagnosis(file: Path, found: Diagnosis, page: str | None = None) -> No
     report = found.report
     nearest = report["nearest"] or {"mechanisms": []}
     named = [*report["mechanisms"], *report["likeliest"], *report["alternatives"], *nearest["mechanisms"]]
-    errors = mismatch(found.judgement.whitened, found.judgement.calibrated)
+    errors = mismatch(found.judgement.calibrated)
     with matplotlib.rc_context(STYLE):
         text = _template("page.html.j2").render(
             report=report,
@@ -83,9 +84,20 @@ def write_diagnosis(file: Path, found: Diagnosis, page: str | None = None) -> No
             caution=_caution(report, errors),
             repeatability=repeatability_in_words(report["repeatability"]),
             loops=_encoded(_loops(found)),
+            between=_between(found.judgement.best),
             recordings=[w.observations.given.recording.id for w in found.judgement.whitened],
         )
     file.write_text(text, encoding="utf-8")
+
+
+def _between(fit: CandidateFit) -> list[str]:
+    """The friction of each batch over the rig's, of several batches, in words."""
+    start = batch_key("friction_scale", "")
+    return [
+        f"{key.removeprefix(start)} {fit.values[key]:.3f} ({one.low:.3f} to {one.high:.3f})"
+        for key, one in fit.intervals().items()
+        if key.startswith(start)
+    ]
 
 
 def write_inconsistent(file: Path, report: Mapping, recordings: Sequence[Recording], page: str | None = None) -> None:
@@ -200,7 +212,7 @@ def _why(fit: CandidateFit, found: Diagnosis) -> str:
         # The lack of fit of a candidate that others surpass is not computed.
         above = fit.mean_square > limit
         return f"mean square above {limit:.3g}, the limit" if above else "others have a smaller mean square"
-    if j.single_fault_places and fit.hypothesis.is_pair:
+    if j.single_fault_places and fit.hypothesis.size > 1:
         return f"adequate, but one fault at the {' or '.join(j.single_fault_places)} is as adequate"
     ratio = fit.mean_square / j.best.mean_square
     return f"adequate, with {ratio:.3g} times the mean square" if ratio > 1 else "adequate, with more parameters"
@@ -209,11 +221,11 @@ def _why(fit: CandidateFit, found: Diagnosis) -> str:
 def _map(found: Diagnosis) -> Figure:
     """Errors over the noise by channel and part of the motion: baseline and, if any, with the mechanisms found."""
     j = found.judgement
-    before = mismatch(j.whitened, j.calibrated)
+    before = mismatch(j.calibrated)
     highest = max(np.nanmax([list(v.values()) for v in before.values()]), 3.0)
     shown = {_baseline(found.report): before}
     if j.best is not j.calibrated:
-        shown[WITH_FOUND] = mismatch(j.whitened, j.best)
+        shown[WITH_FOUND] = mismatch(j.best)
     figure, axes = subplots(1, len(shown), figsize=(4 * len(shown), 2.9), sharey=True, squeeze=False)
     for ax, (title, table) in zip(axes[0], shown.items(), strict=True):
         values = np.array([[table[c][p] for p in PHASES] for c in table])
@@ -243,8 +255,7 @@ def _loops(found: Diagnosis) -> Figure:
     scale = TABLE[channel].scale
     figure, axes = subplots(1, len(order), figsize=(3.1 * len(order), 3.1), squeeze=False)
     for ax, i in zip(axes[0], order, strict=True):
-        w = j.whitened[i]
-        observed = w.observations
+        observed = j.whitened[i].observations
         c = observed.channels.index(channel)
         theta = observed.given.theta_in[observed.judged]
         ax.plot(theta, scale * observed.measured[c], color=FAINT, lw=2.2, label=_origin(found))
@@ -254,8 +265,7 @@ def _loops(found: Diagnosis) -> Figure:
         if found.report["nearest"] and j.nearest is not None:
             models.append((j.nearest, COLOURS[3], "-.", f"nearest model, {NOT_ACCEPTED}"))
         for fit, colour, line, label in models:
-            model = observed.with_parameters(fit.held_out(i, w))
-            ax.plot(theta, scale * model.modelled({})[c], color=colour, lw=1.0, ls=line, label=label)
+            ax.plot(theta, scale * fit.held_out(i).modelled({})[c], color=colour, lw=1.0, ls=line, label=label)
         ax.set_title(observed.given.recording.id, fontsize=9)
         ax.set_xlabel(TABLE[THETA_IN].axis)
     axes[0][0].set_ylabel(TABLE[channel].axis)

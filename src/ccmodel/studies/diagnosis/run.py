@@ -1,7 +1,7 @@
-"""A batch -> its diagnosis: diagnosis.json, a page, and the models that were compared."""
+"""A batch, or several of one rig -> a diagnosis: diagnosis.json, a page, and the models that were compared."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ccmodel import mechanisms as registry
@@ -14,8 +14,8 @@ from ccmodel.model.parameters import Parameters
 from ccmodel.progress import Progress, silent
 from ccmodel.recording import Recording
 from ccmodel.report.verdict import headline
-from ccmodel.rig.findings import Finding
 from ccmodel.rig.ingest import Ingested
+from ccmodel.rig.joint import together
 from ccmodel.steps.files import write_json
 from ccmodel.steps.ingest import read_ingested
 from ccmodel.studies.diagnosis import inconsistent
@@ -68,7 +68,7 @@ def diagnosed(
     progress: Progress = silent,
     trust_inputs: bool = False,
 ) -> Outcome:
-    """Diagnose a batch that was read; nothing is written.
+    """Diagnose a batch that was read, or several of one rig (`ccmodel.rig.joint`); nothing is written.
 
     Parameters
     ----------
@@ -90,11 +90,19 @@ def diagnosed(
     """
     findings = ingested.findings
     if ingested.contradicts and not trust_inputs:
-        report = inconsistent.report(ingested.stated.batch, findings, options.freeze)
-        return Outcome(_complete(report, inputs), ingested.recordings)
+        report = inconsistent.report(ingested.stated.batch, findings, options.freeze, bool(ingested.parts))
+        return Outcome(_complete(_with_batches(report, ingested), inputs), ingested.recordings)
     estimates = Parameters.estimated(ingested.stated.rig)
-    found = run(ingested.recordings, estimates, options, baseline, _not_judged(findings), progress)
+    found = run(ingested.recordings, estimates, options, baseline, _not_judged(ingested), progress)
+    found = replace(found, report=_with_batches(found.report, ingested))
     return Outcome(_complete(found.report, inputs), ingested.recordings, found)
+
+
+def _with_batches(report: dict, ingested: Ingested) -> dict:
+    """A report that names its batches after its name, if there are several."""
+    if not ingested.parts:
+        return report
+    return {"format": report["format"], "batch": report["batch"], "batches": list(ingested.parts)} | report
 
 
 def _complete(report: dict, inputs: dict) -> dict:
@@ -144,30 +152,57 @@ def check_options(options: Options, has_baseline: bool, prefix: str = "") -> Non
 
 
 def diagnose_recordings(
-    recordings_file: Path, out: Path, settings: Diagnosing | None = None, progress: Progress = silent
+    recordings_files: Sequence[Path],
+    out: Path,
+    settings: Diagnosing | None = None,
+    progress: Progress = silent,
 ) -> None:
-    """Diagnose a batch that the pipeline has read; a batch that cannot be diagnosed has files with the reason."""
-    settings, inputs = settings or Diagnosing(), provenance.of_inputs([recordings_file])
-    ingested = read_ingested(recordings_file)
+    """Diagnose a batch that the pipeline has read, or all batches of a rig, which has the name of the folder `out`.
+
+    What cannot be diagnosed has files with the reason.
+    """
+    settings, inputs = settings or Diagnosing(), provenance.of_inputs(recordings_files)
+    name = recordings_files[0].stem if len(recordings_files) == 1 else out.name
     try:
+        ingested = _read([(file.stem, read_ingested(file)) for file in recordings_files], name)
         if ingested.batch is None or not (ingested.recordings or (ingested.contradicts and not settings.trust_inputs)):
             raise ModelError("no recording that can be used")
         outcome = diagnosed(ingested, inputs, options_of(settings), None, progress, settings.trust_inputs)
-    except (ModelError, ValueError) as error:
-        name, reason = recordings_file.stem, str(error)
+    except (InputError, ModelError, ValueError) as error:
+        reason = str(error)
         out.mkdir(parents=True, exist_ok=True)
-        write_json(out / "diagnosis.json", {"batch": name, "verdict": None, "why": reason})
+        batches = {"batches": [file.stem for file in recordings_files]} if len(recordings_files) > 1 else {}
+        write_json(out / "diagnosis.json", {"batch": name, **batches, "verdict": None, "why": reason})
         _write_models(out, {}, dict.fromkeys(MODEL_FILES, reason))
         write_not_diagnosed(out / "report.html", name, reason, PAGE_OF_RUN)
         return
     write(outcome, out, PAGE_OF_RUN)
 
 
-def _not_judged(findings: Iterable[Finding]) -> list[dict]:
-    """Files that were refused, and contradictions of inputs that are trusted, with the reason."""
-    refused = [{"what": Path(f.file).name, "why": f.text} for f in findings if f.severity == "refused"]
+def _read(batches: Sequence[tuple[str, Ingested]], name: str) -> Ingested:
+    """A batch, or those of a rig together, without the ones that are refused as a whole."""
+    usable = [(batch, ingested) for batch, ingested in batches if ingested.batch is not None]
+    if len(batches) == 1 or not usable:
+        return batches[0][1]
+    refused = [f for _, ingested in batches if ingested.batch is None for f in ingested.findings]
+    found = together(usable, name)
+    return replace(found, findings=[*found.findings, *refused])
+
+
+def _not_judged(ingested: Ingested) -> list[dict]:
+    """Files that were refused, and contradictions of inputs that are trusted, with the reason.
+
+    Of several batches also their estimates, if these differ.
+    """
+    findings, several = ingested.findings, bool(ingested.parts)
+    refused = [replace(f, row=None, column=None) for f in findings if f.severity == "refused"]
     trusted = [f for f in findings if f.severity == "inconsistent"]
-    return [*refused, *({"what": f.place, "why": f.text, "confidence": f.confidence} for f in trusted)]
+    differing = [f for f in findings if several and f.batch == ingested.stated.batch]
+    return [
+        *({"what": f.place_in(several), "why": f.text} for f in refused),
+        *({"what": f.place_in(several), "why": f.text, "confidence": f.confidence} for f in trusted),
+        *({"what": f"{f.file}, {f.column}", "why": f.text} for f in differing),
+    ]
 
 
 def options_of(settings: Diagnosing, without: Sequence[str] = (), freeze: bool = False) -> Options:

@@ -72,6 +72,7 @@ class _Recorded:
     measured: NDArray
     span: NDArray
     name: str = "half loop"
+    session: str = ""
 
     def errors(self, values: Mapping[str, float]) -> NDArray:
         """Errors of the paper's model over the norms, shape (channels, samples)."""

@@ -1,0 +1,173 @@
+"""Rigs whose effect no single study decides: how often their studies decide it when they are diagnosed together.
+
+Each rig has one concealed effect, drawn as in the proof but without the largest and the smallest ones, and is recorded
+in three studies on three days. A study is one recording, or several of the same (`--repeats`); the studies differ in
+bend, pretension and motion. From day to day friction differs by a further 2 % (`BETWEEN`), which no batch file states,
+and every recording has zeros and a pretension of its own. A rig counts if each of its studies, diagnosed by itself, is
+`undecided`. It is decided if all three together are `explained`, with the true effect named first.
+
+A single recording is `undecided` at most, because nothing can be held out. Rigs are therefore counted a second time:
+those of whose studies none reaches the confidence `AMBIGUOUS`, from which more recordings like it would be `explained`.
+(Studies of two recordings of one condition nearly always decide by themselves what they show.)
+
+    python -m benchmarks.joint_rigs --first 8000000 --rigs 25 --cores 2 --out results/joint-rigs.csv
+"""
+
+import argparse
+import tempfile
+import time
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from functools import partial
+from itertools import count, islice
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.stats import binomtest
+
+import ccmodel as cc
+from ccmodel.diagnosis import settings
+from ccmodel.inference.pool import set_threads
+from proof.build import record
+from proof.cases import Case, draw
+from proof.plan import Conditions as Factors
+from proof.plan import PlannedRecording, Protocol, read_plan
+from proof.recording_draw import Conditions, draw_recordings
+
+FIRST_SEED = 8_000_000  # far from the seeds of tests, proofs and other benchmarks
+# Strengths of the effects, from 0 (barely visible) to 1 (large), as in `proof.cases.Truth`. Weaker ones no study shows;
+# stronger ones leave no doubt even in a single recording.
+STRENGTHS = (0.1, 0.6)
+# Standard deviation of a day's friction over the rig's, besides the 1 % from run to run.
+BETWEEN = 0.02
+# By study, factors of the rig's pretension and bend, and amplitude (rad) and frequency (Hz) of the drive's sine.
+STUDIES = {"loops": (1.0, 2.0, 0.3, 0.5), "pretension": (0.45, 1.0, 0.3, 0.5), "speed": (1.0, 1.0, 0.3, 0.8)}
+SINE = {"wave": "sine", "rest_s": 0.5, "start_up_cycles": 0.5, "cycles": 3.0}
+# Confidence of a single recording from which more of the same would be `explained`.
+AMBIGUOUS = settings.UNTESTED * settings.SURE
+WANTED = 0.8
+
+
+def studies(seed: int, repeats: int = 1) -> dict[str, Case]:
+    """The batches of a rig with one effect, by study, each as a case whose name is the batch's."""
+    plan, rig = read_plan(), draw(seed, "single")
+    random = np.random.default_rng([seed, 0x10E7])
+    own = Conditions(
+        pretension_N=random.uniform(*plan.rig.pretension_N),
+        bend_rad=random.uniform(*plan.rig.bend_rad),
+        length_m=rig.campaign.rig.cable.length_m,
+    )
+    return {name: _study(rig, name, own, repeats, random) for name in STUDIES}
+
+
+def _study(rig: Case, name: str, own: Conditions, repeats: int, random: np.random.Generator) -> Case:
+    """The batch of one study, one condition that is recorded `repeats` times on a day of its own."""
+    pretension, bend, amplitude_rad, frequency_Hz = STUDIES[name]
+    motion = SINE | {"amplitude_rad": amplitude_rad, "frequency_Hz": frequency_Hz}
+    planned = [
+        {"id": f"{name}-{k}", "pretension": pretension, "bend": bend, "motion": motion}
+        | ({"again": f"{name}-0"} if k else {})
+        for k in range(repeats)
+    ]
+    whole = Factors(pretension=(1.0, 1.0), bend=(1.0, 1.0))
+    protocol = Protocol(recordings=tuple(map(PlannedRecording.model_validate, planned)), kept_back=whole)
+    cable = rig.campaign.rig.cable
+    friction = cable.friction_coefficient * (1 + BETWEEN * random.standard_normal())
+    of_day = rig.campaign.rig.model_copy(update={"cable": cable.model_copy(update={"friction_coefficient": friction})})
+    campaign = rig.campaign.model_copy(update={"rig": of_day})
+    plans = draw_recordings(protocol, read_plan(), own, random)
+    return replace(rig, name=name, campaign=campaign, recordings=plans)
+
+
+def row(seed: int, repeats: int = 1) -> dict:
+    """Verdicts on a rig's studies, and, if each is `undecided`, on all of them together."""
+    set_threads(1)
+    started, cases = time.process_time(), studies(seed, repeats)
+    (truth,) = next(iter(cases.values())).truth
+    found: dict = {"seed": seed, "truth": truth.name, "place": truth.place, "strength": round(truth.strength, 3)}
+    with tempfile.TemporaryDirectory() as folder:
+        batches = [Path(folder) / name for name in cases]
+        for case, batch in zip(cases.values(), batches, strict=True):
+            record(case, case.recordings, batch)
+            said = cc.diagnose(batch)
+            found |= {case.name: said.verdict, f"{case.name}_confidence": said.confidence}
+            # The rig does not count; the time is better spent on another.
+            if found[case.name] != "undecided":
+                break
+        else:
+            found |= _together(batches, truth.name)
+    return found | {"took_s": round(time.process_time() - started, 1)}
+
+
+def _together(batches: list[Path], truth: str) -> dict:
+    said = cc.diagnose(batches)
+    named = [m["name"] for m in said.report["mechanisms"]]
+    return {
+        "together": said.verdict,
+        "named": " + ".join(named),
+        "confidence": said.confidence,
+        "alternatives": " ".join(f"{a['name']}:{a['confidence']:.2f}" for a in said.report["alternatives"]),
+        "decided": said.verdict == "explained" and named[:1] == [truth],
+    }
+
+
+def rows(first: int, rigs: int, most: int, repeats: int, cores: int) -> Iterator[dict]:
+    """Rows of rigs from the seed `first` on, until so many count, or the `most` were drawn."""
+    low, high = STRENGTHS
+    seeds, counted = islice((s for s in count(first) if low < draw(s, "single").truth[0].strength < high), most), 0
+    with ProcessPoolExecutor(cores) as pool:
+        while counted < rigs and (chunk := list(islice(seeds, cores))):
+            for one in pool.map(partial(row, repeats=repeats), chunk):
+                counted += "decided" in one
+                yield one
+
+
+def summary(table: pd.DataFrame) -> list[str]:
+    """How many rigs count, and how many of these are decided, with the 95 % interval of Wilson."""
+    asked = table[table["together"].notna()] if "together" in table else table.iloc[:0]
+    confidence = asked[[f"{name}_confidence" for name in STUDIES if f"{name}_confidence" in asked]].max(axis=1)
+    return [
+        f"{len(asked)} of {len(table)} rigs have three studies that are each undecided",
+        *_decided("all of these", asked),
+        *_decided(f"no study above {AMBIGUOUS:.2g}", asked[confidence < AMBIGUOUS]),
+    ]
+
+
+def _decided(which: str, asked: pd.DataFrame) -> list[str]:
+    """A line on some of the rigs that count, if there are any."""
+    if asked.empty:
+        return []
+    decided, verdicts = asked["decided"].astype(bool), asked["together"].value_counts()
+    low, high = binomtest(int(decided.sum()), len(asked)).proportion_ci(0.95, "wilson")
+    wrong = int(((asked["together"] == "explained") & ~decided).sum())
+    said = ", ".join(f"{n} {verdict}" for verdict, n in verdicts.items())
+    return [
+        f"{which}: together {decided.sum()} of {len(asked)} are decided ({decided.mean():.0%}; {low:.0%} to {high:.0%};"
+        f" wanted: {WANTED:.0%}); verdicts: {said}; explained, but not by the true effect: {wrong}"
+    ]
+
+
+def main() -> None:
+    """Run as a script."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--first", type=int, default=FIRST_SEED, help="seed of the first rig")
+    parser.add_argument("--rigs", type=int, default=25, help="rigs that count")
+    parser.add_argument("--most", type=int, default=400, help="rigs that are recorded at most")
+    parser.add_argument("--repeats", type=int, default=1, help="recordings of each study")
+    parser.add_argument("--cores", type=int, default=1, help="processes")
+    parser.add_argument("--out", type=Path, required=True, help="CSV with a row for each rig")
+    asked = parser.parse_args()
+    asked.out.parent.mkdir(parents=True, exist_ok=True)
+    found: list[dict] = []
+    for one in rows(asked.first, asked.rigs, asked.most, asked.repeats, asked.cores):
+        found.append(one)
+        print(" ".join(f"{key}={value}" for key, value in one.items()), flush=True)
+        # An interrupted run leaves what it has.
+        pd.DataFrame(found).to_csv(asked.out, index=False)
+    print(*summary(pd.DataFrame(found)), sep="\n")
+
+
+if __name__ == "__main__":
+    main()
