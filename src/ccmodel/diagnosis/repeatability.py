@@ -156,7 +156,7 @@ def estimated(whitened: Sequence["Whitened"], residuals: Sequence[NDArray]) -> R
     for name in names:
         of_name = deviations(whitened, residuals, name)
         if name in _WORDS:
-            found[name] = relative_spread(name, without_trend(of_name), groups)
+            found[name] = relative_spread(name, without_trend(of_name, sequences(whitened)), groups)
         elif name in _CHANNEL_OF:
             found[name] = zero_spread(name, of_name, groups)
     return Repeatability(found, groups)
@@ -206,7 +206,7 @@ def friction_repeats(whitened: Sequence["Whitened"], residuals: Sequence[NDArray
     found = deviations(whitened, residuals, FRICTION)
     groups = whitened[0].repeatability.conditions or [[i] for i in range(len(whitened))]
     is_scatter = min(within_probability(found, groups), between_probability(found, groups, is_fitted))
-    return is_scatter > settings.SCATTER_LEVEL and trend_probability(found) > settings.TREND_LEVEL
+    return is_scatter > settings.SCATTER_LEVEL and trend_probability(found, sequences(whitened)) > settings.TREND_LEVEL
 
 
 def within_probability(found: Deviations, groups: Sequence[Sequence[int]]) -> float:
@@ -230,30 +230,50 @@ def between_probability(found: Deviations, groups: Sequence[Sequence[int]], is_f
     return float(fisher.sf(ratio, between_freedom, settings.SPREAD_FREEDOM + freedom))
 
 
-def trend_probability(found: Deviations) -> float:
-    """Two-sided probability of at least this trend over the sequence of the recordings, if there is none."""
-    known = np.flatnonzero(np.isfinite(found.values))
-    if len(known) < settings.FEWEST_FOR_SCATTER:
+def sequences(whitened: Sequence["Whitened"]) -> list[list[int]]:
+    """Numbers of the recordings of each batch, in the order in which they are listed."""
+    batches: dict[str, list[int]] = {}
+    for i, w in enumerate(whitened):
+        batches.setdefault(w.session, []).append(i)
+    return list(batches.values())
+
+
+def trend_probability(found: Deviations, runs: Sequence[Sequence[int]]) -> float:
+    """Two-sided probability of at least this trend over the recordings of each batch, if there is none."""
+    at, values = _over_sequence(found, runs)
+    freedom = settings.SPREAD_FREEDOM + values.size - len(runs) - 1
+    if values.size < settings.FEWEST_FOR_SCATTER or not at.any():
         return 1.0
-    at, slope = known - known.mean(), _slope(found.values)
-    left = found.values[known] - found.values[known].mean() - slope * at
-    freedom = settings.SPREAD_FREEDOM + len(known) - 2
+    left = values - _slope(at, values) * at
     sd = np.sqrt((settings.SPREAD_FREEDOM + float(left @ left)) / freedom / float(at @ at))
-    return float(2 * student.sf(abs(slope) / sd, freedom))
+    return float(2 * student.sf(abs(_slope(at, values)) / sd, freedom))
 
 
-def without_trend(found: Deviations) -> Deviations:
-    """Deviations about their trend over the sequence of the recordings, if they have one."""
-    if trend_probability(found) > settings.TREND_LEVEL:
+def without_trend(found: Deviations, runs: Sequence[Sequence[int]]) -> Deviations:
+    """Deviations about their trend over the recordings of each batch, if they have one."""
+    if trend_probability(found, runs) > settings.TREND_LEVEL:
         return found
-    return Deviations(found.values - _slope(found.values) * np.arange(found.values.size), found.variances)
+    slope, values = _slope(*_over_sequence(found, runs)), found.values.copy()
+    for run in runs:
+        values[list(run)] -= slope * np.arange(len(run))
+    return Deviations(values, found.variances)
 
 
-def _slope(values: NDArray) -> float:
-    """Least-squares slope over the number of the recording, without those that are NaN."""
-    known = np.flatnonzero(np.isfinite(values))
-    at = known - known.mean()
-    return float(at @ values[known] / (at @ at))
+def _over_sequence(found: Deviations, runs: Sequence[Sequence[int]]) -> tuple[NDArray, NDArray]:
+    """Number within its batch and deviation of each recording that determines it, both less the batch's mean."""
+    at, values = [], []
+    for run in runs:
+        known = np.array([k for k, i in enumerate(run) if np.isfinite(found.values[i])], dtype=int)
+        if known.size:
+            own = found.values[[run[k] for k in known]]
+            at.append(known - known.mean())
+            values.append(own - own.mean())
+    return np.concatenate([np.zeros(0), *at]), np.concatenate([np.zeros(0), *values])
+
+
+def _slope(at: NDArray, values: NDArray) -> float:
+    """Least-squares slope of values without a mean."""
+    return float(at @ values / (at @ at))
 
 
 def report(whitened: Sequence["Whitened"]) -> list[dict]:
