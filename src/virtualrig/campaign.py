@@ -97,8 +97,11 @@ def prepare(campaign: Campaign, plan: RecordingPlan, draw: Generator) -> Prepara
     """Draw the initial state of one recording: friction, pretension and tension profile."""
     spread: Repeatability = campaign.repeatability
     low, high = spread.profile_share
+    drifted = 1 + campaign.rig.effects.friction_drift * plan.position
     return Preparation(
-        friction_coefficient=campaign.rig.cable.friction_coefficient * (1 + spread.friction * draw.standard_normal()),
+        friction_coefficient=drifted
+        * campaign.rig.cable.friction_coefficient
+        * (1 + spread.friction * draw.standard_normal()),
         pretension_N=plan.pretension_N * (1 + spread.pretension * draw.standard_normal()),
         profile_share=(draw.uniform(low, high), draw.uniform(low, high)),
         tensioned_before_s=_drawn(spread.tensioned_before_s, draw),
@@ -119,7 +122,10 @@ def run(campaign: Campaign, plan: RecordingPlan, preparation: Preparation) -> Tr
     time_s = np.arange(round(plan.excitation.duration_s * rate) + 1) / rate
     numerics = campaign.numerics
     grid = make_grid(plan.conduit, numerics.cell_length_m, numerics.cell_bend_rad)
-    return simulate(campaign.rig, grid, numerics, preparation, time_s, plan.excitation.angle_and_rate(time_s))
+    drifted = 1 + campaign.rig.effects.stiffness_drift * plan.position
+    cable = campaign.rig.cable.model_copy(update={"stiffness_N_per_m": drifted * campaign.rig.cable.stiffness_N_per_m})
+    rig = campaign.rig.model_copy(update={"cable": cable})
+    return simulate(rig, grid, numerics, preparation, time_s, plan.excitation.angle_and_rate(time_s))
 
 
 def compress(columns: dict[str, NDArray]) -> bytes:

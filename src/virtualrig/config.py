@@ -142,12 +142,13 @@ class Piece(Strict):
 
 
 class RecordingPlan(Strict):
-    """Plan of one recording."""
+    """Plan of one recording; `position` is its place in the session, -1/2 to 1/2, for what drifts."""
 
     id: str
     pretension_N: PositiveFloat
     conduit: tuple[Piece, ...] = Field(min_length=1)
     excitation: Excitation
+    position: float = 0.0
 
 
 Repeats = Annotated[int, Field(ge=1, le=26)]

@@ -19,6 +19,7 @@ from ccmodel.diagnosis.repeatability import (
     friction_repeats,
     relative_spread,
     report,
+    sequences,
     trend_probability,
     within_probability,
     without_trend,
@@ -50,13 +51,36 @@ def calibrated(recordings):
     return found, estimated(recordings, found.residuals)
 
 
+def recorded(observations, **changed):
+    """Observations of a changed recording."""
+    recording = replace(observations.given.recording, **changed)
+    return replace(observations, given=replace(observations.given, recording=recording))
+
+
 def test_repeats_are_found_by_their_motion_conduit_and_pretension():
-    recordings = [made.whitened(*at, seed=k).observations.given.recording for k, at in enumerate((
+    every = [made.whitened(*at, seed=k).observations for k, at in enumerate((
         (0.6, 1.0, 7.0), (0.6, 1.0, 7.0), (0.6, 1.0, 5.0), (0.5, 1.0, 7.0), (0.6, 1.1, 7.0),
     ))]  # fmt: skip
-    assert conditions(recordings) == [[0, 1], [2], [3], [4]]
-    bent = replace(recordings[1], path=recordings[1].path.with_extra_bend(0.5))
-    assert conditions([recordings[0], bent]) == [[0], [1]]
+    assert conditions(every) == [[0, 1], [2], [3], [4]]
+    bent = recorded(every[1], path=every[1].given.recording.path.with_extra_bend(0.5))
+    assert conditions([every[0], bent]) == [[0], [1]]
+
+
+def test_recordings_under_other_measured_loads_are_no_repeats():
+    one, other = (made.whitened(seed=k).observations.without("tau_out_Nm") for k in (0, 1))
+    assert conditions([one, other]) == [[0, 1]]
+    channels = other.given.recording.channels
+    heavier = recorded(other, channels=dict(channels, tau_out_Nm=1.3 * channels["tau_out_Nm"]))
+    assert conditions([one, heavier]) == [[0], [1]]
+
+
+def test_recordings_are_in_the_order_of_their_starts():
+    recordings = with_frictions(1.0, 1.0, 1.0)
+    assert sequences(recordings) == [[0, 1, 2]]
+    starts = zip(recordings, (30.0, 10.0, 20.0), strict=True)
+    assert sequences([replace(w, observations=recorded(w.observations, started_at_s=s)) for w, s in starts]) == [
+        [1, 2, 0]
+    ]
 
 
 def test_deviations_are_those_of_the_rig_and_not_shrunk():

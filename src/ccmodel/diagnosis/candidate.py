@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm as normal
 from scipy.stats import t as student
 
 from ccmodel import mechanisms as registry
@@ -22,7 +23,7 @@ from ccmodel.inference.least_squares import Search, Solution, minimise
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.pool import each
 from ccmodel.inference.problem import Free, Problem
-from ccmodel.model.parameters import Parameters
+from ccmodel.model.parameters import Parameters, mechanism_key
 
 SEARCH = Search(
     tolerance=settings.FIT_TOLERANCE,
@@ -169,20 +170,25 @@ def fit(
         If the deadline has passed.
     """
     unknowns = {n: replace(f, start=start[n]) for n, f in free.items()} | hypothesis.free(start)
+    unknowns |= _state_means(whitened, hypothesis, unknowns)
     modelled = _with_states(whitened, hypothesis, {n: f.start for n, f in unknowns.items()})
     problem = Problem(modelled, unknowns, weight=mean_weight)
     search = replace(SEARCH, deadline=deadline)
     solution = _search(problem, hypothesis, search)
-    if any(registry.get(name).states for name, _ in hypothesis.baseline + hypothesis.acting):
+    has_states = any(registry.get(name).states for name, _ in hypothesis.baseline + hypothesis.acting)
+    for _ in range(settings.STATE_PASSES if has_states else 0):
         # The states' effects were those of the values at the start, which the fit has left.
-        values = problem.values_of(solution.x, 0)
-        modelled = _with_states(whitened, hypothesis, values)
-        problem = Problem(modelled, {n: replace(f, start=values[n]) for n, f in unknowns.items()}, weight=mean_weight)
-        solution = minimise(problem, inside_bounds(problem, problem.start), search)
+        before, modelled = solution.cost, _with_states(whitened, hypothesis, problem.values_of(solution.x, 0))
+        problem = replace(problem, observations=modelled)
+        solution = minimise(problem, inside_bounds(problem, solution.x), search)
+        if abs(solution.cost - before) < settings.STATE_TOLERANCE * before:
+            break
     left_out = leave_one_out(problem, solution)
-    covariance = left_out.covariance
+    covariance, degrees = left_out.covariance, left_out.degrees_of_freedom
     if len(modelled) == 1:
         covariance = covariance / (IN_DIAGNOSIS * len(modelled[0].observations.channels))
+    if any(f.spread for f in unknowns.values()):
+        covariance, degrees = at_least_by_information(problem, solution, covariance, degrees)
     roots = [np.sqrt(w.measured.size) for w in modelled]
     return CandidateFit(
         hypothesis,
@@ -192,12 +198,45 @@ def fit(
         [block.errors * root for block, root in zip(solution.blocks, roots, strict=True)],
         [block.derivatives * root for block, root in zip(solution.blocks, roots, strict=True)],
         covariance,
-        left_out.degrees_of_freedom,
+        degrees,
         [problem.values_of(x, 0) for x in left_out.values],
         left_out.residuals,
         solution.message,
         solution.converged,
     )
+
+
+def _state_means(whitened: Sequence[Whitened], hypothesis: Hypothesis, unknowns: Mapping[str, Free]) -> dict[str, Free]:
+    """The states' means as unknowns, with the prior that a single recording's state has too.
+
+    Where little of a mechanism shows, its strength and its state are nearly one unknown, which the prior divides. It
+    counts as one effective sample.
+    """
+    samples = IN_DIAGNOSIS * float(np.mean([len(w.observations.channels) for w in whitened]))
+    return {
+        key: replace(unknowns[key], mean=p.start, spread=p.spread * np.sqrt(samples))
+        for name, place in hypothesis.baseline + hypothesis.acting
+        for p in registry.get(name).states
+        if (key := mechanism_key(name, place, p.name)) in unknowns
+    }
+
+
+def at_least_by_information(
+    problem: Problem, solution: Solution, covariance: NDArray, degrees: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Covariance and degrees of freedom of the wider of two intervals of each unknown: the given one, and that of
+    the information of all recordings and of the priors.
+
+    A jackknife does not see a direction that no recording determines: all leave-one-out fits stay where it started.
+    """
+    samples = [IN_DIAGNOSIS * len(w.observations.channels) for w in problem.observations]
+    information = sum(n * block.information for n, block in zip(samples, solution.blocks, strict=True))
+    information = information + np.diag(np.mean(samples) * problem.prior_precision**2)
+    variance, least = np.diag(covariance).clip(0.0), np.diag(inverse_of(information, problem.sizes))
+    wider = normal.ppf(0.5 + COVERAGE / 2) ** 2 * least > student.ppf(0.5 + COVERAGE / 2, degrees) ** 2 * variance
+    ratio = np.sqrt(np.divide(least, variance, out=np.ones_like(least), where=wider & (variance > 0)))
+    covariance = covariance * np.outer(ratio, ratio) + np.diag(np.where(variance > 0, 0.0, least))
+    return covariance, np.where(wider, np.inf, degrees)
 
 
 def _with_states(whitened: Sequence[Whitened], hypothesis: Hypothesis, values: Mapping[str, float]) -> list[Whitened]:

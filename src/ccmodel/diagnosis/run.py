@@ -22,6 +22,7 @@ from ccmodel.diagnosis.whitening import Whitened, relinearised, whiten
 from ccmodel.inference.observations import Tolerance
 from ccmodel.inference.pool import each
 from ccmodel.model.parameters import Parameters
+from ccmodel.model.session import in_order, with_session
 from ccmodel.progress import Progress, silent, within
 from ccmodel.recording import Recording
 
@@ -143,6 +144,7 @@ def calibrate(
     ModelError
         If the model cannot be run on any of the recordings, or `only` has another name.
     """
+    recordings, estimates = in_order(recordings), with_session(estimates, recordings)
     observations, missing = observations_of(recordings, estimates, options.tolerance, options.step_s, options.cycles)
     tested_name = "the baseline" if baseline else "the paper's model"
     progress(f"calibrating {tested_name} on {len(observations)} recordings", 0.0)

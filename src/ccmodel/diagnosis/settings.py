@@ -44,6 +44,8 @@ PRETENSION_SPREAD = 0.01
 SPREAD_FREEDOM = 4
 # Distance of two motions over the stroke, and of their durations, within which they are repeats. Chosen.
 SAME_MOTION = 0.01
+# The same of a measured load torque or motion that is the model's input. Chosen: what a brake or a hand repeats to.
+SAME_LOAD = 0.05
 # Fewest recordings whose scatter or trend is looked at, and the largest spread that their scatter, without repeats, may
 # give, over the stated one. Chosen: what differs from run to run by more is to be found, not to be allowed for.
 FEWEST_FOR_SCATTER, MOST_SCATTER = 4, 2.0
@@ -59,6 +61,9 @@ FRICTION_BETWEEN = 0.02
 PRETENSION_BETWEEN = 0.05
 # Bounds of both ratios. Chosen: far outside.
 BETWEEN_BOUNDS = (0.2, 5.0)
+# Standard deviation of the curvature of a cable's initial tension between its ends, over the largest that friction can
+# hold. Chosen: earlier motions leave a profile that the rest shows at the ends only.
+CURVATURE_SPREAD = 0.15
 # Standard deviation of the load's position in its gap: uniform from -1 to 1.
 GAP_SPREAD = 1 / np.sqrt(3)
 # Positions in the gap about which the covariance is linearised, the first where nothing speaks for another. Chosen.
@@ -72,6 +77,9 @@ FIT_TOLERANCE = 1e-4
 # velocity-weakening friction are not smooth on a smaller scale.
 FIT_DIFFERENCE = 3e-4
 FIT_EVALUATIONS = 25
+# Times that the effects of mechanisms' states, which are proportional to their strength, are linearised again about the
+# values of a fit, at most, and the relative change of the cost below which they are not. Chosen.
+STATE_PASSES, STATE_TOLERANCE = 6, 0.005
 # Factor by which an unknown is lowered at each step of a continuation (`Parameter.continuation`). Chosen.
 CONTINUATION_FACTOR = 4.0
 # Shares of the pretension from which a fit starts where the initial tension is not observed, and the evaluations after

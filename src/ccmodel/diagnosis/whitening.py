@@ -27,6 +27,7 @@ from ccmodel.inference.jacobian import STEP, jacobian, size_of
 from ccmodel.inference.observations import Observations
 from ccmodel.model.general.run import settings_of
 from ccmodel.model.parameters import Parameters, mechanism_key, mechanism_parameter, of_batch
+from ccmodel.model.session import known_states
 
 # Step of the differences by a nuisance, relative to its size.
 NUISANCE_STEP = 10 * STEP
@@ -176,7 +177,7 @@ def with_states_of(one: Whitened, model: Parameters) -> Whitened:
     All other nuisances stay linearised as they are: candidate models are compared under one covariance, apart from the
     states that only some of them have.
     """
-    states = _states(model)
+    states = _states(one.observations.with_parameters(model))
     is_state = [mechanism_parameter(name) is not None for name, _, _ in one.scalar_nuisances]
     if not states and not any(is_state):
         return one
@@ -235,13 +236,15 @@ def _derivative(o: Observations, name: str, value: float, step: float, simulated
     return jacobian(lambda x: o.modelled({name: x[0]}), np.array([value]), np.array([step]), simulated)[..., 0]
 
 
-def _states(model: Parameters) -> list[tuple[str, float, float]]:
-    """States of the model's mechanisms that differ between recordings, as scalar nuisances."""
-    return [
+def _states(o: Observations) -> list[tuple[str, float, float]]:
+    """States of the mechanisms at the recording's start that its stated times do not give, as scalar nuisances."""
+    known = known_states(o.given.recording, o.parameters)
+    every = [
         (mechanism_key(m.name, m.place, p.name), m.values[p.name], p.spread)
-        for m in model.mechanisms
+        for m in o.parameters.mechanisms
         for p in registry.get(m.name).states
     ]
+    return [one for one in every if one[0] not in known]
 
 
 def shrinkage_of(s: NDArray) -> NDArray:
@@ -289,4 +292,8 @@ def _scalar_nuisances(o: Observations) -> Sequence[tuple[str, float, float]]:
         found.append(("load_gap_position", parameters.load_gap_position, settings.GAP_SPREAD))
     if THETA_OUT in o.channels and (step := recording.encoder_step_rad.get(THETA_OUT)):
         found.append(("theta_out_zero_rad", parameters.theta_out_zero_rad, step / np.sqrt(12)))
-    return [*found, *_states(parameters)]
+    if o.given.initial_tension_observed:
+        cables = ("A",) if recording.far_end else ("A", "B")
+        curvatures = (f"tension_curvature_{cable}" for cable in cables)
+        found += [(name, getattr(parameters, name), settings.CURVATURE_SPREAD) for name in curvatures]
+    return [*found, *_states(o)]

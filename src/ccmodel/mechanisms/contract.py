@@ -4,7 +4,8 @@
    finds it by listing the folder.
 2. Its docstring (a relative's: that of its function) is its ``text``: a title and the paragraphs of `PARAGRAPHS`. The
    command line, ``docs/mechanisms`` and the report are made from it and from the fields.
-3. A mechanism modifies either the physics or the observation. Before a run, its parameters are written into the
+3. A mechanism modifies either the physics or the observation, or is the drift of a parameter of the model from
+   recording to recording (`ccmodel.model.session`). Before a run, its parameters are written into the
    solver's `Settings` as ``settings`` declares; a setting that is no number stands in ``structures`` and is written by
    ``modifies_physics``. After a run, ``modifies_observation`` changes what the sensors read.
 4. A model without the mechanism and a model with it at its neutral values give the same numbers, bit for bit. Where
@@ -182,6 +183,10 @@ class Mechanism:
         ``modifies_physics(settings, values)`` writes the structures.
     modifies_observation : callable or None
         ``modifies_observation(sensing, place, values)`` returns the channels that change.
+    drift : str or None
+        The parameter of the model that its ``change`` drifts through a session.
+    states_after_tensioning : callable or None
+        ``states_after_tensioning(seconds, values)``: its states, by name, at a time after the cables were tensioned.
     """
 
     name: str
@@ -198,13 +203,16 @@ class Mechanism:
     structures: Mapping[str, Any] = field(default_factory=dict)
     modifies_physics: Callable[[Settings, Mapping[str, float]], None] | None = None
     modifies_observation: Callable[[Sensing, str, Mapping[str, float]], dict[str, NDArray]] | None = None
+    drift: str | None = None
+    states_after_tensioning: Callable[[float, Mapping[str, float]], dict[str, float]] | None = None
 
     def __post_init__(self) -> None:
         unknown = set(self.places) - set(PLACES)
         if unknown or not self.places:
             raise ValueError(f"{self.name}: places are {', '.join(PLACES)}; got {', '.join(self.places) or 'none'}")
-        if bool(self.neutral_settings) == (self.modifies_observation is not None):
-            raise ValueError(f"{self.name}: a mechanism modifies either the physics or the observation")
+        kinds = bool(self.neutral_settings), self.modifies_observation is not None, self.drift is not None
+        if sum(kinds) != 1:
+            raise ValueError(f"{self.name}: a mechanism modifies the physics or the observation, or is a drift")
         if missing := set(PARAGRAPHS) - self.paragraphs.keys():
             raise ValueError(f"{self.name}: its text has no paragraph {', '.join(sorted(missing))}")
 

@@ -69,5 +69,6 @@ MECHANISM = Mechanism(
     ),
     mistaken_for=("load-cell-drift",),
     depends_on_time=True,
+    states_after_tensioning=lambda seconds, values: {"relaxed": relaxed_after(seconds, values["r"], values["tau"])},
     settings={"relaxing_share": "r", "relaxing_time_s": "tau", "relaxed_share": "relaxed"},
 )

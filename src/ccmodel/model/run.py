@@ -29,6 +29,7 @@ from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad
 from ccmodel.model.model_input import PRESCRIBED, ModelInput
 from ccmodel.model.parameters import Parameters
+from ccmodel.model.session import of_recording
 from ccmodel.model.transmission import Transmission
 from ccmodel.recording import Recording
 
@@ -74,6 +75,7 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
         If the model cannot be run on this recording.
     """
     recording = given.recording
+    parameters = of_recording(parameters, recording)
     transmission = Transmission(
         path=recording.path.with_extra_bend(parameters.extra_bend_rad),
         axial_rigidity_N=parameters.stiffness_N_per_m * parameters.reference_length_m,
