@@ -19,6 +19,7 @@ from ccmodel.diagnosis.repeatability import (
     friction_repeats,
     relative_spread,
     report,
+    sequences,
     trend_probability,
     within_probability,
     without_trend,
@@ -35,6 +36,10 @@ def observed(values, variance=0.0):
     return Deviations(np.array(values, float), np.full(len(values), variance))
 
 
+def trend(found):
+    return trend_probability(found, [range(found.values.size)])
+
+
 def with_frictions(*ratios, pretensions=(7.0, 7.0, 5.0, 6.0, 7.0, 5.0, 6.0)):
     """Recordings of the model, each with its own friction; the first two are repeats."""
     truths = [replace(made.PARAMETERS, friction_scale=ratio) for ratio in ratios]
@@ -46,13 +51,36 @@ def calibrated(recordings):
     return found, estimated(recordings, found.residuals)
 
 
+def recorded(observations, **changed):
+    """Observations of a changed recording."""
+    recording = replace(observations.given.recording, **changed)
+    return replace(observations, given=replace(observations.given, recording=recording))
+
+
 def test_repeats_are_found_by_their_motion_conduit_and_pretension():
-    recordings = [made.whitened(*at, seed=k).observations.given.recording for k, at in enumerate((
+    every = [made.whitened(*at, seed=k).observations for k, at in enumerate((
         (0.6, 1.0, 7.0), (0.6, 1.0, 7.0), (0.6, 1.0, 5.0), (0.5, 1.0, 7.0), (0.6, 1.1, 7.0),
     ))]  # fmt: skip
-    assert conditions(recordings) == [[0, 1], [2], [3], [4]]
-    bent = replace(recordings[1], path=recordings[1].path.with_extra_bend(0.5))
-    assert conditions([recordings[0], bent]) == [[0], [1]]
+    assert conditions(every) == [[0, 1], [2], [3], [4]]
+    bent = recorded(every[1], path=every[1].given.recording.path.with_extra_bend(0.5))
+    assert conditions([every[0], bent]) == [[0], [1]]
+
+
+def test_recordings_under_other_measured_loads_are_no_repeats():
+    one, other = (made.whitened(seed=k).observations.without("tau_out_Nm") for k in (0, 1))
+    assert conditions([one, other]) == [[0, 1]]
+    channels = other.given.recording.channels
+    heavier = recorded(other, channels=dict(channels, tau_out_Nm=1.3 * channels["tau_out_Nm"]))
+    assert conditions([one, heavier]) == [[0], [1]]
+
+
+def test_recordings_are_in_the_order_of_their_starts():
+    recordings = with_frictions(1.0, 1.0, 1.0)
+    assert sequences(recordings) == [[0, 1, 2]]
+    starts = zip(recordings, (30.0, 10.0, 20.0), strict=True)
+    assert sequences([replace(w, observations=recorded(w.observations, started_at_s=s)) for w, s in starts]) == [
+        [1, 2, 0]
+    ]
 
 
 def test_deviations_are_those_of_the_rig_and_not_shrunk():
@@ -132,16 +160,26 @@ def test_scatter_is_judged_by_that_of_repeats():
 
 def test_a_trend_is_no_scatter():
     drift = np.linspace(-7.5, 7.5, 9) + np.random.default_rng(0).standard_normal(9)
-    assert trend_probability(observed(drift)) < TREND_LEVEL
-    assert trend_probability(observed(drift[np.random.default_rng(2).permutation(9)])) > TREND_LEVEL
-    assert np.std(without_trend(observed(drift)).values) < 0.3 * drift.std()
+    assert trend(observed(drift)) < TREND_LEVEL
+    assert trend(observed(drift[np.random.default_rng(2).permutation(9)])) > TREND_LEVEL
+    assert np.std(without_trend(observed(drift), [range(9)]).values) < 0.3 * drift.std()
     draws = np.random.default_rng(3).standard_normal((500, 9))
-    assert np.mean([trend_probability(observed(d)) < TREND_LEVEL for d in draws]) <= 0.01
+    assert np.mean([trend(observed(d)) < TREND_LEVEL for d in draws]) <= 0.01
+
+
+def test_a_trend_is_that_of_each_batch():
+    """Batches one after another, each of which drifts alike and begins anew."""
+    drift = np.tile(np.linspace(-4, 4, 5), 3) + np.random.default_rng(0).standard_normal(15)
+    batches = [range(0, 5), range(5, 10), range(10, 15)]
+    assert trend_probability(observed(drift), batches) < TREND_LEVEL < trend(observed(drift))
+    apart = np.repeat([-9.0, 0.0, 9.0], 5) + np.random.default_rng(1).standard_normal(15)
+    assert trend(observed(apart)) < TREND_LEVEL < trend_probability(observed(apart), batches)
+    assert trend_probability(observed([5.0, -5.0, 0.0, 1.0]), [[0], [1], [2], [3]]) == 1.0
 
 
 def test_a_recording_that_does_not_determine_friction_does_not_count():
     values = [*np.linspace(-7.5, 7.5, 8), np.nan]
-    assert trend_probability(observed(values)) < TREND_LEVEL
+    assert trend(observed(values)) < TREND_LEVEL
     assert relative_spread(FRICTION, observed([3.0, np.nan, 0.0]), [[0, 1], [2]]).source == "assumed"
 
 

@@ -28,8 +28,9 @@ from numpy.typing import NDArray
 from scipy.stats import f as fisher
 from scipy.stats import t as student
 
-from ccmodel.channels import THETA_IN, ZERO_OF, short_name, unit_of
+from ccmodel.channels import MEASURED, THETA_IN, ZERO_OF, short_name, unit_of
 from ccmodel.diagnosis import settings
+from ccmodel.inference.observations import Observations
 from ccmodel.recording import Recording
 
 if TYPE_CHECKING:
@@ -115,11 +116,11 @@ class Deviations:
         return max(square, 0.0), freedom, count
 
 
-def conditions(recordings: Sequence[Recording]) -> list[list[int]]:
-    """Numbers of the recordings of each condition: the same conduit, pretension aimed at, and motion of the drive."""
+def conditions(observations: Sequence[Observations]) -> list[list[int]]:
+    """Numbers of the recordings of each condition: the same conduit, pretension aimed at, drive motion and load."""
     groups: list[list[int]] = []
-    for i, recording in enumerate(recordings):
-        found = next((g for g in groups if _is_repeat(recordings[g[0]], recording)), None)
+    for i, one in enumerate(observations):
+        found = next((g for g in groups if _is_repeat(observations[g[0]], one)), None)
         if found is None:
             groups.append([i])
         else:
@@ -127,19 +128,29 @@ def conditions(recordings: Sequence[Recording]) -> list[list[int]]:
     return groups
 
 
-def _is_repeat(a: Recording, b: Recording) -> bool:
+def _is_repeat(one: Observations, other: Observations) -> bool:
+    a, b = one.given.recording, other.given.recording
     first, second = (np.stack([r.path.piece_length_m, r.path.piece_bend_rad]) for r in (a, b))
     if first.shape != second.shape or not np.allclose(first, second) or a.far_end != b.far_end:
         return False
-    if not np.isclose(a.pretension_N, b.pretension_N, rtol=1e-3):
+    if not np.isclose(a.pretension_N, b.pretension_N, rtol=1e-3) or one.channels != other.channels:
         return False
+    # What was measured and is not compared is the load, an input of the model.
+    load = [c for c in MEASURED if c in a and c in b and c not in one.channels]
+    counts = 2 * max(r.encoder_step_rad.get(THETA_IN, 0.0) for r in (a, b))
+    return _is_same(a, b, THETA_IN, settings.SAME_MOTION, counts) and all(
+        _is_same(a, b, channel, settings.SAME_LOAD) for channel in load
+    )
+
+
+def _is_same(a: Recording, b: Recording, channel: str, share: float, least: float = 0.0) -> bool:
+    """Whether the rms difference of a channel is at most a share of its peak to peak, or `least`, in its unit."""
     times = [r.time_s - r.time_s[0] for r in (a, b)]
     if not np.isclose(times[0][-1], times[1][-1], rtol=settings.SAME_MOTION):
         return False
-    motions = [r[THETA_IN] - r[THETA_IN][0] for r in (a, b)]
-    apart = np.sqrt(np.mean((motions[0] - np.interp(times[0], times[1], motions[1])) ** 2))
-    counts = 2 * max(r.encoder_step_rad.get(THETA_IN, 0.0) for r in (a, b))
-    return bool(apart <= max(settings.SAME_MOTION * np.ptp(motions[0]), counts))
+    first, second = (r[channel] - (r[channel][0] if channel == THETA_IN else 0.0) for r in (a, b))
+    apart = np.sqrt(np.mean((first - np.interp(times[0], times[1], second)) ** 2))
+    return bool(apart <= max(share * np.ptp(first), least))
 
 
 def deviations(whitened: Sequence["Whitened"], residuals: Sequence[NDArray], nuisance: str) -> Deviations:
@@ -150,13 +161,13 @@ def deviations(whitened: Sequence["Whitened"], residuals: Sequence[NDArray], nui
 
 def estimated(whitened: Sequence["Whitened"], residuals: Sequence[NDArray]) -> Repeatability:
     """Spreads of friction and of the sensors' zeros from the residuals of a fit of the calibrated model."""
-    groups = conditions([w.observations.given.recording for w in whitened])
+    groups = conditions([w.observations for w in whitened])
     names = dict.fromkeys(name for w in whitened for name, _, _ in w.scalar_nuisances)
     found = {}
     for name in names:
         of_name = deviations(whitened, residuals, name)
         if name in _WORDS:
-            found[name] = relative_spread(name, without_trend(of_name), groups)
+            found[name] = relative_spread(name, without_trend(of_name, sequences(whitened)), groups)
         elif name in _CHANNEL_OF:
             found[name] = zero_spread(name, of_name, groups)
     return Repeatability(found, groups)
@@ -206,7 +217,7 @@ def friction_repeats(whitened: Sequence["Whitened"], residuals: Sequence[NDArray
     found = deviations(whitened, residuals, FRICTION)
     groups = whitened[0].repeatability.conditions or [[i] for i in range(len(whitened))]
     is_scatter = min(within_probability(found, groups), between_probability(found, groups, is_fitted))
-    return is_scatter > settings.SCATTER_LEVEL and trend_probability(found) > settings.TREND_LEVEL
+    return is_scatter > settings.SCATTER_LEVEL and trend_probability(found, sequences(whitened)) > settings.TREND_LEVEL
 
 
 def within_probability(found: Deviations, groups: Sequence[Sequence[int]]) -> float:
@@ -230,30 +241,54 @@ def between_probability(found: Deviations, groups: Sequence[Sequence[int]], is_f
     return float(fisher.sf(ratio, between_freedom, settings.SPREAD_FREEDOM + freedom))
 
 
-def trend_probability(found: Deviations) -> float:
-    """Two-sided probability of at least this trend over the sequence of the recordings, if there is none."""
-    known = np.flatnonzero(np.isfinite(found.values))
-    if len(known) < settings.FEWEST_FOR_SCATTER:
+def sequences(whitened: Sequence["Whitened"]) -> list[list[int]]:
+    """Numbers of the recordings of each batch, in the order in which they were made, or else are listed."""
+    batches: dict[str, list[int]] = {}
+    for i, w in enumerate(whitened):
+        batches.setdefault(w.session, []).append(i)
+    starts = [w.observations.given.recording.started_at_s for w in whitened]
+    return [
+        numbers if any(starts[i] is None for i in numbers) else sorted(numbers, key=lambda i: starts[i] or 0.0)
+        for numbers in batches.values()
+    ]
+
+
+def trend_probability(found: Deviations, runs: Sequence[Sequence[int]]) -> float:
+    """Two-sided probability of at least this trend over the recordings of each batch, if there is none."""
+    at, values = _over_sequence(found, runs)
+    freedom = settings.SPREAD_FREEDOM + values.size - len(runs) - 1
+    if values.size < settings.FEWEST_FOR_SCATTER or not at.any():
         return 1.0
-    at, slope = known - known.mean(), _slope(found.values)
-    left = found.values[known] - found.values[known].mean() - slope * at
-    freedom = settings.SPREAD_FREEDOM + len(known) - 2
+    left = values - _slope(at, values) * at
     sd = np.sqrt((settings.SPREAD_FREEDOM + float(left @ left)) / freedom / float(at @ at))
-    return float(2 * student.sf(abs(slope) / sd, freedom))
+    return float(2 * student.sf(abs(_slope(at, values)) / sd, freedom))
 
 
-def without_trend(found: Deviations) -> Deviations:
-    """Deviations about their trend over the sequence of the recordings, if they have one."""
-    if trend_probability(found) > settings.TREND_LEVEL:
+def without_trend(found: Deviations, runs: Sequence[Sequence[int]]) -> Deviations:
+    """Deviations about their trend over the recordings of each batch, if they have one."""
+    if trend_probability(found, runs) > settings.TREND_LEVEL:
         return found
-    return Deviations(found.values - _slope(found.values) * np.arange(found.values.size), found.variances)
+    slope, values = _slope(*_over_sequence(found, runs)), found.values.copy()
+    for run in runs:
+        values[list(run)] -= slope * np.arange(len(run))
+    return Deviations(values, found.variances)
 
 
-def _slope(values: NDArray) -> float:
-    """Least-squares slope over the number of the recording, without those that are NaN."""
-    known = np.flatnonzero(np.isfinite(values))
-    at = known - known.mean()
-    return float(at @ values[known] / (at @ at))
+def _over_sequence(found: Deviations, runs: Sequence[Sequence[int]]) -> tuple[NDArray, NDArray]:
+    """Number within its batch and deviation of each recording that determines it, both less the batch's mean."""
+    at, values = [], []
+    for run in runs:
+        known = np.array([k for k, i in enumerate(run) if np.isfinite(found.values[i])], dtype=int)
+        if known.size:
+            own = found.values[[run[k] for k in known]]
+            at.append(known - known.mean())
+            values.append(own - own.mean())
+    return np.concatenate([np.zeros(0), *at]), np.concatenate([np.zeros(0), *values])
+
+
+def _slope(at: NDArray, values: NDArray) -> float:
+    """Least-squares slope of values without a mean."""
+    return float(at @ values / (at @ at))
 
 
 def report(whitened: Sequence["Whitened"]) -> list[dict]:

@@ -44,6 +44,8 @@ PRETENSION_SPREAD = 0.01
 SPREAD_FREEDOM = 4
 # Distance of two motions over the stroke, and of their durations, within which they are repeats. Chosen.
 SAME_MOTION = 0.01
+# The same of a measured load torque or motion that is the model's input. Chosen: what a brake or a hand repeats to.
+SAME_LOAD = 0.05
 # Fewest recordings whose scatter or trend is looked at, and the largest spread that their scatter, without repeats, may
 # give, over the stated one. Chosen: what differs from run to run by more is to be found, not to be allowed for.
 FEWEST_FOR_SCATTER, MOST_SCATTER = 4, 2.0
