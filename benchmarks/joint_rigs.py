@@ -3,7 +3,7 @@
 Each rig has one concealed effect, drawn as in the proof but without the largest and the smallest ones, and is recorded
 in three studies on three days. A study repeats one condition; the studies differ in bend, pretension and motion. From
 day to day friction differs by a further 2 % (`BETWEEN`), which no batch file states, and every recording has zeros and
-a pretension of its own. A rig counts if each of its studies, diagnosed by itself, is `undecided`; about one in six
+a pretension of its own. A rig counts if each of its studies, diagnosed by itself, is `undecided`; about one in seven
 does. It is decided if all three together are `explained`, with the true effect named first.
 
 A study has two recordings. One (`--repeats 1`) would be `undecided` by rule, whatever it shows.
