@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from proof.cases import Case
 from virtualrig.campaign import as_yaml, compress, description, log_name, prepare, recording_generator, run
-from virtualrig.config import Campaign, LoadCell, RecordingPlan, TorqueSensor
+from virtualrig.config import Campaign, LoadCell, RecordingPlan, Repeatability, TorqueSensor
 from virtualrig.motion import Excitation, smooth_step
 from virtualrig.sensors import log, sensed_sides
 from virtualrig.trajectory import Preparation, SimulationError, Trajectory
@@ -110,10 +110,11 @@ def noise_floor(
 ) -> dict[str, float]:
     """Root mean square error of a model with the true physics, by channel: repeatability plus sensors.
 
-    The recording is simulated again with friction 1 % higher and the drive offset by one standard deviation of its
-    sub-count position. The difference is added in quadrature to the sensors' noise and to the uncertainty of their
-    zeros. The load's sub-count position counts twice, because its zero is read at the same rest. Both load cells give
-    the pretension at rest, so that each is off by half the difference of their zeros.
+    The recording is simulated again with friction 1 % higher, the drive offset by one standard deviation of its
+    sub-count position, and a past in the middle of its range. The difference is added in quadrature to the sensors'
+    noise and to the uncertainty of their zeros. The load's sub-count position counts twice, because its zero is read at
+    the same rest. Both load cells give the pretension at rest, so that each is off by half the difference of their
+    zeros.
 
     Parameters
     ----------
@@ -126,7 +127,8 @@ def noise_floor(
     """
     sensors = campaign.sensors
     count_variance = (2 * np.pi / sensors.encoder.counts_per_rev) ** 2 / 12
-    repeat = replace(preparation, friction_coefficient=preparation.friction_coefficient * REPEAT_FRICTION_FACTOR)
+    friction = preparation.friction_coefficient * REPEAT_FRICTION_FACTOR
+    repeat = replace(preparation, friction_coefficient=friction, **_usual_past(campaign.repeatability))
     offset = plan.model_copy(update={"excitation": OffsetMotion(plan.excitation, np.sqrt(count_variance))})
     first = noise_free_channels(campaign, trajectory)
     second = noise_free_channels(campaign, simulate(campaign, offset, repeat))
@@ -140,6 +142,11 @@ def noise_floor(
         "F_load_N": force,
     }
     return {name: float(np.sqrt(np.mean((first[name] - second[name]) ** 2) + sensor_variance[name])) for name in first}
+
+
+def _usual_past(spread: Repeatability) -> dict[str, float]:
+    """The past that a model knows of a recording which states none: the middle of its range, by field."""
+    return {name: float(np.mean(getattr(spread, name))) for name in ("tensioned_before_s", "ran_in_before")}
 
 
 def _noise_variance(sensor: TorqueSensor | LoadCell) -> float:

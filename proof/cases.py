@@ -16,6 +16,8 @@ from virtualrig.effects.contract import Twin
 
 CLEAN = "none"
 SEVERITIES = 3
+# Kinds of cases with several effects, and their number.
+SEVERAL = {"pair": 2, "triple": 3}
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ class Case:
     requested : dict
         Requested kind and effect; None where they were drawn.
     kind : str
-        clean, single, pair, unlisted, removed or poor.
+        clean, single, pair, triple, unlisted, removed or poor.
     protocol : str
         Name of the protocol in the plan.
     truth : tuple of Truth
@@ -71,6 +73,8 @@ class Case:
         The batch that is diagnosed.
     kept_back : tuple of RecordingPlan
         Held-out recordings, made after the diagnosis has ended.
+    effects : tuple of Effects
+        Each concealed effect as a rig has it that has no other.
     """
 
     name: str
@@ -83,6 +87,13 @@ class Case:
     campaign: Campaign
     recordings: tuple[RecordingPlan, ...]
     kept_back: tuple[RecordingPlan, ...]
+    effects: tuple[Effects, ...] = ()
+
+    def alone(self, k: int) -> "Case":
+        """The same rig and recordings with one of the concealed effects."""
+        rig = self.campaign.rig.model_copy(update={"effects": self.effects[k]})
+        campaign = self.campaign.model_copy(update={"rig": rig})
+        return replace(self, name=f"{self.name}-{k}", truth=self.truth[k : k + 1], campaign=campaign)
 
     @property
     def key(self) -> dict:
@@ -153,6 +164,7 @@ def draw(seed: int, kind: str | None = None, effect: str | None = None) -> Case:
         campaign=campaign,
         recordings=draw_recordings(protocol, plan, conditions, random),
         kept_back=draw_held_out(protocol, plan, conditions, random),
+        effects=tuple(Effects.model_validate(merged([e])) for _, e in drawn),
     )
 
 
@@ -177,9 +189,9 @@ def _chosen(kind: str, effect: str | None, plan: Plan, random: Generator) -> lis
     if kind == "unlisted":
         name = effect or str(random.choice(list(plan.unlisted)))
         return [(plan.unlisted[name], random.uniform())]
-    if kind == "pair":
-        both = random.choice(list(plan.effects), 2, replace=False)
-        return [(plan.effects[name], random.uniform(*plan.pair_strength)) for name in both]
+    if kind in SEVERAL:
+        several = random.choice(list(plan.effects), SEVERAL[kind], replace=False)
+        return [(plan.effects[name], random.uniform(*plan.pair_strength)) for name in several]
     name = effect or str(random.choice(list(plan.effects)))
     return [(plan.effects[name], random.uniform())]
 

@@ -15,7 +15,7 @@ from ccmodel.cli import FormerOptions
 from proof import conceal
 from proof.archive import pack, unpack
 from proof.build import build as build_case
-from proof.cases import Case, draw
+from proof.cases import SEVERAL, Case, draw
 from proof.plan import read_plan
 
 
@@ -249,7 +249,7 @@ def cases_of(seed: int, count: int, kind: str | None, effect: str | None) -> lis
     for what, (given, names) in known.items():
         if given is not None and given not in names:
             raise typer.BadParameter(f"there is no {what} {given!r}; there are {', '.join(names)}")
-    if effect is not None and kind in (None, "clean", "pair"):
+    if effect is not None and kind in (None, "clean", *SEVERAL):
         raise typer.BadParameter("--effect needs --kind single, removed, poor or unlisted")
     if effect is not None and (effect in plan.unlisted) != (kind == "unlisted"):
         raise typer.BadParameter(f"{effect} is not an effect of a case of kind {kind}")

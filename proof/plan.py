@@ -59,6 +59,14 @@ class SensorsPlan(Strict):
     slow_s: Range
 
 
+class PastPlan(Strict):
+    """What comes before a recording: ranges of times over the time constants, and of the profile that motions leave."""
+
+    relaxed_for: Range = (0.0, 0.0)
+    ran_in_for: Range = (0.0, 0.0)
+    profile_curvature: Range = (0.0, 0.0)
+
+
 class NumericsPlan(Strict):
     """The rig's numerics. `first_tension_limit_N` is raised for a run that exceeds it."""
 
@@ -143,6 +151,7 @@ class Plan(Strict):
     estimates: EstimatesPlan
     sensors: SensorsPlan
     repeatability: Repeatability
+    past: PastPlan = PastPlan()
     numerics: NumericsPlan
     motion: MotionPlan
     kinds: dict[str, Share]

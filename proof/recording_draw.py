@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from numpy.random import Generator
 
 from proof.plan import Plan, PlannedRecording, Protocol
@@ -37,7 +38,8 @@ def draw_recordings(
     for planned in protocol.recordings:
         motion = made[planned.again].excitation if planned.again else _varied_motion(planned, plan, random)
         made[planned.id] = conditions.recording(planned.id, planned.pretension, planned.bend, motion)
-    return tuple(made.values())
+    places = np.linspace(-0.5, 0.5, len(made)).tolist() if len(made) > 1 else [0.0]
+    return tuple(one.model_copy(update={"position": place}) for one, place in zip(made.values(), places, strict=True))
 
 
 def _varied_motion(planned: PlannedRecording, plan: Plan, random: Generator) -> Excitation:

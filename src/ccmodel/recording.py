@@ -63,6 +63,10 @@ class Recording:
         End of a start-up transient, s: comparisons begin there. 0 if there is none.
     warnings : tuple of str
         Faults that leave the recording usable.
+    started_at_s, tensioned_at_s : float or None
+        When the recording started and when its cables were tensioned, s since 1970 (UTC); None if not stated.
+    position : float
+        Place in the session by the order of the recordings, -1/2 to 1/2; 0 if unknown.
     far_end : str or None
         What holds the far end of a single cable, one of `FAR_ENDS`; None for a pull-pull pair.
     """
@@ -82,6 +86,9 @@ class Recording:
     settled_s: float = 0.0
     warnings: tuple[str, ...] = ()
     far_end: str | None = None
+    started_at_s: float | None = None
+    tensioned_at_s: float | None = None
+    position: float = 0.0
 
     def __post_init__(self) -> None:
         for name, values in self.channels.items():
@@ -203,6 +210,7 @@ def read_provenance(path: Path) -> dict:
 
 
 _SCALARS = {"batch": str, "origin": str, "pretension_N": float, "rest_s": float, "settled_s": float}
+_IF_STATED = ("far_end", "started_at_s", "tensioned_at_s")
 # Numbers of each channel of a sensor.
 _OF_SENSORS = ("accuracy", "encoder_step_rad")
 
@@ -219,8 +227,9 @@ def _to_dataset(recording: Recording) -> xr.Dataset:
     variables["piece_bend_rad"] = ("piece", recording.path.piece_bend_rad, {"units": "rad"})
     attributes = {name: getattr(recording, name) for name in _SCALARS}
     attributes["excitation"] = json.dumps(dict(recording.excitation))
-    if recording.far_end:
-        attributes["far_end"] = recording.far_end
+    for name in _IF_STATED:
+        if (value := getattr(recording, name)) is not None:
+            attributes[name] = value
     attributes["warnings"] = json.dumps(list(recording.warnings))
     return xr.Dataset(variables, coords={"time_s": ("time_s", recording.time_s, {"units": "s"})}, attrs=attributes)
 
@@ -232,6 +241,7 @@ def _from_dataset(name: str, dataset: xr.Dataset) -> Recording:
     of_sensors: dict[str, Any] = {
         key: {c: float(a[key]) for c, a in attributes.items() if key in a} for key in _OF_SENSORS
     }
+    if_stated: dict[str, Any] = {name: dataset.attrs.get(name) for name in _IF_STATED}
     return Recording(
         id=name,
         time_s=dataset["time_s"].values,
@@ -240,7 +250,7 @@ def _from_dataset(name: str, dataset: xr.Dataset) -> Recording:
         path=ConduitPath(dataset["piece_length_m"].values, dataset["piece_bend_rad"].values),
         excitation=json.loads(dataset.attrs["excitation"]),
         warnings=tuple(json.loads(dataset.attrs["warnings"])),
-        far_end=dataset.attrs.get("far_end"),
+        **if_stated,
         **scalars,
         **of_sensors,
     )

@@ -97,14 +97,23 @@ def prepare(campaign: Campaign, plan: RecordingPlan, draw: Generator) -> Prepara
     """Draw the initial state of one recording: friction, pretension and tension profile."""
     spread: Repeatability = campaign.repeatability
     low, high = spread.profile_share
-    earliest, latest = spread.tensioned_before_s
+    drifted = 1 + campaign.rig.effects.friction_drift * plan.position
     return Preparation(
-        friction_coefficient=campaign.rig.cable.friction_coefficient * (1 + spread.friction * draw.standard_normal()),
+        friction_coefficient=drifted
+        * campaign.rig.cable.friction_coefficient
+        * (1 + spread.friction * draw.standard_normal()),
         pretension_N=plan.pretension_N * (1 + spread.pretension * draw.standard_normal()),
         profile_share=(draw.uniform(low, high), draw.uniform(low, high)),
-        # Without a range there is no draw, so that rigs without a past keep the noise of their recordings.
-        tensioned_before_s=draw.uniform(earliest, latest) if latest > earliest else latest,
+        tensioned_before_s=_drawn(spread.tensioned_before_s, draw),
+        ran_in_before=_drawn(spread.ran_in_before, draw),
+        profile_curvature=(_drawn(spread.profile_curvature, draw), _drawn(spread.profile_curvature, draw)),
     )
+
+
+def _drawn(between: tuple[float, float], draw: Generator) -> float:
+    """A number between two bounds; no draw without a range, so that rigs without a past keep their noise."""
+    low, high = between
+    return draw.uniform(low, high) if high > low else high
 
 
 def run(campaign: Campaign, plan: RecordingPlan, preparation: Preparation) -> Trajectory:
@@ -113,7 +122,10 @@ def run(campaign: Campaign, plan: RecordingPlan, preparation: Preparation) -> Tr
     time_s = np.arange(round(plan.excitation.duration_s * rate) + 1) / rate
     numerics = campaign.numerics
     grid = make_grid(plan.conduit, numerics.cell_length_m, numerics.cell_bend_rad)
-    return simulate(campaign.rig, grid, numerics, preparation, time_s, plan.excitation.angle_and_rate(time_s))
+    drifted = 1 + campaign.rig.effects.stiffness_drift * plan.position
+    cable = campaign.rig.cable.model_copy(update={"stiffness_N_per_m": drifted * campaign.rig.cable.stiffness_N_per_m})
+    rig = campaign.rig.model_copy(update={"cable": cable})
+    return simulate(rig, grid, numerics, preparation, time_s, plan.excitation.angle_and_rate(time_s))
 
 
 def compress(columns: dict[str, NDArray]) -> bytes:

@@ -108,13 +108,18 @@ class Repeatability(Strict):
 
     `friction` and `pretension` are relative standard deviations. `profile_share` holds the bounds of the initial
     profile, drawn for each cable: ln T falls from the drive end to the load end by this share of mu phi.
-    `tensioned_before_s` holds the bounds of the time between tensioning and recording, in which the cables relax.
+    `tensioned_before_s` holds the bounds of the time between tensioning and recording, in which the cables relax, and
+    `ran_in_before` those of the time or travel before the recording over the scale of the running-in.
+    `profile_curvature` holds the bounds of the initial profile's curvature, drawn for each cable: along the conduit the
+    slope of ln T changes by twice this share of mu.
     """
 
     friction: Share
     pretension: Share
     profile_share: tuple[Share, Share]
     tensioned_before_s: tuple[NonNegative, NonNegative] = (0.0, 0.0)
+    ran_in_before: tuple[NonNegative, NonNegative] = (0.0, 0.0)
+    profile_curvature: tuple[float, float] = (0.0, 0.0)
 
 
 class Numerics(Strict):
@@ -137,12 +142,13 @@ class Piece(Strict):
 
 
 class RecordingPlan(Strict):
-    """Plan of one recording."""
+    """Plan of one recording; `position` is its place in the session, -1/2 to 1/2, for what drifts."""
 
     id: str
     pretension_N: PositiveFloat
     conduit: tuple[Piece, ...] = Field(min_length=1)
     excitation: Excitation
+    position: float = 0.0
 
 
 Repeats = Annotated[int, Field(ge=1, le=26)]

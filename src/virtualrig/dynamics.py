@@ -68,7 +68,7 @@ def _channels(
     """Arguments of the compiled march, and its result: theta_out, T1, T2, T3, T4; shape (5, samples)."""
     radius, load, cable = rig.pulley_radius_m, rig.load, rig.cable
     grip = node_grip(grid, preparation.friction_coefficient)
-    bristle = np.repeat(np.array(preparation.profile_share)[:, None], grip.size, axis=1)
+    bristle = preparation.bristles(grip.size)
     tension = np.stack([initial_tension(grid, grip, b, preparation.pretension_N) for b in bristle])
     stiffness, mass = cable.EA_N / grid.segment_length_m, cable.density_kg_per_m * grid.cell_length_m
     bristles = 2 * grip * numerics.tension_limit_N / numerics.bristle_length_m

@@ -55,6 +55,7 @@ def simulate(
     """Run a rig with effects; parameters, result and errors are those of `virtualrig.dynamics.simulate`."""
     theta_in_rad, omega_in_rad_per_s = drive
     effects, physics = rig.effects, _physics(rig, numerics)
+    physics = physics._replace(run_in_before=preparation.ran_in_before * physics.run_in_scale)
     lengths = _bristle_lengths(effects, numerics)
     half_bend = _half_bend(grid, effects, preparation.friction_coefficient)
     stiffness = _stiffness(rig, grid)
@@ -158,7 +159,7 @@ def _initial_state(
     physics: Physics, grid: Grid, preparation: Preparation, half_bend: NDArray, drag: NDArray
 ) -> tuple[NDArray, NDArray]:
     """Tension of the segments (N, shape (2, n + 1)) and bristles (shape (2, n)) that hold it in balance."""
-    share = np.repeat(np.array(preparation.profile_share)[:, None], drag.size, axis=1)
+    share = preparation.bristles(drag.size)
     grip = np.tanh(half_bend)
     tension = np.stack([initial_tension(grid, *of, preparation.pretension_N) for of in zip(grip, share, strict=True)])
     both = tension[:, :-1] + tension[:, 1:]

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 from numpy.typing import NDArray
 
 
@@ -17,6 +18,10 @@ class Preparation:
         Mean tension along the conduit, of both cables, N.
     profile_share : tuple of float
         Fall of ln T from the drive end to the load end over mu phi, for cables A and B.
+    ran_in_before : float
+        Time or travel before the first sample, over the scale of the running-in.
+    profile_curvature : tuple of float
+        Half of the change of that slope along the conduit, for cables A and B.
     tensioned_before_s : float
         Time between the tensioning of the cables and the first sample, in which they have relaxed, s.
     """
@@ -24,7 +29,15 @@ class Preparation:
     friction_coefficient: float
     pretension_N: float
     profile_share: tuple[float, float]
+    ran_in_before: float = 0.0
+    profile_curvature: tuple[float, float] = (0.0, 0.0)
     tensioned_before_s: float = 0.0
+
+    def bristles(self, cells: int) -> NDArray:
+        """Slope of ln T over mu in each cell of cables A and B, shape (2, cells); friction holds no more than 1."""
+        along = 1 - 2 * (np.arange(cells) + 0.5) / cells
+        share, curvature = (np.array(of)[:, None] for of in (self.profile_share, self.profile_curvature))
+        return np.clip(share + curvature * along, -1.0, 1.0)
 
 
 @dataclass(frozen=True)

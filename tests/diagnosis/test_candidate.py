@@ -9,7 +9,9 @@ import pytest
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import continued, discretisation_shift, fit
 from ccmodel.diagnosis.hypothesis import Hypothesis
-from made_observations import batch, calibrated
+from ccmodel.diagnosis.whitening import relinearised
+from ccmodel.model.general import Active
+from made_observations import PARAMETERS, batch, calibrated, whitened
 
 LOW = np.array([0.0, 1e-3])
 KEY = "conduit-compliance/conduit/compliance"
@@ -22,12 +24,12 @@ def test_the_discretisation_shift_is_that_of_a_fit_on_the_finer_solver(monkeypat
     hypothesis = Hypothesis((("conduit-compliance", "conduit"),))
     found = fit(recordings, hypothesis, base.free, base.values | {KEY: 1e-5})
     k = list(found.values).index(KEY)
-    moved = discretisation_shift(recordings, found)
+    moved = discretisation_shift(found)
     finer = [w.with_parameters(replace(w.observations.parameters, refinement=settings.REFINEMENT)) for w in recordings]
     there = fit(finer, hypothesis, base.free, found.values)
     assert found.values[KEY] + moved[k] == pytest.approx(there.values[KEY], abs=0.3 * abs(moved[k]))
     monkeypatch.setattr(settings, "REFINEMENT", 1)
-    assert discretisation_shift(recordings, found) == pytest.approx(np.zeros(moved.size), abs=1e-12)
+    assert discretisation_shift(found) == pytest.approx(np.zeros(moved.size), abs=1e-12)
 
 
 def test_the_papers_model_has_no_solver_to_refine():
@@ -49,3 +51,40 @@ def test_a_model_without_unknowns_is_evaluated_as_it_is():
     found = fit(recordings, Hypothesis(), {}, {})
     assert found.values == {}
     assert found.mean_square == pytest.approx(calibrated(recordings).mean_square, rel=0.05)
+
+
+RELAXED = (0.0, 0.9, 0.4, 0.7)
+SHARE, TAU, STATE = (f"relaxation/cable/{name}" for name in ("r", "tau", "relaxed"))
+RELAXATION = Hypothesis((("relaxation", "cable"),))
+
+
+def relaxing():
+    """Recordings whose cables were tensioned at different times before, of a rig that relaxes by a fifth in 5 s."""
+    conditions = ((0.6, 1.0, 7.0), (0.4, 0.7, 7.0), (0.6, 1.0, 5.0), (0.5, 1.3, 6.0))
+    values = [{"r": 0.2, "tau": 5.0, "relaxed": relaxed} for relaxed in RELAXED]
+    truths = [replace(PARAMETERS, mechanisms=(Active("relaxation", "cable", v),)) for v in values]
+    return [whitened(*c, seed=k, truth=t) for k, (c, t) in enumerate(zip(conditions, truths, strict=True))]
+
+
+def test_recordings_may_differ_in_the_state_that_they_begin_at():
+    recordings = relaxing()
+    base = calibrated(recordings)
+    found = fit(recordings, RELAXATION, base.free, base.values | {SHARE: 0.1, TAU: 10.0, STATE: 0.5})
+    assert base.mean_square > 10
+    assert found.mean_square < 1.3
+    own = [w.own_values(found.values)[STATE] for w in found.whitened]
+    assert own == pytest.approx(RELAXED, abs=0.1)
+    assert found.values[SHARE] == pytest.approx(0.2, abs=0.04)
+
+
+def test_only_a_model_with_states_has_them_as_nuisances():
+    recordings = relaxing()
+    base = calibrated(recordings)
+    assert all(a.effects is b.effects for a, b in zip(base.whitened, recordings, strict=True))
+    found = fit(recordings, RELAXATION, base.free, base.values | {SHARE: 0.2, TAU: 5.0, STATE: 0.5})
+    assert all(w.scalar_nuisances[-1][0] == STATE for w in found.whitened)
+    about = [relinearised(w, found.model(PARAMETERS)) for w in recordings]
+    without = fit(about, Hypothesis(), base.free, base.values)
+    assert [name for name, _, _ in without.whitened[0].scalar_nuisances] == [
+        name for name, _, _ in recordings[0].scalar_nuisances
+    ]

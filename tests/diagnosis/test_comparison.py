@@ -9,11 +9,12 @@ import pytest
 
 from ccmodel.diagnosis import verdict as verdicts
 from ccmodel.diagnosis.candidate import CandidateFit
-from ccmodel.diagnosis.comparison import Comparison, well_specified
+from ccmodel.diagnosis.comparison import Comparison, improves_on_members, well_specified
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.lack_of_fit import LackOfFit
+from ccmodel.diagnosis.result import alternatives_of
 from ccmodel.diagnosis.screening import Score
-from ccmodel.diagnosis.selection import Selection, improves_on_members
+from ccmodel.diagnosis.selection import Selection, grows
 from ccmodel.diagnosis.settings import RIVAL, SUFFICIENT, SURE
 from ccmodel.diagnosis.verdict import judge, nested_choice
 from ccmodel.inference.effective_samples import in_comparison
@@ -21,12 +22,18 @@ from ccmodel.inference.problem import Free
 from made_observations import batch, calibrated
 
 FRICTION, SCALE = ("pulley-friction", "drive-pulley"), ("torque-scale", "drive-sensor")
+KINK = ("kink", "conduit")
 STARTS = [
     {"torque-scale/drive-sensor/gain": 0.05},
     {f"pulley-friction/drive-pulley/{name}": 2e-3 for name in ("friction_torque", "presliding")},
 ]
 BASE_VALUES = {"friction_coefficient": 0.15}
-VALUES = {"pulley-friction/drive-pulley/friction_torque": 4e-3, "torque-scale/drive-sensor/gain": 0.05}
+VALUES = {
+    "pulley-friction/drive-pulley/friction_torque": 4e-3,
+    "torque-scale/drive-sensor/gain": 0.05,
+    "kink/conduit/beta": 0.5,
+    "presliding/conduit/z0": 5e-5,
+}
 CHANNELS = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N")
 WHITENED = [SimpleNamespace(observations=SimpleNamespace(channels=CHANNELS, tolerance_share=0.0))] * 8
 
@@ -44,7 +51,7 @@ def fitted(mean_square, *acting, **values):
     mean_squares = np.broadcast_to(np.asarray(mean_square, float), 8)
     residuals = list(np.sqrt(mean_squares)[:, None])
     return CandidateFit(
-        Hypothesis(acting), {}, BASE_VALUES | own, [], [], np.eye(1), np.ones(1), [BASE_VALUES] * 8, residuals
+        Hypothesis(acting), WHITENED, {}, BASE_VALUES | own, [], [], np.eye(1), np.ones(1), [BASE_VALUES] * 8, residuals
     )
 
 
@@ -139,11 +146,11 @@ def test_a_tolerance_lowers_the_confidence_in_proportion_to_its_share():
 
 def test_misspecification_is_more_likely_the_higher_the_mean_square_and_the_more_was_tried():
     base, mean_squares = fitted(10.0), (0.95, 1.1, 1.4, 2.0, 5.0)
-    odds = [well_specified(fitted(mean_square, FRICTION), base) for mean_square in mean_squares]
+    odds = [well_specified(fitted(mean_square, FRICTION), base, 0.0) for mean_square in mean_squares]
     assert all(a > b for a, b in itertools.pairwise(odds))
     assert odds[0] > 0.98
     assert odds[-1] < 0.2
-    pairs = [well_specified(fitted(mean_square, FRICTION, SCALE), base) for mean_square in mean_squares[:3]]
+    pairs = [well_specified(fitted(mean_square, FRICTION, SCALE), base, 0.0) for mean_square in mean_squares[:3]]
     assert all(pair < single for pair, single in zip(pairs, odds, strict=False))
 
 
@@ -208,6 +215,45 @@ def test_a_pair_must_halve_the_excess_of_its_members():
     alone = fitted(1.9, FRICTION)
     assert not improves_on_members(fitted(1.6, FRICTION, SCALE), [alone])
     assert improves_on_members(fitted(1.2, FRICTION, SCALE), [alone])
+
+
+def test_a_set_of_three_must_halve_the_excess_of_each_part_of_it():
+    pairs = [fitted(3.0, FRICTION, SCALE), fitted(2.6, FRICTION, KINK), fitted(1.5, SCALE, KINK)]
+    assert improves_on_members(fitted(1.2, FRICTION, SCALE, KINK), pairs)
+    assert not improves_on_members(fitted(1.3, FRICTION, SCALE, KINK), pairs)
+
+
+def test_the_form_error_of_a_set_is_a_share_of_the_effect_of_each_member():
+    presliding = ("presliding", "conduit")
+    singles = [fitted(50.0, presliding), fitted(20.0, KINK)]
+    both = fitted(4.0, presliding, KINK)
+    found = Comparison(WHITENED, fitted(100.0), [both, *singles], {})
+    assert found.form_error(both) == pytest.approx(0.08 * 16.0 + 0.001 * 46.0)
+    assert found.form_error(singles[0]) == pytest.approx(0.08 * 50.0)
+    assert found.form_error(found.base) == 0.0
+
+
+def test_sets_grow_as_long_as_they_gain_evidence():
+    """Three effects alike in size: no pair halves the excess of its members, and yet the pairs lead on."""
+    singles = [fitted(3.2, one) for one in (FRICTION, SCALE, KINK)]
+    pairs = [fitted(2.5, *two) for two in itertools.combinations((FRICTION, SCALE, KINK), 2)]
+    assert not any(improves_on_members(pair, singles) for pair in pairs)
+    found = Comparison(WHITENED, fitted(4.5), singles, {}, passed_over=pairs)
+    assert grows(found, 2)
+    assert not grows(found, 3)
+    same = Comparison(WHITENED, fitted(4.5), singles, {}, passed_over=[fitted(3.195, FRICTION, SCALE)])
+    assert not grows(same, 2)
+
+
+def test_a_mechanism_has_the_probability_of_all_sets_that_contain_it():
+    """Which of two look-alikes stands beside a mechanism is open; the mechanism itself is not."""
+    sets = [fitted(1.0, FRICTION, SCALE), fitted(1.0, FRICTION, KINK)]
+    found = verdict(fitted(9.0), *sets)
+    assert found.verdict == "undecided"
+    assert found.probability == pytest.approx([0.5, 0.5], abs=0.01)
+    shares = {a["name"]: a["confidence"] for a in alternatives_of(found, {})}
+    assert shares["pulley-friction"] == pytest.approx(2 * shares["kink"], rel=0.05)
+    assert shares["pulley-friction"] > SURE
 
 
 def test_a_recording_is_predicted_by_the_choice_of_the_others():

@@ -300,7 +300,16 @@ def test_a_number_stands_where_a_finer_solver_would_have_it():
     key, found = "constant-drag/conduit/f0", {}
     for moved in (0.0, 0.03):
         candidate = CandidateFit(
-            Hypothesis((("constant-drag", "conduit"),)), {}, {key: 0.5}, [], [], np.array([[0.04**2]]), np.inf, [], []
+            Hypothesis((("constant-drag", "conduit"),)),
+            [],
+            {},
+            {key: 0.5},
+            [],
+            [],
+            np.array([[0.04**2]]),
+            np.inf,
+            [],
+            [],
         )
         found[moved] = mechanism_of(candidate, 0, 0.9, np.array([moved]))["parameters"][0]
     plain, corrected = found[0.0], found[0.03]

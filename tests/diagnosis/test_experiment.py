@@ -28,7 +28,7 @@ def fitted(recordings, *acting, known_to=KNOWN_TO, **numbers):
     values = VALUES | numbers
     covariance = np.diag([(known_to * value) ** 2 for value in values.values()])
     residuals = [np.ones(w.observations.measured.size) for w in recordings]
-    return CandidateFit(Hypothesis(acting), FREE, values, [], [], covariance, np.ones(len(values)), [], residuals)
+    return CandidateFit(Hypothesis(acting), [], FREE, values, [], [], covariance, np.ones(len(values)), [], residuals)
 
 
 def judged(recordings, *rivals):

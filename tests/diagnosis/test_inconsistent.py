@@ -18,7 +18,7 @@ from ccmodel.typed import InputError
 
 KEYS = {
     "format", "batch", "verdict", "is_held", "location", "mechanisms", "alternatives", "likeliest", "nearest", "fit",
-    "next_experiment", "not_judged", "headline", "provenance",
+    "repeatability", "next_experiment", "not_judged", "headline", "provenance",
 }  # fmt: skip
 DEAD = "is 0 throughout: a sensor that is dead or was never connected: column not used"
 

@@ -24,29 +24,29 @@ def fitted(recordings, errors):
         e = w.observations
         shape = e.measured.shape
         residuals.append((random.standard_normal(shape) + errors(k, e)).ravel())
-    return CandidateFit(Hypothesis(), {}, {}, [], [], np.eye(1), np.ones(1), [], residuals)
+    return CandidateFit(Hypothesis(), recordings, {}, {}, [], [], np.eye(1), np.ones(1), [], residuals)
 
 
 def test_noise_is_not_predicted(recordings):
-    found = lack_of_fit(recordings, fitted(recordings, lambda k, e: 0.0))
+    found = lack_of_fit(fitted(recordings, lambda k, e: 0.0))
     assert found.mean < 0.02
     assert found.lower_bound < 0.01
 
 
 def test_errors_that_follow_the_drive_are_predicted(recordings):
-    found = lack_of_fit(recordings, fitted(recordings, lambda k, e: np.sin(4 * e.given.theta_in[e.judged])))
+    found = lack_of_fit(fitted(recordings, lambda k, e: np.sin(4 * e.given.theta_in[e.judged])))
     assert found.lower_bound > 0.2
 
 
 def test_differences_from_run_to_run_are_not_predicted(recordings):
     signs = [1, -1, 1, -1]
-    found = lack_of_fit(recordings, fitted(recordings, lambda k, e: signs[k] * np.sin(4 * e.given.theta_in[e.judged])))
+    found = lack_of_fit(fitted(recordings, lambda k, e: signs[k] * np.sin(4 * e.given.theta_in[e.judged])))
     assert found.lower_bound < 0.02
 
 
 def test_a_single_recording_is_predicted_in_stretches(recordings):
     one = recordings[:1]
-    found = lack_of_fit(one, fitted(one, lambda k, e: 2 * np.sin(4 * e.given.theta_in[e.judged])))
+    found = lack_of_fit(fitted(one, lambda k, e: 2 * np.sin(4 * e.given.theta_in[e.judged])))
     assert found.reduction.size == 4
     assert found.mean > 0.2
 
@@ -54,15 +54,15 @@ def test_a_single_recording_is_predicted_in_stretches(recordings):
 def test_a_channel_may_be_missing_in_a_recording(recordings):
     lacking = [recordings[0].with_parameters(recordings[0].observations.parameters), *recordings[1:]]
     object.__setattr__(lacking[0], "observations", lacking[0].observations.without("tau_out_Nm"))
-    found = lack_of_fit(lacking, fitted(lacking, lambda k, e: np.sin(4 * e.given.theta_in[e.judged])))
+    found = lack_of_fit(fitted(lacking, lambda k, e: np.sin(4 * e.given.theta_in[e.judged])))
     assert found.lower_bound > 0.2
 
 
 def test_errors_within_the_tolerance_do_not_count(recordings):
     """A tolerance of half the noise's mean square: predictable errors of that size do not count, larger ones do."""
     allowed = [replace(w, observations=_allowing(w.observations, 0.5)) for w in recordings]
-    small = lack_of_fit(allowed, fitted(allowed, lambda k, e: 0.8 * np.sin(4 * e.given.theta_in[e.judged])))
-    large = lack_of_fit(allowed, fitted(allowed, lambda k, e: 2.0 * np.sin(4 * e.given.theta_in[e.judged])))
+    small = lack_of_fit(fitted(allowed, lambda k, e: 0.8 * np.sin(4 * e.given.theta_in[e.judged])))
+    large = lack_of_fit(fitted(allowed, lambda k, e: 2.0 * np.sin(4 * e.given.theta_in[e.judged])))
     assert small.lower_bound < 0 < large.lower_bound
 
 

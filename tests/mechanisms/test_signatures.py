@@ -9,6 +9,7 @@ from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.mechanisms.drive_windup import STANDSTILL_RAD, torque_of_train
 from ccmodel.mechanisms.pulley_friction import PRESLIDING_RAD
+from ccmodel.mechanisms.relaxation import relaxed_after
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, SpringLoad
 from general_runs import HALF_LOOP, K_E, MU, T0, TENSIONS, L, R, last_cycle, loop_area, rms, run, sine
@@ -170,6 +171,39 @@ def test_relaxation_decays_at_rest_as_the_standard_linear_solid():
     for name in TENSIONS:
         assert getattr(run_, name) == pytest.approx(expected, rel=1e-6)
     assert np.abs(run_.theta_out_rad).max() < 1e-9
+
+
+@pytest.mark.parametrize("relaxed", [0.4, 1.0])
+def test_relaxation_goes_on_from_where_a_recording_starts(relaxed):
+    """Of the tension that the rest shows, r (1 - relaxed) is yet to be lost."""
+    r, tau = 0.2, 30.0
+    run_ = run(np.zeros(501), ("relaxation", "cable", {"r": r, "tau": tau, "relaxed": relaxed}), period_s=60.0)
+    expected = T0 * (1 - r * (1 - relaxed) * -np.expm1(-run_.time_s / tau))
+    for name in TENSIONS:
+        assert getattr(run_, name) == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_run_goes_on_as_the_later_part_of_a_longer_one():
+    """Held at rest for a time, a fresh cable has relaxed by 1 - exp(-t / tau), and its friction has run in by it."""
+    theta, held_s, tau = sine(), 4.0, 5.0
+    mechanisms = {
+        "relaxation": ("cable", {"r": 0.15, "tau": tau}, {"relaxed": relaxed_after(held_s, 0.15, tau)}),
+        "running-in": ("conduit", {"change": -0.3, "tau": tau}, {"done": -np.expm1(-held_s / tau)}),
+    }
+    for name, (place, values, state) in mechanisms.items():
+        whole = run(np.concatenate([np.zeros(2000), theta]), (name, place, values))
+        later = run(theta, (name, place, values | state), T=whole.T1_N[2000])
+        for tension in TENSIONS:
+            assert getattr(later, tension) == pytest.approx(getattr(whole, tension)[2000:], rel=1e-4), name
+
+
+def test_a_state_without_a_strength_is_the_papers_model_bit_for_bit(base):
+    for name, place, values in (
+        ("relaxation", "cable", {"r": 0.0, "tau": 30.0, "relaxed": 0.7}),
+        ("running-in", "conduit", {"change": 0.0, "tau": 30.0, "done": 0.7}),
+    ):
+        neutral = run(sine(), (name, place, values))
+        assert all((getattr(neutral, tension) == getattr(base, tension)).all() for tension in TENSIONS), name
 
 
 def test_relaxation_does_not_depend_on_the_step():

@@ -81,6 +81,10 @@ def effect(place="conduit", **values):
             lambda: by_general(relaxation=effect("cable", r=0.1, tau=0.0)),
             "tau = 0 .time constant., which must be above 0",
         ),
+        (
+            lambda: by_general(relaxation=effect("cable", r=0.1, tau=5.0, relaxed=1.2)),
+            "relaxed = 1.2 .share of the loss .*; it is 0 to 1",
+        ),
         (lambda: by_general(running_in=effect(change=-1.5, tau=5.0)), "change = -1.5 .*must be above -1"),
         (lambda: by_general(pulley_eccentricity=effect("load-pulley", e=1.5, psi=0.0)), "e = 1.5 .*must be below 1"),
         (lambda: by_general(cable_asymmetry=effect("cable", ratio=-1.0, K_ratio=1.0)), "must not be negative"),

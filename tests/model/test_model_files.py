@@ -39,7 +39,7 @@ def test_keys_of_the_format_stay(tmp_path):
     """Files of before have these keys, and programs of others read them."""
     written = json.loads(write(tmp_path / "model.json").read_text())["parameters"]
     assert {key: written[key] for key in FORMAT_KEYS} == FORMAT_KEYS
-    names = {f.name for f in fields(Parameters)} - {"mechanisms", "refinement"}
+    names = {f.name for f in fields(Parameters)} - {"mechanisms", "refinement", "session_start_s", "session_end_s"}
     assert len(written) == len(names)
 
 

@@ -40,6 +40,7 @@ def diagnosis(batch: str, verdict: str | None, **changed) -> dict:
         "mechanisms": [BACKLASH] if verdict == "explained" else [],
         "alternatives": [],
         "likeliest": [],
+        "repeatability": [],
         "nearest": None,
         "fit": {
             "held_out": ["a", "b"],

@@ -4,7 +4,7 @@ import pytest
 from made_pages import content, diagnosis
 
 from ccmodel.report.page import write_page
-from ccmodel.studies.diagnosis.page import _caution, _map_in_words, write_not_diagnosed
+from ccmodel.studies.diagnosis.page import _caution, _map_in_words, repeatability_in_words, write_not_diagnosed
 
 YELLOW = {"tau_in": {"at rest": 0.9, "after a reversal": 2.4, "under way": 1.0}}
 QUIET = {"tau_in": {"at rest": 0.9, "after a reversal": 1.2, "under way": float("nan")}}
@@ -23,6 +23,16 @@ def test_no_other_map_needs_it(verdict, errors):
 
 def test_the_map_is_told_to_readers_who_do_not_see_it():
     assert _map_in_words(YELLOW).endswith("τ_in at rest 0.9, after a reversal 2.4, under way 1.0")
+
+
+def test_the_page_says_what_repeats_show_and_what_was_assumed():
+    friction = {"what": "friction from run to run", "value": 0.0123, "unit": "1", "from": "repeats", "recordings": 2}
+    zero = {"what": "zero of F_load from run to run", "value": 0.1, "unit": "N", "from": "assumed", "recordings": 0}
+    assert repeatability_in_words([friction, zero]) == (
+        "Standard deviations that count as noise, estimated: friction from run to run 1.2 % (2 recordings that repeat a"
+        " condition); assumed: zero of F_load from run to run 0.1 N."
+    )
+    assert repeatability_in_words([zero]).endswith("as noise, assumed: zero of F_load from run to run 0.1 N.")
 
 
 def test_a_batch_that_was_not_diagnosed_has_a_report_with_a_way_back(tmp_path):

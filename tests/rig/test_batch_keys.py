@@ -4,6 +4,7 @@ import pytest
 import yaml
 from made_up_batch import description
 
+from ccmodel.recording import read_recordings, write_recordings
 from ccmodel.rig.batch import Batch, load_batch
 from ccmodel.rig.ingest import ingest_batch
 from ccmodel.typed import InputError
@@ -160,3 +161,35 @@ def test_null_is_a_value_and_some_keys_may_be_empty(bench):
     path.write_text(text.replace("    torque_constant", "    encoder_accuracy_rad: null\n    torque_constant"))
     batch = load_batch(bench.folder)
     assert batch.note is None and batch.rig.drive.encoder_accuracy_rad is None
+
+
+def test_a_recording_states_when_it_started_and_when_its_cables_were_tensioned(bench):
+    shared(bench, tensioned_at="2026-03-31T12:00:00Z")
+    one, two = bench.described["recordings"]
+    one["started_at"] = "2026-03-31T14:05:00+02:00"
+    two |= {"started_at": "2026-03-31T12:10:00", "tensioned_at": "2026-03-31T12:08:30"}
+    ingested = ingest_batch(bench.write().folder)
+    waited = [r.started_at_s - r.tensioned_at_s for r in ingested.recordings]
+    assert waited == [300.0, 90.0]
+    assert ingested.recordings[1].started_at_s - ingested.recordings[0].started_at_s == 300.0
+    summary = json.loads(json.dumps(ingested.batch.model_dump(mode="json")))
+    assert Batch.model_validate(summary, strict=False) == ingested.batch
+    file = bench.folder.parent / "recordings.nc"
+    write_recordings(file, ingested.recordings, {})
+    assert [(r.started_at_s, r.tensioned_at_s) for r in read_recordings(file)] == [
+        (r.started_at_s, r.tensioned_at_s) for r in ingested.recordings
+    ]
+
+
+@pytest.mark.parametrize(
+    ("stated", "text"),
+    [
+        ({"started_at": "2026-03-31T14:05:00", "tensioned_at": "2026-03-31T14:06:00"}, "tensioned_at is 60 s after"),
+        ({"started_at": "soon"}, "started_at: must be a date with a time of day as"),
+        ({"started_at": "2026-13-31T14:05:00"}, "started_at: must be a date with a time of day as"),
+    ],
+)
+def test_times_that_cannot_be_are_refused(bench, stated, text):
+    bench.described["recordings"][1] |= stated
+    ((_, found),) = problems(bench)
+    assert text in found

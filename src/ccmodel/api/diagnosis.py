@@ -179,6 +179,7 @@ def diagnose(
     step_s: float | None = None,
     cycles: int | None = None,
     candidates: Candidates = (),
+    time_limit_s: float | None = None,
     trust_inputs: bool = False,
     progress: bool | Progress = False,
 ) -> Diagnosis:
@@ -203,8 +204,10 @@ def diagnose(
         As of `ccmodel.fit`. A batch whose inputs contradict one another has the verdict ``inputs-inconsistent`` unless
         they are trusted.
     candidates : str or sequence
-        Mechanisms at their places, which are fitted in full whatever the screening says: ``"kink at conduit"``, or two
-        together, as ``"kink at conduit, backlash at drive-train"`` or as a sequence of the two; or a sequence of these.
+        Mechanisms at their places, which are fitted in full whatever the screening says: ``"kink at conduit"``; or up
+        to four together, as ``"kink at conduit, backlash at load-pulley"`` or as a sequence; or a sequence of these.
+    time_limit_s : float, optional
+        Time after which no further candidate is fitted, s, by default 140; the report says so.
 
     Returns
     -------
@@ -227,7 +230,9 @@ def diagnose(
     >>> found.nearest
     Model: ...; pulley-friction at drive-pulley, fitted to half-loop, recording (virtual rig, simulated)
     """
-    options = diagnosis_options(tolerance, step_s, cycles, candidates, without, freeze, baseline is not None)
+    options = diagnosis_options(
+        tolerance, step_s, cycles, candidates, without, freeze, baseline is not None, time_limit_s=time_limit_s
+    )
     known = None if baseline is None else as_model(baseline).parameters
     if out is not None:
         try_folder(out)

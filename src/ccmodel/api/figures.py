@@ -93,7 +93,7 @@ def compared(pairs: Sequence[tuple[Recording, Recording]], channel: str | None =
 @_figure
 def residuals(calibration: Calibration, batch: Batch) -> Figure:
     """Residuals of the calibrated model over the noise floor, by channel (rows) and recording (columns)."""
-    whitened = calibration.whitened
+    whitened = calibration.fit.whitened
     of = {w.observations.id: w.observations.errors(calibration.fit.values) for w in whitened}
     floors = {w.observations.id: w for w in whitened}
     size = {

@@ -131,7 +131,7 @@ class Fit:
 
         Columns are the recording's own ``friction_coefficient``, and the zeros of its sensors.
         """
-        rows = {w.observations.id: w.own_values(self.values) for w in self._calibration.whitened}
+        rows = {w.observations.id: w.own_values(self.values) for w in self._calibration.fit.whitened}
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("recording")
 
     @property

@@ -19,10 +19,10 @@ from ccmodel.typed import InputError
 FEWEST_SAMPLES = 20
 # Standard deviation of the model discrepancy that counts as noise, as a share of a channel's peak to peak.
 Tolerance = float | Mapping[str, float]
-# Candidates that are fitted whatever the screening says: one, or several, each of them one mechanism or two together.
+# Candidates that are fitted whatever the screening says: one, or several, each of them one to four mechanisms together.
 Candidates = str | Sequence[str | Sequence[str]]
 # Name of an option on the command line, where it has another one.
-_ON_COMMAND_LINE = {"step_s": "step", "candidates": "candidate"}
+_ON_COMMAND_LINE = {"step_s": "step", "candidates": "candidate", "time_limit_s": "time-limit"}
 
 
 def diagnosis_options(
@@ -34,6 +34,7 @@ def diagnosis_options(
     freeze: bool = False,
     has_baseline: bool = False,
     prefix: str = "",
+    time_limit_s: float | None = None,
 ) -> Options:
     """Checked options of a diagnosis; `prefix` as of `settings_of`.
 
@@ -43,7 +44,7 @@ def diagnosis_options(
         A line for each option that cannot be used.
     """
     names = (without,) if isinstance(without, str) else tuple(without)
-    options = options_of(settings_of(tolerance, step_s, cycles, candidates, prefix), names, freeze)
+    options = options_of(settings_of(tolerance, step_s, cycles, candidates, prefix, time_limit_s), names, freeze)
     check_options(options, has_baseline, prefix)
     return options
 
@@ -54,6 +55,7 @@ def settings_of(
     cycles: int | None = None,
     candidates: Candidates = (),
     prefix: str = "",
+    time_limit_s: float | None = None,
 ) -> Diagnosing:
     """Checked settings of a fit or a diagnosis.
 
@@ -63,6 +65,8 @@ def settings_of(
         As of `ccmodel.diagnose`.
     prefix : str
         What stands before the names of options in messages, "--" on the command line.
+    time_limit_s : float, optional
+        As of `ccmodel.diagnose`.
 
     Raises
     ------
@@ -72,6 +76,8 @@ def settings_of(
     stated_candidates = [candidates] if isinstance(candidates, str) else candidates
     forced = [_together(one) if isinstance(one, str) else list(one) for one in stated_candidates]
     stated: dict[str, Any] = {"step_s": step_s, "cycles": cycles, "forced_candidates": forced}
+    if time_limit_s is not None:
+        stated["time_limit_s"] = time_limit_s
     if isinstance(tolerance, Mapping):
         if unknown := [repr(name) for name in tolerance if name not in MEASURED]:
             text = f"a channel is one of {', '.join(MEASURED)}; got {', '.join(unknown)}"
@@ -88,7 +94,7 @@ def settings_of(
 
 
 def _together(candidate: str) -> list[str]:
-    """One mechanism, or two with a comma between them."""
+    """One mechanism, or several with commas between them."""
     return [one.strip() for one in candidate.split(",")]
 
 

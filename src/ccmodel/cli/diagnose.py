@@ -54,11 +54,15 @@ def diagnose(
     candidate: Annotated[
         list[str],
         typer.Option(
-            help="As 'kink at conduit', or two with a comma: fit it in full whatever the screening says.",
+            help="As 'kink at conduit', or up to four with commas: fit it in full whatever the screening says.",
             autocompletion=completion.candidates,
             show_default=False,
         ),
     ] = [],  # noqa: B006
+    time_limit: Annotated[
+        float | None,
+        typer.Option("--time-limit", help="Time for fitting candidates, s; 140 if not given.", show_default=False),
+    ] = None,
     trust_inputs: TrustInputs = False,
     strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 unless the model agrees.")] = False,
     as_json: Json = False,
@@ -74,7 +78,9 @@ def diagnose(
 
     output, shares = Output(as_json, quiet), tolerance_of(tolerance)
     # The same check as below, with the names that options have here.
-    diagnosis_options(shares, step, cycles, candidate, without, freeze, baseline is not None, prefix="--")
+    diagnosis_options(
+        shares, step, cycles, candidate, without, freeze, baseline is not None, prefix="--", time_limit_s=time_limit
+    )
     with leaving(out), output.progress() as progress:
         found = ccmodel.diagnose(
             batches,
@@ -86,6 +92,7 @@ def diagnose(
             step_s=step,
             cycles=cycles,
             candidates=candidate,
+            time_limit_s=time_limit,
             trust_inputs=trust_inputs,
             progress=progress,
         )

@@ -6,20 +6,24 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm as normal
 from scipy.stats import t as student
 
+from ccmodel import mechanisms as registry
+from ccmodel.deadline import UNLIMITED, Deadline
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.hypothesis import Hypothesis, plausible
-from ccmodel.diagnosis.whitening import Whitened
+from ccmodel.diagnosis.whitening import Whitened, with_states_of
 from ccmodel.failure import ModelError
 from ccmodel.inference.cross_validation import inverse_of, leave_one_out
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS, mean_weight
 from ccmodel.inference.intervals import COVERAGE, Interval
 from ccmodel.inference.jacobian import size_of
 from ccmodel.inference.least_squares import Search, Solution, minimise
+from ccmodel.inference.observations import Observations
 from ccmodel.inference.pool import each
 from ccmodel.inference.problem import Free, Problem
-from ccmodel.model.parameters import Parameters
+from ccmodel.model.parameters import Parameters, mechanism_key
 
 SEARCH = Search(
     tolerance=settings.FIT_TOLERANCE,
@@ -39,6 +43,8 @@ class CandidateFit:
     Attributes
     ----------
     hypothesis : Hypothesis
+    whitened : list of Whitened
+        The observations that it was fitted to, with its own mechanisms' states as nuisances.
     free : dict of str to Free
         Unknowns of the calibration, without those of mechanisms.
     values : dict of str to float
@@ -62,6 +68,7 @@ class CandidateFit:
     """
 
     hypothesis: Hypothesis
+    whitened: Sequence[Whitened]
     free: Mapping[str, Free]
     values: dict[str, float]
     residuals: list[NDArray]
@@ -129,14 +136,18 @@ class CandidateFit:
         """The fitted model, with estimates of everything that is not fitted."""
         return self.hypothesis.of(estimates).with_values(self.values)
 
-    def held_out(self, i: int, whitened: Whitened) -> Parameters:
-        """The model of one of the recordings, fitted to all others."""
-        observations = whitened.observations
-        return self.hypothesis.of(observations.parameters).with_values(self.loo_values[i], observations.session)
+    def held_out(self, i: int) -> Observations:
+        """One of the recordings with the model that was fitted to all others."""
+        o = self.whitened[i].observations
+        return o.with_parameters(self.hypothesis.of(o.parameters).with_values(self.loo_values[i], o.session))
 
 
 def fit(
-    whitened: Sequence[Whitened], hypothesis: Hypothesis, free: Mapping[str, Free], start: Mapping[str, float]
+    whitened: Sequence[Whitened],
+    hypothesis: Hypothesis,
+    free: Mapping[str, Free],
+    start: Mapping[str, float],
+    deadline: Deadline = UNLIMITED,
 ) -> CandidateFit:
     """Fit a candidate model from given values and cross-validate it.
 
@@ -148,29 +159,46 @@ def fit(
         Unknowns of the calibration.
     start : mapping of str to float
         Starting values of these and of the mechanisms' unknowns.
+    deadline : Deadline
+        When the fit is given up.
 
     Raises
     ------
     ModelError
         If the model cannot be run at a point of the search.
+    ccmodel.deadline.OutOfTimeError
+        If the deadline has passed.
     """
     unknowns = {n: replace(f, start=start[n]) for n, f in free.items()} | hypothesis.free(start)
-    modelled = [w.with_parameters(hypothesis.of(w.observations.parameters)) for w in whitened]
+    unknowns |= _state_means(whitened, hypothesis, unknowns)
+    modelled = _with_states(whitened, hypothesis, {n: f.start for n, f in unknowns.items()})
     problem = Problem(modelled, unknowns, weight=mean_weight)
-    solution = _search(problem, hypothesis)
+    search = replace(SEARCH, deadline=deadline)
+    solution = _search(problem, hypothesis, search)
+    has_states = any(registry.get(name).states for name, _ in hypothesis.baseline + hypothesis.acting)
+    for _ in range(settings.STATE_PASSES if has_states else 0):
+        # The states' effects were those of the values at the start, which the fit has left.
+        before, modelled = solution.cost, _with_states(whitened, hypothesis, problem.values_of(solution.x, 0))
+        problem = replace(problem, observations=modelled)
+        solution = minimise(problem, inside_bounds(problem, solution.x), search)
+        if abs(solution.cost - before) < settings.STATE_TOLERANCE * before:
+            break
     left_out = leave_one_out(problem, solution)
-    covariance = left_out.covariance
+    covariance, degrees = left_out.covariance, left_out.degrees_of_freedom
     if len(modelled) == 1:
         covariance = covariance / (IN_DIAGNOSIS * len(modelled[0].observations.channels))
+    if any(f.spread for f in unknowns.values()):
+        covariance, degrees = at_least_by_information(problem, solution, covariance, degrees)
     roots = [np.sqrt(w.measured.size) for w in modelled]
     return CandidateFit(
         hypothesis,
+        modelled,
         free,
         problem.values_of(solution.x, 0),
         [block.errors * root for block, root in zip(solution.blocks, roots, strict=True)],
         [block.derivatives * root for block, root in zip(solution.blocks, roots, strict=True)],
         covariance,
-        left_out.degrees_of_freedom,
+        degrees,
         [problem.values_of(x, 0) for x in left_out.values],
         left_out.residuals,
         solution.message,
@@ -178,16 +206,74 @@ def fit(
     )
 
 
-def _search(problem: Problem, hypothesis: Hypothesis) -> Solution:
+def _state_means(whitened: Sequence[Whitened], hypothesis: Hypothesis, unknowns: Mapping[str, Free]) -> dict[str, Free]:
+    """The states' means as unknowns, with the prior that a single recording's state has too.
+
+    Where little of a mechanism shows, its strength and its state are nearly one unknown, which the prior divides. It
+    counts as one effective sample.
+    """
+    samples = IN_DIAGNOSIS * float(np.mean([len(w.observations.channels) for w in whitened]))
+    return {
+        key: replace(unknowns[key], mean=p.start, spread=p.spread * np.sqrt(samples))
+        for name, place in hypothesis.baseline + hypothesis.acting
+        for p in registry.get(name).states
+        if (key := mechanism_key(name, place, p.name)) in unknowns
+    }
+
+
+def at_least_by_information(
+    problem: Problem, solution: Solution, covariance: NDArray, degrees: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Covariance and degrees of freedom of the wider of two intervals of each unknown: the given one, and that of
+    the information of all recordings and of the priors.
+
+    A jackknife does not see a direction that no recording determines: all leave-one-out fits stay where it started.
+    """
+    samples = [IN_DIAGNOSIS * len(w.observations.channels) for w in problem.observations]
+    information = sum(n * block.information for n, block in zip(samples, solution.blocks, strict=True))
+    information = information + np.diag(np.mean(samples) * problem.prior_precision**2)
+    variance, least = np.diag(covariance).clip(0.0), np.diag(inverse_of(information, problem.sizes))
+    wider = normal.ppf(0.5 + COVERAGE / 2) ** 2 * least > student.ppf(0.5 + COVERAGE / 2, degrees) ** 2 * variance
+    ratio = np.sqrt(np.divide(least, variance, out=np.ones_like(least), where=wider & (variance > 0)))
+    covariance = covariance * np.outer(ratio, ratio) + np.diag(np.where(variance > 0, 0.0, least))
+    return covariance, np.where(wider, np.inf, degrees)
+
+
+def _with_states(whitened: Sequence[Whitened], hypothesis: Hypothesis, values: Mapping[str, float]) -> list[Whitened]:
+    """Observations for a hypothesis, with the states of its mechanisms as nuisances, linearised about values."""
+
+    def of(w: Whitened) -> Whitened:
+        model = hypothesis.of(w.observations.parameters)
+        return with_states_of(w, model.with_values(values, w.session)).with_parameters(model)
+
+    return each(whitened, lambda i, w: of(w))
+
+
+def _search(problem: Problem, hypothesis: Hypothesis, search: Search) -> Solution:
+    starts = [inside_bounds(problem, x) for x in starting_points(problem)]
+    if len(starts) > 1:
+        starts = [best_start(problem, starts, search).x]
+    solution = minimise(problem, starts[0], search)
+    if hypothesis.continuation and solution.cost > _cost_without(problem, hypothesis):
+        return solution  # a minimum that is worse than no mechanism at all leads nowhere
+    for name in hypothesis.continuation:
+        solution = continued(
+            lambda x: minimise(problem, x, search), solution, problem.names.index(name), problem.bounds[0]
+        )
+    return solution
+
+
+def inside_bounds(problem: Problem, x: NDArray) -> NDArray:
+    """A point off the bounds of the unknowns, from which a search can start; all of shape (unknowns,)."""
     low, high = problem.bounds
     inside = 1e-9 * (high - low)
-    starts = [np.clip(x, low + inside, high - inside) for x in starting_points(problem)]
-    if len(starts) > 1:
-        starts = [best_start(problem, starts).x]
-    solution = minimise(problem, starts[0], SEARCH)
-    for name in hypothesis.continuation:
-        solution = continued(lambda x: minimise(problem, x, SEARCH), solution, problem.names.index(name), low)
-    return solution
+    return np.clip(x, low + inside, high - inside)
+
+
+def _cost_without(problem: Problem, hypothesis: Hypothesis) -> float:
+    """Cost at the start with no effect of the candidate's mechanisms."""
+    values = zip(problem.names, problem.start, strict=True)
+    return problem.cost(np.array([hypothesis.neutral.get(name, value) for name, value in values]))
 
 
 def starting_points(problem: Problem) -> list[NDArray]:
@@ -198,12 +284,12 @@ def starting_points(problem: Problem) -> list[NDArray]:
     return [np.where(is_pretension, share * problem.start, problem.start) for share in settings.PRETENSION_STARTS]
 
 
-def best_start(problem: Problem, starts: Sequence[NDArray]) -> Solution:
+def best_start(problem: Problem, starts: Sequence[NDArray], search: Search = SEARCH) -> Solution:
     """The best of short searches; a start at which the model cannot be run counts only if it can at none."""
     found, failures = [], []
     for x in starts:
         try:
-            found.append(minimise(problem, x, replace(SEARCH, most_evaluations=settings.START_EVALUATIONS)))
+            found.append(minimise(problem, x, replace(search, most_evaluations=settings.START_EVALUATIONS)))
         except ModelError as error:
             failures.append(error)
     if not found:
@@ -226,7 +312,7 @@ def continued(search: Callable[[NDArray], Solution], solution: Solution, k: int,
     return solution
 
 
-def discretisation_shift(whitened: Sequence[Whitened], candidate: CandidateFit) -> NDArray:
+def discretisation_shift(candidate: CandidateFit) -> NDArray:
     """Values on a finer solver minus values on the usual one, to first order; shape (unknowns,).
 
     Raises
@@ -236,10 +322,10 @@ def discretisation_shift(whitened: Sequence[Whitened], candidate: CandidateFit) 
     """
     finer = [
         w.with_parameters(replace(candidate.hypothesis.of(w.observations.parameters), refinement=settings.REFINEMENT))
-        for w in whitened
+        for w in candidate.whitened
     ]
     changes = each(finer, lambda i, w: w.errors(candidate.values) - candidate.residuals[i])
-    weights = [mean_weight(w.observations) for w in whitened]
+    weights = [mean_weight(w.observations) for w in candidate.whitened]
     sizes = np.array([size_of(n, v) for n, v in candidate.values.items()])
     information = sum(c * J.T @ J for J, c in zip(candidate.jacobian, weights, strict=True))
     information += candidate.prior[1].T @ candidate.prior[1]

@@ -16,10 +16,12 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import norm
 
+from ccmodel import mechanisms as registry
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
+from ccmodel.diagnosis.repeatability import FRICTION, friction_repeats
 from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.inference.effective_samples import in_comparison
 
@@ -34,12 +36,16 @@ class Comparison:
     base : CandidateFit
         The calibrated model.
     candidates : list of CandidateFit
-        The calibrated model with one mechanism or two, by ascending leave-one-out mean square; those with a strength
+        The calibrated model with mechanisms, by ascending leave-one-out mean square; those with a strength
         outside its plausible range last.
+    passed_over : list of CandidateFit
+        Fitted sets of mechanisms that do not improve enough on a part of theirs (`improves_on_members`), likewise.
     lack_of_fit : mapping of Hypothesis to LackOfFit
         Of the calibrated model, the candidates with the lowest mean squares and the most probable one.
     screened : int
         Number of hypotheses that were screened, among which the prior probability is shared.
+    linearised_about : Hypothesis or None
+        The candidate about which the covariance is linearised; None for the model of the first fit.
     """
 
     whitened: Sequence[Whitened]
@@ -47,17 +53,31 @@ class Comparison:
     candidates: list[CandidateFit]
     lack_of_fit: Mapping[Hypothesis, LackOfFit]
     screened: int = 0
+    linearised_about: Hypothesis | None = None
+    passed_over: Sequence[CandidateFit] = ()
 
     @classmethod
     def of(
-        cls, whitened: Sequence[Whitened], base: CandidateFit, candidates: Sequence[CandidateFit], screened: int = 0
+        cls,
+        whitened: Sequence[Whitened],
+        base: CandidateFit,
+        candidates: Sequence[CandidateFit],
+        screened: int = 0,
+        linearised_about: Hypothesis | None = None,
     ) -> "Comparison":
         """Order the candidates, and compute the lack of fit of those that may be named."""
-        ordered = sorted(candidates, key=lambda c: (not c.is_plausible, c.mean_square))
-        found = cls(whitened, base, ordered, {}, screened)
+        every = sorted(candidates, key=lambda c: (not c.is_plausible, c.mean_square))
+        ordered = [c for c in every if improves_on_members(c, every)]
+        others = [c for c in every if c not in ordered]
+        found = cls(whitened, base, ordered, {}, screened, linearised_about, others)
         contenders = {c.hypothesis: c for c in [base, *ordered[: settings.CONTENDERS], found.most_probable]}
-        lacks = {hypothesis: lack_of_fit(whitened, c) for hypothesis, c in contenders.items()}
+        lacks = {hypothesis: lack_of_fit(c) for hypothesis, c in contenders.items()}
         return replace(found, lack_of_fit=lacks)
+
+    @property
+    def fitted(self) -> list[CandidateFit]:
+        """All that were fitted, by ascending mean square; those with a strength outside its plausible range last."""
+        return sorted([*self.candidates, *self.passed_over], key=lambda c: (not c.is_plausible, c.mean_square))
 
     @cached_property
     def posterior(self) -> list[float]:
@@ -73,16 +93,20 @@ class Comparison:
         not they were fitted: the best of many is good by chance. An implausible candidate has probability zero.
         """
         every = [self.base, *self.candidates]
-        samples = in_comparison([w.observations for w in self.whitened])
         mean_squares = np.array([c.mean_square for c in every])
-        unknowns = np.array([len(c.values) - len(self.base.values) for c in every])
-        bic = samples * mean_squares / max(1.0, mean_squares.min()) + unknowns * np.log(samples)
+        bic = np.array([self.bic(c, max(1.0, mean_squares.min())) for c in every])
         count = len(self.candidates)
         prior_of_each = (1 - settings.PRIOR_AGREES) / max(self.screened, count, 1)
         log_posterior = -bic / 2 + np.log([settings.PRIOR_AGREES, *[prior_of_each] * count])
         log_posterior[1:][[not c.is_plausible for c in self.candidates]] = -np.inf
         weight = np.exp(log_posterior - log_posterior.max())
         return (weight / weight.sum())[1:].tolist()
+
+    def bic(self, candidate: CandidateFit, noise: float) -> float:
+        """Bayesian information criterion of a candidate at a mean square of the noise, up to a constant."""
+        samples = in_comparison([w.observations for w in self.whitened])
+        unknowns = len(candidate.values) - len(self.base.values)
+        return float(samples * candidate.mean_square / noise + unknowns * np.log(samples))
 
     @property
     def most_probable(self) -> CandidateFit:
@@ -97,21 +121,37 @@ class Comparison:
     def is_adequate(self, candidate: CandidateFit) -> bool:
         """Whether the mean square and the lack of fit of a candidate are as low as the true physics could leave them.
 
-        The limits allow for noise and for the model-form error of the added mechanisms, a share of the excess.
+        The limits allow for noise and for the model-form error of the added mechanisms. Friction must differ between
+        recordings by no more than from run to run.
         """
         lack = self.lack_of_fit.get(candidate.hypothesis)
         if lack is None or not candidate.is_plausible:
             return False
-        highest_lack = settings.ADEQUATE_LACK_OF_FIT + candidate.hypothesis.model_form_error * self.excess
+        if not friction_repeats(candidate.whitened, candidate.residuals, FRICTION in candidate.values):
+            return False
+        highest_lack = settings.ADEQUATE_LACK_OF_FIT + self.form_error(candidate)
         return candidate.mean_square <= self.adequate_mean_square(candidate) and lack.lower_bound <= highest_lack
 
     def adequate_mean_square(self, candidate: CandidateFit) -> float:
         """Highest mean square of an adequate candidate; the calibrated model gets no allowance for its form."""
         if candidate is self.base:
             return settings.ADEQUATE
-        limit = settings.ADEQUATE_PAIR if candidate.hypothesis.is_pair else settings.ADEQUATE
-        form = candidate.hypothesis.model_form_error
-        return limit + max(settings.ADEQUATE_SHARE / _imitations(candidate), form) * self.excess
+        limit = settings.ADEQUATE_SET if candidate.hypothesis.size > 1 else settings.ADEQUATE
+        return limit + max(settings.ADEQUATE_SHARE / _imitations(candidate) * self.excess, self.form_error(candidate))
+
+    def form_error(self, candidate: CandidateFit) -> float:
+        """Mean square that the equations of a candidate's mechanisms may leave: of each, a share of its own effect.
+
+        The effect of a mechanism is the decrease of the mean square from the candidate without it, where that was
+        fitted, and otherwise from the calibrated model.
+        """
+        fitted = {frozenset(c.hypothesis.acting): c.mean_square for c in [self.base, *self.fitted]}
+        members = frozenset(candidate.hypothesis.acting)
+        return sum(
+            registry.get(one[0]).model_form_error
+            * max(fitted.get(members - {one}, self.base.mean_square) - max(candidate.mean_square, 1.0), 0.0)
+            for one in members
+        )
 
     @property
     def has_adequate(self) -> bool:
@@ -120,21 +160,22 @@ class Comparison:
 
     @property
     def is_sufficient(self) -> bool:
-        """Whether no second mechanism is needed: the best candidate is adequate and close to the noise.
+        """Whether no further mechanism is needed: the best candidate is adequate and close to the noise.
 
-        Also true without candidates, since a second mechanism is only added to a first.
+        Also true without candidates, since a further mechanism is only added to a first.
         """
         if not self.has_adequate:
             return not self.candidates
         best = self.candidates[0]
-        return best.mean_square <= settings.SUFFICIENT + best.hypothesis.model_form_error * self.excess
+        return best.mean_square <= settings.SUFFICIENT + self.form_error(best)
 
     @property
     def well_specified(self) -> float:
         """Probability that the most probable candidate is correct and no imitation, times `_discount`."""
         if not self.candidates:
             return self._discount
-        return self._discount * well_specified(self.most_probable, self.base)
+        best = self.most_probable
+        return self._discount * well_specified(best, self.base, self.form_error(best))
 
     @property
     def _discount(self) -> float:
@@ -148,19 +189,32 @@ class Comparison:
         return float(settings.UNTESTED**share)
 
 
-def well_specified(candidate: CandidateFit, base: CandidateFit) -> float:
+def is_part_of(candidate: CandidateFit, other: CandidateFit) -> bool:
+    """Whether another candidate has all of its mechanisms and more."""
+    return set(candidate.hypothesis.acting) < set(other.hypothesis.acting)
+
+
+def improves_on_members(candidate: CandidateFit, candidates: Sequence[CandidateFit]) -> bool:
+    """Whether a set halves the excess mean square of each candidate with fewer of its members; true of a single."""
+    lowest = candidate.mean_square
+    parts = [c.mean_square for c in candidates if is_part_of(c, candidate)]
+    return all(lowest - 1 < settings.SET_SHARE * (part - 1) and lowest < part for part in parts)
+
+
+def well_specified(candidate: CandidateFit, base: CandidateFit, form_error: float) -> float:
     """Probability that a candidate is the missing physics and no imitation of it, given the candidate's mean square.
 
-    Bayes' rule with the prior `PRIOR_MISSPECIFIED` and two densities of the mean square above `CORRECT_LEVEL`:
+    Bayes' rule with the prior `PRIOR_MISSPECIFIED` and two densities of the mean square above `CORRECT_LEVEL`
+    (`form_error`: as of `Comparison.form_error`):
 
     - of a correct candidate: normal about zero. In every second case a half-normal model-form error is added, because
       the real effect does not follow the mechanism's equation exactly;
     - of an imitation: uniform from zero to the excess of the calibrated model. A pair is taken for the best of several
-      imitations, with the density of the smallest of as many uniform variables.
+      imitations, with the density of the smallest of as many uniform variables; likewise a larger set.
     """
     excess = max(base.mean_square - settings.CORRECT_LEVEL, settings.CORRECT_SPREAD)
     above = candidate.mean_square - settings.CORRECT_LEVEL
-    form = max(settings.FORM_SHARE, candidate.hypothesis.model_form_error) * excess
+    form = max(settings.FORM_SHARE * excess, form_error)
     width = np.hypot(settings.CORRECT_SPREAD, form)
     exact = norm.pdf(above, scale=settings.CORRECT_SPREAD)
     # The half-normal form error convolved with the normal scatter of correct models.
@@ -174,5 +228,5 @@ def well_specified(candidate: CandidateFit, base: CandidateFit) -> float:
 
 
 def _imitations(candidate: CandidateFit) -> int:
-    """Number of imitations of which a candidate may be the best: for a pair the partners that were fitted, else one."""
-    return settings.PARTNERS if candidate.hypothesis.is_pair else 1
+    """Number of imitations of which a candidate may be the best: for a set the partners that were fitted, else one."""
+    return settings.PARTNERS if candidate.hypothesis.size > 1 else 1

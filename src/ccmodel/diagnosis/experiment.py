@@ -160,4 +160,4 @@ def _absorbed(o: Observations, predicted: NDArray, candidate: CandidateFit) -> N
     steps = inward(settings.FIT_DIFFERENCE * sizes, x, np.array([free[name].high for name in names]))
     effects = jacobian(lambda at: o.errors(dict(zip(names, at, strict=True))).ravel(), x, steps, predicted)
     variances, axes = np.linalg.eigh(candidate.covariance)
-    return np.hstack([effects @ (axes * np.sqrt(variances.clip(0.0))), nuisances(o)[0]])
+    return np.hstack([effects @ (axes * np.sqrt(variances.clip(0.0))), nuisances(o)])

@@ -1,4 +1,4 @@
-"""Candidate models: the tested model, with one mechanism at one of its places, or with two of them."""
+"""Candidate models: the tested model with mechanisms at some of their places."""
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -39,9 +39,9 @@ class Hypothesis:
         return replace(self, acting=self.acting + other.acting)
 
     @property
-    def is_pair(self) -> bool:
-        """Whether more than one mechanism acts."""
-        return len(self.acting) > 1
+    def size(self) -> int:
+        """Number of mechanisms that act."""
+        return len(self.acting)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -52,11 +52,6 @@ class Hypothesis:
     def places(self) -> list[str]:
         """Places of its mechanisms, each once."""
         return list(dict.fromkeys(place for _, place in self.acting))
-
-    @property
-    def model_form_error(self) -> float:
-        """Largest model-form error of its mechanisms, as a share of their effect's mean square."""
-        return max((registry.get(name).model_form_error for name, _ in self.acting), default=0.0)
 
     def of(self, parameters: Parameters) -> Parameters:
         """Parameters with the mechanisms added, at their values in `parameters` or else at their starting values."""
@@ -69,6 +64,11 @@ class Hypothesis:
     def start(self) -> dict[str, float]:
         """Starting values of the mechanisms' unknowns."""
         return {key: parameter.start for key, parameter, _ in self._unknowns()}
+
+    @property
+    def neutral(self) -> dict[str, float]:
+        """Values of the mechanisms' strengths at which they have no effect."""
+        return {key: parameter.neutral for key, parameter, is_strength in self._unknowns() if is_strength}
 
     def free(self, start: Mapping[str, float]) -> dict[str, Free]:
         """The mechanisms' parameters as unknowns, from `start`."""

@@ -48,8 +48,9 @@ class LackOfFit:
         return self.mean - quantile * float(self.reduction.std(ddof=1)) / np.sqrt(n)
 
 
-def lack_of_fit(whitened: Sequence[Whitened], candidate: CandidateFit) -> LackOfFit:
+def lack_of_fit(candidate: CandidateFit) -> LackOfFit:
     """Predict a candidate's leave-one-out residuals from the state of the rig, each recording from all others."""
+    whitened = candidate.whitened
     inputs = each(whitened, lambda i, w: _inputs(w, candidate))
     residuals = each(whitened, lambda i, w: _by_channel(w, candidate.loo_residuals[i], whitened))
     if len(whitened) == 1:

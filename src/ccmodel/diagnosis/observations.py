@@ -38,7 +38,7 @@ def observations_of(
         step = max(step_s, float(np.ptp(recording.time_s)) / settings.MOST_SAMPLES)
         try:
             shown = first_cycles(recording, cycles)
-            usable.append(Observations.of(shown, estimates, step_s=step, tolerance=tolerance))
+            usable.append(Observations.of(shown, estimates, step_s=step, tolerance=tolerance, whole=recording))
         except (ModelError, ValueError) as error:
             not_judged.append(_entry(recording.id, str(error)))
     if not usable:

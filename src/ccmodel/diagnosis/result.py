@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
 from ccmodel.channels import short_name, unit_of
-from ccmodel.diagnosis import experiment, location, settings
+from ccmodel.diagnosis import experiment, location, repeatability, settings
 from ccmodel.diagnosis.candidate import CandidateFit, discretisation_shift, fit
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.observations import NotJudged
@@ -43,6 +43,7 @@ def report(batch: str, judgement: Judgement, estimates: Parameters, not_judged: 
             "mean_square": {"calibrated": base.mean_square, "extended": best.mean_square},
             "error": held_out_errors(judgement, nested_choice(judgement)),
         },
+        "repeatability": repeatability.report(whitened),
         "next_experiment": experiment.proposed(judgement, estimates) if open_question else None,
         "not_judged": [*not_judged, *contradicting_recording(judgement), *_at_bounds(best), *failures],
     }
@@ -88,7 +89,7 @@ def _place_probability(acting: tuple[str, str], confidence: Mapping[Hypothesis, 
 def _discretisation(judgement: Judgement) -> tuple[NDArray | None, NotJudged]:
     """Shift of the best candidate's values on a finer solver, or the reason why there is none."""
     try:
-        return discretisation_shift(judgement.whitened, judgement.best), []
+        return discretisation_shift(judgement.best), []
     except ModelError as error:
         return None, [{"what": "discretisation error of the values", "why": str(error)}]
 
@@ -121,7 +122,7 @@ def held_out_errors(judgement: Judgement, chosen: Sequence[CandidateFit]) -> dic
     squares: dict[str, list[tuple[float, float, float]]] = {}
     for i, w in enumerate(judgement.whitened):
         o = w.observations
-        before, after = (o.with_parameters(c.held_out(i, w)).errors({}) for c in (judgement.calibrated, chosen[i]))
+        before, after = (c.held_out(i).errors({}) for c in (judgement.calibrated, chosen[i]))
         for c, channel in enumerate(o.channels):
             row = *(np.mean((e[c] * o.sigma[c]) ** 2) for e in (before, after)), w.noise_floor[channel] ** 2
             squares.setdefault(channel, []).append(row)

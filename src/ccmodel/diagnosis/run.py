@@ -8,18 +8,21 @@ from dataclasses import dataclass
 
 from threadpoolctl import threadpool_limits
 
+from ccmodel.deadline import Deadline
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.calibration import TestedModel, tested_model
 from ccmodel.diagnosis.candidate import CandidateFit, fit
 from ccmodel.diagnosis.hypothesis import single_mechanisms, stated_hypothesis
 from ccmodel.diagnosis.observations import NotJudged, observations_of
+from ccmodel.diagnosis.repeatability import estimated
 from ccmodel.diagnosis.result import report
 from ccmodel.diagnosis.selection import Selection
 from ccmodel.diagnosis.verdict import Judgement, judge
-from ccmodel.diagnosis.whitening import Whitened, whiten
+from ccmodel.diagnosis.whitening import Whitened, relinearised, whiten
 from ccmodel.inference.observations import Tolerance
 from ccmodel.inference.pool import each
 from ccmodel.model.parameters import Parameters
+from ccmodel.model.session import in_order, with_session
 from ccmodel.progress import Progress, silent, within
 from ccmodel.recording import Recording
 
@@ -48,6 +51,8 @@ class Options:
     freeze : bool
         Whether a baseline keeps its values, except for sensor zeros that are not observed at rest. The diagnosis then
         finds what has changed on the rig since the baseline was fitted.
+    time_limit_s : float
+        Time after which no further candidate is fitted, s: the verdict is on what was fitted until then.
     """
 
     tolerance: Tolerance = 0.0
@@ -56,6 +61,7 @@ class Options:
     forced_candidates: Sequence[Sequence[str]] = ()
     without: Collection[str] = ()
     freeze: bool = False
+    time_limit_s: float = settings.TIME_LIMIT_S
 
 
 @dataclass(frozen=True)
@@ -67,7 +73,7 @@ class Calibration:
     tested : TestedModel
         The model that is tested, with its unknowns and their values from a first fit.
     whitened : list of Whitened
-        The observations, their errors whitened about that first fit.
+        The observations, their errors whitened with the spreads that they show.
     fit : CandidateFit
         The calibrated model.
     not_judged : list of {"what", "why"}
@@ -124,8 +130,9 @@ def calibrate(
 ) -> Calibration:
     """Fit the paper's model, or a baseline, to recordings; parameters as of `diagnose`.
 
-    Two fits: a first one gives the model about which the errors are linearised and whitened, and the fit of the
-    whitened errors is the calibrated model.
+    Three fits: a first one gives the model about which the errors are linearised and whitened. A fit of the whitened
+    errors shows how much friction and zeros differ from run to run; whitened with these spreads, about each recording's
+    own friction, they give the calibrated model.
 
     Parameters
     ----------
@@ -137,6 +144,7 @@ def calibrate(
     ModelError
         If the model cannot be run on any of the recordings, or `only` has another name.
     """
+    recordings, estimates = in_order(recordings), with_session(estimates, recordings)
     observations, missing = observations_of(recordings, estimates, options.tolerance, options.step_s, options.cycles)
     tested_name = "the baseline" if baseline else "the paper's model"
     progress(f"calibrating {tested_name} on {len(observations)} recordings", 0.0)
@@ -144,7 +152,10 @@ def calibrate(
     at_estimates = [o.with_parameters(tested.estimates) for o in observations]
     progress("calibrating with whitened errors", FIRST_FIT)
     whitened = each(at_estimates, lambda i, o: whiten(o, tested.model))
-    return Calibration(tested, whitened, fit(whitened, tested.hypothesis, tested.free, tested.start), missing)
+    first = fit(whitened, tested.hypothesis, tested.free, tested.start)
+    repeatability, model = estimated(first.whitened, first.residuals), first.model(tested.estimates)
+    whitened = each(whitened, lambda i, w: relinearised(w, model, repeatability))
+    return Calibration(tested, whitened, fit(whitened, tested.hypothesis, tested.free, first.values), missing)
 
 
 @_one_thread
@@ -177,6 +188,7 @@ def diagnose(
     ModelError
         If the model cannot be run on any of the recordings.
     """
+    deadline = Deadline.after(options.time_limit_s)
     found = calibrate(recordings, estimates, options, baseline, within(progress, 0.0, CALIBRATED))
     tested, whitened = found.tested, found.whitened
     unjudged = [*map(dict, not_judged), *found.not_judged]
@@ -185,8 +197,11 @@ def diagnose(
         unjudged.append({"what": "stiffness, friction and everything else that a calibration would fit", "why": why})
     mechanisms = single_mechanisms(options.without, tested.hypothesis)
     forced = [stated_hypothesis(stated) for stated in options.forced_candidates]
-    selection = Selection(tested.free, mechanisms, forced, within(progress, CALIBRATED, SELECTED))
+    selection = Selection(tested.free, mechanisms, forced, within(progress, CALIBRATED, SELECTED), deadline)
     comparison, scores = selection.run(whitened, found.fit)
+    if deadline.has_passed:
+        why = f"the time limit of {options.time_limit_s:g} s was reached before all of them were fitted"
+        unjudged.append({"what": "further candidates", "why": why})
     progress("deciding the verdict", SELECTED)
     judgement = judge(comparison, scores)
     progress("correcting the values for the discretisation, designing an experiment", JUDGED)

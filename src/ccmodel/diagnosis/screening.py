@@ -1,16 +1,18 @@
-"""Screening: a score test (Lagrange multiplier test) of every mechanism against a fitted model.
+"""Screening: score tests (Lagrange multiplier tests) of mechanisms against a fitted model, alone and in sets.
 
 One run of the model with a mechanism at each of a few values gives the direction in which it changes the errors. The
-part of that direction which a recalibration would absorb is projected out; the rest is compared with the residuals.
+part of that direction which a recalibration would absorb is projected out; the rest is compared with the residuals. The
+products of all directions (their Gram matrix) give the same test for any set of mechanisms, without further runs.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
+from ccmodel.deadline import UNLIMITED, Deadline
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.hypothesis import Hypothesis
@@ -19,18 +21,21 @@ from ccmodel.failure import ModelError
 from ccmodel.inference.pool import each
 from ccmodel.model.parameters import mechanism_key
 
+# Least squared length of a direction, relative to the residuals': below it, a recalibration absorbs the mechanism.
+ABSORBED = 1e-12
+
 
 @dataclass(frozen=True)
 class Score:
-    """Result of the score test of a mechanism.
+    """Result of the score test of a mechanism, or of a set of them.
 
     Attributes
     ----------
     hypothesis : Hypothesis
     gain : float
-        Predicted share of the mean square that the mechanism takes off, after recalibration.
+        Predicted share of the mean square that is taken off, after recalibration.
     values : dict of str to float
-        The best of the screened values, extrapolated to the strength with the largest gain; empty if none has a gain.
+        The best of the screened values, extrapolated to the strengths with the largest gain; empty if none has a gain.
     """
 
     hypothesis: Hypothesis
@@ -38,75 +43,215 @@ class Score:
     values: dict[str, float]
 
 
-def screen(whitened: Sequence[Whitened], base: CandidateFit, hypotheses: Sequence[Hypothesis]) -> list[Score]:
-    """Score tests of mechanisms against a fitted model that they extend, the largest gain first."""
-    distances, derivatives = base.prior
-    absorbed, _ = np.linalg.qr(np.concatenate([_stacked(whitened, base.jacobian), derivatives]))
-    residuals = np.concatenate([_stacked(whitened, base.residuals), distances])
-    test = _Test(whitened, base, absorbed, residuals - absorbed @ (absorbed.T @ residuals))
-    return sorted((test.score(h) for h in hypotheses), key=lambda s: -s.gain)
-
-
 @dataclass(frozen=True)
-class _Test:
-    """A fitted model's residuals, and the space of changes that a recalibration absorbs.
+class Trial:
+    """A mechanism at one of the values at which it is screened.
 
     Attributes
     ----------
-    absorbed : ndarray, shape (rows, unknowns)
-        Orthonormal basis of that space.
-    residuals : ndarray, shape (rows,)
-        Residuals outside of it, each recording weighted by its mean square.
+    hypothesis : Hypothesis
+        A single mechanism.
+    values : dict of str to float
+    own : mapping of str to float, or None
+        Values that a frozen baseline has of this mechanism; None for any other.
     """
 
-    whitened: Sequence[Whitened]
-    base: CandidateFit
-    absorbed: NDArray
-    residuals: NDArray
+    hypothesis: Hypothesis
+    values: dict[str, float]
+    own: Mapping[str, float] | None = None
 
-    def score(self, hypothesis: Hypothesis) -> Score:
-        """The best over the values at which the mechanism is screened."""
-        own = self._baseline_values(hypothesis)
-        if own is None:
-            screened = hypothesis.screening_values()
-        else:
-            screened = (own | {key: (1 + settings.SCREENED_CHANGE) * value} for key, value in own.items())
-        best = Score(hypothesis, 0.0, {})
-        for values in screened:
-            found = self._at(hypothesis, values, own)
-            if found is not None and found.gain > best.gain:
-                best = found
-        return best
+    def extrapolated(self, strength: float) -> dict[str, float] | None:
+        """The values at another strength (1: as tried); None if the mechanism cannot have it."""
+        if self.own is None:
+            return scaled(self.hypothesis, self.values, strength)
+        return changed(self.own, self.values, strength)
 
-    def _at(self, hypothesis: Hypothesis, values: dict[str, float], own: Mapping[str, float] | None) -> Score | None:
-        direction = self._direction(hypothesis, values)
-        size = 0.0 if direction is None else float(direction @ direction)
-        # A recalibration absorbs the mechanism, or the model cannot be run with it.
-        if size < 1e-12:
-            return None
-        strength = -float(direction @ self.residuals) / size
-        gain = strength**2 * size / float(self.residuals @ self.residuals)
-        extrapolated = scaled(hypothesis, values, strength) if own is None else changed(own, values, strength)
-        return None if extrapolated is None else Score(hypothesis, gain, extrapolated)
+    @property
+    def has_one_sign(self) -> bool:
+        """Whether its strength cannot be negative."""
+        if self.own is not None:
+            return False
+        ((name, _),) = self.hypothesis.acting
+        return not any(p.signed or p.ratio for p in registry.get(name).strengths)
 
-    def _direction(self, hypothesis: Hypothesis, values: Mapping[str, float]) -> NDArray | None:
-        """Change of the weighted errors that a recalibration does not absorb."""
-        extended = self.base.hypothesis.and_also(hypothesis)
-        modelled = [w.with_parameters(extended.of(w.observations.parameters)) for w in self.whitened]
-        every = {**self.base.values, **values}
-        try:
-            moved = each(modelled, lambda i, w: w.errors(every) - self.base.residuals[i])
-        except ModelError:
-            return None
-        d = np.concatenate([_stacked(self.whitened, moved), np.zeros(self.base.prior[0].size)])
-        return d - self.absorbed @ (self.absorbed.T @ d)
 
-    def _baseline_values(self, hypothesis: Hypothesis) -> dict[str, float] | None:
-        """Values of a mechanism that a frozen baseline has already; None for any other."""
-        if hypothesis.acting[0] not in self.base.hypothesis.baseline:
-            return None
-        model = self.base.hypothesis.of(self.whitened[0].observations.parameters)
-        return {key: model.value_of(key) for key in hypothesis.start}
+@dataclass(frozen=True)
+class Screening:
+    """Products of the directions of all trials with one another and with the residuals.
+
+    Attributes
+    ----------
+    trials : list of Trial
+    gram : ndarray, shape (trials, trials)
+    product : ndarray, shape (trials,)
+        Of minus the residuals with each direction: its size and sign are the strengths'.
+    square : float
+        Of the residuals, outside of what a recalibration absorbs.
+    mechanisms : sequence of Hypothesis
+        All that were screened, also those without a trial that can be run.
+    """
+
+    trials: list[Trial]
+    gram: NDArray
+    product: NDArray
+    square: float
+    mechanisms: Sequence[Hypothesis]
+
+    def singles(self) -> list[Score]:
+        """The best score of each mechanism, the largest gain first."""
+        best = {h: Score(h, 0.0, {}) for h in self.mechanisms}
+        for k, trial in enumerate(self.trials):
+            found = self._score([k], np.array([self.product[k] / self.gram[k, k]]))
+            if found is not None and found.gain > best[trial.hypothesis].gain:
+                best[trial.hypothesis] = found
+        return sorted(best.values(), key=lambda s: -s.gain)
+
+    def sets(self, size: int) -> list[Score]:
+        """The leading sets of `size` mechanisms, the largest gain first; each set of mechanisms once.
+
+        A beam search: the leading sets of each size are extended by every trial of another mechanism.
+        """
+        beam: list[tuple[int, ...]] = [()]
+        for _ in range(size):
+            extended = {}
+            for members in beam:
+                for gain, k in self._extensions(members):
+                    extended[tuple(sorted((*members, k)))] = gain
+            beam = sorted(extended, key=lambda members: -extended[members])[: settings.BEAM]
+        best: dict[frozenset, Score] = {}
+        for members in beam:
+            found = self._score(list(members), self._strengths(members))
+            key = frozenset(self.trials[k].hypothesis.acting[0] for k in members)
+            if found is not None and (key not in best or found.gain > best[key].gain):
+                best[key] = found
+        return sorted(best.values(), key=lambda s: -s.gain)
+
+    def leading_trials(self, members: Sequence[tuple[str, str]]) -> list[Trial]:
+        """Of each mechanism, the trials with the largest gains beside some mechanisms (name, place)."""
+        at = tuple(self._best_trials(members))
+        found = []
+        for hypothesis in self.mechanisms:
+            own = [k for k, trial in enumerate(self.trials) if trial.hypothesis == hypothesis]
+            gains = self._gains(at)[own] if own else np.empty(0)
+            found += [self.trials[own[k]] for k in np.argsort(-gains, kind="stable")[: settings.TRIALS_AGAIN]]
+        return found
+
+    def _best_trials(self, members: Sequence[tuple[str, str]]) -> Iterator[int]:
+        """The trial of each of some mechanisms that gains most by itself, where there is one."""
+        for acting in members:
+            own = [k for k, trial in enumerate(self.trials) if trial.hypothesis.acting[0] == acting]
+            if own:
+                yield max(own, key=lambda k: self.product[k] ** 2 / self.gram[k, k])
+
+    def _extensions(self, members: tuple[int, ...]) -> Iterator[tuple[float, int]]:
+        """Gain of each set that a trial of another mechanism extends, and that trial; only sets that can act."""
+        taken = {self.trials[k].hypothesis for k in members}
+        base = self.product[list(members)] @ self._strengths(members) if members else 0.0
+        gains, left = base + self._gains(members), settings.BEAM
+        for k in np.argsort(-gains, kind="stable").tolist():
+            if left and self.trials[k].hypothesis not in taken and self._can_act((*members, k)):
+                left -= 1
+                yield float(gains[k]), k
+
+    def _gains(self, members: tuple[int, ...]) -> NDArray:
+        """Decrease of the sum of squares by each trial beside some others, shape (trials,)."""
+        size, along = np.diag(self.gram), self.product
+        if members:
+            S = list(members)
+            by_members = np.linalg.lstsq(self.gram[np.ix_(S, S)], self.gram[S], rcond=None)[0]
+            size = size - np.einsum("sk,sk->k", self.gram[S], by_members)
+            along = along - self.product[S] @ by_members
+        # A trial that the others imitate adds nothing.
+        is_new = size > settings.IMITATED * np.diag(self.gram)
+        return np.divide(along**2, size, out=np.zeros_like(size), where=is_new)
+
+    def _strengths(self, members: Sequence[int]) -> NDArray:
+        S = list(members)
+        return np.linalg.lstsq(self.gram[np.ix_(S, S)], self.product[S], rcond=None)[0]
+
+    def _can_act(self, members: Sequence[int]) -> bool:
+        """Whether the strengths with the largest gain are ones that the mechanisms can have."""
+        strengths = self._strengths(members)
+        return all(s > 0 or not self.trials[k].has_one_sign for s, k in zip(strengths, members, strict=True))
+
+    def _score(self, members: Sequence[int], strengths: NDArray) -> Score | None:
+        """Score of a set of trials, the strongest first; None if one of its mechanisms cannot have its strength."""
+        values: dict[str, float] = {}
+        hypothesis = Hypothesis()
+        pairs = zip(members, strengths.tolist(), strict=True)
+        for k, strength in sorted(pairs, key=lambda one: -(one[1] ** 2) * self.gram[one[0], one[0]]):
+            extrapolated = self.trials[k].extrapolated(strength)
+            if extrapolated is None:
+                return None
+            values |= extrapolated
+            hypothesis = hypothesis.and_also(self.trials[k].hypothesis)
+        return Score(hypothesis, float(self.product[list(members)] @ strengths) / self.square, values)
+
+
+def screen(
+    base: CandidateFit,
+    hypotheses: Sequence[Hypothesis],
+    trials: Sequence[Trial] | None = None,
+    deadline: Deadline = UNLIMITED,
+) -> Screening:
+    """Screen mechanisms against a fitted model that they extend.
+
+    Parameters
+    ----------
+    base : CandidateFit
+    hypotheses : sequence of Hypothesis
+        Single mechanisms.
+    trials : sequence of Trial, optional
+        Values at which they are screened; by default those of `Hypothesis.screening_values`.
+    deadline : Deadline
+        When the screening ends with the trials that were run until then.
+    """
+    distances, derivatives = base.prior
+    absorbed, _ = np.linalg.qr(np.concatenate([_stacked(base.whitened, base.jacobian), derivatives]))
+    residuals = np.concatenate([_stacked(base.whitened, base.residuals), distances])
+    residuals = residuals - absorbed @ (absorbed.T @ residuals)
+    square = float(residuals @ residuals)
+    every = [t for h in hypotheses for t in trials_of(base, h)] if trials is None else trials
+    usable, directions = [], []
+    for trial in every:
+        if deadline.has_passed:
+            break
+        direction = _direction(base, trial)
+        # The model cannot be run with the mechanism, or a recalibration absorbs it.
+        if direction is None or direction @ direction < ABSORBED:
+            continue
+        direction -= absorbed @ (absorbed.T @ direction)
+        if direction @ direction >= ABSORBED:
+            usable.append(trial)
+            directions.append(direction.astype(np.float32))
+    if not usable:
+        return Screening([], np.empty((0, 0)), np.empty(0), square, hypotheses)
+    D = np.stack(directions)
+    product = -(D @ residuals.astype(np.float32))
+    return Screening(usable, (D @ D.T).astype(float), product.astype(float), square, hypotheses)
+
+
+def trials_of(base: CandidateFit, hypothesis: Hypothesis) -> Iterator[Trial]:
+    """Values at which a mechanism is screened; of a frozen baseline's mechanism, a change of each of its values."""
+    if hypothesis.acting[0] not in base.hypothesis.baseline:
+        yield from (Trial(hypothesis, values) for values in hypothesis.screening_values())
+        return
+    model = base.hypothesis.of(base.whitened[0].observations.parameters)
+    own = {key: model.value_of(key) for key in hypothesis.start}
+    for key, value in own.items():
+        yield Trial(hypothesis, own | {key: (1 + settings.SCREENED_CHANGE) * value}, own)
+
+
+def _direction(base: CandidateFit, trial: Trial) -> NDArray | None:
+    """Change of the weighted errors by a trial; None if the model cannot be run with it."""
+    extended = base.hypothesis.and_also(trial.hypothesis)
+    modelled = [w.with_parameters(extended.of(w.observations.parameters)) for w in base.whitened]
+    every = {**base.values, **trial.values}
+    try:
+        moved = each(modelled, lambda i, w: w.errors(every) - base.residuals[i])
+    except ModelError:
+        return None
+    return np.concatenate([_stacked(base.whitened, moved), np.zeros(base.prior[0].size)])
 
 
 def _stacked(whitened: Sequence[Whitened], by_recording: Sequence[NDArray]) -> NDArray:

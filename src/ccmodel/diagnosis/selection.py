@@ -1,25 +1,29 @@
-"""Forward selection: single mechanisms by their screening score, and a second mechanism where one does not suffice."""
+"""Forward selection: single mechanisms by their screening score, and further ones as long as the evidence grows."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from typing import Self
 
+import numpy as np
+
+from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit, fit
-from ccmodel.diagnosis.comparison import Comparison
+from ccmodel.diagnosis.comparison import Comparison, improves_on_members, is_part_of
 from ccmodel.diagnosis.hypothesis import Hypothesis
-from ccmodel.diagnosis.screening import Score, screen
+from ccmodel.diagnosis.screening import Score, Screening, screen
 from ccmodel.diagnosis.whitening import Whitened, relinearised
 from ccmodel.failure import ModelError
 from ccmodel.inference.pool import each
 from ccmodel.inference.problem import Free
 from ccmodel.progress import Progress, silent, within
 
-# Shares of a whole selection at which the mechanisms are screened, the single ones fitted and the covariance linearised
-# anew; the rest is the pairs'. Of the pairs' share, that of the screening for a second mechanism, and that at which all
-# are fitted. Measured on two batches, data/raw/loops and half-loop; they only serve the estimate of the time left.
-SCREENED, FITTED, RELINEARISED = 0.15, 0.35, 0.5
-PARTNERS_SCREENED, PAIRS_FITTED = 0.5, 0.8
+# Shares of a whole selection at which the mechanisms are screened and the single ones fitted; the rest is that of the
+# sets. Of a set size's share, those at which the covariance is linearised and the further mechanisms are screened.
+# Measured on two batches, data/raw/loops and half-loop; they only serve the estimate of the time left.
+SCREENED, FITTED = 0.15, 0.35
+RELINEARISED, PARTNERS_SCREENED = 0.3, 0.5
 
 
 @dataclass(frozen=True)
@@ -33,20 +37,24 @@ class Selection:
     mechanisms : sequence of Hypothesis
         Single mechanisms that may be missing.
     forced : sequence of Hypothesis
-        Singles or pairs that are fitted whatever their screening score.
+        Candidates that are fitted whatever their screening score.
     progress : Progress
+    deadline : Deadline
+        When the selection ends with what was fitted until then.
     """
 
     free: Mapping[str, Free]
     mechanisms: Sequence[Hypothesis]
     forced: Sequence[Hypothesis] = ()
     progress: Progress = field(default=silent)
+    deadline: Deadline = UNLIMITED
 
     def run(self, whitened: Sequence[Whitened], base: CandidateFit) -> tuple[Comparison, list[Score]]:
         """Select from all mechanisms; the comparison of what was fitted, and the screening scores."""
         text = f"calibrated model: leave-one-out mean square {base.mean_square:.2f} (1: noise); screening"
         self.progress(f"{text} {len(self.mechanisms)} mechanisms", 0.0)
-        scores = screen(whitened, base, self.mechanisms)
+        screening = screen(base, self.mechanisms, deadline=self.deadline)
+        scores = screening.singles()
         fewest = settings.FEWEST_FITTED if base.mean_square > settings.ADEQUATE else 0
         worth = [s for k, s in enumerate(scores) if s.values and (s.gain > settings.WORTH_FITTING or k < fewest)]
         leading = worth[: settings.MOST_FITTED]
@@ -54,24 +62,38 @@ class Selection:
         forced = [Score(h, 0.0, h.start) for h in self.forced if h not in chosen]
         singles = self._part(SCREENED, FITTED).fit_all(whitened, base, [*leading, *forced])
         found = Comparison.of(whitened, base, singles, len(self.mechanisms))
+        step, adequate = (1.0 - FITTED) / (settings.MOST_MECHANISMS - 1), None
+        for size in range(2, settings.MOST_MECHANISMS + 1):
+            part = self._part(FITTED + (size - 2) * step, FITTED + (size - 1) * step)
+            if not found.is_sufficient:
+                found = part._part(0.0, RELINEARISED).relinearise(found)
+            # An inadequate set does not displace an adequate candidate.
+            adequate = found if found.has_adequate else adequate
+            if found.is_sufficient or self.deadline.has_passed:
+                break
+            extended = part._part(RELINEARISED, 1.0).extended(found, screening, size)
+            if not grows(extended, size):
+                break
+            found = extended
         if not found.is_sufficient:
-            found = self._part(FITTED, RELINEARISED).relinearise(found)
-        if not found.is_sufficient:
-            found = self._part(RELINEARISED, 1.0).with_pairs(found)
-        return found, scores
+            found = self.relinearise(found)
+        return (found if found.has_adequate else adequate or found), scores
 
     def _part(self, low: float, high: float) -> Self:
         """The same, whose work takes these shares of the whole."""
         return replace(self, progress=within(self.progress, low, high))
 
     def fit_all(self, whitened: Sequence[Whitened], base: CandidateFit, chosen: Sequence[Score]) -> list[CandidateFit]:
-        """Fit extensions of a fitted model, from the values of their scores."""
+        """Fit extensions of a fitted model, from the values of their scores, until the deadline."""
         fitted = []
         for k, score in enumerate(chosen):
             hypothesis = base.hypothesis.and_also(score.hypothesis)
             self.progress(f"fitting {hypothesis}", k / len(chosen))
             try:
-                candidate = fit(whitened, hypothesis, self.free, base.values | score.values)
+                candidate = fit(whitened, hypothesis, self.free, base.values | score.values, self.deadline)
+            except OutOfTimeError:
+                self.progress(f"{hypothesis}: not fitted, the time is over")
+                break
             except (ModelError, ValueError) as error:
                 self.progress(f"{hypothesis}: cannot be run ({error})")
                 continue
@@ -79,45 +101,53 @@ class Selection:
             fitted.append(candidate)
         return fitted
 
-    def with_pairs(self, found: Comparison) -> Comparison:
-        """The same with pairs that improve on their members, from adequate singles where there are any."""
-        singles = [c for c in found.candidates if not c.hypothesis.is_pair]
-        firsts = [c for c in singles if found.is_adequate(c)] or singles
-        pairs = self._part(0.0, PAIRS_FITTED)._pairs(found.whitened, firsts[: settings.FIRSTS])
-        every = [*found.candidates, *pairs]
-        improving = [c for c in every if improves_on_members(c, every)]
-        paired = Comparison.of(found.whitened, found.base, improving, found.screened)
-        if not paired.has_adequate and paired.candidates[0].hypothesis.is_pair:
-            paired = self._part(PAIRS_FITTED, 1.0).relinearise(paired)
-            improving = [c for c in paired.candidates if improves_on_members(c, paired.candidates)]
-            paired = replace(paired, candidates=improving)
-        # An inadequate pair does not displace an adequate single mechanism.
-        return found if found.has_adequate and not paired.has_adequate else paired
+    def extended(self, found: Comparison, screening: Screening, size: int) -> Comparison:
+        """The same with sets of `size` mechanisms, and with the parts of the best of them that lack a member."""
+        sets = self._part(0.0, 0.8)._sets(found, screening, size)
+        if not sets:
+            return found
+        every = [*found.fitted, *sets]
+        best = min(sets, key=lambda c: (not c.is_plausible, c.mean_square))
+        if improves_on_members(best, every):
+            every += self._part(0.8, 1.0)._subsets(found, best, every)
+        return Comparison.of(found.whitened, found.base, every, found.screened, found.linearised_about)
 
-    def _pairs(self, whitened: Sequence[Whitened], firsts: Sequence[CandidateFit]) -> list[CandidateFit]:
-        self.progress("a single mechanism is not sufficient; fitting pairs", 0.0)
-        found, seen = [], set()
+    def _sets(self, found: Comparison, screening: Screening, size: int) -> list[CandidateFit]:
+        """Fitted sets: the leading smaller ones with the best partner each, and those that lead the first screening."""
+        smaller = [c for c in found.fitted if c.hypothesis.size == size - 1]
+        firsts = ([c for c in smaller if found.is_adequate(c)] or smaller)[: settings.FIRSTS[size]]
+        fitted, seen = [], {frozenset(c.hypothesis.acting) for c in found.fitted}
         for k, first in enumerate(firsts):
-            part = self._part(k / len(firsts), (k + 1) / len(firsts))
+            part = self._part(k / (len(firsts) + 1), (k + 1) / (len(firsts) + 1))
             part.progress(f"screening mechanisms beside {first.hypothesis}", 0.0)
             partners = [h for h in self.mechanisms if h.acting[0] not in first.hypothesis.acting]
-            chosen: list[Score] = []
-            for s in screen(whitened, first, partners):
-                pair = frozenset(first.hypothesis.acting + s.hypothesis.acting)
-                if s.gain > settings.WORTH_FITTING and pair not in seen and len(chosen) < settings.PARTNERS:
-                    seen.add(pair)
-                    chosen.append(s)
-            found += part._part(PARTNERS_SCREENED, 1.0).fit_all(whitened, first, chosen)
-        return found
+            trials = [t for t in screening.leading_trials(first.hypothesis.acting) if t.hypothesis in partners]
+            scores = screen(first, partners, trials, self.deadline).singles()
+            worth = [s for s in scores if s.gain > settings.WORTH_FITTING]
+            chosen = unseen(worth, seen, settings.PARTNERS, first.hypothesis.acting)
+            fitted += part._part(PARTNERS_SCREENED, 1.0).fit_all(found.whitened, first, chosen)
+        linear = unseen(screening.sets(size), seen, settings.LINEAR_SETS)
+        part = self._part(len(firsts) / (len(firsts) + 1), 1.0)
+        return fitted + part.fit_all(found.whitened, found.base, linear)
+
+    def _subsets(self, found: Comparison, best: CandidateFit, every: Sequence[CandidateFit]) -> list[CandidateFit]:
+        """The fitted subsets of a set that lack one of its members each, as far as they are not among `every`."""
+        fitted = {frozenset(c.hypothesis.acting) for c in every}
+        subsets = combinations(best.hypothesis.acting, best.hypothesis.size - 1)
+        missing = [Hypothesis(s) for s in subsets if frozenset(s) not in fitted]
+        starts = [Score(h, 0.0, {key: best.values[key] for key in h.start}) for h in missing]
+        return self.fit_all(found.whitened, found.base, starts)
 
     def relinearise(self, found: Comparison) -> Comparison:
-        """Singles and leading pairs fitted again, with the covariance linearised about the best of them.
+        """Leading candidates fitted again, with the covariance linearised about the best of them.
 
         The paper's model, for instance, has no ringing load, and so no error of it from the uncertain drive motion.
         Where the initial tension is not observed, every candidate is fitted from the best one's calibration too: the
         cost has several minima there.
         """
-        best = found.candidates[0]
+        best = found.fitted[0]
+        if best.hypothesis == found.linearised_about:
+            return found
         self.progress(f"linearising the covariance about {best.hypothesis}", 0.0)
         models = [best.model(w.observations.parameters) for w in found.whitened]
 
@@ -129,23 +159,38 @@ class Selection:
         try:
             whitened = each(found.whitened, lambda i, w: relinearised(w, models[i]))
             base = min(
-                (fit(whitened, found.base.hypothesis, self.free, s) for s in starts(found.base)),
+                (fit(whitened, found.base.hypothesis, self.free, s, self.deadline) for s in starts(found.base)),
                 key=lambda c: c.mean_square,
             )
         except ModelError as error:
             self.progress(f"the covariance stays as it is ({error})")
             return found
-        leading = [c for k, c in enumerate(found.candidates) if k < settings.CONTENDERS or not c.hypothesis.is_pair]
+        # Every rival of an adequate candidate matters; of an inadequate one, only the leading ones lead on.
+        most = len(found.fitted) if found.has_adequate else settings.CONTENDERS
+        leading = [c for k, c in enumerate(found.fitted) if k < most or is_part_of(c, best)]
         again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in leading for s in starts(c)])
+        if not any(c.hypothesis == best.hypothesis for c in again):
+            return found
         best_of = {c.hypothesis: c for c in sorted(again, key=lambda c: c.mean_square, reverse=True)}
-        return Comparison.of(whitened, base, list(best_of.values()), found.screened)
+        return Comparison.of(whitened, base, list(best_of.values()), found.screened, best.hypothesis)
 
 
-def improves_on_members(candidate: CandidateFit, candidates: Sequence[CandidateFit]) -> bool:
-    """Whether a pair halves the excess mean square of each of its members alone; true of a single."""
-    if not candidate.hypothesis.is_pair:
-        return True
-    members = set(candidate.hypothesis.acting)
-    alone = [c.mean_square for c in candidates if set(c.hypothesis.acting) < members]
-    pair = candidate.mean_square
-    return all(pair - 1 < settings.PAIR_SHARE * (single - 1) and pair < single for single in alone)
+def unseen(
+    scores: Iterable[Score], seen: set[frozenset], most: int, beside: tuple[tuple[str, str], ...] = ()
+) -> list[Score]:
+    """The first `most` scores whose mechanisms, beside others, are none of the sets `seen`; they are added to these."""
+    chosen: list[Score] = []
+    for score in scores:
+        members = frozenset(beside + score.hypothesis.acting)
+        if len(chosen) < most and members not in seen:
+            seen.add(members)
+            chosen.append(score)
+    return chosen
+
+
+def grows(found: Comparison, size: int) -> bool:
+    """Whether the best set of `size` mechanisms has more evidence than every smaller candidate, by their BIC."""
+    noise = max(1.0, min(c.mean_square for c in [found.base, *found.fitted]))
+    sets = [found.bic(c, noise) for c in found.fitted if c.hypothesis.size == size and c.is_plausible]
+    smaller = [found.bic(c, noise) for c in found.fitted if c.hypothesis.size < size and c.is_plausible]
+    return bool(sets) and min(sets) < min(smaller, default=np.inf)

@@ -103,10 +103,12 @@ def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
         return replace(unexplained, single_fault_places=places)
     if comparison.well_specified * max(probability) <= settings.RIVAL:
         return unexplained
-    # Candidates with the same mechanisms at other places count towards the probability of the mechanisms.
-    names = most_probable.hypothesis.names
-    of_names = sum(p for c, p in zip(comparison.candidates, probability, strict=True) if c.hypothesis.names == names)
-    is_sure = comparison.well_specified * of_names >= settings.SURE and not places
+    # Every candidate with a mechanism, at whatever place and beside whatever others, counts towards its probability.
+    of_each = [
+        sum(p for c, p in zip(comparison.candidates, probability, strict=True) if name in c.hypothesis.names)
+        for name in most_probable.hypothesis.names
+    ]
+    is_sure = comparison.well_specified * min(of_each) >= settings.SURE and not places
     return replace(unexplained, verdict="explained" if is_sure else "undecided", best=most_probable)
 
 
@@ -123,7 +125,7 @@ def improves(candidate: CandidateFit, base: CandidateFit, least: float) -> bool:
 
 def _is_at(candidate: CandidateFit, places: Sequence[str]) -> bool:
     """Whether a candidate is a single mechanism at one of these places."""
-    return not candidate.hypothesis.is_pair and set(candidate.hypothesis.places) <= set(places)
+    return candidate.hypothesis.size == 1 and set(candidate.hypothesis.places) <= set(places)
 
 
 def single_fault_places(comparison: Comparison, hypothesis: Hypothesis) -> list[str]:
@@ -134,7 +136,7 @@ def single_fault_places(comparison: Comparison, hypothesis: Hypothesis) -> list[
     imitated by an eccentric pulley and a torque gain. If both mechanisms of the pair act at one of these parts, fault
     isolation cannot tell the pair from a single fault, and the list is empty.
     """
-    if not hypothesis.is_pair:
+    if hypothesis.size < 2:
         return []
     pair_places = set(hypothesis.places)
     isolated = sorted(

@@ -1,28 +1,33 @@
 """Whitened observations: errors of a recording divided by the square root of their covariance.
 
-The covariance has two parts: the sensors' noise, and nuisances that differ from run to run. Nuisances are friction,
-sensor zeros, encoder offsets and the uncertain drive motion, each a direction in the space of errors with a prior
-standard deviation. They are marginalised, so that no fit needs unknowns for them.
+The covariance has two parts: the sensors' noise, and nuisances that differ from run to run. Nuisances are friction, an
+initial tension that is not observed, sensor zeros, encoder offsets and the uncertain drive motion, each a direction in
+the space of errors with a prior standard deviation. They are marginalised, so that no fit needs unknowns for them.
 
 A nuisance far outside its prior, such as friction that is 10 % higher in every recording, is one number among
 thousands of samples. The posterior means of the nuisances are therefore appended to the whitened errors, each with the
 weight of one effective sample.
+
+Errors are linear in a nuisance only nearby. Each recording is therefore linearised about its own friction.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel import mechanisms as registry
 from ccmodel.channels import THETA_OUT, ZERO_OF
 from ccmodel.diagnosis import settings
+from ccmodel.diagnosis.repeatability import FRICTION, PRETENSION, STATED, Repeatability
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS
 from ccmodel.inference.jacobian import STEP, jacobian, size_of
 from ccmodel.inference.observations import Observations
 from ccmodel.model.general.run import settings_of
-from ccmodel.model.parameters import Parameters
+from ccmodel.model.parameters import Parameters, mechanism_key, mechanism_parameter, of_batch
+from ccmodel.model.session import known_states
 
 # Step of the differences by a nuisance, relative to its size.
 NUISANCE_STEP = 10 * STEP
@@ -42,18 +47,33 @@ class Whitened:
     nuisance_mean : ndarray, shape (nuisances, rows)
         Maps errors over the sensors' noise to the posterior mean of each scalar nuisance over its prior standard
         deviation.
+    determined : ndarray, shape (nuisances,)
+        One minus the posterior variance of each scalar nuisance over its prior variance.
     noise_floor : dict of str to float
         Root mean square error of a correct model by channel, in its unit: sensor noise and repeatability.
     scalar_nuisances : sequence of (str, float, float)
         Parameter, value and prior standard deviation of each scalar nuisance.
+    effects : ndarray, shape (rows, nuisances and draws)
+        Effects of the nuisances on the errors (`nuisances`), of which directions and shrinkage follow.
+    repeatability : Repeatability
+        Where the prior standard deviations come from.
+    own : mapping of str to float
+        Parameters of this recording alone, over those of its batch, about which its errors are linearised.
+    own_errors : ndarray, shape (rows,)
+        Change of the errors by these, to first order.
     """
 
     observations: Observations
     directions: NDArray
     shrinkage: NDArray
     nuisance_mean: NDArray
+    determined: NDArray
     noise_floor: Mapping[str, float]
-    scalar_nuisances: Sequence[tuple[str, float, float]] = ()
+    scalar_nuisances: Sequence[tuple[str, float, float]]
+    effects: NDArray
+    repeatability: Repeatability = STATED
+    own: Mapping[str, float] = field(default_factory=dict)
+    own_errors: NDArray | float = 0.0
 
     @property
     def name(self) -> str:
@@ -76,56 +96,139 @@ class Whitened:
 
     def with_nuisances(self, errors: NDArray) -> NDArray:
         """Whitened errors, followed by the nuisances' posterior means; shape (rows + nuisances,)."""
-        rows_per_sample = self.measured.shape[1] / IN_DIAGNOSIS
-        return np.concatenate([self.whiten(errors), np.sqrt(rows_per_sample) * (self.nuisance_mean @ errors)])
+        return np.concatenate([self.whiten(errors), self._nuisance_weight * (self.nuisance_mean @ errors)])
 
     def errors(self, values: Mapping[str, float]) -> NDArray:
         """Whitened errors of the model with some parameters replaced, and nuisances; shape (rows + nuisances,)."""
-        return self.with_nuisances(self.observations.errors(values).ravel())
+        return self.with_nuisances(self.linearised_errors(values))
+
+    def linearised_errors(self, values: Mapping[str, float]) -> NDArray:
+        """Errors over the noise, extrapolated from the recording's own friction to that of all; shape (rows,)."""
+        shared = of_batch(values, self.session)
+        own = {name: ratio * shared.get(name, 1.0) for name, ratio in self.own.items()}
+        return self.observations.errors(shared | own).ravel() - self.own_errors
+
+    @property
+    def _nuisance_weight(self) -> float:
+        """Weight of a nuisance's posterior mean among the errors: that of one effective sample."""
+        return float(np.sqrt(self.measured.shape[1] / IN_DIAGNOSIS))
+
+    def deviation(self, nuisance: str, residuals: NDArray) -> tuple[float, float]:
+        """Deviation of a nuisance, in stated standard deviations, and the variance of its error, from `errors`.
+
+        NaN if the recording determines less than half of its variance.
+        """
+        names = [name for name, _, _ in self.scalar_nuisances]
+        if nuisance not in names or self.determined[k := names.index(nuisance)] < 0.5:
+            return np.nan, np.nan
+        # Errors are model minus recording: a recording that has a nuisance has the opposite error.
+        mean = -float(residuals[self.measured.size + k]) / self._nuisance_weight
+        share, ratio = float(self.determined[k]), self.repeatability.ratio(nuisance)
+        return ratio * mean / share, ratio**2 * (1 - share) / share
 
     def own_values(self, values: Mapping[str, float]) -> dict[str, float]:
         """Posterior mean of each scalar nuisance in this recording, by parameter, for shared values of a fit."""
         # Errors are model minus recording: a recording that has a nuisance has the opposite error.
-        means = -self.nuisance_mean @ self.observations.errors(values).ravel()
+        means = -self.nuisance_mean @ self.linearised_errors(values)
         pairs = zip(self.scalar_nuisances, means.tolist(), strict=True)
         return {name: values.get(name, value) + spread * mean for (name, value, spread), mean in pairs}
+
+    @property
+    def friction_ratio(self) -> float:
+        """Posterior mean of the friction in this recording over that of the model, as far as it may be linearised."""
+        stated = {name: value for name, value, _ in self.scalar_nuisances}
+        ratio = self.own_values({})[FRICTION] / stated[FRICTION] if FRICTION in stated else 1.0
+        return float(np.clip(ratio, *settings.OWN_FRICTION))
 
     def with_parameters(self, parameters: Parameters) -> "Whitened":
         """The same for a model with other parameters, under the same covariance."""
         return replace(self, observations=self.observations.with_parameters(parameters))
 
 
-def whiten(observations: Observations, model: Parameters) -> Whitened:
-    """Observations with the covariance of their errors, linearised about a fitted model."""
+def whiten(
+    observations: Observations, model: Parameters, repeatability: Repeatability = STATED, friction_ratio: float = 1.0
+) -> Whitened:
+    """Observations with the covariance of their errors, linearised about a fitted model.
+
+    Parameters
+    ----------
+    observations : Observations
+    model : Parameters
+    repeatability : Repeatability
+        Estimated spreads of the nuisances.
+    friction_ratio : float
+        Friction of the recording over the model's, about which the errors are linearised.
+    """
     o = observations.with_parameters(model)
-    N, scalars = nuisances(o)
+    own = {} if friction_ratio == 1.0 else {"friction_scale": friction_ratio}
+    at = o.with_parameters(model.with_values(own))
+    N, known = nuisances(at, repeatability), repeatability.applied(_scalar_nuisances(at))
     friction = N[:, 0].reshape(o.sigma.shape) * o.sigma
     floor = np.sqrt((o.sigma**2).mean(axis=1) + (friction**2).mean(axis=1))
-    U, s, Vt = np.linalg.svd(N, full_matrices=False)
-    nuisance_mean = (Vt.T[:scalars] * (s / (1 + s**2))) @ U.T
     by_channel = dict(zip(o.channels, floor.tolist(), strict=True))
-    return Whitened(o, U, shrinkage_of(s), nuisance_mean, by_channel, _scalar_nuisances(o))
+    spread = known[0][2] / known[0][1]
+    own_errors = N[:, 0] * (1 - 1 / friction_ratio) / spread
+    return Whitened(o, *_moments(N, len(known)), by_channel, known, N, repeatability, own, own_errors)
 
 
-def nuisances(o: Observations) -> tuple[NDArray, int]:
+def with_states_of(one: Whitened, model: Parameters) -> Whitened:
+    """Observations with the states of a model's mechanisms as nuisances, linearised about it, and no other states.
+
+    All other nuisances stay linearised as they are: candidate models are compared under one covariance, apart from the
+    states that only some of them have.
+    """
+    states = _states(one.observations.with_parameters(model))
+    is_state = [mechanism_parameter(name) is not None for name, _, _ in one.scalar_nuisances]
+    if not states and not any(is_state):
+        return one
+    kept = [k for k, state in enumerate(is_state) if not state]
+    scalars = [*(one.scalar_nuisances[k] for k in kept), *states]
+    by_state = _effects(one.observations.with_parameters(model.with_values(one.own)), states)
+    N = np.column_stack([one.effects[:, kept], *by_state, one.effects[:, len(is_state) :]])
+    directions, shrinkage, nuisance_mean, determined = _moments(N, len(scalars))
+    return replace(
+        one, directions=directions, shrinkage=shrinkage, nuisance_mean=nuisance_mean, determined=determined,
+        scalar_nuisances=scalars, effects=N,
+    )  # fmt: skip
+
+
+def _moments(effects: NDArray, scalars: int) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """Directions, shrinkage, and the posterior mean and determination of the scalar nuisances (`Whitened`)."""
+    U, s, Vt = np.linalg.svd(effects, full_matrices=False)
+    nuisance_mean = (Vt.T[:scalars] * (s / (1 + s**2))) @ U.T
+    determined = (Vt.T[:scalars] ** 2) @ (s**2 / (1 + s**2))
+    return U, shrinkage_of(s), nuisance_mean, determined
+
+
+def nuisances(o: Observations, repeatability: Repeatability = STATED) -> NDArray:
     """Effects of the nuisances on the errors, a prior standard deviation of each, in units of the noise.
 
     Returns
     -------
     ndarray, shape (rows, k)
         Scalar nuisances first, friction before all others; then draws of the drive motion's error.
-    int
-        Number of scalar nuisances.
     """
-    simulated, scalars = o.modelled({}), _scalar_nuisances(o)
-    effects = []
-    for name, value, spread in scalars:
-        step = NUISANCE_STEP * size_of(name, value)
-        derivative = _derivative(o, name, value, step, simulated)
-        effects.append(spread * derivative / o.sigma)
+    scalars = repeatability.applied(_scalar_nuisances(o))
     drawn = o.drive_errors({})
-    columns = [*effects, *(d / np.sqrt(len(drawn)) for d in drawn)]
-    return np.stack([c.ravel() for c in columns], axis=1), len(scalars)
+    columns = [*_effects(o, scalars), *((d / np.sqrt(len(drawn))).ravel() for d in drawn)]
+    return np.stack(columns, axis=1)
+
+
+def _effects(o: Observations, scalars: Sequence[tuple[str, float, float]]) -> list[NDArray]:
+    """Effect on the errors of a prior standard deviation of each scalar nuisance, shape (rows,)."""
+    simulated, found = o.modelled({}), []
+    for name, value, spread in scalars:
+        derivative = _derivative(o, name, value, _step(name, value), simulated)
+        found.append((spread * derivative / o.sigma).ravel())
+    return found
+
+
+def _step(name: str, value: float) -> float:
+    """Step of the difference by a nuisance; for a state of a mechanism, into its range."""
+    if (parts := mechanism_parameter(name)) is None:
+        return NUISANCE_STEP * size_of(name, value)
+    state = registry.get(parts[0]).parameter(parts[2])
+    return NUISANCE_STEP * (1 if value < (state.low + state.high) / 2 else -1)
 
 
 def _derivative(o: Observations, name: str, value: float, step: float, simulated: NDArray) -> NDArray:
@@ -133,26 +236,46 @@ def _derivative(o: Observations, name: str, value: float, step: float, simulated
     return jacobian(lambda x: o.modelled({name: x[0]}), np.array([value]), np.array([step]), simulated)[..., 0]
 
 
+def _states(o: Observations) -> list[tuple[str, float, float]]:
+    """States of the mechanisms at the recording's start that its stated times do not give, as scalar nuisances."""
+    known = known_states(o.given.recording, o.parameters)
+    every = [
+        (mechanism_key(m.name, m.place, p.name), m.values[p.name], p.spread)
+        for m in o.parameters.mechanisms
+        for p in registry.get(m.name).states
+    ]
+    return [one for one in every if one[0] not in known]
+
+
 def shrinkage_of(s: NDArray) -> NDArray:
     """Share by which whitening reduces errors along directions of `s` standard deviations of the noise."""
     return 1 - 1 / np.hypot(1, s)
 
 
-def relinearised(one: Whitened, model: Parameters) -> Whitened:
-    """Observations with the covariance linearised about another model.
+def relinearised(one: Whitened, model: Parameters, repeatability: Repeatability | None = None) -> Whitened:
+    """Observations with the covariance linearised about another model and the recording's own friction.
 
     The load's position in a gap of that model is the most likely one of a few: a load with mass rings differently on
     either side of its gap, and no linearisation leads from one to the other.
+
+    Parameters
+    ----------
+    one : Whitened
+    model : Parameters
+    repeatability : Repeatability, optional
+        Spreads of the nuisances, instead of the present ones.
     """
 
     def mean_square(position: float) -> float:
-        at = one.observations.with_parameters(replace(model, load_gap_position=position))
-        return float(np.mean(one.whiten(at.errors({}).ravel()) ** 2))
+        at = one.with_parameters(replace(model, load_gap_position=position))
+        return float(np.mean(one.whiten(at.linearised_errors({})) ** 2))
 
     has_gap = settings_of(model.mechanisms).half_gap
     position = min(settings.GAP_POSITIONS, key=mean_square) if has_gap else model.load_gap_position
-    about = whiten(one.observations, replace(model, load_gap_position=position))
-    return about.with_parameters(replace(one.observations.parameters, load_gap_position=position))
+    friction = one.with_parameters(model).friction_ratio
+    about = replace(model, load_gap_position=position)
+    found = whiten(one.observations, about, repeatability or one.repeatability, friction)
+    return found.with_parameters(replace(one.observations.parameters, load_gap_position=position))
 
 
 def _scalar_nuisances(o: Observations) -> Sequence[tuple[str, float, float]]:
@@ -163,8 +286,14 @@ def _scalar_nuisances(o: Observations) -> Sequence[tuple[str, float, float]]:
     for channel, name in ZERO_OF.items():
         if channel in o.channels and channel in recording.accuracy:
             found.append((name, getattr(parameters, name), recording.accuracy[channel]))
+    if not o.given.initial_tension_observed:
+        found.append((PRETENSION, parameters.pretension_scale, settings.PRETENSION_SPREAD))
     if settings_of(parameters.mechanisms).half_gap:
         found.append(("load_gap_position", parameters.load_gap_position, settings.GAP_SPREAD))
     if THETA_OUT in o.channels and (step := recording.encoder_step_rad.get(THETA_OUT)):
         found.append(("theta_out_zero_rad", parameters.theta_out_zero_rad, step / np.sqrt(12)))
-    return found
+    if o.given.initial_tension_observed:
+        cables = ("A",) if recording.far_end else ("A", "B")
+        curvatures = (f"tension_curvature_{cable}" for cable in cables)
+        found += [(name, getattr(parameters, name), settings.CURVATURE_SPREAD) for name in curvatures]
+    return [*found, *_states(o)]

@@ -43,7 +43,7 @@ class LeaveOneOut:
 
 
 def leave_one_out(problem: Problem, solution: Solution) -> LeaveOneOut:
-    """Cross-validate a fit that has shared unknowns only; their priors are never left out.
+    """Cross-validate a fit that has shared unknowns only; their priors hold for every part of the recordings.
 
     Where the model cannot be run at a recording's left-out optimum, the joint optimum stands for it.
     """

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
+from ccmodel.deadline import UNLIMITED, Deadline
 from ccmodel.failure import ModelError
 from ccmodel.inference.jacobian import STEP
 from ccmodel.inference.problem import Block, Problem
@@ -69,6 +70,8 @@ class Search:
         Whether scipy searches in the unknowns' own units, with their sizes as scales, and not in dimensionless
         variables. Near bounds its steps differ between the two. A cost with several minima, as with measured load
         torques, is then searched to another one.
+    deadline : Deadline
+        When the search is given up: it raises `ccmodel.deadline.OutOfTimeError`.
     """
 
     tolerance: float = 1e-10
@@ -78,6 +81,7 @@ class Search:
     retreats: bool = True
     gradient: float | None = None
     own_units: bool = False
+    deadline: Deadline = UNLIMITED
 
 
 @dataclass(frozen=True)
@@ -250,6 +254,7 @@ class _Reduced:
         Scipy rejects a point that does not reduce the cost and uses nothing but the norm of its rows. Derivatives are
         therefore not computed there, and the norm stands in the first row.
         """
+        self.how.deadline.check()
         try:
             x = self.place(y)
             errors = self.problem.errors(x)

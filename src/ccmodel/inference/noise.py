@@ -1,11 +1,13 @@
 """Noise of a recording under the correct model: sensor noise, encoder steps, and the uncertain drive motion."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from ccmodel.inference.cycles import NONE, CycleNoise
+from ccmodel.inference.effective_samples import IN_DIAGNOSIS
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 
@@ -13,31 +15,63 @@ from ccmodel.model.run import ModelInput, simulate
 FEWEST_AT_REST = 20
 # Least noise of a sensor, as a share of its stated accuracy, however small its scatter at rest.
 BEST_SHARE = 0.1
+# Weight of the noise at rest beside that of consecutive cycles, as degrees of freedom.
+REST_FREEDOM = 4.0
 # Time over which the variance of a few draws of the drive motion is averaged.
 ALIKE_S = 0.05
 # Sub-count offsets of the load encoder, uniform over a count.
 PHASES = (np.arange(16) + 0.5) / 16 - 0.5
 
 
-def sensor_noise(given: ModelInput) -> dict[str, float]:
-    """Standard deviation of each channel's noise, in its unit.
+@dataclass(frozen=True)
+class SensorNoise:
+    """Noise of a channel.
 
-    The scatter about a straight line through the rest at the recording's start, or the stated accuracy if the rest is
-    too short. A counted angle has the standard deviation of its step, a channel without rest and accuracy a hundredth
-    of its range.
+    Attributes
+    ----------
+    sd : float
+        Standard deviation, in the channel's unit.
+    source : {"cycles", "rest", "count", "assumed"}
+        Consecutive cycles, scatter at rest, the step of a counted angle, or the stated accuracy.
+    """
+
+    sd: float
+    source: str
+
+
+def sensor_noise(given: ModelInput, cycles: CycleNoise = NONE) -> dict[str, SensorNoise]:
+    """Noise of each channel.
+
+    The scatter about a straight line through the first half of the rest at the recording's start (before the drive's
+    first count, friction already gives way in the second half), or the stated accuracy if the rest is too short. A
+    counted angle has the standard deviation of its step, a channel without rest and accuracy a hundredth of its range.
+    This is the prior of what consecutive cycles show (`repeated`).
     """
     recording, found = given.recording, {}
     for channel, values in recording.channels.items():
-        if (step := recording.encoder_step_rad.get(channel)) is not None:
-            found[channel] = step / np.sqrt(12)
-            continue
         stated = recording.accuracy.get(channel)
-        if (rest := given.resting[channel]).size >= FEWEST_AT_REST:
+        rest = given.resting[channel]
+        if (step := recording.encoder_step_rad.get(channel)) is not None:
+            prior = SensorNoise(step / np.sqrt(12), "count")
+        elif rest.size >= FEWEST_AT_REST:
             best = BEST_SHARE * stated if stated else 1e-6 * max(float(np.abs(values).max()), 1e-9)
-            found[channel] = max(_scatter(rest), best)
+            prior = SensorNoise(max(_scatter(rest[: max(FEWEST_AT_REST, rest.size // 2)]), best), "rest")
         else:
-            found[channel] = stated or 0.01 * max(float(np.ptp(values)), 1e-9)
+            prior = SensorNoise(stated or 0.01 * max(float(np.ptp(values)), 1e-9), "assumed")
+        found[channel] = repeated(prior, cycles.variance.get(channel), cycles.cycles)
     return found
+
+
+def repeated(prior: SensorNoise, variance: float | None, cycles: float) -> SensorNoise:
+    """Noise from a prior and the variance between so many consecutive cycles.
+
+    A channel may repeat less well in motion than at rest, and never better.
+    """
+    if variance is None or variance <= prior.sd**2:
+        return prior
+    freedom = IN_DIAGNOSIS * cycles
+    square = (REST_FREEDOM * prior.sd**2 + freedom * variance) / (REST_FREEDOM + freedom)
+    return SensorNoise(float(np.sqrt(square)), "cycles")
 
 
 def drive_errors(given: ModelInput, parameters: Parameters, offset_is_free: bool = False) -> dict[str, NDArray]:

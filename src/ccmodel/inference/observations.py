@@ -1,14 +1,15 @@
 """A recording prepared for a fit: the model's input, the samples that are compared and the noise of each."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.channels import MEASURED, TAU_OUT
 from ccmodel.failure import ModelError
-from ccmodel.inference.noise import PHASES, drive_errors, rounding_errors, sensor_noise, size_over_time
+from ccmodel.inference.cycles import cycle_noise
+from ccmodel.inference.noise import PHASES, SensorNoise, drive_errors, rounding_errors, sensor_noise, size_over_time
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import PRESCRIBED, LoadFrom, ModelInput, simulate
 from ccmodel.recording import Recording
@@ -38,6 +39,8 @@ class Observations:
         Whether the sub-count offset of the drive encoder is an unknown of the fit. Otherwise it is part of the noise.
     load_from : {"law", "torque"}
         Whether the load's law or the measured load torque acts at the cables' far end.
+    noise : mapping of str to SensorNoise
+        Noise of each channel's sensor.
     friction_between : float
         Standard deviation of friction between batches, over its mean, that this recording has besides the one between
         runs: of the only recording of a batch among several. Otherwise 0.
@@ -52,6 +55,7 @@ class Observations:
     tolerance: NDArray
     offset_is_free: bool = False
     load_from: LoadFrom = "law"
+    noise: Mapping[str, SensorNoise] = field(default_factory=dict)
     friction_between: float = 0.0
 
     @classmethod
@@ -63,8 +67,11 @@ class Observations:
         step_s: float | None = None,
         tolerance: Tolerance = 0.0,
         offset_is_free: bool = False,
+        whole: Recording | None = None,
     ) -> "Observations":
         """Observations from a recording, one sample every `step_s`.
+
+        `whole` is the recording with all its cycles, if `recording` is a part of it: consecutive cycles show the noise.
 
         Raises
         ------
@@ -78,13 +85,14 @@ class Observations:
             raise ModelError(f"{recording.batch}/{recording.id}: none of {', '.join(channels)} was recorded")
         time_s = given.recording.time_s
         judged = time_s >= max(recording.rest_s, recording.settled_s)
-        sensors, drive = sensor_noise(given), drive_errors(given, parameters, offset_is_free)
+        sensors = sensor_noise(given, cycle_noise(whole or recording))
+        drive = drive_errors(given, parameters, offset_is_free)
         measured = np.stack([given.recording[c][judged] for c in used])
-        sigma = np.stack([np.hypot(sensors[c], size_over_time(drive[c], time_s)[judged]) for c in used])
+        sigma = np.stack([np.hypot(sensors[c].sd, size_over_time(drive[c], time_s)[judged]) for c in used])
         by_channel = tolerance if isinstance(tolerance, Mapping) else dict.fromkeys(used, tolerance)
         shares = np.array([by_channel.get(c, 0.0) for c in used])
         sigma = np.hypot(sigma, (shares * np.ptp(measured, axis=1))[:, None])
-        return cls(given, parameters, used, judged, measured, sigma, shares, offset_is_free)
+        return cls(given, parameters, used, judged, measured, sigma, shares, offset_is_free, noise=sensors)
 
     def without(self, channel: str) -> "Observations":
         """The same without one of the channels."""

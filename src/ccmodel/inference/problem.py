@@ -22,14 +22,14 @@ from ccmodel.model.parameters import acts_on
 
 @dataclass(frozen=True)
 class Free:
-    """An unknown: its start, its bounds, and its prior if recordings or batches have values of their own.
+    """An unknown: its start, its bounds, and its prior if it has one, as those that differ between recordings do.
 
     Attributes
     ----------
     start : float
     low, high : float
     spread : float or None
-        The prior's standard deviation, from recording to recording or from batch to batch; None: no prior.
+        The prior's standard deviation; of an own unknown, from recording to recording. None: no prior.
     mean : float or None
         The prior's mean; None: the start.
     """

@@ -162,6 +162,8 @@ def _role(mechanism: Mechanism) -> str:
     """What it changes, and what a diagnosis assumes about it."""
     if mechanism.modifies_observation is not None:
         role = "It modifies the observation: the sensors' readings after a run."
+    elif mechanism.drift is not None:
+        role = f"It drifts the model's `{mechanism.drift}` from recording to recording."
     else:
         settings = ", ".join(f"`{name}`" for name in mechanism.neutral_settings)
         role = f"It modifies the physics: the general solver's {settings}."

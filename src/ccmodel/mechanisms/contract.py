@@ -4,7 +4,8 @@
    finds it by listing the folder.
 2. Its docstring (a relative's: that of its function) is its ``text``: a title and the paragraphs of `PARAGRAPHS`. The
    command line, ``docs/mechanisms`` and the report are made from it and from the fields.
-3. A mechanism modifies either the physics or the observation. Before a run, its parameters are written into the
+3. A mechanism modifies either the physics or the observation, or is the drift of a parameter of the model from
+   recording to recording (`ccmodel.model.session`). Before a run, its parameters are written into the
    solver's `Settings` as ``settings`` declares; a setting that is no number stands in ``structures`` and is written by
    ``modifies_physics``. After a run, ``modifies_observation`` changes what the sensors read.
 4. A model without the mechanism and a model with it at its neutral values give the same numbers, bit for bit. Where
@@ -75,6 +76,9 @@ class Parameter:
         Value in a model that omits it; None if a model must give it.
     above, below : float
         Physical limits, both excluded.
+    spread : float
+        Of a state at the recording's start: its standard deviation from recording to recording about the value of the
+        model. The range is then that of the state, both ends included. 0: the same in all recordings.
     """
 
     name: str
@@ -92,6 +96,7 @@ class Parameter:
     default: float | None = None
     above: float = -inf
     below: float = inf
+    spread: float = 0.0
 
     def at(self, share: float) -> float:
         """Value at a share of the range, on the parameter's scale."""
@@ -178,6 +183,10 @@ class Mechanism:
         ``modifies_physics(settings, values)`` writes the structures.
     modifies_observation : callable or None
         ``modifies_observation(sensing, place, values)`` returns the channels that change.
+    drift : str or None
+        The parameter of the model that its ``change`` drifts through a session.
+    states_after_tensioning : callable or None
+        ``states_after_tensioning(seconds, values)``: its states, by name, at a time after the cables were tensioned.
     """
 
     name: str
@@ -194,13 +203,16 @@ class Mechanism:
     structures: Mapping[str, Any] = field(default_factory=dict)
     modifies_physics: Callable[[Settings, Mapping[str, float]], None] | None = None
     modifies_observation: Callable[[Sensing, str, Mapping[str, float]], dict[str, NDArray]] | None = None
+    drift: str | None = None
+    states_after_tensioning: Callable[[float, Mapping[str, float]], dict[str, float]] | None = None
 
     def __post_init__(self) -> None:
         unknown = set(self.places) - set(PLACES)
         if unknown or not self.places:
             raise ValueError(f"{self.name}: places are {', '.join(PLACES)}; got {', '.join(self.places) or 'none'}")
-        if bool(self.neutral_settings) == (self.modifies_observation is not None):
-            raise ValueError(f"{self.name}: a mechanism modifies either the physics or the observation")
+        kinds = bool(self.neutral_settings), self.modifies_observation is not None, self.drift is not None
+        if sum(kinds) != 1:
+            raise ValueError(f"{self.name}: a mechanism modifies the physics or the observation, or is a drift")
         if missing := set(PARAGRAPHS) - self.paragraphs.keys():
             raise ValueError(f"{self.name}: its text has no paragraph {', '.join(sorted(missing))}")
 
@@ -230,6 +242,15 @@ class Mechanism:
     def shapes(self) -> tuple[Parameter, ...]:
         """The other parameters."""
         return tuple(p for p in self.parameters if p not in self.strengths)
+
+    def parameter(self, name: str) -> Parameter:
+        """Its parameter of that name."""
+        return next(p for p in self.parameters if p.name == name)
+
+    @property
+    def states(self) -> tuple[Parameter, ...]:
+        """Parameters that are states at a recording's start, which differ from recording to recording."""
+        return tuple(p for p in self.parameters if p.spread)
 
     @property
     def neutral(self) -> dict[str, float]:

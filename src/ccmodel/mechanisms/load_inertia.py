@@ -16,7 +16,7 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter, Settings
 
 # A mass that is a few per cent off rings out of phase with the recording. Screening therefore tries this many masses,
 # with high damping, under which a resonance is seen from further off; the fit then lowers the damping by continuation.
-MASSES = tuple(k / 24 for k in range(1, 24))
+MASSES = tuple(k / 36 for k in range(1, 36))
 
 
 def load_damping(settings: Settings, stiffness: float) -> float:
@@ -31,7 +31,7 @@ MECHANISM = Mechanism(
     sentence="the load has a moment of inertia of {J}",
     places=("load",),
     parameters=(
-        Parameter("J", "kg m^2", 1e-5, 1e-3, 1e-4, "moment of inertia", screening_grid=MASSES),
+        Parameter("J", "kg m^2", 1e-5, 1e-2, 1e-4, "moment of inertia", screening_grid=MASSES),
         Parameter("zeta", "1", 1e-3, 0.3, 0.1, "damping ratio", screening_grid=(0.85,), continuation=True, default=0.0),
     ),
     mistaken_for=("time-skew",),

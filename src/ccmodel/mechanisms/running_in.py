@@ -1,7 +1,8 @@
 """Friction coefficient changes through a recording.
 
-Equation: The friction coefficient is mu (1 + change (1 - exp(-t / tau - per_m w))), with t the time and w the
-drive's cable travel since the start of the recording: warming goes with t, wear with w.
+Equation: The friction coefficient is mu (1 + change (1 - (1 - done) exp(-t / tau - per_m w))), with t the time and w
+the drive's cable travel since the start of the recording: warming goes with t, wear with w. done is the share of the
+change that has happened when the recording starts, and mu the friction coefficient before any of it.
 
 Signature: Loops drift through a recording while the sensors' zeros stay.
 
@@ -22,7 +23,8 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter, Settings
 
 def _modifies_physics(settings: Settings, values: Mapping[str, float]) -> None:
     def history(time_s: NDArray, travel_m: NDArray) -> NDArray:
-        return 1 + values["change"] * -np.expm1(-(time_s - time_s[0]) / values["tau"] - values["per_m"] * travel_m)
+        aged = -(time_s - time_s[0]) / values["tau"] - values["per_m"] * travel_m
+        return 1 + values["change"] * (values["done"] * np.exp(aged) - np.expm1(aged))
 
     settings.friction_history = history
 
@@ -30,7 +32,8 @@ def _modifies_physics(settings: Settings, values: Mapping[str, float]) -> None:
 MECHANISM = Mechanism(
     name="running-in",
     text=__doc__,
-    tex=r"\mu(t, w) = \mu\,\Bigl(1 + \mathrm{change}\,\bigl(1 - e^{-t/\tau - \mathrm{per\_m}\,w}\bigr)\Bigr)",
+    tex=r"\mu(t, w) = \mu\,\Bigl(1 + \mathrm{change}\,"
+    r"\bigl(1 - (1 - \mathrm{done})\, e^{-t/\tau - \mathrm{per\_m}\,w}\bigr)\Bigr)",
     sentence="friction [rises|falls] by {change:%} through a recording",
     places=("conduit",),
     parameters=(
@@ -39,6 +42,18 @@ MECHANISM = Mechanism(
             "tau", "s", 2.0, 1000.0, 10.0, "time constant", neutral=10.0, screening_grid=(0.13, 0.31, 0.5), above=0.0
         ),
         Parameter("per_m", "1/m", 1.0, 200.0, 1.0, "rate per cable travel", screening_grid=(0.0, 0.6), default=0.0),
+        Parameter(
+            "done",
+            "1",
+            0.0,
+            1.0,
+            0.3,
+            "share of the change that is over when a recording starts",
+            scale="linear",
+            screening_grid=(0.0,),
+            default=0.0,
+            spread=0.3,
+        ),
     ),
     mistaken_for=("relaxation",),
     depends_on_time=True,

@@ -1,8 +1,9 @@
 """Friction is higher at rest than in motion.
 
 Equation: The friction coefficient is mu (1 + a r) with the state r of the contact: r = 1 after a rest, and dr/ds =
-(exp(-(v / vs)^delta) - r) / 20 um over the sliding distance s, with v the sliding speed. Steady sliding gives mu (1
-+ a exp(-(v / vs)^delta)): a Gaussian for delta = 2, the default, and an exponential for delta = 1.
+(exp(-(v / vs)^delta) - r) / renewal over the sliding distance s, with v the sliding speed. Steady sliding gives mu
+(1 + a exp(-(v / vs)^delta)): a Gaussian for delta = 2, the default, and an exponential for delta = 1. By default,
+renewal is 20 um.
 
 Signature: Friction peaks at break-away, and the loss falls with speed.
 
@@ -18,16 +19,16 @@ from ccmodel.elementary import quick_exp, quick_log
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
-# Sliding distance over which a contact adapts to a new speed. At zero, friction that falls with speed has no unique
-# step, with or without inertia: explicit dynamics chatters on ever shorter pieces of cable the finer its grid, and its
-# mean is that of mu alone, whatever a and vs (docs/verification.md).
+# Sliding distance over which a contact adapts to a new speed, where a model states none. At zero, friction that falls
+# with speed has no unique step, with or without inertia: explicit dynamics chatters on ever shorter pieces of cable the
+# finer its grid, and its mean is that of mu alone, whatever a and vs (docs/verification.md).
 RENEWAL_M = 2e-5
 
 
 @kernel(inline="always")
-def renewed(rested: float, slide: float, dt: float, vs: float, delta: float) -> float:
+def renewed(rested: float, slide: float, dt: float, vs: float, delta: float, renewal: float) -> float:
     """State r of the contact (0 to 1) after sliding by `slide` (m) within `dt` (s)."""
-    decay = quick_exp(-abs(slide) / RENEWAL_M)
+    decay = quick_exp(-abs(slide) / renewal)
     ratio = abs(slide) / (dt * vs)
     if delta == 2.0:
         ratio *= ratio
@@ -41,7 +42,7 @@ MECHANISM = Mechanism(
     text=__doc__,
     tex=(
         r"\mu_\mathrm{eff} = \mu\,(1 + a\,r), \qquad \frac{dr}{ds} = \frac{e^{-(|v|/v_s)^\delta} - "
-        r"r}{20\,\mathrm{\mu m}}"
+        r"r}{\mathrm{renewal}}"
     ),
     sentence="friction is {a:%} higher at rest than in motion",
     places=("conduit",),
@@ -51,8 +52,25 @@ MECHANISM = Mechanism(
         Parameter(
             "delta", "1", 0.5, 2.5, 1.5, "exponent of the speed", neutral=2.0, screening_grid=(0.7,), default=2.0
         ),
+        Parameter(
+            "renewal",
+            "m",
+            2e-6,
+            2e-4,
+            RENEWAL_M,
+            "sliding distance over which a contact adapts to a new speed",
+            neutral=RENEWAL_M,
+            screening_grid=(0.5,),
+            default=RENEWAL_M,
+            above=0.0,
+        ),
     ),
     mistaken_for=("presliding", "viscous-friction"),
     depends_on_time=True,
-    settings={"stribeck_rise": "a", "stribeck_speed": "vs", "stribeck_exponent": "delta"},
+    settings={
+        "stribeck_rise": "a",
+        "stribeck_speed": "vs",
+        "stribeck_exponent": "delta",
+        "stribeck_renewal_m": "renewal",
+    },
 )

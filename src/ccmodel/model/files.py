@@ -22,6 +22,7 @@ FORMAT = 1
 # Parameters that a file may state, must state, and may state as null.
 _KNOWN = {f.name: f for f in fields(Parameters) if f.name not in ("mechanisms", "refinement")}
 _REQUIRED = [name for name, f in _KNOWN.items() if f.default is MISSING]
+_SESSION = ("session_start_s", "session_end_s")  # not in a file where they are not known
 _OPTIONAL = [name for name, f in _KNOWN.items() if "None" in str(f.type)]
 
 
@@ -233,6 +234,7 @@ def model_as_dict(parameters: Parameters, provenance: dict) -> dict:
     numbers = asdict(parameters)
     active = numbers.pop("mechanisms")
     del numbers["refinement"]
+    numbers = {name: value for name, value in numbers.items() if value is not None or name not in _SESSION}
     in_file = {name: former for former, name in FORMER_NAMES.items()}
     numbers = {in_file.get(name, name): value for name, value in numbers.items()}
     return {"format": FORMAT, "parameters": numbers, "mechanisms": active, "provenance": provenance}

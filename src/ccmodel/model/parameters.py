@@ -51,6 +51,9 @@ class Parameters:
         (``ccmodel.model.initial.InitialTension.between_ends``).
     mechanisms : tuple of Active
         Effects beyond the paper's physics.
+    session_start_s, session_end_s : float or None
+        When the first and the last recording of the session started that the model was fitted to, s since 1970 (UTC).
+        None: not stated for all of them.
     refinement : int
         Factor by which the general solver's grid and steps are finer than usual, to measure their error.
     """
@@ -77,6 +80,8 @@ class Parameters:
     tension_curvature_A: float = 0.0
     tension_curvature_B: float = 0.0
     mechanisms: tuple[Active, ...] = ()
+    session_start_s: float | None = None
+    session_end_s: float | None = None
     refinement: int = 1
 
     @property

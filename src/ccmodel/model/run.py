@@ -21,6 +21,7 @@ from ccmodel.channels import (
     ZERO_OF,
 )
 from ccmodel.failure import ModelError
+from ccmodel.mechanisms.relaxation import kept_at_rest
 from ccmodel.model.exact import pair as exact
 from ccmodel.model.general import run as general
 from ccmodel.model.general.sensors import true_at
@@ -28,6 +29,7 @@ from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad
 from ccmodel.model.model_input import PRESCRIBED, ModelInput
 from ccmodel.model.parameters import Parameters
+from ccmodel.model.session import of_recording
 from ccmodel.model.transmission import Transmission
 from ccmodel.recording import Recording
 
@@ -73,6 +75,7 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
         If the model cannot be run on this recording.
     """
     recording = given.recording
+    parameters = of_recording(parameters, recording)
     transmission = Transmission(
         path=recording.path.with_extra_bend(parameters.extra_bend_rad),
         axial_rigidity_N=parameters.stiffness_N_per_m * parameters.reference_length_m,
@@ -139,10 +142,14 @@ def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension
     if not given.initial_tension_observed:
         return InitialTension.uniform(path, scale * parameters.pretension_share * given.recording.pretension_N)
     tensions = _tensions(_true_at_rest(given, parameters), given.recording, parameters)
+    settings = general.settings_of(parameters.mechanisms)
+    seconds = given.resting_mean["time_s"] - float(given.recording.time_s[0])
+    # The rest's mean is what the cables have after half of the rest.
+    scale /= kept_at_rest(seconds, settings.relaxing_share, settings.relaxing_time_s, settings.relaxed_share)
     A = _both_ends("A", tensions, scale)
     B = A if given.recording.far_end else _both_ends("B", tensions, scale)
     curvatures = parameters.tension_curvature_A, parameters.tension_curvature_B
-    kinks_rad = sum(kink.hold * kink.bend_rad for kink in general.settings_of(parameters.mechanisms).kinks)
+    kinks_rad = sum(kink.hold * kink.bend_rad for kink in settings.kinks)
     return InitialTension.between_ends(path, parameters.friction, A, B, curvatures, kinks_rad)
 
 

@@ -5,12 +5,13 @@ All keys that were added later are optional, so a file written before them keeps
 
 import re
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from functools import reduce
 from pathlib import Path, PurePath
 from typing import Annotated, Any, Literal, NamedTuple, Self, get_args
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, Field, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, field_validator, model_validator
 
 from ccmodel.channels import (
     ANGLE_AT,
@@ -263,8 +264,23 @@ PRETENSION = "the tension to which each cable was set before the motion, N"
 CONDUIT = "the pieces of the conduit from the drive end, as [{length_m: 1.2, bend_rad: 3.14}]"
 
 
+def _moment(stated: Any) -> datetime | None:
+    """A date with a time of day; without an offset from UTC it is UTC."""
+    try:
+        at = datetime.fromisoformat(stated) if isinstance(stated, str) else stated
+        return at if at is None or at.tzinfo else at.replace(tzinfo=UTC)
+    except (AttributeError, TypeError, ValueError):
+        raise ValueError("must be a date with a time of day as 2026-03-31T14:05:00+02:00 (ISO 8601)") from None
+
+
+Moment = Annotated[datetime | None, BeforeValidator(_moment)]
+
+
 class RecordingEntry(TypedModel):
-    """One recording: its log and its conditions. Samples before `settled_s` are a start-up transient."""
+    """One recording: its log and its conditions. Samples before `settled_s` are a start-up transient.
+
+    `started_at` is the time of the log's first sample and `tensioned_at` that of the cables' last tensioning before it.
+    """
 
     id: Name
     file: str
@@ -272,7 +288,19 @@ class RecordingEntry(TypedModel):
     conduit: Annotated[Conduit, FillIn(CONDUIT)]
     excitation: dict[str, Any] = Field(default_factory=dict)
     settled_s: NotNegative = 0.0
+    started_at: Moment = None
+    tensioned_at: Moment = None
     note: Any = None
+
+    @model_validator(mode="after")
+    def _tensioned_before_it_started(self) -> Self:
+        if self.started_at is not None and self.tensioned_at is not None and self.tensioned_at > self.started_at:
+            late_s = (self.tensioned_at - self.started_at).total_seconds()
+            raise ValueError(
+                f"tensioned_at is {late_s:g} s after started_at: the cables are tensioned before the recording starts;"
+                " correct one of the two, or remove tensioned_at"
+            )
+        return self
 
     @field_validator("file")
     @classmethod
@@ -296,6 +324,7 @@ class RecordingDefaults(TypedModel):
     conduit: Annotated[Conduit | None, FillIn(CONDUIT)] = None
     excitation: dict[str, Any] = Field(default_factory=dict)
     settled_s: NotNegative = 0.0
+    tensioned_at: Moment = None
     note: Any = None
 
 

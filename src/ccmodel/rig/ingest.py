@@ -191,5 +191,7 @@ def _recording(
         settled_s=entry.settled_s,
         warnings=tuple(map(str, findings)),
         far_end=batch.rig.far_end,
+        started_at_s=entry.started_at.timestamp() if entry.started_at else None,
+        tensioned_at_s=entry.tensioned_at.timestamp() if entry.tensioned_at else None,
     )
     return recording, findings

@@ -25,7 +25,7 @@ def _not_all(branches: tuple[Relaxation, ...]) -> tuple[Relaxation, ...]:
 
 def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     half, root = size / 2, 10**0.5
-    return {"relaxation": [{"share": half, "time_constant_s": also["tau"] * f} for f in (1 / root, root)]}, {}
+    return {"relaxation": [{"share": half, "time_constant_s": also["tau"] * f} for f in (1 / root, root)]}, {"r": size}
 
 
 TWIN = Twin(

@@ -1,4 +1,7 @@
-"""Running-in: the friction coefficient times 1 + change (1 - exp(-x / scale)), x the time or the drive's travel."""
+"""Running-in: the friction coefficient times 1 + change (1 - exp(-x / scale)), x the time or the drive's travel.
+
+A recording starts at an age that its past has left (`Preparation.ran_in_before`).
+"""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -24,6 +27,7 @@ def _numbers(effects: Any) -> dict[str, Any]:
     return {
         "run_in_change": given.change if given else 0.0,
         "run_in_scale": given.scale if given else 1.0,
+        "run_in_before": 0.0,
         "run_in_by_travel": given is not None and given.over == "travel_m",
     }
 
@@ -32,14 +36,14 @@ def _numbers(effects: Any) -> dict[str, Any]:
 def _value(p: Any, y: float, tension: float, time: float, travel: float, position: float) -> float:
     if p.run_in_change == 0.0:
         return y
-    age = travel if p.run_in_by_travel else time
+    age = p.run_in_before + (travel if p.run_in_by_travel else time)
     return y * (1.0 + p.run_in_change * -np.expm1(-age / p.run_in_scale))
 
 
 def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     # Running in over travel is a form of the rig's own; it is drawn where the time constant comes out short.
     if also["tau"] < 10:
-        return {"running_in": {"change": size, "over": "travel_m", "scale": also["travel_m"]}}, {}
+        return {"running_in": {"change": size, "over": "travel_m", "scale": also["travel_m"]}}, {"change": size}
     return {"running_in": {"change": size, "scale": also["tau"]}}, {"change": size, "tau": also["tau"]}
 
 

@@ -62,6 +62,8 @@ def _check(a: Active, known: Mechanism) -> None:
         if not p.above < value < p.below:
             limit = f"above {p.above:g}" if value <= p.above else f"below {p.below:g}"
             raise ModelError(f"{a.name} has {p.name} = {value:g} ({p.meaning}), which must be {limit}")
+        if p.spread and not p.low <= value <= p.high:
+            raise ModelError(f"{a.name} has {p.name} = {value:g} ({p.meaning}); it is {p.low:g} to {p.high:g}")
         if p.low > 0 and not p.signed and value < 0:
             raise ModelError(
                 f"{a.name} has {p.name} = {value:g} {p.unit}, which must not be negative; "

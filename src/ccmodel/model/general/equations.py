@@ -242,4 +242,4 @@ def renew_contacts(ph: Physics, node: NDArray, slide: NDArray, c: int, dt: float
     """Write the contacts' memory of rest after the slides in `NOW` into row `into`."""
     rested, d, following = node[rows.RESTED, c], slide[rows.NOW, c], node[into, c]
     for i in range(node.shape[2]):
-        following[i] = renewed(rested[i], d[i + 1], dt, ph.stribeck_speed, ph.stribeck_exponent)
+        following[i] = renewed(rested[i], d[i + 1], dt, ph.stribeck_speed, ph.stribeck_exponent, ph.stribeck_renewal_m)

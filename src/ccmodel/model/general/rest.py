@@ -30,11 +30,15 @@ def initial_state(
         T = np.concatenate([T[:, :1], T], axis=1)
     if settings.load_end_compliance > 0:
         T = np.concatenate([T, T[:, -1:]], axis=1)
-    stretch = T / piece[rows.STIFFNESS]
+    # The rest shows the tension that relaxation has left so far.
+    r = piece[rows.RELAXING]
+    elastic = T * ((1 - r * (1 - physics.relaxed_share)) / (1 - r))
+    stretch = elastic / piece[rows.STIFFNESS]
     settles = piece[rows.LOST] > 0
     if settles.any():
-        stretch[settles] = stretch_at(T[settles], piece[rows.LOST][settles], piece[rows.STIFFNESS][settles])
-    piece[rows.STRETCH], piece[rows.ELASTIC] = stretch, T
+        stretch[settles] = stretch_at(elastic[settles], piece[rows.LOST][settles], piece[rows.STIFFNESS][settles])
+    piece[rows.STRETCH], piece[rows.ELASTIC] = stretch, elastic
+    piece[rows.LOST_TENSION] = physics.relaxed_share * T / (1 - r)
     both = T[:, :-1] + T[:, 1:]
     factor = friction_factor * (1 + physics.stribeck_rise)
     if physics.tension_exponent != 0:

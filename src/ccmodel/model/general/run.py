@@ -26,8 +26,9 @@ from ccmodel.model.transmission import Transmission
 ELEMENTS = 32
 # Outputs of the march, row by row.
 OUTPUTS = (*TENSIONS, THETA_OUT, TAU_OUT, TAU_IN)
-# A step covers no more than this phase of a load that rings, up to so many steps a sample.
-RINGING_STEP_RAD, MOST_STEPS = 0.15, 16
+# A step covers no more than this phase of a load that rings, up to so many steps a sample. A load that rings faster,
+# near half the sampling rate and above, shows its inertia in the samples but not its ringing, and needs only a few.
+RINGING_STEP_RAD, MOST_STEPS, UNRESOLVED_STEPS = 0.15, 16, 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -222,7 +223,8 @@ def _steps(physics: rows.Physics, transmission: Transmission, time_s: NDArray) -
     cables = 2 * transmission.axial_rigidity_N / transmission.path.length_m * physics.radius**2
     rings_rad_per_s = np.sqrt((cables + physics.stiffness_load) / physics.inertia)
     wanted = rings_rad_per_s * float(np.median(np.diff(time_s))) / RINGING_STEP_RAD
-    return int(np.clip(2 ** np.ceil(np.log2(wanted)), 1, MOST_STEPS))
+    steps = int(max(2 ** np.ceil(np.log2(wanted)), 1))
+    return steps if steps <= MOST_STEPS else UNRESOLVED_STEPS
 
 
 def _coulomb_bristle(transmission: Transmission, settings: Settings, elements: int) -> float:

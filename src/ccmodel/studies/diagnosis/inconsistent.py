@@ -44,6 +44,7 @@ def report(batch: str, findings: Sequence[Finding], is_held: bool = False, sever
             "mean_square": {"calibrated": None, "extended": None},
             "error": {},
         },
+        "repeatability": [],
         "next_experiment": {"text": _correction(contradictions, several), "separates": []},
         "not_judged": [
             {"what": f.place_in(several), "why": f.text, "confidence": round(f.confidence, 4)}

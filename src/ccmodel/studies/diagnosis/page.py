@@ -61,7 +61,7 @@ def write_diagnosis(file: Path, found: Diagnosis, page: str | None = None) -> No
     report = found.report
     nearest = report["nearest"] or {"mechanisms": []}
     named = [*report["mechanisms"], *report["likeliest"], *report["alternatives"], *nearest["mechanisms"]]
-    errors = mismatch(found.judgement.whitened, found.judgement.calibrated)
+    errors = mismatch(found.judgement.calibrated)
     with matplotlib.rc_context(STYLE):
         text = _template("page.html.j2").render(
             report=report,
@@ -82,6 +82,7 @@ def write_diagnosis(file: Path, found: Diagnosis, page: str | None = None) -> No
             map=_encoded(_map(found)),
             map_in_words=_map_in_words(errors),
             caution=_caution(report, errors),
+            repeatability=repeatability_in_words(report["repeatability"]),
             loops=_encoded(_loops(found)),
             between=_between(found.judgement.best),
             recordings=[w.observations.given.recording.id for w in found.judgement.whitened],
@@ -133,6 +134,29 @@ def _map_in_words(errors: Mapping[str, Mapping[str, float]]) -> str:
         for channel, phases in errors.items()
     )
     return "Residuals over the noise floor: " + "; ".join(rows)
+
+
+# Where a standard deviation comes from, after the number of recordings.
+SOURCES = {
+    "repeats": "that repeat a condition",
+    "scatter": "none of which repeats another",
+    "cycles": "with consecutive cycles",
+    "rest": "at rest",
+    "count": "with encoder counts",
+}
+
+
+def repeatability_in_words(rows: Sequence[Mapping]) -> str:
+    """The standard deviations that count as noise: what the recordings show, and what was assumed."""
+    shown, assumed = [], []
+    for row in rows:
+        size = f"{100 * row['value']:.2g} %" if row["unit"] == "1" else f"{row['value']:.2g} {row['unit']}"
+        if row["from"] == "assumed":
+            assumed.append(f"{row['what']} {size}")
+        else:
+            shown.append(f"{row['what']} {size} ({row['recordings']} recordings {SOURCES[row['from']]})")
+    parts = [f"estimated: {', '.join(shown)}"] * bool(shown) + [f"assumed: {', '.join(assumed)}"] * bool(assumed)
+    return f"Standard deviations that count as noise, {'; '.join(parts)}."
 
 
 def _caution(report: Mapping, errors: Mapping[str, Mapping[str, float]]) -> str | None:
@@ -188,7 +212,7 @@ def _why(fit: CandidateFit, found: Diagnosis) -> str:
         # The lack of fit of a candidate that others surpass is not computed.
         above = fit.mean_square > limit
         return f"mean square above {limit:.3g}, the limit" if above else "others have a smaller mean square"
-    if j.single_fault_places and fit.hypothesis.is_pair:
+    if j.single_fault_places and fit.hypothesis.size > 1:
         return f"adequate, but one fault at the {' or '.join(j.single_fault_places)} is as adequate"
     ratio = fit.mean_square / j.best.mean_square
     return f"adequate, with {ratio:.3g} times the mean square" if ratio > 1 else "adequate, with more parameters"
@@ -197,11 +221,11 @@ def _why(fit: CandidateFit, found: Diagnosis) -> str:
 def _map(found: Diagnosis) -> Figure:
     """Errors over the noise by channel and part of the motion: baseline and, if any, with the mechanisms found."""
     j = found.judgement
-    before = mismatch(j.whitened, j.calibrated)
+    before = mismatch(j.calibrated)
     highest = max(np.nanmax([list(v.values()) for v in before.values()]), 3.0)
     shown = {_baseline(found.report): before}
     if j.best is not j.calibrated:
-        shown[WITH_FOUND] = mismatch(j.whitened, j.best)
+        shown[WITH_FOUND] = mismatch(j.best)
     figure, axes = subplots(1, len(shown), figsize=(4 * len(shown), 2.9), sharey=True, squeeze=False)
     for ax, (title, table) in zip(axes[0], shown.items(), strict=True):
         values = np.array([[table[c][p] for p in PHASES] for c in table])
@@ -231,8 +255,7 @@ def _loops(found: Diagnosis) -> Figure:
     scale = TABLE[channel].scale
     figure, axes = subplots(1, len(order), figsize=(3.1 * len(order), 3.1), squeeze=False)
     for ax, i in zip(axes[0], order, strict=True):
-        w = j.whitened[i]
-        observed = w.observations
+        observed = j.whitened[i].observations
         c = observed.channels.index(channel)
         theta = observed.given.theta_in[observed.judged]
         ax.plot(theta, scale * observed.measured[c], color=FAINT, lw=2.2, label=_origin(found))
@@ -242,8 +265,7 @@ def _loops(found: Diagnosis) -> Figure:
         if found.report["nearest"] and j.nearest is not None:
             models.append((j.nearest, COLOURS[3], "-.", f"nearest model, {NOT_ACCEPTED}"))
         for fit, colour, line, label in models:
-            model = observed.with_parameters(fit.held_out(i, w))
-            ax.plot(theta, scale * model.modelled({})[c], color=colour, lw=1.0, ls=line, label=label)
+            ax.plot(theta, scale * fit.held_out(i).modelled({})[c], color=colour, lw=1.0, ls=line, label=label)
         ax.set_title(observed.given.recording.id, fontsize=9)
         ax.set_xlabel(TABLE[THETA_IN].axis)
     axes[0][0].set_ylabel(TABLE[channel].axis)

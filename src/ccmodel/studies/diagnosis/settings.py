@@ -5,6 +5,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from ccmodel import mechanisms
+from ccmodel.diagnosis.settings import MOST_MECHANISMS, TIME_LIMIT_S
 from ccmodel.steps.settings import Tolerance
 from ccmodel.typed import TypedModel
 
@@ -23,7 +24,10 @@ class Diagnosing(TypedModel):
     cycles: int | None = Field(None, ge=1, description="cycles of a sine that are compared once settled; absent: all")
     forced_candidates: list[list[str]] = Field(
         default_factory=list,
-        description="one or two mechanisms each, 'name at place', to fit in full whatever the screening says",
+        description="one to four mechanisms each, 'name at place', to fit in full whatever the screening says",
+    )
+    time_limit_s: float = Field(
+        TIME_LIMIT_S, gt=0, description="time after which no further candidate is fitted, s; the verdict says so"
     )
     trust_inputs: bool = Field(
         False, description="whether to diagnose even if the recordings contradict one another or batch.yaml"
@@ -38,6 +42,6 @@ class Diagnosing(TypedModel):
             if place not in (places := mechanisms.get(name).places):
                 stated = " or ".join(f"'{name} at {possible}'" for possible in places)
                 raise ValueError(f"forced_candidates: '{one}' is at none of its places; state {stated}")
-        if any(len(candidate) not in (1, 2) for candidate in self.forced_candidates):
-            raise ValueError("forced_candidates: each is a list of one mechanism or of two")
+        if not all(1 <= len(candidate) <= MOST_MECHANISMS for candidate in self.forced_candidates):
+            raise ValueError(f"forced_candidates: each is a list of one to {MOST_MECHANISMS} mechanisms")
         return self

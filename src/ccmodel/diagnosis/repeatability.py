@@ -1,0 +1,298 @@
+"""Repeatability: how much friction and sensor zeros differ from run to run, and whether they differ by no more.
+
+Recordings of one condition (`conditions`) are repeats. Their differences estimate each spread hierarchically, with the
+stated spread as prior: a scaled inverse chi-square distribution of `settings.SPREAD_FREEDOM` degrees of freedom, which
+SS, the sum of squares about the means of the conditions, updates to
+
+    s^2 = (nu0 s0^2 + SS) / (nu0 + nu).
+
+Where no condition repeats, the spread of friction comes from its scatter over all recordings by the same formula, up to
+`settings.MOST_SCATTER` times the stated one: that scatter may be physics too.
+
+Whitening marginalises friction's deviation, so that no mean square shows a deviation that no repeat would have.
+`friction_repeats` tests it: by the scatter of repeats over the stated spread, and between conditions over the estimated
+one (F tests), and for a trend over the sequence of the recordings (t test). A trend is no scatter: spreads are those
+about it.
+
+Deviations are in standard deviations as stated, and not shrunk: a posterior mean m with the posterior variance v under
+a standard normal prior is an observation m / (1 - v) with the variance v / (1 - v).
+"""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as fisher
+from scipy.stats import t as student
+
+from ccmodel.channels import THETA_IN, ZERO_OF, short_name, unit_of
+from ccmodel.diagnosis import settings
+from ccmodel.recording import Recording
+
+if TYPE_CHECKING:
+    from ccmodel.diagnosis.whitening import Whitened
+
+FRICTION, PRETENSION = "friction_coefficient", "pretension_scale"
+_WORDS = {FRICTION: "friction", PRETENSION: "initial tension"}
+_CHANNEL_OF = {zero: channel for channel, zero in ZERO_OF.items()}
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Standard deviation of a nuisance from run to run.
+
+    Attributes
+    ----------
+    nuisance : str
+        Name of its parameter.
+    ratio : float
+        Estimated over stated standard deviation.
+    source : {"repeats", "scatter", "assumed"}
+        Differences of repeats, scatter of all recordings, or the stated value.
+    recordings : int
+        Number of recordings that it rests on; 0 if assumed.
+    """
+
+    nuisance: str
+    ratio: float = 1.0
+    source: str = "assumed"
+    recordings: int = 0
+
+
+@dataclass(frozen=True)
+class Repeatability:
+    """Spreads of the nuisances, and the conditions of the recordings.
+
+    Attributes
+    ----------
+    spreads : mapping of str to Spread
+        By nuisance; one that is not among them has its stated spread.
+    conditions : sequence of sequence of int
+        Recordings of each condition, by their number.
+    """
+
+    spreads: Mapping[str, Spread]
+    conditions: Sequence[Sequence[int]] = ()
+
+    def ratio(self, nuisance: str) -> float:
+        """Estimated over stated standard deviation."""
+        return self.spreads[nuisance].ratio if nuisance in self.spreads else 1.0
+
+    def applied(self, nuisances: Sequence[tuple[str, float, float]]) -> list[tuple[str, float, float]]:
+        """Name, value and stated standard deviation of nuisances, with the estimated standard deviations instead."""
+        return [(name, value, self.ratio(name) * spread) for name, value, spread in nuisances]
+
+
+STATED = Repeatability({})
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """Deviations of a nuisance in each recording, in stated standard deviations.
+
+    Attributes
+    ----------
+    values, variances : ndarray, shape (recordings,)
+        Observed deviations and the variances of their errors; NaN in a recording that does not determine it.
+    """
+
+    values: NDArray
+    variances: NDArray
+
+    def sum_of_squares(self, groups: Sequence[Sequence[int]]) -> tuple[float, int, int]:
+        """Sum of squares about the mean of each group without the errors' share, degrees of freedom, and recordings."""
+        square, freedom, count = 0.0, 0, 0
+        for group in groups:
+            kept = [i for i in group if np.isfinite(self.values[i])]
+            if len(kept) > 1:
+                scatter = float(np.sum((self.values[kept] - self.values[kept].mean()) ** 2))
+                square += scatter - (1 - 1 / len(kept)) * float(self.variances[kept].sum())
+                freedom += len(kept) - 1
+                count += len(kept)
+        return max(square, 0.0), freedom, count
+
+
+def conditions(recordings: Sequence[Recording]) -> list[list[int]]:
+    """Numbers of the recordings of each condition: the same conduit, pretension aimed at, and motion of the drive."""
+    groups: list[list[int]] = []
+    for i, recording in enumerate(recordings):
+        found = next((g for g in groups if _is_repeat(recordings[g[0]], recording)), None)
+        if found is None:
+            groups.append([i])
+        else:
+            found.append(i)
+    return groups
+
+
+def _is_repeat(a: Recording, b: Recording) -> bool:
+    first, second = (np.stack([r.path.piece_length_m, r.path.piece_bend_rad]) for r in (a, b))
+    if first.shape != second.shape or not np.allclose(first, second) or a.far_end != b.far_end:
+        return False
+    if not np.isclose(a.pretension_N, b.pretension_N, rtol=1e-3):
+        return False
+    times = [r.time_s - r.time_s[0] for r in (a, b)]
+    if not np.isclose(times[0][-1], times[1][-1], rtol=settings.SAME_MOTION):
+        return False
+    motions = [r[THETA_IN] - r[THETA_IN][0] for r in (a, b)]
+    apart = np.sqrt(np.mean((motions[0] - np.interp(times[0], times[1], motions[1])) ** 2))
+    counts = 2 * max(r.encoder_step_rad.get(THETA_IN, 0.0) for r in (a, b))
+    return bool(apart <= max(settings.SAME_MOTION * np.ptp(motions[0]), counts))
+
+
+def deviations(whitened: Sequence["Whitened"], residuals: Sequence[NDArray], nuisance: str) -> Deviations:
+    """Deviations of a nuisance in each recording from the residuals of a fit, nuisances included."""
+    found = [w.deviation(nuisance, e) for w, e in zip(whitened, residuals, strict=True)]
+    return Deviations(*np.array(found, dtype=float).reshape(-1, 2).T)
+
+
+def estimated(whitened: Sequence["Whitened"], residuals: Sequence[NDArray]) -> Repeatability:
+    """Spreads of friction and of the sensors' zeros from the residuals of a fit of the calibrated model."""
+    groups = conditions([w.observations.given.recording for w in whitened])
+    names = dict.fromkeys(name for w in whitened for name, _, _ in w.scalar_nuisances)
+    found = {}
+    for name in names:
+        of_name = deviations(whitened, residuals, name)
+        if name in _WORDS:
+            found[name] = relative_spread(name, without_trend(of_name), groups)
+        elif name in _CHANNEL_OF:
+            found[name] = zero_spread(name, of_name, groups)
+    return Repeatability(found, groups)
+
+
+def relative_spread(name: str, found: Deviations, groups: Sequence[Sequence[int]]) -> Spread:
+    """Spread of friction or initial tension from repeats; without repeats from the scatter of all recordings."""
+    square, freedom, count = found.sum_of_squares(groups)
+    if freedom:
+        return Spread(name, _posterior(square, freedom), "repeats", count)
+    square, freedom, count = found.sum_of_squares([range(found.values.size)])
+    if freedom + 1 < settings.FEWEST_FOR_SCATTER:
+        return Spread(name)
+    ratio = float(np.clip(_posterior(square, freedom), 1.0, settings.MOST_SCATTER))
+    return Spread(name, ratio, "scatter", count) if ratio > 1 else Spread(name)
+
+
+def zero_spread(name: str, found: Deviations, groups: Sequence[Sequence[int]]) -> Spread:
+    """Spread of a sensor's zero from repeats, at least the stated accuracy.
+
+    The accuracy is also that of the part of a zero that stays from run to run, which repeats do not show.
+    """
+    square, freedom, count = found.sum_of_squares(groups)
+    ratio = _posterior(square, freedom)
+    return Spread(name, ratio, "repeats", count) if ratio > 1 else Spread(name)
+
+
+def _posterior(square: float, freedom: int) -> float:
+    """Ratio of the estimated to the stated standard deviation, from a sum of squares over the stated variance."""
+    return float(np.sqrt((settings.SPREAD_FREEDOM + square) / (settings.SPREAD_FREEDOM + freedom)))
+
+
+def friction_repeats(whitened: Sequence["Whitened"], residuals: Sequence[NDArray], is_fitted: bool) -> bool:
+    """Whether friction differs between recordings by no more than from run to run, and has no trend over them.
+
+    Parameters
+    ----------
+    whitened : sequence of Whitened
+    residuals : sequence of ndarray
+        By recording, of a fit (`CandidateFit.residuals`).
+    is_fitted : bool
+        Whether the fit determines the mean friction; otherwise deviations count from the model's friction.
+    """
+    # A tolerance accepts discrepancies, and friction takes up some of them.
+    if len(residuals) < settings.FEWEST_FOR_SCATTER or any(w.observations.tolerance.any() for w in whitened):
+        return True
+    found = deviations(whitened, residuals, FRICTION)
+    groups = whitened[0].repeatability.conditions or [[i] for i in range(len(whitened))]
+    is_scatter = min(within_probability(found, groups), between_probability(found, groups, is_fitted))
+    return is_scatter > settings.SCATTER_LEVEL and trend_probability(found) > settings.TREND_LEVEL
+
+
+def within_probability(found: Deviations, groups: Sequence[Sequence[int]]) -> float:
+    """Probability of at least this scatter of friction within conditions, if its spread is the stated one."""
+    within, freedom, _ = found.sum_of_squares(groups)
+    return float(fisher.sf(within / freedom, freedom, settings.SPREAD_FREEDOM)) if freedom else 1.0
+
+
+def between_probability(found: Deviations, groups: Sequence[Sequence[int]], is_fitted: bool = True) -> float:
+    """Probability of at least this scatter of friction between conditions, if recordings differ as repeats do."""
+    within, freedom, _ = found.sum_of_squares(groups)
+    known = np.flatnonzero(np.isfinite(found.values))
+    between = found.sum_of_squares([known.tolist()])[0] - within
+    between_freedom = len(known) - 1 - freedom
+    if not is_fitted and len(known):
+        between += len(known) * float(found.values[known].mean()) ** 2
+        between_freedom += 1
+    if between_freedom < 1:
+        return 1.0
+    ratio = max(between, 0.0) / between_freedom / _posterior(within, freedom) ** 2
+    return float(fisher.sf(ratio, between_freedom, settings.SPREAD_FREEDOM + freedom))
+
+
+def trend_probability(found: Deviations) -> float:
+    """Two-sided probability of at least this trend over the sequence of the recordings, if there is none."""
+    known = np.flatnonzero(np.isfinite(found.values))
+    if len(known) < settings.FEWEST_FOR_SCATTER:
+        return 1.0
+    at, slope = known - known.mean(), _slope(found.values)
+    left = found.values[known] - found.values[known].mean() - slope * at
+    freedom = settings.SPREAD_FREEDOM + len(known) - 2
+    sd = np.sqrt((settings.SPREAD_FREEDOM + float(left @ left)) / freedom / float(at @ at))
+    return float(2 * student.sf(abs(slope) / sd, freedom))
+
+
+def without_trend(found: Deviations) -> Deviations:
+    """Deviations about their trend over the sequence of the recordings, if they have one."""
+    if trend_probability(found) > settings.TREND_LEVEL:
+        return found
+    return Deviations(found.values - _slope(found.values) * np.arange(found.values.size), found.variances)
+
+
+def _slope(values: NDArray) -> float:
+    """Least-squares slope over the number of the recording, without those that are NaN."""
+    known = np.flatnonzero(np.isfinite(values))
+    at = known - known.mean()
+    return float(at @ values[known] / (at @ at))
+
+
+def report(whitened: Sequence["Whitened"]) -> list[dict]:
+    """Standard deviations that count as noise, as plain data for diagnosis.json: estimated from what, or assumed."""
+    return [*_spreads(whitened), *_sensors(whitened)]
+
+
+def _spreads(whitened: Sequence["Whitened"]) -> list[dict]:
+    applied: dict[str, tuple[float, str]] = {}
+    for w in whitened:
+        for name, value, sd in w.scalar_nuisances:
+            if name in _WORDS:
+                applied[name] = sd / value, "1"
+            elif name in _CHANNEL_OF:
+                applied[name] = sd, _unit(_CHANNEL_OF[name])
+    found = []
+    for name, (size, unit) in applied.items():
+        spread = whitened[0].repeatability.spreads.get(name, Spread(name))
+        what = _WORDS.get(name) or f"zero of {short_name(_CHANNEL_OF[name])}"
+        found.append(_row(f"{what} from run to run", size, unit, spread.source, spread.recordings))
+    return found
+
+
+def _sensors(whitened: Sequence["Whitened"]) -> list[dict]:
+    """The noise of each channel: its root mean square over all recordings, and where most of them have it from."""
+    found = []
+    for channel in dict.fromkeys(c for w in whitened for c in w.observations.channels):
+        noises = [w.observations.noise[channel] for w in whitened if channel in w.observations.noise]
+        if noises:
+            (source, count), *_ = Counter(n.source for n in noises).most_common(1)
+            size = float(np.sqrt(np.mean([n.sd**2 for n in noises])))
+            number = 0 if source == "assumed" else count
+            found.append(_row(f"noise of {short_name(channel)}", size, _unit(channel), source, number))
+    return found
+
+
+def _unit(channel: str) -> str:
+    return unit_of(channel).replace(" ", "*")
+
+
+def _row(what: str, value: float, unit: str, source: str, recordings: int) -> dict:
+    return {"what": what, "value": value, "unit": unit, "from": source, "recordings": recordings}

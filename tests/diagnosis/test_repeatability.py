@@ -1,0 +1,179 @@
+"""Repeatability: conditions, spreads, and the tests of friction's deviations."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import made_observations as made
+from ccmodel.diagnosis.candidate import fit
+from ccmodel.diagnosis.hypothesis import PAPER
+from ccmodel.diagnosis.repeatability import (
+    FRICTION,
+    PRETENSION,
+    Deviations,
+    between_probability,
+    conditions,
+    deviations,
+    estimated,
+    friction_repeats,
+    relative_spread,
+    report,
+    trend_probability,
+    within_probability,
+    without_trend,
+    zero_spread,
+)
+from ccmodel.diagnosis.settings import MOST_SCATTER, SCATTER_LEVEL, SPREAD_FREEDOM, TREND_LEVEL
+from ccmodel.diagnosis.whitening import relinearised, whiten
+from ccmodel.inference.observations import Observations
+
+ALONE = [[i] for i in range(9)]
+
+
+def observed(values, variance=0.0):
+    return Deviations(np.array(values, float), np.full(len(values), variance))
+
+
+def with_frictions(*ratios, pretensions=(7.0, 7.0, 5.0, 6.0, 7.0, 5.0, 6.0)):
+    """Recordings of the model, each with its own friction; the first two are repeats."""
+    truths = [replace(made.PARAMETERS, friction_scale=ratio) for ratio in ratios]
+    return [made.whitened(0.6, 1.0, pretensions[k], seed=k, truth=truth) for k, truth in enumerate(truths)]
+
+
+def calibrated(recordings):
+    found = made.calibrated(recordings)
+    return found, estimated(recordings, found.residuals)
+
+
+def test_repeats_are_found_by_their_motion_conduit_and_pretension():
+    recordings = [made.whitened(*at, seed=k).observations.given.recording for k, at in enumerate((
+        (0.6, 1.0, 7.0), (0.6, 1.0, 7.0), (0.6, 1.0, 5.0), (0.5, 1.0, 7.0), (0.6, 1.1, 7.0),
+    ))]  # fmt: skip
+    assert conditions(recordings) == [[0, 1], [2], [3], [4]]
+    bent = replace(recordings[1], path=recordings[1].path.with_extra_bend(0.5))
+    assert conditions([recordings[0], bent]) == [[0], [1]]
+
+
+def test_deviations_are_those_of_the_rig_and_not_shrunk():
+    ratios = np.array([1.03, 0.99, 1.0, 0.98, 1.02])
+    recordings = with_frictions(*ratios)
+    found, repeatability = calibrated(recordings)
+    values = deviations(recordings, found.residuals, FRICTION).values
+    assert values - values.mean() == pytest.approx(100 * (ratios / ratios.mean() - 1), abs=0.7)
+    again = [relinearised(w, found.model(made.PARAMETERS), repeatability) for w in recordings]
+    assert again[0].scalar_nuisances[0][2] != pytest.approx(recordings[0].scalar_nuisances[0][2], rel=0.05)
+    refitted = fit(again, PAPER, found.free, found.values)
+    assert deviations(again, refitted.residuals, FRICTION).values == pytest.approx(values, abs=0.7)
+
+
+def test_a_recording_is_linearised_about_its_own_friction():
+    """Fifteen per cent are beyond the linear range: the errors that remain are those of the noise all the same."""
+    recordings = with_frictions(1.0, 1.15, 1.0, 1.0, 1.0, pretensions=(7.0, 7.0, 7.0, 5.0, 5.0))
+    found, repeatability = calibrated(recordings)
+    again = [relinearised(w, found.model(made.PARAMETERS), repeatability) for w in recordings]
+    truth = {"friction_coefficient": made.PARAMETERS.friction_coefficient}
+
+    def mean_square(w):
+        return np.mean(w.errors(truth)[: w.measured.size] ** 2)
+
+    assert mean_square(recordings[1]) > 1.1 * mean_square(recordings[0])
+    assert mean_square(again[1]) == pytest.approx(1.0, abs=0.1)
+
+
+def test_the_spread_is_that_of_repeats_with_the_stated_one_as_prior():
+    nu = SPREAD_FREEDOM
+    found = relative_spread(FRICTION, observed([2.0, -2.0, 0.0]), [[0, 1], [2]])
+    assert (found.ratio, found.source, found.recordings) == (pytest.approx(np.sqrt((nu + 8) / (nu + 1))), "repeats", 2)
+    # The errors of the deviations are no difference of the rig.
+    assert relative_spread(FRICTION, observed([2.0, -2.0, 0.0], 4.0), [[0, 1], [2]]).ratio == pytest.approx(
+        np.sqrt(nu / (nu + 1)) * np.sqrt((nu + 4) / nu)
+    )
+    assert relative_spread(FRICTION, observed([0.1, 0.0, 0.0]), [[0, 1], [2]]).ratio < 1
+
+
+def test_without_repeats_scatter_counts_up_to_a_limit():
+    modest, wild = observed([1.8, -1.8] * 4), observed([9.0, -9.0] * 4)
+    assert 1 < relative_spread(FRICTION, modest, ALONE[:8]).ratio < MOST_SCATTER
+    assert relative_spread(FRICTION, wild, ALONE[:8]).ratio == MOST_SCATTER
+    assert relative_spread(FRICTION, wild, ALONE[:8]).source == "scatter"
+    assert relative_spread(FRICTION, observed([3.0, -3.0]), ALONE[:2]).source == "assumed"
+
+
+def test_repeats_never_make_a_zero_better_than_its_stated_accuracy():
+    assert zero_spread("tau_in_zero_Nm", observed([0.0, 0.0]), [[0, 1]]).ratio == 1.0
+    assert zero_spread("tau_in_zero_Nm", observed([4.0, -4.0]), [[0, 1]]).ratio > 1.5
+
+
+def test_the_stated_scatter_passes_and_many_times_as_much_does_not():
+    draws = np.random.default_rng(1).standard_normal((200, 9))
+    passed = {
+        size: np.mean([between_probability(observed(size * d), ALONE) > SCATTER_LEVEL for d in draws])
+        for size in (1.0, 2.0, 8.0)
+    }
+    assert passed[1.0] == 1.0
+    assert passed[2.0] > 0.95
+    assert passed[8.0] < 0.1
+
+
+def test_scatter_is_judged_by_that_of_repeats():
+    groups = [[0, 1, 2, 3], [4], [5], [6], [7]]
+    frictions = [0.0, 0.0, 0.0, 0.0, 6.0, -6.0, 5.0, -5.0]
+    assert between_probability(observed(frictions), groups) < SCATTER_LEVEL
+    frictions[:4] = [4.0, -4.0, 4.0, -4.0]
+    assert between_probability(observed(frictions), groups) > SCATTER_LEVEL
+    # Repeats that differ by far more than stated are no repeats.
+    assert (
+        within_probability(observed([8.0, -8.0]), [[0, 1]])
+        < SCATTER_LEVEL
+        < within_probability(observed([2.0, -2.0]), [[0, 1]])
+    )
+
+
+def test_a_trend_is_no_scatter():
+    drift = np.linspace(-7.5, 7.5, 9) + np.random.default_rng(0).standard_normal(9)
+    assert trend_probability(observed(drift)) < TREND_LEVEL
+    assert trend_probability(observed(drift[np.random.default_rng(2).permutation(9)])) > TREND_LEVEL
+    assert np.std(without_trend(observed(drift)).values) < 0.3 * drift.std()
+    draws = np.random.default_rng(3).standard_normal((500, 9))
+    assert np.mean([trend_probability(observed(d)) < TREND_LEVEL for d in draws]) <= 0.01
+
+
+def test_a_recording_that_does_not_determine_friction_does_not_count():
+    values = [*np.linspace(-7.5, 7.5, 8), np.nan]
+    assert trend_probability(observed(values)) < TREND_LEVEL
+    assert relative_spread(FRICTION, observed([3.0, np.nan, 0.0]), [[0, 1], [2]]).source == "assumed"
+
+
+def test_an_initial_tension_that_is_not_observed_may_differ_from_run_to_run():
+    o = made.whitened().observations
+    channels = {c: v for c, v in o.given.recording.channels.items() if not c.startswith(("F_", "T"))}
+    blind = Observations.of(replace(o.given.recording, channels=channels), made.PARAMETERS)
+    names = {name: spread for name, _, spread in whiten(blind, made.PARAMETERS).scalar_nuisances}
+    assert names[PRETENSION] == pytest.approx(0.01)
+    assert PRETENSION not in {name for name, _, _ in made.whitened().scalar_nuisances}
+
+
+@pytest.mark.parametrize("drift, repeats", [(0.0, True), (0.12, False)])
+def test_friction_that_drifts_does_not_repeat(drift, repeats):
+    recordings = with_frictions(*(1 + drift * np.linspace(-0.5, 0.5, 7)))
+    found, repeatability = calibrated(recordings)
+    assert found.mean_square < 1.5
+    again = [relinearised(w, found.model(made.PARAMETERS), repeatability) for w in recordings]
+    refitted = fit(again, PAPER, found.free, found.values)
+    assert friction_repeats(again, refitted.residuals, True) == repeats
+
+
+def test_the_report_says_what_was_assumed():
+    recordings = with_frictions(1.0, 1.0, 1.0, 1.0)
+    said = {row["what"]: row for row in report(recordings)}
+    for what in ("friction from run to run", "zero of F_load from run to run"):
+        assert (said[what]["from"], said[what]["recordings"]) == ("assumed", 0)
+    assert said["noise of tau_in"]["value"] == pytest.approx(made.NOISE["tau_in_Nm"], rel=0.25)
+    assert said["noise of tau_in"]["from"] in ("rest", "cycles")
+    row = {"what": "friction from run to run", "value": pytest.approx(0.01), "unit": "1"}
+    assert report(recordings)[0] == row | {"from": "assumed", "recordings": 0}
+    found, repeatability = calibrated(recordings)
+    rows = report([relinearised(w, found.model(made.PARAMETERS), repeatability) for w in recordings])
+    assert (rows[0]["from"], rows[0]["recordings"]) == ("repeats", 2)
+    assert rows[0]["value"] < 0.01

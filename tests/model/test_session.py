@@ -1,0 +1,84 @@
+"""A recording within its session: drift by its time or place, and states that follow from stated times."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from builders import recording
+from ccmodel.mechanisms.relaxation import relaxed_after
+from ccmodel.model.files import model_as_dict
+from ccmodel.model.general import Active
+from ccmodel.model.parameters import Parameters
+from ccmodel.model.run import ModelInput, simulate
+from ccmodel.model.session import in_order, known_states, of_recording, position_of, with_session
+
+PARAMETERS = Parameters(9000.0, 1.2, 0.15, 0.006, 0.006, 0.05)
+FRICTION = Active("friction-drift", "conduit", {"change": 0.2})
+STIFFNESS = Active("stiffness-drift", "cable", {"change": -0.1})
+RELAXATION = Active("relaxation", "cable", {"r": 0.1, "tau": 20.0, "relaxed": 0.5})
+
+
+def started(*minutes):
+    return [replace(recording(id=f"r{k}"), started_at_s=60.0 * m) for k, m in enumerate(minutes)]
+
+
+def test_without_times_a_recordings_place_is_its_order():
+    assert [r.position for r in in_order([recording()] * 5)] == [-0.5, -0.25, 0.0, 0.25, 0.5]
+    assert in_order([recording()])[0].position == 0.0
+    assert recording().position == 0.0
+
+
+def test_with_times_it_is_the_elapsed_time_and_goes_on_after_the_session():
+    every = in_order(started(0, 10, 40))
+    session = with_session(PARAMETERS, every)
+    assert [position_of(r, session) for r in every] == pytest.approx([-0.5, -0.25, 0.5])
+    later = started(50, 500)
+    assert [position_of(r, session) for r in later] == pytest.approx([0.75, 1.0])
+    assert position_of(recording(), session) == 0.0
+
+
+def test_one_recording_without_a_time_leaves_the_order():
+    every = in_order([*started(0, 10), recording()])
+    assert with_session(PARAMETERS, every).session_start_s is None
+    assert [position_of(r, with_session(PARAMETERS, every)) for r in every] == [-0.5, 0.0, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("active", "name", "factor"),
+    [(FRICTION, "friction_coefficient", 1.1), (STIFFNESS, "stiffness_N_per_m", 0.95)],
+)
+def test_a_drift_is_another_value_of_the_parameter(active, name, factor):
+    """Bit for bit: the drifted model is the paper's with that value, on the paper's solver."""
+    last = replace(recording(), position=0.5)
+    given = ModelInput.of(last)
+    drifted = simulate(given, replace(PARAMETERS, mechanisms=(active,)))
+    plain = simulate(given, replace(PARAMETERS, **{name: factor * getattr(PARAMETERS, name)}))
+    middle = simulate(ModelInput.of(recording()), replace(PARAMETERS, mechanisms=(active,)))
+    paper = simulate(ModelInput.of(recording()), PARAMETERS)
+    for channel in plain.channels:
+        assert drifted[channel] == pytest.approx(plain[channel], rel=1e-12, abs=1e-12), channel
+        assert (middle[channel] == paper[channel]).all(), channel
+    assert np.abs(drifted["tau_in_Nm"] - paper["tau_in_Nm"]).max() > 1e-4
+
+
+def test_two_drifts_act_together():
+    both = of_recording(replace(PARAMETERS, mechanisms=(FRICTION, STIFFNESS)), replace(recording(), position=-0.5))
+    assert (both.friction, both.stiffness_N_per_m) == pytest.approx((0.9 * 0.15, 1.05 * 9000.0))
+    assert both.mechanisms == ()
+
+
+def test_a_state_follows_from_stated_times():
+    known = replace(recording(), started_at_s=130.0, tensioned_at_s=100.0)
+    relaxing = replace(PARAMETERS, mechanisms=(RELAXATION,))
+    assert known_states(known, relaxing) == {"relaxation/cable/relaxed": relaxed_after(30.0, 0.1, 20.0)}
+    assert known_states(replace(known, tensioned_at_s=None), relaxing) == {}
+    stated = simulate(ModelInput.of(known), relaxing)
+    own = relaxing.with_values({"relaxation/cable/relaxed": relaxed_after(30.0, 0.1, 20.0)})
+    assert (stated["tau_in_Nm"] == simulate(ModelInput.of(recording()), own)["tau_in_Nm"]).all()
+
+
+def test_a_model_file_has_its_session_only_where_it_is_known():
+    assert "session_start_s" not in model_as_dict(PARAMETERS, {})["parameters"]
+    stated = model_as_dict(with_session(PARAMETERS, started(1, 2)), {})["parameters"]
+    assert (stated["session_start_s"], stated["session_end_s"]) == (60.0, 120.0)
