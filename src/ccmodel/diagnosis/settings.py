@@ -80,6 +80,9 @@ FIT_EVALUATIONS = 25
 # Times that the effects of mechanisms' states, which are proportional to their strength, are linearised again about the
 # values of a fit, at most, and the relative change of the cost below which they are not. Chosen.
 STATE_PASSES, STATE_TOLERANCE = 6, 0.005
+# The same for a search that stalls: friction that falls with speed lets cables jump, and the cost is rough. Practice:
+# of 3e-4, 3e-3 and 1e-2 this one led to the least cost.
+ROUGH_DIFFERENCE = 3e-3
 # Factor by which an unknown is lowered at each step of a continuation (`Parameter.continuation`). Chosen.
 CONTINUATION_FACTOR = 4.0
 # Shares of the pretension from which a fit starts where the initial tension is not observed, and the evaluations after
