@@ -101,7 +101,7 @@ def test_a_parameter_that_a_model_omits_has_its_default():
         run(sine(), ("stribeck", "conduit", {"a": 0.3, "vs": 2e-3, **more})) for more in ({"delta": 2.0}, {})
     )
     assert (given.T1_N == omitted.T1_N).all()
-    with pytest.raises(ModelError, match="stribeck has the parameters a, delta, vs; got a"):
+    with pytest.raises(ModelError, match="stribeck has the parameters a, delta, renewal, vs; got a"):
         run(sine(), ("stribeck", "conduit", {"a": 0.3}))
 
 

@@ -253,12 +253,15 @@ def _search(problem: Problem, hypothesis: Hypothesis, search: Search) -> Solutio
     starts = [inside_bounds(problem, x) for x in starting_points(problem)]
     if len(starts) > 1:
         starts = [best_start(problem, starts, search).x]
+    if hypothesis.continuation:
+        short = minimise(problem, starts[0], replace(search, most_evaluations=settings.START_EVALUATIONS))
+        if short.cost > settings.PROMISING * _cost_without(problem, hypothesis):
+            return short
+        starts = [inside_bounds(problem, short.x)]
     solution = minimise(problem, starts[0], search)
     if solution.message == STALLED:
         rough = minimise(problem, solution.x, replace(search, difference=settings.ROUGH_DIFFERENCE))
         solution = min(solution, rough, key=lambda s: s.cost)
-    if hypothesis.continuation and solution.cost > _cost_without(problem, hypothesis):
-        return solution  # a minimum that is worse than no mechanism at all leads nowhere
     for name in hypothesis.continuation:
         solution = continued(
             lambda x: minimise(problem, x, search), solution, problem.names.index(name), problem.bounds[0]
