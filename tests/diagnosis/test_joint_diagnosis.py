@@ -70,6 +70,14 @@ def test_the_model_is_the_rigs(joint):
     assert [c.recording for c in model.rig.conditions][::2] == ["monday/t-7N", "tuesday/t-7N"]
 
 
+@pytest.mark.parametrize("freeze", [False, True])
+def test_a_model_of_the_rig_is_a_baseline_of_its_batches(raw, joint, freeze):
+    both = [raw / "monday", raw / "tuesday"]
+    found = cc.diagnose(both, baseline=joint / "model.json", freeze=freeze, step_s=0.02)
+    assert found.verdict == "agrees"
+    assert (KEYS[0] in found.report["fit"]["calibrated"]) != freeze
+
+
 def test_a_list_of_one_batch_is_that_batch(raw):
     alone, listed = cc.diagnose(raw / "monday", step_s=0.02), cc.diagnose([raw / "monday"], step_s=0.02)
     assert json.dumps(alone.report) == json.dumps(listed.report)

@@ -19,7 +19,7 @@ from ccmodel.inference.cross_validation import inverse_of, leave_one_out
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS, mean_weight
 from ccmodel.inference.intervals import COVERAGE, Interval
 from ccmodel.inference.jacobian import size_of
-from ccmodel.inference.least_squares import Search, Solution, minimise
+from ccmodel.inference.least_squares import STALLED, Search, Solution, minimise
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.pool import each
 from ccmodel.inference.problem import Free, Problem
@@ -254,6 +254,9 @@ def _search(problem: Problem, hypothesis: Hypothesis, search: Search) -> Solutio
     if len(starts) > 1:
         starts = [best_start(problem, starts, search).x]
     solution = minimise(problem, starts[0], search)
+    if solution.message == STALLED:
+        rough = minimise(problem, solution.x, replace(search, difference=settings.ROUGH_DIFFERENCE))
+        solution = min(solution, rough, key=lambda s: s.cost)
     if hypothesis.continuation and solution.cost > _cost_without(problem, hypothesis):
         return solution  # a minimum that is worse than no mechanism at all leads nowhere
     for name in hypothesis.continuation:

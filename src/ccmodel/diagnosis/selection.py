@@ -115,7 +115,7 @@ class Selection:
     def _sets(self, found: Comparison, screening: Screening, size: int) -> list[CandidateFit]:
         """Fitted sets: the leading smaller ones with the best partner each, and those that lead the first screening."""
         smaller = [c for c in found.fitted if c.hypothesis.size == size - 1]
-        firsts = ([c for c in smaller if found.is_adequate(c)] or smaller)[: settings.FIRSTS]
+        firsts = ([c for c in smaller if found.is_adequate(c)] or smaller)[: settings.FIRSTS[size]]
         fitted, seen = [], {frozenset(c.hypothesis.acting) for c in found.fitted}
         for k, first in enumerate(firsts):
             part = self._part(k / (len(firsts) + 1), (k + 1) / (len(firsts) + 1))
@@ -139,7 +139,7 @@ class Selection:
         return self.fit_all(found.whitened, found.base, starts)
 
     def relinearise(self, found: Comparison) -> Comparison:
-        """Singles and leading sets fitted again, with the covariance linearised about the best of them.
+        """Leading candidates fitted again, with the covariance linearised about the best of them.
 
         The paper's model, for instance, has no ringing load, and so no error of it from the uncertain drive motion.
         Where the initial tension is not observed, every candidate is fitted from the best one's calibration too: the
@@ -165,7 +165,8 @@ class Selection:
         except ModelError as error:
             self.progress(f"the covariance stays as it is ({error})")
             return found
-        most = settings.CONTENDERS if best.hypothesis.size > 1 else len(found.fitted)
+        # Every rival of an adequate candidate matters; of an inadequate one, only the leading ones lead on.
+        most = len(found.fitted) if found.has_adequate else settings.CONTENDERS
         leading = [c for k, c in enumerate(found.fitted) if k < most or is_part_of(c, best)]
         again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in leading for s in starts(c)])
         if not any(c.hypothesis == best.hypothesis for c in again):

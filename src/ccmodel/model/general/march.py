@@ -27,6 +27,9 @@ LONGEST_BRISTLE_M = 1e-6
 GRIP_TOLERANCE = 1e-4
 GRIP_ITERATIONS = 6
 SMALLEST_SUBSTEP = 1.0 / 4096
+# A run ends after so many attempts at a step on average. Without this limit a single sample may take thousands of steps,
+# and a search that strays to such a model never ends.
+MOST_ATTEMPTS = 30
 # Shares of a sample and its time add up to the whole within this.
 ROUNDING = 1e-9
 
@@ -108,10 +111,11 @@ def march(
     Returns
     -------
     int
-        Samples that were solved.
+        Samples that were solved; fewer than there are after a step without a solution, or `MOST_ATTEMPTS` steps.
     """
     piece, node, slide, mean, load = borrowed((piece, node, slide, mean, load))
     m, n = time_s.size, node.shape[2]
+    attempts, most_attempts = 0, MOST_ATTEMPTS * m * steps
     last_rotation, before_rotation, last_pull, before_pull, last_dt = 0.0, 0.0, 0.0, 0.0, 0.0
     node[rows.RESTED] = 1.0
     set_grip(ph, node, slide, friction_factor[0], 0.0)
@@ -148,6 +152,9 @@ def march(
             if prescribed:
                 rotation = value - load[rows.ANGLE]
             torque = 0.0 if prescribed else value
+            attempts += 1
+            if attempts > most_attempts:
+                return j
             solved = False
             for iteration in range(GRIP_ITERATIONS):
                 # The contacts' memory depends on the slides: on the extrapolated ones first, then on the solved ones.
