@@ -71,8 +71,9 @@ def test_a_motion_that_does_not_repeat_shows_no_cycles():
 
 
 def test_the_noise_in_motion_is_never_below_that_at_rest():
-    rest = SensorNoise(1e-3, "rest")
-    assert repeated(rest, 1e-8, 2.0) == repeated(rest, None, 0.0) == rest
+    rest, restless = SensorNoise(1e-3, "rest"), SensorNoise(1e-2, "rest")
+    assert repeated(rest, 0.8e-6, 2.0) == repeated(rest, None, 0.0) == rest
+    assert repeated(restless, 1e-6, 2.0) == SensorNoise(1e-3, "cycles")
     freedom = 20 * 2.0
     expected = np.sqrt((REST_FREEDOM + freedom * 9.0) / (REST_FREEDOM + freedom)) * 1e-3
     found = repeated(rest, 9e-6, 2.0)

@@ -35,8 +35,9 @@ FIRST_FIT_EVALUATIONS, FIRST_FIT_TOLERANCE = 20, 1e-4
 # Standard deviation of the friction coefficient from run to run, over its mean. Stated: recordings of one
 # condition repeat to about 1 % in friction (docs/rig-log-format.md).
 FRICTION_SPREAD = 0.01
-# Range of a recording's friction over the model's, for the linearisation. Chosen: a model that needs more is wrong.
-OWN_FRICTION = (0.5, 2.0)
+# Range of a recording's friction over the model's about which its errors are linearised. Chosen: four stated spreads. A
+# model that needs more is wrong, and linearised there the errors of the right one would be wrong too.
+OWN_FRICTION = (0.96, 1.04)
 # Standard deviation of the initial tension from run to run, over its mean, where it is not observed. Stated, likewise.
 PRETENSION_SPREAD = 0.01
 # Weight of a stated spread beside the spread that recordings show, as degrees of freedom (nu0). Chosen: a stated spread

@@ -17,6 +17,8 @@ FEWEST_AT_REST = 20
 BEST_SHARE = 0.1
 # Weight of the noise at rest beside that of consecutive cycles, as degrees of freedom.
 REST_FREEDOM = 4.0
+# Scatter at rest over that of cycles from which on the rest is none.
+RESTLESS = 2.0
 # Time over which the variance of a few draws of the drive motion is averaged.
 ALIKE_S = 0.05
 # Sub-count offsets of the load encoder, uniform over a count.
@@ -65,8 +67,11 @@ def sensor_noise(given: ModelInput, cycles: CycleNoise = NONE) -> dict[str, Sens
 def repeated(prior: SensorNoise, variance: float | None, cycles: float) -> SensorNoise:
     """Noise from a prior and the variance between so many consecutive cycles.
 
-    A channel may repeat less well in motion than at rest, and never better.
+    A channel may repeat less well in motion than at rest, and never better. A rest that scatters far more than cycles
+    do is no rest.
     """
+    if variance is not None and prior.source == "rest" and prior.sd**2 > RESTLESS**2 * variance:
+        return SensorNoise(float(np.sqrt(variance)), "cycles")
     if variance is None or variance <= prior.sd**2:
         return prior
     freedom = IN_DIAGNOSIS * cycles
