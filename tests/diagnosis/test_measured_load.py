@@ -104,7 +104,7 @@ def test_a_forced_candidate_is_fitted_whatever_its_screening_score():
     [
         ([["friction"]], "there is no mechanism 'friction'"),
         ([["presliding at load"]], "'presliding at load' is at none of its places; state 'presliding at conduit'"),
-        ([[]], "one mechanism or of two"),
+        ([[]], "one to 4 mechanisms"),
     ],
 )
 def test_a_forced_candidate_that_is_not_known_is_refused(forced_candidates, said):
