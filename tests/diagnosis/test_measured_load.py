@@ -45,7 +45,8 @@ def whitened(recorded, sigma=(1e-3, 1e-4)):
     e = Observations.of(recorded, replace(TRUE, spring_beside_load_Nm_per_rad=0.0), CHANNELS, step_s=0.02)
     e = replace(e, sigma=np.repeat(np.array(sigma)[:, None], e.measured.shape[1], axis=1))
     rows = e.measured.size
-    return Whitened(e, np.zeros((rows, 1)), np.zeros(1), np.zeros((0, rows)), dict(zip(e.channels, sigma, strict=True)))
+    floor = dict(zip(e.channels, sigma, strict=True))
+    return Whitened(e, np.zeros((rows, 1)), np.zeros(1), np.zeros((0, rows)), floor, (), np.zeros((rows, 1)))
 
 
 def test_a_fit_finds_pretension_friction_and_spring_without_a_rest():
