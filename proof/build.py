@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,9 +145,10 @@ def noise_floor(
     return {name: float(np.sqrt(np.mean((first[name] - second[name]) ** 2) + sensor_variance[name])) for name in first}
 
 
-def _usual_past(spread: Repeatability) -> dict[str, float]:
-    """The past that a model knows of a recording which states none: the middle of its range, by field."""
-    return {name: float(np.mean(getattr(spread, name))) for name in ("tensioned_before_s", "ran_in_before")}
+def _usual_past(spread: Repeatability) -> dict[str, Any]:
+    """The past that a model takes for a recording which shows none: the middle of its range, by field."""
+    middle = {name: float(np.mean(getattr(spread, name))) for name in ("tensioned_before_s", "ran_in_before")}
+    return {**middle, "profile_curvature": (float(np.mean(spread.profile_curvature)),) * 2}
 
 
 def _noise_variance(sensor: TorqueSensor | LoadCell) -> float:

@@ -10,7 +10,8 @@ from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import continued, discretisation_shift, fit
 from ccmodel.diagnosis.hypothesis import Hypothesis, single_mechanisms
 from ccmodel.diagnosis.screening import screen
-from ccmodel.diagnosis.whitening import relinearised
+from ccmodel.diagnosis.whitening import relinearised, with_states_of
+from ccmodel.mechanisms.relaxation import relaxed_after
 from ccmodel.model.general import Active
 from made_observations import PARAMETERS, batch, calibrated, whitened
 
@@ -111,3 +112,25 @@ def placed(w, position):
     given = w.observations.given
     recording = replace(given.recording, position=position)
     return replace(w, observations=replace(w.observations, given=replace(given, recording=recording)))
+
+
+def test_a_state_beyond_its_range_is_an_error_of_its_own():
+    """The first recording begins with fresh cables: a tenth of the share would need still fresher ones."""
+    fresh = replace(PARAMETERS, mechanisms=(Active("relaxation", "cable", {"r": 0.2, "tau": 5.0, "relaxed": 0.5}),))
+    w = with_states_of(relaxing()[0], fresh).with_parameters(fresh)
+    rows = w.measured.size + len(w.scalar_nuisances)
+    beyond = {share: w.errors({SHARE: share})[rows:] for share in (0.02, 0.3)}
+    assert w.own_values({SHARE: 0.02})[STATE] < -0.2
+    assert beyond[0.02] < -1
+    assert 0 <= w.own_values({SHARE: 0.3})[STATE] <= 1
+    assert beyond[0.3] == 0
+
+
+def test_the_total_share_of_cables_that_have_settled_is_uncertain():
+    """All four were tensioned four time constants before: a large share and a small one leave the same little rest."""
+    settled = {"r": 0.2, "tau": 5.0, "relaxed": relaxed_after(20.0, 0.2, 5.0)}
+    recordings = batch(truth=replace(PARAMETERS, mechanisms=(Active("relaxation", "cable", settled),)))
+    found = fit(recordings, RELAXATION, {}, calibrated(recordings).values | {SHARE: 0.1, TAU: 10.0, STATE: 0.5})
+    k = list(found.values).index(SHARE)
+    assert abs(found.values[SHARE] - 0.2) < found.half_widths()[k]
+    assert found.half_widths()[k] > 0.03

@@ -178,8 +178,11 @@ def fit(
     has_states = any(registry.get(name).states for name, _ in hypothesis.baseline + hypothesis.acting)
     for _ in range(settings.STATE_PASSES if has_states else 0):
         # The states' effects were those of the values at the start, which the fit has left.
-        before, modelled = solution.cost, _with_states(whitened, hypothesis, problem.values_of(solution.x, 0))
-        problem = replace(problem, observations=modelled)
+        before, values = solution.cost, problem.values_of(solution.x, 0)
+        modelled = _with_states(whitened, hypothesis, values)
+        # Steps are measured by the start: a rate that has become slow needs large ones. A prior keeps its mean.
+        unknowns = {n: f if f.spread else replace(f, start=values[n]) for n, f in unknowns.items()}
+        problem = Problem(modelled, unknowns, weight=mean_weight)
         solution = minimise(problem, inside_bounds(problem, solution.x), search)
         if abs(solution.cost - before) < settings.STATE_TOLERANCE * before:
             break
@@ -229,9 +232,14 @@ def at_least_by_information(
 
     A jackknife does not see a direction that no recording determines: all leave-one-out fits stay where it started.
     """
-    samples = [IN_DIAGNOSIS * len(w.observations.channels) for w in problem.observations]
-    information = sum(n * block.information for n, block in zip(samples, solution.blocks, strict=True))
-    information = information + np.diag(np.mean(samples) * problem.prior_precision**2)
+    low, high = problem.bounds
+    information = np.diag(12 / (high - low) ** 2)  # an unknown lies anywhere within its bounds
+    for w, block in zip(problem.observations, solution.blocks, strict=True):
+        samples = IN_DIAGNOSIS * len(w.observations.channels)
+        prior = problem.prior_precision**2 / len(solution.blocks)
+        # Without the rows of states beyond their range: these bound a state on one side only.
+        J = block.derivatives[: w.measured.size + len(w.scalar_nuisances)]
+        information += samples * (J.T @ J + np.diag(prior))
     variance, least = np.diag(covariance).clip(0.0), np.diag(inverse_of(information, problem.sizes))
     wider = normal.ppf(0.5 + COVERAGE / 2) ** 2 * least > student.ppf(0.5 + COVERAGE / 2, degrees) ** 2 * variance
     ratio = np.sqrt(np.divide(least, variance, out=np.ones_like(least), where=wider & (variance > 0)))

@@ -99,8 +99,26 @@ class Whitened:
         return np.concatenate([self.whiten(errors), self._nuisance_weight * (self.nuisance_mean @ errors)])
 
     def errors(self, values: Mapping[str, float]) -> NDArray:
-        """Whitened errors of the model with some parameters replaced, and nuisances; shape (rows + nuisances,)."""
-        return self.with_nuisances(self.linearised_errors(values))
+        """Whitened errors of the model with some parameters replaced, and nuisances; shape (rows + nuisances,).
+
+        A mechanism's state has a further row: the part of its posterior mean that is beyond its range. Without it a
+        state that shows more than it can would stand for a larger strength.
+        """
+        errors = self.linearised_errors(values)
+        beyond = self._states_beyond_range(values, errors)
+        rows = self.with_nuisances(errors)
+        return np.concatenate([rows, beyond]) if beyond else rows
+
+    def _states_beyond_range(self, values: Mapping[str, float], errors: NDArray) -> list[float]:
+        found = []
+        for row, (name, value, spread) in enumerate(self.scalar_nuisances):
+            if (parts := mechanism_parameter(name)) is not None:
+                state = registry.get(parts[0]).parameter(parts[2])
+                own = values.get(name, value) - spread * float(self.nuisance_mean[row] @ errors)
+                found.append(
+                    self._nuisance_weight * (own - float(np.clip(own, state.low, state.high))) / settings.BEYOND_STATE
+                )
+        return found
 
     def linearised_errors(self, values: Mapping[str, float]) -> NDArray:
         """Errors over the noise, extrapolated from the recording's own friction to that of all; shape (rows,)."""
