@@ -105,9 +105,8 @@ def test_stribeck_friction_adapts_over_its_renewal_length(renewal):
 
 
 def test_a_parameter_that_a_model_omits_has_its_default():
-    given, omitted = (
-        run(sine(), ("stribeck", "conduit", {"a": 0.3, "vs": 2e-3, **more})) for more in ({"delta": 2.0, "renewal": 2e-5}, {})
-    )
+    stated = {"delta": 2.0, "renewal": 2e-5}
+    given, omitted = (run(sine(), ("stribeck", "conduit", {"a": 0.3, "vs": 2e-3, **more})) for more in (stated, {}))
     assert (given.T1_N == omitted.T1_N).all()
     with pytest.raises(ModelError, match="stribeck has the parameters a, delta, renewal, vs; got a"):
         run(sine(), ("stribeck", "conduit", {"a": 0.3}))

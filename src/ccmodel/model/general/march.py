@@ -27,8 +27,8 @@ LONGEST_BRISTLE_M = 1e-6
 GRIP_TOLERANCE = 1e-4
 GRIP_ITERATIONS = 6
 SMALLEST_SUBSTEP = 1.0 / 4096
-# A run ends after so many attempts at a step on average. Without this limit a single sample may take thousands of steps,
-# and a search that strays to such a model never ends.
+# A run ends after so many attempts at a step on average. Without this limit a single sample may take thousands of
+# steps, and a search that strays to such a model never ends.
 MOST_ATTEMPTS = 30
 # Shares of a sample and its time add up to the whole within this.
 ROUNDING = 1e-9
