@@ -104,7 +104,7 @@ def _clean_paper(rig: Mapping[str, float], random: Generator) -> Seeded:
 
 
 def _load_inertia(rig: Mapping[str, float], random: Generator) -> Seeded:
-    """A load that rings at 3 to 15 Hz on its spring and both cables, at 1 to 5 % of critical damping on the spring."""
+    """A load that rings at 3 to 15 Hz on spring and cables, with a damping ratio of 1 to 5 % on the spring alone."""
     rings = 2 * np.pi * log_uniform((3.0, 15.0), random)
     total = rig["spring"] + 2 * rig["stiffness"] * rig["radius"] ** 2
     inertia = total / rings**2

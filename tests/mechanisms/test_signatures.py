@@ -96,10 +96,18 @@ def test_stribeck_friction_falls_with_speed_along_its_curve(delta):
     assert friction == pytest.approx(MU * (1 + a * np.exp(-((speed / vs) ** delta))), rel=5e-3)
 
 
+@pytest.mark.parametrize("renewal", [1e-3, 3e-3])
+def test_stribeck_friction_adapts_over_its_renewal_length(renewal):
+    """Far above the Stribeck speed, ln(T1/T2) in full slip is the bend times mu (1 + a exp(-s / renewal))."""
+    a, theta = 0.4, np.linspace(0, 0.5, 800)
+    r = run(theta, ("stribeck", "conduit", {"a": a, "vs": 1e-4, "renewal": renewal}), load=AngleLoad(theta))
+    friction, slid_m = np.log(r.T1_N[-1] / r.T2_N[-1]) / np.pi, 0.5 * R
+    assert friction == pytest.approx(MU * (1 + a * np.exp(-slid_m / renewal)), rel=0.02)
+
+
 def test_a_parameter_that_a_model_omits_has_its_default():
-    given, omitted = (
-        run(sine(), ("stribeck", "conduit", {"a": 0.3, "vs": 2e-3, **more})) for more in ({"delta": 2.0}, {})
-    )
+    stated = {"delta": 2.0, "renewal": 2e-5}
+    given, omitted = (run(sine(), ("stribeck", "conduit", {"a": 0.3, "vs": 2e-3, **more})) for more in (stated, {}))
     assert (given.T1_N == omitted.T1_N).all()
     with pytest.raises(ModelError, match="stribeck has the parameters a, delta, renewal, vs; got a"):
         run(sine(), ("stribeck", "conduit", {"a": 0.3}))

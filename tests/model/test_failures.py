@@ -90,6 +90,7 @@ def effect(place="conduit", **values):
         (lambda: by_general(cable_asymmetry=effect("cable", ratio=-1.0, K_ratio=1.0)), "must not be negative"),
         (lambda: by_general(cable_asymmetry=effect("cable", ratio=1.0, K_ratio=0.0)), "K_ratio = 0 .*must be above 0"),
         (lambda: by_general(stribeck=effect(a=0.2, vs=0.0)), "vs = 0 .Stribeck speed., which must be above 0"),
+        (lambda: by_general(stribeck=effect(a=0.2, vs=1e-3, renewal=0.0)), "renewal = 0 .*must be above 0"),
         (lambda: by_general(presliding=effect(z0=np.nan)), "not finite"),
         (lambda: by_general(kink=effect(beta=1.0, s=1.5)), "share of the length"),
         (lambda: as_model(stiffness_N_per_m=-1.0), "axial_rigidity_N must be positive"),

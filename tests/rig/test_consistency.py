@@ -1,5 +1,6 @@
 """Parity relations of known values, and mistakes in recorded batches."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -136,6 +137,16 @@ def test_white_noise_is_found_below_a_motion():
     random, time = np.random.default_rng(4), np.arange(0, 10, 0.002)
     values = 5.0 * np.sin(np.pi * time) + random.normal(0, 0.03, time.size)
     assert white_noise(values) == pytest.approx(0.03, rel=0.25)
+
+
+def test_noise_is_that_of_the_rest_where_cables_stick_and_slip_throughout(tmp_path):
+    parity = parity_of(tmp_path)
+    quiet, recording = parity.ratios["noise of tau_in_Nm"], parity.recording
+    jumps = np.where(recording.time_s > recording.rest_s, 0.1 * (-1.0) ** np.arange(recording.time_s.size), 0.0)
+    channels = {**recording.channels, "tau_in_Nm": recording["tau_in_Nm"] + jumps}
+    jumping = Parity(replace(recording, channels=channels), parity.batch)
+    assert white_noise(jumping.moving["tau_in_Nm"]) > 0.05
+    assert jumping.ratios["noise of tau_in_Nm"] == pytest.approx(quiet, rel=0.5, abs=1e-4)
 
 
 def test_a_zero_does_no_work_over_the_closed_part():

@@ -97,7 +97,7 @@ class Parity:
             found["frequency"] = 0.5 / np.median(np.diff(x["time_s"][marks])) / frequency
         for channel in (TAU_IN, TAU_OUT, F_DRIVE, F_LOAD):
             if channel in x:
-                found[f"noise of {channel}"] = white_noise(x[channel])
+                found[f"noise of {channel}"] = self._noise(channel)
         if THETA_OUT in x:
             found["travel"] = np.ptp(x[THETA_OUT]) * radii[1] / (np.ptp(x[THETA_IN]) * radii[0])
         if THETA_OUT in x and TAU_OUT in x and (spring := rig.load.spring_stiffness_Nm_per_rad):
@@ -122,6 +122,12 @@ class Parity:
             found["stiffness"] = np.sign(low) * np.sqrt(low * high)
             found["nearest stiffness"] = float(np.clip(1.0, low, high))
         return {name: float(value) for name, value in found.items() if np.isfinite(value)}
+
+    def _noise(self, channel: str) -> float:
+        """Standard deviation of white noise, the least of motion and rest: cables may stick and slip throughout."""
+        at_rest = self.recording[channel][self.recording.time_s <= self.recording.rest_s]
+        moving = white_noise(self.moving[channel])
+        return min(moving, white_noise(at_rest)) if at_rest.size >= limits.NOISE_SAMPLES // 2 else moving
 
     @property
     def capstan(self) -> float:
