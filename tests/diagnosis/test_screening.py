@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.screening import Screening, Trial
 
@@ -82,13 +81,6 @@ def test_singles_and_sets_of_one_agree():
     for score in found.singles():
         if score.hypothesis.acting[0] in of_one:
             assert score.gain == pytest.approx(of_one[score.hypothesis.acting[0]])
-
-
-def test_trials_that_are_run_again_are_those_with_the_largest_gains():
-    found = screening({GAIN: 0.5, DRAG: 1.0}, second=True)
-    again = found.leading_trials([GAIN])
-    assert len(again) <= settings.TRIALS_AGAIN * len(found.mechanisms)
-    assert {t.hypothesis.acting[0] for t in again} == set(EVERY)
 
 
 def test_nothing_that_can_be_run_gives_no_sets():

@@ -126,23 +126,6 @@ class Screening:
                 best[key] = found
         return sorted(best.values(), key=lambda s: -s.gain)
 
-    def leading_trials(self, members: Sequence[tuple[str, str]]) -> list[Trial]:
-        """Of each mechanism, the trials with the largest gains beside some mechanisms (name, place)."""
-        at = tuple(self._best_trials(members))
-        found = []
-        for hypothesis in self.mechanisms:
-            own = [k for k, trial in enumerate(self.trials) if trial.hypothesis == hypothesis]
-            gains = self._gains(at)[own] if own else np.empty(0)
-            found += [self.trials[own[k]] for k in np.argsort(-gains, kind="stable")[: settings.TRIALS_AGAIN]]
-        return found
-
-    def _best_trials(self, members: Sequence[tuple[str, str]]) -> Iterator[int]:
-        """The trial of each of some mechanisms that gains most by itself, where there is one."""
-        for acting in members:
-            own = [k for k, trial in enumerate(self.trials) if trial.hypothesis.acting[0] == acting]
-            if own:
-                yield max(own, key=lambda k: self.product[k] ** 2 / self.gram[k, k])
-
     def _extensions(self, members: tuple[int, ...]) -> Iterator[tuple[float, int]]:
         """Gain of each set that a trial of another mechanism extends, and that trial; only sets that can act."""
         taken = {self.trials[k].hypothesis for k in members}
@@ -188,12 +171,7 @@ class Screening:
         return Score(hypothesis, float(self.product[list(members)] @ strengths) / self.square, values)
 
 
-def screen(
-    base: CandidateFit,
-    hypotheses: Sequence[Hypothesis],
-    trials: Sequence[Trial] | None = None,
-    deadline: Deadline = UNLIMITED,
-) -> Screening:
+def screen(base: CandidateFit, hypotheses: Sequence[Hypothesis], deadline: Deadline = UNLIMITED) -> Screening:
     """Screen mechanisms against a fitted model that they extend.
 
     Parameters
@@ -201,8 +179,6 @@ def screen(
     base : CandidateFit
     hypotheses : sequence of Hypothesis
         Single mechanisms.
-    trials : sequence of Trial, optional
-        Values at which they are screened; by default those of `Hypothesis.screening_values`.
     deadline : Deadline
         When the screening ends with the trials that were run until then.
     """
@@ -211,9 +187,8 @@ def screen(
     residuals = np.concatenate([_stacked(base.whitened, base.residuals), distances])
     residuals = residuals - absorbed @ (absorbed.T @ residuals)
     square = float(residuals @ residuals)
-    every = [t for h in hypotheses for t in trials_of(base, h)] if trials is None else trials
     usable, directions = [], []
-    for trial in every:
+    for trial in (t for h in hypotheses for t in trials_of(base, h)):
         if deadline.has_passed:
             break
         direction = _direction(base, trial)

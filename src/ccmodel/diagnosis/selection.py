@@ -53,7 +53,7 @@ class Selection:
         """Select from all mechanisms; the comparison of what was fitted, and the screening scores."""
         text = f"calibrated model: leave-one-out mean square {base.mean_square:.2f} (1: noise); screening"
         self.progress(f"{text} {len(self.mechanisms)} mechanisms", 0.0)
-        screening = screen(base, self.mechanisms, deadline=self.deadline)
+        screening = screen(base, self.mechanisms, self.deadline)
         scores = screening.singles()
         fewest = settings.FEWEST_FITTED if base.mean_square > settings.ADEQUATE else 0
         worth = [s for k, s in enumerate(scores) if s.values and (s.gain > settings.WORTH_FITTING or k < fewest)]
@@ -121,8 +121,7 @@ class Selection:
             part = self._part(k / (len(firsts) + 1), (k + 1) / (len(firsts) + 1))
             part.progress(f"screening mechanisms beside {first.hypothesis}", 0.0)
             partners = [h for h in self.mechanisms if h.acting[0] not in first.hypothesis.acting]
-            trials = [t for t in screening.leading_trials(first.hypothesis.acting) if t.hypothesis in partners]
-            scores = screen(first, partners, trials, self.deadline).singles()
+            scores = screen(first, partners, self.deadline).singles()
             worth = [s for s in scores if s.gain > settings.WORTH_FITTING]
             chosen = unseen(worth, seen, settings.PARTNERS, first.hypothesis.acting)
             fitted += part._part(PARTNERS_SCREENED, 1.0).fit_all(found.whitened, first, chosen)

@@ -108,9 +108,9 @@ SCREENED_STRENGTHS, SCREENED_SHAPES, SCREENED_RATIO = (0.25, 0.6), (0.2, 0.5, 0.
 SCREENED_CHANGE = 0.05
 # Limits of the linear extrapolation from a trial value to the start of a fit, as factors of it. Chosen.
 EXTRAPOLATION = (0.1, 4.0)
-# Sets of trials of each size that are extended by a further trial, share of a direction outside of others' below which
-# these imitate it, and trials of each mechanism that are run again beside others. Chosen.
-BEAM, IMITATED, TRIALS_AGAIN = 40, 1e-3, 3
+# Sets of trials of each size that are extended by a further trial, and share of a direction outside of others' below
+# which these imitate it. Chosen.
+BEAM, IMITATED = 40, 1e-3
 # Least share of the mean square that a mechanism must take off, to first order, to be fitted. Chosen.
 WORTH_FITTING = 0.01
 # Most mechanisms that are fitted, and how many at least if the calibrated model is inadequate: screening is linear, and
