@@ -228,8 +228,8 @@ def test_the_form_error_of_a_set_is_a_share_of_the_effect_of_each_member():
     singles = [fitted(50.0, presliding), fitted(20.0, KINK)]
     both = fitted(4.0, presliding, KINK)
     found = Comparison(WHITENED, fitted(100.0), [both, *singles], {})
-    assert found.form_error(both) == pytest.approx(0.08 * 16.0 + 0.001 * 46.0)
-    assert found.form_error(singles[0]) == pytest.approx(0.08 * 50.0)
+    assert found.form_error(both) == pytest.approx(0.1 * 16.0 + 0.001 * 46.0)
+    assert found.form_error(singles[0]) == pytest.approx(0.1 * 50.0)
     assert found.form_error(found.base) == 0.0
 
 
