@@ -175,6 +175,7 @@ def fit(
     problem = Problem(modelled, unknowns, weight=mean_weight)
     search = replace(SEARCH, deadline=deadline)
     solution = _search(problem, hypothesis, search)
+    further = replace(search, most_evaluations=settings.START_EVALUATIONS)
     has_states = any(registry.get(name).states for name, _ in hypothesis.baseline + hypothesis.acting)
     for _ in range(settings.STATE_PASSES if has_states else 0):
         # The states' effects were those of the values at the start, which the fit has left.
@@ -183,7 +184,7 @@ def fit(
         # Steps are measured by the start: a rate that has become slow needs large ones. A prior keeps its mean.
         unknowns = {n: f if f.spread else replace(f, start=values[n]) for n, f in unknowns.items()}
         problem = Problem(modelled, unknowns, weight=mean_weight)
-        solution = minimise(problem, inside_bounds(problem, solution.x), search)
+        solution = minimise(problem, inside_bounds(problem, solution.x), further)
         if abs(solution.cost - before) < settings.STATE_TOLERANCE * before:
             break
     left_out = leave_one_out(problem, solution)

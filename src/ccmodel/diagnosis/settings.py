@@ -166,6 +166,9 @@ FIRSTS, PARTNERS, LINEAR_SETS = {2: 2, 3: 1, 4: 1}, 3, 2
 TIME_LIMIT_S = 140.0
 # Candidate fits for which the lack of fit is worked out. Chosen for time.
 CONTENDERS = 4
+# Excess mean square over that of the best candidate above which a rival is not fitted again about it. Chosen for time:
+# a covariance changes mean squares by a factor of two or three.
+HOPELESS = 20.0
 # Share of the excess mean square of its members, or of some of them, below which a set must come. Chosen: a further
 # mechanism halves it.
 SET_SHARE = 0.5
