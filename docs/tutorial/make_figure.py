@@ -10,7 +10,7 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 ROOT = Path(__file__).parents[2]
-SIZE = {"width": 1100, "height": 1110}
+SIZE = {"width": 1100, "height": 1215}
 
 
 def main() -> None:

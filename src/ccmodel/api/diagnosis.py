@@ -228,7 +228,7 @@ def diagnose(
     >>> found.report["location"]["place"]
     'conduit'
     >>> found.nearest
-    Model: ...; pulley-friction at drive-pulley, fitted to half-loop, recording (virtual rig, simulated)
+    Model: ...; pulley-friction at drive-pulley + presliding at conduit, fitted to half-loop, ...
     """
     options = diagnosis_options(
         tolerance, step_s, cycles, candidates, without, freeze, baseline is not None, time_limit_s=time_limit_s

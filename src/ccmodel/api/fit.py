@@ -277,7 +277,7 @@ def fit(
     >>> import ccmodel as cc
     >>> fit = cc.fit("data/raw/half-loop")
     >>> round(fit.values["stiffness_N_per_m"], -2)
-    7800.0
+    7500.0
     >>> interval = fit.intervals["friction_coefficient"]
     >>> interval.low < fit.values["friction_coefficient"] < interval.high
     True

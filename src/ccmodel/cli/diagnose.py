@@ -25,7 +25,7 @@ from ccmodel.cli.output import Output
 
 def add_to(app: typer.Typer) -> None:
     """Add the command."""
-    of_a_rig = "ccmodel diagnose data/raw/loops data/raw/pretension --out out"
+    of_a_rig = "ccmodel diagnose data/raw/loops data/raw/later --out rig"
     later = "ccmodel diagnose data/raw/later --baseline out/model.json --freeze --out later"
     command(app, "diagnose", MODEL, ["ccmodel diagnose data/raw/loops --out out", of_a_rig, later])(diagnose)
 
