@@ -45,7 +45,7 @@ class Options:
     cycles : int, optional
         Number of cycles of a sine that are compared, counted from the end of its start-up transient; None: all.
     forced_candidates : sequence of sequence of str
-        Candidates of one or two mechanisms, each as "name at place", that are fitted whatever their screening score.
+        Candidates of one to four mechanisms, each as "name at place", that are fitted whatever their screening score.
     without : collection of str
         Mechanisms that are excluded from the candidates. The proof excludes the true one to imitate unknown physics.
     freeze : bool
