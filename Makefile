@@ -6,8 +6,8 @@ CORES ?= 2
 # The former name of REGRESSORS.
 REGRESSORS ?= $(RIVALS)
 
-.PHONY: help results real data test docs bench accuracy-gate input-checks diagnosis-settings joint-rigs table-one \
-  coverage proof proof-full proof-real slurm-test lint lock clean
+.PHONY: help results real data test docs bench accuracy-gate input-checks diagnosis-settings joint-rigs several-effects \
+  table-one coverage proof proof-full proof-real slurm-test lint lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -66,6 +66,10 @@ diagnosis-settings: $(VENV)/.ready  ## compute again the figures behind the diag
 
 joint-rigs: $(VENV)/.ready  ## diagnose together the studies of rigs that no single study decides: results/joint-rigs.csv
 	$(BIN)/python -m benchmarks.joint_rigs --cores $(CORES) --out results/joint-rigs.csv
+
+several-effects: $(VENV)/.ready  ## diagnose rigs with several effects: make several-effects KIND=triple SEED=0 N=20
+	$(BIN)/python -m benchmarks.several_effects --kind $(or $(KIND),triple) --seed $(or $(SEED),0) --count $(or $(N),20) \
+	  --cores $(CORES) --out results/several-effects
 
 table-one: $(VENV)/.ready  ## ask which left-out effect errs as the paper's Table I does: results/table-one, docs/figures/table-one.png
 	$(BIN)/ccmodel table-one config/table-one.yaml --out results/table-one --figure docs/figures/table-one.png \

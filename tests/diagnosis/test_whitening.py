@@ -28,7 +28,11 @@ def whitened():
         accuracy={"tau_in_Nm": 1e-4, "tau_out_Nm": 1e-4, "F_drive_N": 0.1, "F_load_N": 0.1, "theta_out_rad": 1e-3},
         rest_s=0.3,
     )
-    return whiten(Observations.of(measured, PARAMETERS), PARAMETERS)
+    o = Observations.of(measured, PARAMETERS)
+    # The recording has no noise; these are its sensors' standard deviations.
+    sd = {"theta_out_rad": 1e-3, "tau_in_Nm": 1e-4, "tau_out_Nm": 1e-4, "F_drive_N": 0.05, "F_load_N": 0.05}
+    sigma = np.repeat([[sd[c]] for c in o.channels], o.measured.shape[1], axis=1)
+    return whiten(replace(o, sigma=sigma), PARAMETERS)
 
 
 def test_nuisances_are_shrunk_to_one_standard_deviation(whitened):

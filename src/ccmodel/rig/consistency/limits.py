@@ -16,6 +16,8 @@ LEAST_CAPSTAN = 0.05
 PULLED = 1.25
 # Fewest samples of an estimate, and of one of a sensor's noise.
 FEWEST_SAMPLES, NOISE_SAMPLES = 20, 100
+# Noise in motion over noise at rest above which the cables stick and slip, so that the rest shows the sensor's noise.
+CHATTER = 3.0
 
 # Correlation or share of work below which a sign is wrong. With the right sign it was 0.15 or more.
 WRONG_SIGN = -0.1

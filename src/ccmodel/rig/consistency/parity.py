@@ -124,10 +124,14 @@ class Parity:
         return {name: float(value) for name, value in found.items() if np.isfinite(value)}
 
     def _noise(self, channel: str) -> float:
-        """Standard deviation of white noise, the least of motion and rest: cables may stick and slip throughout."""
-        at_rest = self.recording[channel][self.recording.time_s <= self.recording.rest_s]
+        """Standard deviation of white noise in motion; at rest, if it is far less: cables may stick and slip."""
         moving = white_noise(self.moving[channel])
-        return min(moving, white_noise(at_rest)) if at_rest.size >= limits.NOISE_SAMPLES // 2 else moving
+        at_rest = self.recording[channel][self.recording.time_s <= self.recording.rest_s]
+        # A channel that repeats its value at rest shows no noise there.
+        if at_rest.size < limits.NOISE_SAMPLES // 2 or np.mean(np.diff(at_rest) == 0) > 0.5:
+            return moving
+        resting = white_noise(at_rest)
+        return resting if moving > limits.CHATTER * resting else moving
 
     @property
     def capstan(self) -> float:
