@@ -54,8 +54,7 @@ def simulate(
 ) -> Trajectory:
     """Run a rig with effects; parameters, result and errors are those of `virtualrig.dynamics.simulate`."""
     theta_in_rad, omega_in_rad_per_s = drive
-    effects, physics = rig.effects, _physics(rig, numerics)
-    physics = physics._replace(run_in_before=preparation.ran_in_before * physics.run_in_scale)
+    effects, physics = rig.effects, _physics(rig, numerics, preparation)
     lengths = _bristle_lengths(effects, numerics)
     half_bend = _half_bend(grid, effects, preparation.friction_coefficient)
     stiffness = _stiffness(rig, grid)
@@ -102,14 +101,16 @@ def simulate(
     return Trajectory(time_s, theta_in_rad, theta_out, T1, T2, T3, T4, tau_in, load_radius * (T2 - T4) - bearing)
 
 
-def _physics(rig: Rig, numerics: Numerics) -> Physics:
+def _physics(rig: Rig, numerics: Numerics, preparation: Preparation) -> Physics:
+    of_effects = numbers(rig.effects)
+    of_effects["run_in_before"] = preparation.ran_in_before * of_effects["run_in_scale"]
     return Physics(
         bristle_length=_bristle_lengths(rig.effects, numerics)[0],
         radius=rig.pulley_radius_m,
         spring=rig.load.spring_stiffness_Nm_per_rad,
         damping=rig.load.damping_Nms_per_rad,
         inertia=rig.load.inertia_kg_m2 + rig.effects.load.inertia_kg_m2,
-        **numbers(rig.effects),
+        **of_effects,
     )
 
 
