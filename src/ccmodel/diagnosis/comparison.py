@@ -209,8 +209,8 @@ def well_specified(candidate: CandidateFit, base: CandidateFit, form_error: floa
 
     - of a correct candidate: normal about zero. In every second case a half-normal model-form error is added, because
       the real effect does not follow the mechanism's equation exactly;
-    - of an imitation: uniform from zero to the excess of the calibrated model. A pair is taken for the best of several
-      imitations, with the density of the smallest of as many uniform variables; likewise a larger set.
+    - of an imitation: uniform from zero to the excess of the calibrated model. A set is taken for the best of several
+      imitations, with the density of the smallest of as many uniform variables.
     """
     excess = max(base.mean_square - settings.CORRECT_LEVEL, settings.CORRECT_SPREAD)
     above = candidate.mean_square - settings.CORRECT_LEVEL

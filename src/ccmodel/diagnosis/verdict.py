@@ -34,7 +34,7 @@ class Judgement:
     scores : list of Score
         Screening scores of all mechanisms.
     single_fault_places : sequence of str
-        Places where a single fault of unknown kind would explain the recordings as well as the most probable pair.
+        Places where a single fault of unknown kind would explain the recordings as well as the most probable set.
     """
 
     verdict: str
@@ -78,8 +78,8 @@ def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
 
     - ``agrees``: the calibrated model is adequate, and no candidate is a large enough improvement.
     - ``unexplained``: the calibrated model is inadequate, and no candidate improves on it or is more probable; or the
-      most probable candidate is inadequate; or that candidate is a pair, while a single fault that no candidate
-      describes would suffice; or it is almost certainly an imitation.
+      most probable candidate is inadequate; or that candidate is a set of mechanisms, while a single fault that no
+      candidate describes would suffice; or it is almost certainly an imitation.
     - ``explained``: the most probable candidate is adequate, and its mechanisms have enough probability.
     - ``undecided``: otherwise.
     """
@@ -129,22 +129,22 @@ def _is_at(candidate: CandidateFit, places: Sequence[str]) -> bool:
 
 
 def single_fault_places(comparison: Comparison, hypothesis: Hypothesis) -> list[str]:
-    """Places where a single fault of unknown kind would explain the recordings as well as a pair does.
+    """Places where a single fault of unknown kind would explain the recordings as well as a set of mechanisms does.
 
     The places are those of every part without which the calibrated model fits (`isolate`), the best first. A single
     fault is more probable than two mechanisms that together imitate it: an eccentric encoder disc, for instance, is
-    imitated by an eccentric pulley and a torque gain. If both mechanisms of the pair act at one of these parts, fault
-    isolation cannot tell the pair from a single fault, and the list is empty.
+    imitated by an eccentric pulley and a torque gain. If all mechanisms of the set act at one of these parts, fault
+    isolation cannot tell the set from a single fault, and the list is empty.
     """
     if hypothesis.size < 2:
         return []
-    pair_places = set(hypothesis.places)
+    set_places = set(hypothesis.places)
     isolated = sorted(
         (excess, places)
         for excess, places in isolate(comparison.whitened, comparison.base)
         if excess <= settings.SUFFICIENT - 1.0
     )
-    if any(pair_places <= set(places) for _, places in isolated):
+    if any(set_places <= set(places) for _, places in isolated):
         return []
     return list(dict.fromkeys(place for _, places in isolated for place in places))
 

@@ -76,11 +76,11 @@ def _undecided(diagnosis: Mapping, missing: str) -> str:
     together = [_placed(one) for one in diagnosis["likeliest"]]
     names = [f"{_placed(one)} ({one['confidence']:.2f})" for one in diagnosis["alternatives"]]
     if len(together) > 1:
-        pair = " and ".join(together)
+        all_of_them = " and ".join(together)
         others = [
             name for name, one in zip(names, diagnosis["alternatives"], strict=True) if _placed(one) not in together
         ]
-        names = [f"{pair} together", *others]
+        names = [f"{all_of_them} together", *others]
     if len(names) == 1:
         return f"Something {missing}; it may be {names[0]}, but these recordings do not confirm it."
     return f"Something {missing}, and these recordings cannot tell {' or '.join(names)} apart."
