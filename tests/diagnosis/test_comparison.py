@@ -177,7 +177,7 @@ def test_a_mean_square_that_no_mechanism_reduces_is_unexplained():
 
 @pytest.mark.parametrize("lack, said", [(0.0, "agrees"), (0.05, "explained")])
 def test_a_small_gain_counts_if_it_removes_lack_of_fit(lack, said):
-    base, scale = fitted(0.93), fitted(0.90, SCALE)
+    base, scale = fitted(0.93), fitted(0.905, SCALE)
     lacks = {base.hypothesis: LackOfFit(np.full(8, lack)), scale.hypothesis: LackOfFit(np.zeros(8))}
     assert judge(Comparison(WHITENED, base, [scale], lacks), []).verdict == said
 
@@ -303,7 +303,8 @@ def test_the_covariance_is_linearised_about_the_best_candidate():
     again = selection.relinearise(Comparison.of(recordings, base, candidates))
     assert again.candidates[0].hypothesis.acting == (SCALE,)
     assert again.candidates[0].values[f"{SCALE[0]}/{SCALE[1]}/gain"] == pytest.approx(0.1, abs=0.005)
-    assert {c.hypothesis for c in again.candidates} == {c.hypothesis for c in candidates}
+    # The other one leaves more than twenty times as much; it is not fitted again.
+    assert [c.hypothesis.acting for c in again.candidates] == [(SCALE,)]
     assert again.base.mean_square > again.candidates[0].mean_square
     assert again.whitened[0].observations.parameters == recordings[0].observations.parameters
     assert not np.allclose(again.whitened[0].shrinkage, recordings[0].shrinkage, rtol=1e-6)
