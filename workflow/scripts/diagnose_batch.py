@@ -1,4 +1,6 @@
-"""Recordings of a batch, or of all batches of a rig -> diagnosis.json, its page (HTML), the calibrated, best and nearest model (JSON)."""
+"""Recordings of a batch, or of all batches of a rig -> diagnosis.json, its page (HTML), the calibrated, best and
+nearest model (JSON).
+"""
 
 from pathlib import Path
 
