@@ -38,7 +38,7 @@ class Recording:
     ----------
     batch, id : str
         Name of the batch, and of the recording within it. If several batches of a rig are taken together
-        (`ccmodel.rig.joint`), the name of all, and batch and recording as ``loops/loops-1-a``.
+        (``ccmodel.rig.joint``), the name of all, and batch and recording as ``loops/loops-1-a``.
     origin : str
         "rig" (measured), "virtual-rig" (a simulated rig) or "model".
     time_s : ndarray, shape (n,)

@@ -28,7 +28,7 @@ def friction_drift() -> Mechanism:
     return Mechanism(
         name="friction-drift",
         text=friction_drift.__doc__ or "",
-        tex=r"\mu(x) = \mu\,(1 + \mathrm{change}\,x), \qquad -\tfrac12 \le x \le \tfrac12",
+        tex=r"\mu(x) = \mu\,(1 + \mathrm{change}\,x), \qquad -0.5 \le x \le 0.5",
         sentence="friction [rises|falls] by {change:%} from the first recording to the last",
         places=("conduit",),
         parameters=_change("friction", 2.0),
@@ -55,7 +55,7 @@ def stiffness_drift() -> Mechanism:
     return Mechanism(
         name="stiffness-drift",
         text=stiffness_drift.__doc__ or "",
-        tex=r"k(x) = k\,(1 + \mathrm{change}\,x), \qquad -\tfrac12 \le x \le \tfrac12",
+        tex=r"k(x) = k\,(1 + \mathrm{change}\,x), \qquad -0.5 \le x \le 0.5",
         sentence="the cables' stiffness [rises|falls] by {change:%} from the first recording to the last",
         places=("cable",),
         parameters=_change("stiffness", 2.0),
