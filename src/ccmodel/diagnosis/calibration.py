@@ -9,7 +9,7 @@ from ccmodel.channels import TAU_IN, TAU_OUT, ZERO_OF
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.hypothesis import PAPER, Hypothesis
 from ccmodel.failure import ModelError
-from ccmodel.inference.effective_samples import IN_DIAGNOSIS
+from ccmodel.inference.effective_samples import prior_spread
 from ccmodel.inference.least_squares import Search, solve
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.problem import Free, Problem
@@ -118,9 +118,6 @@ def _between_batches(observations: Sequence[Observations]) -> dict[str, Free]:
 
     The friction of a batch with one recording is a nuisance of that recording (`Observations.friction_between`): left
     out, nothing would determine an unknown.
-
-    In the cost of a fit, where a recording counts by its mean square, an error of one standard deviation has the weight
-    of one effective sample.
     """
     if len(sessions_of(observations)) == 1:
         return {}
@@ -130,9 +127,8 @@ def _between_batches(observations: Sequence[Observations]) -> dict[str, Free]:
     }
     if not all(o.given.initial_tension_observed for o in observations):
         spreads |= dict.fromkeys(_by_session("pretension_scale", observations), settings.PRETENSION_BETWEEN)
-    samples = IN_DIAGNOSIS * float(np.mean([len(o.channels) for o in observations]))
     low, high = settings.BETWEEN_BOUNDS
-    return {name: Free(1.0, low, high, spread * np.sqrt(samples), mean=1.0) for name, spread in spreads.items()}
+    return {name: Free(1.0, low, high, prior_spread(s, observations), mean=1.0) for name, s in spreads.items()}
 
 
 def _chosen(free: Mapping[str, Free], names: Collection[str]) -> dict[str, Free]:

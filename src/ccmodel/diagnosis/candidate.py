@@ -16,7 +16,7 @@ from ccmodel.diagnosis.hypothesis import Hypothesis, plausible
 from ccmodel.diagnosis.whitening import Whitened, with_states_of
 from ccmodel.failure import ModelError
 from ccmodel.inference.cross_validation import inverse_of, leave_one_out
-from ccmodel.inference.effective_samples import IN_DIAGNOSIS, mean_weight
+from ccmodel.inference.effective_samples import mean_weight, of_recording, prior_spread
 from ccmodel.inference.intervals import COVERAGE, Interval
 from ccmodel.inference.jacobian import size_of
 from ccmodel.inference.least_squares import STALLED, Search, Solution, minimise
@@ -190,7 +190,7 @@ def fit(
     left_out = leave_one_out(problem, solution)
     covariance, degrees = left_out.covariance, left_out.degrees_of_freedom
     if len(modelled) == 1:
-        covariance = covariance / (IN_DIAGNOSIS * len(modelled[0].observations.channels))
+        covariance = covariance / of_recording(modelled[0].observations)
     if any(f.spread for f in unknowns.values()):
         covariance, degrees = at_least_by_information(problem, solution, covariance, degrees)
     roots = [np.sqrt(w.measured.size) for w in modelled]
@@ -213,12 +213,11 @@ def fit(
 def _state_means(whitened: Sequence[Whitened], hypothesis: Hypothesis, unknowns: Mapping[str, Free]) -> dict[str, Free]:
     """The states' means as unknowns, with the prior that a single recording's state has too.
 
-    Where little of a mechanism shows, its strength and its state are nearly one unknown, which the prior divides. It
-    counts as one effective sample.
+    Where little of a mechanism shows, its strength and its state are nearly one unknown, which the prior divides.
     """
-    samples = IN_DIAGNOSIS * float(np.mean([len(w.observations.channels) for w in whitened]))
+    observations = [w.observations for w in whitened]
     return {
-        key: replace(unknowns[key], mean=p.start, spread=p.spread * np.sqrt(samples))
+        key: replace(unknowns[key], mean=p.start, spread=prior_spread(p.spread, observations))
         for name, place in hypothesis.baseline + hypothesis.acting
         for p in registry.get(name).states
         if (key := mechanism_key(name, place, p.name)) in unknowns
@@ -236,11 +235,10 @@ def at_least_by_information(
     low, high = problem.bounds
     information = np.diag(12 / (high - low) ** 2)  # an unknown lies anywhere within its bounds
     for w, block in zip(problem.observations, solution.blocks, strict=True):
-        samples = IN_DIAGNOSIS * len(w.observations.channels)
         prior = problem.prior_precision**2 / len(solution.blocks)
         # Without the rows of states beyond their range: these bound a state on one side only.
         J = block.derivatives[: w.measured.size + len(w.scalar_nuisances)]
-        information += samples * (J.T @ J + np.diag(prior))
+        information += of_recording(w.observations) * (J.T @ J + np.diag(prior))
     variance, least = np.diag(covariance).clip(0.0), np.diag(inverse_of(information, problem.sizes))
     wider = normal.ppf(0.5 + COVERAGE / 2) ** 2 * least > student.ppf(0.5 + COVERAGE / 2, degrees) ** 2 * variance
     ratio = np.sqrt(np.divide(least, variance, out=np.ones_like(least), where=wider & (variance > 0)))

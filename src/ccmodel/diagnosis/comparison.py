@@ -12,6 +12,7 @@ is not so. The confidence in a candidate is the product of both probabilities.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import compress
 
 import numpy as np
 from scipy.stats import norm
@@ -67,8 +68,9 @@ class Comparison:
     ) -> "Comparison":
         """Order the candidates, and compute the lack of fit of those that may be named."""
         every = sorted(candidates, key=lambda c: (not c.is_plausible, c.mean_square))
-        ordered = [c for c in every if improves_on_members(c, every)]
-        others = [c for c in every if c not in ordered]
+        improves = [improves_on_members(c, every) for c in every]
+        ordered = list(compress(every, improves))
+        others = [c for c, better in zip(every, improves, strict=True) if not better]
         found = cls(whitened, base, ordered, {}, screened, linearised_about, others)
         contenders = {c.hypothesis: c for c in [base, *ordered[: settings.CONTENDERS], found.most_probable]}
         lacks = {hypothesis: lack_of_fit(c) for hypothesis, c in contenders.items()}

@@ -71,8 +71,7 @@ class Trial:
         """Whether its strength cannot be negative."""
         if self.own is not None:
             return False
-        ((name, _),) = self.hypothesis.acting
-        return not any(p.signed or p.ratio for p in registry.get(name).strengths)
+        return has_one_sign(self.hypothesis)
 
 
 @dataclass(frozen=True)
@@ -240,6 +239,12 @@ def changed(own: Mapping[str, float], values: Mapping[str, float], strength: flo
     return {key: own[key] + share * (value - own[key]) for key, value in values.items()}
 
 
+def has_one_sign(hypothesis: Hypothesis) -> bool:
+    """Whether the strength of a single mechanism cannot be negative."""
+    ((name, _),) = hypothesis.acting
+    return not any(p.signed or p.ratio for p in registry.get(name).strengths)
+
+
 def scaled(hypothesis: Hypothesis, values: Mapping[str, float], strength: float) -> dict[str, float] | None:
     """Screened values extrapolated to another strength; None if the mechanism cannot have it.
 
@@ -247,7 +252,7 @@ def scaled(hypothesis: Hypothesis, values: Mapping[str, float], strength: float)
     """
     ((name, place),) = hypothesis.acting
     strengths = registry.get(name).strengths
-    if strength <= 0 and not any(p.signed or p.ratio for p in strengths):
+    if strength <= 0 and has_one_sign(hypothesis):
         return None
     if any(p.screening_grid for p in strengths):
         return dict(values)

@@ -167,8 +167,9 @@ class Selection:
         # Every rival of an adequate candidate matters; of an inadequate one, only the leading ones lead on.
         most = len(found.fitted) if found.has_adequate else settings.CONTENDERS
         highest = 1.0 + settings.HOPELESS * max(best.mean_square - 1.0, settings.SUFFICIENT - 1.0)
-        rivals = [c for c in found.fitted[:most] if c.mean_square <= highest]
-        leading = [*rivals, *(c for c in found.fitted if is_part_of(c, best) and c not in rivals)]
+        leading = [
+            c for k, c in enumerate(found.fitted) if (k < most and c.mean_square <= highest) or is_part_of(c, best)
+        ]
         again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in leading for s in starts(c)])
         if not any(c.hypothesis == best.hypothesis for c in again):
             return found

@@ -110,15 +110,22 @@ class Whitened:
         return np.concatenate([rows, beyond]) if beyond else rows
 
     def _states_beyond_range(self, values: Mapping[str, float], errors: NDArray) -> list[float]:
-        found = []
-        for row, (name, value, spread) in enumerate(self.scalar_nuisances):
-            if (parts := mechanism_parameter(name)) is not None:
-                state = registry.get(parts[0]).parameter(parts[2])
-                own = values.get(name, value) - spread * float(self.nuisance_mean[row] @ errors)
-                found.append(
-                    self._nuisance_weight * (own - float(np.clip(own, state.low, state.high))) / settings.BEYOND_STATE
-                )
+        states = [(n, parts) for n, _, _ in self.scalar_nuisances if (parts := mechanism_parameter(n)) is not None]
+        if not states:
+            return []
+        own, found = self._posterior_means(values, errors), []
+        for name, (mechanism, _, parameter) in states:
+            state = registry.get(mechanism).parameter(parameter)
+            beyond = own[name] - float(np.clip(own[name], state.low, state.high))
+            found.append(self._nuisance_weight * beyond / settings.BEYOND_STATE)
         return found
+
+    def _posterior_means(self, values: Mapping[str, float], errors: NDArray) -> dict[str, float]:
+        """Of each scalar nuisance, by parameter, for shared values of a fit and its errors."""
+        # Errors are model minus recording: a recording that has a nuisance has the opposite error.
+        means = -self.nuisance_mean @ errors
+        pairs = zip(self.scalar_nuisances, means.tolist(), strict=True)
+        return {name: values.get(name, value) + spread * mean for (name, value, spread), mean in pairs}
 
     def linearised_errors(self, values: Mapping[str, float]) -> NDArray:
         """Errors over the noise, extrapolated from the recording's own friction to that of all; shape (rows,)."""
@@ -146,10 +153,7 @@ class Whitened:
 
     def own_values(self, values: Mapping[str, float]) -> dict[str, float]:
         """Posterior mean of each scalar nuisance in this recording, by parameter, for shared values of a fit."""
-        # Errors are model minus recording: a recording that has a nuisance has the opposite error.
-        means = -self.nuisance_mean @ self.linearised_errors(values)
-        pairs = zip(self.scalar_nuisances, means.tolist(), strict=True)
-        return {name: values.get(name, value) + spread * mean for (name, value, spread), mean in pairs}
+        return self._posterior_means(values, self.linearised_errors(values))
 
     @property
     def friction_ratio(self) -> float:

@@ -6,7 +6,7 @@ samples. Neither number below is derived from the errors' autocorrelation; both 
 """
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,12 +35,25 @@ def mean_weight(observations: Measured) -> float:
     return 1.0 / observations.measured.size
 
 
+def of_recording(recording: Any) -> int:
+    """Independent samples that a recording gives in a comparison of models."""
+    return IN_DIAGNOSIS * len(recording.channels)
+
+
+def prior_spread(spread: float, recordings: Sequence) -> float:
+    """Standard deviation of a prior in a cost where every recording counts by its mean square.
+
+    An error of one stated standard deviation has the weight of one independent sample.
+    """
+    return spread * float(np.sqrt(np.mean([of_recording(r) for r in recordings])))
+
+
 def in_comparison(recordings: Sequence) -> float:
     """Independent samples that recordings together give in a comparison of models.
 
     The tolerance stands for errors that a model makes in the same way in every recording: its share of the variance
     counts once, as the mean over recordings, and not once for each of them.
     """
-    samples = np.array([IN_DIAGNOSIS * len(r.channels) for r in recordings])
+    samples = np.array([of_recording(r) for r in recordings])
     shared = np.array([r.tolerance_share for r in recordings])
     return float(np.sum(samples * (1 - shared)) + np.mean(samples * shared))
