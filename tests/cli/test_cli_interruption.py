@@ -50,7 +50,9 @@ def batch(tmp_path):
 def interrupted(code, how, *words):
     """Exit code, standard output and standard error of a command that gets a signal in the middle of its work."""
     command = [sys.executable, "-c", code, *map(str, words)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=_heed_interruptions
+    )
     try:
         assert process.stdout.readline() == "working\n"
         process.send_signal(how)
@@ -59,6 +61,11 @@ def interrupted(code, how, *words):
     finally:
         process.kill()
     return process.returncode, out, err
+
+
+def _heed_interruptions():
+    """Tests in the background of a shell inherit that Ctrl-C is ignored, and so would the command."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 @pytest.mark.parametrize("how, code", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
