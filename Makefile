@@ -6,7 +6,7 @@ CORES ?= 2
 # The former name of REGRESSORS.
 REGRESSORS ?= $(RIVALS)
 
-.PHONY: help results real data test docs bench accuracy-gate input-checks diagnosis-settings joint-rigs several-effects \
+.PHONY: help results real data test docs bench accuracy-gate input-checks diagnosis-settings joint-rigs outside-rigs past several-effects \
   table-one coverage proof proof-full proof-real slurm-test lint lock clean
 
 help:  ## list the targets
@@ -70,6 +70,14 @@ joint-rigs: $(VENV)/.ready  ## diagnose together the studies of rigs that no sin
 several-effects: $(VENV)/.ready  ## diagnose rigs with several effects: make several-effects KIND=triple SEED=0 N=20
 	$(BIN)/python -m benchmarks.several_effects --kind $(or $(KIND),triple) --seed $(or $(SEED),0) --count $(or $(N),20) \
 	  --cores $(CORES) --out results/several-effects
+
+past: $(VENV)/.ready  ## diagnose cables with a past and fresh ones: make past SEED=0 N=10
+	$(BIN)/python -m benchmarks.past --seed $(or $(SEED),0) --count $(or $(N),10) --cores $(CORES) --out results/past
+
+outside-rigs: $(VENV)/.ready  ## diagnose rigs of other forms and constants than the model's: make outside-rigs SEED=0 N=3
+	$(BIN)/python -m benchmarks.outside_rigs build results/outside-rigs --seed $(or $(SEED),0) --count $(or $(N),3)
+	$(BIN)/python -m benchmarks.outside_rigs diagnose results/outside-rigs/diagnoses results/outside-rigs --cores $(CORES)
+	$(BIN)/python -m benchmarks.outside_rigs score results/outside-rigs/diagnoses results/outside-rigs
 
 table-one: $(VENV)/.ready  ## ask which left-out effect errs as the paper's Table I does: results/table-one, docs/figures/table-one.png
 	$(BIN)/ccmodel table-one config/table-one.yaml --out results/table-one --figure docs/figures/table-one.png \

@@ -1,6 +1,7 @@
 """Concealed effects on rigs that do not share the forms, the damping and the constants of the model.
 
     python -m benchmarks.outside_rigs build DIR --seed 0 --count 3 [--kind kink ...]
+    python -m benchmarks.outside_rigs diagnose RESULTS DIR [--cores 2]
     python -m benchmarks.outside_rigs score RESULTS DIR
 
 The proof's rig has the model's friction law, a load without noticeable mass and one sampling rate. Here friction is of
@@ -15,8 +16,10 @@ An effect is visible if the calibrated model errs on the kept-back recordings by
 import argparse
 import gzip
 import json
+import time
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -27,6 +30,8 @@ import yaml
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+import ccmodel
+from ccmodel.inference.pool import set_threads
 from proof.build import noise_floor, simulate
 from proof.plan import read_plan
 from proof.recording_draw import Conditions, draw_held_out, draw_recordings
@@ -303,6 +308,21 @@ def _record(
     return runs
 
 
+def diagnose(results: Path, folder: Path, name: str) -> str:
+    """Diagnose a case and predict its kept-back recordings, unless that has been done; a line about it."""
+    set_threads(1)
+    out = results / name
+    if (out / "extended").exists():
+        return f"{name}: done"
+    started = time.process_time()
+    found = ccmodel.diagnose(folder / "cases" / name)
+    found.save(out)
+    for model, into in ((found.calibrated, "calibrated"), (found.model, "extended")):
+        if model is not None:
+            ccmodel.predict(model, folder / "kept-back" / name).save(out / into)
+    return f"{name}: {found.verdict} in {time.process_time() - started:.0f} s of one core"
+
+
 def score(results: Path, folder: Path) -> pd.DataFrame:
     """One row a case: verdict, names, and the worst channel's errors on kept-back recordings over the noise floor."""
     rows = []
@@ -394,12 +414,22 @@ def main() -> None:
     building.add_argument("--seed", type=int, default=0)
     building.add_argument("--count", type=int, default=1)
     building.add_argument("--kind", nargs="+", choices=list(KINDS), default=list(KINDS))
+    diagnosing = commands.add_parser("diagnose")
+    diagnosing.add_argument("results", type=Path)
+    diagnosing.add_argument("folder", type=Path)
+    diagnosing.add_argument("--cores", type=int, default=2)
     scoring = commands.add_parser("score")
     scoring.add_argument("results", type=Path)
     scoring.add_argument("folder", type=Path)
     given = parser.parse_args()
     if given.command == "build":
         _build_all(given.folder, given.seed, given.count, given.kind)
+        return
+    if given.command == "diagnose":
+        with ProcessPoolExecutor(given.cores) as pool:
+            names = sorted(key["case"] for key in json.loads((given.folder / "keys.json").read_text()))
+            for line in pool.map(diagnose, *zip(*((given.results, given.folder, n) for n in names), strict=True)):
+                print(line, flush=True)
         return
     table = score(given.results, given.folder)
     print(table.to_string(index=False, float_format="%.2f"))

@@ -21,7 +21,7 @@ DECISION_THRESHOLD = 0.8
 # alarm of the consistency checks.
 INCONSISTENT = "inputs-inconsistent"
 # More mechanisms or alternatives than these are not counted.
-MOST_MECHANISMS = 2
+MOST_MECHANISMS = 4
 MOST_ALTERNATIVES = 4
 # Least error over the noise floor of a visible effect: three times the difference of two repeats, which is
 # sqrt(2) times the noise floor.

@@ -9,7 +9,7 @@ import pytest
 
 from ccmodel.diagnosis import verdict as verdicts
 from ccmodel.diagnosis.candidate import CandidateFit
-from ccmodel.diagnosis.comparison import Comparison, improves_on_members, well_specified
+from ccmodel.diagnosis.comparison import Comparison, improves_on_members, log_likelihood, well_specified
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.lack_of_fit import LackOfFit
 from ccmodel.diagnosis.result import alternatives_of
@@ -142,6 +142,33 @@ def test_a_tolerance_lowers_the_confidence_in_proportion_to_its_share():
     assert all(more > less for more, less in itertools.pairwise(shares))
     assert sure(0.01).verdict == "explained"
     assert (sure(1.0).verdict, shares[-1] / shares[0]) == ("undecided", pytest.approx(0.75))
+
+
+@pytest.mark.parametrize("above", [-0.03, 0.0, 0.05, 2.0, 30.0])
+@pytest.mark.parametrize("form, rate", [(0.6, 500.0), (10.0, 30.0), (0.01, 500.0)])
+def test_the_likelihood_is_the_integral_over_the_model_form_error(above, form, rate):
+    left = np.linspace(0.0, form, 400_001)
+    simplified = np.trapezoid(np.exp(-rate * np.abs(above - left)), left) / form
+    exact = np.exp(-rate * above)
+    # Of a mean square far above both, the logarithm is all that is left.
+    if (either := exact + simplified) > 0:
+        assert log_likelihood(above, form, rate) == pytest.approx(np.log(either / 2), abs=1e-3)
+    else:
+        assert log_likelihood(above, form, rate) < -500
+
+
+def test_without_a_model_form_error_the_likelihood_is_the_noises():
+    assert log_likelihood(0.2, 0.0, 500.0) == log_likelihood(0.2, 1e-9, 500.0) == -100.0
+
+
+def test_what_an_equation_misses_is_no_evidence_for_a_further_mechanism():
+    """Presliding leaves up to a tenth of its effect; a second mechanism that takes some of it is not more probable."""
+    base, alone = fitted(100.0), fitted(6.0, ("presliding", "conduit"))
+    both = fitted(3.0, ("presliding", "conduit"), FRICTION)
+    exact = fitted(1.0, ("presliding", "conduit"), FRICTION)
+    assert verdict(base, alone, both).best is alone
+    # One that takes all of it is.
+    assert verdict(base, alone, exact).best is exact
 
 
 def test_misspecification_is_more_likely_the_higher_the_mean_square_and_the_more_was_tried():

@@ -1,8 +1,9 @@
 """Comparison of candidate models: posterior probabilities, adequacy, and the probability of misspecification.
 
-The log posterior of a candidate is -BIC/2 plus a log prior. The BIC is computed from leave-one-out mean squares, with
-an effective sample size instead of the number of samples. Leave-one-out mean squares already penalise superfluous
-unknowns; the BIC penalises them a second time.
+The log posterior of a candidate is its log evidence plus a log prior. The evidence is that of the BIC, computed from
+leave-one-out mean squares with an effective sample size instead of the number of samples, and integrated over what the
+mechanisms' equations may leave (`log_evidence`). Leave-one-out mean squares already penalise superfluous unknowns; the
+BIC penalises them a second time.
 
 The posterior assumes a closed world: one of the candidates is correct. In fact the missing physics may be outside the
 list of mechanisms, and the best candidate may only imitate it. `Comparison.well_specified` is the probability that this
@@ -25,6 +26,9 @@ from ccmodel.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
 from ccmodel.diagnosis.repeatability import FRICTION, friction_repeats
 from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.inference.effective_samples import in_comparison
+
+# Model-form error, over the scatter of mean squares, below which it changes no probability.
+NEGLIGIBLE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -85,30 +89,33 @@ class Comparison:
     def posterior(self) -> list[float]:
         """Closed-world posterior probability of each candidate; the remainder is the calibrated model's.
 
-        It is -BIC/2 plus a log prior. The BIC is N m / max(1, m_min) + p ln N, with
-
-        - N the effective sample size,
-        - m the candidate's leave-one-out mean square, and m_min the lowest of all candidates and the calibrated model,
-        - p the number of unknowns that the candidate has in addition to the calibrated model's.
+        It is the log evidence plus a log prior. The noise is max(1, m_min), with m_min the lowest leave-one-out mean
+        square of all candidates and the calibrated model.
 
         The calibrated model has the prior `PRIOR_AGREES`. All screened hypotheses share the rest equally, whether or
         not they were fitted: the best of many is good by chance. An implausible candidate has probability zero.
         """
         every = [self.base, *self.candidates]
         mean_squares = np.array([c.mean_square for c in every])
-        bic = np.array([self.bic(c, max(1.0, mean_squares.min())) for c in every])
+        evidence = np.array([self.log_evidence(c, max(1.0, mean_squares.min())) for c in every])
         count = len(self.candidates)
         prior_of_each = (1 - settings.PRIOR_AGREES) / max(self.screened, count, 1)
-        log_posterior = -bic / 2 + np.log([settings.PRIOR_AGREES, *[prior_of_each] * count])
+        log_posterior = evidence + np.log([settings.PRIOR_AGREES, *[prior_of_each] * count])
         log_posterior[1:][[not c.is_plausible for c in self.candidates]] = -np.inf
         weight = np.exp(log_posterior - log_posterior.max())
         return (weight / weight.sum())[1:].tolist()
 
-    def bic(self, candidate: CandidateFit, noise: float) -> float:
-        """Bayesian information criterion of a candidate at a mean square of the noise, up to a constant."""
+    def log_evidence(self, candidate: CandidateFit, noise: float) -> float:
+        """Logarithm of the evidence of a candidate at a mean square `noise` of the noise, up to a constant.
+
+        It is the log likelihood less p/2 ln N, with N the effective sample size and p the number of unknowns that the
+        candidate has in addition to the calibrated model's. Without the integral over the model-form error it is
+        -BIC/2.
+        """
         samples = in_comparison([w.observations for w in self.whitened])
         unknowns = len(candidate.values) - len(self.base.values)
-        return float(samples * candidate.mean_square / noise + unknowns * np.log(samples))
+        above, form = candidate.mean_square - 1.0, self.form_error(candidate)
+        return log_likelihood(above, form, samples / (2 * noise)) - unknowns * float(np.log(samples)) / 2
 
     @property
     def most_probable(self) -> CandidateFit:
@@ -201,6 +208,22 @@ def improves_on_members(candidate: CandidateFit, candidates: Sequence[CandidateF
     lowest = candidate.mean_square
     parts = [c.mean_square for c in candidates if is_part_of(c, candidate)]
     return all(lowest - 1 < settings.SET_SHARE * (part - 1) and lowest < part for part in parts)
+
+
+def log_likelihood(above: float, form_error: float, rate: float) -> float:
+    """Log likelihood of a mean square that is `above` that of noise, up to a constant.
+
+    A model that leaves a mean square g beside the noise has the likelihood exp(-rate |above - g|). Every second
+    candidate is exact: g = 0. Of the others g is uniform from 0 to `form_error`. What a true mechanism's equation
+    misses is therefore no evidence for a further mechanism that imitates it.
+    """
+    exact, most = -rate * above, rate * form_error
+    if most < NEGLIGIBLE:
+        return exact
+    inside = float(np.clip(above, 0.0, form_error))
+    area = -np.expm1(-rate * inside) - np.expm1(-rate * (form_error - inside))
+    simplified = -rate * abs(above - inside) + np.log(area / most)
+    return float(np.logaddexp(exact, simplified) - np.log(2))
 
 
 def well_specified(candidate: CandidateFit, base: CandidateFit, form_error: float) -> float:

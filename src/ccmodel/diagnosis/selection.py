@@ -12,6 +12,7 @@ from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit, fit
 from ccmodel.diagnosis.comparison import Comparison, improves_on_members, is_part_of
 from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.repeatability import estimated
 from ccmodel.diagnosis.screening import Score, Screening, screen
 from ccmodel.diagnosis.whitening import Whitened, relinearised
 from ccmodel.failure import ModelError
@@ -75,7 +76,8 @@ class Selection:
             if not grows(extended, size):
                 break
             found = extended
-        if not found.is_sufficient:
+        # The parts of a set are compared with it under its own covariance.
+        if not found.is_sufficient or found.fitted[0].hypothesis.size > 1:
             found = self.relinearise(found)
         return (found if found.has_adequate else adequate or found), scores
 
@@ -141,6 +143,7 @@ class Selection:
         """Leading candidates fitted again, with the covariance linearised about the best of them.
 
         The paper's model, for instance, has no ringing load, and so no error of it from the uncertain drive motion.
+        What differs from run to run is estimated again too: about a wrong model, friction seems to scatter.
         Where the initial tension is not observed, every candidate is fitted from the best one's calibration too: the
         cost has several minima there.
         """
@@ -156,7 +159,8 @@ class Selection:
             return [candidate.values, candidate.values | {name: best.values[name] for name in self.free}]
 
         try:
-            whitened = each(found.whitened, lambda i, w: relinearised(w, models[i]))
+            repeatability = estimated(best.whitened, best.residuals)
+            whitened = each(found.whitened, lambda i, w: relinearised(w, models[i], repeatability))
             base = min(
                 (fit(whitened, found.base.hypothesis, self.free, s, self.deadline) for s in starts(found.base)),
                 key=lambda c: c.mean_square,
@@ -191,8 +195,9 @@ def unseen(
 
 
 def grows(found: Comparison, size: int) -> bool:
-    """Whether the best set of `size` mechanisms has more evidence than every smaller candidate, by their BIC."""
+    """Whether the best set of `size` mechanisms has more evidence than every smaller candidate."""
     noise = max(1.0, min(c.mean_square for c in [found.base, *found.fitted]))
-    sets = [found.bic(c, noise) for c in found.fitted if c.hypothesis.size == size and c.is_plausible]
-    smaller = [found.bic(c, noise) for c in found.fitted if c.hypothesis.size < size and c.is_plausible]
-    return bool(sets) and min(sets) < min(smaller, default=np.inf)
+    plausible = [c for c in found.fitted if c.is_plausible]
+    sets = [found.log_evidence(c, noise) for c in plausible if c.hypothesis.size == size]
+    smaller = [found.log_evidence(c, noise) for c in plausible if c.hypothesis.size < size]
+    return bool(sets) and max(sets) > max(smaller, default=-np.inf)

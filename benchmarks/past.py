@@ -1,0 +1,105 @@
+"""Cables with a past and fresh ones: are relaxation and running-in named as often, where they are as visible?
+
+``python -m benchmarks.past --seed S --count N --out DIR`` draws N rigs with relaxation and N with running-in. Each is
+recorded twice: with the past that the proof draws for every recording (tensioned 0 to 4 time constants before, run in
+for 0 to 2 of its scales), and fresh. Rates are of the cases in which the effect is visible, as in the proof.
+"""
+
+import argparse
+import json
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+
+from ccmodel.inference.pool import set_threads
+from proof.calibration import compared_values
+from proof.cases import Case, draw
+from proof.intervals import rate
+from proof.judge import judge
+from proof.outcome import Outcome, is_located, outcome
+
+EFFECTS, STATES = ("relaxation", "running-in"), ("past", "fresh")
+# Parameters whose intervals are compared with the truth: the total share, and the change of friction.
+SIZES = {"relaxation": "r", "running-in": "change"}
+
+
+def without_past(case: Case) -> Case:
+    """The same rig and recordings, its cables tensioned and its conduits new as each recording begins."""
+    fresh = case.campaign.repeatability.model_copy(
+        update={"tensioned_before_s": (0.0, 0.0), "ran_in_before": (0.0, 0.0)}
+    )
+    return replace(case, campaign=case.campaign.model_copy(update={"repeatability": fresh}))
+
+
+def judged(seed: int, effect: str, state: str, out: Path) -> dict:
+    """Result of a case; read again if it exists."""
+    set_threads(1)
+    case = draw(seed, "single", effect)
+    file = out / state / case.name / "past.json"
+    if file.exists():
+        return json.loads(file.read_text(encoding="utf-8"))
+    result = judge(without_past(case) if state == "fresh" else case, file.parent, report=lambda text: None)
+    row = {"seed": seed, "effect": effect, "state": state, "protocol": case.protocol} | _said(outcome(result))
+    file.write_text(json.dumps(row), encoding="utf-8")
+    return row
+
+
+def _said(found: Outcome) -> dict:
+    (truth,) = found.key["truth"]
+    sizes = [v for v in compared_values([found]) if v["parameter"] == SIZES[truth["name"]]]
+    return {
+        "strength": truth["strength"],
+        "visible": found.is_visible,
+        "verdict": found.verdict,
+        "failure": found.failure,
+        "first": found.first_identified,
+        "confidence": [m["confidence"] for m in found.identified],
+        "alternatives": found.alternatives,
+        "right": found.is_identified_first,
+        "located": bool(is_located(found)),
+        "wrong": found.is_confidently_wrong,
+        "before": found.error_before,
+        "after": found.error_after,
+        "interval": [sizes[0][key] for key in ("low", "true", "high")] if sizes else None,
+        "took_s": found.took_s,
+    }
+
+
+def rates(rows: Iterable[dict]) -> list[dict]:
+    """Of each effect, with and without a past: named first, placed, and held by its interval."""
+    found = []
+    for effect, state in product(EFFECTS, STATES):
+        group = [r for r in rows if (r["effect"], r["state"]) == (effect, state)]
+        visible, held = [r for r in group if r["visible"]], [r["interval"] for r in group if r["interval"]]
+        found += [
+            rate(f"{effect}, {state}, visible: named first", sum(r["right"] for r in visible), len(visible)),
+            rate(f"{effect}, {state}, visible: located", sum(r["located"] for r in visible), len(visible)),
+            rate(f"{effect}, {state}: size within its interval", sum(lo <= t <= hi for lo, t, hi in held), len(held)),
+            rate(f"{effect}, {state}: confidently wrong", sum(r["wrong"] for r in group), len(group)),
+        ]
+    return found
+
+
+def main() -> None:
+    """Diagnose the cases and print a line for each, then the rates."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--count", type=int, default=10)
+    parser.add_argument("--cores", type=int, default=2)
+    parser.add_argument("--out", type=Path, required=True)
+    asked = parser.parse_args()
+    rows = []
+    with ProcessPoolExecutor(asked.cores) as pool:
+        cases = product(range(asked.seed, asked.seed + asked.count), EFFECTS, STATES)
+        for done in as_completed(pool.submit(judged, *case, asked.out) for case in cases):
+            rows.append(done.result())
+            print(json.dumps(rows[-1]), flush=True)
+    for one in rates(rows):
+        share = "" if one["rate"] is None else f" {one['rate']:.0%} ({one['low']:.0%} to {one['high']:.0%})"
+        print(f"{one['what']}: {one['k']} of {one['n']}{share}")
+
+
+if __name__ == "__main__":
+    main()
