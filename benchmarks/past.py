@@ -51,7 +51,7 @@ def _said(found: Outcome) -> dict:
     sizes = [v for v in compared_values([found]) if v["parameter"] == SIZES[truth["name"]]]
     return {
         "strength": truth["strength"],
-        "visible": found.is_visible,
+        "visible": bool(found.is_visible),
         "verdict": found.verdict,
         "failure": found.failure,
         "first": found.first_identified,

@@ -36,5 +36,8 @@ MECHANISM = Mechanism(
     ),
     mistaken_for=("time-skew",),
     depends_on_time=True,
+    # It rings after every breakaway, whose instant no recording gives to a part of a ring. On three practice rigs the
+    # mechanism misses 4 to 6 % of its effect.
+    model_form_error=0.06,
     settings={"inertia": "J", "damping_ratio": "zeta"},
 )
