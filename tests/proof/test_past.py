@@ -1,6 +1,9 @@
 """The benchmark of cables with a past: what differs between the two recordings of a rig, and how they are counted."""
 
-from benchmarks.past import rates, without_past
+import numpy as np
+import pytest
+
+from benchmarks.past import left_by_past, rates, without_past
 from proof.cases import draw
 from virtualrig.campaign import prepare, recording_generator
 
@@ -12,20 +15,30 @@ def test_the_same_rig_is_recorded_with_a_past_and_without():
     aged, new = (
         prepare(one.campaign, plan, recording_generator(case.seed, case.name, plan.id)) for one in (case, fresh)
     )
-    assert fresh.campaign.rig == case.campaign.rig
+    assert fresh.campaign.rig.cable == case.campaign.rig.cable
+    lost = [sum(b.share for b in one.campaign.rig.effects.relaxation) for one in (case, fresh)]
+    assert lost[1] == pytest.approx(left_by_past("relaxation") * lost[0])
+    assert left_by_past("relaxation") == pytest.approx((1 - np.exp(-4)) / 4)
     assert aged.tensioned_before_s > 0 == new.tensioned_before_s
 
 
 def row(**other):
-    first = {"effect": "relaxation", "state": "past", "visible": True, "right": True, "located": True, "wrong": False}
-    return first | {"interval": [0.1, 0.12, 0.2]} | other
+    first = {
+        "effect": "relaxation",
+        "state": "past",
+        "mean_square": 1.3,
+        "right": True,
+        "located": True,
+        "wrong": False,
+    }
+    return first | {"interval": [0.1, 0.12, 0.2], "listed": True} | other
 
 
-def test_only_visible_effects_count_and_every_interval_does():
-    rows = [row(), row(right=False, interval=None), row(visible=False, right=False, interval=[0.1, 0.3, 0.2])]
+def test_only_effects_that_show_count_and_every_interval_does():
+    rows = [row(), row(right=False, interval=None), row(mean_square=1.05, right=False, interval=[0.1, 0.3, 0.2])]
     by_name = {one["what"]: (one["k"], one["n"]) for one in rates(rows)}
-    assert by_name["relaxation, past, visible: named first"] == (1, 2)
-    assert by_name["relaxation, past, visible: located"] == (2, 2)
+    assert by_name["relaxation, past, shows: named first"] == (1, 2)
+    assert by_name["relaxation, past, shows: located"] == (2, 2)
     assert by_name["relaxation, past: size within its interval"] == (1, 2)
     assert by_name["relaxation, past: confidently wrong"] == (0, 3)
-    assert by_name["running-in, fresh, visible: named first"] == (0, 0)
+    assert by_name["running-in, fresh, shows: named first"] == (0, 0)
