@@ -39,7 +39,7 @@ def left_by_past(effect: str) -> float:
 
 
 def without_past(case: Case) -> Case:
-    """The same rig and recordings, tensioned and new as each recording begins, with what a past leaves of the effect."""
+    """The same rig, tensioned and new as each recording begins, with what a past leaves of the effect."""
     (truth,) = case.truth
     left, effects = left_by_past(truth.name), case.campaign.rig.effects
     if truth.name == "relaxation":

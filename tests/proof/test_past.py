@@ -31,7 +31,7 @@ def row(**other):
         "located": True,
         "wrong": False,
     }
-    return first | {"interval": [0.1, 0.12, 0.2], "listed": True} | other
+    return first | {"right": True, "listed": True, "located": True, "interval": [0.1, 0.12, 0.2]} | other
 
 
 def test_only_effects_that_show_count_and_every_interval_does():
