@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from ccmodel.diagnosis import comparison as comparisons
 from ccmodel.diagnosis import verdict as verdicts
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.comparison import Comparison, improves_on_members, log_likelihood, well_specified
@@ -169,6 +170,17 @@ def test_what_an_equation_misses_is_no_evidence_for_a_further_mechanism():
     assert verdict(base, alone, both).best is alone
     # One that takes all of it is.
     assert verdict(base, alone, exact).best is exact
+
+
+def test_friction_that_does_not_repeat_speaks_against_a_candidate(monkeypatch):
+    """A candidate of lower mean square whose friction has a trend is less probable than one without."""
+    base, drifts, repeats = fitted(20.0), fitted(1.0, FRICTION), fitted(1.005, SCALE)
+    drifts = replace(drifts, residuals=["trend"])
+    monkeypatch.setattr(
+        comparisons, "friction_probabilities", lambda w, residuals, fitted: (0.5, 1e-6 if residuals else 0.5)
+    )
+    assert verdict(base, drifts, repeats).probability[0] > 0.9
+    assert verdict(base, drifts, repeats).candidates[0] is repeats
 
 
 def test_misspecification_is_more_likely_the_higher_the_mean_square_and_the_more_was_tried():

@@ -17,6 +17,7 @@ from ccmodel.diagnosis.repeatability import (
     deviations,
     estimated,
     friction_repeats,
+    log_bayes_factor,
     relative_spread,
     report,
     sequences,
@@ -215,3 +216,10 @@ def test_the_report_says_what_was_assumed():
     rows = report([relinearised(w, found.model(made.PARAMETERS), repeatability) for w in recordings])
     assert (rows[0]["from"], rows[0]["recordings"]) == ("repeats", 2)
     assert rows[0]["value"] < 0.01
+
+
+def test_an_unlikely_scatter_speaks_against_a_model_and_a_likely_one_for_nothing():
+    assert log_bayes_factor(0.5) == log_bayes_factor(1.0) == 0.0
+    assert log_bayes_factor(0.01) == pytest.approx(np.log(-np.e * 0.01 * np.log(0.01)))
+    assert np.isfinite(log_bayes_factor(0.0))
+    assert log_bayes_factor(1e-8) < log_bayes_factor(1e-4) < -5

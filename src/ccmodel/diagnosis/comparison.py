@@ -23,7 +23,7 @@ from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
-from ccmodel.diagnosis.repeatability import FRICTION, friction_repeats
+from ccmodel.diagnosis.repeatability import FRICTION, friction_probabilities, friction_repeats, log_bayes_factor
 from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.inference.effective_samples import in_comparison
 
@@ -110,12 +110,14 @@ class Comparison:
 
         It is the log likelihood less p/2 ln N, with N the effective sample size and p the number of unknowns that the
         candidate has in addition to the calibrated model's. Without the integral over the model-form error it is
-        -BIC/2.
+        -BIC/2. Friction that does not repeat speaks against a candidate: whitening keeps it out of the mean square.
         """
         samples = in_comparison([w.observations for w in self.whitened])
         unknowns = len(candidate.values) - len(self.base.values)
         above, form = candidate.mean_square - 1.0, self.form_error(candidate)
-        return log_likelihood(above, form, samples / (2 * noise)) - unknowns * float(np.log(samples)) / 2
+        tests = friction_probabilities(candidate.whitened, candidate.residuals, FRICTION in candidate.values)
+        repeats = sum(map(log_bayes_factor, tests))
+        return log_likelihood(above, form, samples / (2 * noise)) + repeats - unknowns * float(np.log(samples)) / 2
 
     @property
     def most_probable(self) -> CandidateFit:

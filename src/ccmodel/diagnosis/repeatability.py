@@ -200,8 +200,10 @@ def _posterior(square: float, freedom: int) -> float:
     return float(np.sqrt((settings.SPREAD_FREEDOM + square) / (settings.SPREAD_FREEDOM + freedom)))
 
 
-def friction_repeats(whitened: Sequence["Whitened"], residuals: Sequence[NDArray], is_fitted: bool) -> bool:
-    """Whether friction differs between recordings by no more than from run to run, and has no trend over them.
+def friction_probabilities(
+    whitened: Sequence["Whitened"], residuals: Sequence[NDArray], is_fitted: bool
+) -> tuple[float, float]:
+    """Probabilities of at least this scatter and of at least this trend of friction, if it differs as from run to run.
 
     Parameters
     ----------
@@ -213,11 +215,26 @@ def friction_repeats(whitened: Sequence["Whitened"], residuals: Sequence[NDArray
     """
     # A tolerance accepts discrepancies, and friction takes up some of them.
     if len(residuals) < settings.FEWEST_FOR_SCATTER or any(w.observations.tolerance.any() for w in whitened):
-        return True
+        return 1.0, 1.0
     found = deviations(whitened, residuals, FRICTION)
     groups = whitened[0].repeatability.conditions or [[i] for i in range(len(whitened))]
-    is_scatter = min(within_probability(found, groups), between_probability(found, groups, is_fitted))
-    return is_scatter > settings.SCATTER_LEVEL and trend_probability(found, sequences(whitened)) > settings.TREND_LEVEL
+    scatter = min(within_probability(found, groups), between_probability(found, groups, is_fitted))
+    return scatter, trend_probability(found, sequences(whitened))
+
+
+def friction_repeats(whitened: Sequence["Whitened"], residuals: Sequence[NDArray], is_fitted: bool) -> bool:
+    """Whether friction differs between recordings by no more than from run to run; as of `friction_probabilities`."""
+    scatter, trend = friction_probabilities(whitened, residuals, is_fitted)
+    return scatter > settings.SCATTER_LEVEL and trend > settings.TREND_LEVEL
+
+
+def log_bayes_factor(probability: float) -> float:
+    """Logarithm of the least Bayes factor of a hypothesis whose test has this p-value; 0 for p above 1/e.
+
+    -e p ln p: Sellke, Bayarri and Berger 2001, The American Statistician 55(1), 62-71.
+    """
+    p = max(probability, np.finfo(float).tiny)
+    return float(1.0 + np.log(p) + np.log(-np.log(p))) if p < np.exp(-1) else 0.0
 
 
 def within_probability(found: Deviations, groups: Sequence[Sequence[int]]) -> float:
