@@ -6,7 +6,8 @@ CORES ?= 2
 # The former name of REGRESSORS.
 REGRESSORS ?= $(RIVALS)
 
-.PHONY: help results real data test docs bench accuracy-gate input-checks diagnosis-settings joint-rigs outside-rigs past several-effects \
+.PHONY: help results real data test docs bench accuracy-gate input-checks diagnosis-settings form-errors joint-rigs \
+  outside-rigs past several-effects \
   table-one coverage proof proof-full proof-real slurm-test lint lock clean
 
 help:  ## list the targets
@@ -63,6 +64,9 @@ coverage: $(VENV)/.ready  ## count how often the fits' 90 % intervals hold the t
 
 diagnosis-settings: $(VENV)/.ready  ## compute again the figures behind the diagnosis's settings: results/diagnosis-settings.csv
 	$(BIN)/python -m benchmarks.diagnosis_settings --out results/diagnosis-settings.csv
+
+form-errors: $(VENV)/.ready  ## measure what the mechanisms' equations miss on rigs of other forms: results/form-errors.csv
+	$(BIN)/python -m benchmarks.form_errors --cores $(CORES) --out results/form-errors.csv
 
 joint-rigs: $(VENV)/.ready  ## diagnose together the studies of rigs that no single study decides: results/joint-rigs.csv
 	$(BIN)/python -m benchmarks.joint_rigs --cores $(CORES) --out results/joint-rigs.csv

@@ -22,7 +22,5 @@ MECHANISM = Mechanism(
     parameters=(Parameter("c", "N s/m^2", 5.0, 1000.0, 50.0, "drag per sliding speed and length"),),
     mistaken_for=("stribeck", "time-skew"),
     depends_on_time=True,
-    # On two practice rigs it leaves 0.16 and 0.17 % of a strong effect, mostly near reversals.
-    model_form_error=0.003,
     settings={"viscous": "c"},
 )
