@@ -20,6 +20,7 @@ from ccmodel.diagnosis.settings import RIVAL, SUFFICIENT, SURE
 from ccmodel.diagnosis.verdict import judge, nested_choice
 from ccmodel.inference.effective_samples import in_comparison
 from ccmodel.inference.problem import Free
+from ccmodel.mechanisms import get
 from made_observations import batch, calibrated
 
 FRICTION, SCALE = ("pulley-friction", "drive-pulley"), ("torque-scale", "drive-sensor")
@@ -267,8 +268,10 @@ def test_the_form_error_of_a_set_is_a_share_of_the_effect_of_each_member():
     singles = [fitted(50.0, presliding), fitted(20.0, KINK)]
     both = fitted(4.0, presliding, KINK)
     found = Comparison(WHITENED, fitted(100.0), [both, *singles], {})
-    assert found.form_error(both) == pytest.approx(0.1 * 16.0 + 0.001 * 46.0)
-    assert found.form_error(singles[0]) == pytest.approx(0.1 * 50.0)
+    assert found.form_error(both) == pytest.approx(
+        get("presliding").model_form_error * 16.0 + get("kink").model_form_error * 46.0
+    )
+    assert found.form_error(singles[0]) == pytest.approx(get("presliding").model_form_error * 50.0)
     assert found.form_error(found.base) == 0.0
 
 
