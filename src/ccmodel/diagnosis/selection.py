@@ -77,7 +77,7 @@ class Selection:
                 break
             found = extended
         # The parts of a set are compared with it under its own covariance.
-        if not found.is_sufficient or found.fitted[0].hypothesis.size > 1:
+        if not found.is_sufficient or any(c.hypothesis.size > 1 for c in found.fitted[:1]):
             found = self.relinearise(found)
         return (found if found.has_adequate else adequate or found), scores
 
