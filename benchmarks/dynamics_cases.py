@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from ccmodel.mechanisms.presliding import ELEMENTS, SPREAD, element_lengths
 from ccmodel.mechanisms.stribeck import RENEWAL_M
 from virtualrig.motion import Sine
 
@@ -60,8 +61,14 @@ def _case(name: str, place: str, text: str, effects: Mapping, values: Mapping, *
     return Case(name, text, effects, [(name, place, values)], **run)
 
 
+def _maxwell_slip(z0: float) -> dict:
+    """The rig's presliding with the elements of the mechanism."""
+    lengths = element_lengths(z0, SPREAD)
+    return {"law": "iwan", "shortest_m": lengths[0], "longest_m": lengths[-1], "elements": ELEMENTS}
+
+
 def _presliding(z0: float) -> Case:
-    effects = {"presliding": {"law": "dahl", "length_m": z0}}
+    effects = {"presliding": _maxwell_slip(z0)}
     return _case("presliding", "conduit", f"z0 {z0 * 1e6:g} um", effects, {"z0": z0})
 
 
@@ -162,7 +169,7 @@ def _stribeck(rise: float, speed: float, renewal_m: float = RENEWAL_M, preslidin
     mechanisms = [("stribeck", "conduit", {"a": rise, "vs": speed})]
     text = f"a {100 * rise:g} %, vs {1e3 * speed:g} mm/s"
     if presliding_m:
-        effects["presliding"] = {"law": "dahl", "length_m": presliding_m}
+        effects["presliding"] = _maxwell_slip(presliding_m)
         mechanisms.append(("presliding", "conduit", {"z0": presliding_m}))
         text += f", with presliding {1e6 * presliding_m:g} um"
     if renewal_m != RENEWAL_M:

@@ -35,6 +35,8 @@ VALUES = {
     "torque-scale/drive-sensor/gain": 0.05,
     "kink/conduit/beta": 0.5,
     "presliding/conduit/z0": 5e-5,
+    "presliding/conduit/spread": 4.0,
+    "stribeck/conduit/a": 0.2,
 }
 CHANNELS = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N")
 WHITENED = [SimpleNamespace(observations=SimpleNamespace(channels=CHANNELS, tolerance_share=0.0))] * 8
@@ -164,10 +166,11 @@ def test_without_a_model_form_error_the_likelihood_is_the_noises():
 
 
 def test_what_an_equation_misses_is_no_evidence_for_a_further_mechanism():
-    """Presliding leaves up to a tenth of its effect; a second mechanism that takes some of it is not more probable."""
-    base, alone = fitted(100.0), fitted(6.0, ("presliding", "conduit"))
-    both = fitted(3.0, ("presliding", "conduit"), FRICTION)
-    exact = fitted(1.0, ("presliding", "conduit"), FRICTION)
+    """Stribeck friction leaves some of its effect; a second mechanism that takes part of that is not more probable."""
+    left = get("stribeck").model_form_error * 100.0
+    stribeck = ("stribeck", "conduit")
+    base, alone = fitted(101.0), fitted(1.0 + 0.9 * left, stribeck)
+    both, exact = fitted(1.0 + 0.4 * left, stribeck, FRICTION), fitted(1.0, stribeck, FRICTION)
     assert verdict(base, alone, both).best is alone
     # One that takes all of it is.
     assert verdict(base, alone, exact).best is exact
@@ -200,8 +203,9 @@ def test_a_single_above_the_sufficient_mean_square_is_extended():
         nothing = {one.hypothesis: LackOfFit(np.zeros(8))}
         return not Comparison(WHITENED, fitted(10.0), [one], nothing).is_sufficient
 
-    assert asks(SUFFICIENT + 0.05)
-    assert not asks(SUFFICIENT - 0.05)
+    limit = SUFFICIENT + get(FRICTION[0]).model_form_error * (10.0 - SUFFICIENT)
+    assert asks(limit + 0.05)
+    assert not asks(limit - 0.05)
 
 
 def test_the_tolerance_counts_once_for_all_recordings():

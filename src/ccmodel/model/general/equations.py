@@ -5,8 +5,8 @@ The unknowns are the slides d of all nodes and the rotation of the load pulley. 
     T_i - T_{i+1} = xi_i(d_i) tanh(mu phi_i / 2) (T_i + T_{i+1}) + (drag),      T_i on its drive side,
 
 so that a node that slides has the capstan's ratio T_i / T_{i+1} = exp(mu phi_i) on any grid. xi is the node's bristle,
--1 to 1: Dahl's law where there is presliding, else an elastic, ideally plastic one of `COULOMB_BRISTLE_M`, which makes
-the equations piecewise linear.
+-1 to 1, elastic and ideally plastic, over `COULOMB_BRISTLE_M`; where there is presliding, the mean of several with
+lengths of their own. The equations are piecewise linear.
 """
 
 from numpy.typing import NDArray
@@ -15,8 +15,9 @@ from ccmodel.elementary import quick_tanh
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.backlash import dead_zone
 from ccmodel.mechanisms.load_dependent_friction import power_of_tension
-from ccmodel.mechanisms.presliding import dahl
+from ccmodel.mechanisms.presliding import ELEMENTS
 from ccmodel.mechanisms.pulley_eccentricity import winding, winding_change
+from ccmodel.mechanisms.pulley_friction import dahl
 from ccmodel.mechanisms.strand_settling import settling_tension
 from ccmodel.mechanisms.stribeck import renewed
 from ccmodel.model.general import layout as rows
@@ -95,6 +96,22 @@ def _set_hold(ph: Physics, piece: NDArray, node: NDArray, c: int) -> None:
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
+def _elements(ph: Physics, node: NDArray, d: NDArray, c: int) -> None:
+    """Friction of each node of a cable over its limit, the mean of its elements, and its derivative by the slide."""
+    x, slope = node[rows.BRISTLE_NEXT, c], node[rows.GIVES, c]
+    for i in range(node.shape[2]):
+        x[i], slope[i] = 0.0, 0.0
+    for k in range(ELEMENTS):
+        before, after = node[rows.ELEMENT + k, c], node[rows.ELEMENT_NEXT + k, c]
+        inverse = 1.0 / ph.element_m[k]
+        for i in range(node.shape[2]):
+            trial = before[i] + d[i + 1] * inverse
+            after[i] = min(max(trial, -1.0), 1.0)
+            x[i] += after[i] / ELEMENTS
+            slope[i] += inverse / ELEMENTS if abs(trial) < 1.0 else 0.0
+
+
+@kernel(error_model="numpy", fastmath=rows.FAST)
 def _nodes(ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, dt: float, bristle: float) -> float:
     """Force out of balance at each node and its derivatives; returns the sum of its squares, N^2."""
     n = node.shape[2]
@@ -105,11 +122,7 @@ def _nodes(ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, dt: float
         grip, xi = node[rows.GRIP, c], node[rows.BRISTLE, c]
         p, q, fd, r = node[rows.NEAR, c], node[rows.FAR, c], node[rows.GIVES, c], node[rows.EXCESS, c]
         if ph.presliding:
-            for i in range(n):
-                x, slope = dahl(xi[i], d[i + 1], bristle)
-                # Where nothing has slid yet, the slope differs between the two directions.
-                node[rows.BRISTLE_NEXT, c, i] = x
-                fd[i] = slope if d[i + 1] != 0.0 else 1.0 / bristle
+            _elements(ph, node, d, c)
         else:
             inverse = 1.0 / bristle
             for i in range(n):

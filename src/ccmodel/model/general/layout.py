@@ -8,6 +8,7 @@ from collections import namedtuple
 from typing import TYPE_CHECKING, NamedTuple
 
 from ccmodel import mechanisms as registry
+from ccmodel.mechanisms.presliding import ELEMENTS
 
 IMPEDANCE, PRESCRIBED_ANGLE = 0, 1
 
@@ -37,6 +38,8 @@ STIFFNESS, LOST, RELAXING, SHARE, STRETCH, LOST_TENSION, ELASTIC, TENSION, TANGE
     GRIP_NOW,
     GRIP_SLOPE,
 ) = range(18)
+# Then the elements of presliding friction, -1 to 1: state, and result of the step.
+ELEMENT, ELEMENT_NEXT = 18, 18 + ELEMENTS
 # slide, shape (rows, 2, n + 2): drive end, nodes, load end, m. Of this step, of Newton's step, and of those before.
 NOW, STEP, SAVED, LAST, BEFORE = range(5)
 # mean, shape (rows, 2): mean tension of a cable, which a compliant conduit responds to, N.
@@ -56,7 +59,7 @@ NOW, STEP, SAVED, LAST, BEFORE = range(5)
 # load, shape (rows,): angle (rad), rotation (rad) and duration (s) of the last step, speed (rad/s), speed before that,
 # bristle of the bearing; then speed, bristle and torque (N m) of this step.
 ANGLE, ROTATION, DT, OMEGA, OMEGA_BEFORE, BEARING, OMEGA_NEXT, BEARING_NEXT, TORQUE = range(9)
-PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10, 18, 5, 11, 9
+PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10, 18 + 2 * ELEMENTS, 5, 11, 9
 
 # Constants of a run: its own, and every setting of the mechanisms.
 if TYPE_CHECKING:
@@ -68,6 +71,7 @@ if TYPE_CHECKING:
         has_relaxation: bool
         bristle: float
         presliding: bool
+        element_m: tuple[float, ...]
         radius: float
         stiffness_load: float
         load_damping: float
@@ -79,8 +83,8 @@ if TYPE_CHECKING:
 else:
     Physics = namedtuple(
         "Physics",
-        "has_settling has_relaxation bristle presliding radius stiffness_load load_damping kind general_friction "
-        + " ".join(registry.march_settings()),
+        "has_settling has_relaxation bristle presliding element_m radius stiffness_load load_damping kind "
+        "general_friction " + " ".join(registry.march_settings()),
     )
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}  # not nnan: a NaN must be seen

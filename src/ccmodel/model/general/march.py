@@ -8,6 +8,7 @@ cable B. Displacements count towards the drive end. A step solves the equations 
 from numpy.typing import NDArray
 
 from ccmodel.kernel import borrowed, kernel
+from ccmodel.mechanisms.presliding import ELEMENTS
 from ccmodel.mechanisms.pulley_eccentricity import winding
 from ccmodel.mechanisms.relaxation import lag_weights
 from ccmodel.model.general import layout as rows
@@ -61,6 +62,10 @@ def _accept(
                 piece[rows.ELASTIC, c, i] = elastic
         for i in range(n):
             node[rows.BRISTLE, c, i] = node[rows.BRISTLE_NEXT, c, i]
+        if ph.presliding:
+            for k in range(ELEMENTS):
+                for i in range(n):
+                    node[rows.ELEMENT + k, c, i] = node[rows.ELEMENT_NEXT + k, c, i]
     if ph.stribeck_rise > 0.0 and dt > 0.0:
         for c in range(2):
             renew_contacts(ph, node, slide, c, dt, rows.RESTED)

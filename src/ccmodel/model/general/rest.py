@@ -46,6 +46,7 @@ def initial_state(
     hold = np.tanh(node[rows.HALF_BEND] * factor) * both + node[rows.DRAG]
     xi = np.divide(T[:, :-1] - T[:, 1:], hold, out=np.zeros_like(both), where=hold > 0)
     node[rows.BRISTLE] = np.clip(xi, -1, 1)
+    node[rows.ELEMENT : rows.ELEMENT_NEXT] = node[rows.BRISTLE]
     return T
 
 

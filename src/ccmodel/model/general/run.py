@@ -11,6 +11,7 @@ from ccmodel.channels import TAU_IN, TAU_OUT, TENSIONS, THETA_OUT
 from ccmodel.failure import ModelError
 from ccmodel.mechanisms.contract import Settings
 from ccmodel.mechanisms.load_inertia import load_damping
+from ccmodel.mechanisms.presliding import element_lengths
 from ccmodel.mechanisms.pulley_friction import bearing
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.active import Active, active_of
@@ -204,6 +205,7 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
         if settings.bristle_m > 0
         else _coulomb_bristle(transmission, settings, elements),
         presliding=settings.bristle_m > 0,
+        element_m=element_lengths(settings.bristle_m, settings.bristle_spread),
         radius=float(transmission.load_radius_m),
         stiffness_load=float(K_e),
         load_damping=float(load_damping(settings, K_e)),
