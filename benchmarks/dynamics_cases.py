@@ -61,15 +61,15 @@ def _case(name: str, place: str, text: str, effects: Mapping, values: Mapping, *
     return Case(name, text, effects, [(name, place, values)], **run)
 
 
-def _maxwell_slip(z0: float) -> dict:
-    """The rig's presliding with the elements of the mechanism."""
-    lengths = element_lengths(z0, SPREAD)
-    return {"law": "iwan", "shortest_m": lengths[0], "longest_m": lengths[-1], "elements": ELEMENTS}
-
-
 def _presliding(z0: float) -> Case:
-    effects = {"presliding": _maxwell_slip(z0)}
+    effects = {"presliding": {"law": "dahl", "length_m": z0}}
     return _case("presliding", "conduit", f"z0 {z0 * 1e6:g} um", effects, {"z0": z0})
+
+
+def _elements(z0: float) -> Case:
+    shortest, *_, longest = element_lengths(z0, SPREAD)
+    effects = {"presliding": {"law": "iwan", "shortest_m": shortest, "longest_m": longest, "elements": ELEMENTS}}
+    return _case("presliding", "conduit", f"z0 {z0 * 1e6:g} um, no creep", effects, {"z0": z0, "creep": 0.0})
 
 
 def _viscous(c: float) -> Case:
@@ -90,6 +90,7 @@ def _conduit_cases() -> list[Case]:
     running_in = {"running_in": {"change": 0.3, "scale": 2.0}}
     return [
         *map(_presliding, (20e-6, 150e-6)),
+        _elements(60e-6),
         *map(_viscous, (50.0, 400.0)),
         *map(_load_dependent, (-0.15, -0.35)),
         _case("constant-drag", "conduit", "f0 1 N", {"drag_N": 1.0}, {"f0": 1.0}),
@@ -169,7 +170,7 @@ def _stribeck(rise: float, speed: float, renewal_m: float = RENEWAL_M, preslidin
     mechanisms = [("stribeck", "conduit", {"a": rise, "vs": speed})]
     text = f"a {100 * rise:g} %, vs {1e3 * speed:g} mm/s"
     if presliding_m:
-        effects["presliding"] = _maxwell_slip(presliding_m)
+        effects["presliding"] = {"law": "dahl", "length_m": presliding_m}
         mechanisms.append(("presliding", "conduit", {"z0": presliding_m}))
         text += f", with presliding {1e6 * presliding_m:g} um"
     if renewal_m != RENEWAL_M:

@@ -36,6 +36,7 @@ VALUES = {
     "kink/conduit/beta": 0.5,
     "presliding/conduit/z0": 5e-5,
     "presliding/conduit/spread": 4.0,
+    "presliding/conduit/creep": 0.5,
     "stribeck/conduit/a": 0.2,
 }
 CHANNELS = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm", "F_drive_N", "F_load_N")

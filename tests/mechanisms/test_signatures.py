@@ -48,10 +48,23 @@ def test_small_reversals_lose_no_work_with_presliding_and_some_with_a_terminatio
         last = slice(500, 601)
         return abs(np.trapezoid(T1[last], theta[last])) / np.ptp(T1[last]) / swing_rad
 
-    presliding = ("presliding", "conduit", {"z0": 100e-6})
+    presliding = ("presliding", "conduit", {"z0": 100e-6, "creep": 0.0})
     end = ("termination-compliance", "drive-end", {"compliance": 40e-6})
     assert loop(presliding, 0.008) < 1e-6 < 0.02 < loop(end, 0.008)
     assert loop(presliding, 0.08) == pytest.approx(loop(end, 0.08), rel=0.1)
+
+
+def test_small_nested_reversals_creep_with_a_bristle_and_close_with_a_termination():
+    """Both soften a small reversal alike; only a bristle lets tension creep from one to the next."""
+    phase = np.linspace(0, 8 * np.pi, 401)
+    theta = np.concatenate([np.linspace(0, 0.5, 200), 0.5 - 0.002 * (1 - np.cos(phase))])
+    bristles = run(theta, ("presliding", "conduit", {"z0": 100e-6, "creep": 1.0})).T1_N
+    end = run(theta, ("termination-compliance", "drive-end", {"compliance": 40e-6})).T1_N
+    swing = [np.ptp(T[500:]) for T in (run(theta).T1_N, bristles, end)]
+    assert swing[1] < 0.4 * swing[0]
+    assert swing[2] < 0.4 * swing[0]
+    assert bristles[200] - bristles[600] > swing[1]
+    assert end[600] == pytest.approx(end[200], abs=1e-6)
 
 
 def test_elements_are_evenly_spaced_about_the_stated_length():

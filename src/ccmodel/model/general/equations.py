@@ -99,16 +99,21 @@ def _set_hold(ph: Physics, piece: NDArray, node: NDArray, c: int) -> None:
 def _elements(ph: Physics, node: NDArray, d: NDArray, c: int) -> None:
     """Friction of each node of a cable over its limit, the mean of its elements, and its derivative by the slide."""
     x, slope = node[rows.BRISTLE_NEXT, c], node[rows.GIVES, c]
+    before, after, length = node[rows.ELEMENT + ELEMENTS, c], node[rows.ELEMENT_NEXT + ELEMENTS, c], ph.bristle
     for i in range(node.shape[2]):
-        x[i], slope[i] = 0.0, 0.0
+        after[i], by_slide = dahl(before[i], d[i + 1], length)
+        # Where nothing has slid yet, the slope differs between the two directions.
+        slope[i] = ph.bristle_creep * (by_slide if d[i + 1] != 0.0 else 1.0 / length)
+        x[i] = ph.bristle_creep * after[i]
+    share = (1.0 - ph.bristle_creep) / ELEMENTS
     for k in range(ELEMENTS):
         before, after = node[rows.ELEMENT + k, c], node[rows.ELEMENT_NEXT + k, c]
         inverse = 1.0 / ph.element_m[k]
         for i in range(node.shape[2]):
             trial = before[i] + d[i + 1] * inverse
             after[i] = min(max(trial, -1.0), 1.0)
-            x[i] += after[i] / ELEMENTS
-            slope[i] += inverse / ELEMENTS if abs(trial) < 1.0 else 0.0
+            x[i] += share * after[i]
+            slope[i] += share * inverse if abs(trial) < 1.0 else 0.0
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)

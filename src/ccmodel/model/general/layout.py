@@ -38,8 +38,8 @@ STIFFNESS, LOST, RELAXING, SHARE, STRETCH, LOST_TENSION, ELASTIC, TENSION, TANGE
     GRIP_NOW,
     GRIP_SLOPE,
 ) = range(18)
-# Then the elements of presliding friction, -1 to 1: state, and result of the step.
-ELEMENT, ELEMENT_NEXT = 18, 18 + ELEMENTS
+# Then the elements of presliding friction and its creeping one, -1 to 1: state, and result of the step.
+ELEMENT, ELEMENT_NEXT = 18, 19 + ELEMENTS
 # slide, shape (rows, 2, n + 2): drive end, nodes, load end, m. Of this step, of Newton's step, and of those before.
 NOW, STEP, SAVED, LAST, BEFORE = range(5)
 # mean, shape (rows, 2): mean tension of a cable, which a compliant conduit responds to, N.
@@ -59,7 +59,7 @@ NOW, STEP, SAVED, LAST, BEFORE = range(5)
 # load, shape (rows,): angle (rad), rotation (rad) and duration (s) of the last step, speed (rad/s), speed before that,
 # bristle of the bearing; then speed, bristle and torque (N m) of this step.
 ANGLE, ROTATION, DT, OMEGA, OMEGA_BEFORE, BEARING, OMEGA_NEXT, BEARING_NEXT, TORQUE = range(9)
-PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10, 18 + 2 * ELEMENTS, 5, 11, 9
+PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10, 20 + 2 * ELEMENTS, 5, 11, 9
 
 # Constants of a run: its own, and every setting of the mechanisms.
 if TYPE_CHECKING:

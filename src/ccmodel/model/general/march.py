@@ -63,7 +63,7 @@ def _accept(
         for i in range(n):
             node[rows.BRISTLE, c, i] = node[rows.BRISTLE_NEXT, c, i]
         if ph.presliding:
-            for k in range(ELEMENTS):
+            for k in range(ELEMENTS + 1):
                 for i in range(n):
                     node[rows.ELEMENT + k, c, i] = node[rows.ELEMENT_NEXT + k, c, i]
     if ph.stribeck_rise > 0.0 and dt > 0.0:

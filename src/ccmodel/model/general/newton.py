@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.presliding import ELEMENTS
 from ccmodel.mechanisms.relaxation import lag_weights
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.equations import imbalance
@@ -128,18 +127,6 @@ def solve_with_conduits(
 
 
 @kernel(error_model="numpy")
-def _stopped(ph: Physics, node: NDArray, c: int, i: int, old: float, new: float) -> float:
-    """The slide of a node with presliding, stopped where its last element slips if it reversed at a step."""
-    above, below = 0.0, 0.0
-    for k in range(ELEMENTS):
-        xi = node[rows.ELEMENT + k, c, i]
-        above, below = max(above, (EDGE - xi) * ph.element_m[k]), min(below, (-EDGE - xi) * ph.element_m[k])
-    if old > above and new < below:
-        return above
-    return below if old < below and new > above else new
-
-
-@kernel(error_model="numpy")
 def _move(ph: Physics, node: NDArray, slide: NDArray, share: float, bristle: float) -> None:
     """Add a share of Newton's step to the slides, but stop a node at the edge of sticking before it reverses.
 
@@ -154,7 +141,7 @@ def _move(ph: Physics, node: NDArray, slide: NDArray, share: float, bristle: flo
             new = old + share * slide[rows.STEP, c, i]
             if ph.presliding:
                 if old * new < 0.0:
-                    new = _stopped(ph, node, c, i - 1, old, new)
+                    new = 0.0
             else:
                 xi = node[rows.BRISTLE, c, i - 1]
                 before, after = xi + old * inverse, xi + new * inverse
