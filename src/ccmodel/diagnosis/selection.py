@@ -76,8 +76,9 @@ class Selection:
             if not grows(extended, size):
                 break
             found = extended
-        # The parts of a set are compared with it under its own covariance.
-        if not found.is_sufficient or any(c.hypothesis.size > 1 for c in found.fitted[:1]):
+        # Candidates are compared, and their parameters estimated, under the best one's own covariance: about a model
+        # that lacks something, friction seems to scatter.
+        if found.fitted and not found.is_adequate(found.base):
             found = self.relinearise(found)
         return (found if found.has_adequate else adequate or found), scores
 
