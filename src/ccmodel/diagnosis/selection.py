@@ -78,7 +78,7 @@ class Selection:
             found = extended
         # Candidates are compared, and their parameters estimated, under the best one's own covariance: about a model
         # that lacks something, friction seems to scatter.
-        if found.fitted and not found.is_adequate(found.base):
+        if found.fitted and (sum(found.posterior) > 0.5 or not found.is_adequate(found.base)):
             found = self.relinearise(found)
         return (found if found.has_adequate else adequate or found), scores
 
