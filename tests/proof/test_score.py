@@ -106,7 +106,9 @@ def test_a_pair_needs_both_mechanisms():
 
 
 def test_too_many_mechanisms_count_as_none():
-    many = reported("explained", *[(n, "conduit", 0.5, []) for n in ("torque-scale", "kink", "stribeck")])
+    many = reported(
+        "explained", *[(n, "conduit", 0.5, []) for n in ("torque-scale", "kink", "stribeck", "presliding", "backlash")]
+    )
     o = Outcome(answer("single", GAIN), many)
     assert o.first_identified is None
     assert o.is_confidently_wrong
