@@ -7,8 +7,7 @@ CORES ?= 2
 REGRESSORS ?= $(RIVALS)
 
 .PHONY: help results real data test docs bench accuracy-gate input-checks diagnosis-settings form-errors joint-rigs \
-  outside-rigs past several-effects \
-  table-one coverage proof proof-full proof-real slurm-test lint lock clean
+  outside-rigs past several-effects table-one coverage proof proof-full proof-real slurm-test lint lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12

@@ -19,7 +19,7 @@ import numpy as np
 from ccmodel.inference.pool import set_threads
 from proof.calibration import compared_values
 from proof.cases import Case, draw
-from proof.intervals import rate
+from proof.intervals import rate, text_of
 from proof.judge import judge
 from proof.outcome import Outcome, is_located, outcome
 from proof.plan import read_plan
@@ -125,8 +125,7 @@ def main() -> None:
             rows.append(done.result())
             print(json.dumps(rows[-1]), flush=True)
     for one in rates(rows):
-        share = "" if one["rate"] is None else f" {one['rate']:.0%} ({one['low']:.0%} to {one['high']:.0%})"
-        print(f"{one['what']}: {one['k']} of {one['n']}{share}")
+        print(text_of(one))
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ import ccmodel
 from ccmodel.inference.pool import set_threads
 from proof.build import noise_floors, record
 from proof.cases import SEVERAL, Case, draw
-from proof.intervals import rate
+from proof.intervals import rate, text_of
 from proof.judge import blind, judge
 from proof.measured import CHANNELS, error_squares
 from proof.outcome import VISIBLE, outcome
@@ -99,8 +99,7 @@ def main() -> None:
             rows.append(done.result())
             print(json.dumps(rows[-1]), flush=True)
     for one in rates(rows, SEVERAL[asked.kind]):
-        share = "" if one["rate"] is None else f" {one['rate']:.0%} ({one['low']:.0%} to {one['high']:.0%})"
-        print(f"{one['what']}: {one['k']} of {one['n']}{share}")
+        print(text_of(one))
 
 
 if __name__ == "__main__":

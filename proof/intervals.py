@@ -30,6 +30,12 @@ def rate(what: str, k: int, n: int, target: float | None = None) -> dict:
     }
 
 
+def text_of(one: dict) -> str:
+    """A rate in words: how many of how many, the share and its interval."""
+    share = "" if one["rate"] is None else f" {one['rate']:.0%} ({one['low']:.0%} to {one['high']:.0%})"
+    return f"{one['what']}: {one['k']} of {one['n']}{share}"
+
+
 def bootstrap(what: str, values: Sequence, statistic: Callable[[Sequence], float], target: float | None = None) -> dict:
     """A statistic of `values` with its 95 % percentile bootstrap interval, from `RESAMPLES` resamples of a fixed seed.
 

@@ -12,7 +12,7 @@ import pytest
 import ccmodel
 from ccmodel import provenance
 from ccmodel.kernel import TESTED_NUMBA, check_numba
-from ccmodel.mechanisms.pulley_friction import dahl
+from ccmodel.mechanisms.presliding import dahl
 from ccmodel.model.exact.run import run
 from ccmodel.model.general.march import march
 from ccmodel.model.paper import _march

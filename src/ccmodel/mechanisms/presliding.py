@@ -15,6 +15,8 @@ Source: Iwan, Journal of Applied Mechanics 33(4), 893-900, 1966, doi:10.1115/1.3
 1675-1682, 1976, doi:10.2514/3.61511.
 """
 
+from ccmodel.elementary import quick_exp
+from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
 # Elements of a contact. Four describe eight whose lengths differ by a factor of 3 or 15 to 0.4 and 3 % of friction
@@ -22,6 +24,14 @@ from ccmodel.mechanisms.contract import Mechanism, Parameter
 ELEMENTS = 4
 # Longest over shortest length unless a model states it.
 SPREAD = 4.0
+
+
+@kernel(inline="always")
+def dahl(xi: float, slide: float, z0: float) -> tuple[float, float]:
+    """Bristle xi = z / z0 after sliding by `slide` (m or rad) in one direction, and its derivative by it."""
+    direction = 1.0 if slide >= 0.0 else -1.0
+    decay = quick_exp(-abs(slide) / z0)
+    return direction + (xi - direction) * decay, (1.0 - direction * xi) * decay / z0
 
 
 def element_lengths(z0: float, spread: float) -> tuple[float, ...]:

@@ -16,20 +16,12 @@ Journal 14(12), 1675-1682, 1976, doi:10.2514/3.61511.
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.elementary import quick_exp
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
+from ccmodel.mechanisms.presliding import dahl
 
 # Angle over which a bearing's friction builds up unless a model states it.
 PRESLIDING_RAD = 2e-3
-
-
-@kernel(inline="always")
-def dahl(xi: float, slide: float, z0: float) -> tuple[float, float]:
-    """Bristle xi = z / z0 after sliding by `slide` (m or rad) in one direction, and its derivative by it."""
-    direction = 1.0 if slide >= 0.0 else -1.0
-    decay = quick_exp(-abs(slide) / z0)
-    return direction + (xi - direction) * decay, (1.0 - direction * xi) * decay / z0
 
 
 @kernel

@@ -5,8 +5,8 @@ The unknowns are the slides d of all nodes and the rotation of the load pulley. 
     T_i - T_{i+1} = xi_i(d_i) tanh(mu phi_i / 2) (T_i + T_{i+1}) + (drag),      T_i on its drive side,
 
 so that a node that slides has the capstan's ratio T_i / T_{i+1} = exp(mu phi_i) on any grid. xi is the node's bristle,
--1 to 1, elastic and ideally plastic, over `COULOMB_BRISTLE_M`; where there is presliding, the mean of several with
-lengths of their own. The equations are piecewise linear.
+-1 to 1, elastic and ideally plastic, over `COULOMB_BRISTLE_M`, which makes the equations piecewise linear. Where there
+is presliding, it is the mean of several with lengths of their own and of one that follows Dahl's law.
 """
 
 from numpy.typing import NDArray
@@ -15,9 +15,8 @@ from ccmodel.elementary import quick_tanh
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.backlash import dead_zone
 from ccmodel.mechanisms.load_dependent_friction import power_of_tension
-from ccmodel.mechanisms.presliding import ELEMENTS
+from ccmodel.mechanisms.presliding import ELEMENTS, dahl
 from ccmodel.mechanisms.pulley_eccentricity import winding, winding_change
-from ccmodel.mechanisms.pulley_friction import dahl
 from ccmodel.mechanisms.strand_settling import settling_tension
 from ccmodel.mechanisms.stribeck import renewed
 from ccmodel.model.general import layout as rows
@@ -97,7 +96,7 @@ def _set_hold(ph: Physics, piece: NDArray, node: NDArray, c: int) -> None:
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
 def _elements(ph: Physics, node: NDArray, d: NDArray, c: int) -> None:
-    """Friction of each node of a cable over its limit, the mean of its elements, and its derivative by the slide."""
+    """Friction of each node of a cable over its limit, from its elements and its bristle, and its derivative."""
     x, slope = node[rows.BRISTLE_NEXT, c], node[rows.GIVES, c]
     before, after, length = node[rows.ELEMENT + ELEMENTS, c], node[rows.ELEMENT_NEXT + ELEMENTS, c], ph.bristle
     for i in range(node.shape[2]):
