@@ -355,3 +355,7 @@ def test_the_covariance_is_linearised_about_the_best_candidate():
     assert again.base.mean_square > again.candidates[0].mean_square
     assert again.whitened[0].observations.parameters == recordings[0].observations.parameters
     assert not np.allclose(again.whitened[0].shrinkage, recordings[0].shrinkage, rtol=1e-6)
+    # Once more only if a value has moved by more than its standard deviation.
+    assert selection.relinearise(again) is again
+    moved = replace(again.linearised_about, values=dict.fromkeys(again.linearised_about.values, 0.0))
+    assert not replace(again, linearised_about=moved).is_linearised_about(again.candidates[0])

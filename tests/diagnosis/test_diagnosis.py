@@ -15,7 +15,7 @@ from builders import spoil, write_batch
 from ccmodel import cli
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.hypothesis import Hypothesis
-from ccmodel.diagnosis.result import alternatives_of, mechanism_of
+from ccmodel.diagnosis.result import alternatives_of, interval, mechanism_of
 from ccmodel.failure import ModelError
 from ccmodel.inference import pool
 from ccmodel.model.files import read_model_file
@@ -319,6 +319,15 @@ def test_a_number_stands_where_a_finer_solver_would_have_it():
     # It knows of the move, and does not take it for certain.
     assert corrected["high"] - corrected["value"] == pytest.approx(reach * 0.05 / 0.04, rel=1e-3)
     assert corrected["low"] == pytest.approx(2 * corrected["value"] - corrected["high"])
+
+
+def test_the_interval_of_a_relative_strength_is_symmetric_in_its_logarithm():
+    assert interval(0.5, 0.2, is_relative=False) == pytest.approx([0.3, 0.7])
+    low, high = interval(-0.1, 0.15, is_relative=True)
+    assert (low / -0.1, -0.1 / high) == pytest.approx([np.exp(1.5)] * 2)
+    # Small errors are small in either.
+    assert interval(0.1, 1e-4, is_relative=True) == pytest.approx(interval(0.1, 1e-4, is_relative=False), rel=1e-5)
+    assert np.all(np.isfinite(interval(1e-9, 1.0, is_relative=True)))
 
 
 def test_the_pipeline_says_which_recordings_it_had_to_do_without(tmp_path, monkeypatch):

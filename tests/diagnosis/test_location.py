@@ -18,6 +18,11 @@ def unexplained(recordings):
     return Judgement("unexplained", base, Comparison(recordings, base, [], {}), [], [], 1.0, [])
 
 
+def located(recordings):
+    found = unexplained(recordings)
+    return location(found, found.calibrated)
+
+
 def wave(simulated, channel):
     """A ripple of the drive angle, which no spring, cable or friction causes."""
     return {channel: 10 * NOISE[channel] * np.sin(25 * simulated["theta_in_rad"])}
@@ -35,7 +40,7 @@ def wave(simulated, channel):
 )
 def test_an_error_in_one_channel_is_located_at_its_sensor(channel, place):
     recordings = batch(lambda simulated: wave(simulated, channel))
-    found = location(unexplained(recordings))
+    found = located(recordings)
     assert found["place"] == place
     assert found["channels"][0] == channel.rsplit("_", 1)[0]
 
@@ -43,7 +48,7 @@ def test_an_error_in_one_channel_is_located_at_its_sensor(channel, place):
 def test_a_load_of_another_law_is_located_at_the_load():
     stiff = Active("load-stiffening", "load", {"K3": 0.1})
     recordings = batch(truth=replace(PARAMETERS, mechanisms=(stiff,)))
-    assert location(unexplained(recordings))["place"] == "load"
+    assert located(recordings)["place"] == "load"
 
 
 def test_errors_at_both_ends_are_located_between_them():
@@ -55,13 +60,13 @@ def test_errors_at_both_ends_are_located_between_them():
             wave(simulated, "tau_in_Nm") | wave(simulated, "tau_out_Nm") | wave(simulated, "theta_out_rad")
         )
     )
-    assert location(unexplained(recordings))["place"] == "conduit"
+    assert located(recordings)["place"] == "conduit"
 
 
 def test_a_single_channel_gives_a_place():
     one = [only(w.observations, "tau_in_Nm") for w in batch(lambda simulated: wave(simulated, "tau_in_Nm"))]
     recordings = [whiten(e, PARAMETERS) for e in one]
-    found = location(unexplained(recordings))
+    found = located(recordings)
     assert (found["place"], found["channels"]) == ("drive-pulley", ["tau_in"])
 
 

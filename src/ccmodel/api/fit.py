@@ -239,9 +239,8 @@ def fit(
 
     It is the calibration that a diagnosis begins with. Shared by all recordings are stiffness, friction coefficient,
     the load's spring, and whatever a rest does not show. What differs from recording to recording (friction by about
-    1 %, sensor zeros, encoder offsets) has a prior and is marginalised. Where the model reproduces the recordings, the
-    calibrated model of a diagnosis has the same values. Otherwise the diagnosis weights the errors anew about the best
-    candidate, and its calibrated model has others; the fit then warns.
+    1 %, sensor zeros, encoder offsets) has a prior and is marginalised. It is also the calibrated model of a diagnosis.
+    The fit warns where it does not reproduce the recordings.
 
     Parameters
     ----------

@@ -49,8 +49,8 @@ class Comparison:
         Of the calibrated model, the candidates with the lowest mean squares and the most probable one.
     screened : int
         Number of hypotheses that were screened, among which the prior probability is shared.
-    linearised_about : Hypothesis or None
-        The candidate about which the covariance is linearised; None for the model of the first fit.
+    linearised_about : CandidateFit or None
+        The candidate, with its values, about which the covariance is linearised; None for the model of the first fit.
     """
 
     whitened: Sequence[Whitened]
@@ -58,7 +58,7 @@ class Comparison:
     candidates: list[CandidateFit]
     lack_of_fit: Mapping[Hypothesis, LackOfFit]
     screened: int = 0
-    linearised_about: Hypothesis | None = None
+    linearised_about: CandidateFit | None = None
     passed_over: Sequence[CandidateFit] = ()
 
     @classmethod
@@ -68,7 +68,7 @@ class Comparison:
         base: CandidateFit,
         candidates: Sequence[CandidateFit],
         screened: int = 0,
-        linearised_about: Hypothesis | None = None,
+        linearised_about: CandidateFit | None = None,
     ) -> "Comparison":
         """Order the candidates, and compute the lack of fit of those that may be named."""
         every = sorted(candidates, key=lambda c: (not c.is_plausible, c.mean_square))
@@ -84,6 +84,14 @@ class Comparison:
     def fitted(self) -> list[CandidateFit]:
         """All that were fitted, by ascending mean square; those with a strength outside its plausible range last."""
         return sorted([*self.candidates, *self.passed_over], key=lambda c: (not c.is_plausible, c.mean_square))
+
+    def is_linearised_about(self, candidate: CandidateFit) -> bool:
+        """Whether the covariance is linearised about these mechanisms, within a standard deviation of each value."""
+        about = self.linearised_about
+        if about is None or about.hypothesis != candidate.hypothesis:
+            return False
+        moved = np.array([candidate.values[name] - value for name, value in about.values.items()])
+        return bool(np.all(np.abs(moved) <= candidate.standard_deviations()))
 
     @cached_property
     def posterior(self) -> list[float]:

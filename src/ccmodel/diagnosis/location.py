@@ -1,6 +1,7 @@
 """Location of the mismatch: its place in the transmission, its channels and its phases of the motion."""
 
 from collections import defaultdict
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.drive import is_moving, since_reversal
 from ccmodel.diagnosis.isolation import channels_of, isolate
 from ccmodel.diagnosis.verdict import Judgement
+from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.model.run import ModelInput
 
 # Phases of the drive's motion.
@@ -31,14 +33,14 @@ TEXT = {
 }
 
 
-def location(judgement: Judgement) -> dict:
-    """Most likely place of the mismatch and all possible ones, its channels and phases, and a sentence."""
+def location(judgement: Judgement, calibrated: CandidateFit) -> dict:
+    """Most likely place of the mismatch and all possible ones, the calibration's worst channels and phases, in words."""
     if judgement.verdict == "agrees":
         text = "model and recordings agree within the noise"
         return {"place": None, "places": [], "channels": [], "phases": [], "text": text}
     hypothesis = judgement.best.hypothesis
     places = hypothesis.places or judgement.single_fault_places or _places(judgement)
-    table = mismatch(judgement.calibrated)
+    table = mismatch(calibrated, judgement.whitened)
     square = {c: float(np.nanmean(np.square(list(phases.values())))) for c, phases in table.items()}
     channels = prominent(square, settings.NAMED_CHANNEL)
     squares = {p: np.array([table[c][p] ** 2 for c in channels]) for p in PHASES}
@@ -71,10 +73,10 @@ def _places(judgement: Judgement) -> list[str]:
     return list(dict.fromkeys([*(place for place in scored if place in possible), *possible]))
 
 
-def mismatch(candidate: CandidateFit) -> dict[str, dict[str, float]]:
+def mismatch(candidate: CandidateFit, whitened: Sequence[Whitened]) -> dict[str, dict[str, float]]:
     """Root mean square of the held-out errors over the noise floor, by channel and phase of the motion."""
     collected: dict[str, dict[str, list[NDArray]]] = defaultdict(lambda: {p: [] for p in PHASES})
-    for i, w in enumerate(candidate.whitened):
+    for i, w in enumerate(whitened):
         o = candidate.held_out(i)
         floor = np.array([w.noise_floor[c] for c in o.channels])[:, None]
         errors = o.errors({}) * o.sigma / floor

@@ -18,8 +18,21 @@ from ccmodel.model.parameters import Parameters, mechanism_key
 FORMAT = 1
 
 
-def report(batch: str, judgement: Judgement, estimates: Parameters, not_judged: NotJudged) -> dict:
-    """The content of diagnosis.json."""
+def report(
+    batch: str, judgement: Judgement, calibrated: CandidateFit, estimates: Parameters, not_judged: NotJudged
+) -> dict:
+    """The content of diagnosis.json.
+
+    Parameters
+    ----------
+    batch : str
+    judgement : Judgement
+    calibrated : CandidateFit
+        The calibration before any candidate. The one of the comparison is fitted with the best candidate's covariance,
+        which may raise its errors.
+    estimates : Parameters
+    not_judged : list of {"what", "why"}
+    """
     best, base, whitened = judgement.best, judgement.calibrated, judgement.whitened
     named = best.hypothesis.acting if judgement.verdict == "explained" else ()
     shift, failures = _discretisation(judgement) if named else (None, [])
@@ -29,19 +42,19 @@ def report(batch: str, judgement: Judgement, estimates: Parameters, not_judged: 
         "batch": batch,
         "verdict": judgement.verdict,
         "is_held": base.hypothesis.is_frozen,
-        "location": location.location(judgement),
+        "location": location.location(judgement, calibrated),
         "mechanisms": [
             mechanism_of(best, k, _name_probability(name, judgement.confidence), shift)
             for k, (name, _) in enumerate(named)
         ],
         "alternatives": alternatives_of(judgement, dict(named)),
         "likeliest": [{"name": n, "place": p} for n, p in best.hypothesis.acting if judgement.verdict == "undecided"],
-        "nearest": _nearest(judgement),
+        "nearest": _nearest(judgement, calibrated),
         "fit": {
             "held_out": [w.observations.id for w in whitened] if len(whitened) > 1 else [],
-            "calibrated": base.values,
+            "calibrated": calibrated.values,
             "mean_square": {"calibrated": base.mean_square, "extended": best.mean_square},
-            "error": held_out_errors(judgement, nested_choice(judgement)),
+            "error": held_out_errors(judgement, calibrated, nested_choice(judgement)),
         },
         "repeatability": repeatability.report(whitened),
         "next_experiment": experiment.proposed(judgement, estimates) if open_question else None,
@@ -49,7 +62,7 @@ def report(batch: str, judgement: Judgement, estimates: Parameters, not_judged: 
     }
 
 
-def _nearest(judgement: Judgement) -> dict | None:
+def _nearest(judgement: Judgement, calibrated: CandidateFit) -> dict | None:
     """The nearest candidate of an unexplained batch, its leave-one-out mean square and errors; otherwise None."""
     if judgement.verdict != "unexplained" or (nearest := judgement.nearest) is None:
         return None
@@ -57,7 +70,7 @@ def _nearest(judgement: Judgement) -> dict | None:
     return {
         "mechanisms": [{key: value for key, value in m.items() if key != "confidence"} for m in acting],
         "mean_square": nearest.mean_square,
-        "error": held_out_errors(judgement, [nearest] * len(judgement.whitened)),
+        "error": held_out_errors(judgement, calibrated, [nearest] * len(judgement.whitened)),
         "one_fault_at": list(judgement.single_fault_places),
     }
 
@@ -105,16 +118,33 @@ def mechanism_of(candidate: CandidateFit, k: int, confidence: float, shift: NDAr
     reach = candidate.half_widths(shift)
     free = candidate.hypothesis.free(candidate.values)
     parameters = []
-    for p in registry.get(name).parameters:
+    mechanism = registry.get(name)
+    for p in mechanism.parameters:
         key = mechanism_key(name, place, p.name)
         i, low, high = names.index(key), free[key].low, free[key].high
         value = float(np.clip(candidate.values[key] + shift[i], low, high))
-        interval = {"low": max(float(value - reach[i]), low), "high": min(float(value + reach[i]), high)}
-        parameters.append({"name": p.name, "value": value, **interval, "unit": p.unit.replace(" ", "*")})
+        is_relative = bool(mechanism.states) and p in mechanism.strengths
+        ends = interval(value, float(reach[i]), is_relative).clip(low, high).tolist()
+        unit = p.unit.replace(" ", "*")
+        parameters.append({"name": p.name, "value": value, "low": ends[0], "high": ends[1], "unit": unit})
     return {"name": name, "place": place, "confidence": round(confidence, 4), "parameters": parameters}
 
 
-def held_out_errors(judgement: Judgement, chosen: Sequence[CandidateFit]) -> dict[str, dict]:
+def interval(value: float, reach: float, is_relative: bool) -> NDArray:
+    """Ends of an interval of half-width `reach`, shape (2,); of a relative one on the logarithmic scale.
+
+    The strength of a mechanism with a state is what shows of it over one less the state: its error is a factor, and the
+    strength may be many times as large as the value, but not much smaller.
+    """
+    if not is_relative or value == 0.0:
+        return np.array([value - reach, value + reach])
+    # A factor beyond exp(20) is beyond any bound.
+    return np.sort(value * np.exp(np.array([-1, 1]) * min(reach / abs(value), 20.0)))
+
+
+def held_out_errors(
+    judgement: Judgement, calibrated: CandidateFit, chosen: Sequence[CandidateFit]
+) -> dict[str, dict]:
     """Root mean square error on held-out recordings by channel, and the noise floor.
 
     "before" is the calibrated model, "after" the model that is `chosen` for each recording.
@@ -122,7 +152,8 @@ def held_out_errors(judgement: Judgement, chosen: Sequence[CandidateFit]) -> dic
     squares: dict[str, list[tuple[float, float, float]]] = {}
     for i, w in enumerate(judgement.whitened):
         o = w.observations
-        before, after = (c.held_out(i).errors({}) for c in (judgement.calibrated, chosen[i]))
+        after_fit = calibrated if chosen[i] is judgement.calibrated else chosen[i]
+        before, after = (c.held_out(i).errors({}) for c in (calibrated, after_fit))
         for c, channel in enumerate(o.channels):
             row = *(np.mean((e[c] * o.sigma[c]) ** 2) for e in (before, after)), w.noise_floor[channel] ** 2
             squares.setdefault(channel, []).append(row)

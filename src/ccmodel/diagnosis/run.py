@@ -101,12 +101,15 @@ class Diagnosis:
         The content of diagnosis.json.
     judgement : Judgement
         The verdict with the fitted candidates and their probabilities.
+    calibrated : CandidateFit
+        The calibrated model before any candidate was fitted.
     estimates : Parameters
         Values of the parameters that are not fitted; the fitted ones are replaced by `model`.
     """
 
     report: dict
     judgement: Judgement
+    calibrated: CandidateFit
     estimates: Parameters
 
     def model(self, candidate: CandidateFit) -> Parameters:
@@ -205,5 +208,5 @@ def diagnose(
     progress("deciding the verdict", SELECTED)
     judgement = judge(comparison, scores)
     progress("correcting the values for the discretisation, designing an experiment", JUDGED)
-    content = report(recordings[0].batch, judgement, tested.estimates, unjudged)
-    return Diagnosis(content, judgement, tested.estimates)
+    content = report(recordings[0].batch, judgement, found.fit, tested.estimates, unjudged)
+    return Diagnosis(content, judgement, found.fit, tested.estimates)

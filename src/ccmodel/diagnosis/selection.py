@@ -149,7 +149,7 @@ class Selection:
         cost has several minima there.
         """
         best = found.fitted[0]
-        if best.hypothesis == found.linearised_about:
+        if found.is_linearised_about(best):
             return found
         self.progress(f"linearising the covariance about {best.hypothesis}", 0.0)
         models = [best.model(w.observations.parameters) for w in found.whitened]
@@ -179,7 +179,7 @@ class Selection:
         if not any(c.hypothesis == best.hypothesis for c in again):
             return found
         best_of = {c.hypothesis: c for c in sorted(again, key=lambda c: c.mean_square, reverse=True)}
-        return Comparison.of(whitened, base, list(best_of.values()), found.screened, best.hypothesis)
+        return Comparison.of(whitened, base, list(best_of.values()), found.screened, best)
 
 
 def unseen(

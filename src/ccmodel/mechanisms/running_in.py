@@ -47,7 +47,7 @@ MECHANISM = Mechanism(
             "1",
             0.0,
             1.0,
-            0.3,
+            0.5,
             "share of the change that is over when a recording starts",
             scale="linear",
             screening_grid=(0.0,),

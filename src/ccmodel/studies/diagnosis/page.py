@@ -61,7 +61,7 @@ def write_diagnosis(file: Path, found: Diagnosis, page: str | None = None) -> No
     report = found.report
     nearest = report["nearest"] or {"mechanisms": []}
     named = [*report["mechanisms"], *report["likeliest"], *report["alternatives"], *nearest["mechanisms"]]
-    errors = mismatch(found.judgement.calibrated)
+    errors = mismatch(found.calibrated, found.judgement.whitened)
     with matplotlib.rc_context(STYLE):
         text = _template("page.html.j2").render(
             report=report,
@@ -221,11 +221,11 @@ def _why(fit: CandidateFit, found: Diagnosis) -> str:
 def _map(found: Diagnosis) -> Figure:
     """Errors over the noise by channel and part of the motion: baseline and, if any, with the mechanisms found."""
     j = found.judgement
-    before = mismatch(j.calibrated)
+    before = mismatch(found.calibrated, j.whitened)
     highest = max(np.nanmax([list(v.values()) for v in before.values()]), 3.0)
     shown = {_baseline(found.report): before}
     if j.best is not j.calibrated:
-        shown[WITH_FOUND] = mismatch(j.best)
+        shown[WITH_FOUND] = mismatch(j.best, j.whitened)
     figure, axes = subplots(1, len(shown), figsize=(4 * len(shown), 2.9), sharey=True, squeeze=False)
     for ax, (title, table) in zip(axes[0], shown.items(), strict=True):
         values = np.array([[table[c][p] for p in PHASES] for c in table])
@@ -259,7 +259,7 @@ def _loops(found: Diagnosis) -> Figure:
         c = observed.channels.index(channel)
         theta = observed.given.theta_in[observed.judged]
         ax.plot(theta, scale * observed.measured[c], color=FAINT, lw=2.2, label=_origin(found))
-        models = [(j.calibrated, COLOURS[0], "--", _baseline(found.report))]
+        models = [(found.calibrated, COLOURS[0], "--", _baseline(found.report))]
         if chosen[i] is not j.calibrated:
             models.append((chosen[i], COLOURS[1], "-", WITH_FOUND))
         if found.report["nearest"] and j.nearest is not None:

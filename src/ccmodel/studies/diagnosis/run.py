@@ -53,7 +53,9 @@ class Outcome:
         if self.found is None:
             return {}
         judged = self.found.judgement
-        candidates = {"calibrated": judged.calibrated, "extended": judged.best}
+        has_further = judged.best is not judged.calibrated
+        candidates = {"calibrated": self.found.calibrated}
+        candidates["extended"] = judged.best if has_further else self.found.calibrated
         if self.content["nearest"] and judged.nearest is not None:
             candidates["nearest"] = judged.nearest
         rig, inputs = RigConditions.of(self.recordings), self.content["provenance"]
