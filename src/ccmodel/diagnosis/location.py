@@ -34,7 +34,7 @@ TEXT = {
 
 
 def location(judgement: Judgement, calibrated: CandidateFit) -> dict:
-    """Most likely place of the mismatch and all possible ones, the calibration's worst channels and phases, in words."""
+    """Most likely place of the mismatch and all possible ones, the calibration's worst channels and phases, a text."""
     if judgement.verdict == "agrees":
         text = "model and recordings agree within the noise"
         return {"place": None, "places": [], "channels": [], "phases": [], "text": text}

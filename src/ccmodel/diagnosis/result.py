@@ -142,9 +142,7 @@ def interval(value: float, reach: float, is_relative: bool) -> NDArray:
     return np.sort(value * np.exp(np.array([-1, 1]) * min(reach / abs(value), 20.0)))
 
 
-def held_out_errors(
-    judgement: Judgement, calibrated: CandidateFit, chosen: Sequence[CandidateFit]
-) -> dict[str, dict]:
+def held_out_errors(judgement: Judgement, calibrated: CandidateFit, chosen: Sequence[CandidateFit]) -> dict[str, dict]:
     """Root mean square error on held-out recordings by channel, and the noise floor.
 
     "before" is the calibrated model, "after" the model that is `chosen` for each recording.
