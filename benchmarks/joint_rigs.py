@@ -23,12 +23,12 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.stats import binomtest
 
 import ccmodel as cc
 from ccmodel.inference.pool import set_threads
 from proof.build import record
 from proof.cases import Case, draw
+from proof.intervals import rate, text_of
 from proof.plan import Conditions as Factors
 from proof.plan import PlannedRecording, Protocol, read_plan
 from proof.recording_draw import Conditions, draw_recordings
@@ -119,20 +119,15 @@ def rows(first: int, rigs: int, most: int, repeats: int, cores: int) -> Iterator
                 yield one
 
 
-def summary(table: pd.DataFrame) -> list[str]:
-    """How many rigs count, and how many of these are decided, with the 95 % interval of Wilson."""
+def rates(table: pd.DataFrame) -> list[dict]:
+    """How many rigs count, and how many of these are decided, rightly or wrongly."""
     asked = table[table["together"].notna()] if "together" in table else table.iloc[:0]
-    lines = [f"{len(asked)} of {len(table)} rigs have three studies that are each undecided"]
-    if asked.empty:
-        return lines
-    decided, verdicts = asked["decided"].astype(bool), asked["together"].value_counts()
-    low, high = binomtest(int(decided.sum()), len(asked)).proportion_ci(0.95, "wilson")
-    wrong = int(((asked["together"] == "explained") & ~decided).sum())
-    said = ", ".join(f"{n} {verdict}" for verdict, n in verdicts.items())
+    decided = asked["decided"].astype(bool) if len(asked) else pd.Series(dtype=bool)
+    wrong = (asked["together"] == "explained") & ~decided if len(asked) else decided
     return [
-        *lines,
-        f"together {decided.sum()} of {len(asked)} are decided ({decided.mean():.0%}; {low:.0%} to {high:.0%}; wanted:"
-        f" {WANTED:.0%}); verdicts: {said}; explained, but not by the true effect: {wrong}",
+        rate("rigs with three studies that are each undecided", len(asked), len(table)),
+        rate("decided together, of these", int(decided.sum()), len(asked), WANTED),
+        rate("explained by another effect, of these", int(wrong.sum()), len(asked)),
     ]
 
 
@@ -153,7 +148,7 @@ def main() -> None:
         print(" ".join(f"{key}={value}" for key, value in one.items()), flush=True)
         # An interrupted run leaves what it has.
         pd.DataFrame(found).to_csv(asked.out, index=False)
-    print(*summary(pd.DataFrame(found)), sep="\n")
+    print(*map(text_of, rates(pd.DataFrame(found))), sep="\n")
 
 
 if __name__ == "__main__":
