@@ -10,7 +10,7 @@ from ccmodel.geometry import ConduitPath
 from ccmodel.mechanisms.drive_windup import STANDSTILL_RAD, torque_of_train
 from ccmodel.mechanisms.presliding import element_lengths
 from ccmodel.mechanisms.pulley_friction import PRESLIDING_RAD
-from ccmodel.mechanisms.relaxation import relaxed_after
+from ccmodel.mechanisms.relaxation import BRANCHES, branch_times, followed, kept_at_rest, relaxed_after
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, SpringLoad
 from general_runs import HALF_LOOP, K_E, MU, T0, TENSIONS, L, R, last_cycle, loop_area, rms, run, sine
@@ -216,14 +216,43 @@ def test_relaxation_goes_on_from_where_a_recording_starts(relaxed):
         assert getattr(run_, name) == pytest.approx(expected, rel=1e-6)
 
 
+def test_relaxation_of_several_times_decays_as_the_mean_of_exponentials():
+    r, tau, spread, held_s = 0.2, 10.0, 30.0, 7.0
+    times = np.geomspace(tau / np.sqrt(spread), tau * np.sqrt(spread), BRANCHES)
+    state = relaxed_after(held_s, r, tau, spread)
+    run_ = run(
+        np.zeros(501),
+        ("relaxation", "cable", {"r": r, "tau": tau, "spread": spread, "relaxed": state}),
+        period_s=60.0,
+    )
+    since = held_s + np.append(run_.time_s, -held_s)  # the last value is that of a fresh cable
+    left = 1 - r * np.mean(-np.expm1(-since[:, None] / times), axis=1)
+    for name in TENSIONS:
+        assert getattr(run_, name) == pytest.approx(T0 * left[:-1] / left[0], rel=1e-6)
+    assert kept_at_rest(5.0, r, tuple(times), state) == pytest.approx(np.interp(5.0, run_.time_s, run_.T1_N) / T0)
+    assert 1 - state == pytest.approx((left[0] - (1 - r)) / (left[0] * r))
+
+
+@pytest.mark.parametrize("relaxed", [0.0, 0.3, 0.9])
+def test_all_branches_have_followed_as_long(relaxed):
+    r, times = 0.2, branch_times(10.0, 30.0)
+    of_each = followed(r, times, relaxed)
+    seconds = -times[-1] * np.log1p(-of_each[-1])
+    assert of_each == pytest.approx(-np.expm1(-seconds / np.array(times)))
+    assert relaxed_after(seconds, r, 10.0, 30.0) == pytest.approx(relaxed, abs=1e-9)
+    assert followed(r, times, 1.0) == pytest.approx(1.0)
+
+
 def test_a_run_goes_on_as_the_later_part_of_a_longer_one():
     """Held at rest for a time, a fresh cable has relaxed by 1 - exp(-t / tau), and its friction has run in by it."""
     theta, held_s, tau = sine(), 4.0, 5.0
-    mechanisms = {
-        "relaxation": ("cable", {"r": 0.15, "tau": tau}, {"relaxed": relaxed_after(held_s, 0.15, tau)}),
-        "running-in": ("conduit", {"change": -0.3, "tau": tau}, {"done": -np.expm1(-held_s / tau)}),
-    }
-    for name, (place, values, state) in mechanisms.items():
+    several = {"r": 0.15, "tau": tau, "spread": 20.0}
+    mechanisms = [
+        ("relaxation", "cable", {"r": 0.15, "tau": tau}, {"relaxed": relaxed_after(held_s, 0.15, tau)}),
+        ("relaxation", "cable", several, {"relaxed": relaxed_after(held_s, 0.15, tau, 20.0)}),
+        ("running-in", "conduit", {"change": -0.3, "tau": tau}, {"done": -np.expm1(-held_s / tau)}),
+    ]
+    for name, place, values, state in mechanisms:
         whole = run(np.concatenate([np.zeros(2000), theta]), (name, place, values))
         later = run(theta, (name, place, values | state), T=whole.T1_N[2000])
         for tension in TENSIONS:

@@ -282,7 +282,7 @@ def test_bad_input_is_refused_by_name():
         attempt(mechanisms=[Active("presliding", "conduit", {"z0": -0.01})])
     with pytest.raises(ModelError, match="share of the length"):
         attempt(mechanisms=[Active("kink", "conduit", {"beta": 0.5, "s": 1.5})])
-    with pytest.raises(ModelError, match="relaxation has the parameters r, relaxed, tau; got r"):
+    with pytest.raises(ModelError, match="relaxation has the parameters r, relaxed, spread, tau; got r"):
         attempt(mechanisms=[Active("relaxation", "cable", {"r": 0.1})])
 
 

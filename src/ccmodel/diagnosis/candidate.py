@@ -180,7 +180,8 @@ def fit(
     for _ in range(settings.STATE_PASSES if has_states else 0):
         # The states' effects were those of the values at the start, which the fit has left.
         before, values = solution.cost, problem.values_of(solution.x, 0)
-        modelled = _with_states(whitened, hypothesis, values)
+        own = [w.states_within_range(values) for w in modelled]
+        modelled = _with_states(whitened, hypothesis, values, own)
         # Steps are measured by the start: a rate that has become slow needs large ones. A prior keeps its mean.
         unknowns = {n: f if f.spread else replace(f, start=values[n]) for n, f in unknowns.items()}
         problem = Problem(modelled, unknowns, weight=mean_weight)
@@ -246,14 +247,22 @@ def at_least_by_information(
     return covariance, np.where(wider, np.inf, degrees)
 
 
-def _with_states(whitened: Sequence[Whitened], hypothesis: Hypothesis, values: Mapping[str, float]) -> list[Whitened]:
-    """Observations for a hypothesis, with the states of its mechanisms as nuisances, linearised about values."""
+def _with_states(
+    whitened: Sequence[Whitened],
+    hypothesis: Hypothesis,
+    values: Mapping[str, float],
+    own: Sequence[Mapping[str, float]] | None = None,
+) -> list[Whitened]:
+    """Observations for a hypothesis, with the states of its mechanisms as nuisances, linearised about values.
 
-    def of(w: Whitened) -> Whitened:
+    `own` are each recording's own states.
+    """
+
+    def of(i: int, w: Whitened) -> Whitened:
         model = hypothesis.of(w.observations.parameters)
-        return with_states_of(w, model.with_values(values, w.session)).with_parameters(model)
+        return with_states_of(w, model.with_values(values, w.session), own and own[i]).with_parameters(model)
 
-    return each(whitened, lambda i, w: of(w))
+    return each(whitened, of)
 
 
 def _search(problem: Problem, hypothesis: Hypothesis, search: Search) -> Solution:

@@ -161,7 +161,7 @@ class Selection:
 
         try:
             repeatability = estimated(best.whitened, best.residuals)
-            whitened = each(found.whitened, lambda i, w: relinearised(w, models[i], repeatability))
+            whitened = each(found.whitened, lambda i, w: relinearised(w, models[i], repeatability, best.whitened[i]))
             base = min(
                 (fit(whitened, found.base.hypothesis, self.free, s, self.deadline) for s in starts(found.base)),
                 key=lambda c: c.mean_square,
@@ -179,6 +179,10 @@ class Selection:
         if not any(c.hypothesis == best.hypothesis for c in again):
             return found
         best_of = {c.hypothesis: c for c in sorted(again, key=lambda c: c.mean_square, reverse=True)}
+        # About the same mechanisms once more: only if that leads on.
+        about = found.linearised_about
+        if about and about.hypothesis == best.hypothesis and best_of[best.hypothesis].mean_square >= best.mean_square:
+            return found
         return Comparison.of(whitened, base, list(best_of.values()), found.screened, best)
 
 

@@ -8,7 +8,8 @@ A nuisance far outside its prior, such as friction that is 10 % higher in every 
 thousands of samples. The posterior means of the nuisances are therefore appended to the whitened errors, each with the
 weight of one effective sample.
 
-Errors are linear in a nuisance only nearby. Each recording is therefore linearised about its own friction.
+Errors are linear in a nuisance only nearby. Each recording is therefore linearised about its own friction and, of
+mechanisms with states, about its own states.
 """
 
 from collections.abc import Mapping, Sequence
@@ -61,6 +62,8 @@ class Whitened:
         Parameters of this recording alone, over those of its batch, about which its errors are linearised.
     own_errors : ndarray, shape (rows,)
         Change of the errors by these, to first order.
+    own_states : mapping of str to float
+        States of mechanisms in this recording about which its errors are linearised.
     """
 
     observations: Observations
@@ -74,6 +77,7 @@ class Whitened:
     repeatability: Repeatability = STATED
     own: Mapping[str, float] = field(default_factory=dict)
     own_errors: NDArray | float = 0.0
+    own_states: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -128,10 +132,26 @@ class Whitened:
         return {name: values.get(name, value) + spread * mean for (name, value, spread), mean in pairs}
 
     def linearised_errors(self, values: Mapping[str, float]) -> NDArray:
-        """Errors over the noise, extrapolated from the recording's own friction to that of all; shape (rows,)."""
+        """Errors over the noise, extrapolated from the recording's own friction and states to those of all.
+
+        Shape (rows,).
+        """
         shared = of_batch(values, self.session)
         own = {name: ratio * shared.get(name, 1.0) for name, ratio in self.own.items()}
-        return self.observations.errors(shared | own).ravel() - self.own_errors
+        errors = self.observations.errors(shared | own | dict(self.own_states)).ravel() - self.own_errors
+        for k, (name, value, spread) in enumerate(self.scalar_nuisances):
+            if name in self.own_states:
+                errors += self.effects[:, k] * ((values.get(name, value) - self.own_states[name]) / spread)
+        return errors
+
+    def states_within_range(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Posterior mean of each mechanism's state in this recording, by parameter, as far as a state can go."""
+        found = {}
+        for name, value in self.own_values(values).items():
+            if (parts := mechanism_parameter(name)) is not None:
+                state = registry.get(parts[0]).parameter(parts[2])
+                found[name] = float(np.clip(value, state.low, state.high))
+        return found
 
     @property
     def _nuisance_weight(self) -> float:
@@ -193,11 +213,11 @@ def whiten(
     return Whitened(o, *_moments(N, len(known)), by_channel, known, N, repeatability, own, own_errors)
 
 
-def with_states_of(one: Whitened, model: Parameters) -> Whitened:
+def with_states_of(one: Whitened, model: Parameters, own: Mapping[str, float] | None = None) -> Whitened:
     """Observations with the states of a model's mechanisms as nuisances, linearised about it, and no other states.
 
     All other nuisances stay linearised as they are: candidate models are compared under one covariance, apart from the
-    states that only some of them have.
+    states that only some of them have. The states are linearised about their `own` values, or those of the model.
     """
     states = _states(one.observations.with_parameters(model))
     is_state = [mechanism_parameter(name) is not None for name, _, _ in one.scalar_nuisances]
@@ -205,12 +225,14 @@ def with_states_of(one: Whitened, model: Parameters) -> Whitened:
         return one
     kept = [k for k, state in enumerate(is_state) if not state]
     scalars = [*(one.scalar_nuisances[k] for k in kept), *states]
-    by_state = _effects(one.observations.with_parameters(model.with_values(one.own)), states)
+    about = {name: (own or {}).get(name, value) for name, value, _ in states}
+    at_own = [(name, about[name], spread) for name, _, spread in states]
+    by_state = _effects(one.observations.with_parameters(model.with_values(dict(one.own) | about)), at_own)
     N = np.column_stack([one.effects[:, kept], *by_state, one.effects[:, len(is_state) :]])
     directions, shrinkage, nuisance_mean, determined = _moments(N, len(scalars))
     return replace(
         one, directions=directions, shrinkage=shrinkage, nuisance_mean=nuisance_mean, determined=determined,
-        scalar_nuisances=scalars, effects=N,
+        scalar_nuisances=scalars, effects=N, own_states=dict(own or {}),
     )  # fmt: skip
 
 
@@ -274,7 +296,9 @@ def shrinkage_of(s: NDArray) -> NDArray:
     return 1 - 1 / np.hypot(1, s)
 
 
-def relinearised(one: Whitened, model: Parameters, repeatability: Repeatability | None = None) -> Whitened:
+def relinearised(
+    one: Whitened, model: Parameters, repeatability: Repeatability | None = None, fitted: Whitened | None = None
+) -> Whitened:
     """Observations with the covariance linearised about another model and the recording's own friction.
 
     The load's position in a gap of that model is the most likely one of a few: a load with mass rings differently on
@@ -286,6 +310,8 @@ def relinearised(one: Whitened, model: Parameters, repeatability: Repeatability 
     model : Parameters
     repeatability : Repeatability, optional
         Spreads of the nuisances, instead of the present ones.
+    fitted : Whitened, optional
+        The recording as the model was fitted to it, with its mechanisms' states, which differ beside its friction.
     """
 
     def mean_square(position: float) -> float:
@@ -294,7 +320,7 @@ def relinearised(one: Whitened, model: Parameters, repeatability: Repeatability 
 
     has_gap = settings_of(model.mechanisms).half_gap
     position = min(settings.GAP_POSITIONS, key=mean_square) if has_gap else model.load_gap_position
-    friction = one.with_parameters(model).friction_ratio
+    friction = (fitted or one).with_parameters(model).friction_ratio
     about = replace(model, load_gap_position=position)
     found = whiten(one.observations, about, repeatability or one.repeatability, friction)
     return found.with_parameters(replace(one.observations.parameters, load_gap_position=position))

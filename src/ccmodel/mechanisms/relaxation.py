@@ -1,35 +1,64 @@
 """Tension decays at rest and over cycles.
 
-Equation: Standard linear solid: the tension is T = T_e - r q with the elastic tension T_e and dq/dt = (T_e - q) /
-tau. A recording starts at rest with the tension T and q = relaxed T / (1 - r): held, its cables would lose
-r (1 - relaxed) of that tension. They are fresh at relaxed = 0 and settled at 1; a time t after the tensioning,
-1 - relaxed = e / (1 - r (1 - e)) with e = exp(-t / tau). r is the share that a fresh cable loses in all. Between
-samples T_e is taken as linear in time, for which q is exact.
+Equation: Generalised Maxwell chain: the tension is T = T_e - r q with the elastic tension T_e and the mean q of four
+branches, dq_k/dt = (T_e - q_k) / tau_k. Their times tau_k are evenly spaced in the logarithm about tau; spread is the
+longest over the shortest, and at 1 the chain is a standard linear solid. r is the share that a fresh cable loses in
+all. A recording starts at rest, as if its cables had been held since their tensioning: a time t after it, q is
+(1 - e) T_e with e the mean of exp(-t / tau_k). relaxed is then the share of the loss from here on that is over,
+1 - relaxed = e / (1 - r (1 - e)): 0 in fresh cables and 1 in settled ones. Between samples T_e is taken as linear in
+time, for which each q_k is exact.
 
 Signature: Tension decays at rest and over cycles while the angles stay. The paper measured 10.5 % with 30 s on its
 rig and neglected it.
 
 Separated by: both ends and both cables at rest: they relax together, a load cell drifts alone.
 
-Source: Agrawal, Peine and Yao 2010, Sections V and VI; with the standard linear solid of Lakes, Viscoelastic
-Materials, Cambridge University Press, 2009.
+Source: Agrawal, Peine and Yao 2010, Sections V and VI; with the chain and the standard linear solid of Lakes,
+Viscoelastic Materials, Cambridge University Press, 2009.
 """
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Mechanism, Parameter
 
+# Branches of the chain.
+BRANCHES = 4
+# A branch that has followed by this share has settled.
+SETTLED = 1.0 - 1e-12
 
-def relaxed_after(seconds: float, r: float, tau: float) -> float:
+
+def branch_times(tau: float, spread: float) -> tuple[float, ...]:
+    """Time constant of each branch (s), the shortest first."""
+    return tuple(float(tau * spread ** (k / (BRANCHES - 1) - 0.5)) for k in range(BRANCHES))
+
+
+def relaxed_after(seconds: float, r: float, tau: float, spread: float = 1.0) -> float:
     """The state `relaxed` at a time after the cables were tensioned."""
-    over = -np.expm1(-seconds / tau)
-    return float((1 - r) * over / (1 - r * over))
+    over = float(np.mean(-np.expm1(-seconds / np.array(branch_times(tau, spread)))))
+    return (1 - r) * over / (1 - r * over)
 
 
-def kept_at_rest(seconds: float, r: float, tau: float, relaxed: float) -> float:
+def followed(r: float, times: tuple[float, ...], relaxed: float) -> NDArray:
+    """Share of the elastic tension that each branch has followed at a state `relaxed`, shape (branches,)."""
+    wanted, tau = min(relaxed / (1 - r + r * relaxed), SETTLED), np.array(times)
+
+    def excess(seconds: float) -> float:
+        return float(np.mean(-np.expm1(-seconds / tau))) - wanted
+
+    # The slowest branch alone would be the last.
+    latest = -float(tau.max()) * np.log1p(-wanted)
+    seconds = brentq(excess, 0.0, latest, xtol=1e-12 * latest) if excess(latest) > 0 else latest
+    return -np.expm1(-seconds / tau)
+
+
+def kept_at_rest(seconds: float, r: float, times: tuple[float, ...], relaxed: float) -> float:
     """Tension at a time into the rest that a recording starts with, over the tension at its first sample."""
-    return float(1 - r * (1 - relaxed) * -np.expm1(-seconds / tau))
+    left = 1 - followed(r, times, relaxed)
+    now, then = (1 - r * (1 - np.mean(left * decay)) for decay in (1.0, np.exp(-seconds / np.array(times))))
+    return float(then / now)
 
 
 @kernel
@@ -47,13 +76,24 @@ def lag_weights(step_over_tau: float) -> tuple[float, float, float]:
 MECHANISM = Mechanism(
     name="relaxation",
     text=__doc__,
-    tex=r"T = T_e - r\,q, \qquad \frac{dq}{dt} = \frac{T_e - q}{\tau}, \qquad "
-    r"q(0) = \frac{\mathrm{relaxed}}{1 - r}\,T(0)",
+    tex=r"T = T_e - \frac{r}{4} \sum_k q_k, \qquad \frac{dq_k}{dt} = \frac{T_e - q_k}{\tau_k}, \qquad "
+    r"\tau_1 \ldots \tau_4 = \frac{\tau}{\sqrt{\mathrm{spread}}} \ldots \tau \sqrt{\mathrm{spread}}",
     sentence="the cables lose {r:%} of their tension as time passes",
     places=("cable",),
     parameters=(
         Parameter("r", "1", 0.01, 0.2, 0.05, "share of the tension that is lost", below=1.0),
-        Parameter("tau", "s", 5.0, 100.0, 30.0, "time constant", neutral=30.0, above=0.0),
+        Parameter("tau", "s", 5.0, 100.0, 30.0, "middle time constant", neutral=30.0, above=0.0),
+        Parameter(
+            "spread",
+            "1",
+            1.0,
+            100.0,
+            4.0,
+            "longest over shortest time constant",
+            neutral=1.0,
+            screening_grid=(0.3,),
+            default=1.0,
+        ),
         Parameter(
             "relaxed",
             "1",
@@ -69,6 +109,13 @@ MECHANISM = Mechanism(
     ),
     mistaken_for=("load-cell-drift",),
     depends_on_time=True,
-    states_after_tensioning=lambda seconds, values: {"relaxed": relaxed_after(seconds, values["r"], values["tau"])},
-    settings={"relaxing_share": "r", "relaxing_time_s": "tau", "relaxed_share": "relaxed"},
+    states_after_tensioning=lambda seconds, values: {
+        "relaxed": relaxed_after(seconds, values["r"], values["tau"], values["spread"])
+    },
+    settings={
+        "relaxing_share": "r",
+        "relaxing_time_s": "tau",
+        "relaxing_spread": "spread",
+        "relaxed_share": "relaxed",
+    },
 )

@@ -21,7 +21,7 @@ from ccmodel.channels import (
     ZERO_OF,
 )
 from ccmodel.failure import ModelError
-from ccmodel.mechanisms.relaxation import kept_at_rest
+from ccmodel.mechanisms.relaxation import branch_times, kept_at_rest
 from ccmodel.model.exact import pair as exact
 from ccmodel.model.general import run as general
 from ccmodel.model.general.sensors import true_at
@@ -145,7 +145,8 @@ def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension
     settings = general.settings_of(parameters.mechanisms)
     seconds = given.resting_mean["time_s"] - float(given.recording.time_s[0])
     # The rest's mean is what the cables have after half of the rest.
-    scale /= kept_at_rest(seconds, settings.relaxing_share, settings.relaxing_time_s, settings.relaxed_share)
+    times = branch_times(settings.relaxing_time_s, settings.relaxing_spread)
+    scale /= kept_at_rest(seconds, settings.relaxing_share, times, settings.relaxed_share)
     A = _both_ends("A", tensions, scale)
     B = A if given.recording.far_end else _both_ends("B", tensions, scale)
     curvatures = parameters.tension_curvature_A, parameters.tension_curvature_B

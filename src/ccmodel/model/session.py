@@ -45,7 +45,7 @@ def known_states(recording: Recording, parameters: Parameters) -> dict[str, floa
         mechanism_key(m.name, m.place, state): value
         for m in parameters.mechanisms
         if (states := registry.get(m.name).states_after_tensioning) is not None
-        for state, value in states(seconds, m.values).items()
+        for state, value in states(seconds, registry.get(m.name).default | dict(m.values)).items()
     }
 
 

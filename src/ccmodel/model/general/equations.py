@@ -17,6 +17,7 @@ from ccmodel.mechanisms.backlash import dead_zone
 from ccmodel.mechanisms.load_dependent_friction import power_of_tension
 from ccmodel.mechanisms.presliding import ELEMENTS, dahl
 from ccmodel.mechanisms.pulley_eccentricity import winding, winding_change
+from ccmodel.mechanisms.relaxation import BRANCHES, lag_weights
 from ccmodel.mechanisms.strand_settling import settling_tension
 from ccmodel.mechanisms.stribeck import renewed
 from ccmodel.model.general import layout as rows
@@ -24,8 +25,11 @@ from ccmodel.model.general.layout import Physics
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
-def _tensions(ph: Physics, piece: NDArray, slide: NDArray, mean: NDArray, weights: tuple[float, float, float]) -> None:
-    """Tension (N) and tangent stiffness (N/m) of each piece for the slides of this step."""
+def _tensions(ph: Physics, piece: NDArray, slide: NDArray, mean: NDArray, follows: float) -> None:
+    """Tension (N) and tangent stiffness (N/m) of each piece for the slides of this step.
+
+    Relaxation has lost the share r of `MEMORY` and of what `follows` of the new elastic tension (`set_memory`).
+    """
     n1 = piece.shape[2]
     for c in range(2):
         T, K, k = piece[rows.TENSION, c], piece[rows.TANGENT, c], piece[rows.STIFFNESS, c]
@@ -50,12 +54,8 @@ def _tensions(ph: Physics, piece: NDArray, slide: NDArray, mean: NDArray, weight
             pull, tangent = piece[rows.PULL, c, i], K[i]
             if ph.has_relaxation:
                 r = piece[rows.RELAXING, c, i]
-                q = (
-                    weights[0] * piece[rows.LOST_TENSION, c, i]
-                    + weights[1] * piece[rows.ELASTIC, c, i]
-                    + weights[2] * max(pull, 0.0)
-                )
-                tangent *= 1.0 - r * weights[2] if pull > 0.0 else 1.0
+                q = piece[rows.MEMORY, c, i] + follows * max(pull, 0.0)
+                tangent *= 1.0 - r * follows if pull > 0.0 else 1.0
                 pull -= r * q
             share = 1.0 if pull > 0.0 else rows.SLACK_SHARE
             T[i] = share * pull
@@ -199,13 +199,13 @@ def imbalance(
     torque: float,
     dt: float,
     bristle: float,
-    weights: tuple[float, float, float],
+    follows: float,
 ) -> tuple[float, float, float, float, float]:
     """Imbalance of the whole chain: sum of squares (N^2), highest tension (N), and the terms of `_load`."""
     n = node.shape[2]
     pulled = ph.radius * winding_change(load[rows.ANGLE], rotation, ph.load_eccentricity, ph.load_eccentricity_rad)
     slide[rows.NOW, 0, n + 1], slide[rows.NOW, 1, n + 1] = pulled, -pulled
-    _tensions(ph, piece, slide, mean, weights)
+    _tensions(ph, piece, slide, mean, follows)
     error = _nodes(ph, piece, node, slide, dt, bristle)
     G, slope, R = _load(ph, piece, load, rotation, torque, dt)
     if ph.kind == rows.IMPEDANCE:
@@ -260,3 +260,35 @@ def renew_contacts(ph: Physics, node: NDArray, slide: NDArray, c: int, dt: float
     rested, d, following = node[rows.RESTED, c], slide[rows.NOW, c], node[into, c]
     for i in range(node.shape[2]):
         following[i] = renewed(rested[i], d[i + 1], dt, ph.stribeck_speed, ph.stribeck_exponent, ph.stribeck_renewal_m)
+
+
+@kernel(error_model="numpy", fastmath=rows.FAST)
+def set_memory(ph: Physics, piece: NDArray, dt: float) -> float:
+    """Write the mean of the relaxing branches after a step into `MEMORY`, without the part that follows its tension.
+
+    Returns this part over the new elastic tension, which is linear in time through the step.
+    """
+    piece[rows.MEMORY] = 0.0
+    follows = 0.0
+    for k in range(BRANCHES):
+        kept, before, after = lag_weights(dt / ph.relaxing_times_s[k]) if dt > 0.0 else (1.0, 0.0, 0.0)
+        follows += after / BRANCHES
+        for c in range(2):
+            memory, branch, elastic = piece[rows.MEMORY, c], piece[rows.BRANCH + k, c], piece[rows.ELASTIC, c]
+            for i in range(piece.shape[2]):
+                memory[i] += (kept * branch[i] + before * elastic[i]) / BRANCHES
+    return follows
+
+
+@kernel(error_model="numpy", fastmath=rows.FAST)
+def relax(ph: Physics, piece: NDArray, dt: float) -> None:
+    """Let the relaxing branches follow the elastic tension of the solved step, and make this tension the state."""
+    for k in range(BRANCHES):
+        kept, before, after = lag_weights(dt / ph.relaxing_times_s[k]) if dt > 0.0 else (1.0, 0.0, 0.0)
+        for c in range(2):
+            pull, branch, elastic = piece[rows.PULL, c], piece[rows.BRANCH + k, c], piece[rows.ELASTIC, c]
+            for i in range(piece.shape[2]):
+                branch[i] = kept * branch[i] + before * elastic[i] + after * max(pull[i], 0.0)
+    for c in range(2):
+        for i in range(piece.shape[2]):
+            piece[rows.ELASTIC, c, i] = max(piece[rows.PULL, c, i], 0.0)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ccmodel import mechanisms as registry
 from ccmodel.mechanisms.presliding import ELEMENTS
+from ccmodel.mechanisms.relaxation import BRANCHES
 
 IMPEDANCE, PRESCRIBED_ANGLE = 0, 1
 
@@ -16,7 +17,9 @@ IMPEDANCE, PRESCRIBED_ANGLE = 0, 1
 SLACK_SHARE = 1e-9
 
 # piece, shape (rows, 2, n + 1): the cable between nodes. Constants (N/m, m, -, -), state, results of the step.
-STIFFNESS, LOST, RELAXING, SHARE, STRETCH, LOST_TENSION, ELASTIC, TENSION, TANGENT, PULL = range(10)
+STIFFNESS, LOST, RELAXING, SHARE, STRETCH, ELASTIC, TENSION, TANGENT, PULL, MEMORY = range(10)
+# Then the branches of relaxation (N), state.
+BRANCH = 10
 # node, shape (rows, 2, n): constants (rad, N, N s/m), state, the step's equations and their elimination.
 (
     HALF_BEND,
@@ -59,7 +62,7 @@ NOW, STEP, SAVED, LAST, BEFORE = range(5)
 # load, shape (rows,): angle (rad), rotation (rad) and duration (s) of the last step, speed (rad/s), speed before that,
 # bristle of the bearing; then speed, bristle and torque (N m) of this step.
 ANGLE, ROTATION, DT, OMEGA, OMEGA_BEFORE, BEARING, OMEGA_NEXT, BEARING_NEXT, TORQUE = range(9)
-PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10, 20 + 2 * ELEMENTS, 5, 11, 9
+PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10 + BRANCHES, 20 + 2 * ELEMENTS, 5, 11, 9
 
 # Constants of a run: its own, and every setting of the mechanisms.
 if TYPE_CHECKING:
@@ -69,6 +72,7 @@ if TYPE_CHECKING:
 
         has_settling: bool
         has_relaxation: bool
+        relaxing_times_s: tuple[float, ...]
         bristle: float
         presliding: bool
         element_m: tuple[float, ...]
@@ -83,8 +87,8 @@ if TYPE_CHECKING:
 else:
     Physics = namedtuple(
         "Physics",
-        "has_settling has_relaxation bristle presliding element_m radius stiffness_load load_damping kind "
-        "general_friction " + " ".join(registry.march_settings()),
+        "has_settling has_relaxation relaxing_times_s bristle presliding element_m radius stiffness_load load_damping "
+        "kind general_friction " + " ".join(registry.march_settings()),
     )
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}  # not nnan: a NaN must be seen

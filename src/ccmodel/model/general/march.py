@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from ccmodel.kernel import borrowed, kernel
 from ccmodel.mechanisms.presliding import ELEMENTS
 from ccmodel.mechanisms.pulley_eccentricity import winding
-from ccmodel.mechanisms.relaxation import lag_weights
 from ccmodel.model.general import layout as rows
-from ccmodel.model.general.equations import renew_contacts, set_grip
+from ccmodel.model.general.equations import relax, renew_contacts, set_grip
 from ccmodel.model.general.layout import Physics
 from ccmodel.model.general.newton import copy_slides, solve_step
 
@@ -41,7 +40,6 @@ def _accept(
 ) -> None:
     """Make a solved step the state."""
     n = node.shape[2]
-    weights = lag_weights(dt / ph.relaxing_time_s) if ph.has_relaxation and dt > 0.0 else (1.0, 0.0, 0.0)
     soft = ph.conduit_compliance > 0.0
     for c in range(2):
         d = slide[rows.NOW, c]
@@ -54,18 +52,14 @@ def _accept(
             mean[rows.MEAN, c] = mean[rows.MEAN_NEXT, c]
             for i in range(n + 1):
                 piece[rows.STRETCH, c, i] -= gives * piece[rows.SHARE, c, i]
-        if ph.has_relaxation:
-            for i in range(n + 1):
-                elastic = max(piece[rows.PULL, c, i], 0.0)
-                lost = weights[0] * piece[rows.LOST_TENSION, c, i] + weights[1] * piece[rows.ELASTIC, c, i]
-                piece[rows.LOST_TENSION, c, i] = lost + weights[2] * elastic
-                piece[rows.ELASTIC, c, i] = elastic
         for i in range(n):
             node[rows.BRISTLE, c, i] = node[rows.BRISTLE_NEXT, c, i]
         if ph.presliding:
             for k in range(ELEMENTS + 1):
                 for i in range(n):
                     node[rows.ELEMENT + k, c, i] = node[rows.ELEMENT_NEXT + k, c, i]
+    if ph.has_relaxation:
+        relax(ph, piece, dt)
     if ph.stribeck_rise > 0.0 and dt > 0.0:
         for c in range(2):
             renew_contacts(ph, node, slide, c, dt, rows.RESTED)

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.relaxation import lag_weights
 from ccmodel.model.general import layout as rows
-from ccmodel.model.general.equations import imbalance
+from ccmodel.model.general.equations import imbalance, set_memory
 from ccmodel.model.general.layout import Physics
 
 # Out of balance by no more than this share of the highest tension.
@@ -181,7 +180,7 @@ def solve_step(
 ) -> tuple[bool, float]:
     """Solve a step, starting from the slides in `NOW` and a rotation of the load; (converged, rotation of the load)."""
     free = ph.kind == rows.IMPEDANCE
-    weights = lag_weights(dt / ph.relaxing_time_s) if ph.has_relaxation and dt > 0.0 else (1.0, 0.0, 0.0)
+    follows = set_memory(ph, piece, dt) if ph.has_relaxation else 0.0
     soft = ph.conduit_compliance > 0.0
     # With compliant conduits all nodes reverse at once, and full steps overshoot far.
     patience = 2 if soft and not ph.presliding else PATIENCE
@@ -189,7 +188,7 @@ def solve_step(
     step_rotation, saved_rotation = 0.0, rotation
     for iteration in range(ITERATIONS):
         error, limit, G, slope, R = imbalance(
-            ph, piece, node, slide, mean, load, rotation, torque, dt, bristle, weights
+            ph, piece, node, slide, mean, load, rotation, torque, dt, bristle, follows
         )
         if error <= (TOLERANCE * limit) ** 2:
             return True, rotation
@@ -226,5 +225,5 @@ def solve_step(
     copy_slides(slide, rows.NOW, rows.SAVED)
     copy_means(mean, rows.MEAN_NEXT, rows.MEAN_SAVED)
     rotation = saved_rotation
-    error, limit, G, slope, R = imbalance(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle, weights)
+    error, limit, G, slope, R = imbalance(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle, follows)
     return error <= (LOOSE_TOLERANCE * limit) ** 2, rotation

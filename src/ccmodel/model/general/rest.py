@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ccmodel.mechanisms.contract import Settings
 from ccmodel.mechanisms.load_dependent_friction import FLOOR_N, REFERENCE_N
 from ccmodel.mechanisms.pulley_eccentricity import winding
+from ccmodel.mechanisms.relaxation import followed
 from ccmodel.mechanisms.strand_settling import stretch_at
 from ccmodel.model.general import layout as rows
 from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad
@@ -32,13 +33,14 @@ def initial_state(
         T = np.concatenate([T, T[:, -1:]], axis=1)
     # The rest shows the tension that relaxation has left so far.
     r = piece[rows.RELAXING]
-    elastic = T * ((1 - r * (1 - physics.relaxed_share)) / (1 - r))
+    branches = followed(physics.relaxing_share, physics.relaxing_times_s, physics.relaxed_share)
+    elastic = T / (1 - r * branches.mean())
     stretch = elastic / piece[rows.STIFFNESS]
     settles = piece[rows.LOST] > 0
     if settles.any():
         stretch[settles] = stretch_at(elastic[settles], piece[rows.LOST][settles], piece[rows.STIFFNESS][settles])
     piece[rows.STRETCH], piece[rows.ELASTIC] = stretch, elastic
-    piece[rows.LOST_TENSION] = physics.relaxed_share * T / (1 - r)
+    piece[rows.BRANCH : rows.BRANCH + branches.size] = branches[:, None, None] * elastic
     both = T[:, :-1] + T[:, 1:]
     factor = friction_factor * (1 + physics.stribeck_rise)
     if physics.tension_exponent != 0:

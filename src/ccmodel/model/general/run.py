@@ -13,6 +13,7 @@ from ccmodel.mechanisms.contract import Settings
 from ccmodel.mechanisms.load_inertia import load_damping
 from ccmodel.mechanisms.presliding import element_lengths
 from ccmodel.mechanisms.pulley_friction import bearing
+from ccmodel.mechanisms.relaxation import branch_times
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.active import Active, active_of
 from ccmodel.model.general.grid import Grid, make_grid
@@ -201,6 +202,7 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
     return rows.Physics(
         has_settling=settings.settling_N > 0,
         has_relaxation=settings.relaxing_share != 0,
+        relaxing_times_s=branch_times(settings.relaxing_time_s, settings.relaxing_spread),
         bristle=float(settings.bristle_m)
         if settings.bristle_m > 0
         else _coulomb_bristle(transmission, settings, elements),
