@@ -23,7 +23,6 @@ NOTE = "recordings of a simulated rig; its physics is not disclosed"
 LIMIT_FACTOR = 1.5
 HIGHEST_LIMIT_N = 2000.0
 # Run-to-run change of friction in the noise floor: a model with the true physics does not know a run's own friction.
-REPEAT_FRICTION_FACTOR = 1.01
 # Time over which the drive's sub-count offset is added to the motion, s.
 OFFSET_RISE_S = 0.3
 
@@ -111,11 +110,11 @@ def noise_floor(
 ) -> dict[str, float]:
     """Root mean square error of a model with the true physics, by channel: repeatability plus sensors.
 
-    The recording is simulated again with friction 1 % higher, the drive offset by one standard deviation of its
-    sub-count position, and a past in the middle of its range. The difference is added in quadrature to the sensors'
-    noise and to the uncertainty of their zeros. The load's sub-count position counts twice, because its zero is read at
-    the same rest. Both load cells give the pretension at rest, so that each is off by half the difference of their
-    zeros.
+    The recording is simulated again with friction higher by its standard deviation from run to run, the drive offset by
+    one standard deviation of its sub-count position, and a past in the middle of its range. The difference is added in
+    quadrature to the sensors' noise and to the uncertainty of their zeros. The load's sub-count position counts twice,
+    because its zero is read at the same rest. Both load cells give the pretension at rest, so that each is off by half
+    the difference of their zeros.
 
     Parameters
     ----------
@@ -128,7 +127,7 @@ def noise_floor(
     """
     sensors = campaign.sensors
     count_variance = (2 * np.pi / sensors.encoder.counts_per_rev) ** 2 / 12
-    friction = preparation.friction_coefficient * REPEAT_FRICTION_FACTOR
+    friction = preparation.friction_coefficient * (1 + campaign.repeatability.friction)
     repeat = replace(preparation, friction_coefficient=friction, **_usual_past(campaign.repeatability))
     offset = plan.model_copy(update={"excitation": OffsetMotion(plan.excitation, np.sqrt(count_variance))})
     first = noise_free_channels(campaign, trajectory)

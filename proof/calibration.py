@@ -1,6 +1,6 @@
 """Whether stated confidences and intervals are calibrated: as often right as they state."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from proof.intervals import rate
 from proof.outcome import Outcome, same_place
 
 BINS = 10
+DOUBTFUL = (0.3, 0.9)
 
 
 def reliability(outcomes: Iterable[Outcome]) -> list[dict]:
@@ -27,6 +28,23 @@ def calibration_error(outcomes: Iterable[Outcome]) -> float:
     bins = reliability(outcomes)
     claims = sum(b["n"] for b in bins)
     return float(sum(b["n"] * abs(b["stated"] - b["rate"]) for b in bins) / claims)
+
+
+def spiegelhalter(claims: Sequence[tuple[float, bool]]) -> float:
+    """Spiegelhalter's z: standard normal if the claims are right as often as they state.
+
+    D. J. Spiegelhalter, "Probabilistic prediction in patient management and clinical trials", Statistics in Medicine 5
+    (1986) 421-433.
+    """
+    p, right = np.array(claims, dtype=float).T
+    spread = np.sqrt(np.sum((1 - 2 * p) ** 2 * p * (1 - p)))
+    return float(np.sum((right - p) * (1 - 2 * p)) / spread) if spread else 0.0
+
+
+def doubtful(outcomes: Iterable[Outcome]) -> list[tuple[float, bool]]:
+    """Claims with a confidence between 0.3 and 0.9, the number of `Outcome.claims`."""
+    low, high = DOUBTFUL
+    return [c for o in outcomes for c in o.claims if low <= c[0] <= high]
 
 
 def compared_values(outcomes: Iterable[Outcome]) -> list[dict]:

@@ -37,6 +37,9 @@ class Truth:
     unit : str
     values : dict of str to float
         True parameter values under the mechanism's names, for parameters defined alike in the rig and the mechanism.
+    law : str
+        Empty if the rig's law of the effect is that of the mechanism, otherwise the name of another published law
+        (`Twin.other_laws`).
     """
 
     name: str
@@ -46,6 +49,7 @@ class Truth:
     size: float
     unit: str
     values: dict[str, float]
+    law: str = ""
 
 
 @dataclass(frozen=True)
@@ -140,7 +144,7 @@ def draw(seed: int, kind: str | None = None, effect: str | None = None) -> Case:
     protocol_name = _protocol_of(kind, plan, random)
     protocol = plan.protocols[protocol_name]
     spring = log_uniform(plan.rig.load_stiffness_Nm_per_rad, random)
-    drawn = [_effect(*chosen, spring, random) for chosen in _chosen(kind, effect, plan, random)]
+    drawn = [_effect(*chosen, spring, plan.other_law_share, random) for chosen in _chosen(kind, effect, plan, random)]
     truth = tuple(t for t, _ in drawn)
     campaign = draw_campaign(seed, plan, spring, Effects.model_validate(merged([e for _, e in drawn])), random)
     truth = tuple(_in_rig(t, campaign) for t in truth)
@@ -196,8 +200,11 @@ def _chosen(kind: str, effect: str | None, plan: Plan, random: Generator) -> lis
     return [(plan.effects[name], random.uniform())]
 
 
-def _effect(twin: Twin, strength: float, spring: float, random: Generator) -> tuple[Truth, dict]:
-    """An effect of a given strength as its truth and its settings of the rig; `spring` is the load's, N m/rad."""
+def _effect(twin: Twin, strength: float, spring: float, other: float, random: Generator) -> tuple[Truth, dict]:
+    """An effect of a given strength as its truth and its settings of the rig; `spring` is the load's, N m/rad.
+
+    `other` is the share of laws that the mechanism does not have, among effects that have such laws.
+    """
     low, high = twin.size
     size = float(low * (high / low) ** strength)
     if twin.signed and random.uniform() < 0.5:
@@ -205,9 +212,11 @@ def _effect(twin: Twin, strength: float, spring: float, random: Generator) -> tu
     also = {key: log_uniform(between, random) for key, between in twin.also.items()}
     also["phase"] = random.uniform(-np.pi, np.pi)
     place = str(random.choice(twin.places))
-    settings, values = twin.seed(size, also, place, spring)
+    law = str(random.choice(list(twin.other_laws))) if twin.other_laws and random.uniform() < other else ""
+    seed = twin.other_laws[law] if law else twin.seed
+    settings, values = seed(size, also, place, spring)
     severity = min(int(strength * SEVERITIES) + 1, SEVERITIES)
-    return Truth(twin.name, place, float(strength), severity, size, twin.unit, values), settings
+    return Truth(twin.name, place, float(strength), severity, size, twin.unit, values, law), settings
 
 
 def _in_rig(truth: Truth, campaign: Campaign) -> Truth:

@@ -76,6 +76,11 @@ class Outcome:
         return {t["name"] for t in self.key["truth"]} - {CLEAN}
 
     @property
+    def has_another_law(self) -> bool:
+        """Whether the rig has another law of a concealed effect than its mechanism."""
+        return any(t.get("law") for t in self.key["truth"])
+
+    @property
     def verdict(self) -> str:
         """The verdict; "none" if there is no diagnosis."""
         return self.diagnosis["verdict"] if self.diagnosis else "none"
@@ -158,10 +163,16 @@ class Outcome:
 
     @property
     def is_confidently_wrong(self) -> bool:
-        """Whether a mechanism stated with confidence is none of the concealed effects, or too many are reported."""
+        """Whether a mechanism stated with confidence is none of the concealed effects, or too many are reported.
+
+        Several effects that are declared explained with confidence while one of them is not named count too.
+        """
         reported = self.diagnosis["mechanisms"] if self.diagnosis else []
-        wrong = (c["confidence"] >= DECISION_THRESHOLD and c["name"] not in self.true_names for c in reported)
-        return len(reported) > MOST_MECHANISMS or any(wrong)
+        wrong = any(c["confidence"] >= DECISION_THRESHOLD and c["name"] not in self.true_names for c in reported)
+        named = {c["name"] for c in reported}
+        is_sure = self.verdict == "explained" and all(c["confidence"] >= DECISION_THRESHOLD for c in reported)
+        is_incomplete = is_sure and len(self.true_names) > 1 and not self.true_names <= named
+        return len(reported) > MOST_MECHANISMS or wrong or is_incomplete
 
 
 class Answered(Protocol):

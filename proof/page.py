@@ -93,14 +93,19 @@ The held-out recordings are simulated after the diagnosis has ended.
 - **Kinds**: a clean case has no effect. A single or a pair has one or two effects whose mechanisms are candidates. In a
   removed case the mechanism of the one effect is removed from the candidates. An unlisted effect has no mechanism. A
   poor case has a single effect, recorded with little variation.
+- **Law**: many effects have several published laws. Half of such effects are drawn with a law that the mechanism does
+  not have (`other_laws` of the files in `src/virtualrig/effects`). The rates of both stand apart. Intervals are compared
+  with the truth where both laws share a parameter.
 - **Recalibrated model**: the paper's model as the diagnosis fits it to the batch (`calibrated.json`).
 - **Noise floor**: the error of a model with the true physics, from sensor noise, sensor zeros, encoder resolution and
-  1 % run-to-run variation of friction.
+  the run-to-run variation of friction.
 - **Visible**: the recalibrated model's error on held-out recordings is at least 3 sqrt(2) noise floors in some channel,
   which is three standard deviations of the difference of two repeats.
 - **No candidate**: unlisted and removed cases.
 - **Inconsistent inputs**: all inputs of these cases are right, so the verdict `inputs-inconsistent` is a false alarm.
   It names no physics and counts as not detected.
+- **No confident misidentification**: no mechanism with a confidence of at least 0.8 is wrong, and no pair is declared
+  explained with such a confidence while one of its effects is not named.
 - **Located**: the reported place is the true one. Places that no recording distinguishes count as equal: cable and
   conduit, a pulley and its cable end, the load and its pulley.
 - **Open** in the column "met": the 95 % interval includes the target, so that more cases are needed to decide.

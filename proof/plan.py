@@ -59,6 +59,13 @@ class SensorsPlan(Strict):
     slow_s: Range
 
 
+class RepeatsPlan(Strict):
+    """Ranges of what differs from run to run, drawn for a case."""
+
+    friction: Range
+    pretension: Range
+
+
 class PastPlan(Strict):
     """What comes before a recording: ranges of times over the time constants, and of the profile that motions leave."""
 
@@ -151,9 +158,11 @@ class Plan(Strict):
     estimates: EstimatesPlan
     sensors: SensorsPlan
     repeatability: Repeatability
+    repeats: RepeatsPlan
     past: PastPlan = PastPlan()
     numerics: NumericsPlan
     motion: MotionPlan
+    other_law_share: Share
     kinds: dict[str, Share]
     protocol_shares: dict[str, Share]
     pair_strength: Range

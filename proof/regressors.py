@@ -22,6 +22,10 @@ GP_SAMPLES = 300  # samples of all recordings together; the cost of a Gaussian p
 SIGN_SPEED_RAD_PER_S = 0.1
 SMOOTHING_S = 0.05
 THRESHOLDS = (0.01, 0.03, 0.1, 0.3)
+# Times before a sample at which the regressor with memory knows the drive's angle and speed, s.
+LAGS_S = (0.02, 0.04, 0.08, 0.16, 0.32, 0.64)
+MEMORY = "memory: "
+BOOSTING = {"max_iter": 150, "max_leaf_nodes": 15, "min_samples_leaf": 20, "learning_rate": 0.1, "random_state": 0}
 GP_FEATURES = ("theta", "direction", "omega", "tau_in", "F_drive")
 
 Features = dict[str, NDArray]
@@ -35,6 +39,7 @@ def regressors() -> dict[str, Regressor]:
         "stepwise by BIC": stepwise,
         "sparse regression (pysindy)": sparse,
         "Gaussian process (scikit-learn)": gaussian_process,
+        "gradient boosting with memory (scikit-learn)": boosting,
     }
 
 
@@ -105,7 +110,21 @@ def _features(time_s: NDArray, modelled: Mapping[str, NDArray]) -> Features:
         "tau_in^3": modelled["tau_in_Nm"] ** 3,
         "theta_out": modelled["theta_out_rad"],
         "time": time_s,
+        **_memory(time_s, theta, omega),
     }
+
+
+def _memory(time_s: NDArray, theta: NDArray, omega: NDArray) -> Features:
+    """What came before each sample: earlier angles and speeds, travel and time since the last reversal."""
+    found = {}
+    for lag in LAGS_S:
+        found[f"{MEMORY}theta {lag:g} s before"] = np.interp(time_s - lag, time_s, theta) - theta
+        found[f"{MEMORY}omega {lag:g} s before"] = np.interp(time_s - lag, time_s, omega)
+    reverses = np.flatnonzero(np.diff(np.sign(omega)) != 0) + 1
+    last = np.concatenate([[0], reverses])[np.searchsorted(reverses, np.arange(time_s.size), side="right")]
+    found[f"{MEMORY}travel since the reversal"] = theta - theta[last]
+    found[f"{MEMORY}time since the reversal"] = time_s - time_s[last]
+    return found
 
 
 def _motion(time_s: NDArray, theta: NDArray) -> tuple[NDArray, NDArray, NDArray]:
@@ -123,7 +142,7 @@ def _motion(time_s: NDArray, theta: NDArray) -> tuple[NDArray, NDArray, NDArray]
 
 def _design(features: Mapping[str, NDArray]) -> tuple[NDArray, Callable[[Mapping[str, NDArray]], NDArray]]:
     """Design matrix of standardised columns, shape (n, features), and the function that makes it of other features."""
-    names = [n for n in features if n != "one"]
+    names = [n for n in features if n != "one" and not n.startswith(MEMORY)]
     columns = np.column_stack([features[n] for n in names])
     mean, spread = columns.mean(axis=0), columns.std(axis=0)
     spread[spread == 0] = 1.0
@@ -196,3 +215,15 @@ def gaussian_process(features: Features, residuals: NDArray, recording: NDArray)
         warnings.simplefilter("ignore", ConvergenceWarning)
         fitted = GaussianProcessRegressor(kernel, random_state=0).fit(design[rows, 1:], residuals[rows] / scale)
     return lambda other: fitted.predict(design_of(other)[:, 1:]) * scale
+
+
+def boosting(features: Features, residuals: NDArray, recording: NDArray) -> Correction:
+    """Gradient-boosted trees on all features and on the memory of the motion (scikit-learn)."""
+    from sklearn.ensemble import HistGradientBoostingRegressor
+
+    names = [name for name in features if name != "one"]
+    scale = residuals.std() or 1.0
+    fitted = HistGradientBoostingRegressor(**BOOSTING).fit(
+        np.column_stack([features[n] for n in names]), residuals / scale
+    )
+    return lambda other: fitted.predict(np.column_stack([other[n] for n in names])) * scale

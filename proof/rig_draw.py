@@ -61,15 +61,16 @@ def draw_campaign(seed: int, plan: Plan, spring: float, effects: Effects, random
             effects=effects,
         ),
         sensors=_draw_sensors(plan.sensors, random),
-        repeatability=_with_past(plan, effects),
+        repeatability=_repeatability(plan, effects, random),
         numerics=Numerics(**numerics, tension_limit_N=limit),
         batches={},
     )
 
 
-def _with_past(plan: Plan, effects: Effects) -> Repeatability:
+def _repeatability(plan: Plan, effects: Effects, random: Generator) -> Repeatability:
     """What differs between recordings, with a past that lasts as long as the rig's effects remember it."""
-    past = {"ran_in_before": plan.past.ran_in_for, "profile_curvature": plan.past.profile_curvature}
+    past: dict = {name: log_uniform(getattr(plan.repeats, name), random) for name in ("friction", "pretension")}
+    past |= {"ran_in_before": plan.past.ran_in_for, "profile_curvature": plan.past.profile_curvature}
     if effects.relaxation:
         time_s = float(np.exp(np.mean(np.log([branch.time_constant_s for branch in effects.relaxation]))))
         past["tensioned_before_s"] = tuple(time_s * t for t in plan.past.relaxed_for)

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from proof.calibration import calibration_error, compared_values, reliability
+from proof.calibration import calibration_error, compared_values, doubtful, reliability, spiegelhalter
 from proof.detection import confusion, detection, detection_by_error
 from proof.intervals import bootstrap, count
 from proof.outcome import INCONSISTENT, Outcome, is_located
@@ -13,6 +13,7 @@ from proof.outcome import INCONSISTENT, Outcome, is_located
 INPUTS_ACCEPTED = "right inputs are not called inconsistent"
 COVERAGE = 0.9
 COVERAGE_RATE = "coverage of the 90 % intervals"
+SPIEGELHALTER = "Spiegelhalter's z of confidences from 0.3 to 0.9 (calibrated: within 2)"
 CALIBRATION_ERROR = "expected calibration error of stated confidences"
 RECALIBRATED, DIAGNOSED = "recalibrated model", "this diagnosis"
 
@@ -41,6 +42,13 @@ def _rates_of_listed(outcomes: Sequence[Outcome]) -> list[dict]:
         count("single, visible: detected", visible, lambda o: o.is_detected, 0.95),
         count("single, visible: located", visible, is_located, 0.95),
         count("single, visible, rich protocol: identified first", rich_visible, lambda o: o.is_identified_first, 0.90),
+        *(
+            count(f"{law}: visible single, rich protocol: identified first", of_law, lambda o: o.is_identified_first, t)
+            for law, of_law, t in (
+                ("the mechanism's law", [o for o in rich_visible if not o.has_another_law], 0.90),
+                ("another law", [o for o in rich_visible if o.has_another_law], 0.85),
+            )
+        ),
         count("single, any size, rich protocol: identified first", rich, lambda o: o.is_identified_first),
         count("single, any size: identified or among the alternatives", singles, lambda o: o.includes_truth),
     ]
@@ -107,6 +115,7 @@ def statistics(outcomes: Sequence[Outcome]) -> list[dict]:
     claiming = [o for o in outcomes if o.claims]
     return [
         bootstrap(CALIBRATION_ERROR, claiming, calibration_error, 0.05),
+        bootstrap(SPIEGELHALTER, doubtful(outcomes), spiegelhalter),
         bootstrap("share of the gap to the noise floor closed, median", closed, np.median, 0.85),
         bootstrap("single and pair: error after over the noise floor, worst channel, median", diagnosed, np.median),
         bootstrap("clean: error after over the noise floor, worst channel, median", clean, np.median),

@@ -11,18 +11,25 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from virtualrig.chain import initial_tension, stable_step
 from virtualrig.config import Numerics, Rig
 from virtualrig.effects import Effects, cached, chained, laws, numbers
-from virtualrig.effects.presliding import DahlPresliding, IwanPresliding
+from virtualrig.effects.presliding import BoucWenPresliding, DahlPresliding, IwanPresliding
 from virtualrig.effects.pulley_friction import PulleyFriction
+from virtualrig.effects.viscous_friction import REFERENCE_M_PER_S
 from virtualrig.grid import Grid
 from virtualrig.trajectory import Preparation, Trajectory, check_tensions
 
 SLOW_S = 1e-4
 # A conduit follows its cable's mean tension within this time: far below any motion, well above the time step.
 CONDUIT_LAG_S = 1e-4
+# Logarithmic velocity weakening: from a tenth of its speed to ten times it.
+DECADE = 10.0
+HYPERBOLIC, EXPONENTIAL, TOE = range(3)  # laws of strand settling
+# Below this speed a drag with a power of the speed is linear in it.
+SLOWEST_M_PER_S = 1e-5
 # A tension (N), time (s), travel and position (m) at which every law of slow friction that is present has an effect.
 ANY_STATE = (2.3, 0.7, 0.011, 0.0037)
 
@@ -59,7 +66,7 @@ def simulate(
     half_bend = _half_bend(grid, effects, preparation.friction_coefficient)
     stiffness = _stiffness(rig, grid)
     mass = rig.cable.density_kg_per_m * grid.cell_length_m
-    drag = effects.drag_N * grid.cell_length_m / grid.cell_length_m.sum()
+    drag = effects.drag_N * _drag_shares(effects, grid)
     tension, bristle = _initial_state(physics, grid, preparation, half_bend, drag)
     share, time_constant_s = (
         np.array([getattr(branch, name) for branch in effects.relaxation]) for name in ("share", "time_constant_s")
@@ -90,14 +97,15 @@ def simulate(
         1 / mass,
         half_bend,
         drag,
-        numerics.drag_rate_per_s + effects.viscous_Ns_per_m2 * grid.cell_length_m / mass,
+        np.full(mass.size, numerics.drag_rate_per_s),
+        effects.viscous_Ns_per_m2 * grid.cell_length_m / mass,
         theta_out,
     )
     theta_out, T1, T2, T3, T4, bearing = channels
     check_tensions(channels[1:5], numerics.tension_limit_N)
-    drive_radius = physics.radius * _roundness(theta_in_rad, physics.drive_share, physics.drive_phase)
-    load_radius = physics.radius * _roundness(theta_out, physics.load_share, physics.load_phase)
-    tau_in = drive_radius * (T1 - T3) + _bearing_torque(theta_in_rad, effects.drive_pulley.friction)
+    drive_radius = physics.radius * _roundness(theta_in_rad, _drive_shape(physics))
+    load_radius = physics.radius * _roundness(theta_out, _load_shape(physics))
+    tau_in = drive_radius * (T1 - T3) + _bearing_torque(theta_in_rad, effects.drive_pulley.friction, T1 + T3)
     return Trajectory(time_s, theta_in_rad, theta_out, T1, T2, T3, T4, tau_in, load_radius * (T2 - T4) - bearing)
 
 
@@ -117,12 +125,22 @@ def _physics(rig: Rig, numerics: Numerics, preparation: Preparation) -> Physics:
 def _bristle_lengths(effects: Effects, numerics: Numerics) -> NDArray:
     """Length over which each of a node's elements yields, m, shape (elements,); one element is Dahl's bristle."""
     match effects.presliding:
-        case DahlPresliding(length_m=length):
+        case DahlPresliding(length_m=length) | BoucWenPresliding(length_m=length):
             return np.array([length])
         case IwanPresliding(shortest_m=shortest, longest_m=longest, elements=elements):
             return np.geomspace(shortest, longest, elements)
         case _:
             return np.array([numerics.bristle_length_m])
+
+
+def _drag_shares(effects: Effects, grid: Grid) -> NDArray:
+    """Share of the constant drag in each cell: by length, or all of it in one, shape (n,)."""
+    ends = np.cumsum(grid.cell_length_m)
+    if effects.drag_at_share is None:
+        return grid.cell_length_m / ends[-1]
+    shares = np.zeros(ends.size)
+    shares[np.searchsorted(ends, effects.drag_at_share * ends[-1])] = 1.0
+    return shares
 
 
 def _half_bend(grid: Grid, effects: Effects, friction_coefficient: float) -> NDArray:
@@ -134,6 +152,11 @@ def _half_bend(grid: Grid, effects: Effects, friction_coefficient: float) -> NDA
     ends = np.cumsum(grid.cell_length_m)
     centre = ends - grid.cell_length_m / 2
     for kink in effects.kinks:
+        if kink.spread_m:
+            starts = ends - grid.cell_length_m
+            low, high = (kink.place_share * ends[-1] + side * kink.spread_m / 2 for side in (-1, 1))
+            bend += kink.bend_rad * (np.minimum(ends, high) - np.maximum(starts, low)).clip(0.0) / kink.spread_m
+            continue
         at = np.interp(kink.place_share * ends[-1], centre, np.arange(centre.size))
         before = min(int(at), max(centre.size - 2, 0))
         bend[before] += (1 - (at - before)) * kink.bend_rad
@@ -152,8 +175,15 @@ def _stiffness(rig: Rig, grid: Grid) -> NDArray:
 
 
 def _settling_length(effects: Effects, stiffness: NDArray) -> NDArray:
-    """Elongation of each segment that the settling's tension scale makes, m, shape (2, n + 1)."""
-    return (effects.strand_settling.tension_scale_N if effects.strand_settling else 0.0) / stiffness
+    """Elongation of each segment that the tension scale of its settling makes, m, shape (2, n + 1).
+
+    In the segments at the ends that of a knot is added.
+    """
+    settling = (effects.strand_settling.tension_scale_N if effects.strand_settling else 0.0) / stiffness
+    ends = effects.termination_compliance
+    settling[:, 0] += ends.drive_bedding_N * ends.drive_m_per_N
+    settling[:, -1] += ends.load_bedding_N * ends.load_m_per_N
+    return settling
 
 
 def _initial_state(
@@ -192,10 +222,10 @@ def _relaxed(
 def _elongation(physics: Physics, tension: NDArray, stiffness: NDArray, settling: NDArray) -> NDArray:
     """Elongation of each segment under its tension, m; all of one shape."""
     ideal = tension / stiffness
-    if not physics.has_settling:
-        return ideal
-    if not physics.settling_is_exponential:
+    if physics.settling_law == HYPERBOLIC:
         return np.sqrt((ideal + settling) ** 2 - settling**2)
+    if physics.settling_law == TOE:
+        return np.where(ideal < settling, 2 * np.sqrt(settling * ideal), ideal + settling)
     e = ideal + settling
     for _ in range(60):
         decay = np.exp(-e / settling)
@@ -205,15 +235,16 @@ def _elongation(physics: Physics, tension: NDArray, stiffness: NDArray, settling
 
 def _load_angle(physics: Physics, tension_difference: float) -> float:
     """Angle at which the load's spring holds the difference of the cables' load-end tensions, rad."""
-    theta = 0.0
-    for _ in range(50):
-        torque = physics.radius * _roundness(theta, physics.load_share, physics.load_phase) * tension_difference
-        beyond = torque / physics.spring
-        for _ in range(50):
-            excess = physics.spring * beyond + physics.cubic * beyond**3 - torque
-            beyond -= excess / (physics.spring + 3 * physics.cubic * beyond**2)
-        theta = beyond + np.sign(beyond) * physics.half_gap
-    return float(theta)
+    if tension_difference == 0.0:
+        return 0.0
+
+    def excess(theta: float) -> float:
+        pull = physics.radius * _roundness(theta, _load_shape(physics)) * tension_difference
+        return float(_spring_torque(physics, theta) - pull)
+
+    # No law is softer than the linear spring beyond its gap, and no pulley twice as large.
+    furthest = physics.half_gap + 2 * physics.radius * abs(tension_difference) / physics.spring
+    return float(brentq(excess, -furthest, furthest, xtol=1e-14))
 
 
 def _stable_step(
@@ -234,10 +265,13 @@ def _stable_step(
     bristle = hold * np.mean(1 / lengths)
     for law in laws("friction"):
         bristle = law.bound(physics, limit) * bristle
-    radius = physics.radius * (1 - physics.load_share)
-    beyond = np.cbrt(physics.radius * limit / physics.cubic) if physics.cubic else 0.0
+    radius = physics.radius * (1 - physics.load_share - physics.load_second)
+    # Stiffness at the largest torque, at which each law alone would balance it.
+    torque = physics.radius * limit
+    beyond = np.cbrt(torque / physics.cubic) if physics.cubic else 0.0
     torsion = (
-        physics.spring
+        np.hypot(physics.spring, physics.exponential * torque)
+        + physics.bumper
         + 3 * physics.cubic * beyond**2
         + physics.bearing_torque / physics.bearing_angle
         + physics.hysteresis_torque / physics.hysteresis_angle
@@ -246,9 +280,22 @@ def _stable_step(
     return stable_step(stiffness.max(axis=0), mass, bristle, spring, pulley_mass, numerics)
 
 
-def _roundness(theta: Any, share: float, phase: float) -> Any:
+@njit
+def _drive_shape(p: Physics) -> tuple[float, float, float, float]:
+    """Shares of the radius and phases of the drive pulley's first and second harmonic."""
+    return p.drive_share, p.drive_phase, p.drive_second, p.drive_second_phase
+
+
+@njit
+def _load_shape(p: Physics) -> tuple[float, float, float, float]:
+    return p.load_share, p.load_phase, p.load_second, p.load_second_phase
+
+
+@njit
+def _roundness(theta: Any, shape: tuple[float, float, float, float]) -> Any:
     """A pulley's radius at an angle (rad), over its mean."""
-    return 1 + share * np.sin(theta + phase)
+    share, phase, second, second_phase = shape
+    return 1 + share * np.sin(theta + phase) + second * np.sin(2 * theta + second_phase)
 
 
 @njit(cache=True)
@@ -261,20 +308,35 @@ def _bearing_course(theta: NDArray, angle: float) -> NDArray:
     return z
 
 
-def _bearing_torque(theta: NDArray, friction: PulleyFriction | None) -> NDArray | float:
-    """Friction torque (N m) of a bearing along the angles `theta` (rad)."""
-    return friction.torque_Nm * _bearing_course(theta, friction.presliding_rad) if friction else 0.0
+def _bearing_torque(theta: NDArray, friction: PulleyFriction | None, pull_N: NDArray) -> NDArray | float:
+    """Friction torque (N m) of a bearing along the angles `theta` (rad) under the pull of both cables."""
+    if friction is None:
+        return 0.0
+    load = pull_N / pull_N[0] if friction.law == "proportional" else 1.0
+    return friction.torque_Nm * load * _bearing_course(theta, friction.presliding_rad)
 
 
-@njit(inline="always")
-def _winding(theta: float, share: float, phase: float) -> float:
+@njit
+def _winding(theta: float, shape: tuple[float, float, float, float]) -> float:
     """Cable travel over the mean radius, rad: the integral of the roundness."""
-    return theta - share * np.cos(theta + phase)
+    share, phase, second, second_phase = shape
+    return theta - share * np.cos(theta + phase) - 0.5 * second * np.cos(2 * theta + second_phase)
 
 
-@njit(inline="always")
-def _dead_zone(theta: float, half_gap: float) -> float:
-    return max(theta - half_gap, 0.0) + min(theta + half_gap, 0.0)
+@njit
+def _spring_torque(p: Physics, theta: float) -> float:
+    """Torque of the load's spring at an angle, N m."""
+    above, below = theta - p.half_gap, theta + p.half_gap
+    if p.soft_flank > 0.0:
+        above = 0.5 * (above + np.hypot(above, p.soft_flank))
+        below = 0.5 * (below - np.hypot(below, p.soft_flank))
+    beyond = max(above, 0.0) + min(below, 0.0)
+    further = p.cubic * beyond * beyond * beyond
+    if p.exponential > 0.0:
+        further += p.spring * (np.sinh(p.exponential * beyond) / p.exponential - beyond)
+    if p.bumper > 0.0:
+        further += p.bumper * (max(beyond - p.bumper_at, 0.0) + min(beyond + p.bumper_at, 0.0))
+    return p.spring * beyond + further
 
 
 @njit(inline="always")
@@ -304,18 +366,46 @@ def _set_hold(p: Physics, hold: NDArray, strength: NDArray, rested: NDArray, dra
 
 
 @njit(error_model="numpy")
+def _deflect(p: Physics, z: NDArray, w: NDArray, dt: float) -> None:
+    """Let one cable's bristles follow its nodes' speeds `w`: Dahl's, or those of Bouc and Wen."""
+    slid = dt / p.bristle_length
+    if p.bristle_exponent == 1.0:
+        for i in range(z.size):
+            z[i] = _bristle(z[i], w[i + 1] * slid)
+        return
+    for i in range(z.size):
+        slide = w[i + 1] * slid
+        held = abs(z[i]) ** p.bristle_exponent
+        z[i] = min(max(z[i] + slide - abs(slide) * held * np.sign(z[i]), -1.0), 1.0)
+
+
+@njit(error_model="numpy")
+def _set_keep(p: Physics, keep: NDArray, drag_rate: NDArray, viscous_rate: NDArray, w: NDArray, dt: float) -> None:
+    """Share of their speed that one cable's nodes keep in a step against a drag with a power of the speed."""
+    for i in range(keep.size):
+        speed = max(abs(w[i + 1]), SLOWEST_M_PER_S) / REFERENCE_M_PER_S
+        keep[i] = 1.0 / (1.0 + dt * (drag_rate[i] + viscous_rate[i] * speed ** (p.viscous_power - 1.0)))
+
+
+@njit(error_model="numpy")
 def _renew(p: Physics, rested: NDArray, w: NDArray, dt: float) -> None:
     """Let the contacts of one cable's nodes adapt to their sliding speed `w`."""
     inverse, renewal = 1.0 / p.stribeck_speed, dt / p.stribeck_renewal
     for i in range(rested.size):
         speed = abs(w[i + 1])
         s = speed * inverse
-        if p.stribeck_exponent == 2.0:
-            s = s * s
-        elif p.stribeck_exponent != 1.0:
-            s = s**p.stribeck_exponent
+        if p.stribeck_law == 1:
+            target = 1.0 / ((1.0 + s) * (1.0 + s))
+        elif p.stribeck_law == 2:
+            target = max(1.0 - np.log1p(DECADE * s) / np.log1p(DECADE * DECADE), 0.0)
+        else:
+            if p.stribeck_exponent == 2.0:
+                s = s * s
+            elif p.stribeck_exponent != 1.0:
+                s = s**p.stribeck_exponent
+            target = np.exp(-s)
         share = speed * renewal
-        rested[i] = (rested[i] + share * np.exp(-s)) / (1.0 + share)
+        rested[i] = (rested[i] + share * target) / (1.0 + share)
 
 
 @njit(error_model="numpy")
@@ -328,17 +418,22 @@ def _set_elastic(
     settling: NDArray,
     share: NDArray,
     shortening: float,
+    settles: bool,
 ) -> None:
     """Tension (N) of one cable's segments without dampers; `x` are the slides, `shortening` is the conduit's."""
     n1 = elastic.size
     for i in range(n1):
         e = stretch[i] + (x[i] - x[i + 1]) - share[i] * shortening
         elastic[i] = stiffness[i] * max(e, 0.0)
-    if p.has_settling:
+    if settles:
         for i in range(n1):
             e, s = elastic[i] / stiffness[i], settling[i]
-            if p.settling_is_exponential:
+            if s == 0.0:
+                continue
+            if p.settling_law == EXPONENTIAL:
                 elastic[i] = stiffness[i] * (e + s * np.expm1(-e / s))
+            elif p.settling_law == TOE:
+                elastic[i] = stiffness[i] * (e * e / (4 * s) if e < 2 * s else e - s)
             else:
                 elastic[i] = stiffness[i] * (np.sqrt(e * e + s * s) - s)
 
@@ -366,6 +461,7 @@ def _run(
     half_bend: NDArray,
     drag: NDArray,
     drag_rate: NDArray,
+    viscous_rate: NDArray,
     theta_out: float,
 ) -> NDArray:
     """Integrate; returns theta_out, T1, T2, T3, T4 and the load bearing's torque at the samples, shape (6, samples).
@@ -378,8 +474,10 @@ def _run(
     share_of_one = 1.0 / elements
     dt = sample_s / steps
     slow_steps = max(1, int(SLOW_S / dt))
+    settles = settling.max() > 0.0
     is_slow = slow_friction(p, 1.0, *ANY_STATE) != 1.0
-    keep = 1 / (1 + drag_rate * dt)
+    keep = 1 / (1 + (drag_rate + viscous_rate) * dt)
+    thins = p.viscous_power != 1.0 and viscous_rate.max() > 0.0
     u = np.zeros((2, nodes + 2))
     v = np.zeros((2, nodes + 2))
     tension = start_tension.copy()
@@ -397,12 +495,15 @@ def _run(
     theta_rest = theta_out
     omega_out = 0.0
     bearing = 0.0
+    bearing_torque = p.bearing_torque
+    start_pull = tension[0, nodes] + tension[1, nodes]
     hysteresis = 0.0
     travel = 0.0
     drive = 0.0
     since_slow = slow_steps
-    drive_start = _winding(theta_in[0], p.drive_share, p.drive_phase)
-    load_start = _winding(theta_rest, p.load_share, p.load_phase)
+    drive_shape, load_shape = _drive_shape(p), _load_shape(p)
+    drive_start = _winding(theta_in[0], drive_shape)
+    load_start = _winding(theta_rest, load_shape)
     out = np.empty((6, samples))
 
     for sample in range(samples):
@@ -411,7 +512,7 @@ def _run(
         out[2, sample] = tension[0, nodes]
         out[3, sample] = tension[1, 0]
         out[4, sample] = tension[1, nodes]
-        out[5, sample] = p.bearing_torque * bearing
+        out[5, sample] = bearing_torque * bearing
         if sample == samples - 1:
             break
         # The drive angle between two samples: the cubic through angles and rates at both.
@@ -425,8 +526,8 @@ def _run(
             s = step / steps
             theta = theta_in[sample] + s * (slope_0 + s * (c2 + s * c3))
             omega = (slope_0 + s * (2 * c2 + s * 3 * c3)) / sample_s
-            drive = p.radius * (_winding(theta, p.drive_share, p.drive_phase) - drive_start)
-            drive_rate = p.radius * (1.0 + p.drive_share * np.sin(theta + p.drive_phase)) * omega
+            drive = p.radius * (_winding(theta, drive_shape) - drive_start)
+            drive_rate = p.radius * _roundness(theta, drive_shape) * omega
             travel += abs(drive_rate) * dt
             if since_slow >= slow_steps:
                 _set_strength(p, strength, half_bend, tension, (sample + s) * sample_s, travel, drive)
@@ -434,17 +535,18 @@ def _run(
             if is_slow:
                 since_slow += 1
 
-            load_radius = p.radius * (1.0 + p.load_share * np.sin(theta_out + p.load_phase))
-            beyond = _dead_zone(theta_out, p.half_gap)
+            load_radius = p.radius * _roundness(theta_out, load_shape)
             torque = load_radius * (tension[0, nodes] - tension[1, nodes])
-            torque -= beyond * (p.spring + p.cubic * beyond * beyond) + p.damping * omega_out
-            torque -= p.bearing_torque * bearing + p.hysteresis_torque * hysteresis
+            torque -= _spring_torque(p, theta_out) + p.damping * omega_out
+            if p.bearing_is_proportional:
+                bearing_torque = p.bearing_torque * (tension[0, nodes] + tension[1, nodes]) / start_pull
+            torque -= bearing_torque * bearing + p.hysteresis_torque * hysteresis
             omega_out += dt * torque / p.inertia
             theta_out += dt * omega_out
             bearing = _bristle(bearing, omega_out * dt / p.bearing_angle)
             hysteresis = _bristle(hysteresis, omega_out * dt / p.hysteresis_angle)
-            load_radius = p.radius * (1.0 + p.load_share * np.sin(theta_out + p.load_phase))
-            load_travel = p.radius * (_winding(theta_out, p.load_share, p.load_phase) - load_start)
+            load_radius = p.radius * _roundness(theta_out, load_shape)
+            load_travel = p.radius * (_winding(theta_out, load_shape) - load_start)
 
             for c in range(2):
                 side = 1.0 - 2.0 * c
@@ -453,14 +555,15 @@ def _run(
                 w = v[c]
                 z = bristle[c]
                 _set_hold(p, hold, strength[c], rested[c], drag, T)
+                if thins:
+                    _set_keep(p, keep, drag_rate, viscous_rate, w, dt)
                 for i in range(nodes):
                     friction = friction_law(p, hold[i] * z[i], z[i], w[i + 1])
                     w[i + 1] = keep[i] * (w[i + 1] + dt * inverse_mass[i] * (T[i] - T[i + 1] - friction))
                 if p.stribeck_rise > 0.0:
                     _renew(p, rested[c], w, dt)
                 if elements == 1:
-                    for i in range(nodes):
-                        z[i] = _bristle(z[i], w[i + 1] * (dt / p.bristle_length))
+                    _deflect(p, z, w, dt)
                 else:
                     z[:] = 0.0
                     for k in range(elements):
@@ -475,7 +578,7 @@ def _run(
                 w[0] = side * drive_rate
                 x[nodes + 1] = side * load_travel
                 w[nodes + 1] = side * load_radius * omega_out
-                _set_elastic(p, elastic[c], x, stretch[c], stiffness[c], settling[c], share, shortening[c])
+                _set_elastic(p, elastic[c], x, stretch[c], stiffness[c], settling[c], share, shortening[c], settles)
                 base[:] = elastic[c]
                 for k in range(relaxing.size):
                     q = relaxed[k, c]
@@ -491,7 +594,8 @@ def _run(
                     mean = 0.0
                     for i in range(nodes + 1):
                         mean += share[i] * T[i]
-                    shortening[c] += (
-                        dt / CONDUIT_LAG_S * (p.conduit_compliance * (mean - start_mean[c]) - shortening[c])
-                    )
+                    change = mean - start_mean[c]
+                    if p.conduit_closes > 0.0:
+                        change = p.conduit_closes * np.tanh(change / p.conduit_closes)
+                    shortening[c] += dt / CONDUIT_LAG_S * (p.conduit_compliance * change - shortening[c])
     return out

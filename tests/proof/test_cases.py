@@ -31,7 +31,8 @@ def test_true_values_have_the_names_of_the_mechanisms_parameters():
 
 def test_true_viscous_friction_includes_the_rigs_own_damping():
     """Forces at the load end at one speed: drag along both cables and damping of the load."""
-    case = draw(3, "single", "viscous-friction")
+    cases = (draw(seed, "single", "viscous-friction") for seed in range(3, 20))
+    case = next(case for case in cases if not case.truth[0].law)
     (truth,), rig, speed = case.truth, case.campaign.rig, 0.01
     mass_kg = 2 * rig.cable.density_kg_per_m * rig.cable.length_m
     own_N = case.campaign.numerics.drag_rate_per_s * mass_kg * speed
@@ -52,6 +53,15 @@ def test_an_effect_enters_the_rig(name):
     assert low <= abs(truth.size) <= high
     assert truth.place in {**PLAN.effects, **PLAN.unlisted}[name].places
     assert effects.model_dump() != draw(12, kind, name).campaign.rig.effects.model_dump()
+
+
+@pytest.mark.parametrize("name", [name for name, twin in PLAN.effects.items() if twin.other_laws])
+def test_every_law_of_an_effect_is_drawn_and_enters_the_rig(name):
+    cases = [draw(seed, "single", name) for seed in range(40)]
+    laws = [case.truth[0].law for case in cases]
+    assert set(laws) == {"", *TWINS[name].other_laws}
+    assert 0.2 < np.mean([law == "" for law in laws]) < 0.8
+    assert all(case.campaign.rig.effects != Effects() for case in cases)
 
 
 def test_a_seed_gives_one_case_and_another_seed_another():
@@ -171,7 +181,9 @@ def test_the_noise_floor_adds_sensors_and_repeatability(poor, monkeypatch):
     prepared = Preparation(1.0, 7.0, (0.2, 0.2))
     floor = build.noise_floor(campaign, plan, prepared, simulated(campaign, plan, prepared))
     noise, slow = campaign.sensors.torque.noise_Nm, campaign.sensors.torque.slow_noise.ratio
-    expected = np.sqrt(0.01**2 + noise**2 * (1 + slow**2) + campaign.sensors.torque.accuracy_Nm**2 / 3)
+    expected = np.sqrt(
+        campaign.repeatability.friction**2 + noise**2 * (1 + slow**2) + campaign.sensors.torque.accuracy_Nm**2 / 3
+    )
     assert floor["tau_in_Nm"] == pytest.approx(expected, rel=1e-6)
     count = 2 * np.pi / 2000 / np.sqrt(12)
     # Two counts of the load and, once the drive moves, one of the drive.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from proof import score as scoring
-from proof.calibration import calibration_error
+from proof.calibration import calibration_error, spiegelhalter
 from proof.detection import detection_by_error, half_detected
 from proof.figures import write_figures
 from proof.intervals import rate
@@ -63,6 +63,33 @@ UNDECIDED = Outcome(
     answer("poor", GAIN, protocol="single"),
     reported("undecided", alternatives=[("torque-scale", "drive-sensor", 0.5, []), ("kink", "conduit", 0.5, [])]),
 )
+
+
+def test_spiegelhalters_z_is_standard_normal_for_calibrated_claims():
+    random = np.random.default_rng(0)
+    stated = random.uniform(0.3, 0.9, (400, 150))
+    z = [spiegelhalter(list(zip(p, random.uniform(size=p.size) < p, strict=True))) for p in stated]
+    assert np.mean(z) == pytest.approx(0, abs=0.15)
+    assert np.std(z) == pytest.approx(1, abs=0.1)
+    too_sure = [spiegelhalter(list(zip(p, random.uniform(size=p.size) < p - 0.2, strict=True))) for p in stated]
+    assert abs(np.mean(too_sure)) > 2
+
+
+def test_a_pair_that_is_declared_complete_with_one_member_is_confidently_wrong():
+    answered = answer("pair", GAIN, ("kink", "conduit", 0.5, {}))
+    assert Outcome(answered, RIGHT).is_confidently_wrong
+    doubtful = reported("explained", ("torque-scale", "drive-sensor", 0.7, VALUE))
+    assert not Outcome(answered, doubtful).is_confidently_wrong
+    both = reported("explained", ("torque-scale", "drive-sensor", 0.9, VALUE), ("kink", "conduit", 0.9, []))
+    assert not Outcome(answered, both).is_confidently_wrong
+
+
+def test_rates_of_the_mechanisms_law_and_of_another_stand_apart():
+    other = answer("single", GAIN)
+    other["truth"][0]["law"] = "another"
+    visible = Outcome(other, RIGHT, errors=errors(11.0))
+    assert rate_of("the mechanism's law", IDENTIFIED, visible) == (1, 1)
+    assert rate_of("another law", IDENTIFIED, visible, Outcome(other, WRONG, errors=errors(11.0))) == (1, 2)
 
 
 def rate_of(what, *outcomes):

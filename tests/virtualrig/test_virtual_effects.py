@@ -42,6 +42,24 @@ ALONE = {
     "stiffening": {"load": {"cubic_Nm_per_rad3": 0.1}},
     "inertia": {"load": {"inertia_kg_m2": 5e-4}},
     "hysteretic-load": {"hysteretic_load": {"torque_Nm": 4e-3, "angle_rad": 0.1}},
+    "presliding-bouc-wen": {"presliding": {"law": "bouc-wen", "length_m": 1e-4, "exponent": 0.5}},
+    "stribeck-hess-soom": {"stribeck": {"law": "hess-soom", "rise": 0.3, "speed_m_per_s": 3e-3}},
+    "stribeck-logarithmic": {"stribeck": {"law": "logarithmic", "rise": 0.3, "speed_m_per_s": 3e-3}},
+    "viscous-thinning": {"viscous_Ns_per_m2": 200.0, "viscous_power": 0.5},
+    "load-dependent-logarithmic": {"load_dependent_friction": {"law": "logarithmic", "exponent": -0.3}},
+    "seal": {"drag_N": 1.0, "drag_at_share": 0.9},
+    "spread-kink": {"kinks": [{"bend_rad": 0.8, "place_share": 0.4, "spread_m": 0.05}]},
+    "hyperbolic-running-in": {"running_in": {"law": "hyperbolic", "change": 0.3, "scale": 0.5}},
+    "settling-exponential": {"strand_settling": {"law": "exponential", "tension_scale_N": 3.0}},
+    "settling-toe": {"strand_settling": {"law": "toe", "tension_scale_N": 3.0}},
+    "knot": {"termination_compliance": {"load_m_per_N": 1e-4, "load_bedding_N": 3.0}},
+    "closing-conduit": {"conduit_compliance_m_per_N": 6e-5, "conduit_closes_N": 2.0},
+    "plain-drive-bearing": {"drive_pulley": {"friction": {"law": "proportional", "torque_Nm": 4e-3}}},
+    "plain-load-bearing": {"load_pulley": {"friction": {"law": "proportional", "torque_Nm": 4e-3}}},
+    "two-lobes": {"load_pulley": {"eccentricity": {"share": 0.05, "second_share": 0.03, "second_phase_rad": 0.5}}},
+    "soft-gap": {"load": {"half_gap_rad": 0.03, "soft_flank_rad": 0.01}},
+    "exponential-spring": {"load": {"exponential_per_rad": 3.0}},
+    "bumper": {"load": {"bumper_Nm_per_rad": 0.05, "bumper_at_rad": 0.2}},
     "directional": {"directional_friction": {"bias": 0.2}},
     "positional": {"positional_friction": {"rise": 0.2, "period_m": 0.01}},
 }
@@ -102,7 +120,7 @@ def test_it_rests_in_balance_and_then_acts(coarse, recorded, name):
     t, ideal = recorded(name), recorded("none")
     rest = t.time_s <= 0.05
     # At rest tensions change where the cable relaxes, and hardly where bristles hold less from moment to moment.
-    settles = {"relaxation": 0.15, "running-in": 1e-3}.get(name, 1e-6)
+    settles = {"relaxation": 0.15, "running-in": 1e-3, "hyperbolic-running-in": 1e-3}.get(name, 1e-6)
     for tension in TENSIONS:
         assert np.ptp(getattr(t, tension)[rest]) < settles * 7.3, tension
     seen, wanted = channels(coarse, t) | {"tau_in": t.tau_in_Nm}, channels(coarse, ideal)
@@ -179,6 +197,53 @@ def test_a_hysteretic_spring_shows_in_the_loads_torque(coarse, recorded):
     over = t.tau_out_Nm - coarse.rig.load.spring_stiffness_Nm_per_rad * t.theta_out_rad
     assert over[full_slip(t)].mean() == pytest.approx(4e-3, rel=0.05)
     assert over.min() < -3e-3
+
+
+def test_every_law_of_a_load_spring_is_the_torque_at_the_pulley(coarse, recorded):
+    spring, tau = coarse.rig.load.spring_stiffness_Nm_per_rad, "tau_out_Nm"
+    laws = {
+        "exponential-spring": lambda theta: spring * np.sinh(3.0 * theta) / 3.0,
+        "bumper": lambda theta: spring * theta + 0.05 * np.sign(theta) * np.maximum(np.abs(theta) - 0.2, 0.0),
+    }
+    for name, law in laws.items():
+        t = recorded(name)
+        slip = full_slip(t)
+        assert getattr(t, tau)[slip] == pytest.approx(law(t.theta_out_rad[slip]), abs=2e-4), name
+
+
+def test_a_drag_of_a_power_below_one_falls_less_at_low_speed(recorded):
+    ideal, linear, thins = (recorded(name) for name in ("none", "viscous", "viscous-thinning"))
+    slip = full_slip(ideal)
+    drag = [np.mean((t.T1_N - t.T2_N - ideal.T1_N + ideal.T2_N)[slip]) for t in (linear, thins)]
+    speed = 0.006 * np.gradient(ideal.theta_in_rad, ideal.time_s)[slip].mean()
+    assert drag[1] / drag[0] == pytest.approx((speed / 0.01) ** -0.5, rel=0.15)
+
+
+def test_a_spread_kink_bends_as_much(campaign, recorded):
+    t = recorded("spread-kink")
+    expected = campaign.rig.cable.friction_coefficient * (np.pi + 0.8)
+    np.testing.assert_allclose(np.log(t.T1_N / t.T2_N)[full_slip(t)], expected, rtol=3e-3)
+
+
+def test_a_seal_drags_in_one_place(recorded):
+    """In full slip it matters little where a drag acts; in front of the load the whole cable has slipped before."""
+    seal, drag, ideal = (recorded(name) for name in ("seal", "drag", "none"))
+    slip = full_slip(ideal)
+    over = [np.mean((t.T1_N - ideal.T1_N - (t.T2_N - ideal.T2_N))[slip]) for t in (seal, drag)]
+    assert over[0] == pytest.approx(over[1], rel=0.4)
+    assert not np.allclose(seal.T1_N, drag.T1_N, atol=0.05)
+
+
+def test_a_filter_delays_slow_motions_as_a_late_clock_does(campaign):
+    time_s = np.arange(2000) / 250
+    truth = Side(np.sin(time_s), np.cos(time_s), 12 + time_s)
+    late, filtered = (
+        sensed(time_s, truth, campaign.rig, Effects(drive_sensors=fault).drive_sensors)
+        for fault in ({"delay_s": 0.02}, {"filter_s": 0.02})
+    )
+    for there, here in zip(late, filtered, strict=True):
+        assert here[100:] == pytest.approx(there[100:], abs=2e-3)
+    assert filtered.torque_Nm[0] == truth.torque_Nm[0]
 
 
 def test_nothing_turns_the_load_inside_its_gap(recorded):

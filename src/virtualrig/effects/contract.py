@@ -33,6 +33,7 @@ class Side(NamedTuple):
 Read = Callable[[Side, Side, Any, NDArray, float], Side]
 # Settings of the rig's effects, and the answer.
 Seeded = tuple[dict, dict[str, float]]
+Seed = Callable[[float, Mapping[str, float], str, float], Seeded]
 
 
 class Law(NamedTuple):
@@ -70,7 +71,10 @@ class Twin:
     seed : callable
         ``seed(size, also, place, spring)`` returns what it sets in the rig's effects, nested as these, and its values
         under the names of the mechanism's parameters, as far as these mean the same in the rig. ``also`` holds the
-        other drawn numbers and a phase (rad), ``spring`` is the load's stiffness (N m/rad).
+        other drawn numbers and a phase (rad), ``spring`` is the load's stiffness (N m/rad). The law is the mechanism's.
+    other_laws : mapping of str to callable
+        Published laws of the effect that the mechanism does not have, by name; each like ``seed``. Values of parameters
+        are those that both laws share.
     signed : bool
         Whether either sign is drawn.
     also : mapping of str to (float, float)
@@ -95,7 +99,8 @@ class Twin:
     places: tuple[str, ...]
     size: Range
     unit: str
-    seed: Callable[[float, Mapping[str, float], str, float], Seeded]
+    seed: Seed
+    other_laws: Mapping[str, Seed] = field(default_factory=dict)
     signed: bool = False
     also: Mapping[str, Range] = field(default_factory=dict)
     numbers: Callable[[Any], dict[str, Any]] = lambda effects: {}

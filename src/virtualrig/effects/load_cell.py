@@ -1,10 +1,17 @@
-"""Faults of a load cell, which reads (1 + gain) F + offset + drift t + crosstalk tau / R."""
+"""Faults of a load cell, which reads (1 + gain) F + offset + drift t + crosstalk tau / R.
 
+As a cell warms up, its drift falls off exponentially.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
-from virtualrig.effects.contract import Range, Read, Side, Twin, group_of
+from virtualrig.effects.contract import Range, Read, Seeded, Side, Twin, group_of
+from virtualrig.strict import NonNegative
 
 
 def _scale(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: float) -> Side:
@@ -16,7 +23,9 @@ def _offset(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: 
 
 
 def _drift(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: float) -> Side:
-    return reading._replace(force_N=reading.force_N + faults.load_cell_drift_N_per_s * (time_s - time_s[0]))
+    since, warm_up_s = time_s - time_s[0], faults.load_cell_warm_up_s
+    grown = warm_up_s * -np.expm1(-since / warm_up_s) if warm_up_s else since
+    return reading._replace(force_N=reading.force_N + faults.load_cell_drift_N_per_s * grown)
 
 
 def _crosstalk(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: float) -> Side:
@@ -36,9 +45,18 @@ def _twin(name: str, field: str, parameter: str, size: Range, unit: str, read: R
     )
 
 
+def _warming(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
+    return {group_of(place): {"load_cell_drift_N_per_s": size, "load_cell_warm_up_s": also["warm_up_s"]}}, {}
+
+
 TWINS = (
     _twin("load-cell-scale", "load_cell_gain", "gain", (0.005, 0.1), "1", _scale),
     _twin("load-cell-offset", "load_cell_offset_N", "offset", (0.1, 3.0), "N", _offset),
-    _twin("load-cell-drift", "load_cell_drift_N_per_s", "rate", (0.005, 0.2), "N/s", _drift),
+    replace(
+        _twin("load-cell-drift", "load_cell_drift_N_per_s", "rate", (0.005, 0.2), "N/s", _drift),
+        fields={"sensors": {"load_cell_drift_N_per_s": (float, 0.0), "load_cell_warm_up_s": (NonNegative, 0.0)}},
+        also={"warm_up_s": (2.0, 8.0)},
+        other_laws={"warm-up": _warming},
+    ),
     _twin("load-cell-crosstalk", "load_cell_crosstalk", "crosstalk", (0.005, 0.1), "1", _crosstalk),
 )

@@ -1,17 +1,27 @@
-"""Load-dependent friction: the friction coefficient times (T / reference)^exponent, constant below `floor_N`."""
+"""Load-dependent friction: the friction coefficient times (T / reference)^exponent, or 1 + exponent ln(T / reference).
 
-from typing import Annotated, Any
+The power is that of a contact of one asperity (Archard 1957), the logarithm an empirical law; both are constant below
+`floor_N`.
+"""
 
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+import numpy as np
 from numba import njit
 from pydantic import Field, PositiveFloat
 
-from virtualrig.effects.contract import Law, Twin
+from virtualrig.effects.contract import Law, Seed, Seeded, Twin
 from virtualrig.strict import Strict
+
+# The logarithm leaves this share of the friction coefficient at least.
+LEAST = 0.1
 
 
 class LoadDependentFriction(Strict):
     """Its numbers."""
 
+    law: Literal["power", "logarithmic"] = "power"
     exponent: Annotated[float, Field(gt=-1, lt=1)]
     reference_N: PositiveFloat = 5.0
     floor_N: PositiveFloat = 0.1
@@ -21,6 +31,7 @@ def _numbers(effects: Any) -> dict[str, Any]:
     given = effects.load_dependent_friction
     return {
         "tension_exponent": given.exponent if given else 0.0,
+        "tension_is_logarithmic": given is not None and given.law == "logarithmic",
         "tension_reference": given.reference_N if given else 1.0,
         "tension_floor": given.floor_N if given else 0.0,
     }
@@ -30,7 +41,25 @@ def _numbers(effects: Any) -> dict[str, Any]:
 def _value(p: Any, y: float, tension: float, time: float, travel: float, position: float) -> float:
     if p.tension_exponent == 0.0:
         return y
-    return y * (max(tension, p.tension_floor) / p.tension_reference) ** p.tension_exponent
+    ratio = max(tension, p.tension_floor) / p.tension_reference
+    if p.tension_is_logarithmic:
+        return y * max(1.0 + p.tension_exponent * np.log(ratio), LEAST)
+    return y * ratio**p.tension_exponent
+
+
+def _bound(p: Any, tension_N: float) -> float:
+    ratio = tension_N / p.tension_reference
+    if p.tension_is_logarithmic:
+        return max(1.0 + p.tension_exponent * float(np.log(ratio)), LEAST)
+    return ratio**p.tension_exponent
+
+
+def _seeding(law: str) -> Seed:
+    def seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
+        settings = {"law": law, "exponent": -size, "reference_N": also["reference_N"], "floor_N": also["floor_N"]}
+        return {"load_dependent_friction": settings}, {"n": -size} if law == "power" else {}
+
+    return seed
 
 
 TWIN = Twin(
@@ -39,7 +68,9 @@ TWIN = Twin(
     places=("conduit",),
     size=(0.02, 0.35),
     unit="1",
-    seed=lambda size, also, place, spring: ({"load_dependent_friction": {"exponent": -size}}, {"n": -size}),
+    also={"reference_N": (3.0, 10.0), "floor_N": (0.05, 0.4)},
+    seed=_seeding("power"),
+    other_laws={"logarithmic": _seeding("logarithmic")},
     numbers=_numbers,
-    slow_friction=Law(_value, lambda p, tension_N: (tension_N / p.tension_reference) ** p.tension_exponent),
+    slow_friction=Law(_value, _bound),
 )

@@ -1,7 +1,11 @@
-"""Presliding: friction builds up over a length of one bristle, or of many that yield one after the other."""
+"""Presliding: friction builds up over a length of one bristle, or of many that yield one after the other.
+
+One bristle's law is Dahl's or that of Bouc and Wen, whose knee is rounder or sharper (Wen, Journal of the Engineering
+Mechanics Division 102(2), 249-263, 1976).
+"""
 
 from collections.abc import Mapping
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
@@ -14,6 +18,14 @@ class DahlPresliding(Strict):
 
     law: Literal["dahl"] = "dahl"
     length_m: PositiveFloat
+
+
+class BoucWenPresliding(Strict):
+    """One bristle z of the law of Bouc and Wen: dz/ds = (1 - |z|^exponent sgn(z ds)) / length; Dahl's at 1."""
+
+    law: Literal["bouc-wen"] = "bouc-wen"
+    length_m: PositiveFloat
+    exponent: PositiveFloat
 
 
 class IwanPresliding(Strict):
@@ -40,14 +52,30 @@ def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> 
     return {"presliding": {"law": "iwan", "shortest_m": size / root, "longest_m": size * root}}, {}
 
 
+def _bouc_wen(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
+    return {"presliding": {"law": "bouc-wen", "length_m": size, "exponent": also["exponent"]}}, {}
+
+
+def _numbers(effects: Any) -> dict[str, Any]:
+    given = effects.presliding
+    return {"bristle_exponent": given.exponent if isinstance(given, BoucWenPresliding) else 1.0}
+
+
 TWIN = Twin(
     name="presliding",
     fields={
-        "rig": {"presliding": (Annotated[DahlPresliding | IwanPresliding, Field(discriminator="law")] | None, None)}
+        "rig": {
+            "presliding": (
+                Annotated[DahlPresliding | IwanPresliding | BoucWenPresliding, Field(discriminator="law")] | None,
+                None,
+            )
+        }
     },
     places=("conduit",),
     size=(5e-6, 2e-4),
     unit="m",
-    also={"spread": (3.0, 15.0)},  # longest over shortest element
+    also={"spread": (3.0, 15.0), "exponent": (0.4, 3.0)},  # longest over shortest element; of Bouc and Wen
     seed=_seed,
+    other_laws={"bouc-wen": _bouc_wen},
+    numbers=_numbers,
 )

@@ -1,4 +1,4 @@
-"""Eccentricity: a pulley's radius times 1 + share sin(angle + phase)."""
+"""Eccentricity: a pulley's radius times 1 + share sin(angle + phase), and of a bent one another lobe per half turn."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any
@@ -10,21 +10,34 @@ from virtualrig.strict import Strict
 
 
 class Eccentricity(Strict):
-    """Its share of the radius, and its phase."""
+    """Share of the radius and phase, of the first harmonic of the angle and of the second."""
 
     share: Annotated[float, Field(ge=0, lt=0.5)]
     phase_rad: float = 0.0
+    second_share: Annotated[float, Field(ge=0, lt=0.5)] = 0.0
+    second_phase_rad: float = 0.0
 
 
 def _numbers(effects: Any) -> dict[str, Any]:
     pulleys = {"drive": effects.drive_pulley.eccentricity, "load": effects.load_pulley.eccentricity}
     shares = {f"{side}_share": given.share if given else 0.0 for side, given in pulleys.items()}
-    return shares | {f"{side}_phase": given.phase_rad if given else 0.0 for side, given in pulleys.items()}
+    shares |= {f"{side}_second": given.second_share if given else 0.0 for side, given in pulleys.items()}
+    shares |= {f"{side}_phase": given.phase_rad if given else 0.0 for side, given in pulleys.items()}
+    return shares | {
+        f"{side}_second_phase": given.second_phase_rad if given else 0.0 for side, given in pulleys.items()
+    }
 
 
 def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     eccentricity = {"share": size, "phase_rad": also["phase"]}
     return {group_of(place): {"eccentricity": eccentricity}}, {"e": size, "psi": also["phase"]}
+
+
+def _two_lobes(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
+    settings, values = _seed(size, also, place, spring)
+    second = {"second_share": also["second"] * size, "second_phase_rad": 2.4 - also["phase"]}
+    settings[group_of(place)]["eccentricity"] |= second
+    return settings, values
 
 
 TWIN = Twin(
@@ -34,5 +47,7 @@ TWIN = Twin(
     size=(0.005, 0.08),
     unit="1",
     seed=_seed,
+    other_laws={"two-lobes": _two_lobes},
+    also={"second": (0.2, 0.6)},
     numbers=_numbers,
 )

@@ -1,7 +1,10 @@
-"""A bearing: a torque against the motion of a pulley that builds up over a small angle."""
+"""A bearing: a torque against the motion of a pulley that builds up over a small angle.
+
+The torque of a preloaded ball bearing is constant, that of a plain bearing is in proportion to the cables' pull.
+"""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import PositiveFloat
 
@@ -10,8 +13,9 @@ from virtualrig.strict import NonNegative, Strict
 
 
 class PulleyFriction(Strict):
-    """Its torque, and the angle over which it builds up."""
+    """Its torque, at the cables' tensions at rest, and the angle over which it builds up."""
 
+    law: Literal["constant", "proportional"] = "constant"
     torque_Nm: NonNegative
     presliding_rad: PositiveFloat = 1e-3
 
@@ -21,12 +25,19 @@ def _numbers(effects: Any) -> dict[str, Any]:
     return {
         "bearing_torque": given.torque_Nm if given else 0.0,
         "bearing_angle": given.presliding_rad if given else 1.0,
+        "bearing_is_proportional": given is not None and given.law == "proportional",
     }
 
 
 def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     friction = {"torque_Nm": size, "presliding_rad": also["presliding_rad"]}
     return {group_of(place): {"friction": friction}}, {"friction_torque": size}
+
+
+def _proportional(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
+    settings, values = _seed(size, also, place, spring)
+    settings[group_of(place)]["friction"]["law"] = "proportional"
+    return settings, values
 
 
 TWIN = Twin(
@@ -37,5 +48,6 @@ TWIN = Twin(
     unit="N m",
     also={"presliding_rad": (1e-3, 5e-3)},
     seed=_seed,
+    other_laws={"proportional": _proportional},
     numbers=_numbers,
 )

@@ -1,12 +1,22 @@
-"""Relaxation: branches of the cable that each lose their share of the tension with a time constant."""
+"""Relaxation: branches of the cable that each lose their share of the tension with a time constant.
+
+One branch is the standard linear solid, many are any creep: two that are far apart, or a stretched exponential
+exp(-(t / tau)^beta) (Kohlrausch, Williams and Watts).
+"""
 
 from collections.abc import Mapping
 from typing import Annotated
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import AfterValidator, PositiveFloat
+from scipy.optimize import nnls
 
 from virtualrig.effects.contract import OpenShare, Seeded, Twin
 from virtualrig.strict import Strict
+
+# Branches of the chain.
+BRANCHES = 6
 
 
 class Relaxation(Strict):
@@ -23,9 +33,29 @@ def _not_all(branches: tuple[Relaxation, ...]) -> tuple[Relaxation, ...]:
     return branches
 
 
+def _seeded(size: float, shares: NDArray, times_s: NDArray) -> Seeded:
+    pairs = zip((size * shares).tolist(), times_s.tolist(), strict=True)
+    return {"relaxation": [{"share": share, "time_constant_s": time} for share, time in pairs]}, {"r": size}
+
+
 def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
-    half, root = size / 2, 10**0.5
-    return {"relaxation": [{"share": half, "time_constant_s": also["tau"] * f} for f in (1 / root, root)]}, {"r": size}
+    """Times that are evenly spaced in the logarithm."""
+    root = np.sqrt(also["spread"])
+    return _seeded(size, np.full(BRANCHES, 1 / BRANCHES), also["tau"] * np.geomspace(1 / root, root, BRANCHES))
+
+
+def _two_times(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
+    fast = also["fast_share"]
+    return _seeded(size, np.array([fast, 1 - fast]), also["tau"] * np.array([10**-0.5, 10**0.5]))
+
+
+def _stretched(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
+    """Branches whose decay is nearest to a stretched exponential's from 0.01 to 100 time constants."""
+    t, times = np.geomspace(1e-2, 1e2, 200), np.geomspace(1e-2, 1e2, 10)
+    decay = np.exp(-(t ** also["beta"]))
+    shares, _ = nnls(np.exp(-t[:, None] / times), decay)
+    kept = shares > 1e-4
+    return _seeded(size, shares[kept] / shares[kept].sum(), also["tau"] * times[kept])
 
 
 TWIN = Twin(
@@ -34,6 +64,7 @@ TWIN = Twin(
     places=("cable",),
     size=(0.005, 0.2),
     unit="1",
-    also={"tau": (5.0, 60.0)},
+    also={"tau": (5.0, 60.0), "spread": (1.0, 30.0), "fast_share": (0.3, 0.7), "beta": (0.35, 0.7)},
     seed=_seed,
+    other_laws={"two-times": _two_times, "stretched": _stretched},
 )

@@ -1,4 +1,6 @@
-"""Running-in: the friction coefficient times 1 + change (1 - exp(-x / scale)), x the time or the drive's travel.
+"""Running-in: the friction coefficient times 1 + change g(x / scale), x the time or the drive's travel.
+
+g(a) is 1 - exp(-a), or a / (1 + a), which goes on for decades (a wear rate that falls with the wear done, Blau 2005).
 
 A recording starts at an age that its past has left (`Preparation.ran_in_before`).
 """
@@ -18,6 +20,7 @@ class RunningIn(Strict):
     """Its numbers."""
 
     change: Annotated[float, Field(gt=-1)]
+    law: Literal["exponential", "hyperbolic"] = "exponential"
     over: Literal["time_s", "travel_m"] = "time_s"
     scale: PositiveFloat
 
@@ -28,6 +31,7 @@ def _numbers(effects: Any) -> dict[str, Any]:
         "run_in_change": given.change if given else 0.0,
         "run_in_scale": given.scale if given else 1.0,
         "run_in_before": 0.0,
+        "run_in_is_hyperbolic": given is not None and given.law == "hyperbolic",
         "run_in_by_travel": given is not None and given.over == "travel_m",
     }
 
@@ -37,14 +41,21 @@ def _value(p: Any, y: float, tension: float, time: float, travel: float, positio
     if p.run_in_change == 0.0:
         return y
     age = p.run_in_before + (travel if p.run_in_by_travel else time)
-    return y * (1.0 + p.run_in_change * -np.expm1(-age / p.run_in_scale))
+    a = age / p.run_in_scale
+    return y * (1.0 + p.run_in_change * (a / (1.0 + a) if p.run_in_is_hyperbolic else -np.expm1(-a)))
 
 
 def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
-    # Running in over travel is a form of the rig's own; it is drawn where the time constant comes out short.
+    # By wear where the time constant comes out short.
     if also["tau"] < 10:
         return {"running_in": {"change": size, "over": "travel_m", "scale": also["travel_m"]}}, {"change": size}
     return {"running_in": {"change": size, "scale": also["tau"]}}, {"change": size, "tau": also["tau"]}
+
+
+def _hyperbolic(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
+    settings, _ = _seed(size, also, place, spring)
+    settings["running_in"]["law"] = "hyperbolic"
+    return settings, {}
 
 
 TWIN = Twin(
@@ -56,6 +67,7 @@ TWIN = Twin(
     signed=True,
     also={"tau": (3.0, 40.0), "travel_m": (0.01, 0.1)},  # a recording lasts 8 s and travels 5 cm
     seed=_seed,
+    other_laws={"hyperbolic": _hyperbolic},
     numbers=_numbers,
     slow_friction=Law(_value, lambda p, tension_N: max(1.0, 1 + p.run_in_change)),
 )

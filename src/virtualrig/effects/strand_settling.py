@@ -1,10 +1,11 @@
 """Strand settling: a cable that is soft near slack, until its strands bed in over a tension scale."""
 
+from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import PositiveFloat
 
-from virtualrig.effects.contract import Twin
+from virtualrig.effects.contract import Seed, Seeded, Twin
 from virtualrig.strict import Strict
 
 
@@ -12,19 +13,27 @@ class StrandSettling(Strict):
     """Its law and tension scale.
 
     With the elongation e, and s the elongation of an ideal cable at the tension scale, the tension is that of an
-    elongation sqrt(e^2 + s^2) - s ("hyperbolic"), or e - s (1 - exp(-e / s)) ("exponential").
+    elongation e - s (1 - exp(-e / s)) ("exponential"), sqrt(e^2 + s^2) - s ("hyperbolic"), or e^2 / (4 s) up to 2 s and
+    e - s beyond ("toe", a fibre bundle's).
     """
 
-    law: Literal["hyperbolic", "exponential"] = "hyperbolic"
+    law: Literal["hyperbolic", "exponential", "toe"] = "hyperbolic"
     tension_scale_N: PositiveFloat
 
 
 def _numbers(effects: Any) -> dict[str, Any]:
     given = effects.strand_settling
     return {
-        "has_settling": given is not None,
-        "settling_is_exponential": given is not None and given.law == "exponential",
+        "settling_law": ("hyperbolic", "exponential", "toe").index(given.law) if given else 0,
     }
+
+
+def _seeding(law: str) -> Seed:
+    def seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
+        values = {"T_scale": size} if law == "exponential" else {}
+        return {"strand_settling": {"law": law, "tension_scale_N": size}}, values
+
+    return seed
 
 
 TWIN = Twin(
@@ -33,6 +42,7 @@ TWIN = Twin(
     places=("cable",),
     size=(0.2, 8.0),
     unit="N",
-    seed=lambda size, also, place, spring: ({"strand_settling": {"tension_scale_N": size}}, {}),
+    seed=_seeding("exponential"),
+    other_laws={law: _seeding(law) for law in ("hyperbolic", "toe")},
     numbers=_numbers,
 )

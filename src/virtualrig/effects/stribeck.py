@@ -1,11 +1,16 @@
-"""Stribeck friction: the friction coefficient times 1 + rise exp(-(|v| / speed)^exponent), v the sliding speed."""
+"""Stribeck friction: the friction coefficient times 1 + rise g(|v| / speed), v the sliding speed.
+
+The law g(s) is exp(-s^exponent); 1 / (1 + s)^2 (Hess and Soom, Journal of Tribology 112(1), 147-152, 1990); or falls
+with the logarithm of the speed over two decades about it (Dieterich, Journal of Geophysical Research 84(B5), 2161-2168,
+1979).
+"""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import PositiveFloat
 
-from virtualrig.effects.contract import Seeded, Twin
+from virtualrig.effects.contract import Seed, Seeded, Twin
 from virtualrig.strict import NonNegative, Strict
 
 
@@ -15,6 +20,7 @@ class Stribeck(Strict):
     Without such a length a cable chatters ever faster on ever shorter pieces of itself.
     """
 
+    law: Literal["exponential", "hess-soom", "logarithmic"] = "exponential"
     rise: NonNegative
     speed_m_per_s: PositiveFloat
     exponent: PositiveFloat = 1.0
@@ -26,14 +32,23 @@ def _numbers(effects: Any) -> dict[str, Any]:
     return {
         "stribeck_rise": given.rise,
         "stribeck_speed": given.speed_m_per_s,
+        "stribeck_law": ("exponential", "hess-soom", "logarithmic").index(given.law),
         "stribeck_exponent": given.exponent,
         "stribeck_renewal": given.renewal_m,
     }
 
 
 def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
-    # Another curve over speed than the mechanism's, so that only the height of its peak can be compared.
-    return {"stribeck": {"rise": size, "speed_m_per_s": also["vs"], "exponent": 1.0}}, {"a": size}
+    settings = {"rise": size, "speed_m_per_s": also["vs"], "exponent": also["exponent"], "renewal_m": also["renewal_m"]}
+    return {"stribeck": settings}, {"a": size}
+
+
+def _another(law: str) -> Seed:
+    def seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
+        settings = {"law": law, "rise": size, "speed_m_per_s": also["vs"], "renewal_m": also["renewal_m"]}
+        return {"stribeck": settings}, {"a": size}
+
+    return seed
 
 
 TWIN = Twin(
@@ -42,7 +57,8 @@ TWIN = Twin(
     places=("conduit",),
     size=(0.03, 0.4),  # above 40 % cables chatter
     unit="1",
-    also={"vs": (5e-4, 5e-3)},
+    also={"vs": (5e-4, 5e-3), "exponent": (0.7, 2.0), "renewal_m": (5e-6, 1e-4)},
     seed=_seed,
+    other_laws={law: _another(law) for law in ("hess-soom", "logarithmic")},
     numbers=_numbers,
 )

@@ -1,4 +1,4 @@
-"""Compliances without friction in series at either end of both cables."""
+"""Compliances without friction in series at either end of both cables, linear or of a knot that beds in."""
 
 from collections.abc import Mapping
 
@@ -7,15 +7,22 @@ from virtualrig.strict import NonNegative, Strict
 
 
 class TerminationCompliance(Strict):
-    """Of the drive's and of the load's end."""
+    """Of the drive's and of the load's end; a knot is soft up to a tension of about its bedding."""
 
     drive_m_per_N: NonNegative = 0.0
     load_m_per_N: NonNegative = 0.0
+    drive_bedding_N: NonNegative = 0.0
+    load_bedding_N: NonNegative = 0.0
 
 
 def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     end = {"drive-end": "drive_m_per_N", "load-end": "load_m_per_N"}[place]
     return {"termination_compliance": {end: size}}, {"compliance": size}
+
+
+def _knot(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
+    end = place.removesuffix("-end")
+    return {"termination_compliance": {f"{end}_m_per_N": size, f"{end}_bedding_N": also["bedding_N"]}}, {}
 
 
 TWIN = Twin(
@@ -25,4 +32,6 @@ TWIN = Twin(
     size=(3e-6, 1e-4),
     unit="m/N",
     seed=_seed,
+    other_laws={"knot": _knot},
+    also={"bedding_N": (0.5, 4.0)},
 )
