@@ -1,10 +1,15 @@
 """Screening: sets of mechanisms from the products of their directions alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ccmodel.diagnosis.hypothesis import Hypothesis
-from ccmodel.diagnosis.screening import Screening, Trial
+from ccmodel.diagnosis.screening import Screening, Trial, leading, trials_of
+from ccmodel.diagnosis.settings import LEADING_TRIALS
+from ccmodel.model.general.run import Active
+from made_observations import PARAMETERS, calibrated, whitened
 
 GAIN, DRAG, KINK = ("torque-scale", "drive-sensor"), ("constant-drag", "conduit"), ("kink", "conduit")
 VISCOUS, SKEW = ("viscous-friction", "conduit"), ("time-skew", "load-sensor")
@@ -86,3 +91,18 @@ def test_singles_and_sets_of_one_agree():
 def test_nothing_that_can_be_run_gives_no_sets():
     none = Screening([], np.empty((0, 0)), np.empty(0), 1.0, [Hypothesis((GAIN,))])
     assert none.sets(2) == [] and none.singles()[0].values == {}
+
+
+def test_of_many_trials_those_that_explain_most_in_a_few_recordings_are_kept():
+    """A load with inertia rings on its cables: of 35 inertias those next to its own."""
+    truth = replace(PARAMETERS, mechanisms=(Active("load-inertia", "load", {"J": 3e-4, "zeta": 0.1}),))
+    conditions = ((0.6, 1.0, 7.0), (0.4, 0.7, 7.0), (0.6, 1.0, 5.0), (0.5, 1.3, 6.0))
+    recordings = [whitened(*c, seed=k, truth=truth) for k, c in enumerate(conditions)]
+    base = calibrated(recordings)
+    every = list(trials_of(base, Hypothesis((("load-inertia", "load"),))))
+    kept = leading(base, every)
+    assert (len(every), len(kept)) == (35, LEADING_TRIALS)
+    tried = [trial.values["load-inertia/load/J"] for trial in every]
+    assert min(abs(np.log(trial.values["load-inertia/load/J"] / 3e-4)) for trial in kept) < np.log(tried[1] / tried[0])
+    few = every[:2]
+    assert leading(base, few) is few

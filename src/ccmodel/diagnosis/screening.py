@@ -6,7 +6,7 @@ products of all directions (their Gram matrix) give the same test for any set of
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -181,13 +181,21 @@ def screen(base: CandidateFit, hypotheses: Sequence[Hypothesis], deadline: Deadl
     deadline : Deadline
         When the screening ends with the trials that were run until then.
     """
+    trials = [t for h in hypotheses for t in leading(base, list(trials_of(base, h)), deadline)]
+    return _screening(base, trials, hypotheses, deadline)
+
+
+def _screening(
+    base: CandidateFit, trials: Sequence[Trial], hypotheses: Sequence[Hypothesis], deadline: Deadline
+) -> Screening:
+    """Directions of trials outside of what a recalibration absorbs."""
     distances, derivatives = base.prior
     absorbed, _ = np.linalg.qr(np.concatenate([_stacked(base.whitened, base.jacobian), derivatives]))
     residuals = np.concatenate([_stacked(base.whitened, base.residuals), distances])
     residuals = residuals - absorbed @ (absorbed.T @ residuals)
     square = float(residuals @ residuals)
     usable, directions = [], []
-    for trial in (t for h in hypotheses for t in trials_of(base, h)):
+    for trial in trials:
         if deadline.has_passed:
             break
         direction = _direction(base, trial)
@@ -203,6 +211,34 @@ def screen(base: CandidateFit, hypotheses: Sequence[Hypothesis], deadline: Deadl
     D = np.stack(directions)
     product = -(D @ residuals.astype(np.float32))
     return Screening(usable, (D @ D.T).astype(float), product.astype(float), square, hypotheses)
+
+
+def leading(base: CandidateFit, trials: list[Trial], deadline: Deadline = UNLIMITED) -> list[Trial]:
+    """Of many trials of a mechanism, those that explain most in the few recordings that shake the load most.
+
+    A load with inertia has many: a resonance that is a few per cent out of tune explains nothing.
+    """
+    shaken = np.argsort([-_acceleration(w) for w in base.whitened], kind="stable")[: settings.FEW_RECORDINGS].tolist()
+    if len(trials) <= settings.MOST_TRIALS or len(shaken) == len(base.whitened):
+        return trials
+    part = replace(
+        base,
+        whitened=[base.whitened[i] for i in shaken],
+        residuals=[base.residuals[i] for i in shaken],
+        jacobian=[base.jacobian[i] for i in shaken],
+    )
+    found = _screening(part, trials, [trials[0].hypothesis], deadline)
+    possible = [found.product[k] > 0 or not trial.has_one_sign for k, trial in enumerate(found.trials)]
+    gains = np.where(possible, found.product**2 / np.diag(found.gram), 0.0)
+    kept = {id(found.trials[k]) for k in np.argsort(-gains, kind="stable")[: settings.LEADING_TRIALS]}
+    return [trial for trial in trials if id(trial) in kept]
+
+
+def _acceleration(w: Whitened) -> float:
+    """Root mean square acceleration of the drive in a recording, rad/s^2."""
+    time_s = w.observations.given.recording.time_s
+    rate = np.gradient(w.observations.given.theta_in, time_s)
+    return float(np.sqrt(np.mean(np.gradient(rate, time_s) ** 2)))
 
 
 def trials_of(base: CandidateFit, hypothesis: Hypothesis) -> Iterator[Trial]:

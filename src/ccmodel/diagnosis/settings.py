@@ -106,6 +106,9 @@ RANGE_SLACK = 1.5
 SCREENED_STRENGTHS, SCREENED_SHAPES, SCREENED_RATIO = (0.25, 0.6), (0.2, 0.5, 0.8), 1.15
 # Relative change at which a parameter of a frozen baseline is tried. Chosen.
 SCREENED_CHANGE = 0.05
+# Trials of one mechanism above which they are first tried on a few recordings, how many these are, and how many trials
+# are kept. Chosen for time: the inertias of a load took half of a screening.
+MOST_TRIALS, FEW_RECORDINGS, LEADING_TRIALS = 16, 3, 5
 # Limits of the linear extrapolation from a trial value to the start of a fit, as factors of it. Chosen.
 EXTRAPOLATION = (0.1, 4.0)
 # Sets of trials of each size that are extended by a further trial, and share of a direction outside of others' below
