@@ -22,8 +22,9 @@ from proof.cases import Case, draw
 from proof.intervals import rate, text_of
 from proof.judge import judge
 from proof.outcome import Outcome, is_located, outcome
-from proof.plan import read_plan
 
+# Waits over which what a past leaves is averaged.
+WAITS = 400
 EFFECTS, STATES = ("relaxation", "running-in"), ("past", "fresh")
 # Mean square from which an effect shows in the recordings. Correct models have 1.01 with a standard deviation of 0.03.
 SHOWS = 1.1
@@ -31,17 +32,21 @@ SHOWS = 1.1
 SIZES = {"relaxation": "r", "running-in": "change"}
 
 
-def left_by_past(effect: str) -> float:
-    """Share of an effect that the proof's pasts leave on average, each drawn evenly between two waits."""
-    past = read_plan().past
-    first, last = {"relaxation": past.relaxed_for, "running-in": past.ran_in_for}[effect]
-    return float((np.exp(-first) - np.exp(-last)) / (last - first))
+def left_by_past(case: Case) -> float:
+    """Share of a case's effect that the proof's pasts leave on average, each drawn evenly between two waits."""
+    effects, spread = case.campaign.rig.effects, case.campaign.repeatability
+    if case.truth[0].name == "relaxation":
+        shares, times = (np.array([getattr(b, n) for b in effects.relaxation]) for n in ("share", "time_constant_s"))
+        waits = np.linspace(*spread.tensioned_before_s, WAITS)[:, None]
+        return float((np.exp(-waits / times) @ shares).mean() / shares.sum())
+    ages = np.linspace(*spread.ran_in_before, WAITS)
+    return float(np.mean(1 / (1 + ages) if effects.running_in.law == "hyperbolic" else np.exp(-ages)))
 
 
 def without_past(case: Case) -> Case:
     """The same rig, tensioned and new as each recording begins, with what a past leaves of the effect."""
     (truth,) = case.truth
-    left, effects = left_by_past(truth.name), case.campaign.rig.effects
+    left, effects = left_by_past(case), case.campaign.rig.effects
     if truth.name == "relaxation":
         branches = tuple(b.model_copy(update={"share": left * b.share}) for b in effects.relaxation)
         effects = effects.model_copy(update={"relaxation": branches})
@@ -64,9 +69,9 @@ def judged(seed: int, effect: str, state: str, out: Path) -> dict:
         return json.loads(file.read_text(encoding="utf-8"))
     result = judge(without_past(case) if state == "fresh" else case, file.parent, report=lambda text: None)
     diagnosis = json.loads((file.parent / "diagnosis.json").read_text(encoding="utf-8"))
-    row = {"seed": seed, "effect": effect, "state": state, "protocol": case.protocol}
+    row = {"seed": seed, "effect": effect, "law": case.truth[0].law, "state": state, "protocol": case.protocol}
     row |= {"mean_square": diagnosis["fit"]["mean_square"]["calibrated"]}
-    row |= _said(outcome(result), left_by_past(effect) if state == "fresh" else 1.0)
+    row |= _said(outcome(result), left_by_past(case) if state == "fresh" else 1.0)
     file.write_text(json.dumps(row), encoding="utf-8")
     return row
 

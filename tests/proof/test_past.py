@@ -17,9 +17,17 @@ def test_the_same_rig_is_recorded_with_a_past_and_without():
     )
     assert fresh.campaign.rig.cable == case.campaign.rig.cable
     lost = [sum(b.share for b in one.campaign.rig.effects.relaxation) for one in (case, fresh)]
-    assert lost[1] == pytest.approx(left_by_past("relaxation") * lost[0])
-    assert left_by_past("relaxation") == pytest.approx((1 - np.exp(-4)) / 4)
+    assert lost[1] == pytest.approx(left_by_past(case) * lost[0])
+    branches, longest_s = case.campaign.rig.effects.relaxation, case.campaign.repeatability.tensioned_before_s[1]
+    left = sum(b.share * b.time_constant_s * -np.expm1(-longest_s / b.time_constant_s) for b in branches) / longest_s
+    assert left_by_past(case) == pytest.approx(left / lost[0], rel=1e-3)
     assert aged.tensioned_before_s > 0 == new.tensioned_before_s
+
+
+@pytest.mark.parametrize("law, left", [("", (1 - np.exp(-2)) / 2), ("hyperbolic", np.log(3) / 2)])
+def test_what_a_past_leaves_of_running_in_depends_on_its_law(law, left):
+    cases = (draw(seed, "single", "running-in") for seed in range(20))
+    assert left_by_past(next(case for case in cases if case.truth[0].law == law)) == pytest.approx(left, rel=1e-3)
 
 
 def row(**other):
