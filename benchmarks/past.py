@@ -15,6 +15,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ccmodel.inference.pool import set_threads
 from proof.calibration import compared_values
@@ -37,10 +38,15 @@ def left_by_past(case: Case) -> float:
     effects, spread = case.campaign.rig.effects, case.campaign.repeatability
     if case.truth[0].name == "relaxation":
         shares, times = (np.array([getattr(b, n) for b in effects.relaxation]) for n in ("share", "time_constant_s"))
-        waits = np.linspace(*spread.tensioned_before_s, WAITS)[:, None]
+        waits = evenly(*spread.tensioned_before_s)[:, None]
         return float((np.exp(-waits / times) @ shares).mean() / shares.sum())
-    ages = np.linspace(*spread.ran_in_before, WAITS)
+    ages = evenly(*spread.ran_in_before)
     return float(np.mean(1 / (1 + ages) if effects.running_in.law == "hyperbolic" else np.exp(-ages)))
+
+
+def evenly(first: float, last: float) -> NDArray:
+    """Middles of `WAITS` equal parts of a range, shape (WAITS,)."""
+    return first + (last - first) * (np.arange(WAITS) + 0.5) / WAITS
 
 
 def without_past(case: Case) -> Case:
