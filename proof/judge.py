@@ -14,6 +14,7 @@ from proof import conceal, regressors
 from proof.build import folder_digest, noise_floors, record
 from proof.cases import Case
 from proof.measured import CHANNELS, error_squares
+from proof.plan import read_plan
 
 DRIVE_COLUMNS = ("time_s", "drive_encoder_counts")
 # Model files of a diagnosis: with recalibrated parameters alone, and with the identified mechanisms.
@@ -53,7 +54,8 @@ def judge(
         record(case, case.recordings, batch)
         report(f"{case.name}: diagnosing, {conceal.core_s() - started:.0f} s of one core so far")
         digest = folder_digest(batch)
-        completed = conceal.diagnose(batch, out, case.without, sources)
+        limit = ("--time-limit", f"{read_plan().time_limit_s:g}")
+        completed = conceal.diagnose(batch, out, case.without, sources, limit)
         report(f"{case.name}: predicting held-out recordings, {conceal.core_s() - started:.0f} s of one core so far")
         diagnosis = _read_diagnosis(out / "diagnosis.json") if completed.is_usable else None
         held_out = _compare_with_held_out(case, batch, out, sources, with_regressors) if diagnosis else _HeldOut()

@@ -169,6 +169,7 @@ class Plan(Strict):
     protocols: dict[str, Protocol]
     kept_back: KeptBackPlan
     order: tuple[str, ...]
+    time_limit_s: PositiveFloat
     quick: tuple[FixedCase, ...]
     full: Full
 
