@@ -94,8 +94,8 @@ The held-out recordings are simulated after the diagnosis has ended.
   removed case the mechanism of the one effect is removed from the candidates. An unlisted effect has no mechanism. A
   poor case has a single effect, recorded with little variation.
 - **Law**: many effects have several published laws. Half of such effects are drawn with a law that the mechanism does
-  not have (`other_laws` of the files in `src/virtualrig/effects`). The rates of both stand apart. Intervals are compared
-  with the truth where both laws share a parameter.
+  not have (`other_laws` of the files in `src/virtualrig/effects`). The rates of both stand apart. Intervals are
+  compared with the truth where both laws share a parameter.
 - **Recalibrated model**: the paper's model as the diagnosis fits it to the batch (`calibrated.json`).
 - **Noise floor**: the error of a model with the true physics, from sensor noise, sensor zeros, encoder resolution and
   the run-to-run variation of friction.
