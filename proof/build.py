@@ -22,7 +22,6 @@ NOTE = "recordings of a simulated rig; its physics is not disclosed"
 # The tension limit is multiplied by this factor each time a run exceeds it.
 LIMIT_FACTOR = 1.5
 HIGHEST_LIMIT_N = 2000.0
-# Run-to-run change of friction in the noise floor: a model with the true physics does not know a run's own friction.
 # Time over which the drive's sub-count offset is added to the motion, s.
 OFFSET_RISE_S = 0.3
 

@@ -13,6 +13,7 @@ import pandas as pd
 from proof import conceal, regressors
 from proof.build import folder_digest, noise_floors, record
 from proof.cases import Case
+from proof.follow_up import follow_ups
 from proof.measured import CHANNELS, error_squares
 from proof.plan import read_plan
 
@@ -44,7 +45,8 @@ def judge(
     -------
     dict
         Content of ``result.json``: seed, digests of answer and sources, the diagnosis, and by channel the root mean
-        square errors on held-out recordings before and after it, with the noise floor.
+        square errors on held-out recordings before and after it, with the noise floor. Of an open case also the
+        diagnoses with a further experiment, whose time is not in that of the case.
     """
     started = conceal.core_s()
     out.mkdir(parents=True, exist_ok=True)
@@ -59,6 +61,9 @@ def judge(
         report(f"{case.name}: predicting held-out recordings, {conceal.core_s() - started:.0f} s of one core so far")
         diagnosis = _read_diagnosis(out / "diagnosis.json") if completed.is_usable else None
         held_out = _compare_with_held_out(case, batch, out, sources, with_regressors) if diagnosis else _HeldOut()
+        took_s = conceal.core_s() - started
+        again = _Again(case, sources, limit)
+        further = follow_ups(case, out / "diagnosis.json", Path(folder), again.diagnosed) if diagnosis else {}
     result = {
         "case": case.name,
         "seed": case.seed,
@@ -66,12 +71,13 @@ def judge(
         "key": case.digest,
         **conceal.made_by(sources),
         "batch": digest,
-        "tampering": [*completed.tampering, *held_out.tampering],
+        "tampering": [*completed.tampering, *again.tampering, *held_out.tampering],
         "why": None if diagnosis is not None else completed.failure,
         "diagnosis": diagnosis,
         "errors": held_out.errors,
         "rivals": held_out.regressors,
-        "took_s": round(conceal.core_s() - started, 1),
+        "follow_ups": further,
+        "took_s": round(took_s, 1),
     }
     write_result(result, out, report)
     return result
@@ -105,6 +111,22 @@ def _claim(mechanism: dict) -> dict:
         "confidence": float(mechanism["confidence"]),
         "parameters": mechanism.get("parameters") or [],
     }
+
+
+@dataclass
+class _Again:
+    """Further diagnoses of a case; what they were refused is collected in `tampering`."""
+
+    case: Case
+    sources: Path
+    options: tuple[str, ...]
+    tampering: tuple[str, ...] = ()
+
+    def diagnosed(self, batch: Path, out: Path) -> dict | None:
+        """Diagnose a batch of the case; None without a usable result."""
+        completed = conceal.diagnose(batch, out, self.case.without, self.sources, self.options)
+        self.tampering += completed.tampering
+        return _read_diagnosis(out / "diagnosis.json") if completed.is_usable else None
 
 
 @dataclass

@@ -7,7 +7,7 @@ more than its batch, is refused. A refused result counts as a failure in every r
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -56,6 +56,8 @@ class Outcome:
         Processor time, s.
     regressors : dict
         By reference regressor and channel, the root mean square error on held-out recordings.
+    follow_ups : dict
+        By kind of a further experiment (`proof.follow_up`), the diagnosis with its recordings; None where it failed.
     """
 
     key: dict
@@ -64,6 +66,7 @@ class Outcome:
     errors: dict = field(default_factory=dict)
     took_s: float = 0.0
     regressors: dict = field(default_factory=dict)
+    follow_ups: dict = field(default_factory=dict)
 
     @property
     def kind(self) -> str:
@@ -175,6 +178,11 @@ class Outcome:
         return len(reported) > MOST_MECHANISMS or wrong or is_incomplete
 
 
+def after(o: Outcome, which: str) -> Outcome:
+    """A case as it is diagnosed with a further experiment."""
+    return replace(o, diagnosis=o.follow_ups[which], failure="" if o.follow_ups[which] else "no diagnosis")
+
+
 class Answered(Protocol):
     """A case whose answer has a digest."""
 
@@ -194,6 +202,7 @@ def outcome(result: dict) -> Outcome:
         errors=result["errors"] if diagnosis else {},
         took_s=result["took_s"],
         regressors=result["rivals"] if diagnosis else {},
+        follow_ups={k: v["diagnosis"] for k, v in result.get("follow_ups", {}).items()} if diagnosis else {},
     )
 
 

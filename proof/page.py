@@ -106,6 +106,9 @@ The held-out recordings are simulated after the diagnosis has ended.
   It names no physics and counts as not detected.
 - **No confident misidentification**: no mechanism with a confidence of at least 0.8 is wrong, and no pair is declared
   explained with such a confidence while one of its effects is not named.
+- **Further experiment**: where the verdict is `undecided` or `unexplained`, the recordings that the diagnosis proposes
+  are made on the same rig, at most three, and the batch is diagnosed again with them. The control is as many recordings
+  of a motion, a tension and a bend drawn at random from those of the batch.
 - **Located**: the reported place is the true one. Places that no recording distinguishes count as equal: cable and
   conduit, a pulley and its cable end, the load and its pulley.
 - **Open** in the column "met": the 95 % interval includes the target, so that more cases are needed to decide.

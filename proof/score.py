@@ -7,11 +7,13 @@ import numpy as np
 
 from proof.calibration import calibration_error, compared_values, doubtful, reliability, spiegelhalter
 from proof.detection import confusion, detection, detection_by_error
+from proof.follow_up import PROPOSED, RANDOM
 from proof.intervals import bootstrap, count
-from proof.outcome import INCONSISTENT, Outcome, is_located
+from proof.outcome import INCONSISTENT, Outcome, after, is_located
 
 INPUTS_ACCEPTED = "right inputs are not called inconsistent"
 COVERAGE = 0.9
+EXPERIMENT_DECIDES = 0.7
 COVERAGE_RATE = "coverage of the 90 % intervals"
 SPIEGELHALTER = "Spiegelhalter's z of confidences from 0.3 to 0.9 (calibrated: within 2)"
 CALIBRATION_ERROR = "expected calibration error of stated confidences"
@@ -27,6 +29,7 @@ def rates(outcomes: Sequence[Outcome]) -> list[dict]:
         count("no confident misidentification", outcomes, lambda o: not o.is_confidently_wrong, 0.98),
         *_rates_of_outsiders([o for o in outcomes if o.kind in ("unlisted", "removed")]),
         *_rates_of_open_cases(outcomes),
+        *_rates_of_experiments(outcomes),
         count(COVERAGE_RATE, compared_values(outcomes), lambda v: v["low"] <= v["true"] <= v["high"], COVERAGE),
     ]
 
@@ -80,6 +83,25 @@ def _rates_of_open_cases(outcomes: Sequence[Outcome]) -> list[dict]:
             lambda o: bool(o.true_names & set(o.alternatives)),
         ),
     ]
+
+
+def _rates_of_experiments(outcomes: Sequence[Outcome]) -> list[dict]:
+    """How often a further experiment decides: the proposed one, and one drawn at random."""
+    found = []
+    for verdict, target in (("undecided", EXPERIMENT_DECIDES), ("unexplained", None)):
+        asked = [o for o in outcomes if o.verdict == verdict and o.follow_ups]
+        for which in (PROPOSED, RANDOM):
+            later = [after(o, which) for o in asked]
+            what = f"{verdict}: after the {which} experiment"
+            wanted = target if which == PROPOSED else None
+            found.append(count(f"{what}: explained", later, lambda o: o.verdict == "explained", wanted))
+            found.append(count(f"{what}: explained by the concealed effects", later, _is_complete))
+    return found
+
+
+def _is_complete(o: Outcome) -> bool:
+    """Whether exactly the concealed effects are identified."""
+    return bool(o.identified) and {m["name"] for m in o.identified} == o.true_names
 
 
 def _by_kind(outcomes: Iterable[Outcome]) -> dict[str, list[Outcome]]:

@@ -50,7 +50,7 @@ def test_it_is_within_what_the_rig_has_done():
 
 @pytest.mark.parametrize("fastest", [0.5, 3.0])
 def test_no_motion_is_faster_than_the_rig(fastest):
-    for text, theta in motions(0.6, fastest):
+    for text, _, theta in motions(0.6, fastest):
         assert np.abs(np.diff(theta)).max() * EXPERIMENT_RATE_HZ < fastest * 1.05, text
         assert theta[0] == 0.0
 
@@ -66,6 +66,12 @@ def test_slow_and_fast_friction_are_told_apart_by_speed():
     found = proposed(judged(recordings, *rivals), PARAMETERS)
     assert found["separates"] == ["viscous-friction", "pulley-friction"]
     assert "Hz" in found["text"]
+    asked = found["recording"]
+    assert asked["excitation"]["wave"] in found["text"] or "nested" in found["text"]
+    assert asked["recordings"] >= 1
+    assert asked["bend_rad"] in {w.observations.given.recording.path.bend_rad for w in recordings}
+    highest_N = max(w.observations.given.recording.pretension_N for w in recordings)
+    assert asked["pretension_N"] / highest_N == pytest.approx(1.0) or asked["pretension_N"] / highest_N < 0.5
 
 
 def test_recordings_are_asked_for_until_one_rival_leads():

@@ -32,12 +32,35 @@ STEEPEST = 15 / 8  # Highest over mean slope of a smooth step.
 
 @dataclass(frozen=True)
 class Experiment:
-    """A drive motion, a share of a recording's pretension and its conduits, in words and in numbers."""
+    """A drive motion, a share of a recording's pretension and its conduits, in words and in numbers.
+
+    Attributes
+    ----------
+    text : str
+    motion : dict
+        The motion as `excitation` in a batch.yaml.
+    theta_in : ndarray, shape (n,)
+        The drive angle, rad.
+    pretension_share : float
+        Of the pretension of `like`.
+    like : Recording
+        The recording whose conduits it has.
+    """
 
     text: str
+    motion: dict
     theta_in: NDArray
     pretension_share: float
     like: Recording
+
+    def recording(self, count: int) -> dict:
+        """What is to be recorded, and how often, as plain data for diagnosis.json."""
+        return {
+            "excitation": self.motion,
+            "pretension_N": self.pretension_share * self.like.pretension_N,
+            "bend_rad": self.like.path.bend_rad,
+            "recordings": count,
+        }
 
 
 def proposed(judgement: Judgement, estimates: Parameters) -> dict | None:
@@ -62,8 +85,9 @@ def proposed(judgement: Judgement, estimates: Parameters) -> dict | None:
     differ = f"there the candidates differ by {refitted[best]:.2g} times the noise, fitted to it as well"
     wanted = recordings_wanted(refitted[best], len(template.channels))
     tells = "one such recording tells" if wanted == 1 else f"it takes {wanted} such recordings to tell"
-    text = f"{every[leading[best]].text}: {differ}, more than in any other tried; {tells}."
-    return {"text": text, "separates": names}
+    chosen = every[leading[best]]
+    text = f"{chosen.text}: {differ}, more than in any other tried; {tells}."
+    return {"text": text, "separates": names, "recording": chosen.recording(wanted)}
 
 
 def recordings_wanted(apart: float, channels: int) -> int:
@@ -85,24 +109,29 @@ def experiments(whitened: Sequence[Whitened]) -> list[Experiment]:
             at = f"pretension {pretension:.0%} of the highest recorded"
             at += f", bend {bend:.2g} rad" if len(bends) > 1 else ""
             found += [
-                Experiment(f"{text}, {at}", theta, pretension, like)
-                for text, theta in motions(size * amplitude, fastest)
+                Experiment(f"{text}, {at}", motion, theta, pretension, like)
+                for text, motion, theta in motions(size * amplitude, fastest)
             ]
     return found
 
 
-def motions(a: float, fastest: float) -> Iterator[tuple[str, NDArray]]:
-    """Text and drive angles (rad) of motions with an amplitude (rad), no faster than a speed (rad/s)."""
+def motions(a: float, fastest: float) -> Iterator[tuple[str, dict, NDArray]]:
+    """Text, numbers and drive angles (rad) of motions with an amplitude (rad), no faster than a speed (rad/s)."""
     start = np.clip(np.arange(0, settings.EXPERIMENT_S, 1 / settings.EXPERIMENT_RATE_HZ) - 0.4, 0, None)
     highest_Hz = fastest / (2 * np.pi * a)
     for rate in dict.fromkeys(min(rate, highest_Hz) for rate in settings.SINES_HZ):
-        yield f"a sine of {a:.2g} rad at {rate:.2g} Hz", a * np.sin(2 * np.pi * rate * start)
+        sine = {"wave": "sine", "amplitude_rad": float(a), "frequency_Hz": float(rate)}
+        yield f"a sine of {a:.2g} rad at {rate:.2g} Hz", sine, a * np.sin(2 * np.pi * rate * start)
     for hold in settings.HOLDS_S:
         move_s = max(settings.STEP_DURATION_S, STEEPEST * a / fastest)
-        yield f"steps of {a:.2g} rad held for {hold:g} s", _steps(a, start, hold, move_s)
+        steps = {"wave": "step-and-hold", "angles_rad": [float(a), 0.0, float(-a), 0.0]}
+        steps |= {"move_s": float(move_s), "hold_s": hold}
+        yield f"steps of {a:.2g} rad held for {hold:g} s", steps, _steps(a, start, hold, move_s)
     rate = min(settings.NESTED_HZ, highest_Hz)
     nested = a * np.sin(2 * np.pi * rate * start) * (1 - start / start[-1])
-    yield f"nested reversals from {a:.2g} rad down at {rate:.2g} Hz", nested
+    shrinking = {"wave": "growing-sine", "first_amplitude_rad": float(a), "amplitude_rad": 0.0}
+    shrinking["frequency_Hz"] = float(rate)
+    yield f"nested reversals from {a:.2g} rad down at {rate:.2g} Hz", shrinking, nested
 
 
 def _steps(amplitude: float, start: NDArray, hold_s: float, move_s: float) -> NDArray:
