@@ -260,7 +260,8 @@ def _with_states(
 
     def of(i: int, w: Whitened) -> Whitened:
         model = hypothesis.of(w.observations.parameters)
-        return with_states_of(w, model.with_values(values, w.session), own and own[i]).with_parameters(model)
+        states = own[i] if own else None
+        return with_states_of(w, model.with_values(values, w.session), states).with_parameters(model)
 
     return each(whitened, of)
 

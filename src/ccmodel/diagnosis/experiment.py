@@ -124,8 +124,8 @@ def motions(a: float, fastest: float) -> Iterator[tuple[str, dict, NDArray]]:
         yield f"a sine of {a:.2g} rad at {rate:.2g} Hz", sine, a * np.sin(2 * np.pi * rate * start)
     for hold in settings.HOLDS_S:
         move_s = max(settings.STEP_DURATION_S, STEEPEST * a / fastest)
-        steps = {"wave": "step-and-hold", "angles_rad": [float(a), 0.0, float(-a), 0.0]}
-        steps |= {"move_s": float(move_s), "hold_s": hold}
+        angles = [float(a), 0.0, float(-a), 0.0]
+        steps = {"wave": "step-and-hold", "angles_rad": angles, "move_s": float(move_s), "hold_s": hold}
         yield f"steps of {a:.2g} rad held for {hold:g} s", steps, _steps(a, start, hold, move_s)
     rate = min(settings.NESTED_HZ, highest_Hz)
     nested = a * np.sin(2 * np.pi * rate * start) * (1 - start / start[-1])

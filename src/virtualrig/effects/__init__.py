@@ -1,7 +1,7 @@
 """Effects of a virtual rig beyond Coulomb friction, elastic cables and ideal sensors: one file each, found by listing.
 
 An effect that is not given is absent; `Effects()` is the ideal rig. The time loop that integrates them is
-`virtualrig.effect_dynamics`.
+`virtualrig.effect_march`.
 """
 
 import hashlib

@@ -5,7 +5,7 @@
 2. ``fields`` declares the effect's fields of a rig's configuration: of the rig itself, of each pulley, of the load, or
    of the sensors of each side.
 3. A law of friction is a compiled function, ``slow_friction`` or ``friction``. A fault of sensors is ``read``. What
-   needs a state of its own stands in the time loop (`virtualrig.effect_dynamics`); ``numbers`` gives it the values.
+   needs a state of its own stands in the time loop (`virtualrig.effect_march`); ``numbers`` gives it the values.
 4. ``places`` to ``also`` are what the proof draws; ``seed`` turns a drawn size into the rig's settings and an answer.
 """
 
