@@ -1,12 +1,16 @@
 """The experiment that separates candidate models."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.comparison import Comparison
+from ccmodel.diagnosis.drive import speed
 from ccmodel.diagnosis.experiment import (
     experiments,
+    load_as_recorded,
     motions,
     planned_observations,
     proposed,
@@ -72,6 +76,28 @@ def test_slow_and_fast_friction_are_told_apart_by_speed():
     assert asked["bend_rad"] in {w.observations.given.recording.path.bend_rad for w in recordings}
     highest_N = max(w.observations.given.recording.pretension_N for w in recordings)
     assert asked["pretension_N"] / highest_N == pytest.approx(1.0) or asked["pretension_N"] / highest_N < 0.5
+
+
+def test_a_load_that_was_measured_is_taken_as_in_the_recordings():
+    """A torque that follows the drive's angle and direction does so in another motion, and the models can be run."""
+    recordings = batch()
+    made = []
+    for w in recordings:
+        g = w.observations.given
+        tau = 0.02 * g.theta_in + 0.003 * np.tanh(speed(g) / 0.05) + 0.001
+        made.append(replace(g, tau_out=tau))
+    theta = 0.3 * np.sin(np.linspace(0, 6, 1250))
+    load = load_as_recorded(made, theta)
+    rate = np.gradient(theta) * EXPERIMENT_RATE_HZ
+    moving = np.abs(rate) > 0.2
+    assert load["tau_out"][moving] == pytest.approx((0.02 * theta + 0.003 * np.sign(rate) + 0.001)[moving], abs=5e-4)
+    experiment = replace(experiments(recordings)[0], load=load_as_recorded(made, experiments(recordings)[0].theta_in))
+    free_load = replace(PARAMETERS, load_stiffness_Nm_per_rad=None)
+    base = fitted(recordings)
+    values = {k: v for k, v in base.values.items() if not k.startswith("load_stiffness")}
+    base = replace(base, values=values)
+    planned = planned_observations(experiment, base, recordings[0].observations, free_load)
+    assert np.isfinite(planned.errors({})).all()
 
 
 def test_recordings_are_asked_for_until_one_rival_leads():

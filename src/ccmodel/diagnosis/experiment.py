@@ -6,8 +6,8 @@ covariance of both candidates' values and of the nuisances of a run, so that onl
 (Buzzi-Ferraris and Forzatti, Chemical Engineering Science 38(2), 1983).
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -28,6 +28,7 @@ from ccmodel.model.run import ModelInput
 from ccmodel.recording import Recording
 
 STEEPEST = 15 / 8  # Highest over mean slope of a smooth step.
+SMOOTH_SIGN = 0.05  # Speed over the fastest at which the smooth sign of a motion changes.
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,8 @@ class Experiment:
         Of the pretension of `like`.
     like : Recording
         The recording whose conduits it has.
+    load : mapping of str to ndarray, each of shape (n,)
+        The load at the far end as in the recordings (`load_as_recorded`); a load with a law does without.
     """
 
     text: str
@@ -52,6 +55,7 @@ class Experiment:
     theta_in: NDArray
     pretension_share: float
     like: Recording
+    load: Mapping[str, NDArray] = field(default_factory=dict)
 
     def recording(self, count: int) -> dict:
         """What is to be recorded, and how often, as plain data for diagnosis.json."""
@@ -109,9 +113,30 @@ def experiments(whitened: Sequence[Whitened]) -> list[Experiment]:
             at = f"pretension {pretension:.0%} of the highest recorded"
             at += f", bend {bend:.2g} rad" if len(bends) > 1 else ""
             found += [
-                Experiment(f"{text}, {at}", motion, theta, pretension, like)
+                Experiment(f"{text}, {at}", motion, theta, pretension, like, load_as_recorded(given, theta))
                 for text, motion, theta in motions(size * amplitude, fastest)
             ]
+    return found
+
+
+def load_as_recorded(given: Sequence[ModelInput], theta_in: NDArray) -> dict[str, NDArray]:
+    """What was measured at the load, for a further motion: linear in the drive's angle and smooth sign of its speed.
+
+    A load without a law is an input of the model. What it will be in a new motion is not known; candidates are told
+    apart as if it were as in the recordings.
+    """
+    fastest = max(np.abs(speed(g)).max() for g in given)
+
+    def regressors(angle: NDArray, rate: NDArray) -> NDArray:
+        return np.column_stack([np.ones_like(angle), angle, np.tanh(rate / (SMOOTH_SIGN * fastest))])
+
+    recorded = np.concatenate([regressors(g.theta_in, speed(g)) for g in given])
+    further = regressors(theta_in, np.gradient(theta_in) * settings.EXPERIMENT_RATE_HZ)
+    found = {}
+    for name in ("theta_out", "tau_out", "F_load"):
+        values = [getattr(g, name) for g in given]
+        if all(v is not None for v in values):
+            found[name] = further @ np.linalg.lstsq(recorded, np.concatenate(values), rcond=None)[0]
     return found
 
 
@@ -151,7 +176,7 @@ def planned_observations(
     time_s = np.arange(shape[1]) / settings.EXPERIMENT_RATE_HZ
     model, like = candidate.model(estimates), experiment.like
     return Observations(
-        given=ModelInput.prescribed(like, time_s, experiment.theta_in, like.pretension_N),
+        given=ModelInput.prescribed(like, time_s, experiment.theta_in, like.pretension_N, **experiment.load),
         parameters=replace(model, pretension_scale=model.pretension_scale * experiment.pretension_share),
         channels=template.channels,
         judged=np.ones(shape[1], bool),

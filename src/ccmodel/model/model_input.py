@@ -79,7 +79,9 @@ class ModelInput:
         )
 
     @classmethod
-    def prescribed(cls, like: Recording, time_s: NDArray, theta_in: NDArray, pretension_N: float) -> "ModelInput":
+    def prescribed(
+        cls, like: Recording, time_s: NDArray, theta_in: NDArray, pretension_N: float, **load: NDArray
+    ) -> "ModelInput":
         """Input of a motion that was not recorded, known exactly, of a recording's rig with even initial tension.
 
         Parameters
@@ -89,6 +91,8 @@ class ModelInput:
         time_s, theta_in : ndarray, shape (n,)
             s; rad.
         pretension_N : float
+        **load : ndarray, each of shape (n,)
+            Any of `theta_out`, `tau_out` and `F_load`, for a load without a law.
         """
         recording = replace(
             like,
@@ -101,7 +105,9 @@ class ModelInput:
             rest_s=0.0,
             settled_s=0.0,
         )
-        return cls(recording, theta_in, np.zeros((0, theta_in.size)), np.zeros(theta_in.size), None, None, None, {})
+        theta_out, tau_out, F_load = (load.get(name) for name in ("theta_out", "tau_out", "F_load"))
+        exact = np.zeros((0, theta_in.size)), np.zeros(theta_in.size)
+        return cls(recording, theta_in, *exact, theta_out, tau_out, F_load, {})
 
     @cached_property
     def resting_mean(self) -> dict[str, float]:
