@@ -341,6 +341,21 @@ def test_a_pair_is_undecided_if_a_mechanism_is_that_single_fault(isolated):
     assert (found.verdict, found.probability[0] > SURE) == ("undecided", True)
 
 
+def test_a_further_mechanism_is_not_credited_with_a_worse_minimum_of_a_part(monkeypatch):
+    """The single mechanism was fitted before, and its search had ended at a worse minimum."""
+    recordings = batch(lambda simulated: {"tau_in_Nm": 0.1 * simulated["tau_in_Nm"]})
+    base = calibrated(recordings)
+    selection = Selection(base.free, [])
+    (single,) = selection.fit_all(recordings, base, [Score(Hypothesis((SCALE,)), 0.0, STARTS[0])])
+    stuck = replace(single, loo_residuals=[4 * e for e in single.loo_residuals])
+    (both,) = selection.fit_all(recordings, base, [Score(Hypothesis((SCALE, FRICTION)), 0.0, STARTS[0] | STARTS[1])])
+    monkeypatch.setattr(Selection, "_sets", lambda *given: [both])
+    found = selection.extended(Comparison.of(recordings, base, [stuck]), None, 2)
+    assert found.candidates[0].hypothesis.acting == (SCALE,)
+    assert found.candidates[0].mean_square == pytest.approx(single.mean_square, rel=1e-3)
+    assert both.hypothesis in [c.hypothesis for c in found.passed_over]
+
+
 def test_the_covariance_is_linearised_about_the_best_candidate():
     recordings = batch(lambda simulated: {"tau_in_Nm": 0.1 * simulated["tau_in_Nm"]})
     base = calibrated(recordings)

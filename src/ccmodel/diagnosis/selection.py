@@ -112,8 +112,8 @@ class Selection:
         every = [*found.fitted, *sets]
         best = min(sets, key=lambda c: (not c.is_plausible, c.mean_square))
         if improves_on_members(best, every):
-            every += self._part(0.8, 1.0)._subsets(found, best, every)
-        return Comparison.of(found.whitened, found.base, every, found.screened, found.linearised_about)
+            every += self._part(0.8, 1.0)._subsets(found, best)
+        return Comparison.of(found.whitened, found.base, lowest(every), found.screened, found.linearised_about)
 
     def _sets(self, found: Comparison, screening: Screening, size: int) -> list[CandidateFit]:
         """Fitted sets: the leading smaller ones with the best partner each, and those that lead the first screening."""
@@ -132,13 +132,16 @@ class Selection:
         part = self._part(len(firsts) / (len(firsts) + 1), 1.0)
         return fitted + part.fit_all(found.whitened, found.base, linear)
 
-    def _subsets(self, found: Comparison, best: CandidateFit, every: Sequence[CandidateFit]) -> list[CandidateFit]:
-        """The fitted subsets of a set that lack one of its members each, as far as they are not among `every`."""
-        fitted = {frozenset(c.hypothesis.acting) for c in every}
-        subsets = combinations(best.hypothesis.acting, best.hypothesis.size - 1)
-        missing = [Hypothesis(s) for s in subsets if frozenset(s) not in fitted]
-        starts = [Score(h, 0.0, {key: best.values[key] for key in h.start}) for h in missing]
-        return self.fit_all(found.whitened, found.base, starts)
+    def _subsets(self, found: Comparison, best: CandidateFit) -> list[CandidateFit]:
+        """The subsets of a set that lack one of its members each, fitted from its values.
+
+        Also those that were fitted before: from other values a search may have ended at a worse minimum, and the
+        further member would be credited with the difference.
+        """
+        subsets = map(Hypothesis, combinations(best.hypothesis.acting, best.hypothesis.size - 1))
+        starts = [Score(h, 0.0, {key: best.values[key] for key in h.start}) for h in subsets]
+        base = replace(found.base, values={name: best.values[name] for name in found.base.values})
+        return self.fit_all(found.whitened, base, starts)
 
     def relinearise(self, found: Comparison) -> Comparison:
         """Leading candidates fitted again, with the covariance linearised about the best of them.
@@ -178,12 +181,23 @@ class Selection:
         again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in leading for s in starts(c)])
         if not any(c.hypothesis == best.hypothesis for c in again):
             return found
-        best_of = {c.hypothesis: c for c in sorted(again, key=lambda c: c.mean_square, reverse=True)}
+        every = lowest(again)
         # About the same mechanisms once more: only if that leads on.
         about = found.linearised_about
-        if about and about.hypothesis == best.hypothesis and best_of[best.hypothesis].mean_square >= best.mean_square:
+        reached = next(c.mean_square for c in every if c.hypothesis == best.hypothesis)
+        if about and about.hypothesis == best.hypothesis and reached >= best.mean_square:
             return found
-        return Comparison.of(whitened, base, list(best_of.values()), found.screened, best)
+        return Comparison.of(whitened, base, every, found.screened, best)
+
+
+def lowest(every: Sequence[CandidateFit]) -> list[CandidateFit]:
+    """Of the fits of each set of mechanisms the one with the lowest mean square."""
+    best: dict[frozenset, CandidateFit] = {}
+    for candidate in every:
+        members = frozenset(candidate.hypothesis.acting)
+        if members not in best or candidate.mean_square < best[members].mean_square:
+            best[members] = candidate
+    return list(best.values())
 
 
 def unseen(
