@@ -79,7 +79,7 @@ def effect(place="conduit", **values):
         ),
         (
             lambda: by_general(relaxation=effect("cable", r=0.1, tau=0.0)),
-            "tau = 0 .time constant., which must be above 0",
+            "tau = 0 .middle time constant., which must be above 0",
         ),
         (
             lambda: by_general(relaxation=effect("cable", r=0.1, tau=5.0, relaxed=1.2)),
