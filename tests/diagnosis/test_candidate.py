@@ -9,6 +9,7 @@ import pytest
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import continued, discretisation_shift, fit
 from ccmodel.diagnosis.hypothesis import Hypothesis, single_mechanisms
+from ccmodel.diagnosis.result import least_strength, mechanism_of
 from ccmodel.diagnosis.screening import screen
 from ccmodel.diagnosis.whitening import relinearised, with_states_of
 from ccmodel.mechanisms.relaxation import relaxed_after
@@ -144,6 +145,20 @@ def test_a_state_beyond_its_range_is_an_error_of_its_own():
     assert beyond[0.02] < -1
     assert 0 <= w.own_values({SHARE: 0.3})[STATE] <= 1
     assert beyond[0.3] == 0
+
+
+def test_a_strength_may_be_no_more_than_what_shows_in_one_recording():
+    """Fresh cables show all of it, and nothing tells a fit that they are fresh."""
+    fresh = replace(PARAMETERS, mechanisms=(Active("relaxation", "cable", {"r": 0.1, "tau": 5.0, "relaxed": 0.0}),))
+    recordings = batch(truth=fresh)
+    base = calibrated(recordings)
+    found = fit(recordings, RELAXATION, base.free, base.values | {SHARE: 0.1, TAU: 8.0, SPREAD: 1.5, STATE: 0.5})
+    shown = found.values[SHARE] * (1 - found.values[STATE])
+    least = least_strength(found, SHARE, STATE)
+    assert 0.2 * shown < least < 1.3 * shown
+    ends = {p["name"]: (p["low"], p["high"]) for p in mechanism_of(found, 0, 0.9)["parameters"]}["r"]
+    assert ends[0] <= min(least, 0.1)
+    assert ends[0] < found.values[SHARE] < ends[1]
 
 
 def test_the_total_share_of_cables_that_have_settled_is_uncertain():

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm as normal
 
 from ccmodel import mechanisms as registry
 from ccmodel.channels import short_name, unit_of
@@ -13,6 +14,7 @@ from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.observations import NotJudged
 from ccmodel.diagnosis.verdict import Judgement, nested_choice
 from ccmodel.failure import ModelError
+from ccmodel.inference.intervals import COVERAGE
 from ccmodel.model.parameters import Parameters, mechanism_key
 
 FORMAT = 1
@@ -124,7 +126,12 @@ def mechanism_of(candidate: CandidateFit, k: int, confidence: float, shift: NDAr
         i, low, high = names.index(key), free[key].low, free[key].high
         value = float(np.clip(candidate.values[key] + shift[i], low, high))
         is_relative = bool(mechanism.states) and p in mechanism.strengths
-        ends = interval(value, float(reach[i]), is_relative).clip(low, high).tolist()
+        ends = interval(value, float(reach[i]), is_relative)
+        if is_relative:
+            least = least_strength(candidate, key, mechanism_key(name, place, mechanism.states[0].name))
+            nearest = int(np.argmin(np.abs(ends)))
+            ends[nearest] = np.sign(value) * min(least, abs(ends[nearest]))
+        ends = ends.clip(low, high).tolist()
         unit = p.unit.replace(" ", "*")
         parameters.append({"name": p.name, "value": value, "low": ends[0], "high": ends[1], "unit": unit})
     return {"name": name, "place": place, "confidence": round(confidence, 4), "parameters": parameters}
@@ -140,6 +147,35 @@ def interval(value: float, reach: float, is_relative: bool) -> NDArray:
         return np.array([value - reach, value + reach])
     # A factor beyond exp(20) is beyond any bound.
     return np.sort(value * np.exp(np.array([-1, 1]) * min(reach / abs(value), 20.0)))
+
+
+def least_strength(candidate: CandidateFit, strength: str, state: str) -> float:
+    """The most that shows of a strength in any recording, at the lower end of its 90 % interval.
+
+    No recording tells whether more of it was over before all of them. The state's prior favours recordings that differ
+    little, and so a larger strength than has shown anywhere.
+
+    Parameters
+    ----------
+    candidate : CandidateFit
+    strength, state : str
+        Unknowns: the strength, and the share of it that is over when a recording starts, on average.
+
+    Returns
+    -------
+    float
+        Infinite if the recordings' times give the state.
+    """
+    own = [w.states_within_range(candidate.values) for w in candidate.whitened]
+    value, mean = candidate.values[strength], candidate.values[state]
+    if not all(state in states for states in own) or not own or value * (1 - mean) == 0.0:
+        return np.inf
+    names = list(candidate.values)
+    some = [names.index(strength), names.index(state)]
+    by_both = np.array([1 - mean, -value])
+    spread = np.sqrt(max(by_both @ candidate.covariance[np.ix_(some, some)] @ by_both, 0.0)) / abs(value * (1 - mean))
+    least_over = min(states[state] for states in own)
+    return float(abs(value) * (1 - least_over) * np.exp(-normal.ppf(0.5 + COVERAGE / 2) * spread))
 
 
 def held_out_errors(judgement: Judgement, calibrated: CandidateFit, chosen: Sequence[CandidateFit]) -> dict[str, dict]:
