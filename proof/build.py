@@ -155,19 +155,26 @@ def _noise_variance(sensor: TorqueSensor | LoadCell) -> float:
     return noise**2 * (1 + (sensor.slow_noise.ratio if sensor.slow_noise else 0.0) ** 2)
 
 
-def record(case: Case, plans: Sequence[RecordingPlan], folder: Path) -> dict[str, tuple[Preparation, Trajectory]]:
+def record(
+    case: Case, plans: Sequence[RecordingPlan], folder: Path, recorded: Path | None = None
+) -> dict[str, tuple[Preparation, Trajectory]]:
     """Simulate some of a case's recordings and write them as a batch to a new folder.
+
+    Logs that the batch `recorded` of the same case has already are copied.
 
     Returns
     -------
     dict of str to (Preparation, Trajectory)
-        Initial state and trajectory of each recording, by id.
+        Initial state and trajectory of each simulated recording, by id.
     """
     # An interrupted build may have left a partial folder.
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     campaign, runs = case.campaign, {}
     for plan in plans:
+        if recorded is not None and (recorded / log_name(plan)).exists():
+            shutil.copyfile(recorded / log_name(plan), folder / log_name(plan))
+            continue
         draw = recording_generator(case.seed, case.name, plan.id)
         preparation = prepare(campaign, plan, draw)
         trajectory = simulate(campaign, plan, preparation)

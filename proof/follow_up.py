@@ -33,7 +33,7 @@ STREAM = 0xF0110
 Diagnose = Callable[[Path, Path], dict | None]
 
 
-def follow_ups(case: Case, diagnosis: Path, folder: Path, diagnose: Diagnose) -> dict[str, dict]:
+def follow_ups(case: Case, diagnosis: Path, recorded: Path, folder: Path, diagnose: Diagnose) -> dict[str, dict]:
     """Diagnoses of a case with a further experiment, by `PROPOSED` and `RANDOM`; empty if none was proposed.
 
     Parameters
@@ -41,6 +41,8 @@ def follow_ups(case: Case, diagnosis: Path, folder: Path, diagnose: Diagnose) ->
     case : Case
     diagnosis : Path
         The diagnosis.json of the case.
+    recorded : Path
+        Its batch.
     folder : Path
         Where batches and results are written.
     diagnose : callable
@@ -53,7 +55,7 @@ def follow_ups(case: Case, diagnosis: Path, folder: Path, diagnose: Diagnose) ->
     found = {}
     for which, experiment in ((PROPOSED, asked), (RANDOM, drawn)):
         batch = folder / which / case.name
-        record(case, [*case.recordings, *plans_of(case, experiment)], batch)
+        record(case, [*case.recordings, *plans_of(case, experiment)], batch, recorded)
         found[which] = {"experiment": experiment, "diagnosis": diagnose(batch, folder / f"{which}-out")}
     return found
 

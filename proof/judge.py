@@ -63,7 +63,7 @@ def judge(
         held_out = _compare_with_held_out(case, batch, out, sources, with_regressors) if diagnosis else _HeldOut()
         took_s = conceal.core_s() - started
         again = _Again(case, sources, limit)
-        further = follow_ups(case, out / "diagnosis.json", Path(folder), again.diagnosed) if diagnosis else {}
+        further = follow_ups(case, out / "diagnosis.json", batch, Path(folder), again.diagnosed) if diagnosis else {}
     result = {
         "case": case.name,
         "seed": case.seed,

@@ -87,11 +87,11 @@ def test_a_load_that_was_measured_is_taken_as_in_the_recordings():
         tau = 0.02 * g.theta_in + 0.003 * np.tanh(speed(g) / 0.05) + 0.001
         made.append(replace(g, tau_out=tau))
     theta = 0.3 * np.sin(np.linspace(0, 6, 1250))
-    load = load_as_recorded(made, theta)
+    load = load_as_recorded(made)(theta)
     rate = np.gradient(theta) * EXPERIMENT_RATE_HZ
     moving = np.abs(rate) > 0.2
     assert load["tau_out"][moving] == pytest.approx((0.02 * theta + 0.003 * np.sign(rate) + 0.001)[moving], abs=5e-4)
-    experiment = replace(experiments(recordings)[0], load=load_as_recorded(made, experiments(recordings)[0].theta_in))
+    experiment = replace(experiments(recordings)[0], load=load_as_recorded(made)(experiments(recordings)[0].theta_in))
     free_load = replace(PARAMETERS, load_stiffness_Nm_per_rad=None)
     base = fitted(recordings)
     values = {k: v for k, v in base.values.items() if not k.startswith("load_stiffness")}

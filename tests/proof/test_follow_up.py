@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from proof import follow_up
+from proof.build import folder_digest, record
 from proof.cases import draw
 from proof.follow_up import PROPOSED, RANDOM, follow_ups, plans_of, random_experiment
 from proof.outcome import Outcome, after
@@ -49,16 +50,28 @@ def test_a_random_experiment_is_within_the_batch(case):
 
 def test_an_open_case_is_diagnosed_again_with_either_experiment(case, tmp_path, monkeypatch):
     recorded = {}
-    monkeypatch.setattr(follow_up, "record", lambda case, plans, folder: recorded.update({folder: plans}))
+    monkeypatch.setattr(follow_up, "record", lambda case, plans, folder, before: recorded.update({folder: plans}))
     asked = {"excitation": SINE, "pretension_N": 3.3, "bend_rad": 4.1, "recordings": 1}
     said = {"verdict": "undecided", "next_experiment": {"text": "", "separates": [], "recording": asked}}
     (tmp_path / "open.json").write_text(json.dumps(said))
-    found = follow_ups(case, tmp_path / "open.json", tmp_path, lambda batch, out: {"batch": batch.parent.name})
+    found = follow_ups(
+        case, tmp_path / "open.json", tmp_path, tmp_path, lambda batch, out: {"batch": batch.parent.name}
+    )
     assert {which: one["diagnosis"]["batch"] for which, one in found.items()} == {PROPOSED: PROPOSED, RANDOM: RANDOM}
     assert [len(plans) for plans in recorded.values()] == [len(case.recordings) + 1] * 2
     for other in ({"verdict": "explained"}, {"next_experiment": None}):
         (tmp_path / "closed.json").write_text(json.dumps(said | other))
-        assert follow_ups(case, tmp_path / "closed.json", tmp_path, lambda batch, out: None) == {}
+        assert follow_ups(case, tmp_path / "closed.json", tmp_path, tmp_path, lambda batch, out: None) == {}
+
+
+def test_recordings_of_the_batch_are_not_made_again(case, tmp_path):
+    first, second = case.kept_back[:2]
+    record(case, [first], tmp_path / "before" / case.name)
+    made = record(case, [first, second], tmp_path / "after" / case.name, tmp_path / "before" / case.name)
+    assert list(made) == [second.id]
+    alone = record(case, [first, second], tmp_path / "alone" / case.name)
+    assert list(alone) == [first.id, second.id]
+    assert folder_digest(tmp_path / "after" / case.name) == folder_digest(tmp_path / "alone" / case.name)
 
 
 def test_an_experiment_decides_rightly_if_it_names_all_and_no_more(case):

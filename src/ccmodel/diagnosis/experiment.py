@@ -6,7 +6,7 @@ covariance of both candidates' values and of the nuisances of a run, so that onl
 (Buzzi-Ferraris and Forzatti, Chemical Engineering Science 38(2), 1983).
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
@@ -106,6 +106,7 @@ def experiments(whitened: Sequence[Whitened]) -> list[Experiment]:
     fastest = max(np.abs(speed(g)).max() for g in given)
     highest_N = max(g.recording.pretension_N for g in given)
     bends = {round(g.recording.path.bend_rad, 3): g.recording for g in given}
+    load = load_as_recorded(given)
     found = []
     for bend in dict.fromkeys((max(bends), min(bends))):
         like = replace(bends[bend], id="experiment", pretension_N=highest_N)
@@ -113,14 +114,14 @@ def experiments(whitened: Sequence[Whitened]) -> list[Experiment]:
             at = f"pretension {pretension:.0%} of the highest recorded"
             at += f", bend {bend:.2g} rad" if len(bends) > 1 else ""
             found += [
-                Experiment(f"{text}, {at}", motion, theta, pretension, like, load_as_recorded(given, theta))
+                Experiment(f"{text}, {at}", motion, theta, pretension, like, load(theta))
                 for text, motion, theta in motions(size * amplitude, fastest)
             ]
     return found
 
 
-def load_as_recorded(given: Sequence[ModelInput], theta_in: NDArray) -> dict[str, NDArray]:
-    """What was measured at the load, for a further motion: linear in the drive's angle and smooth sign of its speed.
+def load_as_recorded(given: Sequence[ModelInput]) -> Callable[[NDArray], dict[str, NDArray]]:
+    """What was measured at the load, as a function of a further motion: linear in its angle and smooth sign of speed.
 
     A load without a law is an input of the model. What it will be in a new motion is not known; candidates are told
     apart as if it were as in the recordings.
@@ -131,13 +132,17 @@ def load_as_recorded(given: Sequence[ModelInput], theta_in: NDArray) -> dict[str
         return np.column_stack([np.ones_like(angle), angle, np.tanh(rate / (SMOOTH_SIGN * fastest))])
 
     recorded = np.concatenate([regressors(g.theta_in, speed(g)) for g in given])
-    further = regressors(theta_in, np.gradient(theta_in) * settings.EXPERIMENT_RATE_HZ)
-    found = {}
+    weights = {}
     for name in ("theta_out", "tau_out", "F_load"):
         values = [getattr(g, name) for g in given]
         if all(v is not None for v in values):
-            found[name] = further @ np.linalg.lstsq(recorded, np.concatenate(values), rcond=None)[0]
-    return found
+            weights[name] = np.linalg.lstsq(recorded, np.concatenate(values), rcond=None)[0]
+
+    def of_motion(theta_in: NDArray) -> dict[str, NDArray]:
+        further = regressors(theta_in, np.gradient(theta_in) * settings.EXPERIMENT_RATE_HZ)
+        return {name: further @ of_channel for name, of_channel in weights.items()}
+
+    return of_motion
 
 
 def motions(a: float, fastest: float) -> Iterator[tuple[str, dict, NDArray]]:
