@@ -10,8 +10,6 @@ from scipy.optimize import brentq
 from virtualrig.chain import initial_tension, stable_step
 from virtualrig.config import Numerics, Rig
 from virtualrig.effect_march import (
-    HYPERBOLIC,
-    TOE,
     Physics,
     bearing_course,
     drive_shape,
@@ -22,7 +20,7 @@ from virtualrig.effect_march import (
     slow_friction,
     spring_torque,
 )
-from virtualrig.effects import Effects, laws, numbers
+from virtualrig.effects import Effects, laws, numbers, strand_settling
 from virtualrig.effects.presliding import BoucWenPresliding, DahlPresliding, IwanPresliding
 from virtualrig.effects.pulley_friction import PulleyFriction
 from virtualrig.grid import Grid
@@ -200,9 +198,9 @@ def _relaxed(
 def _elongation(physics: Physics, tension: NDArray, stiffness: NDArray, settling: NDArray) -> NDArray:
     """Elongation of each segment under its tension, m; all of one shape."""
     ideal = tension / stiffness
-    if physics.settling_law == HYPERBOLIC:
+    if physics.settling_law == strand_settling.HYPERBOLIC:
         return np.sqrt((ideal + settling) ** 2 - settling**2)
-    if physics.settling_law == TOE:
+    if physics.settling_law == strand_settling.TOE:
         return np.where(ideal < settling, 2 * np.sqrt(settling * ideal), ideal + settling)
     e = ideal + settling
     for _ in range(60):

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from virtualrig.effects import Effects, cached, chained, numbers
+from virtualrig.effects import Effects, cached, chained, numbers, strand_settling, stribeck
 from virtualrig.effects.viscous_friction import REFERENCE_M_PER_S
 
 SLOW_S = 1e-4
@@ -20,7 +20,6 @@ SLOW_S = 1e-4
 CONDUIT_LAG_S = 1e-4
 # Logarithmic velocity weakening: from a tenth of its speed to ten times it.
 DECADE = 10.0
-HYPERBOLIC, EXPONENTIAL, TOE = range(3)  # laws of strand settling
 # Below this speed a drag with a power of the speed is linear in it.
 SLOWEST_M_PER_S = 1e-5
 # A tension (N), time (s), travel and position (m) at which every law of slow friction that is present has an effect.
@@ -152,9 +151,9 @@ def _renew(p: Physics, rested: NDArray, w: NDArray, dt: float) -> None:
     for i in range(rested.size):
         speed = abs(w[i + 1])
         s = speed * inverse
-        if p.stribeck_law == 1:
+        if p.stribeck_law == stribeck.HESS_SOOM:
             target = 1.0 / ((1.0 + s) * (1.0 + s))
-        elif p.stribeck_law == 2:
+        elif p.stribeck_law == stribeck.LOGARITHMIC:
             target = max(1.0 - np.log1p(DECADE * s) / np.log1p(DECADE * DECADE), 0.0)
         else:
             if p.stribeck_exponent == 2.0:
@@ -188,9 +187,9 @@ def _set_elastic(
             e, s = elastic[i] / stiffness[i], settling[i]
             if s == 0.0:
                 continue
-            if p.settling_law == EXPONENTIAL:
+            if p.settling_law == strand_settling.EXPONENTIAL:
                 elastic[i] = stiffness[i] * (e + s * np.expm1(-e / s))
-            elif p.settling_law == TOE:
+            elif p.settling_law == strand_settling.TOE:
                 elastic[i] = stiffness[i] * (e * e / (4 * s) if e < 2 * s else e - s)
             else:
                 elastic[i] = stiffness[i] * (np.sqrt(e * e + s * s) - s)

@@ -8,6 +8,10 @@ from pydantic import PositiveFloat
 from virtualrig.effects.contract import Seed, Seeded, Twin
 from virtualrig.strict import Strict
 
+# Laws, and their numbers in the time loop.
+LAWS = ("hyperbolic", "exponential", "toe")
+HYPERBOLIC, EXPONENTIAL, TOE = range(len(LAWS))
+
 
 class StrandSettling(Strict):
     """Its law and tension scale.
@@ -24,7 +28,7 @@ class StrandSettling(Strict):
 def _numbers(effects: Any) -> dict[str, Any]:
     given = effects.strand_settling
     return {
-        "settling_law": ("hyperbolic", "exponential", "toe").index(given.law) if given else 0,
+        "settling_law": LAWS.index(given.law) if given else 0,
     }
 
 

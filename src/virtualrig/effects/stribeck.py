@@ -13,6 +13,10 @@ from pydantic import PositiveFloat
 from virtualrig.effects.contract import Seed, Seeded, Twin
 from virtualrig.strict import NonNegative, Strict
 
+# Laws, and their numbers in the time loop.
+LAWS = ("exponential", "hess-soom", "logarithmic")
+EXPONENTIAL, HESS_SOOM, LOGARITHMIC = range(len(LAWS))
+
 
 class Stribeck(Strict):
     """Its numbers; a contact adapts to a new speed over `renewal_m` of sliding.
@@ -32,7 +36,7 @@ def _numbers(effects: Any) -> dict[str, Any]:
     return {
         "stribeck_rise": given.rise,
         "stribeck_speed": given.speed_m_per_s,
-        "stribeck_law": ("exponential", "hess-soom", "logarithmic").index(given.law),
+        "stribeck_law": LAWS.index(given.law),
         "stribeck_exponent": given.exponent,
         "stribeck_renewal": given.renewal_m,
     }
