@@ -73,7 +73,8 @@ def judged(seed: int, effect: str, state: str, out: Path) -> dict:
     file = out / state / case.name / "past.json"
     if file.exists():
         return json.loads(file.read_text(encoding="utf-8"))
-    result = judge(without_past(case) if state == "fresh" else case, file.parent, report=lambda text: None)
+    recorded = without_past(case) if state == "fresh" else case
+    result = judge(recorded, file.parent, report=lambda text: None, with_follow_ups=False)
     diagnosis = json.loads((file.parent / "diagnosis.json").read_text(encoding="utf-8"))
     row = {"seed": seed, "effect": effect, "law": case.truth[0].law, "state": state, "protocol": case.protocol}
     row |= {"mean_square": diagnosis["fit"]["mean_square"]["calibrated"]}

@@ -47,7 +47,7 @@ def judged(seed: int, kind: str, out: Path) -> dict:
     file = out / case.name / "several.json"
     if file.exists():
         return json.loads(file.read_text(encoding="utf-8"))
-    result = judge(case, out / case.name, report=lambda text: None)
+    result = judge(case, out / case.name, report=lambda text: None, with_follow_ups=False)
     found = outcome(result)
     true, named = [t.name for t in case.truth], [m["name"] for m in found.identified]
     missed = bool(set(true) - set(named))

@@ -25,7 +25,12 @@ Report = Callable[[str], None]
 
 
 def judge(
-    case: Case, out: Path, sources: Path = conceal.SOURCES, report: Report = print, with_regressors: bool = False
+    case: Case,
+    out: Path,
+    sources: Path = conceal.SOURCES,
+    report: Report = print,
+    with_regressors: bool = False,
+    with_follow_ups: bool = True,
 ) -> dict:
     """Record a case, have it diagnosed in isolation, then compare its models' predictions with held-out recordings.
 
@@ -40,6 +45,8 @@ def judge(
         Called with a line on each stage and on the outcome.
     with_regressors : bool
         Whether the reference regressors (`proof.regressors`) are fitted to the same recordings.
+    with_follow_ups : bool
+        Whether an open case is diagnosed again with a further experiment (`proof.follow_up`).
 
     Returns
     -------
@@ -62,8 +69,9 @@ def judge(
         diagnosis = _read_diagnosis(out / "diagnosis.json") if completed.is_usable else None
         held_out = _compare_with_held_out(case, batch, out, sources, with_regressors) if diagnosis else _HeldOut()
         took_s = conceal.core_s() - started
-        again = _Again(case, sources, limit)
-        further = follow_ups(case, out / "diagnosis.json", batch, Path(folder), again.diagnosed) if diagnosis else {}
+        again, further = _Again(case, sources, limit), {}
+        if diagnosis and with_follow_ups:
+            further = follow_ups(case, out / "diagnosis.json", batch, Path(folder), again.diagnosed)
     result = {
         "case": case.name,
         "seed": case.seed,

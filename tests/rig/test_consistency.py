@@ -12,6 +12,8 @@ from ccmodel.rig.consistency.clocks import drift_of
 from ccmodel.rig.consistency.parity import Parity, closed_part, crossings, white_noise
 from ccmodel.rig.consistency.signs import EXCHANGED, FAULTS, explanation, negative_relations
 from ccmodel.rig.ingest import ingest_batch
+from proof.build import record
+from proof.cases import draw
 
 SIMULATED, OTHER = Path("data/raw/pretension"), Path("tests/data/ideal-rig/loops")
 SIGNS = {"angles": 1.0, "torques": 0.5, "work": 0.9, "load": 1.0, "loss": 0.9, "F_drive": 1.0, "F_load": 1.0}
@@ -235,3 +237,14 @@ def test_degrees_in_the_place_of_rad_are_called_so(tmp_path):
             counts = f"{end}_encoder_counts"
             bench.tables[name] = log.assign(**{channel: np.degrees(log[counts] * step)}).drop(columns=counts)
     assert all("is the column in degrees?" in sentence for sentence in said_of(bench.write().folder))
+
+
+def test_a_load_cell_that_errs_in_all_recordings_makes_none_of_them_foreign(tmp_path):
+    """Its offset of 2.2 N and its drift double the friction that one recording seems to have."""
+    case = draw(25007)
+    assert [(t.name, t.place) for t in case.truth] == [
+        ("load-cell-drift", "load-sensor"),
+        ("load-cell-offset", "load-sensor"),
+    ]
+    record(case, case.recordings, tmp_path / case.name)
+    assert said_of(tmp_path / case.name) == []

@@ -59,6 +59,11 @@ OTHER_RIG = 4.0
 # Factor of stroke, tension and frequency within which recordings count as alike.
 ALIKE = 1.1
 
+# Offsets (N) and drifts (N/s) of a load cell, the same in all recordings, that may make one of them seem foreign: they
+# span the plausible ranges of both mechanisms. The largest error, over the lowest pretension.
+CELL_OFFSETS_N, CELL_DRIFTS_N_PER_S = (-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0), (-0.15, 0.0, 0.15)
+MOST_CELL_ERROR = 1.0
+
 # Rate at which the load's lag changes from cycle to cycle, s/s, and its change over the recording, s.
 DRIFT_RATE, DRIFT_S = 0.004, 0.02
 # Relative deviation of amplitude and period up to which cycles count as equal, and fewest crossings of the middle.

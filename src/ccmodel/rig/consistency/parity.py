@@ -6,14 +6,27 @@ tensions, ln(T1 / T2) = mu phi.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from ccmodel.channels import F_DRIVE, F_LOAD, T1, T2, T3, T4, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
+from ccmodel.channels import (
+    F_DRIVE,
+    F_LOAD,
+    SUM_AT,
+    T1,
+    T2,
+    T3,
+    T4,
+    TAU_IN,
+    TAU_OUT,
+    TENSIONS_AT,
+    THETA_IN,
+    THETA_OUT,
+)
 from ccmodel.recording import Recording
 from ccmodel.rig.angle import passes_of_zero
 from ccmodel.rig.batch import Batch
@@ -40,6 +53,14 @@ class Parity:
         r = self.recording
         kept = r.time_s >= max(r.settled_s, r.rest_s)
         return {name: values[kept] for name, values in r.channels.items()} | {"time_s": r.time_s[kept]}
+
+    def without_cell_error(self, end: str, offset_N: float, drift_N_per_s: float) -> "Parity":
+        """The same with an offset and a drift of the load cell at the "drive" or "load" end taken out."""
+        r = self.recording
+        error = offset_N + drift_N_per_s * r.time_s
+        corrected = {SUM_AT[end]: r[SUM_AT[end]] - error}
+        corrected |= {name: r[name] - error / 2 for name in TENSIONS_AT[end] if name in r}
+        return replace(self, recording=replace(r, channels=dict(r.channels) | corrected))
 
     @cached_property
     def signs(self) -> dict[str, float]:

@@ -1,6 +1,7 @@
 """Recordings that do not belong to their batch: of another rig or bend, with copied channels, of two runs."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from itertools import product
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from ccmodel.channels import (
     CHANNELS,
     F_DRIVE,
     F_LOAD,
+    SUM_AT,
     TAU_IN,
     TAU_OUT,
     TENSIONS,
@@ -20,13 +22,21 @@ from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
 from ccmodel.rig.consistency.parity import Parity, speed, white_noise
 from ccmodel.rig.sensor_checks import is_noisy
 
+# A comparison of a recording with the others of its batch.
+Check = Callable[[Parity, Sequence[Parity]], Contradiction | None]
+
 
 def foreign_runs(parities: Sequence[Parity]) -> list[Contradiction]:
     """Contradictions of single recordings: the first that is found of each."""
     found = []
     for parity in parities:
         others = [p for p in parities if p is not parity]
-        contradiction = _two_runs(parity) or _straight(parity) or _bend(parity, others) or _other_rig(parity, others)
+        contradiction = (
+            _two_runs(parity)
+            or _straight(parity)
+            or _whatever_cells_err(_bend, parity, others)
+            or _whatever_cells_err(_other_rig, parity, others)
+        )
         if contradiction:
             found.append(contradiction)
     return found
@@ -97,6 +107,23 @@ def _straight(parity: Parity) -> Contradiction | None:
 def _bend_for(parity: Parity, log_ratio: float) -> str:
     mu = parity.batch.rig.cable.friction_coefficient
     return f"{log_ratio / mu:.2g} rad" if mu else "some radians"
+
+
+def _whatever_cells_err(check: Check, parity: Parity, others: Sequence[Parity]) -> Contradiction | None:
+    """What a check finds, unless an offset and a drift of one load cell in all recordings would account for it."""
+    found = check(parity, others)
+    if found is None:
+        return None
+    every = (parity, *others)
+    most = limits.MOST_CELL_ERROR * min(_tension(p) for p in every)
+    lasts_s = max(float(p.recording.time_s[-1]) for p in every)
+    for end, offset, drift in product(SUM_AT, limits.CELL_OFFSETS_N, limits.CELL_DRIFTS_N_PER_S):
+        is_possible = abs(offset) + abs(drift) * lasts_s <= most
+        if is_possible and all(SUM_AT[end] in p.recording for p in every):
+            corrected, *rest = (p.without_cell_error(end, offset, drift) for p in every)
+            if check(corrected, rest) is None:
+                return None
+    return found
 
 
 def _bend(parity: Parity, others: Sequence[Parity]) -> Contradiction | None:
