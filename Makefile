@@ -40,8 +40,9 @@ real: $(VENV)/.ready  ## run the pipeline on the public da Vinci recordings: mak
 data: $(VENV)/.ready  ## record data/raw again with the virtual rig
 	$(BIN)/virtualrig record config/virtual-rig.yaml --out data/raw --concealed data/concealed.json
 
+# One process more than cores: a test of the pipeline often waits for Snakemake.
 test: $(VENV)/.ready  ## run the tests and the linters
-	$(BIN)/python -m pytest -n $(CORES) --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest -n $$(($(CORES) + 1)) --dist loadfile --no-loadscope-reorder
 	$(MAKE) --no-print-directory lint
 
 # A fresh environment every time: a build that reuses the last one's is silent about pages it does not read again.

@@ -1,6 +1,6 @@
 """Model-form error of each mechanism: the share of its effect that its equation misses on rigs of other forms.
 
-Each rig of the virtual rig has one strong effect, whose law need not be the mechanism's. The mechanism is fitted to its
+Each rig of the virtual rig has one strong effect, by the mechanism's law or by another published one. The mechanism is fitted to its
 recordings, with the covariance linearised about it, as a diagnosis fits it. Of the calibrated model's leave-one-out
 mean square above that of noise, what the fit leaves is the model-form error. `Mechanism.model_form_error` states it.
 
@@ -11,7 +11,7 @@ import argparse
 import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from itertools import count, islice
+from itertools import count
 from pathlib import Path
 
 import pandas as pd
@@ -29,6 +29,7 @@ from ccmodel.rig.ingest import ingest_batch
 from proof.build import record
 from proof.cases import Case, draw
 from proof.plan import read_plan
+from virtualrig.effects import TWINS
 
 FIRST_SEED = 9_000_000  # far from the seeds of tests, proofs and other benchmarks
 # Least strength of an effect (`proof.cases.Truth`): of a weak one the noise hides what an equation misses.
@@ -36,9 +37,17 @@ LEAST_STRENGTH = 0.6
 
 
 def rigs(effect: str, number: int) -> list[Case]:
-    """Cases with one strong effect, recorded as advised."""
+    """Cases with one strong effect, recorded as advised: so many of each law."""
     drawn = (draw(seed, "single", effect) for seed in count(FIRST_SEED))
-    return list(islice((c for c in drawn if c.truth[0].strength >= LEAST_STRENGTH and c.protocol == "rich"), number))
+    strong = (c for c in drawn if c.truth[0].strength >= LEAST_STRENGTH and c.protocol == "rich")
+    found: dict[str, list[Case]] = {law: [] for law in ("", *TWINS[effect].other_laws)}
+    for case in strong:
+        of_law = found[case.truth[0].law]
+        if len(of_law) < number:
+            of_law.append(case)
+        if all(len(cases) == number for cases in found.values()):
+            break
+    return [case for cases in found.values() for case in cases]
 
 
 def row(case: Case) -> dict:
@@ -55,6 +64,7 @@ def row(case: Case) -> dict:
     share = (after - 1.0) / (before - 1.0)
     return {
         "effect": truth.name,
+        "law": truth.law or "that of the mechanism",
         "strength": round(truth.strength, 3),
         "calibrated_mean_square": before,
         "mean_square": after,
@@ -75,7 +85,7 @@ def fitted(calibrated: Calibration, hypothesis: Hypothesis) -> CandidateFit:
 def rows(effects: Sequence[str], number: int, cores: int) -> Iterator[dict]:
     """A row for each rig, in the order in which they are done."""
     with ProcessPoolExecutor(cores) as pool:
-        cases = [case for k in zip(*(rigs(effect, number) for effect in effects), strict=True) for case in k]
+        cases = [case for effect in effects for case in rigs(effect, number)]
         for done in as_completed(pool.submit(row, case) for case in cases):
             yield done.result()
 
@@ -83,7 +93,7 @@ def rows(effects: Sequence[str], number: int, cores: int) -> Iterator[dict]:
 def main() -> None:
     """Run as a script."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rigs", type=int, default=2, help="rigs with each effect")
+    parser.add_argument("--rigs", type=int, default=2, help="rigs with each law of an effect")
     parser.add_argument("--effect", nargs="+", default=list(read_plan().effects), help="effects; default: all")
     parser.add_argument("--cores", type=int, default=1, help="processes")
     parser.add_argument("--out", type=Path, required=True, help="CSV with a row for each rig")
