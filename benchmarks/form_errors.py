@@ -1,8 +1,9 @@
 """Model-form error of each mechanism: the share of its effect that its equation misses on rigs of other forms.
 
-Each rig of the virtual rig has one strong effect, by the mechanism's law or by another published one. The mechanism is fitted to its
-recordings, with the covariance linearised about it, as a diagnosis fits it. Of the calibrated model's leave-one-out
-mean square above that of noise, what the fit leaves is the model-form error. `Mechanism.model_form_error` states it.
+Each rig of the virtual rig has one strong effect, by the mechanism's law or by another published one. The mechanism is
+fitted to its recordings, with the covariance linearised about it, as a diagnosis fits it. Of the calibrated model's
+leave-one-out mean square above that of noise, what the fit leaves is the model-form error.
+`Mechanism.model_form_error` states it.
 
     python -m benchmarks.form_errors --rigs 2 --cores 2 --out results/form-errors.csv
 """
