@@ -128,12 +128,10 @@ def rates(table: pd.DataFrame) -> list[dict]:
     wrong = (asked["together"] == "explained") & ~decided if len(asked) else decided
     each = asked["all_undecided"].astype(bool) if len(asked) else decided
     return [
-        rate("rigs with no study that is explained, and one or more undecided", len(asked), len(table)),
+        rate("rigs without an explained study, with one or more undecided", len(asked), len(table)),
         rate("decided together, of these", int(decided.sum()), len(asked), WANTED),
         rate("explained by another effect, of these", int(wrong.sum()), len(asked)),
-        rate(
-            "decided together, of those with three undecided studies", int(decided[each].sum()), int(each.sum()), WANTED
-        ),
+        rate("rigs with three undecided studies: decided together", int(decided[each].sum()), int(each.sum()), WANTED),
     ]
 
 

@@ -117,12 +117,13 @@ def _whatever_cells_err(check: Check, parity: Parity, others: Sequence[Parity]) 
     every = (parity, *others)
     most = limits.MOST_CELL_ERROR * min(_tension(p) for p in every)
     lasts_s = max(float(p.recording.time_s[-1]) for p in every)
-    for end, offset, drift in product(SUM_AT, limits.CELL_OFFSETS_N, limits.CELL_DRIFTS_N_PER_S):
-        is_possible = abs(offset) + abs(drift) * lasts_s <= most
-        if is_possible and all(SUM_AT[end] in p.recording for p in every):
-            corrected, *rest = (p.without_cell_error(end, offset, drift) for p in every)
-            if check(corrected, rest) is None:
-                return None
+    ends = [end for end, channel in SUM_AT.items() if all(channel in p.recording for p in every)]
+    for end, offset, drift in product(ends, limits.CELL_OFFSETS_N, limits.CELL_DRIFTS_N_PER_S):
+        if abs(offset) + abs(drift) * lasts_s > most:
+            continue
+        corrected, *rest = (p.without_cell_error(end, offset, drift) for p in every)
+        if check(corrected, rest) is None:
+            return None
     return found
 
 
