@@ -105,3 +105,17 @@ def test_a_nuisance_beyond_its_prior_counts_as_one_effective_sample(whitened):
         found = counted[errors.size :] / np.sqrt(rows_per_sample)
         assert found[row] == pytest.approx(size, rel=0.15, abs=0.1)
         assert np.abs(np.delete(found, row)).max() < 0.15 * size + 0.1
+
+
+def test_a_recording_is_linearised_about_its_own_initial_tensions(whitened):
+    """With much friction the instant at which a cable slips depends on them, and is far from linear."""
+    strong = replace(PARAMETERS, friction_coefficient=0.5)
+    o = whitened.observations.with_parameters(strong)
+    curved = replace(strong, tension_curvature_A=0.25, tension_curvature_B=-0.2)
+    once = whiten(replace(o, measured=o.with_parameters(curved).modelled({})), strong)
+    again = relinearised(once, strong)
+    before, after = (np.mean(w.whiten(w.linearised_errors({})) ** 2) for w in (once, again))
+    assert after < 0.1 * before
+    found = again.own_values({})
+    assert found["tension_curvature_A"] == pytest.approx(0.25, abs=0.02)
+    assert found["tension_curvature_B"] == pytest.approx(-0.2, abs=0.02)

@@ -135,7 +135,7 @@ def calibrate(
 
     Three fits: a first one gives the model about which the errors are linearised and whitened. A fit of the whitened
     errors shows how much friction and zeros differ from run to run; whitened with these spreads, about each recording's
-    own friction, they give the calibrated model.
+    own friction and initial tensions, they give the calibrated model.
 
     Parameters
     ----------

@@ -65,6 +65,9 @@ BETWEEN_BOUNDS = (0.2, 5.0)
 # Standard deviation of the curvature of a cable's initial tension between its ends, over the largest that friction can
 # hold. Chosen: earlier motions leave a profile that the rest shows at the ends only.
 CURVATURE_SPREAD = 0.15
+# Largest curvature about which a recording's errors are linearised, in these standard deviations. Chosen: two; where a
+# cable goes slack or slips late, its effect is far from linear.
+OWN_CURVATURE = 2.0
 # Standard deviation of the part of a state's posterior mean that lies beyond its range. Chosen: the mean is linear in
 # the errors, so that it may leave the range by a little.
 BEYOND_STATE = 0.1

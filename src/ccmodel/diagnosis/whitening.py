@@ -8,8 +8,8 @@ A nuisance far outside its prior, such as friction that is 10 % higher in every 
 thousands of samples. The posterior means of the nuisances are therefore appended to the whitened errors, each with the
 weight of one effective sample.
 
-Errors are linear in a nuisance only nearby. Each recording is therefore linearised about its own friction and, of
-mechanisms with states, about its own states.
+Errors are linear in a nuisance only nearby. Each recording is therefore linearised about its own friction and
+initial tensions and, of mechanisms with states, about its own states.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,6 +32,8 @@ from ccmodel.model.session import known_states
 
 # Step of the differences by a nuisance, relative to its size.
 NUISANCE_STEP = 10 * STEP
+# Curvatures of the initial tensions between a cable's ends.
+CURVATURES = ("tension_curvature_A", "tension_curvature_B")
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,8 @@ class Whitened:
     repeatability : Repeatability
         Where the prior standard deviations come from.
     own : mapping of str to float
-        Parameters of this recording alone, over those of its batch, about which its errors are linearised.
+        Parameters of this recording alone about which its errors are linearised: its friction over that of its batch,
+        and the curvature of its initial tensions.
     own_errors : ndarray, shape (rows,)
         Change of the errors by these, to first order.
     own_states : mapping of str to float
@@ -137,7 +140,8 @@ class Whitened:
         Shape (rows,).
         """
         shared = of_batch(values, self.session)
-        own = {name: ratio * shared.get(name, 1.0) for name, ratio in self.own.items()}
+        # A batch may have a factor of friction; curvatures are of a recording only.
+        own = {name: value * shared.get(name, 1.0) for name, value in self.own.items()}
         errors = self.observations.errors(shared | own | dict(self.own_states)).ravel() - self.own_errors
         for k, (name, value, spread) in enumerate(self.scalar_nuisances):
             if name in self.own_states:
@@ -176,11 +180,16 @@ class Whitened:
         return self._posterior_means(values, self.linearised_errors(values))
 
     @property
-    def friction_ratio(self) -> float:
-        """Posterior mean of the friction in this recording over that of the model, as far as it may be linearised."""
-        stated = {name: value for name, value, _ in self.scalar_nuisances}
-        ratio = self.own_values({})[FRICTION] / stated[FRICTION] if FRICTION in stated else 1.0
-        return float(np.clip(ratio, *settings.OWN_FRICTION))
+    def own_means(self) -> dict[str, float]:
+        """Posterior means of what `own` holds, as far as errors may be linearised about them."""
+        means, found = self.own_values({}), {}
+        for name, value, spread in self.scalar_nuisances:
+            if name == FRICTION:
+                found["friction_scale"] = float(np.clip(means[name] / value, *settings.OWN_FRICTION))
+            elif name in CURVATURES:
+                reach = settings.OWN_CURVATURE * spread
+                found[name] = float(np.clip(means[name], -reach, reach))
+        return found
 
     def with_parameters(self, parameters: Parameters) -> "Whitened":
         """The same for a model with other parameters, under the same covariance."""
@@ -188,7 +197,10 @@ class Whitened:
 
 
 def whiten(
-    observations: Observations, model: Parameters, repeatability: Repeatability = STATED, friction_ratio: float = 1.0
+    observations: Observations,
+    model: Parameters,
+    repeatability: Repeatability = STATED,
+    own: Mapping[str, float] | None = None,
 ) -> Whitened:
     """Observations with the covariance of their errors, linearised about a fitted model.
 
@@ -198,19 +210,21 @@ def whiten(
     model : Parameters
     repeatability : Repeatability
         Estimated spreads of the nuisances.
-    friction_ratio : float
-        Friction of the recording over the model's, about which the errors are linearised.
+    own : mapping of str to float, optional
+        The recording's own friction and curvatures about which the errors are linearised (`Whitened.own_means`);
+        without it, those of the model.
     """
     o = observations.with_parameters(model)
-    own = {} if friction_ratio == 1.0 else {"friction_scale": friction_ratio}
+    own = own or {}
     at = o.with_parameters(model.with_values(own))
     N, known = nuisances(at, repeatability), repeatability.applied(_scalar_nuisances(at))
     friction = N[:, 0].reshape(o.sigma.shape) * o.sigma
     floor = np.sqrt((o.sigma**2).mean(axis=1) + (friction**2).mean(axis=1))
     by_channel = dict(zip(o.channels, floor.tolist(), strict=True))
-    spread = known[0][2] / known[0][1]
-    own_errors = N[:, 0] * (1 - 1 / friction_ratio) / spread
-    return Whitened(o, *_moments(N, len(known)), by_channel, known, N, repeatability, own, own_errors)
+    # In standard deviations, from what all recordings share.
+    away = [(own.get(name, value) - value) / spread for name, value, spread in known]
+    away[0] = (1 - 1 / own.get("friction_scale", 1.0)) * known[0][1] / known[0][2]
+    return Whitened(o, *_moments(N, len(known)), by_channel, known, N, repeatability, own, N[:, : len(known)] @ away)
 
 
 def with_states_of(one: Whitened, model: Parameters, own: Mapping[str, float] | None = None) -> Whitened:
@@ -299,7 +313,7 @@ def shrinkage_of(s: NDArray) -> NDArray:
 def relinearised(
     one: Whitened, model: Parameters, repeatability: Repeatability | None = None, fitted: Whitened | None = None
 ) -> Whitened:
-    """Observations with the covariance linearised about another model and the recording's own friction.
+    """Observations with the covariance linearised about another model and the recording's own friction and curvatures.
 
     The load's position in a gap of that model is the most likely one of a few: a load with mass rings differently on
     either side of its gap, and no linearisation leads from one to the other.
@@ -320,9 +334,9 @@ def relinearised(
 
     has_gap = settings_of(model.mechanisms).half_gap
     position = min(settings.GAP_POSITIONS, key=mean_square) if has_gap else model.load_gap_position
-    friction = (fitted or one).with_parameters(model).friction_ratio
+    own = (fitted or one).with_parameters(model).own_means
     about = replace(model, load_gap_position=position)
-    found = whiten(one.observations, about, repeatability or one.repeatability, friction)
+    found = whiten(one.observations, about, repeatability or one.repeatability, own)
     return found.with_parameters(replace(one.observations.parameters, load_gap_position=position))
 
 
@@ -341,7 +355,6 @@ def _scalar_nuisances(o: Observations) -> Sequence[tuple[str, float, float]]:
     if THETA_OUT in o.channels and (step := recording.encoder_step_rad.get(THETA_OUT)):
         found.append(("theta_out_zero_rad", parameters.theta_out_zero_rad, step / np.sqrt(12)))
     if o.given.initial_tension_observed:
-        cables = ("A",) if recording.far_end else ("A", "B")
-        curvatures = (f"tension_curvature_{cable}" for cable in cables)
+        curvatures = CURVATURES[:1] if recording.far_end else CURVATURES
         found += [(name, getattr(parameters, name), settings.CURVATURE_SPREAD) for name in curvatures]
     return [*found, *_states(o)]
