@@ -119,3 +119,15 @@ def test_a_recording_is_linearised_about_its_own_initial_tensions(whitened):
     found = again.own_values({})
     assert found["tension_curvature_A"] == pytest.approx(0.25, abs=0.02)
     assert found["tension_curvature_B"] == pytest.approx(-0.2, abs=0.02)
+
+
+def test_its_own_initial_tensions_do_not_move_their_prior(whitened):
+    """A curvature of two standard deviations costs as much wherever the errors are linearised."""
+    curved = replace(PARAMETERS, tension_curvature_A=0.3)
+    o = whitened.observations
+    once = replace(whitened, observations=replace(o, measured=o.with_parameters(curved).modelled({})))
+    again = relinearised(once, PARAMETERS)
+    assert again.own["tension_curvature_A"] > 0.2
+    assert again.scalar_nuisances == once.scalar_nuisances
+    deviations = [np.abs(w.errors({})[o.measured.size :]).max() for w in (once, again)]
+    assert deviations[1] == pytest.approx(deviations[0], rel=0.1)

@@ -217,7 +217,8 @@ def whiten(
     o = observations.with_parameters(model)
     own = own or {}
     at = o.with_parameters(model.with_values(own))
-    N, known = nuisances(at, repeatability), repeatability.applied(_scalar_nuisances(at))
+    # The priors stay those about the model: only the effects are taken at the recording's own values.
+    N, known = nuisances(at, repeatability), repeatability.applied(_scalar_nuisances(o))
     friction = N[:, 0].reshape(o.sigma.shape) * o.sigma
     floor = np.sqrt((o.sigma**2).mean(axis=1) + (friction**2).mean(axis=1))
     by_channel = dict(zip(o.channels, floor.tolist(), strict=True))
