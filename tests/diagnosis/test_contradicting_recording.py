@@ -15,7 +15,7 @@ from made_observations import PARAMETERS, batch, calibrated
 
 def judged(recordings):
     base = calibrated(recordings)
-    return Judgement("unexplained", base, Comparison(recordings, base, [], {}), [], [], 1.0, [])
+    return Judgement("unexplained", base, Comparison(recordings, base, [], {}), [], [], [])
 
 
 @pytest.fixture(scope="module")

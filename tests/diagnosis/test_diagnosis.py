@@ -202,13 +202,19 @@ def test_alternatives_are_others_than_what_is_named_each_once():
     there, elsewhere = ("pulley-friction", "drive-pulley"), ("pulley-friction", "load-pulley")
     shares = {(scale,): 0.5, (drag,): 0.2, (there,): 0.1, (elsewhere,): 0.15}
     confidence = {Hypothesis(acting): share for acting, share in shares.items()}
-    found = alternatives_of(SimpleNamespace(verdict="undecided", confidence=confidence), {})
+
+    def confidence_in(name):
+        return sum(p for hypothesis, p in confidence.items() if name in hypothesis.names)
+
+    judgement = SimpleNamespace(verdict="undecided", confidence=confidence, confidence_in=confidence_in)
+    found = alternatives_of(judgement, {})
     assert [(a["name"], a["place"], a["confidence"]) for a in found] == [
         (*scale, 0.5),
         (*elsewhere, 0.25),
         (*drag, 0.2),
     ]
-    found = alternatives_of(SimpleNamespace(verdict="explained", confidence=confidence), dict([there]))
+    judgement.verdict = "explained"
+    found = alternatives_of(judgement, dict([there]))
     assert [a["name"] for a in found] == ["torque-scale", "constant-drag"]
 
 
@@ -235,6 +241,15 @@ def test_the_headline_separates_a_pair_from_alternatives(alternatives, likeliest
     error = {"tau_in": {"before": 2.0, "after": 1.0, "noise": 1.0}}
     said = {"batch": "b", "verdict": "undecided", "is_held": False, "fit": {"error": error}}
     assert sentence in headline(said | {"alternatives": claims[0], "likeliest": claims[1]})
+
+
+def test_the_headline_says_what_is_sure_and_what_is_open():
+    claims = [{"name": n, "place": "conduit", "confidence": p} for n, p in (("kink", 0.95), ("stribeck", 0.4))]
+    said = {"batch": "b", "verdict": "undecided", "is_held": False, "alternatives": claims, "likeliest": claims}
+    assert headline(said) == (
+        "b: Part of what is missing is kink at the conduit (0.95). These recordings do not tell what else is missing,"
+        " if anything: perhaps stribeck at the conduit (0.40)."
+    )
 
 
 @pytest.mark.parametrize("is_there", [True, False])

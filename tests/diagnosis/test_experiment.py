@@ -38,7 +38,7 @@ def fitted(recordings, *acting, known_to=KNOWN_TO, **numbers):
 def judged(recordings, *rivals):
     shares = [1 / len(rivals)] * len(rivals)
     found = Comparison(recordings, fitted(recordings), list(rivals), {})
-    return Judgement("undecided", rivals[0], found, list(rivals), shares, 1.0, [])
+    return Judgement("undecided", rivals[0], found, list(rivals), shares, [])
 
 
 def test_it_is_within_what_the_rig_has_done():

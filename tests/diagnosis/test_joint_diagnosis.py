@@ -73,7 +73,7 @@ def test_the_model_is_the_rigs(joint):
 @pytest.mark.parametrize("freeze", [False, True])
 def test_a_model_of_the_rig_is_a_baseline_of_its_batches(raw, joint, freeze):
     both = [raw / "monday", raw / "tuesday"]
-    found = cc.diagnose(both, baseline=joint / "model.json", freeze=freeze, step_s=0.02)
+    found = cc.diagnose(both, baseline=joint / "model.json", freeze=freeze, step_s=0.005)
     assert found.verdict == "agrees"
     assert (KEYS[0] in found.report["fit"]["calibrated"]) != freeze
 

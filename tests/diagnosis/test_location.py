@@ -15,7 +15,7 @@ from made_observations import NOISE, PARAMETERS, batch, calibrated
 
 def unexplained(recordings):
     base = calibrated(recordings)
-    return Judgement("unexplained", base, Comparison(recordings, base, [], {}), [], [], 1.0, [])
+    return Judgement("unexplained", base, Comparison(recordings, base, [], {}), [], [], [])
 
 
 def located(recordings):

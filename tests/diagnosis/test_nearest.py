@@ -23,7 +23,7 @@ def test_its_held_out_errors_stand_apart_from_those_of_the_verdict():
     hypothesis = Hypothesis((("torque-scale", "drive-sensor"),))
     nearest = fit(recordings, hypothesis, base.free, base.values | {SCALE: 0.05})
     comparison = Comparison(recordings, base, [nearest], {})
-    found = report("b", Judgement("unexplained", base, comparison, [nearest], [1.0], 0.1, []), base, PARAMETERS, [])
+    found = report("b", Judgement("unexplained", base, comparison, [nearest], [1.0], []), base, PARAMETERS, [])
     error, of_nearest = found["fit"]["error"], found["nearest"]["error"]
     assert {c: e["after"] for c, e in error.items()} == {c: e["before"] for c, e in error.items()}
     assert of_nearest["tau_in"]["before"] == error["tau_in"]["before"] > 3 * of_nearest["tau_in"]["after"]
@@ -35,6 +35,6 @@ def test_other_verdicts_have_none():
     recordings = batch()
     base = calibrated(recordings)
     found = report(
-        "b", Judgement("agrees", base, Comparison(recordings, base, [], {}), [], [], 1.0, []), base, PARAMETERS, []
+        "b", Judgement("agrees", base, Comparison(recordings, base, [], {}), [], [], []), base, PARAMETERS, []
     )
     assert found["nearest"] is None

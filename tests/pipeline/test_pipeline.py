@@ -257,7 +257,7 @@ def test_batches_of_a_rig_are_diagnosed_together(diagnosed, tmp_path):
     write_batch(folder / "data/raw/other", pretensions=(7.0, 5.0))
     config = yaml.safe_load((folder / "config.yaml").read_text())
     config |= {"rigs": {"bench": ["tiny", "other"]}, "diagnose": ["tiny"], "diagnose_rigs": "each"}
-    config["diagnosing_by_batch"] = {"bench": {"step_s": 0.02}}
+    config["diagnosing_by_batch"] = {"bench": {"step_s": 0.01}}
     (folder / "config.yaml").write_text(yaml.safe_dump(config))
     run = snakemake(folder)
     assert run.returncode == 0, run.stdout + run.stderr

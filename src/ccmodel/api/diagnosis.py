@@ -88,9 +88,9 @@ class Diagnosis:
     def to_frame(self) -> pd.DataFrame:
         """Candidate models, a row each, those with the smallest mean square first.
 
-        Columns ``mean_square`` (of the leave-one-out residuals over their noise; 1 is noise), ``lack_of_fit`` (share of
-        these residuals that a regression predicts from the other recordings), ``probability`` (among the candidates)
-        and ``why`` it was selected or not.
+        Columns ``mean_square`` (of the leave-one-out residuals over their noise; 1 is noise), ``lack_of_fit`` (most
+        probable mean square of what the candidate leaves as a function of the rig's state), ``probability`` (that it is
+        all that is missing) and ``why`` it was selected or not.
         """
         rows = [] if self._outcome.found is None else candidates_of(self._outcome.found)
         columns = ["candidate", "mean_square", "lack_of_fit", "probability", "why"]
@@ -228,7 +228,7 @@ def diagnose(
     >>> found.report["location"]["place"]
     'conduit'
     >>> found.nearest
-    Model: ...; pulley-friction at drive-pulley + presliding at conduit, fitted to half-loop, ...
+    Model: ...; pulley-friction at drive-pulley + presliding at conduit + ..., fitted to half-loop, ...
     """
     options = diagnosis_options(
         tolerance, step_s, cycles, candidates, without, freeze, baseline is not None, time_limit_s=time_limit_s

@@ -15,7 +15,7 @@ from ccmodel.api.batch import Batch, as_batch, check_consistent
 from ccmodel.api.options import Tolerance, check_step, progress_of, settings_of
 from ccmodel.api.recordings import counted
 from ccmodel.diagnosis.run import Calibration, calibrate
-from ccmodel.diagnosis.settings import ADEQUATE
+from ccmodel.diagnosis.settings import GOOD_FIT
 from ccmodel.failure import ModelError
 from ccmodel.inference.intervals import COVERAGE, Interval
 from ccmodel.model.files import Model, RigConditions
@@ -92,7 +92,7 @@ class Fit:
     def warnings(self) -> tuple[str, ...]:
         """What speaks against relying on the values, a line each."""
         found = [] if self.succeeded else [f"no minimum was found: {self.message}"]
-        if self.mean_square > ADEQUATE:
+        if self.mean_square > GOOD_FIT:
             found.append(
                 f"the model does not reproduce the recordings (mean square {self.mean_square:.3g}, 1 is noise): its"
                 " values depend on how its errors are weighted, which no interval contains; diagnose() finds what is"

@@ -1,34 +1,33 @@
-"""Comparison of candidate models: posterior probabilities, adequacy, and the probability of misspecification.
+"""Comparison of candidate models: the posterior probability that each is complete, and that something is missing.
 
-The log posterior of a candidate is its log evidence plus a log prior. The evidence is that of the BIC, computed from
-leave-one-out mean squares with an effective sample size instead of the number of samples, and integrated over what the
-mechanisms' equations may leave (`log_evidence`). Leave-one-out mean squares already penalise superfluous unknowns; the
-BIC penalises them a second time.
+Every candidate is two hypotheses. It is *complete*: nothing else is missing, and it is exact or its equations leave a
+share of their own effect. Or it is *incomplete*: something that is on no list is missing beside it, a discrepancy of
+any size up to that of the calibrated model. The calibrated model without any mechanism is such a candidate too. What
+nobody listed therefore competes with what is listed.
 
-The posterior assumes a closed world: one of the candidates is correct. In fact the missing physics may be outside the
-list of mechanisms, and the best candidate may only imitate it. `Comparison.well_specified` is the probability that this
-is not so. The confidence in a candidate is the product of both probabilities.
+The log posterior of each is its log evidence (`ccmodel.diagnosis.discrepancy`) plus a log prior, which follows from the
+number of mechanisms; all that were screened are equally probable.
+
+A mechanism may also only imitate what is missing, and better than a Gaussian process does. What it takes off has three
+explanations (`imitation`), which the share that it leaves tells apart: an effect's own mechanism leaves little, the
+best imitation of something unlisted leaves any share, and a mechanism that only fits what another one's equation leaves
+takes off little of it.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import compress
+from math import comb, exp, log
 
 import numpy as np
-from scipy.stats import norm
+from numpy.typing import NDArray
 
-from ccmodel import mechanisms as registry
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.discrepancy import Discrepancy, Evidence, evidence_of
 from ccmodel.diagnosis.hypothesis import Hypothesis
-from ccmodel.diagnosis.lack_of_fit import LackOfFit, lack_of_fit
-from ccmodel.diagnosis.repeatability import FRICTION, friction_probabilities, friction_repeats, log_bayes_factor
+from ccmodel.diagnosis.repeatability import FRICTION, friction_probabilities, log_bayes_factor
 from ccmodel.diagnosis.whitening import Whitened
-from ccmodel.inference.effective_samples import in_comparison
-
-# Model-form error, over the scatter of mean squares, below which it changes no probability.
-NEGLIGIBLE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -43,23 +42,23 @@ class Comparison:
     candidates : list of CandidateFit
         The calibrated model with mechanisms, by ascending leave-one-out mean square; those with a strength
         outside its plausible range last.
-    passed_over : list of CandidateFit
-        Fitted sets of mechanisms that do not improve enough on a part of theirs (`improves_on_members`), likewise.
-    lack_of_fit : mapping of Hypothesis to LackOfFit
-        Of the calibrated model, the candidates with the lowest mean squares and the most probable one.
+    evidence : mapping of Hypothesis to Evidence
+        Of the calibrated model and of each candidate.
     screened : int
         Number of hypotheses that were screened, among which the prior probability is shared.
     linearised_about : CandidateFit or None
         The candidate, with its values, about which the covariance is linearised; None for the model of the first fit.
+    discrepancy : Discrepancy or None
+        From which the evidence was computed.
     """
 
     whitened: Sequence[Whitened]
     base: CandidateFit
     candidates: list[CandidateFit]
-    lack_of_fit: Mapping[Hypothesis, LackOfFit]
+    evidence: Mapping[Hypothesis, Evidence]
     screened: int = 0
     linearised_about: CandidateFit | None = None
-    passed_over: Sequence[CandidateFit] = ()
+    discrepancy: Discrepancy | None = field(default=None, repr=False)
 
     @classmethod
     def of(
@@ -69,21 +68,26 @@ class Comparison:
         candidates: Sequence[CandidateFit],
         screened: int = 0,
         linearised_about: CandidateFit | None = None,
+        discrepancy: Discrepancy | None = None,
     ) -> "Comparison":
-        """Order the candidates, and compute the lack of fit of those that may be named."""
-        every = sorted(candidates, key=lambda c: (not c.is_plausible, c.mean_square))
-        improves = [improves_on_members(c, every) for c in every]
-        ordered = list(compress(every, improves))
-        others = [c for c, better in zip(every, improves, strict=True) if not better]
-        found = cls(whitened, base, ordered, {}, screened, linearised_about, others)
-        contenders = {c.hypothesis: c for c in [base, *ordered[: settings.CONTENDERS], found.most_probable]}
-        lacks = {hypothesis: lack_of_fit(c) for hypothesis, c in contenders.items()}
-        return replace(found, lack_of_fit=lacks)
+        """Order the candidates, and compute their evidence; `discrepancy` is that of the same calibrated model."""
+        ordered = sorted(candidates, key=lambda c: (not c.is_plausible, c.mean_square))
+        found = cls(
+            whitened, base, ordered, {}, screened, linearised_about, discrepancy or Discrepancy.of(whitened, base)
+        )
+        return replace(found, evidence={c.hypothesis: found._evidence_of(c) for c in [base, *ordered]})
 
-    @property
-    def fitted(self) -> list[CandidateFit]:
-        """All that were fitted, by ascending mean square; those with a strength outside its plausible range last."""
-        return sorted([*self.candidates, *self.passed_over], key=lambda c: (not c.is_plausible, c.mean_square))
+    def _evidence_of(self, candidate: CandidateFit) -> Evidence:
+        assert self.discrepancy is not None
+        part = self.part_of(candidate)
+        effect = max(part.mean_square - 1.0, 0.0) if part else 0.0
+        return evidence_of(self.discrepancy, candidate, effect, self.excess)
+
+    def with_candidates(self, candidates: Sequence[CandidateFit]) -> "Comparison":
+        """The same with other candidates, fitted to the same whitened observations."""
+        return Comparison.of(
+            self.whitened, self.base, candidates, self.screened, self.linearised_about, self.discrepancy
+        )
 
     def is_linearised_about(self, candidate: CandidateFit) -> bool:
         """Whether the covariance is linearised about these mechanisms, within a standard deviation of each value."""
@@ -93,175 +97,201 @@ class Comparison:
         moved = np.array([candidate.values[name] - value for name, value in about.values.items()])
         return bool(np.all(np.abs(moved) <= candidate.standard_deviations()))
 
-    @cached_property
-    def posterior(self) -> list[float]:
-        """Closed-world posterior probability of each candidate; the remainder is the calibrated model's.
-
-        It is the log evidence plus a log prior. The noise is max(1, m_min), with m_min the lowest leave-one-out mean
-        square of all candidates and the calibrated model.
-
-        The calibrated model has the prior `PRIOR_AGREES`. All screened hypotheses share the rest equally, whether or
-        not they were fitted: the best of many is good by chance. An implausible candidate has probability zero.
-        """
-        every = [self.base, *self.candidates]
-        mean_squares = np.array([c.mean_square for c in every])
-        evidence = np.array([self.log_evidence(c, max(1.0, mean_squares.min())) for c in every])
-        count = len(self.candidates)
-        prior_of_each = (1 - settings.PRIOR_AGREES) / max(self.screened, count, 1)
-        log_posterior = evidence + np.log([settings.PRIOR_AGREES, *[prior_of_each] * count])
-        log_posterior[1:][[not c.is_plausible for c in self.candidates]] = -np.inf
-        weight = np.exp(log_posterior - log_posterior.max())
-        return (weight / weight.sum())[1:].tolist()
-
-    def log_evidence(self, candidate: CandidateFit, noise: float) -> float:
-        """Logarithm of the evidence of a candidate at a mean square `noise` of the noise, up to a constant.
-
-        It is the log likelihood less p/2 ln N, with N the effective sample size and p the number of unknowns that the
-        candidate has in addition to the calibrated model's. Without the integral over the model-form error it is
-        -BIC/2. Friction that does not repeat speaks against a candidate: whitening keeps it out of the mean square.
-        """
-        samples = in_comparison([w.observations for w in self.whitened])
-        unknowns = len(candidate.values) - len(self.base.values)
-        above, form = candidate.mean_square - 1.0, self.form_error(candidate)
-        tests = friction_probabilities(candidate.whitened, candidate.residuals, FRICTION in candidate.values)
-        repeats = sum(map(log_bayes_factor, tests))
-        return log_likelihood(above, form, samples / (2 * noise)) + repeats - unknowns * float(np.log(samples)) / 2
-
-    @property
-    def most_probable(self) -> CandidateFit:
-        """The candidate with the highest posterior probability; the calibrated model if there are no candidates."""
-        return self.candidates[int(np.argmax(self.posterior))] if self.candidates else self.base
-
     @property
     def excess(self) -> float:
         """Mean square of the calibrated model minus 1, that of noise; at least 0."""
         return max(self.base.mean_square - 1.0, 0.0)
 
-    def is_adequate(self, candidate: CandidateFit) -> bool:
-        """Whether the mean square and the lack of fit of a candidate are as low as the true physics could leave them.
+    def part_of(self, candidate: CandidateFit) -> CandidateFit | None:
+        """The candidate with all of its mechanisms but the last: the best fit of those that lack fewest of them.
 
-        The limits allow for noise and for the model-form error of the added mechanisms. Friction must differ between
-        recordings by no more than from run to run.
+        The calibrated model has none.
         """
-        lack = self.lack_of_fit.get(candidate.hypothesis)
-        if lack is None or not candidate.is_plausible:
-            return False
-        if not friction_repeats(candidate.whitened, candidate.residuals, FRICTION in candidate.values):
-            return False
-        highest_lack = settings.ADEQUATE_LACK_OF_FIT + self.form_error(candidate)
-        return candidate.mean_square <= self.adequate_mean_square(candidate) and lack.lower_bound <= highest_lack
-
-    def adequate_mean_square(self, candidate: CandidateFit) -> float:
-        """Highest mean square of an adequate candidate; the calibrated model gets no allowance for its form."""
         if candidate is self.base:
-            return settings.ADEQUATE
-        limit = settings.ADEQUATE_SET if candidate.hypothesis.size > 1 else settings.ADEQUATE
-        return limit + max(settings.ADEQUATE_SHARE / _imitations(candidate) * self.excess, self.form_error(candidate))
+            return None
+        parts = [c for c in self.candidates if c.is_plausible and is_part_of(c, candidate)]
+        return min(parts, key=lambda c: (-c.hypothesis.size, c.mean_square), default=self.base)
 
-    def form_error(self, candidate: CandidateFit) -> float:
-        """Mean square that the equations of a candidate's mechanisms may leave: of each, a share of its own effect.
+    @cached_property
+    def log_weights(self) -> NDArray:
+        """Log evidence plus log prior that a candidate is complete, and that it is not; shape (1 + candidates, 2).
 
-        The effect of a mechanism is the decrease of the mean square from the candidate without it, where that was
-        fitted, and otherwise from the calibrated model.
+        The calibrated model comes first. A candidate with a strength outside its plausible range has none.
         """
-        fitted = {frozenset(c.hypothesis.acting): c.mean_square for c in [self.base, *self.fitted]}
-        members = frozenset(candidate.hypothesis.acting)
-        return sum(
-            registry.get(one[0]).model_form_error
-            * max(fitted.get(members - {one}, self.base.mean_square) - max(candidate.mean_square, 1.0), 0.0)
-            for one in members
-        )
+        found = []
+        for candidate in [self.base, *self.candidates]:
+            evidence, repeats = self.evidence[candidate.hypothesis], log_odds_of_repeats(candidate)
+            priors = log_priors(candidate.hypothesis.size, max(self.screened, len(self.candidates)))
+            complete = evidence.exact
+            if candidate is not self.base:
+                by_law = log(settings.SAME_LAW), log(1 - settings.SAME_LAW)
+                complete = float(np.logaddexp(evidence.exact + by_law[0], evidence.other_law + by_law[1]))
+            weights = np.array([complete, evidence.incomplete]) + priors + repeats
+            is_possible = candidate is self.base or candidate.is_plausible
+            found.append(weights if is_possible else np.full(2, -np.inf))
+        return np.array(found)
 
-    @property
-    def has_adequate(self) -> bool:
-        """Whether the candidate with the lowest mean square is adequate."""
-        return bool(self.candidates) and self.is_adequate(self.candidates[0])
+    @cached_property
+    def log_posterior(self) -> NDArray:
+        """As `log_weights`, normalised, with the probability of an imitation given to what it imitates."""
+        every, weights = [self.base, *self.candidates], self.log_weights.copy()
+        for k in sorted(range(1, len(every)), key=lambda k: -every[k].hypothesis.size):
+            part = self.part_of(every[k])
+            assert part is not None
+            p = every.index(part)
+            with np.errstate(divide="ignore"):
+                true, of_part, other = np.log(self._imitation(every[k], part))
+            imitates = np.logaddexp.reduce(weights[k]) + other
+            weights[p] = np.logaddexp(weights[p], weights[k] + of_part)
+            weights[p, 1] = np.logaddexp(weights[p, 1], imitates)
+            weights[k] += true
+        weights -= np.logaddexp.reduce(weights, axis=None)
+        if self._tested < 1:
+            untested = float(np.logaddexp.reduce(weights[1:], axis=None, initial=-np.inf)) + np.log1p(-self._tested)
+            weights[0, 1] = np.logaddexp(weights[0, 1], untested)
+            weights[1:] += log(self._tested)
+        return weights
 
-    @property
-    def is_sufficient(self) -> bool:
-        """Whether no further mechanism is needed: the best candidate is adequate and close to the noise.
+    def _imitation(self, candidate: CandidateFit, part: CandidateFit) -> NDArray:
+        before, resolution = self.left_by(part), self.evidence[candidate.hypothesis].resolution
+        before = max(before, self.evidence[part.hypothesis].resolution, 1e-12)
+        share, smallest = (min(x / before, 1.0) for x in (self.left_by(candidate), resolution))
+        return imitation(share, smallest, part is not self.base)
 
-        Also true without candidates, since a further mechanism is only added to a first.
+    def left_by(self, candidate: CandidateFit) -> float:
+        """Mean square that a candidate leaves above the noise.
+
+        It is that of its discrepancy. What is no function of the rig's state, such as slips at other instants, only the
+        mean square itself shows, as far as it is beyond its scatter.
         """
-        if not self.has_adequate:
-            return not self.candidates
-        best = self.candidates[0]
-        return best.mean_square <= settings.SUFFICIENT + self.form_error(best)
+        lowest = min(c.mean_square for c in [self.base, *self.candidates])
+        noise = 1.0 + float(np.clip(lowest - 1.0, 0.0, settings.MISSTATED_NOISE))
+        above = candidate.mean_square - noise
+        size = self.evidence[candidate.hypothesis].size
+        return max(min(size, above + settings.SCATTER), above - settings.SCATTER, 0.0)
 
     @property
-    def well_specified(self) -> float:
-        """Probability that the most probable candidate is correct and no imitation, times `_discount`."""
+    def probability(self) -> list[float]:
+        """Probability of each candidate to be complete."""
+        return np.exp(self.log_posterior[1:, 0]).tolist()
+
+    @property
+    def probability_of_base(self) -> float:
+        """Probability that nothing is missing in the calibrated model."""
+        return float(np.exp(self.log_posterior[0, 0]))
+
+    @property
+    def unlisted(self) -> float:
+        """Probability that something is missing that no candidate describes, alone or beside what one describes."""
+        return float(np.exp(self.log_posterior[:, 1]).sum())
+
+    @property
+    def is_enough(self) -> bool:
+        """Whether no further mechanism is searched for: the best candidate leaves nothing of a further effect."""
         if not self.candidates:
-            return self._discount
-        best = self.most_probable
-        return self._discount * well_specified(best, self.base, self.form_error(best))
+            return True
+        best = self.most_probable if self.probability_of_base < 0.5 else self.base
+        return self.left_by(best) == 0.0
 
     @property
-    def _discount(self) -> float:
-        """Factor on the confidence, below 1 where the test of adequacy is weak.
+    def most_probable(self) -> CandidateFit:
+        """The candidate that is most probably complete; the calibrated model if there are no candidates."""
+        complete = self.log_posterior[1:, 0]
+        return self.candidates[int(np.argmax(complete))] if self.candidates else self.base
 
-        The test is weak for a single recording, which leaves none to hold out; for an initial tension that is not
-        observed and therefore fitted; and as far as a tolerance takes the place of measured noise.
+    @property
+    def leading(self) -> list[CandidateFit]:
+        """Candidates by descending probability, complete or not; those that are not possible by their mean square."""
+        weights = np.logaddexp.reduce(self.log_posterior[1:], axis=1)
+        return [self.candidates[k] for k in np.argsort(-weights, kind="stable")]
+
+    def log_weight(self, candidate: CandidateFit) -> float:
+        """Log posterior of a candidate, complete or not."""
+        return float(np.logaddexp.reduce(self.log_posterior[1 + self.candidates.index(candidate)]))
+
+    @property
+    def faulty_channels(self) -> dict[str, float]:
+        """Probability that the calibrated model is right but for one channel, by channel."""
+        evidence, total = self.evidence[self.base.hypothesis], np.logaddexp.reduce(self.log_weights, axis=None)
+        shift = self.log_weights[0, 1] - evidence.incomplete - log(2 * len(evidence.in_channel)) - total
+        return {channel: exp(value + shift) for channel, value in evidence.in_channel.items()}
+
+    @property
+    def _tested(self) -> float:
+        """Factor on the probability of every set of mechanisms, below 1 where nothing shows how well models predict.
+
+        That is so for a single recording, which leaves none to hold out; for an initial tension that is not observed
+        and therefore fitted; and as far as a tolerance takes the place of measured noise.
         """
         is_weak = len(self.whitened) == 1 or "pretension_share" in self.base.free
         share = 1.0 if is_weak else np.mean([w.observations.tolerance_share for w in self.whitened])
         return float(settings.UNTESTED**share)
 
 
+def log_priors(size: int, screened: int) -> NDArray:
+    """Log prior that a set of `size` mechanisms is complete, and that one effect is missing beside it; shape (2,)."""
+
+    def of_number(effects: int) -> float:
+        if effects == 0:
+            return log(settings.PRIOR_AGREES)
+        further = (effects - 1) * log(settings.PRIOR_FURTHER) + log(1 - settings.PRIOR_FURTHER)
+        return log(1 - settings.PRIOR_AGREES) + further
+
+    listed = size * log(settings.PRIOR_LISTED) - log(comb(max(screened, size), size))
+    beside = log(1 - settings.PRIOR_LISTED) + log(size + 1)
+    return np.array([of_number(size) + listed, of_number(size + 1) + listed + beside])
+
+
+def imitation(share: float, smallest: float, has_part: bool) -> NDArray:
+    """Probabilities of what a mechanism explains by the share that it leaves of what was left without it.
+
+    Parameters
+    ----------
+    share : float
+        From 0 to 1.
+    smallest : float
+        The least share that would be noticed, above 0.
+    has_part : bool
+        Whether there are other mechanisms, whose equations may leave what this one takes off.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        That it is missing; that it imitates what the equations of the others leave; and that it imitates something
+        unlisted.
+    """
+    least, most = settings.LEFT_BY_LAW
+    power, uniform = settings.IMITATION_POWER + 1, settings.UNIFORM_PART
+    exact = exp(-share / smallest) / (smallest * (1 - exp(-1 / smallest)))
+    # Shares below the smallest that would be noticed are not told apart, and have their mean density.
+    at = max(share, smallest)
+    if share < smallest:
+        by_law = min(log(at / least) / log(most / least), 1.0) / at
+        of_others = uniform + (1 - uniform) * at ** (power - 1)
+    else:
+        by_law = 1 / (log(most / least) * at) if at < most else 0.0
+        of_others = uniform + (1 - uniform) * power * at ** (power - 1)
+    of_its_own = settings.SAME_LAW * exact + (1 - settings.SAME_LAW) * by_law
+    further = settings.PRIOR_FURTHER if has_part else 1.0
+    found = np.array(
+        [
+            further * settings.PRIOR_LISTED * of_its_own,
+            (1 - further) * of_others,
+            further * (1 - settings.PRIOR_LISTED),
+        ]
+    )
+    return found / found.sum()
+
+
+def log_odds_of_repeats(candidate: CandidateFit) -> float:
+    """Logarithm of the least Bayes factor that friction differs between recordings as from run to run.
+
+    Whitening keeps friction that differs from run to run out of the residuals, and so may keep out too much.
+    """
+    tests = friction_probabilities(candidate.whitened, candidate.residuals, FRICTION in candidate.values)
+    return sum(map(log_bayes_factor, tests))
+
+
 def is_part_of(candidate: CandidateFit, other: CandidateFit) -> bool:
     """Whether another candidate has all of its mechanisms and more."""
     return set(candidate.hypothesis.acting) < set(other.hypothesis.acting)
-
-
-def improves_on_members(candidate: CandidateFit, candidates: Sequence[CandidateFit]) -> bool:
-    """Whether a set halves the excess mean square of each candidate with fewer of its members; true of a single."""
-    lowest = candidate.mean_square
-    parts = [c.mean_square for c in candidates if is_part_of(c, candidate)]
-    return all(lowest - 1 < settings.SET_SHARE * (part - 1) and lowest < part for part in parts)
-
-
-def log_likelihood(above: float, form_error: float, rate: float) -> float:
-    """Log likelihood of a mean square that is `above` that of noise, up to a constant.
-
-    A model that leaves a mean square g beside the noise has the likelihood exp(-rate |above - g|). Every second
-    candidate is exact: g = 0. Of the others g is uniform from 0 to `form_error`. What a true mechanism's equation
-    misses is therefore no evidence for a further mechanism that imitates it.
-    """
-    exact, most = -rate * above, rate * form_error
-    if most < NEGLIGIBLE:
-        return exact
-    inside = float(np.clip(above, 0.0, form_error))
-    area = -np.expm1(-rate * inside) - np.expm1(-rate * (form_error - inside))
-    simplified = -rate * abs(above - inside) + np.log(area / most)
-    return float(np.logaddexp(exact, simplified) - np.log(2))
-
-
-def well_specified(candidate: CandidateFit, base: CandidateFit, form_error: float) -> float:
-    """Probability that a candidate is the missing physics and no imitation of it, given the candidate's mean square.
-
-    Bayes' rule with the prior `PRIOR_MISSPECIFIED` and two densities of the mean square above `CORRECT_LEVEL`
-    (`form_error`: as of `Comparison.form_error`):
-
-    - of a correct candidate: normal about zero. In every second case a half-normal model-form error is added, because
-      the real effect does not follow the mechanism's equation exactly;
-    - of an imitation: uniform from zero to the excess of the calibrated model. A set is taken for the best of several
-      imitations, with the density of the smallest of as many uniform variables.
-    """
-    excess = max(base.mean_square - settings.CORRECT_LEVEL, settings.CORRECT_SPREAD)
-    above = candidate.mean_square - settings.CORRECT_LEVEL
-    form = max(settings.FORM_SHARE * excess, form_error)
-    width = np.hypot(settings.CORRECT_SPREAD, form)
-    exact = norm.pdf(above, scale=settings.CORRECT_SPREAD)
-    # The half-normal form error convolved with the normal scatter of correct models.
-    simplified = 2 * norm.pdf(above, scale=width) * norm.cdf(above * form / (settings.CORRECT_SPREAD * width))
-    n = _imitations(candidate)
-    share = float(np.clip(above / excess, 0.0, 1.0))
-    # The uniform density begins at zero with the scatter of correct models instead of a step.
-    imitation = norm.cdf(above / settings.CORRECT_SPREAD) * n * (1 - share) ** (n - 1) / excess
-    correct = (1 - settings.PRIOR_MISSPECIFIED) * (exact + simplified) / 2
-    return float(correct / (correct + settings.PRIOR_MISSPECIFIED * imitation))
-
-
-def _imitations(candidate: CandidateFit) -> int:
-    """Number of imitations of which a candidate may be the best: for a set the partners that were fitted, else one."""
-    return settings.PARTNERS if candidate.hypothesis.size > 1 else 1

@@ -45,10 +45,7 @@ def report(
         "verdict": judgement.verdict,
         "is_held": base.hypothesis.is_frozen,
         "location": location.location(judgement, calibrated),
-        "mechanisms": [
-            mechanism_of(best, k, _name_probability(name, judgement.confidence), shift)
-            for k, (name, _) in enumerate(named)
-        ],
+        "mechanisms": [mechanism_of(best, k, _stated(judgement, name), shift) for k, (name, _) in enumerate(named)],
         "alternatives": alternatives_of(judgement, dict(named)),
         "likeliest": [{"name": n, "place": p} for n, p in best.hypothesis.acting if judgement.verdict == "undecided"],
         "nearest": _nearest(judgement, calibrated),
@@ -86,14 +83,14 @@ def alternatives_of(judgement: Judgement, named: Mapping[str, str]) -> list[dict
     places: dict[str, str] = {}
     for name, place in sorted(every, key=lambda acting: (-_place_probability(acting, confidence), acting)):
         places.setdefault(name, place)
-    others = [(n, p, _name_probability(n, confidence)) for n, p in places.items() if n not in named]
+    others = [(n, p, _stated(judgement, n)) for n, p in places.items() if n not in named]
     ranked = sorted(others, key=lambda one: -one[2])[: settings.MOST_ALTERNATIVES]
     return [{"name": n, "place": p, "confidence": round(c, 4)} for n, p, c in ranked if c > settings.RIVAL]
 
 
-def _name_probability(name: str, confidence: Mapping[Hypothesis, float]) -> float:
-    """Probability that a mechanism acts at any of its places, below certainty."""
-    return min(settings.MOST_CONFIDENT, sum(p for hypothesis, p in confidence.items() if name in hypothesis.names))
+def _stated(judgement: Judgement, name: str) -> float:
+    """Confidence in a mechanism, below certainty."""
+    return min(settings.MOST_CONFIDENT, judgement.confidence_in(name))
 
 
 def _place_probability(acting: tuple[str, str], confidence: Mapping[Hypothesis, float]) -> float:
@@ -200,7 +197,7 @@ def held_out_errors(judgement: Judgement, calibrated: CandidateFit, chosen: Sequ
 
 
 def contradicting_recording(judgement: Judgement) -> NotJudged:
-    """Of an unexplained batch, the recording without which the calibrated model is adequate; a list of one or none."""
+    """Of an unexplained batch, the recording without which the calibrated model fits; a list of one or none."""
     base, whitened = judgement.calibrated, judgement.whitened
     if judgement.verdict != "unexplained" or len(whitened) < settings.FEWEST_TO_CONTRADICT:
         return []
@@ -210,7 +207,7 @@ def contradicting_recording(judgement: Judgement) -> NotJudged:
         without = fit(others, base.hypothesis, base.free, base.values).mean_square
     except (ModelError, ValueError):
         return []
-    if without > settings.ADEQUATE:
+    if without > settings.GOOD_FIT:
         return []
     why = (
         f"the calibrated model has a mean square of {without:.2f} (1: noise) in the others without it, and of"

@@ -5,12 +5,10 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Self
 
-import numpy as np
-
 from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit, fit
-from ccmodel.diagnosis.comparison import Comparison, improves_on_members, is_part_of
+from ccmodel.diagnosis.comparison import Comparison, is_part_of
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.repeatability import estimated
 from ccmodel.diagnosis.screening import Score, Screening, screen
@@ -56,31 +54,29 @@ class Selection:
         self.progress(f"{text} {len(self.mechanisms)} mechanisms", 0.0)
         screening = screen(base, self.mechanisms, self.deadline)
         scores = screening.singles()
-        fewest = settings.FEWEST_FITTED if base.mean_square > settings.ADEQUATE else 0
+        nothing = Comparison.of(whitened, base, [], len(self.mechanisms))
+        fewest = settings.FEWEST_FITTED if nothing.unlisted > 0.5 else 0
         worth = [s for k, s in enumerate(scores) if s.values and (s.gain > settings.WORTH_FITTING or k < fewest)]
         leading = worth[: settings.MOST_FITTED]
         chosen = [s.hypothesis for s in leading]
         forced = [Score(h, 0.0, h.start) for h in self.forced if h not in chosen]
         singles = self._part(SCREENED, FITTED).fit_all(whitened, base, [*leading, *forced])
-        found = Comparison.of(whitened, base, singles, len(self.mechanisms))
-        step, adequate = (1.0 - FITTED) / (settings.MOST_MECHANISMS - 1), None
+        found = nothing.with_candidates(singles)
+        step = (1.0 - FITTED) / (settings.MOST_MECHANISMS - 1)
         for size in range(2, settings.MOST_MECHANISMS + 1):
             part = self._part(FITTED + (size - 2) * step, FITTED + (size - 1) * step)
-            if not found.is_sufficient:
+            if not found.is_enough:
                 found = part._part(0.0, RELINEARISED).relinearise(found)
-            # An inadequate set does not displace an adequate candidate.
-            adequate = found if found.has_adequate else adequate
-            if found.is_sufficient or self.deadline.has_passed:
+            if found.is_enough or self.deadline.has_passed:
                 break
-            extended = part._part(RELINEARISED, 1.0).extended(found, screening, size)
-            if not grows(extended, size):
+            found = part._part(RELINEARISED, 1.0).extended(found, screening, size)
+            if found.leading[0].hypothesis.size < size:
                 break
-            found = extended
         # Candidates are compared, and their parameters estimated, under the best one's own covariance: about a model
         # that lacks something, friction seems to scatter.
-        if found.fitted and (sum(found.posterior) > 0.5 or not found.is_adequate(found.base)):
+        if found.candidates and found.probability_of_base < 0.5:
             found = self.relinearise(found)
-        return (found if found.has_adequate else adequate or found), scores
+        return found, scores
 
     def _part(self, low: float, high: float) -> Self:
         """The same, whose work takes these shares of the whole."""
@@ -109,17 +105,17 @@ class Selection:
         sets = self._part(0.0, 0.8)._sets(found, screening, size)
         if not sets:
             return found
-        every = [*found.fitted, *sets]
-        best = min(sets, key=lambda c: (not c.is_plausible, c.mean_square))
-        if improves_on_members(best, every):
-            every += self._part(0.8, 1.0)._subsets(found, best)
-        return Comparison.of(found.whitened, found.base, lowest(every), found.screened, found.linearised_about)
+        extended = found.with_candidates([*found.candidates, *sets])
+        best = extended.leading[0]
+        if best.hypothesis.size == size:
+            subsets = self._part(0.8, 1.0)._subsets(found, best)
+            extended = extended.with_candidates(lowest([*extended.candidates, *subsets]))
+        return extended
 
     def _sets(self, found: Comparison, screening: Screening, size: int) -> list[CandidateFit]:
         """Fitted sets: the leading smaller ones with the best partner each, and those that lead the first screening."""
-        smaller = [c for c in found.fitted if c.hypothesis.size == size - 1]
-        firsts = ([c for c in smaller if found.is_adequate(c)] or smaller)[: settings.FIRSTS[size]]
-        fitted, seen = [], {frozenset(c.hypothesis.acting) for c in found.fitted}
+        firsts = [c for c in found.leading if c.hypothesis.size == size - 1][: settings.FIRSTS[size]]
+        fitted, seen = [], {frozenset(c.hypothesis.acting) for c in found.candidates}
         for k, first in enumerate(firsts):
             part = self._part(k / (len(firsts) + 1), (k + 1) / (len(firsts) + 1))
             part.progress(f"screening mechanisms beside {first.hypothesis}", 0.0)
@@ -151,7 +147,7 @@ class Selection:
         Where the initial tension is not observed, every candidate is fitted from the best one's calibration too: the
         cost has several minima there.
         """
-        best = found.fitted[0]
+        best = found.leading[0]
         if found.is_linearised_about(best):
             return found
         self.progress(f"linearising the covariance about {best.hypothesis}", 0.0)
@@ -172,11 +168,11 @@ class Selection:
         except ModelError as error:
             self.progress(f"the covariance stays as it is ({error})")
             return found
-        # Every rival of an adequate candidate matters; of an inadequate one, only the leading ones lead on.
-        most = len(found.fitted) if found.has_adequate else settings.CONTENDERS
-        highest = 1.0 + settings.HOPELESS * max(best.mean_square - 1.0, settings.SUFFICIENT - 1.0)
+        # Every rival of a complete candidate matters; of an incomplete one, only the leading ones lead on.
+        most = len(found.candidates) if found.unlisted < 0.5 else settings.CONTENDERS
+        highest = 1.0 + settings.HOPELESS * max(best.mean_square - 1.0, settings.NEAR_NOISE)
         leading = [
-            c for k, c in enumerate(found.fitted) if (k < most and c.mean_square <= highest) or is_part_of(c, best)
+            c for k, c in enumerate(found.leading) if (k < most and c.mean_square <= highest) or is_part_of(c, best)
         ]
         again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in leading for s in starts(c)])
         if not any(c.hypothesis == best.hypothesis for c in again):
@@ -211,12 +207,3 @@ def unseen(
             seen.add(members)
             chosen.append(score)
     return chosen
-
-
-def grows(found: Comparison, size: int) -> bool:
-    """Whether the best set of `size` mechanisms has more evidence than every smaller candidate."""
-    noise = max(1.0, min(c.mean_square for c in [found.base, *found.fitted]))
-    plausible = [c for c in found.fitted if c.is_plausible]
-    sets = [found.log_evidence(c, noise) for c in plausible if c.hypothesis.size == size]
-    smaller = [found.log_evidence(c, noise) for c in plausible if c.hypothesis.size < size]
-    return bool(sets) and max(sets) > max(smaller, default=-np.inf)

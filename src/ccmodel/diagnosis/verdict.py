@@ -1,16 +1,16 @@
-"""The verdict, decided from the comparison of candidate models."""
+"""The verdict, decided from the posterior probabilities of the candidate models."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import exp
 
 import numpy as np
 
+from ccmodel.channels import PLACES_OF
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.comparison import Comparison
 from ccmodel.diagnosis.hypothesis import Hypothesis
-from ccmodel.diagnosis.isolation import isolate
-from ccmodel.diagnosis.lack_of_fit import LackOfFit
 from ccmodel.diagnosis.screening import Score
 from ccmodel.diagnosis.whitening import Whitened
 
@@ -23,18 +23,17 @@ class Judgement:
     ----------
     verdict : {"agrees", "explained", "undecided", "unexplained"}
     best : CandidateFit
-        The most probable candidate if the verdict is explained or undecided, otherwise the calibrated model.
+        The most probable candidate if the verdict is explained, the most probable one whether complete or not if it is
+        undecided, otherwise the calibrated model.
     comparison : Comparison
     candidates : list of CandidateFit
         Those of the comparison, by descending probability.
     probability : list of float
-        Closed-world posterior probability of each of `candidates`.
-    well_specified : float
-        Probability that the most probable candidate is correct and no imitation (`Comparison.well_specified`).
+        Posterior probability of each of `candidates` to be complete.
     scores : list of Score
         Screening scores of all mechanisms.
     single_fault_places : sequence of str
-        Places where a single fault of unknown kind would explain the recordings as well as the most probable set.
+        Places of a channel in which a single fault of unknown kind would explain an unexplained batch.
     """
 
     verdict: str
@@ -42,7 +41,6 @@ class Judgement:
     comparison: Comparison
     candidates: list[CandidateFit]
     probability: list[float]
-    well_specified: float
     scores: list[Score]
     single_fault_places: Sequence[str] = ()
 
@@ -57,15 +55,13 @@ class Judgement:
         return self.comparison.whitened
 
     @property
-    def lack_of_fit(self) -> Mapping[Hypothesis, LackOfFit]:
-        """Of the calibrated model and the leading candidates."""
-        return self.comparison.lack_of_fit
-
-    @property
     def confidence(self) -> dict[Hypothesis, float]:
-        """Probability of each candidate: its closed-world probability times `well_specified`."""
-        pairs = zip(self.candidates, self.probability, strict=True)
-        return {c.hypothesis: self.well_specified * p for c, p in pairs}
+        """Probability of each candidate, complete or not: that its mechanisms act, and no others of the list."""
+        return {c.hypothesis: exp(self.comparison.log_weight(c)) for c in self.candidates}
+
+    def confidence_in(self, name: str) -> float:
+        """Probability that a mechanism acts, at whatever place and beside whatever others."""
+        return sum(p for hypothesis, p in self.confidence.items() if name in hypothesis.names)
 
     @property
     def nearest(self) -> CandidateFit | None:
@@ -76,77 +72,39 @@ class Judgement:
 def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
     """Decide the verdict.
 
-    - ``agrees``: the calibrated model is adequate, and no candidate is a large enough improvement.
-    - ``unexplained``: the calibrated model is inadequate, and no candidate improves on it or is more probable; or the
-      most probable candidate is inadequate; or that candidate is a set of mechanisms, while a single fault that no
-      candidate describes would suffice; or it is almost certainly an imitation.
-    - ``explained``: the most probable candidate is adequate, and its mechanisms have enough probability.
+    - ``agrees``: nothing is missing in the calibrated model, with a probability above one half.
+    - ``explained``: each mechanism of the candidate that is most probably complete has the probability `SURE` at least,
+      and that these and no others are missing has one above one half.
+    - ``unexplained``: something is missing that no candidate describes, with a probability above one half, and no
+      mechanism is part of it with such a probability.
     - ``undecided``: otherwise.
     """
-    most_probable, probability = comparison.most_probable, comparison.posterior
-    order = np.argsort(-np.array(probability), kind="stable")
-    unexplained = Judgement(
-        "unexplained", comparison.base, comparison, [comparison.candidates[k] for k in order],
-        [probability[k] for k in order], comparison.well_specified, scores,
-    )  # fmt: skip
-    agrees = comparison.is_adequate(comparison.base)
-    # An inadequate model may fail by its lack of fit alone. A mechanism that removes it may gain little mean square.
-    least = settings.WORTH_NAMING if agrees else 0.0
-    probability_of_base = 1.0 - sum(probability)
-    if not improves(most_probable, comparison.base, least) or probability_of_base > 0.5:
-        return replace(unexplained, verdict="agrees") if agrees else unexplained
-    if not comparison.is_adequate(most_probable):
-        return unexplained
-    places = single_fault_places(comparison, most_probable.hypothesis)
-    # If an adequate candidate describes that single fault, the verdict is undecided, otherwise unexplained.
-    if places and not any(_is_at(c, places) and comparison.is_adequate(c) for c in comparison.candidates):
-        return replace(unexplained, single_fault_places=places)
-    if comparison.well_specified * max(probability) <= settings.RIVAL:
-        return unexplained
-    # Every candidate with a mechanism, at whatever place and beside whatever others, counts towards its probability.
-    of_each = [
-        sum(p for c, p in zip(comparison.candidates, probability, strict=True) if name in c.hypothesis.names)
-        for name in most_probable.hypothesis.names
-    ]
-    is_sure = comparison.well_specified * min(of_each) >= settings.SURE and not places
-    return replace(unexplained, verdict="explained" if is_sure else "undecided", best=most_probable)
+    probability = np.array(comparison.probability)
+    order = np.argsort(-probability, kind="stable")
+    candidates = [comparison.candidates[k] for k in order]
+    found = Judgement("agrees", comparison.base, comparison, candidates, probability[order].tolist(), scores)
+    if comparison.probability_of_base > 0.5:
+        return found
+    if candidates and _is_explained(found, comparison.most_probable):
+        return replace(found, verdict="explained", best=comparison.most_probable)
+    names = {name for c in candidates for name in c.hypothesis.names}
+    if comparison.unlisted > 0.5 and max(map(found.confidence_in, names), default=0.0) <= 0.5:
+        return replace(found, verdict="unexplained", single_fault_places=single_fault_places(comparison))
+    return replace(found, verdict="undecided", best=comparison.leading[0])
 
 
-def improves(candidate: CandidateFit, base: CandidateFit, least: float) -> bool:
-    """Whether a candidate lowers the mean square by more than a share `least`, and not at some recordings' expense.
-
-    Where the mean square rises, it may rise by less than `UNSTEADY` times its decrease in the other recordings. An
-    effect that is present on the rig raises it in none.
-    """
-    gain = base.by_recording - candidate.by_recording
-    better, worse = gain.clip(0.0).mean(), -gain.clip(None, 0.0).mean()
-    return bool(better - worse > least * max(1.0, base.mean_square) and worse < settings.UNSTEADY * better)
+def _is_explained(judgement: Judgement, best: CandidateFit) -> bool:
+    names = sorted(best.hypothesis.names)
+    pairs = zip(judgement.candidates, judgement.probability, strict=True)
+    alone = sum(p for c, p in pairs if sorted(c.hypothesis.names) == names)
+    return min(map(judgement.confidence_in, names)) >= settings.SURE and alone > 0.5
 
 
-def _is_at(candidate: CandidateFit, places: Sequence[str]) -> bool:
-    """Whether a candidate is a single mechanism at one of these places."""
-    return candidate.hypothesis.size == 1 and set(candidate.hypothesis.places) <= set(places)
-
-
-def single_fault_places(comparison: Comparison, hypothesis: Hypothesis) -> list[str]:
-    """Places where a single fault of unknown kind would explain the recordings as well as a set of mechanisms does.
-
-    The places are those of every part without which the calibrated model fits (`isolate`), the best first. A single
-    fault is more probable than two mechanisms that together imitate it: an eccentric encoder disc, for instance, is
-    imitated by an eccentric pulley and a torque gain. If all mechanisms of the set act at one of these parts, fault
-    isolation cannot tell the set from a single fault, and the list is empty.
-    """
-    if hypothesis.size < 2:
-        return []
-    set_places = set(hypothesis.places)
-    isolated = sorted(
-        (excess, places)
-        for excess, places in isolate(comparison.whitened, comparison.base)
-        if excess <= settings.SUFFICIENT - 1.0
-    )
-    if any(set_places <= set(places) for _, places in isolated):
-        return []
-    return list(dict.fromkeys(place for _, places in isolated for place in places))
+def single_fault_places(comparison: Comparison) -> list[str]:
+    """Places of the channels in which a single unknown fault is probable, the most probable first."""
+    by_channel = comparison.faulty_channels
+    probable = sorted((c for c, p in by_channel.items() if p > settings.RIVAL), key=lambda c: -by_channel[c])
+    return list(dict.fromkeys(place for channel in probable for place in PLACES_OF[channel]))
 
 
 def nested_choice(judgement: Judgement) -> list[CandidateFit]:

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 IN_FITS = 100
 # Of a channel in a comparison of candidate models.
 IN_DIAGNOSIS = 20
+# Of a channel in the evidence of a candidate beside a model discrepancy, which accounts for most of what is correlated.
+IN_EVIDENCE = 50
 
 
 class Measured(Protocol):

@@ -159,7 +159,7 @@ def _look_alikes(mechanism: Mechanism) -> str:
 
 
 def _role(mechanism: Mechanism) -> str:
-    """What it changes, and what a diagnosis assumes about it."""
+    """What it changes, and whether a diagnosis considers it unasked."""
     if mechanism.modifies_observation is not None:
         role = "It modifies the observation: the sensors' readings after a run."
     elif mechanism.drift is not None:
@@ -167,7 +167,6 @@ def _role(mechanism: Mechanism) -> str:
     else:
         settings = ", ".join(f"`{name}`" for name in mechanism.neutral_settings)
         role = f"It modifies the physics: the general solver's {settings}."
-    role += f" Model-form error: {mechanism.model_form_error:g} of its effect (mean square)."
     return role + (" A diagnosis considers it only as a forced candidate." if mechanism.by_name_only else "")
 
 

@@ -170,9 +170,6 @@ class Mechanism:
         Look-alikes: other mechanisms, or `PAPER_LOOK_ALIKES`.
     depends_on_time : bool
         Whether its effect depends on the rate of the motion, not only on its path.
-    model_form_error : float
-        Share of the mechanism's effect on recordings (mean square) that this simple form may miss on a rig. Default:
-        the most that those without a value of their own miss on rigs of other forms (`make form-errors`).
     by_name_only : bool
         Whether a diagnosis considers it only as a forced candidate.
     settings : mapping of str to str
@@ -198,7 +195,6 @@ class Mechanism:
     parameters: tuple[Parameter, ...]
     mistaken_for: tuple[str, ...]
     depends_on_time: bool
-    model_form_error: float = 0.003
     by_name_only: bool = False
     settings: Mapping[str, str] = field(default_factory=dict)
     structures: Mapping[str, Any] = field(default_factory=dict)

@@ -36,8 +36,5 @@ MECHANISM = Mechanism(
     ),
     mistaken_for=("time-skew",),
     depends_on_time=True,
-    # It rings after every breakaway, whose instant no recording gives to a part of a ring. On five practice rigs the
-    # mechanism misses 0.4 to 6 % of its effect; as much as 6 % would hide a second mechanism.
-    model_form_error=0.01,
     settings={"inertia": "J", "damping_ratio": "zeta"},
 )

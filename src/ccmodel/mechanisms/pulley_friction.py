@@ -58,7 +58,5 @@ MECHANISM = Mechanism(
     ),
     mistaken_for=("torque-scale", "constant-drag"),
     depends_on_time=False,
-    # It misses 0.8 % where a bearing yields by another law than Dahl's (`make form-errors`).
-    model_form_error=0.01,
     settings={"{side}_friction_Nm": "friction_torque", "{side}_presliding_rad": "presliding"},
 )

@@ -67,9 +67,6 @@ MECHANISM = Mechanism(
     ),
     mistaken_for=("presliding", "viscous-friction"),
     depends_on_time=True,
-    # Cables jump where friction falls with speed, and the times of their jumps depend on the contact's finest scale. On
-    # a rig with elastic-slip elements, 3 % of the effect of a 28 % peak remain at the true values.
-    model_form_error=0.03,
     settings={
         "stribeck_rise": "a",
         "stribeck_speed": "vs",

@@ -6,6 +6,7 @@ from math import floor, log10
 
 from ccmodel import mechanisms as registry
 from ccmodel.channels import TABLE
+from ccmodel.diagnosis.settings import SURE
 from ccmodel.mechanisms.contract import side
 
 # By the short names of diagnosis.json.
@@ -75,6 +76,11 @@ def _with_confidence(mechanisms: Sequence[Mapping]) -> str:
 def _undecided(diagnosis: Mapping, missing: str) -> str:
     together = [_placed(one) for one in diagnosis["likeliest"]]
     names = [f"{_placed(one)} ({one['confidence']:.2f})" for one in diagnosis["alternatives"]]
+    sure = sum(one["confidence"] >= SURE for one in diagnosis["alternatives"])
+    if sure:
+        rest = f": perhaps {' or '.join(names[sure:])}" if names[sure:] else ""
+        part = f"Part of what {missing} is {' and '.join(names[:sure])}"
+        return f"{part}. These recordings do not tell what else {missing}, if anything{rest}."
     if len(together) > 1:
         all_of_them = " and ".join(together)
         others = [

@@ -16,7 +16,6 @@ from ccmodel.channels import TABLE, THETA_IN, short_name
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.location import PHASES, mismatch
 from ccmodel.diagnosis.run import Diagnosis
-from ccmodel.diagnosis.settings import ADEQUATE_LACK_OF_FIT
 from ccmodel.diagnosis.verdict import nested_choice
 from ccmodel.mechanisms import catalogue
 from ccmodel.model.parameters import batch_key
@@ -76,7 +75,7 @@ def write_diagnosis(file: Path, found: Diagnosis, page: str | None = None) -> No
             baseline=_baseline(report),
             has_found=found.judgement.best is not found.judgement.calibrated,
             candidates=candidates_of(found)[: 1 + CANDIDATES],
-            listed=found.judgement.well_specified,
+            unlisted=found.judgement.comparison.unlisted,
             mechanisms=[catalogue.parts(name) for name in sorted({m["name"] for m in named})],
             summaries={name: registry.get(name) for name in registry.names()},
             map=_encoded(_map(found)),
@@ -186,7 +185,7 @@ def candidates_of(found: Diagnosis) -> list[dict]:
         {
             "candidate": str(fit.hypothesis),
             "mean_square": fit.mean_square,
-            "lack_of_fit": max(lack.mean, 0.0) if (lack := j.lack_of_fit.get(fit.hypothesis)) else None,
+            "lack_of_fit": j.comparison.evidence[fit.hypothesis].size,
             "probability": p,
             "why": _why(fit, found),
         }
@@ -203,19 +202,10 @@ def _why(fit: CandidateFit, found: Diagnosis) -> str:
         return "most probable"
     if not fit.is_plausible:
         return "needs implausible values"
-    if not j.comparison.is_adequate(fit):
-        lack = j.lack_of_fit.get(fit.hypothesis)
-        excessive = lack is not None and lack.lower_bound > ADEQUATE_LACK_OF_FIT
-        if excessive:
-            return "lack of fit"
-        limit = j.comparison.adequate_mean_square(fit)
-        # The lack of fit of a candidate that others surpass is not computed.
-        above = fit.mean_square > limit
-        return f"mean square above {limit:.3g}, the limit" if above else "others have a smaller mean square"
-    if j.single_fault_places and fit.hypothesis.size > 1:
-        return f"adequate, but one fault at the {' or '.join(j.single_fault_places)} is as adequate"
-    ratio = fit.mean_square / j.best.mean_square
-    return f"adequate, with {ratio:.3g} times the mean square" if ratio > 1 else "adequate, with more parameters"
+    evidence = j.comparison.evidence[fit.hypothesis]
+    if evidence.incomplete > max(evidence.exact, evidence.other_law):
+        return "something is missing beside it"
+    return "less probable"
 
 
 def _map(found: Diagnosis) -> Figure:

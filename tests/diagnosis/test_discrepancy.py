@@ -1,0 +1,122 @@
+"""Evidence of candidates beside a model discrepancy."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.discrepancy import Discrepancy, Modes, Products, _log_evidence, evidence_of
+from ccmodel.diagnosis.hypothesis import Hypothesis
+from made_observations import batch, calibrated
+
+EXCESS = 10.0
+
+
+@pytest.fixture(scope="module")
+def recordings():
+    return batch()
+
+
+@pytest.fixture(scope="module")
+def discrepancy(recordings):
+    return Discrepancy.of(recordings, calibrated(recordings))
+
+
+def fitted(recordings, errors):
+    """A candidate without unknowns whose residuals are noise and, in each channel, `errors` of the observations."""
+    random = np.random.default_rng(1)
+    residuals = []
+    for k, w in enumerate(recordings):
+        o = w.observations
+        noise = random.standard_normal(o.measured.shape)
+        residuals.append(w.whiten((noise + errors(k, o)).ravel()))
+    jacobian = [np.zeros((len(e), 0)) for e in residuals]
+    return CandidateFit(Hypothesis(), recordings, {}, {}, residuals, jacobian, np.eye(0), np.ones(0), [], residuals)
+
+
+def following_the_drive(size):
+    return lambda k, o: size * np.sin(4 * o.given.theta_in[o.judged])
+
+
+def test_the_evidence_is_that_of_a_normal_distribution():
+    """Of a few residuals with few features and unknowns, by the density of their sum."""
+    random = np.random.default_rng(3)
+    F, J, e = random.standard_normal((12, 4)), random.standard_normal((12, 2)), random.standard_normal(12)
+    prior_sd, variance = np.array([0.5, 2.0]), np.array([1.0, 0.3, 0.0, 0.7])
+    modes = Modes.of(F.T @ F, variance)
+    products = Products(J.T @ J, J.T @ e, float(e @ e), F.T @ J, F.T @ e, prior_sd)
+    for size in (0.0, 0.2, 30.0):
+        covariance = np.eye(12) + J @ np.diag(prior_sd**2) @ J.T + size * F @ np.diag(variance) @ F.T
+        expected = multivariate_normal(np.zeros(12), covariance).logpdf(e) + 6 * np.log(2 * np.pi)
+        found = _log_evidence(products, modes.strength, modes.vectors.T @ F.T @ J, modes.vectors.T @ F.T @ e, size)
+        assert found == pytest.approx(expected, rel=1e-9)
+
+
+def test_noise_has_no_discrepancy(recordings, discrepancy):
+    found = evidence_of(discrepancy, fitted(recordings, lambda k, o: 0.0), 0.0, EXCESS)
+    assert found.exact > found.incomplete + 2
+    assert found.size <= 0.03
+
+
+def test_errors_that_follow_the_drive_are_a_discrepancy(recordings, discrepancy):
+    found = evidence_of(discrepancy, fitted(recordings, following_the_drive(1.0)), 0.0, EXCESS)
+    assert found.incomplete > found.exact + 20
+    assert found.size >= 0.1
+
+
+def test_what_would_be_noticed_does_not_depend_on_what_is_there(recordings, discrepancy):
+    noise, errors = (
+        evidence_of(discrepancy, fitted(recordings, following_the_drive(size)), 0.0, EXCESS) for size in (0.0, 5.0)
+    )
+    assert noise.resolution == errors.resolution <= 0.1
+
+
+def test_differences_from_run_to_run_are_less_of_one(recordings, discrepancy):
+    """They cannot be a function of the rig's state."""
+    signs = [1, -1, 1, -1]
+    same = evidence_of(discrepancy, fitted(recordings, following_the_drive(1.0)), 0.0, EXCESS)
+    apart = evidence_of(
+        discrepancy, fitted(recordings, lambda k, o: signs[k] * following_the_drive(1.0)(k, o)), 0.0, EXCESS
+    )
+    assert apart.incomplete - apart.exact < 0.3 * (same.incomplete - same.exact)
+
+
+def test_the_channel_of_a_single_fault_is_found(recordings, discrepancy):
+    def errors(k, o):
+        return np.array([[c == "tau_in_Nm"] for c in o.channels]) * following_the_drive(2.0)(k, o)
+
+    found = evidence_of(discrepancy, fitted(recordings, errors), 0.0, EXCESS)
+    assert max(found.in_channel, key=found.in_channel.get) == "tau_in_Nm"
+
+
+def test_a_share_of_an_effect_may_be_left_by_its_equation(recordings, discrepancy):
+    candidate = fitted(recordings, following_the_drive(0.7))
+    strong, weak = (evidence_of(discrepancy, candidate, effect, EXCESS) for effect in (20.0, 0.02))
+    assert strong.exact == weak.exact
+    assert strong.other_law > strong.exact + 20
+    assert weak.other_law < weak.exact + 20
+
+
+def test_an_effect_below_the_least_size_leaves_no_share(recordings, discrepancy):
+    found = evidence_of(discrepancy, fitted(recordings, lambda k, o: 0.0), 0.0, EXCESS)
+    assert found.other_law == -np.inf
+
+
+def test_the_tolerance_counts_once_for_all_recordings(recordings, discrepancy):
+    """Errors that a tolerance allows are the same in every recording."""
+    whole = fitted(recordings, following_the_drive(1.0))
+    allowed = [replace(w, observations=_allowing(w.observations, 1.0)) for w in recordings]
+    tolerated = replace(whole, whitened=allowed)
+    by_noise, by_tolerance = (
+        np.ptp(Discrepancy.of(c.whitened, calibrated(recordings)).log_evidence(c, [0.0, 1.0], {"tau_in_Nm": 1.0}))
+        for c in (whole, tolerated)
+    )
+    assert by_tolerance < by_noise
+
+
+def _allowing(o, share):
+    """The same observations with a tolerance that makes up a share of each variance."""
+    sigma = np.ptp(o.measured, axis=1, keepdims=True) / np.sqrt(share) * np.ones_like(o.measured)
+    return replace(o, sigma=sigma, tolerance=np.ones(len(o.channels)))
