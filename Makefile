@@ -6,8 +6,8 @@ CORES ?= 2
 # The former name of REGRESSORS.
 REGRESSORS ?= $(RIVALS)
 
-.PHONY: help results real data test docs bench accuracy-gate input-checks diagnosis-settings form-errors joint-rigs \
-  outside-rigs past several-effects table-one coverage proof proof-full proof-real slurm-test lint lock clean
+.PHONY: help results real data test docs bench accuracy-gate input-checks diagnosis-settings decision-rules form-errors \
+  joint-rigs outside-rigs past several-effects table-one coverage proof proof-full proof-real slurm-test lint lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -64,6 +64,9 @@ coverage: $(VENV)/.ready  ## count how often the fits' 90 % intervals hold the t
 
 diagnosis-settings: $(VENV)/.ready  ## compute again the figures behind the diagnosis's settings: results/diagnosis-settings.csv
 	$(BIN)/python -m benchmarks.diagnosis_settings --out results/diagnosis-settings.csv
+
+decision-rules: $(VENV)/.ready  ## compare the decision with that of a checkout in FORMER and with simpler ones: docs/decision-rules.md
+	$(BIN)/python -m benchmarks.decision_rules --first 28000 --count 300 --cores $(CORES) --former $(FORMER) --out results/decision-rules
 
 form-errors: $(VENV)/.ready  ## measure what the mechanisms' equations miss on rigs of other forms: results/form-errors.csv
 	$(BIN)/python -m benchmarks.form_errors --cores $(CORES) --out results/form-errors.csv

@@ -53,17 +53,12 @@ def row(case: Case) -> dict:
 
 
 def figures(name: str, candidate: CandidateFit, found: Judgement) -> dict[str, float]:
-    """Mean square, its share of the calibrated excess, lack of fit, and gain with its unsteadiness."""
-    gain = found.calibrated.by_recording - candidate.by_recording
-    better, worse = gain.clip(0.0).mean(), -gain.clip(None, 0.0).mean()
-    lack = found.lack_of_fit.get(candidate.hypothesis)
-    excess = max(found.comparison.excess, settings.CORRECT_SPREAD)
+    """Mean square, and the share that is left of what the calibrated model leaves."""
+    comparison = found.comparison
+    before = comparison.left_by(found.calibrated)
     return {
         f"{name}_mean_square": candidate.mean_square,
-        f"{name}_share_of_excess": (candidate.mean_square - settings.CORRECT_LEVEL) / excess,
-        f"{name}_lack_of_fit": lack.lower_bound if lack else np.nan,
-        f"{name}_gain": (better - worse) / max(1.0, found.calibrated.mean_square),
-        f"{name}_worse_over_better": worse / better if better else np.nan,
+        f"{name}_share_left": comparison.left_by(candidate) / before if before else np.nan,
     }
 
 
@@ -71,26 +66,17 @@ def summary(table: pd.DataFrame) -> list[str]:
     """A line for each setting, with the figures that it separates."""
     clean, single = table[table["truth"] == "none"], table[table["truth"] != "none"]
     level = clean["calibrated_mean_square"]
-    correct, wrong = single.get("correct_mean_square"), single.get("wrong_mean_square")
     lines = [
-        f"CORRECT_LEVEL, CORRECT_SPREAD = {settings.CORRECT_LEVEL}, {settings.CORRECT_SPREAD}:"
-        f" clean cases have {level.mean():.3f}, {level.std(ddof=1):.3f} (n = {level.size}, largest {level.max():.2f})",
-        f"ADEQUATE_LACK_OF_FIT = {settings.ADEQUATE_LACK_OF_FIT}:"
-        f" clean cases have at most {clean['calibrated_lack_of_fit'].max():.4f}",
-        f"WORTH_NAMING = {settings.WORTH_NAMING}: the best mechanism gains at most"
-        f" {clean['wrong_gain'].max():.3f} in clean cases",
+        f"SCATTER, MISSTATED_NOISE = {settings.SCATTER}, {settings.MISSTATED_NOISE}: clean cases have"
+        f" {level.mean():.3f}, {level.std(ddof=1):.3f} (n = {level.size}, largest {level.max():.2f})",
     ]
-    if correct is not None:
-        spread = single["correct_share_of_excess"].clip(0.0)
-        lines += [
-            f"ADEQUATE, SUFFICIENT = {settings.ADEQUATE}, {settings.SUFFICIENT}: correct candidates have"
-            f" {correct.median():.2f} in the median and {correct.max():.2f} at most (n = {correct.count()});"
-            f" the best wrong ones {wrong.median():.2f} in the median and {wrong.min():.2f} at least",
-            f"ADEQUATE_SHARE, FORM_SHARE = {settings.ADEQUATE_SHARE}, {settings.FORM_SHARE}: correct candidates leave"
-            f" {spread.median():.3f} of the excess in the median and {spread.max():.3f} at most",
-            f"UNSTEADY = {settings.UNSTEADY}: correct candidates have"
-            f" {single['correct_worse_over_better'].max():.3f} at most",
-        ]
+    if "correct_share_left" in single:
+        correct, wrong = single["correct_share_left"], single["wrong_share_left"]
+        lines.append(
+            f"LEFT_BY_LAW = {settings.LEFT_BY_LAW}: correct candidates leave {correct.median():.4f} in the median and"
+            f" {correct.max():.4f} at most (n = {correct.count()}); the best wrong ones {wrong.median():.2f} in the"
+            f" median and {wrong.min():.4f} at least"
+        )
     return lines
 
 

@@ -2,8 +2,8 @@
 
 Each rig of the virtual rig has one strong effect, by the mechanism's law or by another published one. The mechanism is
 fitted to its recordings, with the covariance linearised about it, as a diagnosis fits it. Of the calibrated model's
-leave-one-out mean square above that of noise, what the fit leaves is the model-form error.
-`Mechanism.model_form_error` states it.
+leave-one-out mean square above that of noise, what the fit leaves is the model-form error. `settings.LEFT_BY_LAW` rests
+on it.
 
     python -m benchmarks.form_errors --rigs 2 --cores 2 --out results/form-errors.csv
 """
@@ -17,7 +17,6 @@ from pathlib import Path
 
 import pandas as pd
 
-from ccmodel import mechanisms as registry
 from ccmodel.diagnosis.candidate import CandidateFit, fit
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.repeatability import estimated
@@ -106,8 +105,7 @@ def main() -> None:
         print(" ".join(f"{k}={v:.4g}" if isinstance(v, float) else f"{k}={v}" for k, v in one.items()), flush=True)
         # An interrupted run leaves what it has.
         pd.DataFrame(found).to_csv(asked.out, index=False, float_format="%.5g")
-    table = pd.DataFrame(found).groupby("effect")["share_left"].agg(["min", "max", "count"])
-    table["stated"] = [registry.get(name).model_form_error for name in table.index]
+    table = pd.DataFrame(found).groupby(["effect", "law"])["share_left"].agg(["min", "median", "max", "count"])
     print(table.to_string(float_format="%.4f"))
 
 
