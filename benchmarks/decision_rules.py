@@ -155,9 +155,14 @@ def _rates(every: Sequence[Outcome]) -> dict[str, str]:
             [o for o in visible if o.has_another_law],
             lambda o: o.is_identified_first,
         ),
+        "listed, visible: first of those named or listed": (visible, lambda o: o.is_first_of_all),
         "listed, not visible: named first": (
             [o for o in listed if not o.is_visible],
             lambda o: o.is_identified_first,
+        ),
+        "listed, not visible: first of those named or listed": (
+            [o for o in listed if not o.is_visible],
+            lambda o: o.is_first_of_all,
         ),
         "several, one visible: all named": (several, lambda o: o.true_names <= {m["name"] for m in o.identified}),
         "unlisted: unexplained or undecided": (outsiders, lambda o: o.verdict in ("unexplained", "undecided")),

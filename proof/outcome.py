@@ -160,6 +160,11 @@ class Outcome:
         return self.first_identified in self.true_names
 
     @property
+    def is_first_of_all(self) -> bool:
+        """Whether the most probable mechanism, identified or an alternative, is a concealed effect."""
+        return (self.first_identified or next(iter(self.alternatives), None)) in self.true_names
+
+    @property
     def includes_truth(self) -> bool:
         """Whether a concealed effect is identified first or is among the alternatives."""
         return self.is_identified_first or bool(self.true_names & set(self.alternatives))
@@ -168,10 +173,11 @@ class Outcome:
     def is_confidently_wrong(self) -> bool:
         """Whether a mechanism stated with confidence is none of the concealed effects, or too many are reported.
 
-        Several effects that are declared explained with confidence while one of them is not named count too.
+        An alternative counts like a mechanism that is named. Several effects that are declared explained with
+        confidence while one of them is not named count too.
         """
         reported = self.diagnosis["mechanisms"] if self.diagnosis else []
-        wrong = any(c["confidence"] >= DECISION_THRESHOLD and c["name"] not in self.true_names for c in reported)
+        wrong = any(p >= DECISION_THRESHOLD and not is_true for p, is_true in self.claims)
         named = {c["name"] for c in reported}
         is_sure = self.verdict == "explained" and all(c["confidence"] >= DECISION_THRESHOLD for c in reported)
         is_incomplete = is_sure and len(self.true_names) > 1 and not self.true_names <= named

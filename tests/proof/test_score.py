@@ -84,6 +84,14 @@ def test_a_pair_that_is_declared_complete_with_one_member_is_confidently_wrong()
     assert not Outcome(answered, both).is_confidently_wrong
 
 
+@pytest.mark.parametrize(
+    ("name", "confidence", "wrong"), [("kink", 0.9, True), ("kink", 0.7, False), ("torque-scale", 0.9, False)]
+)
+def test_an_alternative_that_is_stated_with_confidence_counts_like_a_mechanism(name, confidence, wrong):
+    said = reported("undecided", alternatives=[(name, "conduit", confidence, [])])
+    assert Outcome(answer("single", GAIN), said).is_confidently_wrong == wrong
+
+
 def test_rates_of_the_mechanisms_law_and_of_another_stand_apart():
     other = answer("single", GAIN)
     other["truth"][0]["law"] = "another"
