@@ -17,7 +17,6 @@ from ccmodel.diagnosis.screening import Score
 from ccmodel.diagnosis.selection import Selection
 from ccmodel.diagnosis.settings import MISSTATED_NOISE, PRIOR_AGREES, PRIOR_FURTHER, PRIOR_LISTED, SCATTER, SURE
 from ccmodel.diagnosis.verdict import judge, nested_choice
-from ccmodel.inference.effective_samples import in_comparison
 from ccmodel.inference.problem import Free
 from made_observations import batch, calibrated
 
@@ -184,12 +183,6 @@ def test_a_tolerance_lowers_the_probability_in_proportion_to_its_share():
         return compared(evidence(), (fitted(1.0, FRICTION), evidence(NONE, NONE)), whitened=[allowing] * 8).unlisted
 
     assert all(less < more for less, more in itertools.pairwise(map(unlisted, (0.0, 0.01, 0.5, 1.0))))
-
-
-def test_the_tolerance_counts_once_for_all_recordings():
-    allowing = [SimpleNamespace(observations=SimpleNamespace(channels=CHANNELS, tolerance_share=1.0))] * 8
-    plain = in_comparison([w.observations for w in WHITENED])
-    assert in_comparison([w.observations for w in allowing]) == pytest.approx(plain / 8)
 
 
 def test_the_place_of_a_single_unknown_fault_is_that_of_its_channel():

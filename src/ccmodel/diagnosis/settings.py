@@ -123,7 +123,7 @@ WORTH_FITTING = 0.01
 # a ringing load or backlash is not. Chosen.
 MOST_FITTED, FEWEST_FITTED = 6, 3
 
-# --- Lack of fit: a Gaussian process on the residuals
+# --- Model discrepancy: a Gaussian process on the residuals
 
 # Random Fourier features of the Gaussian process (Rahimi and Recht 2007), the mean number of inputs to each, and its
 # length scales in standard deviations of the inputs. Chosen.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 # Of a channel in a fit of parameters.
 IN_FITS = 100
-# Of a channel in a comparison of candidate models.
+# Of a channel elsewhere in a diagnosis: weights of nuisances, degrees of freedom of cycles, design of experiments.
 IN_DIAGNOSIS = 20
 # Of a channel in the evidence of a candidate beside a model discrepancy, which accounts for most of what is correlated.
 IN_EVIDENCE = 50
@@ -48,14 +48,3 @@ def prior_spread(spread: float, recordings: Sequence) -> float:
     An error of one stated standard deviation has the weight of one independent sample.
     """
     return spread * float(np.sqrt(np.mean([of_recording(r) for r in recordings])))
-
-
-def in_comparison(recordings: Sequence) -> float:
-    """Independent samples that recordings together give in a comparison of models.
-
-    The tolerance stands for errors that a model makes in the same way in every recording: its share of the variance
-    counts once, as the mean over recordings, and not once for each of them.
-    """
-    samples = np.array([of_recording(r) for r in recordings])
-    shared = np.array([r.tolerance_share for r in recordings])
-    return float(np.sum(samples * (1 - shared)) + np.mean(samples * shared))
