@@ -38,7 +38,7 @@ def mean_weight(observations: Measured) -> float:
 
 
 def of_recording(recording: Any) -> int:
-    """Independent samples that a recording gives in a comparison of models."""
+    """Independent samples that a recording gives in a diagnosis."""
     return IN_DIAGNOSIS * len(recording.channels)
 
 
