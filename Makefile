@@ -65,7 +65,7 @@ coverage: $(VENV)/.ready  ## count how often the fits' 90 % intervals hold the t
 diagnosis-settings: $(VENV)/.ready  ## compute again the figures behind the diagnosis's settings: results/diagnosis-settings.csv
 	$(BIN)/python -m benchmarks.diagnosis_settings --out results/diagnosis-settings.csv
 
-decision-rules: $(VENV)/.ready  ## compare the decision with that of a checkout in FORMER and with simpler ones: docs/decision-rules.md
+decision-rules: $(VENV)/.ready  ## compare the decision with that of a checkout in FORMER and with simpler ones: results/decision-rules
 	$(BIN)/python -m benchmarks.decision_rules --first 28000 --count 300 --cores $(CORES) --former $(FORMER) --out results/decision-rules
 
 form-errors: $(VENV)/.ready  ## measure what the mechanisms' equations miss on rigs of other forms: results/form-errors.csv

@@ -211,6 +211,15 @@ def test_what_one_member_imitates_leaves_the_others_named():
     assert found.verdict == "undecided"
 
 
+def test_what_an_imitation_of_a_remainder_leaves_is_not_unlisted():
+    """A further mechanism takes off part of what a strong effect's equation leaves, and a little is left."""
+    alone = fitted(1.1, FRICTION), evidence(NONE - 40, NONE - 40, size=0.06, resolution=0.1)
+    both = fitted(1.05, FRICTION, SCALE), evidence(NONE - 5, NONE, size=0.02, resolution=0.1)
+    found = compared(evidence(size=60.0), alone, both, model=fitted(61.0))
+    assert found.unlisted < 0.4
+    assert found.most_probable.hypothesis.acting == (FRICTION,)
+
+
 def test_what_is_unlisted_may_be_imitated():
     """A mechanism that takes off half of what is missing has less probability than one that takes off nearly all."""
     halves, most = (

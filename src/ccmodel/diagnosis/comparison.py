@@ -141,9 +141,9 @@ class Comparison:
             p = every.index(part)
             with np.errstate(divide="ignore"):
                 true, of_part, other = np.log(self._imitation(every[k], part))
-            imitates = np.logaddexp.reduce(weights[k]) + other
-            weights[p] = np.logaddexp(weights[p], weights[k] + of_part)
-            weights[p, 1] = np.logaddexp(weights[p, 1], imitates)
+            # What an imitation of the part's remainder leaves is that remainder too, and nothing unlisted.
+            imitates = np.logaddexp.reduce(weights[k]) + np.array([of_part, other])
+            weights[p] = np.logaddexp(weights[p], imitates)
             weights[k] += true
         weights -= np.logaddexp.reduce(weights, axis=None)
         if self._tested < 1:
