@@ -53,7 +53,7 @@ def row(case: Case) -> dict:
 
 
 def figures(name: str, candidate: CandidateFit, found: Judgement) -> dict[str, float]:
-    """Mean square, and the share that is left of what the calibrated model leaves."""
+    """Mean square, and the lack of fit over that of the calibrated model."""
     comparison = found.comparison
     before = comparison.left_by(found.calibrated)
     return {

@@ -193,7 +193,7 @@ def test_the_place_of_a_single_unknown_fault_is_that_of_its_channel():
 
 
 def test_what_takes_off_little_of_what_another_equation_leaves_is_not_named():
-    """However much evidence it has: it may follow what is left better than the discrepancy's features do."""
+    """Its evidence is high, since it follows what is left better than the features of the discrepancy do."""
     base, kink = (fitted(60.0), evidence()), (fitted(3.0, KINK), evidence(NONE - 100, size=2.0))
     for left, named in ((2.6, (KINK,)), (1.05, (KINK, SCALE))):
         both = fitted(1 + left - 1, KINK, SCALE), evidence(NONE, size=left - 1)

@@ -103,9 +103,9 @@ class Comparison:
         return max(self.base.mean_square - 1.0, 0.0)
 
     def part_of(self, candidate: CandidateFit) -> CandidateFit | None:
-        """The candidate with all of its mechanisms but the last: the best fit of those that lack fewest of them.
+        """The fitted candidate whose mechanisms this one extends by as few as possible; of several the best fit.
 
-        The calibrated model has none.
+        It is the calibrated model if there is none. The calibrated model extends nothing: None.
         """
         if candidate is self.base:
             return None
