@@ -40,14 +40,6 @@ from proof.plan import read_plan
 PRESENT, FORMER = "present", "former"
 
 
-def claims(of_each: Sequence[tuple[str, str, float]]) -> list[dict]:
-    """Mechanisms with places and confidences, as a diagnosis has them."""
-    return [
-        {"name": name, "place": place, "confidence": min(p, settings.MOST_CONFIDENT), "parameters": []}
-        for name, place, p in of_each
-    ]
-
-
 def lowest_error(comparison: Comparison) -> dict:
     """Name the single mechanism with the lowest leave-one-out mean square."""
     singles = [c for c in comparison.candidates if c.hypothesis.size == 1]
@@ -75,7 +67,8 @@ def _log_weight(comparison: Comparison, candidate: CandidateFit, screened: int) 
 
 def said(verdict: str, best: CandidateFit, confidence: float) -> dict:
     """A decision in the form of a diagnosis."""
-    named = claims([(name, place, confidence) for name, place in best.hypothesis.acting])
+    stated = min(confidence, settings.MOST_CONFIDENT)
+    named = [{"name": n, "place": p, "confidence": stated, "parameters": []} for n, p in best.hypothesis.acting]
     place = named[0]["place"] if named else None
     listed = verdict == "undecided"
     return {
@@ -145,7 +138,7 @@ def _rates(every: Sequence[Outcome]) -> dict[str, str]:
     outsiders = [o for o in every if o.kind in ("unlisted", "removed")]
     several = [o for o in visible if len(o.true_names) > 1]
     rows = {
-        "clean, accused": (clean, lambda o: o.is_detected),
+        "clean: false positive": (clean, lambda o: o.is_detected),
         "listed, visible: noticed": (visible, lambda o: o.is_detected),
         "listed, visible, the mechanisms' laws: named first": (
             [o for o in visible if not o.has_another_law],
