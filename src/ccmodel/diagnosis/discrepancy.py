@@ -88,14 +88,12 @@ class Discrepancy:
 
     Attributes
     ----------
-    whitened : sequence of Whitened
     features : list of ndarray, each of shape (samples, features)
         By recording, the same for every channel.
     channels : list of str
         Every channel that is compared in any recording.
     """
 
-    whitened: Sequence[Whitened]
     features: list[NDArray]
     channels: list[str]
     _modes: dict[tuple, Modes] = field(default_factory=dict, repr=False, compare=False)
@@ -109,7 +107,7 @@ class Discrepancy:
         """The discrepancy as a function of the state of the rig that a fitted model simulates."""
         inputs = each(whitened, lambda i, w: _inputs(w, base))
         channels = sorted({c for w in whitened for c in w.observations.channels})
-        return cls(whitened, _features(inputs), channels)
+        return cls(_features(inputs), channels)
 
     def log_evidence(self, candidate: CandidateFit, sizes: Sequence[float], by_channel: Mapping[str, float]) -> NDArray:
         """Logarithm of the evidence of a candidate with a discrepancy, up to a constant that all candidates share.
