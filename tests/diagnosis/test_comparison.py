@@ -133,7 +133,7 @@ def test_an_implausible_candidate_has_no_probability():
     wild = fitted(0.95, SCALE, **{"torque-scale/drive-sensor/gain": 5.0})
     found = verdict(evidence(), (fitted(1.0, FRICTION), evidence(NONE)), (wild, evidence(0.0)))
     assert found.best.hypothesis.acting == (FRICTION,)
-    assert found.probability == pytest.approx([1.0, 0.0], abs=1e-3)
+    assert found.probability == pytest.approx([1.0, 0.0], abs=2e-3)
     assert found.nearest.hypothesis.acting == (FRICTION,)
 
 
@@ -230,11 +230,12 @@ def test_what_is_unlisted_may_be_imitated():
     assert most.unlisted < 0.2
 
 
-def test_a_weak_mechanism_is_judged_by_its_evidence_alone():
-    """Of an effect that no discrepancy shows, no share is known."""
+def test_a_weak_mechanism_is_not_named():
+    """Of an effect that no discrepancy shows, no share is known: it may be an imitation, as probably as a priori."""
     found = verdict(evidence(NONE - 20), (fitted(1.0, FRICTION), evidence(NONE)), model=fitted(1.01))
-    assert found.verdict == "explained"
+    assert found.verdict == "undecided"
     assert found.probability[0] == pytest.approx(imitation(0.0, 1.0, False)[0], rel=1e-3)
+    assert 0.5 < found.probability[0] < SURE
 
 
 def test_slips_that_no_feature_follows_are_left_all_the_same():
