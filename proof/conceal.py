@@ -131,16 +131,17 @@ def run(commands: Sequence[Sequence[str]], folder: Path, sources: Path = SOURCES
         The package to run.
     """
     staged = stage(sources)
-    report_read, report_write = os.pipe()
     scratch = _made(folder / "scratch")
-    settings = _guard_settings(commands, folder, staged, report_write)
-    with os.fdopen(report_read, "rb") as report:
+    # A file, since a pipe that nobody reads stops the process after some hundred reports.
+    with tempfile.TemporaryFile() as report:
+        settings = _guard_settings(commands, folder, staged, report.fileno())
         try:
             done = subprocess.run(
-                [sys.executable, "-I", "-S", str(GUARD), json.dumps(settings)],
+                # -B: compiled copies of libraries would be written outside of the folder.
+                [sys.executable, "-I", "-S", "-B", str(GUARD), json.dumps(settings)],
                 cwd=folder,
                 env=_environment(scratch, staged),
-                pass_fds=[report_write],
+                pass_fds=[report.fileno()],
                 capture_output=True,
                 timeout=TIMEOUT_S,
             )
@@ -148,8 +149,8 @@ def run(commands: Sequence[Sequence[str]], folder: Path, sources: Path = SOURCES
         except subprocess.TimeoutExpired:
             code, stderr = -1, f"took longer than {TIMEOUT_S} s"
         finally:
-            os.close(report_write)
             shutil.rmtree(scratch, ignore_errors=True)
+        report.seek(0)
         tampering = report.read().decode(errors="replace").splitlines()
     return Completed(code, stderr[-2000:], tuple(dict.fromkeys(tampering)))
 

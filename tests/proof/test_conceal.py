@@ -71,6 +71,14 @@ def test_tampering_is_reported(cheat, batch, diagnosis, tmp_path):
     assert any(message in line for line in ran.tampering)
 
 
+def test_any_number_of_refusals_is_reported(batch, diagnosis, tmp_path, monkeypatch):
+    """More than a pipe holds."""
+    monkeypatch.setattr(conceal, "TIMEOUT_S", 60)
+    body = "for k in range(5000):\n    try:\n        open(f'/var/tmp/note-{k}', 'w')\n    except OSError:\n        pass"
+    ran = conceal.diagnose(batch, tmp_path / "out", sources=diagnosis(body))
+    assert (ran.code, len(ran.tampering)) == (0, 5000)
+
+
 def test_an_honest_diagnosis_works_and_learns_nothing_of_the_project(batch, diagnosis, tmp_path):
     ran = conceal.diagnose(batch, tmp_path / "out", sources=diagnosis(HONEST))
     assert (ran.code, ran.tampering) == (0, ())
