@@ -68,3 +68,10 @@ SHORTEST_REST_S = 0.1
 SHORTEST_STEP_S, LONGEST_STEP_S = 2e-6, 0.2
 # A change of an angle stands out if it is this factor and so many counts above all changes of the samples near it.
 OUTSTANDING_FACTOR, OUTSTANDING_GRAINS, NEAR_SAMPLES = 2.5, 2.0, 12
+# An impossible reading of an analog channel: it is farther from the median of so many neighbours on each side than any
+# other reading is from its own by this factor, and by this share of the channel's range (between two quantiles) and so
+# many of its smallest steps. Practice: of 269 logs, 102 of them measured ones, none has a factor above 2.6.
+OUTLIER_NEIGHBOURS, OUTLIER_FACTOR, OUTLIER_SHARE, OUTLIER_GRAINS = 5, 4.0, 0.05, 5
+OUTLIER_RANGE = (0.005, 0.995)
+# The first and the last reading must be this many ranges from the median.
+OUTLIER_AT_ENDS = 10

@@ -13,6 +13,7 @@ from scipy.ndimage import find_objects, label
 from ccmodel.rig import limits, readers
 from ccmodel.rig.batch import COLUMNS, DRIVE_ANGLE_COLUMNS, RAW_COLUMNS
 from ccmodel.rig.findings import Defect, LogError
+from ccmodel.rig.outliers import drop_outliers
 from ccmodel.typed import nearest
 
 # Similarity from which an unknown column is a misspelling of a known one. Below it, the rig logs more than the format
@@ -44,6 +45,8 @@ def read_log(path: Path) -> tuple[pd.DataFrame, list[Defect]]:
     warnings = _check_header(list(raw.columns))
     table = _numbers(raw[[name for name in raw.columns if name in COLUMNS]])
     table = _drop_repeated(_drop_bad(table, warnings), warnings)
+    table, impossible = drop_outliers(table)
+    warnings += impossible
     if len(table) < limits.FEWEST_SAMPLES:
         raise LogError(None, None, f"has {len(table)} samples only: too few for a recording; record it again")
     _check_time(table["time_s"], warnings)

@@ -1,0 +1,85 @@
+"""Impossible readings: single cells of an analog column that are far from all readings near them.
+
+A converter or a logger writes one now and then. Least squares would follow it: one current of 30 A among 9 A moves a
+fitted friction by as much as a real effect does.
+"""
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from ccmodel.channels import THETA_IN, THETA_OUT
+from ccmodel.rig import limits
+from ccmodel.rig.batch import RAW_COLUMNS
+from ccmodel.rig.findings import Defect
+
+# A pulley's angle has checks of its own: a cell that is off is a counter that lost counts.
+NOT_ANALOG = ("time_s", *(column for angle in (THETA_IN, THETA_OUT) for column in (angle, *RAW_COLUMNS[angle])))
+# The readings that one is compared with: so many on each side, without itself.
+NEIGHBOURS = np.ones(2 * limits.OUTLIER_NEIGHBOURS + 1, bool)
+NEIGHBOURS[limits.OUTLIER_NEIGHBOURS] = False
+
+
+def drop_outliers(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Defect]]:
+    """Drop the rows of impossible readings.
+
+    Parameters
+    ----------
+    table : DataFrame, shape (n, columns)
+        Columns of a log as finite numbers; the index is the row in the file.
+
+    Returns
+    -------
+    table : DataFrame
+        The other rows.
+    warnings : list of Defect
+        One for each column with impossible readings.
+    """
+    is_bad, warnings = np.zeros(len(table), bool), []
+    for column in table.columns.drop(NOT_ANALOG, errors="ignore"):
+        values = table[column].to_numpy()
+        found = outliers(values)
+        if found.size:
+            at, others = found[0], np.delete(values, found)
+            more = f" (and {found.size - 1} more such readings): their rows are" if found.size > 1 else ": row"
+            text = (
+                f"reads {values[at]:g} in one sample, far from those near it; all others lie between"
+                f" {others.min():g} and {others.max():g}{more} dropped"
+            )
+            warnings.append(Defect(int(table.index[at]), column, text))
+            is_bad[found] = True
+    return table[~is_bad], warnings
+
+
+def outliers(values: NDArray) -> NDArray:
+    """Positions of impossible readings.
+
+    They are farther from the median of their neighbours than all others are, by a factor. Whatever a rig does, from
+    noise to a load that snaps, it does more than once in a recording or within several samples.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Finite readings of a channel.
+
+    Returns
+    -------
+    ndarray of int
+        In ascending order.
+    """
+    steps = np.abs(np.diff(values))
+    low, high = np.quantile(values, limits.OUTLIER_RANGE)
+    least = max(limits.OUTLIER_SHARE * (high - low), limits.OUTLIER_GRAINS * steps[steps > 0].min(initial=np.inf))
+    # Most channels have no step that is large enough, and are done.
+    if not (2 * steps > least).any():
+        return np.array([], int)
+    distance = np.abs(values - median_filter(values, footprint=NEIGHBOURS, mode="mirror"))
+    # A first or last reading may be part of a motion that the log has not, as in the public recordings.
+    is_far = np.abs(values - np.median(values)) > limits.OUTLIER_AT_ENDS * (high - low)
+    distance[[0, -1]] *= is_far[[0, -1]]
+    order = np.argsort(-distance, kind="stable")
+    most = max(int(limits.BAD_CELLS_FRACTION * values.size), 1)
+    leading = distance[order[: most + 1]]
+    stands_out = (leading[:-1] > limits.OUTLIER_FACTOR * leading[1:]) & (leading[:-1] > least)
+    return np.sort(order[: np.flatnonzero(stands_out)[-1] + 1]) if stands_out.any() else np.array([], int)

@@ -1,0 +1,65 @@
+import numpy as np
+import pytest
+from made_up_batch import table
+
+from ccmodel.rig.ingest import ingest_batch
+from ccmodel.rig.outliers import outliers
+
+TIME = np.linspace(0.0, 4.0, 2000)
+NOISE = np.random.default_rng(3).normal(size=TIME.size)
+# What rigs do, from sample to sample.
+CHANNELS = {
+    "noise": NOISE,
+    "sine with noise": np.sin(TIME) + 0.01 * NOISE,
+    "smooth sine": np.sin(5 * TIME),
+    "step": np.where(TIME > 2.0, 1.0, 0.0) + 0.01 * NOISE,
+    "a motion that began before": np.exp(-600 * TIME) + 0.01 * NOISE,
+    "step without noise": np.where(TIME > 2.0, 1.0, 0.0),
+    "one corner": np.abs(TIME - 2.0),
+    "loops with square corners": np.sign(np.sin(6 * TIME)) + 0.01 * NOISE,
+    "a load that snaps and rings": np.exp(-40 * np.clip(TIME - 2, 0, None)) * np.cos(400 * (TIME - 2)) * (TIME > 2),
+    "coarse converter": np.round(3 * np.sin(TIME)),
+    "dead but for one count": (np.arange(TIME.size) == 700).astype(float),
+    "spikes of a switching drive": NOISE * 0.01 + np.where(np.arange(TIME.size) % 97 == 5, 1.0, 0.0),
+    "heavy tails": np.random.default_rng(4).standard_t(2.0, TIME.size),
+}
+
+
+@pytest.mark.parametrize("name", CHANNELS)
+def test_what_a_rig_does_is_no_outlier(name):
+    assert outliers(CHANNELS[name]).size == 0
+
+
+@pytest.mark.parametrize("value", [30.0, -30.0, 1000.0, 1e200])
+@pytest.mark.parametrize("at", [[0], [1], [777], [TIME.size - 1], [500, 501], [20, 900, 1500]])
+def test_impossible_readings_are_found(value, at):
+    values = 9 * np.sin(3 * TIME) + 0.05 * NOISE
+    values[at] = value
+    is_seen = abs(value) > 30.0 or at not in ([0], [TIME.size - 1])
+    assert outliers(values).tolist() == (at if is_seen else [])
+
+
+def test_an_impossible_reading_may_lie_within_the_range():
+    """A channel at 9 cannot read 0 for a sample."""
+    values = 9 * np.sin(3 * TIME) + 0.05 * NOISE
+    at = int(np.argmax(values))
+    values[at] = 0.0
+    assert outliers(values).tolist() == [at]
+
+
+@pytest.mark.parametrize("column", ["drive_current_A", "load_current_A", "drive_load_cell_V", "load_load_cell_V"])
+@pytest.mark.parametrize("factor", [4, 1000, 1e200])
+def test_a_log_with_an_impossible_reading_is_read_without_its_row(bench, column, factor):
+    healthy = table()
+    damaged = healthy.copy()
+    damaged.loc[250, column] = factor * np.abs(healthy[column]).max()
+    bench.write()
+    damaged.to_csv(bench.log(), index=False)
+    ingested = ingest_batch(bench.folder)
+    (finding,) = ingested.findings
+    assert (finding.row, finding.column, finding.severity) == (252, column, "warning")
+    assert "far from those near it" in finding.text and finding.text.endswith("row dropped")
+    healthy.drop(index=250).to_csv(bench.log(), index=False)
+    without = ingest_batch(bench.folder).recordings[0]
+    for channel, values in ingested.recordings[0].channels.items():
+        assert np.array_equal(values, without.channels[channel]), channel
