@@ -68,6 +68,14 @@ def test_an_exchange_of_names_throughout_is_no_mistake(tmp_path):
     assert said_of(write_copy(copy, tmp_path / "mirrored")) == []
 
 
+def test_the_same_samples_under_two_names_are_said_once_and_in_one_line(tmp_path):
+    copy = read_copy(SIMULATED)
+    first, second = list(copy.logs)[:2]
+    copy.logs[second] = copy.logs[first].copy()
+    (said,) = said_of(write_copy(copy, tmp_path / "twice"))
+    assert f"{second} holds the same samples as {first}: take one of the two recordings out" in said
+
+
 def test_a_nominal_value_is_not_compared(tmp_path):
     copy = read_copy(SIMULATED)
     copy.rig["cable"]["stiffness_N_per_m"] *= 10.0

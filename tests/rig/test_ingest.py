@@ -355,6 +355,7 @@ def edit(*keys, value=None, drop=False, new=None):
         (edit("batch", value="other"), "batch: must be the folder's name, 'bench', found 'other'"),
         (edit("origin", value="model"), "origin: must be 'rig' or 'virtual-rig', found 'model'"),
         (edit("recordings", 1, "id", value="one"), "recordings: id 'one' is given to 2 recordings"),
+        (edit("recordings", 1, "file", value="./one.csv"), "recordings: file 'one.csv' is given to 2 recordings"),
         (edit("recordings", 1, "id", value=""), "recordings[1].id: a name is letters, digits"),
         (edit("recordings", 1, "file", value=""), "recordings[1].file: must be the log's path"),
         (edit("recordings", 1, "id", value="a/b"), "recordings[1].id: a name is letters, digits"),

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from functools import reduce
 from pathlib import Path, PurePath
+from posixpath import normpath
 from typing import Annotated, Any, Literal, NamedTuple, Self, get_args
 
 import numpy as np
@@ -362,8 +363,8 @@ class Batch(TypedModel):
     @field_validator("recordings")
     @classmethod
     def _each_once(cls, recordings: tuple[RecordingEntry, ...]) -> tuple[RecordingEntry, ...]:
-        for key in ("id", "file"):
-            values = [getattr(r, key) for r in recordings]
+        # A file may be written in several ways: a.csv, ./a.csv.
+        for key, values in {"id": [r.id for r in recordings], "file": [normpath(r.file) for r in recordings]}.items():
             twice = sorted({v for v in values if values.count(v) > 1})
             if twice:
                 raise ValueError(f"{key} '{twice[0]}' is given to {values.count(twice[0])} recordings")

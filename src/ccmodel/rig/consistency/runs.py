@@ -51,11 +51,11 @@ def copied_channels(parities: Sequence[Parity]) -> list[Contradiction]:
             # The same command gives the same counts of the drive, and perhaps of the load: angles that agree together
             # are no copies.
             if set(copied) - set(ANGLE_AT.values()) or copied == [THETA_OUT]:
-                names = ", ".join(copied)
-                text = (
-                    f"{names} of {parity.recording.id} repeat those of {earlier.recording.id}, sample by sample: noise"
-                    " does not repeat; one of the two logs holds a copy"
-                )
+                names, ids = ", ".join(copied), (parity.recording.id, earlier.recording.id)
+                repeat = f"{names} of {ids[0]} repeat those of {ids[1]}, sample by sample"
+                text = f"{repeat}: noise does not repeat; one of the two logs holds a copy"
+                if all(c in copied for c in CHANNELS if c not in TENSIONS and c in parity.recording):
+                    text = f"{ids[0]} holds the same samples as {ids[1]}: take one of the two recordings out"
                 found.append(Contradiction(names, text, parity.recording.id))
     return found
 
