@@ -76,6 +76,15 @@ def test_the_same_samples_under_two_names_are_said_once_and_in_one_line(tmp_path
     assert f"{second} holds the same samples as {first}: take one of the two recordings out" in said
 
 
+@pytest.mark.parametrize("name", ["da-vinci", "loops"])
+def test_a_cable_longer_than_any_is_in_another_unit(name, tmp_path):
+    """Its length is that of its stiffness: no other relation shows it on a rig without load cells."""
+    copy = read_copy(Path("data/raw") / name)
+    copy.rig["cable"]["length_m"] *= 1000.0
+    (said,) = said_of(write_copy(copy, tmp_path / name))
+    assert said.startswith("batch.yaml rig.cable.length_m") and "is the length in mm?" in said
+
+
 def test_a_nominal_value_is_not_compared(tmp_path):
     copy = read_copy(SIMULATED)
     copy.rig["cable"]["stiffness_N_per_m"] *= 10.0

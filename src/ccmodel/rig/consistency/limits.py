@@ -41,7 +41,7 @@ PRETENSION_FACTOR = 2.0
 MOST_TORQUE = 1.5
 # Radii of pulleys, m.
 SMALLEST_RADIUS_M, LARGEST_RADIUS_M = 3e-4, 0.25
-# Longest path of a conduit, m, and stated accuracy as a share of the largest range that its sensors show.
+# Longest conduit or cable, m, and stated accuracy as a share of the largest range that its sensors show.
 LONGEST_PATH_M, COARSEST_ACCURACY = 100.0, 0.5
 # Bend below which a conduit counts as straight, rad, and logarithm of the ratio of tensions that a straight one lacks.
 STRAIGHT_RAD, STRAIGHT_LOG_RATIO = 0.3, 0.2
