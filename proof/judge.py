@@ -107,6 +107,7 @@ def _read_diagnosis(file: Path) -> dict | None:
             "place": (content.get("location") or {}).get("place"),
             "mechanisms": [_claim(m) for m in content.get("mechanisms") or []],
             "alternatives": [_claim(a) for a in content.get("alternatives") or []],
+            "laws": content.get("laws") or [],
         }
     except (OSError, KeyError, ValueError, TypeError):
         return None

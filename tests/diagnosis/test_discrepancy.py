@@ -41,15 +41,16 @@ def following_the_drive(size):
 
 
 def test_the_evidence_is_that_of_a_normal_distribution():
-    """Of a few residuals with few features and unknowns, by the density of their sum."""
+    """Of a few residuals with few features and unknowns, one of them off its prior's mean, by the density."""
     random = np.random.default_rng(3)
     F, J, e = random.standard_normal((12, 4)), random.standard_normal((12, 2)), random.standard_normal(12)
     prior_sd, variance = np.array([0.5, 2.0]), np.array([1.0, 0.3, 0.0, 0.7])
+    from_mean = np.array([0.0, 1.3])
     modes = Modes.of(F.T @ F, variance)
-    products = Products(J.T @ J, J.T @ e, float(e @ e), F.T @ J, F.T @ e, prior_sd)
+    products = Products(J.T @ J, J.T @ e, float(e @ e), F.T @ J, F.T @ e, prior_sd, from_mean)
     for size in (0.0, 0.2, 30.0):
         covariance = np.eye(12) + J @ np.diag(prior_sd**2) @ J.T + size * F @ np.diag(variance) @ F.T
-        expected = multivariate_normal(np.zeros(12), covariance).logpdf(e) + 6 * np.log(2 * np.pi)
+        expected = multivariate_normal(J @ (prior_sd * from_mean), covariance).logpdf(e) + 6 * np.log(2 * np.pi)
         found = _log_evidence(products, modes.strength, modes.vectors.T @ F.T @ J, modes.vectors.T @ F.T @ e, size)
         assert found == pytest.approx(expected, rel=1e-9)
 

@@ -12,7 +12,7 @@ from scipy.stats import t as student
 from ccmodel import mechanisms as registry
 from ccmodel.deadline import UNLIMITED, Deadline
 from ccmodel.diagnosis import settings
-from ccmodel.diagnosis.hypothesis import Hypothesis, plausible
+from ccmodel.diagnosis.hypothesis import Hypothesis, coefficients_of, plausible
 from ccmodel.diagnosis.whitening import Whitened, with_states_of
 from ccmodel.failure import ModelError
 from ccmodel.inference.cross_validation import inverse_of, leave_one_out
@@ -171,6 +171,9 @@ def fit(
     """
     unknowns = {n: replace(f, start=start[n]) for n, f in free.items()} | hypothesis.free(start)
     unknowns |= _state_means(whitened, hypothesis, unknowns)
+    of_laws = coefficients_of(hypothesis).items()
+    in_cost = [w.observations for w in whitened]
+    unknowns |= {key: replace(unknowns[key], spread=prior_spread(sd, in_cost)) for key, sd in of_laws}
     modelled = _with_states(whitened, hypothesis, {n: f.start for n, f in unknowns.items()})
     problem = Problem(modelled, unknowns, weight=mean_weight)
     search = replace(SEARCH, deadline=deadline)

@@ -21,6 +21,7 @@ from ccmodel.channels import TAU_IN, THETA_OUT
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.drive import since_reversal, speed
+from ccmodel.diagnosis.hypothesis import coefficients_of
 from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS, IN_EVIDENCE
 from ccmodel.inference.pool import each
@@ -72,6 +73,9 @@ class Products:
         Weighted F'J and F'e.
     prior_sd : ndarray, shape (unknowns,)
         Standard deviation of the unknowns' prior.
+    from_mean : ndarray, shape (unknowns,)
+        Distance of the unknowns from their prior's mean over its standard deviation, where the prior has a mean of its
+        own, as that of a law's coefficients; 0 elsewhere.
     """
 
     information: NDArray
@@ -80,6 +84,7 @@ class Products:
     by_unknowns: NDArray
     by_residuals: NDArray
     prior_sd: NDArray
+    from_mean: NDArray
 
 
 @dataclass(frozen=True)
@@ -128,6 +133,12 @@ class Discrepancy:
         J, e = modes.vectors.T @ p.by_unknowns, modes.vectors.T @ p.by_residuals
         return np.array([_log_evidence(p, modes.strength, J, e, size) for size in sizes])
 
+    def most_probable(self, candidate: CandidateFit) -> NDArray:
+        """Change of each unknown to its most probable value, to first order and without a discrepancy."""
+        p = self._products_of(candidate)
+        information = np.eye(len(p.score)) + p.prior_sd[:, None] * p.information * p.prior_sd
+        return -p.prior_sd * np.linalg.solve(information, p.prior_sd * p.score + p.from_mean)
+
     def resolution(self, candidate: CandidateFit, sizes: Sequence[float]) -> float:
         """The least of these sizes, in all channels, that residuals of noise alone show to be too large."""
         strength = self._modes_of(candidate, dict.fromkeys(self.channels, 1.0)).strength
@@ -165,7 +176,9 @@ class Discrepancy:
                 by_unknowns[self._columns(channel)] += part[:, :-1]
                 by_residuals[self._columns(channel)] += part[:, -1]
         prior_sd = np.array([_prior_sd(candidate, name) for name in candidate.values])
-        return Products(information, score, square, by_unknowns, by_residuals, prior_sd)
+        coefficients = coefficients_of(candidate.hypothesis)
+        from_mean = np.array([candidate.values[n] / coefficients.get(n, np.inf) for n in candidate.values])
+        return Products(information, score, square, by_unknowns, by_residuals, prior_sd, from_mean)
 
     def _columns(self, channel: str) -> slice:
         """Features of a channel among those of all channels."""
@@ -289,9 +302,9 @@ def _log_evidence(p: Products, strength: NDArray, J: NDArray, e: NDArray, size: 
     score = p.score - J.T @ (share * e)
     square = p.square - float(e @ (share * e))
     root = np.linalg.cholesky(np.eye(len(score)) + p.prior_sd[:, None] * information * p.prior_sd)
-    along = np.linalg.solve(root, p.prior_sd * score)
+    along = np.linalg.solve(root, p.prior_sd * score + p.from_mean)
     determinants = 2 * np.log(np.diag(root)).sum() + np.log1p(size * strength).sum()
-    return float(-(square - along @ along + determinants) / 2)
+    return float(-(square + p.from_mean @ p.from_mean - along @ along + determinants) / 2)
 
 
 def _weight(w: Whitened, samples: int, recordings: int) -> float:
@@ -308,7 +321,7 @@ def _prior_sd(candidate: CandidateFit, unknown: str) -> float:
     for name, place in candidate.hypothesis.acting:
         for p in registry.get(name).parameters:
             if mechanism_key(name, place, p.name) == unknown:
-                return p.spread or _sd_within_range(p, candidate.values[unknown])
+                return p.spread or p.prior_sd or _sd_within_range(p, candidate.values[unknown])
     free = candidate.free.get(unknown)
     # A baseline's mechanisms are in every candidate, and so are their priors.
     return (free.high - free.low) / np.sqrt(12) if free else 1.0

@@ -8,6 +8,7 @@ from ccmodel import mechanisms as registry
 from ccmodel.diagnosis import settings
 from ccmodel.inference.problem import Free
 from ccmodel.mechanisms import Parameter
+from ccmodel.mechanisms.learned import Law
 from ccmodel.model.general.run import Active
 from ccmodel.model.parameters import Parameters, mechanism_key
 
@@ -25,18 +26,21 @@ class Hypothesis:
     is_frozen : bool
         Whether the baseline's parameters keep their values; otherwise they are fitted with the others. A mechanism of
         a frozen baseline among `acting` means that its parameters have changed.
+    fixed : tuple of (str, float)
+        Values of parameters that the conditions of the recordings set (`Parameter.fixed`), by `mechanism_key`.
     """
 
     acting: tuple[tuple[str, str], ...] = ()
     baseline: tuple[tuple[str, str], ...] = ()
     is_frozen: bool = False
+    fixed: tuple[tuple[str, float], ...] = ()
 
     def __str__(self) -> str:
         return " + ".join(f"{name} at {place}" for name, place in self.acting) or "the calibrated model"
 
     def and_also(self, other: "Hypothesis") -> "Hypothesis":
         """The same with another's mechanisms added."""
-        return replace(self, acting=self.acting + other.acting)
+        return replace(self, acting=self.acting + other.acting, fixed=self.fixed + other.fixed)
 
     @property
     def size(self) -> int:
@@ -57,8 +61,12 @@ class Hypothesis:
         """Parameters with the mechanisms added, at their values in `parameters` or else at their starting values."""
         known = {(m.name, m.place): m.values for m in parameters.mechanisms}
         every = dict.fromkeys(self.baseline + self.acting)
-        acting = tuple(Active(*one, known.get(one) or registry.get(one[0]).start) for one in every)
+        acting = tuple(Active(*one, known.get(one) or self._start_of(*one)) for one in every)
         return replace(parameters, mechanisms=acting)
+
+    def _start_of(self, name: str, place: str) -> dict[str, float]:
+        fixed = dict(self.fixed)
+        return {p: fixed.get(mechanism_key(name, place, p), value) for p, value in registry.get(name).start.items()}
 
     @property
     def start(self) -> dict[str, float]:
@@ -73,7 +81,7 @@ class Hypothesis:
     def free(self, start: Mapping[str, float]) -> dict[str, Free]:
         """The mechanisms' parameters as unknowns, from `start`."""
         unknowns = self._unknowns()
-        return {key: Free.within(start[key], *_bounds(parameter, strength)) for key, parameter, strength in unknowns}
+        return {key: _free(start[key], parameter, strength) for key, parameter, strength in unknowns}
 
     @property
     def continuation(self) -> list[str]:
@@ -84,7 +92,7 @@ class Hypothesis:
         """Name of each unknown, its parameter, and whether it is a strength of its mechanism."""
         for name, place in self.acting if self.is_frozen else self.baseline + self.acting:
             mechanism = registry.get(name)
-            for parameter in mechanism.parameters:
+            for parameter in (p for p in mechanism.parameters if not p.fixed):
                 yield mechanism_key(name, place, parameter.name), parameter, parameter in mechanism.strengths
 
     def screening_values(self) -> Iterator[dict[str, float]]:
@@ -118,6 +126,21 @@ def stated_hypothesis(stated: Collection[str]) -> Hypothesis:
     return Hypothesis(tuple((name, place) for name, _, place in parts))
 
 
+def law_of(hypothesis: Hypothesis) -> Law | None:
+    """The law among the mechanisms of a hypothesis, if there is one."""
+    return next((registry.laws()[name] for name, _ in hypothesis.acting if name in registry.laws()), None)
+
+
+def coefficients_of(hypothesis: Hypothesis) -> dict[str, float]:
+    """Standard deviation of the prior of each coefficient of a law in a hypothesis."""
+    return {
+        mechanism_key(name, place, p.name): p.prior_sd
+        for name, place in hypothesis.baseline + hypothesis.acting
+        for p in registry.get(name).parameters
+        if p.prior_sd
+    }
+
+
 def plausible(hypothesis: Hypothesis, values: Mapping[str, float]) -> bool:
     """Whether every strength lies within its plausible range or below it."""
     return all(
@@ -136,6 +159,12 @@ def _is_plausible(strength: Parameter, value: float) -> bool:
     else:
         low, high = min(low, 0.0), max(high, 0.0)
     return low <= value <= high
+
+
+def _free(start: float, parameter: Parameter, is_strength: bool) -> Free:
+    """A mechanism's parameter as an unknown of a fit."""
+    free = Free.within(start, *_bounds(parameter, is_strength))
+    return replace(free, mean=parameter.neutral, spread=parameter.prior_sd) if parameter.prior_sd else free
 
 
 def _bounds(parameter: Parameter, is_strength: bool) -> tuple[float, float]:

@@ -11,6 +11,7 @@ from ccmodel.channels import short_name, unit_of
 from ccmodel.diagnosis import experiment, location, repeatability, settings
 from ccmodel.diagnosis.candidate import CandidateFit, discretisation_shift, fit
 from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.law_report import laws_of
 from ccmodel.diagnosis.observations import NotJudged
 from ccmodel.diagnosis.verdict import Judgement, nested_choice
 from ccmodel.failure import ModelError
@@ -36,16 +37,18 @@ def report(
     not_judged : list of {"what", "why"}
     """
     best, base, whitened = judgement.best, judgement.calibrated, judgement.whitened
-    named = best.hypothesis.acting if judgement.verdict == "explained" else ()
+    is_named = judgement.verdict in ("explained", "learned")
+    of_list = [k for k, (name, _) in enumerate(best.hypothesis.acting) if is_named and name not in registry.laws()]
+    named = [best.hypothesis.acting[k] for k in of_list]
     shift, failures = _discretisation(judgement) if named else (None, [])
-    open_question = judgement.verdict in ("undecided", "unexplained")
     return {
         "format": FORMAT,
         "batch": batch,
         "verdict": judgement.verdict,
         "is_held": base.hypothesis.is_frozen,
         "location": location.location(judgement, calibrated),
-        "mechanisms": [mechanism_of(best, k, _stated(judgement, name), shift) for k, (name, _) in enumerate(named)],
+        "mechanisms": [mechanism_of(best, k, _stated(judgement, best.hypothesis.acting[k][0]), shift) for k in of_list],
+        "laws": laws_of(judgement),
         "alternatives": alternatives_of(judgement, dict(named)),
         "likeliest": [{"name": n, "place": p} for n, p in best.hypothesis.acting if judgement.verdict == "undecided"],
         "nearest": _nearest(judgement, calibrated),
@@ -56,7 +59,7 @@ def report(
             "error": held_out_errors(judgement, calibrated, nested_choice(judgement)),
         },
         "repeatability": repeatability.report(whitened),
-        "next_experiment": experiment.proposed(judgement, estimates) if open_question else None,
+        "next_experiment": experiment.proposed(judgement, estimates) if judgement.is_open else None,
         "not_judged": [*not_judged, *contradicting_recording(judgement), *_at_bounds(best), *failures],
     }
 
@@ -76,10 +79,10 @@ def _nearest(judgement: Judgement, calibrated: CandidateFit) -> dict | None:
 
 def alternatives_of(judgement: Judgement, named: Mapping[str, str]) -> list[dict]:
     """Every other mechanism with a probability worth mentioning, at its most likely place."""
-    if judgement.verdict in ("agrees", "unexplained"):
+    if judgement.verdict in ("agrees", "learned", "unexplained"):
         return []
     confidence = judgement.confidence
-    every = {acting for hypothesis in confidence for acting in hypothesis.acting}
+    every = {acting for hypothesis in confidence for acting in hypothesis.acting if acting[0] not in registry.laws()}
     places: dict[str, str] = {}
     for name, place in sorted(every, key=lambda acting: (-_place_probability(acting, confidence), acting)):
         places.setdefault(name, place)

@@ -9,13 +9,15 @@ from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit, fit
 from ccmodel.diagnosis.comparison import Comparison, is_part_of
-from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.hypothesis import Hypothesis, law_of
+from ccmodel.diagnosis.laws import proposals
 from ccmodel.diagnosis.repeatability import estimated
 from ccmodel.diagnosis.screening import Score, Screening, screen
 from ccmodel.diagnosis.whitening import Whitened, relinearised
 from ccmodel.failure import ModelError
 from ccmodel.inference.pool import each
 from ccmodel.inference.problem import Free
+from ccmodel.mechanisms.learned import Law
 from ccmodel.progress import Progress, silent, within
 
 # Shares of a whole selection at which the mechanisms are screened and the single ones fitted; the rest is that of the
@@ -37,6 +39,8 @@ class Selection:
         Single mechanisms that may be missing.
     forced : sequence of Hypothesis
         Candidates that are fitted whatever their screening score.
+    laws : sequence of Law
+        Laws that may be learned where something is missing that is on no list.
     progress : Progress
     deadline : Deadline
         When the selection ends with what was fitted until then.
@@ -45,6 +49,7 @@ class Selection:
     free: Mapping[str, Free]
     mechanisms: Sequence[Hypothesis]
     forced: Sequence[Hypothesis] = ()
+    laws: Sequence[Law] = ()
     progress: Progress = field(default=silent)
     deadline: Deadline = UNLIMITED
 
@@ -70,6 +75,10 @@ class Selection:
             if found.is_enough or self.deadline.has_passed:
                 break
             found = part._part(RELINEARISED, 1.0).extended(found, screening, size)
+            if self.laws and size == settings.LEARN_AFTER and found.unlisted > settings.LEARN_ABOVE:
+                found = part.learn(found)
+                if law_of(found.leading[0].hypothesis) is not None:
+                    break
             if found.leading[0].hypothesis.size < size:
                 break
         # Candidates are compared, and their parameters estimated, under the best one's own covariance: about a model
@@ -77,6 +86,23 @@ class Selection:
         if found.candidates and found.probability_of_base < 0.5:
             found = self.relinearise(found)
         return found, scores
+
+    def learn(self, found: Comparison) -> Comparison:
+        """The same with laws that no list holds: the leading ones, and the best of them with more knots."""
+        assert found.discrepancy is not None
+        base, discrepancy = found.base, found.discrepancy
+        self.progress("learning a law from the recordings", 0.0)
+
+        def fitted(every: Sequence[Law], most: int) -> list[CandidateFit]:
+            leading = proposals(base, discrepancy, every, self.deadline)[:most]
+            return self.fit_all(found.whitened, base, [Score(p.hypothesis, 0.0, p.values) for p in leading])
+
+        coarse = sorted(fitted(self.laws, settings.LAWS_FITTED), key=lambda c: c.mean_square)
+        found_first = [law_of(c.hypothesis) for c in coarse[: settings.LAWS_REFINED]]
+        finer = [finer for law in found_first if law is not None and (finer := law.finer()) is not None]
+        learned = coarse + fitted(finer, settings.LAWS_REFINED)
+        found = found.with_candidates([*found.candidates, *learned])
+        return self.relinearise(found) if found.candidates else found
 
     def _part(self, low: float, high: float) -> Self:
         """The same, whose work takes these shares of the whole."""

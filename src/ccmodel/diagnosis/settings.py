@@ -225,3 +225,13 @@ SINES_HZ, HOLDS_S, NESTED_HZ, STEP_DURATION_S = (0.1, 0.4, 1.2), (1.0, 3.0, 8.0)
 WANTED_ODDS = 20.0
 # Experiments, of the most separating ones, for which a refit is taken into account. Chosen for time.
 REFITTED = 8
+
+# Laws that no list holds. A priori sizes of a law's values that are tried, and the one that its sensitivities are taken
+# at: shares of the friction coefficient, or of a channel's peak to peak.
+LAW_SCALES = 0.003, 0.01, 0.03, 0.1, 0.3
+LAW_STEP = 0.01
+# Laws that are fitted, the leading ones to first order; and of these, how many are also fitted with more knots.
+LAWS_FITTED, LAWS_REFINED = 8, 2
+# Laws are learned after sets of so many listed mechanisms, where something that no candidate describes has this
+# probability at least.
+LEARN_AFTER, LEARN_ABOVE = 2, 0.2

@@ -10,9 +10,10 @@ from ccmodel.channels import PLACES_OF
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.comparison import Comparison
-from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.hypothesis import Hypothesis, law_of
 from ccmodel.diagnosis.screening import Score
 from ccmodel.diagnosis.whitening import Whitened
+from ccmodel.mechanisms.learned import Law
 
 
 @dataclass(frozen=True)
@@ -21,10 +22,11 @@ class Judgement:
 
     Attributes
     ----------
-    verdict : {"agrees", "explained", "undecided", "unexplained"}
+    verdict : {"agrees", "explained", "learned", "undecided", "unexplained"}
     best : CandidateFit
-        The most probable candidate if the verdict is explained, the most probable one whether complete or not if it is
-        undecided, otherwise the calibrated model.
+        The most probable candidate if the verdict is explained, the most probable one with a law if it is learned, the
+        most probable one of listed mechanisms, whether complete or not, if it is undecided, otherwise the calibrated
+        model.
     comparison : Comparison
     candidates : list of CandidateFit
         Those of the comparison, by descending probability.
@@ -50,6 +52,11 @@ class Judgement:
         return self.comparison.base
 
     @property
+    def is_open(self) -> bool:
+        """Whether something is missing and not found."""
+        return self.verdict in ("undecided", "unexplained")
+
+    @property
     def whitened(self) -> Sequence[Whitened]:
         """The observations of the comparison."""
         return self.comparison.whitened
@@ -63,10 +70,16 @@ class Judgement:
         """Probability that a mechanism acts, at whatever place and beside whatever others."""
         return sum(p for hypothesis, p in self.confidence.items() if name in hypothesis.names)
 
+    def confidence_in_slot(self, law: Law) -> float:
+        """Probability of the laws of one slot, whatever their argument."""
+        of_slot = ((law_of(hypothesis), p) for hypothesis, p in self.confidence.items())
+        return sum(p for one, p in of_slot if one is not None and one.is_of_slot(law))
+
     @property
     def nearest(self) -> CandidateFit | None:
-        """The plausible candidate with the lowest leave-one-out mean square; None without candidates."""
-        return min(self.candidates, key=lambda c: (not c.is_plausible, c.mean_square), default=None)
+        """The plausible listed candidate with the lowest leave-one-out mean square; None without candidates."""
+        listed = (c for c in self.candidates if law_of(c.hypothesis) is None)
+        return min(listed, key=lambda c: (not c.is_plausible, c.mean_square), default=None)
 
 
 def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
@@ -75,6 +88,7 @@ def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
     - ``agrees``: nothing is missing in the calibrated model, with a probability above one half.
     - ``explained``: each mechanism of the candidate that is most probably complete has the probability `SURE` at least,
       and that these and no others are missing has one above one half.
+    - ``learned``: something that no list holds is missing, and is a law of one slot with a probability above one half.
     - ``unexplained``: something is missing that no candidate describes, with a probability above one half, and no
       mechanism is part of it with such a probability.
     - ``undecided``: otherwise.
@@ -85,12 +99,18 @@ def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
     found = Judgement("agrees", comparison.base, comparison, candidates, probability[order].tolist(), scores)
     if comparison.probability_of_base > 0.5:
         return found
-    if candidates and _is_explained(found, comparison.most_probable):
+    by_law = [(c, law) for c in comparison.leading if (law := law_of(c.hypothesis)) is not None]
+    for candidate, law in by_law[:1]:
+        if found.confidence_in_slot(law) > 0.5:
+            return replace(found, verdict="learned", best=candidate)
+    listed = [c for c in candidates if law_of(c.hypothesis) is None]
+    if comparison.most_probable in listed and _is_explained(found, comparison.most_probable):
         return replace(found, verdict="explained", best=comparison.most_probable)
-    names = {name for c in candidates for name in c.hypothesis.names}
-    if comparison.unlisted > 0.5 and max(map(found.confidence_in, names), default=0.0) <= 0.5:
+    names = {name for c in listed for name in c.hypothesis.names}
+    learned = sum(p for hypothesis, p in found.confidence.items() if law_of(hypothesis) is not None)
+    if comparison.unlisted + learned > 0.5 and max(map(found.confidence_in, names), default=0.0) <= 0.5:
         return replace(found, verdict="unexplained", single_fault_places=single_fault_places(comparison))
-    return replace(found, verdict="undecided", best=comparison.leading[0])
+    return replace(found, verdict="undecided", best=next(c for c in comparison.leading if law_of(c.hypothesis) is None))
 
 
 def _is_explained(judgement: Judgement, best: CandidateFit) -> bool:

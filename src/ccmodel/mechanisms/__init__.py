@@ -8,6 +8,7 @@ from pkgutil import iter_modules
 from typing import Any
 
 from ccmodel.mechanisms.contract import PAPER_LOOK_ALIKES, PLACES, Mechanism, Parameter, Sensing, Settings
+from ccmodel.mechanisms.learned import laws
 
 __all__ = [
     "PLACES",
@@ -17,6 +18,7 @@ __all__ = [
     "Settings",
     "UnknownMechanismError",
     "get",
+    "laws",
     "march_settings",
     "module_of",
     "names",
@@ -56,6 +58,8 @@ def _neutral() -> dict[str, Any]:
         if taken := neutral.keys() & mechanism.neutral_settings.keys():
             raise ValueError(f"{mechanism.name} declares settings of another mechanism: {', '.join(sorted(taken))}")
         neutral |= mechanism.neutral_settings
+    for law in laws().values():
+        neutral |= law.mechanism.neutral_settings
     return neutral
 
 
@@ -80,13 +84,15 @@ def module_of(name: str) -> str:
 
 
 def get(name: str) -> Mechanism:
-    """The mechanism of that name.
+    """The mechanism of that name, or the law (`ccmodel.mechanisms.learned`).
 
     Raises
     ------
     UnknownMechanismError
         If there is none.
     """
+    if (law := laws().get(name)) is not None:
+        return law.mechanism
     try:
         return _registry()[name]
     except KeyError:

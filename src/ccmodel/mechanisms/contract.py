@@ -79,6 +79,11 @@ class Parameter:
     spread : float
         Of a state at the recording's start: its standard deviation from recording to recording about the value of the
         model. The range is then that of the state, both ends included. 0: the same in all recordings.
+    fixed : bool
+        Whether the conditions of the recordings set it, and no fit changes it.
+    prior_sd : float
+        Of a coefficient of an unknown law: standard deviation of its normal prior about the neutral value. 0: any value
+        in the range is as probable.
     """
 
     name: str
@@ -97,6 +102,8 @@ class Parameter:
     above: float = -inf
     below: float = inf
     spread: float = 0.0
+    fixed: bool = False
+    prior_sd: float = 0.0
 
     def at(self, share: float) -> float:
         """Value at a share of the range, on the parameter's scale."""
@@ -232,8 +239,8 @@ class Mechanism:
 
     @property
     def strengths(self) -> tuple[Parameter, ...]:
-        """Parameters that measure its size: its ratios, each by itself, or else its first parameter."""
-        return tuple(p for p in self.parameters if p.ratio) or self.parameters[:1]
+        """Parameters that measure its size: its ratios, each by itself, or else its first one; of a law none."""
+        return tuple(p for p in self.parameters if p.ratio) or tuple(p for p in self.parameters[:1] if not p.fixed)
 
     @property
     def shapes(self) -> tuple[Parameter, ...]:

@@ -274,7 +274,7 @@ def read_model_file(path: Path) -> Model:
 
 def _parameters(path: Path, stated: _ModelFile) -> Parameters:
     for active in stated.mechanisms:
-        if active.name not in registry.names():
+        if active.name not in (*registry.names(), *registry.laws()):
             raise InputError(f"{path}: no mechanism is called {active.name!r}; there are {', '.join(registry.names())}")
     mechanisms = tuple(
         Active(m.name, m.place, registry.get(m.name).default | dict(m.values)) for m in stated.mechanisms

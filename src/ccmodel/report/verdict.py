@@ -44,6 +44,8 @@ def sentence(diagnosis: Mapping) -> str:
         return f"The {model} agrees with the recordings within their noise; they show {nothing}."
     if verdict == "explained":
         return _capital(f"{'this has changed: ' if held else ''}{_with_confidence(diagnosis['mechanisms'])}.")
+    if verdict == "learned":
+        return law_sentence(diagnosis)
     if verdict == "undecided":
         return _undecided(diagnosis, missing)
     places = " or ".join(f"the {place_in_words(place)}" for place in possible_places(diagnosis))
@@ -95,13 +97,37 @@ def _undecided(diagnosis: Mapping, missing: str) -> str:
 def headline(diagnosis: Mapping) -> str:
     """The verdict in a line, with the batch's name and how far the held-out error fell."""
     text = f"{diagnosis['batch']}: {sentence(diagnosis)}"
-    if diagnosis["verdict"] != "explained":
+    if diagnosis["verdict"] not in ("explained", "learned"):
         return text
     worst = worst_channel(diagnosis["fit"]["error"])
     e = diagnosis["fit"]["error"][worst]
     before, after = e["before"] / e["noise"], e["after"] / e["noise"]
     fall = f"falls from {before:.1f} to {after:.1f} times the noise"
     return f"{text} With this in the model, the held-out error of {SYMBOL[worst]} {fall}."
+
+
+# What has a law of each slot.
+IN_SLOT = {
+    "sliding-friction": "Friction along the conduits",
+    "bearing-torque": "The torque at the drive pulley",
+    "load": "The load's torque",
+    "sensor-map": "The error of a sensor",
+}
+
+
+def law_sentence(diagnosis: Mapping) -> str:
+    """What a learned law says, and that it is on no list."""
+    law = diagnosis["laws"][0]
+    what = IN_SLOT[law["slot"]]
+    if law["slot"] == "sensor-map":
+        channel = next(c for c in TABLE.values() if c.name == law["channel"])
+        what = f"The error of {channel.symbol}"
+    others = f" (or on {' or '.join(law['indistinguishable'])})" if law["indistinguishable"] else ""
+    beside = f" Beside it: {_with_confidence(diagnosis['mechanisms'])}." if diagnosis["mechanisms"] else ""
+    return (
+        f"{what} depends on {law['argument_is']}{others}, confidence {law['confidence']:.2f}. No listed mechanism does"
+        f" this; the law was learned from the recordings.{beside}"
+    )
 
 
 def nearest_sentence(diagnosis: Mapping) -> str | None:

@@ -6,7 +6,8 @@ The unknowns are the slides d of all nodes and the rotation of the load pulley. 
 
 so that a node that slides has the capstan's ratio T_i / T_{i+1} = exp(mu phi_i) on any grid. xi is the node's bristle,
 -1 to 1, elastic and ideally plastic, over `COULOMB_BRISTLE_M`, which makes the equations piecewise linear. Where there
-is presliding, it is the mean of several with lengths of their own and of one that follows Dahl's law.
+is presliding, it is the mean of several with lengths of their own and of one that follows Dahl's law. Friction that
+depends on the direction of sliding has xi + b xi^2 in its place.
 """
 
 from numpy.typing import NDArray
@@ -123,19 +124,21 @@ def _nodes(ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, dt: float
     rate = 1.0 / dt if dt > 0.0 else 0.0
     for c in range(2):
         T, K, d = piece[rows.TENSION, c], piece[rows.TANGENT, c], slide[rows.NOW, c]
-        grip, xi = node[rows.GRIP, c], node[rows.BRISTLE, c]
+        grip, before = node[rows.GRIP, c], node[rows.BRISTLE, c]
         p, q, fd, r = node[rows.NEAR, c], node[rows.FAR, c], node[rows.GIVES, c], node[rows.EXCESS, c]
         if ph.presliding:
             _elements(ph, node, d, c)
         else:
             inverse = 1.0 / bristle
             for i in range(n):
-                trial = xi[i] + d[i + 1] * inverse
+                trial = before[i] + d[i + 1] * inverse
                 node[rows.BRISTLE_NEXT, c, i] = min(max(trial, -1.0), 1.0)
                 fd[i] = inverse if abs(trial) < 1.0 else 0.0
         if not ph.general_friction:
             for i in range(n):
-                x, g = node[rows.BRISTLE_NEXT, c, i], grip[i]
+                xi = node[rows.BRISTLE_NEXT, c, i]
+                x, g = xi + ph.direction_bias * xi * xi, grip[i]
+                fd[i] *= 1.0 + 2.0 * ph.direction_bias * xi
                 hold = g * (max(T[i], 0.0) + max(T[i + 1], 0.0))
                 p[i] = K[i] * (1.0 - x * g)
                 q[i] = K[i + 1] * (1.0 + x * g)
@@ -146,7 +149,9 @@ def _nodes(ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, dt: float
                 _set_hold(ph, piece, node, c)
                 grip = node[rows.GRIP_NOW, c]
             for i in range(n):
-                x, g, slope = node[rows.BRISTLE_NEXT, c, i], grip[i], node[rows.GRIP_SLOPE, c, i]
+                xi = node[rows.BRISTLE_NEXT, c, i]
+                x, g, slope = xi + ph.direction_bias * xi * xi, grip[i], node[rows.GRIP_SLOPE, c, i]
+                fd[i] *= 1.0 + 2.0 * ph.direction_bias * xi
                 hold = g * (max(T[i], 0.0) + max(T[i + 1], 0.0)) + node[rows.DRAG, c, i]
                 p[i] = K[i] * (1.0 - x * (g + slope))
                 q[i] = K[i + 1] * (1.0 + x * (g + slope))
@@ -229,10 +234,11 @@ def _mean_tension(piece: NDArray, c: int) -> float:
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
-def set_grip(ph: Physics, node: NDArray, slide: NDArray, friction_factor: float, dt: float) -> float:
+def set_grip(ph: Physics, node: NDArray, slide: NDArray, friction_factor: NDArray, dt: float) -> float:
     """Set friction of each node over the sum of its tensions; with a power of tension, only its argument mu phi / 2.
 
-    The contacts' memory of rest at the end of the step follows from the slides in `NOW`, the best estimate so far.
+    `friction_factor` is that of mu by cable, shape (2,). The contacts' memory of rest at the end of the step follows
+    from the slides in `NOW`, the best estimate so far.
     Returns the largest relative change of friction.
     """
     change = 0.0
@@ -247,7 +253,7 @@ def set_grip(ph: Physics, node: NDArray, slide: NDArray, friction_factor: float,
             change = max(change, abs(rested[i] - before[i]))
             before[i] = rested[i]
         for i in range(node.shape[2]):
-            grip[i] = half_bend[i] * friction_factor * (1.0 + ph.stribeck_rise * rested[i])
+            grip[i] = half_bend[i] * friction_factor[c] * (1.0 + ph.stribeck_rise * rested[i])
         if ph.tension_exponent == 0.0:
             for i in range(node.shape[2]):
                 grip[i] = quick_tanh(grip[i])

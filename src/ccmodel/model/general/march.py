@@ -98,9 +98,11 @@ def march(
         Times (s), and angle of the drive pulley (rad).
     drive : tuple of float
         The drive pulley's radius (m), eccentricity, and the latter's angle (rad).
-    friction_factor, series : ndarray, shape (m,) or (1,)
-        Factor of mu, and the prescribed torque (N m, on top of the load's own law) or angle (rad) of the load. A single
-        value holds throughout.
+    friction_factor : ndarray, shape (m, 2) or (1, 2)
+        Factor of mu by cable. A single row holds throughout.
+    series : ndarray, shape (m,) or (1,)
+        Prescribed torque (N m, on top of the load's own law) or angle (rad) of the load. A single value holds
+        throughout.
     steps : int
         Steps from one sample to the next; a step without a solution is halved.
     out : ndarray, shape (7, m)
@@ -118,7 +120,7 @@ def march(
     last_rotation, before_rotation, last_pull, before_pull, last_dt = 0.0, 0.0, 0.0, 0.0, 0.0
     node[rows.RESTED] = 1.0
     set_grip(ph, node, slide, friction_factor[0], 0.0)
-    fixed_grip = ph.stribeck_rise == 0.0 and friction_factor.size == 1
+    fixed_grip = ph.stribeck_rise == 0.0 and len(friction_factor) == 1
     prescribed = ph.kind == rows.PRESCRIBED_ANGLE
     wound_before = winding(theta_in[0], drive[1], drive[2])[0]
     for j in range(m):
@@ -158,7 +160,7 @@ def march(
             for iteration in range(GRIP_ITERATIONS):
                 # The contacts' memory depends on the slides: on the extrapolated ones first, then on the solved ones.
                 if not fixed_grip:
-                    change = set_grip(ph, node, slide, friction_factor[min(j, friction_factor.size - 1)], step_dt)
+                    change = set_grip(ph, node, slide, friction_factor[min(j, len(friction_factor) - 1)], step_dt)
                     if iteration > 0 and change < GRIP_TOLERANCE:
                         break
                 solved, rotation = solve_step(ph, piece, node, slide, mean, load, rotation, torque, step_dt, bristle)

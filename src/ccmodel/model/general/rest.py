@@ -23,7 +23,7 @@ def initial_state(
     node: NDArray,
     settings: Settings,
     profiles: Sequence[NDArray],
-    friction_factor: float,
+    friction_factor: NDArray,
 ) -> NDArray:
     """Write the state under the initial tension into `piece` and `node`; returns the tension of each piece (N)."""
     T = np.stack(profiles)
@@ -42,11 +42,13 @@ def initial_state(
     piece[rows.STRETCH], piece[rows.ELASTIC] = stretch, elastic
     piece[rows.BRANCH : rows.BRANCH + branches.size] = branches[:, None, None] * elastic
     both = T[:, :-1] + T[:, 1:]
-    factor = friction_factor * (1 + physics.stribeck_rise)
+    factor = friction_factor[:, None] * (1 + physics.stribeck_rise)
     if physics.tension_exponent != 0:
         factor = factor * (np.hypot(both / 2, FLOOR_N) / REFERENCE_N) ** physics.tension_exponent
     hold = np.tanh(node[rows.HALF_BEND] * factor) * both + node[rows.DRAG]
-    xi = np.divide(T[:, :-1] - T[:, 1:], hold, out=np.zeros_like(both), where=hold > 0)
+    share = np.divide(T[:, :-1] - T[:, 1:], hold, out=np.zeros_like(both), where=hold > 0)
+    # Where friction depends on the direction of sliding, the share is xi + b xi^2.
+    xi = 2 * share / (1 + np.sqrt((1 + 4 * physics.direction_bias * share).clip(0.0)))
     node[rows.BRISTLE] = np.clip(xi, -1, 1)
     node[rows.ELEMENT : rows.ELEMENT_NEXT] = node[rows.BRISTLE]
     return T

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
-from ccmodel.channels import TAU_IN, TAU_OUT, TENSIONS, THETA_OUT
+from ccmodel.channels import TAU_IN, TAU_OUT, TENSIONS, THETA_IN, THETA_OUT
 from ccmodel.failure import ModelError
-from ccmodel.mechanisms.contract import Settings
+from ccmodel.mechanisms.contract import Sensing, Settings
 from ccmodel.mechanisms.load_inertia import load_damping
 from ccmodel.mechanisms.presliding import element_lengths
 from ccmodel.mechanisms.pulley_friction import bearing
@@ -26,6 +26,9 @@ from ccmodel.model.response import PairResponse, Status
 from ccmodel.model.transmission import Transmission
 
 ELEMENTS = 32
+# Further passes of the march for laws of the load: each leaves the share of the error that the law's stiffness is of
+# that of the cables.
+LOAD_LAW_PASSES = 3
 # Outputs of the march, row by row.
 OUTPUTS = (*TENSIONS, THETA_OUT, TAU_OUT, TAU_IN)
 # A step covers no more than this phase of a load that rings, up to so many steps a sample. A load that rings faster,
@@ -94,14 +97,36 @@ def simulate(
     series = _series(load)
     _check(time_s, theta_in, series, elements)
     series = np.zeros(1) if series is None else series
+    arguments = transmission, load, settings, time_s, theta_in, initial, elements, steps
+    solved, out = _marched(*arguments, series)
+    # A law of the load takes the load's motion from the pass before.
+    for _ in range(LOAD_LAW_PASSES if settings.load_laws and solved == time_s.size else 0):
+        motion = Sensing(time_s, {THETA_OUT: out[4]}, transmission.drive_radius_m, transmission.load_radius_m)
+        solved, out = _marched(*arguments, series + sum(law(motion) for law in settings.load_laws))
+        if solved < time_s.size:
+            break
+    return _response(transmission, active, time_s[:solved], theta_in[:solved], out)
 
+
+def _marched(
+    transmission: Transmission,
+    load: Load,
+    settings: Settings,
+    time_s: NDArray,
+    theta_in: NDArray,
+    initial: InitialTension,
+    elements: int,
+    steps: int,
+    series: NDArray,
+) -> tuple[int, NDArray]:
+    """Number of samples that were solved, and the outputs at all of them, shape (outputs, n).
+
+    `series` is the load's prescribed torque or angle, shape (n,) or (1,).
+    """
     grid = make_grid(transmission.path, elements, settings.kinks)
     physics = _physics(transmission, load, settings, elements)
     piece, node = _constants(transmission, settings, grid)
-    friction_factor = np.ones(1)
-    if settings.friction_history is not None:
-        travel_m = transmission.drive_radius_m * np.abs(np.diff(theta_in, prepend=theta_in[0])).cumsum()
-        friction_factor = settings.friction_history(time_s, travel_m)
+    friction_factor = _friction_factor(transmission, settings, time_s, theta_in)
     mean, state = np.zeros((rows.MEAN_ROWS, 2)), np.zeros(rows.LOAD_ROWS)
     tension_A, tension_B = initial.at(grid.boundary_m, grid.held_rad)
     if transmission.is_single_cable:
@@ -123,7 +148,22 @@ def simulate(
         out[5, :solved] = series[:solved]  # the sensor does not feel the spring in parallel
     if settings.drive_friction_Nm != 0.0:
         out[6, :solved] += settings.drive_friction_Nm * bearing(theta_in[:solved], settings.drive_presliding_rad)
-    return _response(transmission, active, time_s[:solved], theta_in[:solved], out)
+    return solved, out
+
+
+def _friction_factor(transmission: Transmission, settings: Settings, time_s: NDArray, theta_in: NDArray) -> NDArray:
+    """Factor of mu at each sample or throughout, by cable; shape (n, 2) or (1, 2)."""
+    factor = np.ones((1, 2))
+    if settings.friction_history is not None:
+        travel_m = transmission.drive_radius_m * np.abs(np.diff(theta_in, prepend=theta_in[0])).cumsum()
+        factor = np.repeat(settings.friction_history(time_s, travel_m)[:, None], 2, axis=1)
+    if settings.friction_laws:
+        radii = transmission.drive_radius_m, transmission.load_radius_m
+        # Cable B moves towards the drive where cable A moves away from it.
+        motions = [Sensing(time_s, {THETA_IN: sign * theta_in}, *radii) for sign in (1.0, -1.0)]
+        added = np.stack([sum(law(motion) for law in settings.friction_laws) for motion in motions], axis=1)
+        factor = factor * (1.0 + added).clip(0.0)
+    return factor
 
 
 def _response(

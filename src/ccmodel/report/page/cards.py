@@ -21,7 +21,7 @@ from ccmodel.report.verdict import (
 
 IN_PART, CONTRADICTORY = "explained in part", "inputs inconsistent"
 # Verdicts as cards show them, in the order of the summary.
-SHOWN = ("explained", IN_PART, "undecided", "unexplained", CONTRADICTORY, "agrees")
+SHOWN = ("explained", "learned", IN_PART, "undecided", "unexplained", CONTRADICTORY, "agrees")
 
 
 def cards(batches: Sequence[Mapping], diagnoses: Sequence[Mapping]) -> list[dict]:

@@ -1,0 +1,126 @@
+"""Learning a law that no list holds: which slot, which argument, and the curve.
+
+Every law (`ccmodel.mechanisms.learned`) extends a fitted model by a few coefficients with a normal prior. Their
+sensitivities, from one run each, give its evidence to first order, under each of a few a priori sizes of its values.
+The leading laws are then fitted as any other candidate, and compete with these.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ccmodel.channels import THETA_IN
+from ccmodel.deadline import Deadline, OutOfTimeError
+from ccmodel.diagnosis import settings
+from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.discrepancy import Discrepancy
+from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.failure import ModelError
+from ccmodel.inference.pool import each
+from ccmodel.mechanisms import Sensing, laws
+from ccmodel.mechanisms.learned import COARSE, Law
+from ccmodel.model.parameters import mechanism_key
+from ccmodel.model.run import simulate
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A law beside a fitted model, linearised about no effect.
+
+    Attributes
+    ----------
+    hypothesis : Hypothesis
+        The law alone, with its range and its a priori size.
+    evidence : float
+        Logarithm of its evidence, over that of the model that it extends.
+    values : dict of str to float
+        Coefficients that are most probable to first order.
+    """
+
+    hypothesis: Hypothesis
+    evidence: float
+    values: dict[str, float]
+
+
+def proposals(base: CandidateFit, discrepancy: Discrepancy, every: Sequence[Law], deadline: Deadline) -> list[Proposal]:
+    """Each law beside a fitted model with the a priori size that suits it best, the highest evidence first."""
+    nothing = _evidence(discrepancy, base)
+    motions = each(base.whitened, lambda i, w: _motion(base, i))
+    channels = {c for w in base.whitened for c in w.observations.channels}
+    found = []
+    for law in every:
+        if deadline.has_passed:
+            break
+        if law.channel is not None and law.channel not in channels:
+            continue
+        try:
+            found.append(max(_proposed(base, discrepancy, law, motions, nothing), key=lambda p: p.evidence))
+        except (ModelError, ValueError, OutOfTimeError):
+            continue
+    return sorted(found, key=lambda p: -p.evidence)
+
+
+def _motion(base: CandidateFit, i: int) -> Sensing:
+    """What the arguments of laws are read from, as the fitted model simulates a recording."""
+    o = base.whitened[i].observations
+    simulated = simulate(o.given, base.model(o.parameters))
+    channels = {c: simulated[c] for c in (*o.channels,)} | {THETA_IN: o.given.theta_in}
+    return Sensing(o.given.recording.time_s, channels, o.parameters.drive_radius_m, o.parameters.load_radius_m)
+
+
+def _proposed(
+    base: CandidateFit, discrepancy: Discrepancy, law: Law, motions: Sequence[Sensing], nothing: float
+) -> Iterator[Proposal]:
+    pairs = zip(base.whitened, motions, strict=True)
+    visited = np.concatenate([law.argument.of(m)[w.observations.judged] for w, m in pairs])
+    first, last = law.range_of(visited)
+    if not last > first:
+        raise ValueError(f"{law.name}: its argument does not vary")
+    unit = 1.0 if law.channel is None else float(np.ptp(np.concatenate([m.channels[law.channel] for m in motions])))
+
+    def hypothesis(scale: float) -> Hypothesis:
+        fixed = {"first": first, "last": last, "scale": scale}
+        of_law = tuple((mechanism_key(law.name, law.place, name), value) for name, value in fixed.items())
+        return Hypothesis(((law.name, law.place),), fixed=of_law)
+
+    tried = settings.LAW_STEP * unit
+    columns = _sensitivities(base, base.hypothesis.and_also(hypothesis(tried)), law)
+    for share in settings.LAW_SCALES:
+        one = hypothesis(share * unit)
+        linear = _extended(base, base.hypothesis.and_also(one), [J * share / settings.LAW_STEP for J in columns])
+        names = [name for name in linear.values if name not in base.values]
+        x = discrepancy.most_probable(linear)
+        yield Proposal(one, _evidence(discrepancy, linear) - nothing, dict(zip(names, x[-len(names) :], strict=True)))
+
+
+def _sensitivities(base: CandidateFit, hypothesis: Hypothesis, law: Law) -> list[NDArray]:
+    """By recording, derivatives of the whitened errors by the law's coefficients about no effect."""
+    none = base.values | {name: 0.0 for name in hypothesis.start if name not in base.values}
+    names = [mechanism_key(law.name, law.place, name) for name in law.coefficients]
+
+    def of(i: int) -> NDArray:
+        w = base.whitened[i]
+        w = w.with_parameters(hypothesis.of(w.observations.parameters))
+        without = w.errors(none)
+        return np.column_stack([w.errors(none | {name: 1.0}) - without for name in names])
+
+    return each(base.whitened, lambda i, w: of(i))
+
+
+def _extended(base: CandidateFit, hypothesis: Hypothesis, columns: Sequence[NDArray]) -> CandidateFit:
+    """A fitted model with a law that has no effect yet, and its derivatives."""
+    added = {name: 0.0 for name in hypothesis.start if name not in base.values}
+    jacobian = [np.column_stack([J, D[: len(J)]]) for J, D in zip(base.jacobian, columns, strict=True)]
+    return replace(base, hypothesis=hypothesis, values=base.values | added, jacobian=jacobian)
+
+
+def _evidence(discrepancy: Discrepancy, candidate: CandidateFit) -> float:
+    """Logarithm of the evidence without anything else missing."""
+    return float(discrepancy.log_evidence(candidate, [0.0], dict.fromkeys(discrepancy.channels, 1.0))[0])
+
+
+def coarse_laws() -> list[Law]:
+    """Every law with the fewest knots."""
+    return [law for law in laws().values() if law.resolution == COARSE]

@@ -1,0 +1,374 @@
+"""Laws that no list holds: an unknown function of one quantity at one slot of the transmission.
+
+A slot is a place in the equations where a constitutive law can stand: a factor of the sliding friction, a torque at the
+drive pulley's bearing, the map of a sensor. Its law is a piecewise linear function of one argument, between knots over
+what the recordings visit, and constant beyond them:
+
+    y(x) = scale sum_k B_jk z_k at knot j,    z_k ~ N(0, 1)
+
+B is the root of a squared exponential covariance without its mean, so that z = 0 is no effect, and a smooth law is more
+probable than a rugged one. What a law adds on average belongs to the parameters of the calibration.
+
+Laws are mechanisms that `ccmodel.mechanisms.names` does not list. `ccmodel.diagnosis.laws` learns them.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from math import inf
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ccmodel.channels import (
+    F_DRIVE,
+    F_LOAD,
+    PLACES_OF,
+    TAU_IN,
+    TAU_OUT,
+    THETA_IN,
+    THETA_OUT,
+    short_name,
+    symbol_of,
+    unit_of,
+)
+from ccmodel.kernel import kernel
+from ccmodel.mechanisms.contract import Mechanism, Parameter, Sensing, Settings
+
+# Knots of a law, and the length over which its values are correlated a priori, as a share of its range: at first, and
+# where the recordings show more.
+COARSE, FINE = (9, 0.25), (25, 0.08)
+# Shares of a law's standard deviation below which a direction of its coefficients is left out.
+SLIGHTEST = 0.02
+# A reversal is a motion back by more than this, which noise of the encoder does not reach.
+REVERSAL_RAD = 0.01
+# The contact is renewed when the drive has moved so far, m; and the shortest age that is told apart, s.
+RENEWAL_M, SHORTEST_S = 2e-4, 1e-3
+SLOWEST_M_PER_S = 1e-5
+# The range of a law's argument, as quantiles of what the recordings visit; and the shortest travel at which an element
+# of a law with memory yields, as a share of the longest.
+RANGE, SHORTEST_YIELD = (0.005, 0.995), 0.01
+# Friction is never negative in either direction.
+LARGEST_BIAS = 0.95
+
+SLIDING_FRICTION, BEARING_TORQUE, LOAD, SENSOR_MAP = "sliding-friction", "bearing-torque", "load", "sensor-map"
+
+
+@dataclass(frozen=True)
+class Argument:
+    """A quantity that a law may depend on.
+
+    Attributes
+    ----------
+    name : str
+        As in the diagnosis format.
+    unit : str
+    meaning : str
+        As it stands in a sentence.
+    of : callable
+        ``of(sensing)``: its values, shape (n,).
+    has_two_values : bool
+        Whether it is -1 or 1.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    of: Callable[[Sensing], NDArray]
+    has_two_values: bool = False
+
+
+@dataclass(frozen=True)
+class Law:
+    """A slot and the argument of its law.
+
+    Attributes
+    ----------
+    slot, place : str
+    argument : Argument
+    channel : str or None
+        The channel that a torque or a reading is added to; None for a factor of friction.
+    opposes : str or None
+        The angle whose motion a friction torque with memory opposes: each of its knots is the travel at which a
+        Maxwell-slip element yields, and its value there is the torque of that element.
+    resolution : (int, float)
+        Number of knots, and correlation length.
+    """
+
+    slot: str
+    place: str
+    argument: Argument
+    channel: str | None = None
+    opposes: str | None = None
+    resolution: tuple[int, float] = COARSE
+
+    @property
+    def name(self) -> str:
+        """Its name as a mechanism."""
+        of = "" if self.slot != SENSOR_MAP else f"-{short_name(str(self.channel))}".replace("_", "-")
+        fine = "-fine" if self.resolution == FINE else ""
+        return f"learned-{self.slot}{of}-by-{self.argument.name}{fine}"
+
+    @property
+    def unit(self) -> str:
+        """Unit of its values."""
+        return "1" if self.channel is None else unit_of(self.channel)
+
+    @property
+    def curve_is(self) -> str:
+        """What its values are."""
+        if self.channel is None:
+            return "factor of the friction coefficient"
+        against = "" if self.opposes is None else ", against the motion"
+        return f"added to {symbol_of(self.channel)}{against}, in {self.unit}"
+
+    @property
+    def is_local(self) -> bool:
+        """Whether its argument differs along the cable: the solver then has the law in its equations."""
+        return self.slot == SLIDING_FRICTION and self.argument.has_two_values
+
+    @property
+    def basis(self) -> NDArray:
+        """Derivatives of its values at the knots by its coefficients, shape (knots, coefficients)."""
+        knots, length = (2, 1.0) if self.argument.has_two_values else self.resolution
+        return basis(knots, length, self.opposes is None)
+
+    def at_knots(self, values: Mapping[str, float]) -> tuple[NDArray, NDArray]:
+        """Its arguments at the knots and its values there, both of shape (knots,)."""
+        z = [values[name] for name in self.coefficients]
+        space = np.linspace if self.opposes is None else np.geomspace
+        return space(values["first"], values["last"], len(self.basis)), values["scale"] * (self.basis @ z)
+
+    def range_of(self, visited: NDArray) -> tuple[float, float]:
+        """First and last knot for the arguments that recordings visit."""
+        first, last = np.quantile(visited, RANGE)
+        return (float(last * SHORTEST_YIELD), float(last)) if self.opposes else (float(first), float(last))
+
+    def shown(self, x: NDArray) -> NDArray:
+        """What its curve shows of its values at the knots, shape (knots, knots).
+
+        Of a law with memory it is the torque that builds up from rest; otherwise these values.
+        """
+        return np.eye(len(x)) if self.opposes is None else np.minimum(x[:, None] / x, 1.0)
+
+    @property
+    def coefficients(self) -> list[str]:
+        """Names of its coefficients."""
+        return [f"z{k + 1}" for k in range(self.basis.shape[1])]
+
+    def added(self, sensing: Sensing, values: Mapping[str, float]) -> NDArray:
+        """Its values along a run, shape (n,); of a factor, what is added to 1."""
+        x, y = self.at_knots(values)
+        if self.opposes is None:
+            return np.interp(self.argument.of(sensing), x, y)
+        radius = sensing.drive_radius_m if self.opposes == THETA_IN else sensing.load_radius_m
+        return y @ _slip(radius * sensing.channels[self.opposes], x)
+
+    def is_of_slot(self, other: "Law") -> bool:
+        """Whether another law stands in the same slot."""
+        is_same_sensor = self.slot != SENSOR_MAP or self.channel == other.channel
+        return (self.slot, self.place) == (other.slot, other.place) and is_same_sensor
+
+    def finer(self) -> "Law | None":
+        """The same law with more knots, if there is one."""
+        is_finest = self.argument.has_two_values or self.opposes is not None or self.resolution == FINE
+        return None if is_finest else replace(self, resolution=FINE)
+
+    @cached_property
+    def mechanism(self) -> Mechanism:
+        """The law as a mechanism."""
+        structure = {SLIDING_FRICTION: "friction_laws", LOAD: "load_laws"}.get(self.slot)
+        physics = observation = None
+        structures: dict[str, Any] = {structure: ()} if structure else {}
+        if self.is_local:
+            structures = {"direction_bias": 0.0}
+
+            def physics(settings: Settings, values: Mapping[str, float]) -> None:
+                settings.direction_bias = float(np.clip(self.at_knots(values)[1][-1], -LARGEST_BIAS, LARGEST_BIAS))
+
+        elif structure is not None:
+
+            def physics(settings: Settings, values: Mapping[str, float]) -> None:
+                of_slot = getattr(settings, structure)
+                setattr(settings, structure, (*of_slot, lambda sensing: self.added(sensing, values)))
+
+        else:
+
+            def observation(sensing: Sensing, place: str, values: Mapping[str, float]) -> dict[str, NDArray]:
+                channel = str(self.channel)
+                return {channel: sensing.channels[channel] + self.added(sensing, values)}
+
+        unit = self.argument.unit
+        fixed = (
+            Parameter("first", unit, -inf, inf, 0.0, "argument at the first knot", fixed=True),
+            Parameter("last", unit, -inf, inf, 1.0, "argument at the last knot", fixed=True),
+            Parameter("scale", self.unit, 0.0, inf, 1.0, "standard deviation of its values a priori", fixed=True),
+        )
+        coefficients = tuple(
+            Parameter(name, "1", -4.0, 4.0, 0.0, "coefficient of the law", scale="linear", prior_sd=1.0)
+            for name in self.coefficients
+        )
+        return Mechanism(
+            name=self.name,
+            text=_TEXT.format(what=self.curve_is, argument=self.argument.meaning),
+            tex=r"y(x) = \mathrm{scale}\,\sum_k B_k(x)\,z_k",
+            sentence=f"a law of {self.argument.meaning}",
+            places=(self.place,),
+            parameters=fixed + coefficients,
+            mistaken_for=(),
+            depends_on_time=True,
+            by_name_only=True,
+            structures=structures,
+            modifies_physics=physics,
+            modifies_observation=observation,
+        )
+
+
+_TEXT = """A law that was learnt from recordings: {what}, by {argument}.
+
+Equation: piecewise linear between knots, and constant beyond them.
+
+Signature: the error is a function of {argument}.
+
+Separated by: recordings in which {argument} changes while all else stays.
+
+Source: Rasmussen and Williams, Gaussian Processes for Machine Learning, MIT Press, 2006, Section 4.2.
+"""
+
+
+@cache
+def basis(knots: int, length: float, is_centred: bool) -> NDArray:
+    """Root of the a priori covariance of a law's values at its knots, shape (knots, coefficients).
+
+    Their mean variance is 1. Directions whose standard deviation is below `SLIGHTEST` are left out.
+    """
+    x = np.linspace(0.0, 1.0, knots)
+    covariance = np.exp(-0.5 * ((x[:, None] - x) / length) ** 2)
+    centred = np.eye(knots) - (1.0 / knots if is_centred else 0.0)
+    value, vector = np.linalg.eigh(centred @ covariance @ centred)
+    value, vector = value[::-1].clip(0.0), vector[:, ::-1]
+    root = (vector * np.sqrt(value))[:, value > SLIGHTEST**2 * value.sum()]
+    # Eigenvectors have no sign of their own: that of their last entry is made positive.
+    root = root * np.where(root[-1] < 0, -1.0, 1.0)
+    return root / np.sqrt((root**2).sum() / knots)
+
+
+@kernel
+def _motion_memory(theta: NDArray, play: float) -> tuple[NDArray, NDArray]:
+    """Direction of the last motion (0 before any), and the angle since its reversal; shapes (n,)."""
+    direction, since = np.zeros(theta.size), np.zeros(theta.size)
+    furthest, turned, sign = theta[0], theta[0], 0.0
+    for i in range(theta.size):
+        moved = theta[i] - furthest
+        if sign == 0.0:
+            if abs(moved) > play:
+                sign = 1.0 if moved > 0 else -1.0
+                furthest = theta[i]
+        elif moved * sign > 0:
+            furthest = theta[i]
+        elif abs(moved) > play:
+            turned, sign, furthest = furthest, -sign, theta[i]
+        direction[i], since[i] = sign, abs(theta[i] - turned)
+    return direction, since
+
+
+@kernel
+def _slip(travel: NDArray, yields: NDArray) -> NDArray:
+    """States of Maxwell-slip elements, -1 to 1, that yield after these travels, m; shape (elements, n)."""
+    states = np.zeros((yields.size, travel.size))
+    for k in range(yields.size):
+        for i in range(1, travel.size):
+            moved = (travel[i] - travel[i - 1]) / yields[k]
+            states[k, i] = min(max(states[k, i - 1] + moved, -1.0), 1.0)
+    return states
+
+
+@kernel
+def _contact_age(time_s: NDArray, theta: NDArray, renewal: float) -> NDArray:
+    """Time since the drive was a renewal length away from where it is, s; before that, since the start; shape (n,)."""
+    age = np.zeros(theta.size)
+    for i in range(theta.size):
+        k = i
+        while k > 0 and abs(theta[i] - theta[k]) < renewal:
+            k -= 1
+        age[i] = time_s[i] - time_s[k]
+    return age
+
+
+def _velocity_of(angle: str) -> Callable[[Sensing], NDArray]:
+    return lambda s: np.gradient(s.channels[angle], s.time_s) if s.time_s.size > 1 else np.zeros(1)
+
+
+def _direction_of(angle: str) -> Callable[[Sensing], NDArray]:
+    return lambda s: _motion_memory(s.channels[angle], REVERSAL_RAD)[0]
+
+
+def _since_reversal_of(angle: str) -> Callable[[Sensing], NDArray]:
+    radius = "drive_radius_m" if angle == THETA_IN else "load_radius_m"
+    return lambda s: getattr(s, radius) * _motion_memory(s.channels[angle], REVERSAL_RAD)[1]
+
+
+def _age(s: Sensing) -> NDArray:
+    age = _contact_age(s.time_s, s.channels[THETA_IN], RENEWAL_M / s.drive_radius_m)
+    return np.log10(np.maximum(age, SHORTEST_S))
+
+
+def _travel(s: Sensing) -> NDArray:
+    theta = s.channels[THETA_IN]
+    return s.drive_radius_m * np.abs(np.diff(theta, prepend=theta[0])).cumsum()
+
+
+def _reading(channel: str) -> Callable[[Sensing], NDArray]:
+    return lambda s: s.channels[channel]
+
+
+def _log_speed(s: Sensing) -> NDArray:
+    return np.log10(np.maximum(s.drive_radius_m * np.abs(_velocity_of(THETA_IN)(s)), SLOWEST_M_PER_S))
+
+
+TIME = Argument("time", "s", "the time since the recording's start", lambda s: s.time_s - s.time_s[0])
+TRAVEL = Argument("travel", "m", "the drive's travel since the recording's start", _travel)
+LOG_SPEED = Argument("speed", "log10(m/s)", "the logarithm of the cables' speed at the drive", _log_speed)
+DWELL = Argument("dwell", "log10(s)", "the logarithm of the contacts' age", _age)
+
+
+def _of_motion(angle: str, end: str) -> dict[str, Argument]:
+    """Arguments of the motion of one pulley."""
+    return {
+        "angle": Argument(f"{end}-angle", "rad", f"the {end} pulley's angle", _reading(angle)),
+        "speed": Argument("speed", "rad/s", f"the {end} pulley's velocity", _velocity_of(angle)),
+        "direction": Argument("direction", "1", f"the direction of the {end}'s motion", _direction_of(angle), True),
+        "since": Argument(
+            "distance-since-reversal",
+            "m",
+            f"the distance of the {end}'s motion since its last reversal",
+            _since_reversal_of(angle),
+        ),
+    }
+
+
+def _laws() -> Iterator[Law]:
+    drive, load = _of_motion(THETA_IN, "drive"), _of_motion(THETA_OUT, "load")
+    towards = replace(drive["direction"], meaning="the direction in which the cable slides")
+    for argument in (towards, LOG_SPEED, DWELL, drive["since"], TRAVEL, TIME, drive["angle"]):
+        yield Law(SLIDING_FRICTION, "conduit", argument)
+    for slot, place, channel, motion, angle in (
+        (BEARING_TORQUE, "drive-pulley", TAU_IN, drive, THETA_IN),
+        (LOAD, "load", TAU_OUT, load, THETA_OUT),
+    ):
+        yield Law(slot, place, motion["angle"], channel)
+        yield Law(slot, place, motion["speed"], channel)
+        yield Law(slot, place, motion["since"], channel, opposes=angle)
+    for channel in (TAU_IN, TAU_OUT, F_DRIVE, F_LOAD, THETA_OUT):
+        reading = Argument("reading", unit_of(channel), f"the reading of {symbol_of(channel)}", _reading(channel))
+        place = next(p for p in PLACES_OF[channel] if p.endswith("-sensor"))
+        for argument in (reading, TIME):
+            yield Law(SENSOR_MAP, place, argument, channel)
+
+
+@cache
+def laws() -> dict[str, Law]:
+    """All laws by name, each at first coarse and then fine."""
+    every = [one for law in _laws() for one in (law, law.finer()) if one is not None]
+    return {law.name: law for law in every}
