@@ -197,6 +197,11 @@ class Comparison:
         return self.left_by(best) == 0.0
 
     @property
+    def is_decided(self) -> bool:
+        """Whether the calibrated model or one candidate is complete with a probability of `SURE`."""
+        return max(self.probability_of_base, *self.probability, 0.0) >= settings.SURE
+
+    @property
     def most_probable(self) -> CandidateFit:
         """The candidate that is most probably complete; the calibrated model if there are no candidates."""
         complete = self.log_posterior[1:, 0]

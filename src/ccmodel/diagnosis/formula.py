@@ -5,35 +5,34 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import minimize_scalar
 from scipy.stats import norm as normal
 
 from ccmodel.inference.intervals import COVERAGE
 from ccmodel.mechanisms.learned import Law
 
-# Starting values of a length or a period, as shares of the range of the argument.
-STARTS = (0.05, 0.1, 0.2, 0.4, 0.8)
+# Lengths and periods that are tried first: so many, from twice the distance of the knots to twice the range.
+TRIED = 40
 # Share of the knots at which a formula must lie in the band.
 IN_BAND = 0.9
 
 
 @dataclass(frozen=True)
 class Form:
-    """A formula with unknown constants.
+    """A formula: a sum of terms with a factor each, and perhaps a length.
 
     Attributes
     ----------
     text : str
-    value : callable
-        ``value(x, *constants)``.
+    terms : callable
+        ``terms(x, length)``: each term without its factor.
     names, units : tuple of str
-        Of the constants; "y" is the unit of the curve, "x" that of its argument.
+        Of the factors, and then of the length; "y" is the unit of the curve, "x" that of its argument.
     has_length : bool
-        Whether the last constant is a length or a period.
     """
 
     text: str
-    value: Callable[..., NDArray]
+    terms: Callable[[NDArray, float], tuple[NDArray, ...]]
     names: tuple[str, ...]
     units: tuple[str, ...]
     has_length: bool = False
@@ -42,19 +41,18 @@ class Form:
 def _forms(law: Law) -> Iterator[Form]:
     """Formulas from short to long."""
     if law.argument.has_two_values:
-        yield Form("1 + a sign(v)" if law.channel is None else "a sign(v)", lambda x, a: a * x, ("a",), ("y",))
+        yield Form("1 + a sign(v)" if law.channel is None else "a sign(v)", lambda x, _: (x,), ("a",), ("y",))
         return
-    yield Form("a + b x", lambda x, a, b: a + b * x, ("a", "b"), ("y", "y/x"))
-    yield Form("a + b x^2", lambda x, a, b: a + b * x**2, ("a", "b"), ("y", "y/x^2"))
-    yield Form("a x + b x^3", lambda x, a, b: a * x + b * x**3, ("a", "b"), ("y/x", "y/x^3"))
-    yield Form(
-        "a + b exp(-x/c)", lambda x, a, b, c: a + b * np.exp(-x / c), ("a", "b", "c"), ("y", "y", "x"), has_length=True
-    )
-    yield Form("a + b tanh(x/c)", lambda x, a, b, c: a + b * np.tanh(x / c), ("a", "b", "c"), ("y", "y", "x"), True)
-    yield Form("a + b x + c x^2", lambda x, a, b, c: a + b * x + c * x**2, ("a", "b", "c"), ("y", "y/x", "y/x^2"))
+    yield Form("a + b x", lambda x, _: (x**0, x), ("a", "b"), ("y", "y/x"))
+    yield Form("a + b x^2", lambda x, _: (x**0, x**2), ("a", "b"), ("y", "y/x^2"))
+    yield Form("a x + b x^3", lambda x, _: (x, x**3), ("a", "b"), ("y/x", "y/x^3"))
+    abc, yyx = ("a", "b", "c"), ("y", "y", "x")
+    yield Form("a + b exp(-x/c)", lambda x, c: (x**0, np.exp(-x / c)), abc, yyx, True)
+    yield Form("a + b tanh(x/c)", lambda x, c: (x**0, np.tanh(x / c)), abc, yyx, True)
+    yield Form("a + b x + c x^2", lambda x, _: (x**0, x, x**2), abc, ("y", "y/x", "y/x^2"))
     yield Form(
         "a + b cos(2 pi x/p) + c sin(2 pi x/p)",
-        lambda x, a, b, c, p: a + b * np.cos(2 * np.pi * x / p) + c * np.sin(2 * np.pi * x / p),
+        lambda x, p: (x**0, np.cos(2 * np.pi * x / p), np.sin(2 * np.pi * x / p)),
         ("a", "b", "c", "p"),
         ("y", "y", "y", "x"),
         True,
@@ -78,35 +76,45 @@ def shortest(
     neutral = 1.0 if law.argument.has_two_values and law.channel is None else 0.0
     sd = np.maximum((band[1] - band[0]) / (2 * quantile), 1e-3 * max(float(np.ptp(y)), 1e-12))
     for form in _forms(law):
-        if len(form.names) >= len(x) and len(x) > 2:
+        constants, errors, derivatives = _fitted(form, x, y - neutral, sd)
+        if np.mean(np.abs(errors) <= quantile) < IN_BAND:
             continue
-        found = min(_fits(form, x, y - neutral, sd), key=lambda solution: solution.cost)
-        if np.mean(np.abs(found.fun) <= quantile) < IN_BAND:
-            continue
-        covariance = np.linalg.pinv(found.jac.T @ found.jac)
-        reach = quantile * np.sqrt(np.diag(covariance).clip(0.0))
+        size = np.linalg.norm(derivatives, axis=0)
+        scaled = derivatives / size
+        reach = quantile * np.sqrt(np.diag(np.linalg.pinv(scaled.T @ scaled))) / size
         units = [_unit(unit, law) for unit in form.units]
         return form.text, [
             {"name": name, "value": float(v), "low": float(v - r), "high": float(v + r), "unit": unit}
-            for name, v, r, unit in zip(form.names, found.x, reach, units, strict=True)
+            for name, v, r, unit in zip(form.names, constants, reach, units, strict=True)
         ]
     return None, []
 
 
-def _fits(form: Form, x: NDArray, y: NDArray, sd: NDArray) -> Iterator:
-    """Least squares fits from every starting value."""
+def _fitted(form: Form, x: NDArray, y: NDArray, sd: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Constants of a formula by least squares, its errors over their standard deviation, and their derivatives."""
+
+    def linear(length: float) -> tuple[NDArray, NDArray]:
+        weighted = np.stack(form.terms(x, length), axis=1) / sd[:, None]
+        # A term of another size than the rest would be dropped as if it were dependent on them.
+        size = np.linalg.norm(weighted, axis=0)
+        factors = np.linalg.lstsq(weighted / size, y / sd, rcond=None)[0] / size
+        return factors, weighted @ factors - y / sd
+
+    if not form.has_length:
+        factors, errors = linear(1.0)
+        return factors, errors, np.stack(form.terms(x, 1.0), axis=1) / sd[:, None]
     span = float(np.ptp(x)) or 1.0
-    for share in STARTS if form.has_length else (None,):
-        start = np.full(len(form.names), 0.1 * float(np.ptp(y)) or 1e-6)
-        if share is not None:
-            start[-1] = share * span
-        scale = np.maximum(np.abs(start), 1e-12)
-
-        def errors(constants: NDArray) -> NDArray:
-            return np.nan_to_num((form.value(x, *constants) - y) / sd, posinf=1e9, neginf=-1e9)
-
-        with np.errstate(all="ignore"):
-            yield least_squares(errors, start, x_scale=scale)
+    tried = np.geomspace(2 * span / (len(x) - 1), 2 * span, TRIED).tolist()
+    start = min(tried, key=lambda length: float(np.sum(linear(length)[1] ** 2)))
+    refined = minimize_scalar(
+        lambda length: float(np.sum(linear(length)[1] ** 2)), bounds=(0.8 * start, 1.25 * start), method="bounded"
+    ).x
+    factors, errors = linear(refined)
+    step = 1e-4 * refined
+    higher, lower = (np.stack(form.terms(x, refined + s), axis=1) @ factors for s in (step, -step))
+    by_length = (higher - lower) / (2 * step) / sd
+    terms = np.stack(form.terms(x, refined), axis=1) / sd[:, None]
+    return np.append(factors, refined), errors, np.column_stack([terms, by_length])
 
 
 def _unit(unit: str, law: Law) -> str:

@@ -121,6 +121,6 @@ def _evidence(discrepancy: Discrepancy, candidate: CandidateFit) -> float:
     return float(discrepancy.log_evidence(candidate, [0.0], dict.fromkeys(discrepancy.channels, 1.0))[0])
 
 
-def coarse_laws() -> list[Law]:
-    """Every law with the fewest knots."""
-    return [law for law in laws().values() if law.resolution == COARSE]
+def first_laws() -> list[Law]:
+    """The laws that are tried first: every one with few knots, and those of an angle, which may repeat, with many."""
+    return [law for law in laws().values() if law.resolution == COARSE or law.argument.unit == "rad"]

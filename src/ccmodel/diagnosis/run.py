@@ -13,7 +13,7 @@ from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.calibration import TestedModel, tested_model
 from ccmodel.diagnosis.candidate import CandidateFit, fit
 from ccmodel.diagnosis.hypothesis import single_mechanisms, stated_hypothesis
-from ccmodel.diagnosis.laws import coarse_laws
+from ccmodel.diagnosis.laws import first_laws
 from ccmodel.diagnosis.observations import NotJudged, observations_of
 from ccmodel.diagnosis.repeatability import estimated
 from ccmodel.diagnosis.result import report
@@ -202,7 +202,7 @@ def diagnose(
     mechanisms = single_mechanisms(options.without, tested.hypothesis)
     forced = [stated_hypothesis(stated) for stated in options.forced_candidates]
     of_selection = within(progress, CALIBRATED, SELECTED)
-    selection = Selection(tested.free, mechanisms, forced, coarse_laws(), of_selection, deadline)
+    selection = Selection(tested.free, mechanisms, forced, first_laws(), of_selection, deadline)
     comparison, scores = selection.run(whitened, found.fit)
     if deadline.has_passed:
         why = f"the time limit of {options.time_limit_s:g} s was reached before all of them were fitted"

@@ -75,7 +75,7 @@ class Selection:
             if found.is_enough or self.deadline.has_passed:
                 break
             found = part._part(RELINEARISED, 1.0).extended(found, screening, size)
-            if self.laws and size == settings.LEARN_AFTER and found.unlisted > settings.LEARN_ABOVE:
+            if self.laws and size == settings.LEARN_AFTER and not found.is_decided:
                 found = part.learn(found)
                 if law_of(found.leading[0].hypothesis) is not None:
                     break
@@ -97,10 +97,11 @@ class Selection:
             leading = proposals(base, discrepancy, every, self.deadline)[:most]
             return self.fit_all(found.whitened, base, [Score(p.hypothesis, 0.0, p.values) for p in leading])
 
-        coarse = sorted(fitted(self.laws, settings.LAWS_FITTED), key=lambda c: c.mean_square)
-        found_first = [law_of(c.hypothesis) for c in coarse[: settings.LAWS_REFINED]]
-        finer = [finer for law in found_first if law is not None and (finer := law.finer()) is not None]
-        learned = coarse + fitted(finer, settings.LAWS_REFINED)
+        first = sorted(fitted(self.laws, settings.LAWS_FITTED), key=lambda c: c.mean_square)
+        found_first = [law_of(c.hypothesis) for c in first[: settings.LAWS_REFINED]]
+        tried = {law.name for law in found_first if law is not None}
+        finer = [law.finer() for law in found_first if law is not None]
+        learned = first + fitted([f for f in finer if f is not None and f.name not in tried], settings.LAWS_REFINED)
         found = found.with_candidates([*found.candidates, *learned])
         return self.relinearise(found) if found.candidates else found
 

@@ -232,6 +232,5 @@ LAW_SCALES = 0.003, 0.01, 0.03, 0.1, 0.3
 LAW_STEP = 0.01
 # Laws that are fitted, the leading ones to first order; and of these, how many are also fitted with more knots.
 LAWS_FITTED, LAWS_REFINED = 8, 2
-# Laws are learned after sets of so many listed mechanisms, where something that no candidate describes has this
-# probability at least.
-LEARN_AFTER, LEARN_ABOVE = 2, 0.2
+# Laws are learned after sets of so many listed mechanisms, where these do not decide.
+LEARN_AFTER = 2

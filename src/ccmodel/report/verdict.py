@@ -116,17 +116,21 @@ IN_SLOT = {
 
 
 def law_sentence(diagnosis: Mapping) -> str:
-    """What a learned law says, and that it is on no list."""
-    law = diagnosis["laws"][0]
+    """What a learned law says, that it is on no list, and what acts beside it."""
+    beside = f" Beside it: {_with_confidence(diagnosis['mechanisms'])}." if diagnosis["mechanisms"] else ""
+    return f"{law_claim(diagnosis['laws'][0])}{beside}"
+
+
+def law_claim(law: Mapping) -> str:
+    """What a learned law says, with its confidence."""
     what = IN_SLOT[law["slot"]]
     if law["slot"] == "sensor-map":
         channel = next(c for c in TABLE.values() if c.name == law["channel"])
         what = f"The error of {channel.symbol}"
     others = f" (or on {' or '.join(law['indistinguishable'])})" if law["indistinguishable"] else ""
-    beside = f" Beside it: {_with_confidence(diagnosis['mechanisms'])}." if diagnosis["mechanisms"] else ""
     return (
         f"{what} depends on {law['argument_is']}{others}, confidence {law['confidence']:.2f}. No listed mechanism does"
-        f" this; the law was learned from the recordings.{beside}"
+        " this; the law was learned from the recordings."
     )
 
 

@@ -28,6 +28,7 @@ from ccmodel.report.verdict import (
     NOT_ACCEPTED,
     SYMBOL,
     headline,
+    law_claim,
     nearest_sentence,
     place_in_words,
     possible_places,
@@ -78,6 +79,8 @@ def write_diagnosis(file: Path, found: Diagnosis, page: str | None = None) -> No
             unlisted=found.judgement.comparison.unlisted,
             mechanisms=[catalogue.parts(name) for name in sorted({m["name"] for m in named})],
             summaries={name: registry.get(name) for name in registry.names()},
+            law_sentences=[law_claim(law) for law in report["laws"]],
+            law_figures=[_encoded(_law(law, found)) for law in report["laws"]],
             map=_encoded(_map(found)),
             map_in_words=_map_in_words(errors),
             caution=_caution(report, errors),
@@ -260,6 +263,25 @@ def _loops(found: Diagnosis) -> Figure:
         ax.set_xlabel(TABLE[THETA_IN].axis)
     axes[0][0].set_ylabel(TABLE[channel].axis)
     legend_below(figure, axes[:, :1])
+    stamp_figure(figure, _stamp(found))
+    return figure
+
+
+def _law(law: Mapping, found: Diagnosis) -> Figure:
+    """The curve of a learned law with its 90 % band."""
+    x, y, low, high = np.array(law["curve"]).T
+    figure, axes = subplots(1, 1, figsize=(5.2, 3.1), squeeze=False)
+    ax = axes[0][0]
+    if registry.laws()[law["name"]].argument.has_two_values:
+        ax.errorbar(x, y, [y - low, high - y], fmt="o", color=COLOURS[1], capsize=4, label="learned law, 90 % interval")
+        ax.set_xlim(x[0] - 0.5, x[1] + 0.5)
+    else:
+        ax.fill_between(x, low, high, color=COLOURS[1], alpha=0.25, lw=0, label="90 % band")
+        ax.plot(x, y, color=COLOURS[1], lw=1.4, label="learned law")
+    ax.axhline(1.0 if law["channel"] is None else 0.0, color=FAINT, lw=1.0, ls="--", label="calibrated model")
+    ax.set_xlabel(f"{law['argument_is']} ({law['argument_unit']})")
+    ax.set_ylabel(law["curve_is"])
+    legend_below(figure, axes)
     stamp_figure(figure, _stamp(found))
     return figure
 

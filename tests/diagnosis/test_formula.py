@@ -1,0 +1,51 @@
+"""The shortest formula in the band of a curve."""
+
+import numpy as np
+import pytest
+
+from ccmodel.diagnosis.formula import shortest
+from ccmodel.mechanisms import laws
+
+FRICTION = laws()["learned-sliding-friction-by-drive-angle"]
+DIRECTION = laws()["learned-sliding-friction-by-direction"]
+X = np.linspace(-0.6, 0.6, 25)
+
+
+def formula_of(y, sd=0.003, law=FRICTION, x=X):
+    return shortest(x, y, (y - 1.645 * sd, y + 1.645 * sd), law)
+
+
+@pytest.mark.parametrize(
+    ("y", "text", "last"),
+    [
+        (1 + 0.2 * X, "a + b x", 0.2),
+        (1 + 0.3 * X**2, "a + b x^2", 0.3),
+        (0.9 + 0.2 * np.exp(-(X + 0.0) / 0.3), "a + b exp(-x/c)", 0.3),
+        (1 + 0.2 * np.tanh(X / 0.1), "a + b tanh(x/c)", 0.1),
+        (1 + 0.2 * np.sin(2 * np.pi * X / 0.5), "a + b cos(2 pi x/p) + c sin(2 pi x/p)", 0.5),
+    ],
+)
+def test_a_curve_is_given_its_own_formula_with_its_constants(y, text, last):
+    found, parameters = formula_of(y)
+    assert found == text
+    assert parameters[-1]["value"] == pytest.approx(last, rel=0.03)
+    assert parameters[-1]["low"] < last < parameters[-1]["high"]
+
+
+def test_a_wider_band_has_a_shorter_formula():
+    y = 1 + 0.02 * X + 0.01 * np.sin(2 * np.pi * X / 0.5)
+    assert formula_of(y, sd=0.05)[0] == "a + b x"
+    assert formula_of(y, sd=0.001)[0] != "a + b x"
+
+
+def test_a_curve_that_no_formula_meets_has_none():
+    y = np.random.default_rng(2).standard_normal(X.size)
+    assert formula_of(y, sd=1e-3) == (None, [])
+
+
+def test_friction_by_direction_has_one_constant():
+    x, y = np.array([-1.0, 1.0]), np.array([0.88, 1.12])
+    found, (a,) = formula_of(y, law=DIRECTION, x=x)
+    assert found == "1 + a sign(v)"
+    assert a["value"] == pytest.approx(0.12)
+    assert a["unit"] == "1"

@@ -1,0 +1,71 @@
+"""A law that is on no list is found from recordings: its slot, its argument and its curve."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from builders import spoil, write_batch
+from ccmodel import cli
+from ccmodel.model.files import read_model_file
+
+K_TORQUE = 0.0234
+COGGING_NM, PERIOD_RAD = 2e-3, 0.4
+
+
+def cogging(table):
+    """A motor that pulls to the next of its poles, which no listed mechanism does."""
+    theta = 0.6 * np.sin(2 * np.pi * np.maximum(table["time_s"].to_numpy() - 0.5, 0))
+    table["drive_current_A"] += COGGING_NM * np.sin(2 * np.pi * theta / PERIOD_RAD) / K_TORQUE
+    return table
+
+
+@pytest.fixture(scope="module")
+def learned(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("raw")
+    batch = spoil(write_batch(folder / "cogging", pretensions=(7.0, 6.0, 5.0)), cogging)
+    done = CliRunner().invoke(cli.app, ["diagnose", str(batch), "--out", str(folder / "out")])
+    assert done.exit_code == 0, done.output
+    return batch, folder / "out"
+
+
+def test_the_law_is_named_by_its_slot_and_argument(learned):
+    said = json.loads((learned[1] / "diagnosis.json").read_text())
+    assert said["verdict"] == "learned"
+    assert said["mechanisms"] == [], "nothing that is listed acts"
+    (law,) = said["laws"]
+    assert (law["slot"], law["place"], law["arguments"]) == ("bearing-torque", "drive-pulley", ["drive-angle"])
+    assert law["confidence"] > 0.8
+    assert "The torque at the drive pulley depends on the drive pulley's angle" in said["headline"]
+
+
+def test_its_curve_is_the_true_one_up_to_what_a_calibration_absorbs(learned):
+    (law,) = json.loads((learned[1] / "diagnosis.json").read_text())["laws"]
+    x, y = np.array(law["curve"]).T[:2]
+    true = COGGING_NM * np.sin(2 * np.pi * x / PERIOD_RAD)
+    # What it adds on average, and in proportion to the angle, belongs to the calibration.
+    absorbed = np.polyval(np.polyfit(x, y - true, 1), x)
+    assert np.abs(y - true - absorbed).max() < 0.25 * COGGING_NM
+    assert law["formula"] == "a + b cos(2 pi x/p) + c sin(2 pi x/p)"
+    assert law["parameters"][-1]["value"] == pytest.approx(PERIOD_RAD, rel=0.03)
+
+
+def test_the_error_falls_and_the_model_file_has_the_law(learned, tmp_path):
+    batch, out = learned
+    error = json.loads((out / "diagnosis.json").read_text())["fit"]["error"]["tau_in"]
+    assert error["before"] > 4 * error["after"]
+    model = read_model_file(out / "model.json")
+    assert [m.name for m in model.parameters.mechanisms] == ["learned-bearing-torque-by-drive-angle-fine"]
+    done = CliRunner().invoke(
+        cli.app, ["predict", str(batch), "--model", str(out / "model.json"), "--out", str(tmp_path / "p")]
+    )
+    assert done.exit_code == 0, done.output
+    assert pd.read_csv(next((tmp_path / "p").glob("*.csv")))["tau_in_Nm"].abs().max() > 0
+
+
+def test_the_page_shows_the_curve(learned):
+    page = (learned[1] / "report.html").read_text()
+    assert "a law on no list" in page
+    assert "The learned law: added to" in page
