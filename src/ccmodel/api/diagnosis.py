@@ -45,7 +45,7 @@ class Diagnosis:
 
     @property
     def verdict(self) -> str:
-        """One of ``agrees``, ``explained``, ``undecided``, ``unexplained`` and ``inputs-inconsistent``."""
+        """One of ``agrees``, ``explained``, ``learned``, ``undecided``, ``unexplained`` and ``inputs-inconsistent``."""
         return self.report["verdict"]
 
     @property

@@ -56,7 +56,7 @@ unit is a value beside it (`unit`). A value that there is not is `null`. `out` i
 | `fit` | the model file: `format`, `parameters` (by name, which ends with the unit), `mechanisms`, `rig`, `intervals` (90 %, by parameter `low`, `high`, `sd`), `provenance`; `fit`: `succeeded`, `message`, `mean_square`, `recordings`, `at_bound`; `out`, `warnings`, `notes`, `left_out` |
 | `simulate` | `out`, `recording`, `samples`, `pretension_N` |
 | `predict` | `out`; `errors`: a list with a row for each recording and channel, as in the table of errors of a run; `left_out` |
-| `diagnose` | [diagnosis.json](diagnosis.md): `format`, `batch`, `batches` (of several), `verdict`, `is_held`, `location`, `mechanisms`, `alternatives`, `likeliest`, `nearest`, `fit`, `repeatability`, `next_experiment`, `not_judged`, `headline`, `provenance`; `out` |
+| `diagnose` | [diagnosis.json](diagnosis.md): `format`, `batch`, `batches` (of several), `verdict`, `is_held`, `location`, `mechanisms`, `laws`, `alternatives`, `likeliest`, `nearest`, `fit`, `repeatability`, `next_experiment`, `not_judged`, `headline`, `provenance`; `out` |
 | `check` of `accuracy` | `summary`, `lost`, `gained`, `not_compared` |
 | `accept` of `accuracy` | `baseline`, `history`, `batches` |
 | `history` of `accuracy` | `history`: a list of its rows; `left_out` |
