@@ -46,8 +46,15 @@ from ccmodel.typed import TypedModel
 Values = Callable[[ChannelAccuracy], Sequence[float | None]]
 
 # From the one that determines least; `agrees`, `explained` and `learned` determine all.
-VERDICTS = {"not diagnosed": 0, "inputs-inconsistent": 0, "unexplained": 1, "undecided": 2}
-VERDICTS |= {"learned": 3, "explained": 3, "agrees": 3}
+VERDICTS = {
+    "not diagnosed": 0,
+    "inputs-inconsistent": 0,
+    "unexplained": 1,
+    "undecided": 2,
+    "learned": 3,
+    "explained": 3,
+    "agrees": 3,
+}
 LOST, GAINED, KEPT, UNKNOWN = "lost", "gained", "kept", "not judged"
 # Share of the compared time of a recording that may be missing.
 SHORTER = 0.1

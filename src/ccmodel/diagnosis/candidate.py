@@ -12,7 +12,7 @@ from scipy.stats import t as student
 from ccmodel import mechanisms as registry
 from ccmodel.deadline import UNLIMITED, Deadline
 from ccmodel.diagnosis import settings
-from ccmodel.diagnosis.hypothesis import Hypothesis, coefficients_of, plausible
+from ccmodel.diagnosis.hypothesis import Hypothesis, plausible
 from ccmodel.diagnosis.whitening import Whitened, with_states_of
 from ccmodel.failure import ModelError
 from ccmodel.inference.cross_validation import inverse_of, leave_one_out
@@ -170,10 +170,7 @@ def fit(
         If the deadline has passed.
     """
     unknowns = {n: replace(f, start=start[n]) for n, f in free.items()} | hypothesis.free(start)
-    unknowns |= _state_means(whitened, hypothesis, unknowns)
-    of_laws = coefficients_of(hypothesis).items()
-    in_cost = [w.observations for w in whitened]
-    unknowns |= {key: replace(unknowns[key], spread=prior_spread(sd, in_cost)) for key, sd in of_laws}
+    unknowns |= _with_priors(whitened, hypothesis, unknowns)
     modelled = _with_states(whitened, hypothesis, {n: f.start for n, f in unknowns.items()})
     problem = Problem(modelled, unknowns, weight=mean_weight)
     search = replace(SEARCH, deadline=deadline)
@@ -214,17 +211,18 @@ def fit(
     )
 
 
-def _state_means(whitened: Sequence[Whitened], hypothesis: Hypothesis, unknowns: Mapping[str, Free]) -> dict[str, Free]:
-    """The states' means as unknowns, with the prior that a single recording's state has too.
+def _with_priors(whitened: Sequence[Whitened], hypothesis: Hypothesis, unknowns: Mapping[str, Free]) -> dict[str, Free]:
+    """The unknowns of mechanisms that have a prior: the states' means, and the coefficients of laws.
 
-    Where little of a mechanism shows, its strength and its state are nearly one unknown, which the prior divides.
+    A state's mean has the prior that a single recording's state has too: where little of a mechanism shows, its
+    strength and its state are nearly one unknown, which the prior divides.
     """
     observations = [w.observations for w in whitened]
     return {
-        key: replace(unknowns[key], mean=p.start, spread=prior_spread(p.spread, observations))
+        key: replace(unknowns[key], mean=p.start, spread=prior_spread(p.spread or p.prior_sd, observations))
         for name, place in hypothesis.baseline + hypothesis.acting
-        for p in registry.get(name).states
-        if (key := mechanism_key(name, place, p.name)) in unknowns
+        for p in registry.get(name).parameters
+        if (p.spread or p.prior_sd) and (key := mechanism_key(name, place, p.name)) in unknowns
     }
 
 

@@ -119,6 +119,6 @@ def _fitted(form: Form, x: NDArray, y: NDArray, sd: NDArray) -> tuple[NDArray, N
 
 def _unit(unit: str, law: Law) -> str:
     of_argument = law.argument.unit.replace(" ", "*")
-    by_x = {"x": of_argument, "y": law.unit, "y/x": f"{law.unit}/({of_argument})"}
-    found = by_x.get(unit, unit.replace("y/x", f"{law.unit}/({of_argument})"))
+    alone = {"x": of_argument, "y": law.unit}
+    found = alone.get(unit, unit.replace("y/x", f"{law.unit}/({of_argument})"))
     return found.replace(" ", "*")

@@ -81,7 +81,7 @@ class Hypothesis:
     def free(self, start: Mapping[str, float]) -> dict[str, Free]:
         """The mechanisms' parameters as unknowns, from `start`."""
         unknowns = self._unknowns()
-        return {key: _free(start[key], parameter, strength) for key, parameter, strength in unknowns}
+        return {key: Free.within(start[key], *_bounds(parameter, strength)) for key, parameter, strength in unknowns}
 
     @property
     def continuation(self) -> list[str]:
@@ -159,12 +159,6 @@ def _is_plausible(strength: Parameter, value: float) -> bool:
     else:
         low, high = min(low, 0.0), max(high, 0.0)
     return low <= value <= high
-
-
-def _free(start: float, parameter: Parameter, is_strength: bool) -> Free:
-    """A mechanism's parameter as an unknown of a fit."""
-    free = Free.within(start, *_bounds(parameter, is_strength))
-    return replace(free, mean=parameter.neutral, spread=parameter.prior_sd) if parameter.prior_sd else free
 
 
 def _bounds(parameter: Parameter, is_strength: bool) -> tuple[float, float]:

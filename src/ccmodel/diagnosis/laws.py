@@ -66,7 +66,7 @@ def _motion(base: CandidateFit, i: int) -> Sensing:
     """What the arguments of laws are read from, as the fitted model simulates a recording."""
     o = base.whitened[i].observations
     simulated = simulate(o.given, base.model(o.parameters))
-    channels = {c: simulated[c] for c in (*o.channels,)} | {THETA_IN: o.given.theta_in}
+    channels = {c: simulated[c] for c in o.channels} | {THETA_IN: o.given.theta_in}
     return Sensing(o.given.recording.time_s, channels, o.parameters.drive_radius_m, o.parameters.load_radius_m)
 
 
@@ -90,9 +90,8 @@ def _proposed(
     for share in settings.LAW_SCALES:
         one = hypothesis(share * unit)
         linear = _extended(base, base.hypothesis.and_also(one), [J * share / settings.LAW_STEP for J in columns])
-        names = [name for name in linear.values if name not in base.values]
-        x = discrepancy.most_probable(linear)
-        yield Proposal(one, _evidence(discrepancy, linear) - nothing, dict(zip(names, x[-len(names) :], strict=True)))
+        x = dict(zip(linear.values, discrepancy.most_probable(linear).tolist(), strict=True))
+        yield Proposal(one, _evidence(discrepancy, linear) - nothing, {name: x[name] for name in one.start})
 
 
 def _sensitivities(base: CandidateFit, hypothesis: Hypothesis, law: Law) -> list[NDArray]:

@@ -99,10 +99,10 @@ def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
     found = Judgement("agrees", comparison.base, comparison, candidates, probability[order].tolist(), scores)
     if comparison.probability_of_base > 0.5:
         return found
-    by_law = [(c, law) for c in comparison.leading if (law := law_of(c.hypothesis)) is not None]
-    for candidate, law in by_law[:1]:
-        if found.confidence_in_slot(law) > 0.5:
-            return replace(found, verdict="learned", best=candidate)
+    by_law = ((c, law) for c in comparison.leading if (law := law_of(c.hypothesis)) is not None)
+    candidate, law = next(by_law, (None, None))
+    if candidate is not None and law is not None and found.confidence_in_slot(law) > 0.5:
+        return replace(found, verdict="learned", best=candidate)
     listed = [c for c in candidates if law_of(c.hypothesis) is None]
     if comparison.most_probable in listed and _is_explained(found, comparison.most_probable):
         return replace(found, verdict="explained", best=comparison.most_probable)

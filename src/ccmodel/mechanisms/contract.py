@@ -20,7 +20,10 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
+
+from ccmodel.channels import THETA_IN
 
 PLACES = (
     "drive-pulley",
@@ -152,6 +155,12 @@ class Sensing:
     channels: Mapping[str, NDArray]
     drive_radius_m: float
     load_radius_m: float
+
+    @property
+    def drive_travel_m(self) -> NDArray:
+        """Travel of the cable at the drive since the start, shape (n,)."""
+        theta = self.channels[THETA_IN]
+        return self.drive_radius_m * np.abs(np.diff(theta, prepend=theta[0])).cumsum()
 
 
 @dataclass(frozen=True, kw_only=True)

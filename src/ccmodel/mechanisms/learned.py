@@ -300,8 +300,8 @@ def _velocity_of(angle: str) -> Callable[[Sensing], NDArray]:
     return lambda s: np.gradient(s.channels[angle], s.time_s) if s.time_s.size > 1 else np.zeros(1)
 
 
-def _direction_of(angle: str) -> Callable[[Sensing], NDArray]:
-    return lambda s: _motion_memory(s.channels[angle], REVERSAL_RAD)[0]
+def _direction(s: Sensing) -> NDArray:
+    return _motion_memory(s.channels[THETA_IN], REVERSAL_RAD)[0]
 
 
 def _since_reversal_of(angle: str) -> Callable[[Sensing], NDArray]:
@@ -314,11 +314,6 @@ def _age(s: Sensing) -> NDArray:
     return np.log10(np.maximum(age, SHORTEST_S))
 
 
-def _travel(s: Sensing) -> NDArray:
-    theta = s.channels[THETA_IN]
-    return s.drive_radius_m * np.abs(np.diff(theta, prepend=theta[0])).cumsum()
-
-
 def _reading(channel: str) -> Callable[[Sensing], NDArray]:
     return lambda s: s.channels[channel]
 
@@ -327,8 +322,9 @@ def _log_speed(s: Sensing) -> NDArray:
     return np.log10(np.maximum(s.drive_radius_m * np.abs(_velocity_of(THETA_IN)(s)), SLOWEST_M_PER_S))
 
 
+DIRECTION = Argument("direction", "1", "the direction in which the cable slides", _direction, True)
 TIME = Argument("time", "s", "the time since the recording's start", lambda s: s.time_s - s.time_s[0])
-TRAVEL = Argument("travel", "m", "the drive's travel since the recording's start", _travel)
+TRAVEL = Argument("travel", "m", "the drive's travel since the recording's start", lambda s: s.drive_travel_m)
 LOG_SPEED = Argument("speed", "log10(m/s)", "the logarithm of the cables' speed at the drive", _log_speed)
 DWELL = Argument("dwell", "log10(s)", "the logarithm of the contacts' age", _age)
 
@@ -338,7 +334,6 @@ def _of_motion(angle: str, end: str) -> dict[str, Argument]:
     return {
         "angle": Argument(f"{end}-angle", "rad", f"the {end} pulley's angle", _reading(angle)),
         "speed": Argument("speed", "rad/s", f"the {end} pulley's velocity", _velocity_of(angle)),
-        "direction": Argument("direction", "1", f"the direction of the {end}'s motion", _direction_of(angle), True),
         "since": Argument(
             "distance-since-reversal",
             "m",
@@ -350,8 +345,7 @@ def _of_motion(angle: str, end: str) -> dict[str, Argument]:
 
 def _laws() -> Iterator[Law]:
     drive, load = _of_motion(THETA_IN, "drive"), _of_motion(THETA_OUT, "load")
-    towards = replace(drive["direction"], meaning="the direction in which the cable slides")
-    for argument in (towards, LOG_SPEED, DWELL, drive["since"], TRAVEL, TIME, drive["angle"]):
+    for argument in (DIRECTION, LOG_SPEED, DWELL, drive["since"], TRAVEL, TIME, drive["angle"]):
         yield Law(SLIDING_FRICTION, "conduit", argument)
     for slot, place, channel, motion, angle in (
         (BEARING_TORQUE, "drive-pulley", TAU_IN, drive, THETA_IN),

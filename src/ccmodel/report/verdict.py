@@ -5,9 +5,10 @@ from collections.abc import Mapping, Sequence
 from math import floor, log10
 
 from ccmodel import mechanisms as registry
-from ccmodel.channels import TABLE
+from ccmodel.channels import TABLE, symbol_of
 from ccmodel.diagnosis.settings import SURE
 from ccmodel.mechanisms.contract import side
+from ccmodel.mechanisms.learned import BEARING_TORQUE, LOAD, SENSOR_MAP, SLIDING_FRICTION
 
 # By the short names of diagnosis.json.
 SYMBOL = {channel.short_name: channel.symbol for channel in TABLE.values()}
@@ -106,12 +107,11 @@ def headline(diagnosis: Mapping) -> str:
     return f"{text} With this in the model, the held-out error of {SYMBOL[worst]} {fall}."
 
 
-# What has a law of each slot.
+# What has a law of each slot; that of a sensor is named by its channel.
 IN_SLOT = {
-    "sliding-friction": "Friction along the conduits",
-    "bearing-torque": "The torque at the drive pulley",
-    "load": "The load's torque",
-    "sensor-map": "The error of a sensor",
+    SLIDING_FRICTION: "Friction along the conduits",
+    BEARING_TORQUE: "The torque at the drive pulley",
+    LOAD: "The load's torque",
 }
 
 
@@ -123,10 +123,7 @@ def law_sentence(diagnosis: Mapping) -> str:
 
 def law_claim(law: Mapping) -> str:
     """What a learned law says, with its confidence."""
-    what = IN_SLOT[law["slot"]]
-    if law["slot"] == "sensor-map":
-        channel = next(c for c in TABLE.values() if c.name == law["channel"])
-        what = f"The error of {channel.symbol}"
+    what = f"The error of {symbol_of(law['channel'])}" if law["slot"] == SENSOR_MAP else IN_SLOT[law["slot"]]
     others = f" (or on {' or '.join(law['indistinguishable'])})" if law["indistinguishable"] else ""
     return (
         f"{what} depends on {law['argument_is']}{others}, confidence {law['confidence']:.2f}. No listed mechanism does"
