@@ -7,7 +7,7 @@ from ccmodel import mechanisms as registry
 from ccmodel.channels import TAU_IN, THETA_IN, THETA_OUT
 from ccmodel.mechanisms import Sensing, laws
 from ccmodel.mechanisms.learned import COARSE, FINE, basis
-from ccmodel.model.load import SpringLoad
+from ccmodel.model.load import FixedLoad, SpringLoad
 from tests.general_runs import HALF_LOOP, K_E, MU, run, sine
 
 EVERY = list(laws().values())
@@ -72,6 +72,14 @@ def test_a_law_with_memory_is_a_sum_of_maxwell_slip_elements():
     assert torque[2000] == pytest.approx(torque[400])
     up, down = torque[1200:2001], torque[400:1201]
     np.testing.assert_allclose(up, -down, atol=1e-12)
+
+
+def test_a_load_that_is_held_has_no_law():
+    theta_in = sine(cycles=1)
+    law = learned(laws()["learned-load-by-speed"], z1=1.0)
+    held, with_law = run(theta_in, load=FixedLoad()), run(theta_in, law, load=FixedLoad())
+    for channel, reading in held.read.items():
+        np.testing.assert_array_equal(with_law.read[channel], reading)
 
 
 def test_a_law_of_the_load_is_the_loads_own_torque():

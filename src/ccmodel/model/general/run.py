@@ -99,8 +99,9 @@ def simulate(
     series = np.zeros(1) if series is None else series
     arguments = transmission, load, settings, time_s, theta_in, initial, elements, steps
     solved, out = _marched(*arguments, series)
-    # A law of the load takes the load's motion from the pass before.
-    for _ in range(LOAD_LAW_PASSES if settings.load_laws and solved == time_s.size else 0):
+    # A law of the load takes the load's motion from the pass before. A load that is held or driven has no law.
+    has_law = bool(settings.load_laws) and not isinstance(load, AngleLoad | FixedLoad)
+    for _ in range(LOAD_LAW_PASSES if has_law and solved == time_s.size else 0):
         motion = Sensing(time_s, {THETA_OUT: out[4]}, transmission.drive_radius_m, transmission.load_radius_m)
         solved, out = _marched(*arguments, series + sum(law(motion) for law in settings.load_laws))
         if solved < time_s.size:
