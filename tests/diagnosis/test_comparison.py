@@ -129,6 +129,39 @@ def test_a_mechanism_has_the_probability_of_all_sets_that_contain_it():
     assert shares["pulley-friction"] > SURE
 
 
+@pytest.mark.parametrize(("left", "said"), [(1.3, "explained"), (1.7, "undecided")])
+def test_what_may_be_missing_beside_a_good_fit_is_of_no_consequence(left, said):
+    """The pair's members are certain; whether a third is missing is open, and matters only if the pair's fit is bad."""
+    pair = fitted(left, FRICTION, KINK), evidence(NONE, size=0.1)
+    sets = [(fitted(1.0, FRICTION, KINK, other), evidence(NONE + 3.0)) for other in (SCALE, STRIBECK)]
+    found = verdict(evidence(), (fitted(30.0, KINK), evidence()), pair, *sets)
+    assert found.verdict == said
+    assert {n for n in ("kink", "pulley-friction", "torque-scale") if found.confidence_in(n) > SURE} == {
+        "kink",
+        "pulley-friction",
+    }
+    if said == "explained":
+        assert found.best is pair[0]
+
+
+def test_a_single_bad_channel_makes_a_fit_bad():
+    good = fitted(1.0, FRICTION)
+    assert good.is_good
+    assert good.by_channel == pytest.approx(dict.fromkeys(CHANNELS, 1.0))
+    bad = replace(good, loo_residuals=[rows * [1, 1, 1.3, 1, 1] for rows in good.loo_residuals])
+    assert bad.mean_square < 1.2
+    assert not bad.is_good
+    assert bad.by_channel["tau_out_Nm"] == pytest.approx(1.69)
+
+
+def test_a_search_goes_on_from_what_may_be_an_imitation():
+    """The pair takes off half of what the kink leaves, as an imitation would, and as one of three effects would."""
+    kink, pair = (fitted(60.0, KINK), evidence(NONE - 100, NONE - 90, size=59.0)), fitted(30.0, KINK, SCALE)
+    found = compared(evidence(), kink, (pair, evidence(NONE, NONE, size=29.0)), model=fitted(600.0))
+    assert found.leading[0] is kink[0]
+    assert found.by_evidence[0] is pair
+
+
 def test_an_implausible_candidate_has_no_probability():
     wild = fitted(0.95, SCALE, **{"torque-scale/drive-sensor/gain": 5.0})
     found = verdict(evidence(), (fitted(1.0, FRICTION), evidence(NONE)), (wild, evidence(0.0)))

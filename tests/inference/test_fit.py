@@ -10,9 +10,9 @@ from scipy.optimize import least_squares
 from ccmodel.channels import TENSIONS
 from ccmodel.failure import ModelError
 from ccmodel.inference.fit import fit
-from ccmodel.inference.least_squares import solve
+from ccmodel.inference.least_squares import Search, minimise, solve
 from ccmodel.inference.observations import Observations
-from ccmodel.inference.problem import Free, Problem
+from ccmodel.inference.problem import Block, Free, Problem
 from drawn_batches import CONDITIONS, SPREAD, draw, problem_of
 
 
@@ -101,6 +101,37 @@ def test_all_rows_give_the_same(problem):
     assert ours.x[:shared] == pytest.approx(theirs.x[:shared], rel=1e-6)
     assert ours.x[shared:] == pytest.approx(theirs.x[shared:], abs=1e-4 * problem.sizes[shared:].max())
     assert ours.cost == pytest.approx(2 * theirs.cost, rel=1e-6)
+
+
+def test_derivatives_carried_along_by_secants_lead_to_the_same_minimum_in_fewer_runs(problem, monkeypatch):
+    computed = []
+    blocks = Problem.blocks
+    monkeypatch.setattr(Problem, "blocks", lambda self, *given: computed.append(1) or blocks(self, *given))
+    how = Search(tolerance=1e-8, gradient=1e-8)
+    every = minimise(problem, problem.start, how)
+    by_every = len(computed)
+    few = minimise(problem, problem.start, replace(how, secants=True))
+    assert few.converged
+    assert few.cost == pytest.approx(every.cost, rel=1e-6)
+    assert len(computed) - by_every < by_every
+    # The derivatives of the solution are computed ones.
+    for block, own in zip(few.blocks, blocks(problem, few.x), strict=True):
+        np.testing.assert_allclose(block.derivatives, own.derivatives, rtol=1e-6, atol=1e-6)
+
+
+def test_a_secant_agrees_with_the_errors_at_both_points_and_keeps_what_the_step_does_not_show():
+    random = np.random.default_rng(5)
+    sizes, step = np.array([1.0, 1e3, 1e-3, 1.0]), np.array([0.2, -40.0, 0.0, 7.0])
+    block = Block(np.array([0, 1, 2]), random.normal(size=(2, 5)), random.normal(size=(2, 5, 3)))
+    errors = random.normal(size=(2, 5))
+    moved = block.by_secant(step, sizes, errors)
+    np.testing.assert_allclose(moved.derivatives @ step[:3], errors - block.errors)
+    # Across the step, in units of the sizes.
+    across = np.array([sizes[0] ** 2 * step[1], -sizes[1] ** 2 * step[0], 3.0])
+    scaled = across / sizes[:3] ** 2 @ step[:3]
+    assert scaled == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(moved.derivatives @ across, block.derivatives @ across, rtol=1e-9)
+    assert block.by_secant(np.zeros(4), sizes, block.errors).derivatives is block.derivatives
 
 
 def test_several_starts_end_at_the_same_optimum(found):

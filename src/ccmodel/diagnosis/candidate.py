@@ -33,6 +33,7 @@ SEARCH = Search(
     most_evaluations=settings.FIT_EVALUATIONS,
     retreats=False,
     own_units=True,
+    secants=True,
 )
 
 
@@ -89,6 +90,21 @@ class CandidateFit:
     def mean_square(self) -> float:
         """Mean of `by_recording`."""
         return float(self.by_recording.mean())
+
+    @cached_property
+    def by_channel(self) -> dict[str, float]:
+        """Leave-one-out mean square of the whitened residuals by channel, averaged over recordings; 1 is noise."""
+        found: dict[str, list[float]] = {}
+        for w, rows in zip(self.whitened, self.loo_residuals, strict=True):
+            squares = (rows[: w.measured.size].reshape(w.measured.shape) ** 2).mean(axis=1)
+            for channel, square in zip(w.observations.channels, squares.tolist(), strict=True):
+                found.setdefault(channel, []).append(square)
+        return {channel: float(np.mean(squares)) for channel, squares in found.items()}
+
+    @property
+    def is_good(self) -> bool:
+        """Whether no channel is left with a mean square above `GOOD_FIT`."""
+        return max(self.by_channel.values()) <= settings.GOOD_FIT
 
     @cached_property
     def prior(self) -> tuple[NDArray, NDArray]:

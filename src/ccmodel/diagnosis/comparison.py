@@ -213,6 +213,15 @@ class Comparison:
         weights = np.logaddexp.reduce(self.log_posterior[1:], axis=1)
         return [self.candidates[k] for k in np.argsort(-weights, kind="stable")]
 
+    @property
+    def by_evidence(self) -> list[CandidateFit]:
+        """Candidates by descending evidence and prior, whether they may be imitations or not: where a search goes on.
+
+        A mechanism that takes off a part of what is missing may be an imitation, but also one of several.
+        """
+        weights = np.logaddexp.reduce(self.log_weights[1:], axis=1)
+        return [self.candidates[k] for k in np.argsort(-weights, kind="stable")]
+
     def log_weight(self, candidate: CandidateFit) -> float:
         """Log posterior of a candidate, complete or not."""
         return float(np.logaddexp.reduce(self.log_posterior[1 + self.candidates.index(candidate)]))

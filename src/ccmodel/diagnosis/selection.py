@@ -72,14 +72,14 @@ class Selection:
             part = self._part(FITTED + (size - 2) * step, FITTED + (size - 1) * step)
             if not found.is_enough:
                 found = part._part(0.0, RELINEARISED).relinearise(found)
-            if found.is_enough or self.deadline.has_passed:
+            if found.is_enough or self.deadline.has_passed or (size > 2 and found.by_evidence[0].is_good):
                 break
             found = part._part(RELINEARISED, 1.0).extended(found, screening, size)
-            if self.laws and size == settings.LEARN_AFTER and not found.is_decided:
+            if self.laws and size == settings.LEARN_AFTER and not (found.is_decided or found.by_evidence[0].is_good):
                 found = part.learn(found)
                 if law_of(found.leading[0].hypothesis) is not None:
                     break
-            if found.leading[0].hypothesis.size < size:
+            if found.by_evidence[0].hypothesis.size < size:
                 break
         # Candidates are compared, and their parameters estimated, under the best one's own covariance: about a model
         # that lacks something, friction seems to scatter.
@@ -133,7 +133,7 @@ class Selection:
         if not sets:
             return found
         extended = found.with_candidates([*found.candidates, *sets])
-        best = extended.leading[0]
+        best = extended.by_evidence[0]
         if best.hypothesis.size == size:
             subsets = self._part(0.8, 1.0)._subsets(found, best)
             extended = extended.with_candidates(lowest([*extended.candidates, *subsets]))
@@ -141,7 +141,7 @@ class Selection:
 
     def _sets(self, found: Comparison, screening: Screening, size: int) -> list[CandidateFit]:
         """Fitted sets: the leading smaller ones with the best partner each, and those that lead the first screening."""
-        firsts = [c for c in found.leading if c.hypothesis.size == size - 1][: settings.FIRSTS[size]]
+        firsts = [c for c in found.by_evidence if c.hypothesis.size == size - 1][: settings.FIRSTS[size]]
         fitted, seen = [], {frozenset(c.hypothesis.acting) for c in found.candidates}
         for k, first in enumerate(firsts):
             part = self._part(k / (len(firsts) + 1), (k + 1) / (len(firsts) + 1))
@@ -174,7 +174,7 @@ class Selection:
         Where the initial tension is not observed, every candidate is fitted from the best one's calibration too: the
         cost has several minima there.
         """
-        best = found.leading[0]
+        best = found.by_evidence[0]
         if found.is_linearised_about(best):
             return found
         self.progress(f"linearising the covariance about {best.hypothesis}", 0.0)
@@ -199,7 +199,7 @@ class Selection:
         most = len(found.candidates) if found.unlisted < 0.5 else settings.CONTENDERS
         highest = 1.0 + settings.HOPELESS * max(best.mean_square - 1.0, settings.NEAR_NOISE)
         leading = [
-            c for k, c in enumerate(found.leading) if (k < most and c.mean_square <= highest) or is_part_of(c, best)
+            c for k, c in enumerate(found.by_evidence) if (k < most and c.mean_square <= highest) or is_part_of(c, best)
         ]
         again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in leading for s in starts(c)])
         if not any(c.hypothesis == best.hypothesis for c in again):

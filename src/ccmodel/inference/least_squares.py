@@ -7,6 +7,9 @@ J'J, J'r and r'r alone. These are summed recording by recording. Scipy receives 
 The variables of the search are dimensionless: the distance of each unknown from its start, over its size
 (`ccmodel.inference.jacobian.size_of`). Units of measurement therefore do not affect the search.
 
+Where runs are dear, the derivatives at the first point of a search are carried along by secants (Broyden 1965), as long
+as the cost falls by what they predict. At the end they are computed again, and the search goes on if they say so.
+
 Some costs are too rough for derivatives, for instance where the model is driven by a measured load torque. A fit of few
 unknowns that stalls there is completed by a search without derivatives.
 """
@@ -38,6 +41,10 @@ DAMPING = 1e-9
 # for which it is used.
 SIMPLEX_EDGE, SIMPLEX_TOLERANCE = 1e-2, 1e-4
 SIMPLEX_EVALUATIONS, SIMPLEX_UNKNOWNS = 1000, 8
+# Derivatives are carried on by a secant where the cost fell by a share of the predicted reduction within these bounds.
+AS_PREDICTED = (0.5, 2.0)
+# Searches that are continued with new derivatives, at most.
+MOST_CONTINUATIONS = 5
 # An unknown within this distance of a bound, in sizes, is put on the bound: scipy's iterates stay strictly inside.
 ON_BOUND = 1e-6
 NO_STEP_HELPS = 3  # scipy's status where no step longer than the shortest reduces the cost
@@ -70,6 +77,8 @@ class Search:
         Whether scipy searches in the unknowns' own units, with their sizes as scales, and not in dimensionless
         variables. Near bounds its steps differ between the two. A cost with several minima, as with measured load
         torques, is then searched to another one.
+    secants : bool
+        Whether derivatives are carried along by secants.
     deadline : Deadline
         When the search is given up: it raises `ccmodel.deadline.OutOfTimeError`.
     """
@@ -81,6 +90,7 @@ class Search:
     retreats: bool = True
     gradient: float | None = None
     own_units: bool = False
+    secants: bool = False
     deadline: Deadline = UNLIMITED
 
 
@@ -154,11 +164,19 @@ def minimise(
     y = reduced.variables(start)
     if not y.size:
         return _solution(reduced, y, CONVERGED, 1)
-    found = optimize.least_squares(
-        reduced.residuals, y, reduced.jacobian, reduced.bounds, ftol=how.tolerance, xtol=how.shortest,
-        gtol=how.gradient, x_scale=reduced.sizes / reduced.units, max_nfev=how.most_evaluations,
-    )  # fmt: skip
-    return _solution(reduced, found.x, _message(found, reduced), found.nfev)
+    evaluations = 0
+    for _ in range(MOST_CONTINUATIONS + 1):
+        found = optimize.least_squares(
+            reduced.residuals, y, reduced.jacobian, reduced.bounds, ftol=how.tolerance, xtol=how.shortest,
+            gtol=how.gradient, x_scale=reduced.sizes / reduced.units, max_nfev=how.most_evaluations - evaluations,
+        )  # fmt: skip
+        y, evaluations = found.x, evaluations + found.nfev
+        if reduced.is_computed or evaluations >= how.most_evaluations:
+            break
+        reduced.compute_derivatives()
+        if reduced.predicted_reduction(y) <= how.tolerance * reduced.lowest_cost:
+            break
+    return _solution(reduced, y, _message(found, reduced), evaluations)
 
 
 def _without_derivatives(stalled: Solution, reduced: "_Reduced") -> Solution:
@@ -179,9 +197,7 @@ def _message(found: optimize.OptimizeResult, reduced: "_Reduced") -> str:
     """Whether the search has converged, from scipy's result and the reduction of the cost that is still predicted."""
     if found.status != NO_STEP_HELPS:
         return CONVERGED if found.success else STOPPED
-    # Scipy's cost is half the sum of squares.
-    linear = optimize.lsq_linear(found.jac, found.jac @ found.x - found.fun, reduced.bounds)
-    predicted = 2 * (found.cost - linear.cost)
+    predicted = reduced.predicted_reduction(found.x)
     if predicted <= reduced.how.tolerance * 2 * found.cost:
         return CONVERGED
     # The cost of a correct model is the effective sample size: the limit grows with the cost per sample.
@@ -230,6 +246,7 @@ class _Reduced:
         self.point: NDArray | None = None
         self.blocks: list[Block] = []
         self.rows = np.empty((0, 0))
+        self.is_computed = True
 
     def variables(self, x: NDArray) -> NDArray:
         """The search's variables at a point given by all unknowns."""
@@ -278,15 +295,46 @@ class _Reduced:
         """
         return self.rows[:, self.movable] * self.units
 
+    def predicted_reduction(self, y: NDArray) -> float:
+        """Reduction of the cost within the bounds that the derivatives at `point`, `y` in variables, predict."""
+        jacobian, rows = self.jacobian(y), self.rows[:, -1]
+        # Scipy's cost is half the sum of squares.
+        linear = optimize.lsq_linear(jacobian, jacobian @ y - rows, self.bounds)
+        return float(rows @ rows) - 2 * linear.cost
+
     def blocks_at(self, x: NDArray) -> list[Block]:
         """By recording, errors and derivatives at a point."""
-        if self.point is None or not np.array_equal(x, self.point):
+        if self.point is None or not (self.is_computed and np.array_equal(x, self.point)):
             self.blocks = self.problem.blocks(x, self.how.difference)
         return self.blocks
 
+    def compute_derivatives(self) -> None:
+        """Replace derivatives that were carried along by computed ones."""
+        assert self.point is not None
+        errors = [block.errors for block in self.blocks]
+        self._place_at(self.point, self.problem.blocks(self.point, self.how.difference, errors), self.lowest_cost)
+        self.is_computed = True
+
     def _move_to(self, x: NDArray, errors: Sequence[NDArray], cost: float) -> None:
-        """Compute the derivatives at a point, and the rows: a square root of the matrix [J'J, J'r; r'J, r'r]."""
-        blocks = self.problem.blocks(x, self.how.difference, errors)
+        """Take a point with its errors and derivatives."""
+        self.is_computed = not (self.how.secants and self._has_fallen_as_predicted(x, cost))
+        if self.is_computed:
+            blocks = self.problem.blocks(x, self.how.difference, errors)
+        else:
+            moved = x - self.point
+            pairs = zip(self.blocks, errors, strict=True)
+            blocks = [block.by_secant(moved, self.problem.sizes, e) for block, e in pairs]
+        self._place_at(x, blocks, cost)
+
+    def _has_fallen_as_predicted(self, x: NDArray, cost: float) -> bool:
+        if self.point is None:
+            return False
+        predicted = self.rows[:, -1] + self.rows[:, :-1] @ (x - self.point)
+        share = (self.lowest_cost - cost) / max(self.lowest_cost - float(predicted @ predicted), 1e-300)
+        return AS_PREDICTED[0] <= share <= AS_PREDICTED[1]
+
+    def _place_at(self, x: NDArray, blocks: list[Block], cost: float) -> None:
+        """Take a point, and compute its rows: a square root of the matrix [J'J, J'r; r'J, r'r]."""
         information, gradient = information_and_gradient(self.problem, x, blocks)
         information[np.diag_indices_from(information)] *= 1 + DAMPING
         products = np.block([[information, gradient[:, None]], [gradient, cost]])

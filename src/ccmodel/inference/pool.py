@@ -33,6 +33,8 @@ def each(items: Sequence, work: Callable) -> list:
     Exception
         The first that any of the calls raised.
     """
+    if threads() == 1:
+        return [work(i, item) for i, item in enumerate(items)]
     with ThreadPoolExecutor(threads()) as pool:
         return list(pool.map(work, range(len(items)), items))
 

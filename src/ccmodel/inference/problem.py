@@ -82,6 +82,27 @@ class Block:
         """Gradient of half the sum of squares, shape (k,)."""
         return self._rows.T @ self.errors.ravel()
 
+    def by_secant(self, moved: NDArray, sizes: NDArray, errors: NDArray) -> "Block":
+        """The block at another point, its derivatives changed as little as makes them agree with the errors there.
+
+        Broyden, Mathematics of Computation 19 (92), 1965, in units of `sizes`.
+
+        Parameters
+        ----------
+        moved, sizes : ndarray, shape (unknowns,)
+            Change of all unknowns of the problem, and their sizes.
+        errors : ndarray
+            At the other point.
+        """
+        step, size = moved[self.columns], sizes[self.columns]
+        direction = step / size**2
+        length = float(step @ direction)
+        derivatives = self.derivatives
+        if length > 0:
+            missed = errors - self.errors - derivatives @ step
+            derivatives = derivatives + missed[..., None] * (direction / length)
+        return Block(self.columns, errors, derivatives)
+
     @property
     def _rows(self) -> NDArray:
         return self.derivatives.reshape(self.errors.size, self.columns.size)
