@@ -265,3 +265,23 @@ def test_a_load_cell_that_errs_in_all_recordings_makes_none_of_them_foreign(tmp_
     ]
     record(case, case.recordings, tmp_path / case.name)
     assert said_of(tmp_path / case.name) == []
+
+
+@pytest.mark.parametrize("end", ["drive", "load"])
+def test_a_large_offset_of_a_load_cell_is_no_wrong_friction(tmp_path, end):
+    """3 N are half of what friction takes: the tensions' ratio then shows another friction, their rise does not."""
+    copy = read_copy(SIMULATED)
+    for table in copy.logs.values():
+        table[f"{end}_load_cell_V"] += 3.0 * copy.description["rig"][end]["load_cell"]["sensitivity_V_per_N"]
+    said = said_of(write_copy(copy, tmp_path / "offset"))
+    assert not [text for text in said if "friction" in str(text)]
+
+
+def test_no_offset_of_a_load_cell_acts_on_the_rise_of_tensions():
+    recordings = ingest_batch(SIMULATED)
+    for recording in recordings.recordings[:3]:
+        found = Parity(recording, recordings.batch)
+        shifted = found.without_cell_error("drive", 2.0, 0.0)
+        assert shifted.offset_free_ratio == pytest.approx(found.offset_free_ratio, rel=1e-6)
+        assert found.offset_free_ratio == pytest.approx(found.log_ratio, rel=0.4)
+        assert abs(shifted.log_ratio - found.log_ratio) > 0.05

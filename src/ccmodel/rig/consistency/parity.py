@@ -101,7 +101,8 @@ class Parity:
         - ``amplitude``, ``frequency``: those of a periodic motion over the noted ones
         - ``noise of <channel>``: standard deviation of a sensor's white noise, in the channel's unit
         - ``spring``: load torque over load angle, over the stated spring
-        - ``friction``: ln of the ratio of tensions in full slip, over mu phi
+        - ``friction``: ln of the ratio of tensions in full slip, over mu phi; of two estimates, on one of which no
+          offset of a load cell acts, the nearer to the stated value
         - ``stiffness``: mean tension over stretch of the taut cables, over the stated stiffness; friction makes it
           uncertain, and ``nearest stiffness`` is the value within its bounds that is nearest to the stated one
         - ``pretension at the drive``, ``pretension at the load``: sum of tensions at rest over twice the pretension
@@ -137,7 +138,8 @@ class Parity:
             force = np.maximum(np.abs(x[F_LOAD]), limits.TAUT_N)
             found["torque at the load"] = np.quantile(np.abs(x[TAU_OUT]) / radii[1] / force, 0.95)
         if (log_ratio := self.log_ratio) is not None and self.capstan > limits.LEAST_CAPSTAN:
-            found["friction"] = log_ratio / self.capstan
+            both = [log_ratio, log_ratio if self.offset_free_ratio is None else self.offset_free_ratio]
+            found["friction"] = min(both, key=lambda one: abs(one - self.capstan)) / self.capstan
         if (slopes := self.stiffnesses) is not None:
             low, high = sorted(slope / self.stated_stiffness for slope in slopes)
             found["stiffness"] = np.sign(low) * np.sqrt(low * high)
@@ -172,18 +174,38 @@ class Parity:
         With u = T1 / T2 and the other cable sliding against its tension, F_drive = u T2 + T4 / u. The drive torque,
         which holds the friction of the drive's bearing, does not enter.
         """
-        x = self.moving
-        if not all(name in x for name in (F_DRIVE, T2, T4, THETA_OUT)):
-            return None
         found = []
+        for total, pulled, other in self._in_full_slip:
+            root = np.sqrt(np.maximum(total**2 - 4 * pulled * other, 0.0))
+            found.append(np.median(np.log(np.maximum((total + root) / (2 * pulled), 1e-9))))
+        return float(np.mean(found)) if found else None
+
+    @cached_property
+    def offset_free_ratio(self) -> float | None:
+        """The same from how the difference of the sums rises with that of the load's tensions; None if it does not.
+
+        F_drive - F_load = (u - 1) T2 - (1 - 1 / u) T4, whose slope over T2 - T4 is about u - 1. An offset of a load cell
+        is its intercept.
+        """
+        found = []
+        for total, pulled, other in self._in_full_slip:
+            load = pulled - other
+            if np.ptp(load) > 0:
+                found.append(np.polyfit(load, total - pulled - other, 1)[0])
+        return float(np.log(max(1.0 + np.mean(found), 1e-9))) if found else None
+
+    @cached_property
+    def _in_full_slip(self) -> list[tuple[NDArray, NDArray, NDArray]]:
+        """By direction, F_drive and the load's tensions of the pulled and of the other cable while both slip, N."""
+        x, found = self.moving, []
+        if not all(name in x for name in (F_DRIVE, T2, T4, THETA_OUT)):
+            return []
         for direction, pulled, other in ((1, T2, T4), (-1, T4, T2)):
             a, b = x[pulled], np.maximum(x[other], 0.0)
             slips = self._slips(direction) & (a > self._taut) & (a > limits.PULLED * b)
             if slips.sum() >= limits.FEWEST_SAMPLES:
-                root = np.sqrt(np.maximum(x[F_DRIVE] ** 2 - 4 * a * b, 0.0))
-                ratio = ((x[F_DRIVE] + root) / (2 * np.where(slips, a, 1.0)))[slips]
-                found.append(np.median(np.log(np.maximum(ratio, 1e-9))))
-        return float(np.mean(found)) if found else None
+                found.append((x[F_DRIVE][slips], a[slips], b[slips]))
+        return found
 
     @cached_property
     def stiffnesses(self) -> tuple[float, float] | None:

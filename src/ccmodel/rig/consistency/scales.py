@@ -216,7 +216,7 @@ def _cable(ratios: Mapping[str, float], batch: Batch) -> list[Contradiction]:
         if ratio < -1 / limits.STATED_FACTOR:
             found.append(Contradiction(*_EXCHANGED[relation]))
             continue
-        other = "bend_rad" if relation == "friction" else "length_m and the pulley radii"
+        other = "bend_rad" if key == "friction_coefficient" else "length_m and the pulley radii"
         text = (
             f"rig.cable.{key} is {value:g}, and the recordings show {ratio * value:.3g}{unit} ({how}, {ratio:.3g} times"
             f" as much); correct it, or {other}"
