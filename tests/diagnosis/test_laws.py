@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from builders import spoil, write_batch
 from ccmodel import cli
+from ccmodel.diagnosis.settings import WITHIN_BAND
 from ccmodel.model.files import read_model_file
 
 K_TORQUE = 0.0234
@@ -52,6 +53,13 @@ def test_its_curve_is_the_true_one_up_to_what_a_calibration_absorbs(learned):
     assert law["parameters"][-1]["value"] == pytest.approx(PERIOD_RAD, rel=0.03)
 
 
+def test_no_listed_law_is_near(learned):
+    """An eccentric pulley repeats once a turn, the motor's poles sixteen times."""
+    (law,) = json.loads((learned[1] / "diagnosis.json").read_text())["laws"]
+    assert law["nearest_listed"]["name"] == "pulley-eccentricity"
+    assert law["nearest_listed"]["distance"] > 2 * WITHIN_BAND
+
+
 def test_the_error_falls_and_the_model_file_has_the_law(learned, tmp_path):
     batch, out = learned
     error = json.loads((out / "diagnosis.json").read_text())["fit"]["error"]["tau_in"]
@@ -69,3 +77,20 @@ def test_the_page_shows_the_curve(learned):
     page = (learned[1] / "report.html").read_text()
     assert "a law on no list" in page
     assert "The learned law: added to" in page
+
+
+def test_a_mechanism_that_is_taken_off_the_list_is_recognised_in_the_curve(tmp_path):
+    def gain(table):
+        table["drive_current_A"] *= 1.1
+        return table
+
+    batch = spoil(write_batch(tmp_path / "gain", pretensions=(7.0, 6.0, 5.0)), gain)
+    arguments = ["diagnose", str(batch), "--out", str(tmp_path / "out"), "--without", "torque-scale"]
+    done = CliRunner().invoke(cli.app, arguments)
+    assert done.exit_code == 0, done.output
+    said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    (law,) = said["laws"]
+    assert (law["slot"], law["channel"], law["arguments"]) == ("sensor-map", "tau_in_Nm", ["reading"])
+    assert law["nearest_listed"]["name"] == "torque-scale"
+    assert law["nearest_listed"]["distance"] < WITHIN_BAND
+    assert "this is the law of torque-scale" in said["headline"]

@@ -8,10 +8,11 @@ from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.formula import shortest
 from ccmodel.diagnosis.hypothesis import law_of
+from ccmodel.diagnosis.laws import unknowns_of, values_of
+from ccmodel.diagnosis.listed_laws import learned_of, nearest_listed
 from ccmodel.diagnosis.verdict import Judgement
 from ccmodel.inference.intervals import COVERAGE
 from ccmodel.mechanisms.learned import Law
-from ccmodel.model.parameters import mechanism_key
 
 
 def laws_of(judgement: Judgement) -> list[dict]:
@@ -39,21 +40,17 @@ def laws_of(judgement: Judgement) -> list[dict]:
             "formula": formula,
             "parameters": parameters,
             "indistinguishable": others,
-            "nearest_listed": None,
+            "nearest_listed": nearest_listed(learned_of(best, law)),
         }
     ]
 
 
 def curve_of(candidate: CandidateFit, law: Law) -> tuple[NDArray, NDArray, tuple[NDArray, NDArray]]:
     """A fitted law's arguments at its knots, its values there, and the ends of their 90 % band; shapes (knots,)."""
-    keys = [mechanism_key(law.name, law.place, name) for name in law.coefficients]
-    of_law = ((key.split("/"), value) for key, value in candidate.hypothesis.fixed)
-    fixed = {name: value for (mechanism, _, name), value in of_law if mechanism == law.name}
-    values = {name: candidate.values[key] for name, key in zip(law.coefficients, keys, strict=True)}
-    x, y = law.at_knots(fixed | values)
-    some = [list(candidate.values).index(key) for key in keys]
+    values, some = values_of(candidate, law), unknowns_of(candidate, law)
+    x, y = law.at_knots(values)
     shown = law.shown(x)
-    y, by_coefficients = shown @ y, fixed["scale"] * (shown @ law.basis)
+    y, by_coefficients = shown @ y, values["scale"] * (shown @ law.basis)
     covariance = by_coefficients @ candidate.covariance[np.ix_(some, some)] @ by_coefficients.T
     reach = normal.ppf(0.5 + COVERAGE / 2) * np.sqrt(np.diag(covariance).clip(0.0))
     neutral = 1.0 if law.channel is None else 0.0

@@ -120,6 +120,19 @@ def _evidence(discrepancy: Discrepancy, candidate: CandidateFit) -> float:
     return float(discrepancy.log_evidence(candidate, [0.0], dict.fromkeys(discrepancy.channels, 1.0))[0])
 
 
+def unknowns_of(candidate: CandidateFit, law: Law) -> list[int]:
+    """Position of each coefficient of a law among the unknowns of a fitted candidate."""
+    unknowns = list(candidate.values)
+    return [unknowns.index(mechanism_key(law.name, law.place, name)) for name in law.coefficients]
+
+
+def values_of(candidate: CandidateFit, law: Law) -> dict[str, float]:
+    """The range, the scale and the coefficients of a law of a fitted candidate."""
+    every = dict(candidate.hypothesis.fixed) | candidate.values
+    keys = {p.name: mechanism_key(law.name, law.place, p.name) for p in law.mechanism.parameters}
+    return {name: every[key] for name, key in keys.items()}
+
+
 def first_laws() -> list[Law]:
     """The laws that are tried first: every one with few knots, and those of an angle, which may repeat, with many."""
     return [law for law in laws().values() if law.resolution == COARSE or law.argument.unit == "rad"]

@@ -232,5 +232,9 @@ LAW_SCALES = 0.003, 0.01, 0.03, 0.1, 0.3
 LAW_STEP = 0.01
 # Laws that are fitted, the leading ones to first order; and of these, how many are also fitted with more knots.
 LAWS_FITTED, LAWS_REFINED = 8, 2
+# Starts, of a listed law's constants, from which the best ones are searched. Chosen: a sine has a few minima.
+LISTED_STARTS = 3
+# Distance, in posterior standard deviations, up to which a learned law is a listed one: half of its 90 % band.
+WITHIN_BAND = 1.645
 # Laws are learned after sets of so many listed mechanisms, where these do not decide.
 LEARN_AFTER = 2

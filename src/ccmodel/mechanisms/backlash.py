@@ -12,8 +12,13 @@ Source: Nordin and Gutman, Controlling mechanical systems with backlash - a surv
 2002, doi:10.1016/S0005-1098(02)00047-X.
 """
 
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+from ccmodel.mechanisms.contract import LOAD, Curve, Mechanism, Parameter
 
 
 @kernel(inline="always")
@@ -26,6 +31,14 @@ def dead_zone(theta: float, half_gap: float) -> tuple[float, float]:
     return 0.0, 0.0
 
 
+def _lost(theta: NDArray, values: Mapping[str, float]) -> NDArray:
+    """What the gap takes off a spring's torque."""
+    return -values["K_e"] * np.clip(theta, -values["half_gap"], values["half_gap"])
+
+
+_HALF_GAP = Parameter("half_gap", "rad", 3.5e-3, 70e-3, 15e-3, "half of the dead zone")
+_K_E = Parameter("K_e", "N m/rad", 1e-3, 10.0, 0.05, "the load's stiffness")
+
 MECHANISM = Mechanism(
     name="backlash",
     text=__doc__,
@@ -35,8 +48,9 @@ MECHANISM = Mechanism(
     ),
     sentence="the load follows its pulley with a dead zone of ±{half_gap}",
     places=("load-pulley",),
-    parameters=(Parameter("half_gap", "rad", 3.5e-3, 70e-3, 15e-3, "half of the dead zone"),),
+    parameters=(_HALF_GAP,),
     mistaken_for=("strand-settling", "slack"),
     depends_on_time=False,
     settings={"half_gap": "half_gap"},
+    curves=(Curve(LOAD, "load-angle", _lost, (_HALF_GAP, _K_E)),),
 )

@@ -36,6 +36,8 @@ PLACES = (
     "drive-sensor",
     "load-sensor",
 )
+# Slots: places in the equations at which a constitutive law can stand.
+SLIDING_FRICTION, BEARING_TORQUE, LOAD, SENSOR_MAP = "sliding-friction", "bearing-torque", "load", "sensor-map"
 PARAGRAPHS = ("Equation", "Signature", "Separated by", "Source")
 # A source that begins with this short form is written out.
 PAPER_SHORT = "Agrawal, Peine and Yao 2010"
@@ -113,6 +115,31 @@ class Parameter:
         if self.scale == "log":
             return float(self.low * (self.high / self.low) ** share)
         return float(self.low + share * (self.high - self.low))
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A mechanism as a law of one quantity at one slot, to which a learned law is compared.
+
+    Attributes
+    ----------
+    slot : str
+    argument : str
+        As in the diagnosis format; in the unit that `ccmodel.mechanisms.learned` has.
+    of : callable
+        ``of(x, values)``: the law at arguments of shape (n,): a factor of the friction coefficient, or what is added to
+        a torque or a reading. Up to what a calibration absorbs: a factor of the former, a constant of the latter.
+    constants : tuple of Parameter
+        Constants that are fitted to the learned law.
+    channels : tuple of str
+        Channels whose map it can be; empty for all.
+    """
+
+    slot: str
+    argument: str
+    of: Callable[[NDArray, Mapping[str, float]], NDArray]
+    constants: tuple[Parameter, ...]
+    channels: tuple[str, ...] = ()
 
 
 class Settings:
@@ -201,6 +228,8 @@ class Mechanism:
         The parameter of the model that its ``change`` drifts through a session.
     states_after_tensioning : callable or None
         ``states_after_tensioning(seconds, values)``: its states, by name, at a time after the cables were tensioned.
+    curves : tuple of Curve
+        What a learned law looks like that stands for it; at each slot and argument at which one can.
     """
 
     name: str
@@ -218,6 +247,7 @@ class Mechanism:
     modifies_observation: Callable[[Sensing, str, Mapping[str, float]], dict[str, NDArray]] | None = None
     drift: str | None = None
     states_after_tensioning: Callable[[float, Mapping[str, float]], dict[str, float]] | None = None
+    curves: tuple[Curve, ...] = ()
 
     def __post_init__(self) -> None:
         unknown = set(self.places) - set(PLACES)

@@ -34,7 +34,16 @@ from ccmodel.channels import (
     unit_of,
 )
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import Mechanism, Parameter, Sensing, Settings
+from ccmodel.mechanisms.contract import (
+    BEARING_TORQUE,
+    LOAD,
+    SENSOR_MAP,
+    SLIDING_FRICTION,
+    Mechanism,
+    Parameter,
+    Sensing,
+    Settings,
+)
 
 # Knots of a law, and the length over which its values are correlated a priori, as a share of its range: at first, and
 # where the recordings show more.
@@ -51,8 +60,6 @@ SLOWEST_M_PER_S = 1e-5
 RANGE, SHORTEST_YIELD = (0.005, 0.995), 0.01
 # Friction is never negative in either direction.
 LARGEST_BIAS = 0.95
-
-SLIDING_FRICTION, BEARING_TORQUE, LOAD, SENSOR_MAP = "sliding-friction", "bearing-torque", "load", "sensor-map"
 
 
 @dataclass(frozen=True)

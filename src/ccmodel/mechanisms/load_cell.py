@@ -5,8 +5,9 @@ from collections.abc import Callable, Mapping
 from numpy.typing import NDArray
 
 from ccmodel.channels import SUM_AT, TORQUE_AT
-from ccmodel.mechanisms.contract import Mechanism, Parameter, Sensing, side
+from ccmodel.mechanisms.contract import SENSOR_MAP, Curve, Mechanism, Parameter, Sensing, side
 
+CELLS = tuple(SUM_AT.values())
 # Values of the cell from the sum of tensions, the fault's parameter, all channels, and the end of the transmission.
 Reading = Callable[[NDArray, float, Sensing, str], NDArray]
 
@@ -82,8 +83,12 @@ def _fault(
     mistaken_for: tuple[str, ...],
     sentence: str,
     depends_on_time: bool = False,
+    map_by: str | None = None,
 ) -> Mechanism:
-    """Mechanism of one fault: `reading` gives the cell's values from the sum of tensions and the fault's parameter."""
+    """Mechanism of one fault: `reading` gives the cell's values from the sum of tensions and the fault's parameter.
+
+    `map_by` is the argument in proportion to which it adds to the reading, if it does.
+    """
 
     def modifies_observation(sensing: Sensing, place: str, values: Mapping[str, float]) -> dict[str, NDArray]:
         end = side(place)
@@ -99,6 +104,9 @@ def _fault(
         mistaken_for=mistaken_for,
         depends_on_time=depends_on_time,
         modifies_observation=modifies_observation,
+        curves=(Curve(SENSOR_MAP, map_by, lambda x, values: values[parameter.name] * x, (parameter,), CELLS),)
+        if map_by
+        else (),
     )
 
 
@@ -115,6 +123,7 @@ MECHANISMS = (
         _GAIN,
         ("load-cell-offset", "cable-asymmetry"),
         "the {side}'s load cell reads {gain:%} [high|low]",
+        map_by="reading",
     ),
     _fault(
         "load-cell-offset",
@@ -132,6 +141,7 @@ MECHANISMS = (
         ("relaxation", "load-cell-offset"),
         "the zero of the {side}'s load cell drifts [up|down] by {rate}",
         depends_on_time=True,
+        map_by="time",
     ),
     _fault(
         "load-cell-crosstalk",

@@ -10,7 +10,9 @@ Source: Kovacic and Brennan (editors), The Duffing Equation: Nonlinear Oscillato
 doi:10.1002/9780470977859.
 """
 
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+from ccmodel.mechanisms.contract import LOAD, Curve, Mechanism, Parameter
+
+_K3 = Parameter("K3", "N m/rad^3", 1e-3, 1.0, 0.03, "cubic stiffness", signed=True)
 
 MECHANISM = Mechanism(
     name="load-stiffening",
@@ -18,8 +20,9 @@ MECHANISM = Mechanism(
     tex=r"\tau_\mathrm{out} = K_e\,\theta + K_3\,\theta^3",
     sentence="the load's spring [stiffens|softens] with its angle by {K3}",
     places=("load",),
-    parameters=(Parameter("K3", "N m/rad^3", 1e-3, 1.0, 0.03, "cubic stiffness", signed=True),),
+    parameters=(_K3,),
     mistaken_for=("backlash",),
     depends_on_time=False,
     settings={"cubic_stiffness": "K3"},
+    curves=(Curve(LOAD, "load-angle", lambda theta, values: values["K3"] * theta**3, (_K3,)),),
 )

@@ -15,9 +15,14 @@ Source: Iwan, Journal of Applied Mechanics 33(4), 893-900, 1966, doi:10.1115/1.3
 1675-1682, 1976, doi:10.2514/3.61511.
 """
 
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
 from ccmodel.elementary import quick_exp
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+from ccmodel.mechanisms.contract import SLIDING_FRICTION, Curve, Mechanism, Parameter
 
 # Elements of a contact. Four describe eight whose lengths differ by a factor of 3 or 15 to 0.4 and 3 % of friction
 # (root mean square along nested reversals); one does to 9 and 19 %.
@@ -39,6 +44,13 @@ def element_lengths(z0: float, spread: float) -> tuple[float, ...]:
     return tuple(float(z0 * spread ** (k / (ELEMENTS - 1) - 0.5)) for k in range(ELEMENTS))
 
 
+def _since_reversal(travel: NDArray, values: Mapping[str, float]) -> NDArray:
+    """Friction over that of sliding, by the travel since a reversal from sliding: of a bristle."""
+    return 1 - 2 * np.exp(-travel / values["z0"])
+
+
+_Z0 = Parameter("z0", "m", 5e-6, 200e-6, 50e-6, "middle sliding length over which friction builds up")
+
 MECHANISM = Mechanism(
     name="presliding",
     text=__doc__,
@@ -50,7 +62,7 @@ MECHANISM = Mechanism(
     sentence="friction builds up over {z0} of sliding",
     places=("conduit",),
     parameters=(
-        Parameter("z0", "m", 5e-6, 200e-6, 50e-6, "middle sliding length over which friction builds up"),
+        _Z0,
         Parameter(
             "spread",
             "1",
@@ -78,4 +90,5 @@ MECHANISM = Mechanism(
     mistaken_for=("termination-compliance",),
     depends_on_time=False,
     settings={"bristle_m": "z0", "bristle_spread": "spread", "bristle_creep": "creep"},
+    curves=(Curve(SLIDING_FRICTION, "distance-since-reversal", _since_reversal, (_Z0,)),),
 )

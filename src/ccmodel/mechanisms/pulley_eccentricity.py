@@ -10,10 +10,13 @@ Separated by: strokes that start at other angles of the pulley.
 Source: Litvin and Fuentes, Gear Geometry and Applied Theory, 2nd edition, Cambridge University Press, 2004.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+from ccmodel.mechanisms.contract import BEARING_TORQUE, LOAD, Curve, Mechanism, Parameter
 
 
 @kernel
@@ -28,6 +31,24 @@ def winding_change(theta: float, rotation: float, e: float, psi: float) -> float
     return rotation + 2.0 * e * np.sin(theta + psi + 0.5 * rotation) * np.sin(0.5 * rotation)
 
 
+def _torque(theta: NDArray, values: Mapping[str, float]) -> NDArray:
+    return values["torque"] * np.sin(theta + values["psi"])
+
+
+# Two values of psi half a turn apart would not do: one that is off by a right angle has no gradient in e.
+_PSI = Parameter(
+    "psi",
+    "rad",
+    -np.pi,
+    np.pi,
+    0.0,
+    "phase of the eccentricity",
+    scale="linear",
+    screening_grid=(0.125, 0.375, 0.625, 0.875),
+)
+# The torque is e times that of the cables.
+_TORQUE = Parameter("torque", "N m", 1e-5, 0.1, 1e-3, "largest error of the torque")
+
 MECHANISM = Mechanism(
     name="pulley-eccentricity",
     text=__doc__,
@@ -39,19 +60,13 @@ MECHANISM = Mechanism(
     places=("drive-pulley", "load-pulley"),
     parameters=(
         Parameter("e", "1", 0.01, 0.08, 0.03, "eccentricity over the radius", below=1.0),
-        # Two values of psi half a turn apart would not do: one that is off by a right angle has no gradient in e.
-        Parameter(
-            "psi",
-            "rad",
-            -np.pi,
-            np.pi,
-            0.0,
-            "phase of the eccentricity",
-            scale="linear",
-            screening_grid=(0.125, 0.375, 0.625, 0.875),
-        ),
+        _PSI,
     ),
     mistaken_for=("load-stiffening",),
     depends_on_time=False,
     settings={"{side}_eccentricity": "e", "{side}_eccentricity_rad": "psi"},
+    curves=(
+        Curve(BEARING_TORQUE, "drive-angle", _torque, (_TORQUE, _PSI)),
+        Curve(LOAD, "load-angle", _torque, (_TORQUE, _PSI)),
+    ),
 )

@@ -13,11 +13,13 @@ Source: Agrawal, Peine and Yao 2010, Section VI: friction effects at the two pul
 Journal 14(12), 1675-1682, 1976, doi:10.2514/3.61511.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+from ccmodel.mechanisms.contract import BEARING_TORQUE, LOAD, Curve, Mechanism, Parameter
 from ccmodel.mechanisms.presliding import dahl
 
 # Angle over which a bearing's friction builds up unless a model states it.
@@ -33,6 +35,22 @@ def bearing(theta: NDArray, presliding_rad: float) -> NDArray:
     return share
 
 
+def _by_speed(omega: NDArray, values: Mapping[str, float]) -> NDArray:
+    """Torque by the pulley's velocity; a reversal takes it through zero within `reversal`."""
+    return values["friction_torque"] * np.tanh(omega / values["reversal"])
+
+
+def _from_rest(travel: NDArray, values: Mapping[str, float]) -> NDArray:
+    """Torque by the travel of the pulley's rim from rest."""
+    return -values["friction_torque"] * np.expm1(-travel / values["travel"])
+
+
+_FRICTION = Parameter("friction_torque", "N m", 0.5e-3, 50e-3, 5e-3, "friction torque of the bearing")
+# A reversal at 0.1 to 100 rad/s^2 through the angles of presliding; and these on rims of 3 to 100 mm.
+_REVERSAL = Parameter("reversal", "rad/s", 0.01, 1.0, 0.1, "speed at which friction has built up after a reversal")
+_TRAVEL = Parameter("travel", "m", 1.5e-6, 2e-3, 1e-4, "travel over which friction builds up")
+_BY_MOTION = ("speed", _by_speed, (_FRICTION, _REVERSAL)), ("distance-since-reversal", _from_rest, (_FRICTION, _TRAVEL))
+
 MECHANISM = Mechanism(
     name="pulley-friction",
     text=__doc__,
@@ -43,7 +61,7 @@ MECHANISM = Mechanism(
     sentence="the {side} pulley's bearing has a friction torque of {friction_torque}",
     places=("drive-pulley", "load-pulley"),
     parameters=(
-        Parameter("friction_torque", "N m", 0.5e-3, 50e-3, 5e-3, "friction torque of the bearing"),
+        _FRICTION,
         Parameter(
             "presliding",
             "rad",
@@ -59,4 +77,5 @@ MECHANISM = Mechanism(
     mistaken_for=("torque-scale", "constant-drag"),
     depends_on_time=False,
     settings={"{side}_friction_Nm": "friction_torque", "{side}_presliding_rad": "presliding"},
+    curves=tuple(Curve(slot, *by_motion) for slot in (BEARING_TORQUE, LOAD) for by_motion in _BY_MOTION),
 )

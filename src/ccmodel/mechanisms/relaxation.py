@@ -17,12 +17,14 @@ Source: Agrawal, Peine and Yao 2010, Sections V and VI; with the chain and the s
 Viscoelastic Materials, Cambridge University Press, 2009.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+from ccmodel.mechanisms.contract import SLIDING_FRICTION, Curve, Mechanism, Parameter
 
 # Branches of the chain.
 BRANCHES = 4
@@ -73,6 +75,28 @@ def lag_weights(step_over_tau: float) -> tuple[float, float, float]:
     return decay, mean - decay, 1.0 - mean
 
 
+def _friction_by_time(t: NDArray, values: Mapping[str, float]) -> NDArray:
+    """Factor of friction, which falls with the tension, in cables that are fresh at first."""
+    times = np.array(branch_times(values["tau"], values["spread"]))
+    return 1 + values["r"] * np.expm1(-t[:, None] / times).mean(axis=1)
+
+
+_CHAIN = (
+    Parameter("r", "1", 0.01, 0.2, 0.05, "share of the tension that is lost", below=1.0),
+    Parameter("tau", "s", 5.0, 100.0, 30.0, "middle time constant", neutral=30.0, above=0.0),
+    Parameter(
+        "spread",
+        "1",
+        1.0,
+        100.0,
+        4.0,
+        "longest over shortest time constant",
+        neutral=1.0,
+        screening_grid=(0.3,),
+        default=1.0,
+    ),
+)
+
 MECHANISM = Mechanism(
     name="relaxation",
     text=__doc__,
@@ -81,19 +105,7 @@ MECHANISM = Mechanism(
     sentence="the cables lose {r:%} of their tension as time passes",
     places=("cable",),
     parameters=(
-        Parameter("r", "1", 0.01, 0.2, 0.05, "share of the tension that is lost", below=1.0),
-        Parameter("tau", "s", 5.0, 100.0, 30.0, "middle time constant", neutral=30.0, above=0.0),
-        Parameter(
-            "spread",
-            "1",
-            1.0,
-            100.0,
-            4.0,
-            "longest over shortest time constant",
-            neutral=1.0,
-            screening_grid=(0.3,),
-            default=1.0,
-        ),
+        *_CHAIN,
         Parameter(
             "relaxed",
             "1",
@@ -118,4 +130,5 @@ MECHANISM = Mechanism(
         "relaxing_spread": "spread",
         "relaxed_share": "relaxed",
     },
+    curves=(Curve(SLIDING_FRICTION, "time", _friction_by_time, _CHAIN),),
 )

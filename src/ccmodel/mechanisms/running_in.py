@@ -18,7 +18,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.mechanisms.contract import Mechanism, Parameter, Settings
+from ccmodel.mechanisms.contract import SLIDING_FRICTION, Curve, Mechanism, Parameter, Settings
 
 
 def _modifies_physics(settings: Settings, values: Mapping[str, float]) -> None:
@@ -29,6 +29,20 @@ def _modifies_physics(settings: Settings, values: Mapping[str, float]) -> None:
     settings.friction_history = history
 
 
+def _of_time(t: NDArray, values: Mapping[str, float]) -> NDArray:
+    return 1 - values["change"] * np.expm1(-t / values["tau"])
+
+
+def _of_travel(w: NDArray, values: Mapping[str, float]) -> NDArray:
+    return 1 - values["change"] * np.expm1(-values["per_m"] * w)
+
+
+_CHANGE = Parameter("change", "1", 0.05, 0.3, 0.1, "final relative change of friction", signed=True, above=-1.0)
+_TAU = Parameter(
+    "tau", "s", 2.0, 1000.0, 10.0, "time constant", neutral=10.0, screening_grid=(0.13, 0.31, 0.5), above=0.0
+)
+_PER_M = Parameter("per_m", "1/m", 1.0, 200.0, 1.0, "rate per cable travel", screening_grid=(0.0, 0.6), default=0.0)
+
 MECHANISM = Mechanism(
     name="running-in",
     text=__doc__,
@@ -37,11 +51,9 @@ MECHANISM = Mechanism(
     sentence="friction [rises|falls] by {change:%} through a recording",
     places=("conduit",),
     parameters=(
-        Parameter("change", "1", 0.05, 0.3, 0.1, "final relative change of friction", signed=True, above=-1.0),
-        Parameter(
-            "tau", "s", 2.0, 1000.0, 10.0, "time constant", neutral=10.0, screening_grid=(0.13, 0.31, 0.5), above=0.0
-        ),
-        Parameter("per_m", "1/m", 1.0, 200.0, 1.0, "rate per cable travel", screening_grid=(0.0, 0.6), default=0.0),
+        _CHANGE,
+        _TAU,
+        _PER_M,
         Parameter(
             "done",
             "1",
@@ -60,4 +72,8 @@ MECHANISM = Mechanism(
     # Factor of mu at times (s) and cable travels (m), all of shape (samples,).
     structures={"friction_history": None},
     modifies_physics=_modifies_physics,
+    curves=(
+        Curve(SLIDING_FRICTION, "time", _of_time, (_CHANGE, _TAU)),
+        Curve(SLIDING_FRICTION, "travel", _of_travel, (_CHANGE, _PER_M)),
+    ),
 )

@@ -15,9 +15,14 @@ renewal over a sliding distance: Dieterich, Modeling of rock friction 1, Journal
 2161-2168, 1979, doi:10.1029/JB084iB05p02161.
 """
 
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
 from ccmodel.elementary import quick_exp, quick_log
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+from ccmodel.mechanisms.contract import SLIDING_FRICTION, Curve, Mechanism, Parameter
 
 # Sliding distance over which a contact adapts to a new speed, where a model states none. At zero, friction that falls
 # with speed has no unique step, with or without inertia: explicit dynamics chatters on ever shorter pieces of cable the
@@ -37,6 +42,17 @@ def renewed(rested: float, slide: float, dt: float, vs: float, delta: float, ren
     return rested * decay + (1.0 - decay) * quick_exp(-ratio)
 
 
+def _of_log_speed(log_speed: NDArray, values: Mapping[str, float]) -> NDArray:
+    """Factor of mu in steady sliding, by the logarithm of the speed."""
+    return 1 + values["a"] * np.exp(-((10**log_speed / values["vs"]) ** values["delta"]))
+
+
+_STEADY = (
+    Parameter("a", "1", 0.05, 0.6, 0.2, "relative excess of friction at rest"),
+    Parameter("vs", "m/s", 1e-4, 1e-2, 2e-3, "Stribeck speed", neutral=1e-3, above=0.0),
+    Parameter("delta", "1", 0.5, 2.5, 1.5, "exponent of the speed", neutral=2.0, screening_grid=(0.7,), default=2.0),
+)
+
 MECHANISM = Mechanism(
     name="stribeck",
     text=__doc__,
@@ -47,11 +63,7 @@ MECHANISM = Mechanism(
     sentence="friction is {a:%} higher at rest than in motion",
     places=("conduit",),
     parameters=(
-        Parameter("a", "1", 0.05, 0.6, 0.2, "relative excess of friction at rest"),
-        Parameter("vs", "m/s", 1e-4, 1e-2, 2e-3, "Stribeck speed", neutral=1e-3, above=0.0),
-        Parameter(
-            "delta", "1", 0.5, 2.5, 1.5, "exponent of the speed", neutral=2.0, screening_grid=(0.7,), default=2.0
-        ),
+        *_STEADY,
         Parameter(
             "renewal",
             "m",
@@ -73,4 +85,5 @@ MECHANISM = Mechanism(
         "stribeck_exponent": "delta",
         "stribeck_renewal_m": "renewal",
     },
+    curves=(Curve(SLIDING_FRICTION, "speed", _of_log_speed, _STEADY),),
 )

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from numpy.typing import NDArray
 
 from ccmodel.channels import TORQUE_AT
-from ccmodel.mechanisms.contract import Mechanism, Parameter, Sensing, side
+from ccmodel.mechanisms.contract import SENSOR_MAP, Curve, Mechanism, Parameter, Sensing, side
 
 
 def _modifies_observation(sensing: Sensing, place: str, values: Mapping[str, float]) -> dict[str, NDArray]:
@@ -22,14 +22,19 @@ def _modifies_observation(sensing: Sensing, place: str, values: Mapping[str, flo
     return {channel: sensing.channels[channel] * (1 + values["gain"])}
 
 
+_GAIN = Parameter("gain", "1", 0.02, 0.1, 0.05, "error of the gain", signed=True)
+
 MECHANISM = Mechanism(
     name="torque-scale",
     text=__doc__,
     tex=r"\tau_\mathrm{read} = (1 + \mathrm{gain})\,\tau",
     sentence="the {side}'s torque sensor reads {gain:%} [high|low]",
     places=("drive-sensor", "load-sensor"),
-    parameters=(Parameter("gain", "1", 0.02, 0.1, 0.05, "error of the gain", signed=True),),
+    parameters=(_GAIN,),
     mistaken_for=("pulley-friction",),
     depends_on_time=False,
     modifies_observation=_modifies_observation,
+    curves=(
+        Curve(SENSOR_MAP, "reading", lambda tau, values: values["gain"] * tau, (_GAIN,), tuple(TORQUE_AT.values())),
+    ),
 )

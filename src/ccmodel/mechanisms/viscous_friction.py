@@ -10,7 +10,11 @@ Source: Olsson, Astrom, Canudas de Wit, Gafvert and Lischinsky, Friction models 
 Journal of Control 4(3), 176-195, 1998, doi:10.1016/S0947-3580(98)70113-X.
 """
 
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+from ccmodel.mechanisms.contract import SLIDING_FRICTION, Curve, Mechanism, Parameter
+
+# What the drag adds to Coulomb friction depends on the tension; over the speed it is one constant of its own: at
+# 10 mm/s from 0.3 % to as much as Coulomb friction.
+_RISE = Parameter("rise", "s/m", 0.3, 100.0, 10.0, "relative rise of friction per sliding speed")
 
 MECHANISM = Mechanism(
     name="viscous-friction",
@@ -23,4 +27,5 @@ MECHANISM = Mechanism(
     mistaken_for=("stribeck", "time-skew"),
     depends_on_time=True,
     settings={"viscous": "c"},
+    curves=(Curve(SLIDING_FRICTION, "speed", lambda log_speed, c: 1 + c["rise"] * 10**log_speed, (_RISE,)),),
 )

@@ -6,9 +6,8 @@ from math import floor, log10
 
 from ccmodel import mechanisms as registry
 from ccmodel.channels import TABLE, symbol_of
-from ccmodel.diagnosis.settings import SURE
-from ccmodel.mechanisms.contract import side
-from ccmodel.mechanisms.learned import BEARING_TORQUE, LOAD, SENSOR_MAP, SLIDING_FRICTION
+from ccmodel.diagnosis.settings import SURE, WITHIN_BAND
+from ccmodel.mechanisms.contract import BEARING_TORQUE, LOAD, SENSOR_MAP, SLIDING_FRICTION, side
 
 # By the short names of diagnosis.json.
 SYMBOL = {channel.short_name: channel.symbol for channel in TABLE.values()}
@@ -126,9 +125,20 @@ def law_claim(law: Mapping) -> str:
     what = f"The error of {symbol_of(law['channel'])}" if law["slot"] == SENSOR_MAP else IN_SLOT[law["slot"]]
     others = f" (or on {' or '.join(law['indistinguishable'])})" if law["indistinguishable"] else ""
     return (
-        f"{what} depends on {law['argument_is']}{others}, confidence {law['confidence']:.2f}. No listed mechanism does"
-        " this; the law was learned from the recordings."
+        f"{what} depends on {law['argument_is']}{others}, confidence {law['confidence']:.2f}. {_resemblance(law)}; the"
+        " law was learned from the recordings."
     )
+
+
+def _resemblance(law: Mapping) -> str:
+    """Whether a learned law is that of a listed mechanism within its band, or how far the nearest one is."""
+    nearest = law["nearest_listed"]
+    if nearest is None:
+        return "No listed mechanism does this"
+    if nearest["distance"] <= WITHIN_BAND:
+        return f"Within its band this is the law of {nearest['name']}"
+    away = f"{nearest['distance']:.1f} standard deviations away"
+    return f"No listed mechanism does this (the nearest is {nearest['name']}, {away})"
 
 
 def nearest_sentence(diagnosis: Mapping) -> str | None:

@@ -1,0 +1,154 @@
+"""Which listed mechanism a learned law resembles: the distance of the two curves, measured by what is known of one."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.optimize import least_squares
+
+from ccmodel import mechanisms as registry
+from ccmodel.diagnosis import settings
+from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.hypothesis import coefficients_of
+from ccmodel.diagnosis.laws import unknowns_of, values_of
+from ccmodel.inference.cross_validation import inverse_of
+from ccmodel.inference.effective_samples import of_recording
+from ccmodel.inference.jacobian import size_of
+from ccmodel.mechanisms.contract import Curve, Parameter
+from ccmodel.mechanisms.learned import SLIGHTEST, Law
+
+
+@dataclass(frozen=True)
+class Learned:
+    """A law as it was learned.
+
+    Attributes
+    ----------
+    law : Law
+    values : mapping of str to float
+        Its range, its scale and its coefficients.
+    covariance : ndarray, shape (coefficients, coefficients)
+        Of the coefficients, not singular.
+    """
+
+    law: Law
+    values: Mapping[str, float]
+    covariance: NDArray
+
+
+def nearest_listed(learned: Learned) -> dict[str, str | float] | None:
+    """The listed mechanism whose law at this slot, of this argument, is nearest; None if no mechanism has one.
+
+    ``distance`` is the root mean square distance of the coefficients in their posterior standard deviations, with the
+    listed law's own constants fitted to the curve: about 1 for a law that is the listed one.
+    """
+    every = [(name, curve) for name in registry.names() for curve in registry.get(name).curves]
+    distances = {name: distance(learned, curve) for name, curve in every if _is_comparable(learned.law, curve)}
+    if not distances:
+        return None
+    name = min(distances, key=lambda one: distances[one])
+    return {"name": name, "distance": distances[name]}
+
+
+def _is_comparable(law: Law, curve: Curve) -> bool:
+    is_same = (curve.slot, curve.argument) == (law.slot, law.argument.name)
+    return is_same and (not curve.channels or law.channel in curve.channels)
+
+
+def distance(learned: Learned, curve: Curve) -> float:
+    """Distance of a learned law from a listed one with the constants that suit it best."""
+    from_learned = _Distance.of(learned, curve)
+    starts = sorted(from_learned.starts(), key=lambda one: from_learned.cost(*one))
+    best = min(from_learned.fitted(*one) for one in starts[: settings.LISTED_STARTS])
+    return float(np.sqrt(2 * best / len(learned.covariance)))
+
+
+@dataclass(frozen=True)
+class _Distance:
+    """Errors of a listed law over what is known of a learned one, by the constants of the former."""
+
+    learned: Learned
+    curve: Curve
+    x: NDArray
+    z: NDArray
+    root: NDArray
+
+    @classmethod
+    def of(cls, learned: Learned, curve: Curve) -> "_Distance":
+        x, _ = learned.law.at_knots(learned.values)
+        z = np.array([learned.values[name] for name in learned.law.coefficients])
+        return cls(learned, curve, x, z, np.linalg.cholesky(learned.covariance))
+
+    def errors(self, u: NDArray, signs: Sequence[float]) -> NDArray:
+        """Of the coefficients, and of what no coefficients give; shape (coefficients + knots,)."""
+        law, scale = self.learned.law, self.learned.values["scale"]
+        constants = zip(self.curve.constants, u, signs, strict=True)
+        y = self.curve.of(self.x, {p.name: _value(p, one, sign) for p, one, sign in constants})
+        # What is shown of a law with memory is the torque from rest; it has no average that a calibration absorbs.
+        wanted = np.linalg.solve(law.shown(self.x), y) if law.opposes else _without_average(y, law)
+        z = np.linalg.lstsq(scale * law.basis, wanted, rcond=None)[0]
+        missed = wanted - scale * law.basis @ z
+        by_coefficients = solve_triangular(self.root, z - self.z, lower=True)
+        return np.concatenate([by_coefficients, missed / (SLIGHTEST * scale)])
+
+    def cost(self, u: NDArray, signs: Sequence[float]) -> float:
+        return 0.5 * float(np.sum(self.errors(u, signs) ** 2))
+
+    def starts(self) -> list[tuple[NDArray, tuple[float, ...]]]:
+        """Constants within their ranges, and their signs."""
+        constants = self.curve.constants
+        grids = [[_scaled(p, p.at(share)) for share in p.screening_grid or settings.SCREENED_SHAPES] for p in constants]
+        signs = [(1.0, -1.0) if p.signed else (1.0,) for p in constants]
+        return [(np.array(u), s) for u in product(*grids) for s in product(*signs)]
+
+    def fitted(self, u: NDArray, signs: Sequence[float]) -> float:
+        """The least cost from a start."""
+        low, high = np.array([_bounds(p) for p in self.curve.constants]).T
+        return float(least_squares(lambda v: self.errors(v, signs), u, bounds=(low, high)).cost)
+
+
+def _without_average(y: NDArray, law: Law) -> NDArray:
+    """Values of a law at its knots without what belongs to the calibration: added to 1 for a factor, or to 0."""
+    return y / y.mean() - 1.0 if law.channel is None else y - y.mean()
+
+
+def _scaled(p: Parameter, value: float) -> float:
+    return float(np.log(value)) if p.scale == "log" else value
+
+
+def _value(p: Parameter, u: float, sign: float) -> float:
+    return sign * float(np.exp(u)) if p.scale == "log" else u
+
+
+def _bounds(p: Parameter) -> tuple[float, float]:
+    """As far as a fit of the mechanism itself may go, on the parameter's scale; an angle may exceed a revolution."""
+    if p.scale == "log":
+        return float(np.log(p.low / settings.BEYOND_RANGE)), float(np.log(p.high * settings.BEYOND_RANGE))
+    return (2 * p.low, 2 * p.high) if p.unit == "rad" else (p.low, p.high)
+
+
+def learned_of(candidate: CandidateFit, law: Law) -> Learned:
+    """A law of a fitted candidate.
+
+    The standard deviations of the coefficients are those of the fit. Their correlation is that of the information of
+    all recordings: a jackknife over few recordings is singular.
+    """
+    some = unknowns_of(candidate, law)
+    by_information = _inverse_information(candidate)[np.ix_(some, some)]
+    ratio = np.sqrt(np.diag(candidate.covariance)[some] / np.diag(by_information))
+    return Learned(law, values_of(candidate, law), by_information * np.outer(ratio, ratio))
+
+
+def _inverse_information(candidate: CandidateFit) -> NDArray:
+    """Covariance of all unknowns by the information of the recordings and of the priors."""
+    prior_sd = coefficients_of(candidate.hypothesis)
+    information = np.diag([prior_sd[name] ** -2 if name in prior_sd else 0.0 for name in candidate.values])
+    of_calibration = candidate.prior[1].T @ candidate.prior[1] / len(candidate.whitened)
+    for w, J in zip(candidate.whitened, candidate.jacobian, strict=True):
+        count = of_recording(w.observations)
+        information += count * (J.T @ J / w.measured.size + of_calibration)
+    sizes = [prior_sd.get(name) or size_of(name, value) for name, value in candidate.values.items()]
+    return inverse_of(information, np.array(sizes))

@@ -1,0 +1,151 @@
+"""A learned law is recognised as that of a listed mechanism, or as none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ccmodel import mechanisms
+from ccmodel.diagnosis.listed_laws import Learned, distance, nearest_listed
+from ccmodel.diagnosis.settings import WITHIN_BAND
+from ccmodel.mechanisms import laws
+from ccmodel.mechanisms.learned import COARSE, FINE
+from ccmodel.report.verdict import law_claim
+
+# What recordings visit of each argument.
+RANGES = {
+    ("speed", "log10(m/s)"): (-3.5, -1.0),
+    ("speed", "rad/s"): (-3.0, 3.0),
+    ("time", "s"): (0.0, 25.0),
+    ("travel", "m"): (0.0, 0.6),
+    ("drive-angle", "rad"): (-2.5, 2.5),
+    ("load-angle", "rad"): (-0.8, 0.8),
+    ("distance-since-reversal", "m"): (1e-4, 1e-2),
+    ("reading", "N"): (2.0, 18.0),
+    ("reading", "N m"): (-0.1, 0.1),
+    ("reading", "rad"): (-1.0, 1.0),
+}
+CURVES = [(name, curve) for name in mechanisms.names() for curve in mechanisms.get(name).curves]
+
+
+def law_of(curve):
+    """The learned law that stands for a curve."""
+    return next(
+        law
+        for law in laws().values()
+        if (law.slot, law.argument.name, law.resolution) == (curve.slot, curve.argument, COARSE)
+        and (not curve.channels or law.channel in curve.channels)
+    )
+
+
+def learned(law, y, sd=0.03):
+    """A law with these values at its knots, its coefficients known to `sd` of their prior and off by so much."""
+    first, last = RANGES[law.argument.name, law.argument.unit]
+    values = {"first": first, "last": last, "scale": 1.0}
+    x, _ = law.at_knots(values | dict.fromkeys(law.coefficients, 0.0))
+    y = np.linalg.solve(law.shown(x), y(x)) if law.opposes else y(x)
+    if law.opposes is None:
+        y = y / y.mean() - 1 if law.channel is None else y - y.mean()
+    scale = 3 * float(np.abs(y).max())
+    z = np.linalg.lstsq(scale * law.basis, y, rcond=None)[0]
+    z += sd * np.random.default_rng(7).standard_normal(z.size)
+    covariance = sd**2 * np.eye(z.size)
+    return Learned(law, values | {"scale": scale} | dict(zip(law.coefficients, z, strict=True)), covariance)
+
+
+@pytest.mark.parametrize(("name", "curve"), CURVES, ids=lambda one: one if isinstance(one, str) else one.argument)
+def test_the_law_of_a_listed_mechanism_is_within_the_band_of_that_mechanism(name, curve):
+    constants = {p.name: p.start for p in curve.constants}
+    found = learned(law_of(curve), lambda x: curve.of(x, constants))
+    assert distance(found, curve) < WITHIN_BAND
+    assert nearest_listed(found)["distance"] <= distance(found, curve)
+
+
+@pytest.mark.parametrize(
+    ("name", "slot", "argument", "y"),
+    [
+        ("stribeck", "sliding-friction", "speed", lambda v: 1 + 0.3 * np.exp(-((10**v / 3e-3) ** 1.4))),
+        ("viscous-friction", "sliding-friction", "speed", lambda v: 1 + 6.0 * 10**v),
+        ("running-in", "sliding-friction", "travel", lambda w: 1 - 0.2 * np.expm1(-w * 8)),
+        ("running-in", "sliding-friction", "time", lambda t: 1 - 0.2 * np.expm1(-t / 7)),
+        ("relaxation", "sliding-friction", "time", lambda t: 1 - 0.05 * (1 - np.exp(-t / 15))),
+        ("pulley-eccentricity", "bearing-torque", "drive-angle", lambda a: 2e-3 * np.sin(a + 1.2)),
+        ("pulley-friction", "bearing-torque", "speed", lambda w: 4e-3 * np.tanh(w / 0.4)),
+        ("pulley-friction", "load", "distance-since-reversal", lambda s: 4e-3 * (1 - np.exp(-s / 6e-4))),
+        ("load-stiffening", "load", "load-angle", lambda a: -0.02 * a**3),
+        ("backlash", "load", "load-angle", lambda a: -0.05 * np.clip(a, -0.06, 0.06)),
+        ("load-cell-scale", "sensor-map", "reading", lambda f: -0.04 * f),
+        ("load-cell-drift", "sensor-map", "time", lambda t: 0.07 * t),
+    ],
+)
+def test_the_mechanism_of_a_law_is_the_nearest(name, slot, argument, y):
+    channel = {"sensor-map": "F_load_N"}.get(slot)
+    law = next(
+        one
+        for one in laws().values()
+        if (one.slot, one.argument.name) == (slot, argument) and (channel is None or one.channel == channel)
+    )
+    found = nearest_listed(learned(law, y, sd=0.01))
+    assert found["name"] == name
+    assert found["distance"] < WITHIN_BAND
+
+
+def test_a_law_of_another_period_is_far_from_an_eccentric_pulley():
+    law = replace(law_of(by_name("pulley-eccentricity", "bearing-torque")), resolution=FINE)
+    found = nearest_listed(learned(law, lambda a: 2e-3 * np.sin(2 * np.pi * a / 0.7)))
+    assert found["distance"] > 3 * WITHIN_BAND
+
+
+def by_name(name, slot):
+    return next(curve for curve in mechanisms.get(name).curves if curve.slot == slot)
+
+
+def test_what_is_hardly_known_is_within_the_band_of_more():
+    law = law_of(by_name("stribeck", "sliding-friction"))
+    rising = [
+        distance(learned(law, lambda v: 1 + 6.0 * 10**v, sd), by_name("stribeck", "sliding-friction"))
+        for sd in (0.01, 0.1)
+    ]
+    assert rising[0] > WITHIN_BAND
+    assert rising[1] < rising[0] / 3
+
+
+def test_correlated_coefficients_are_measured_along_their_correlation():
+    """A slope that a calibration nearly absorbs is no distance."""
+    curve = by_name("load-stiffening", "load")
+    law = law_of(curve)
+    found = learned(law, lambda a: 0.02 * a**3 + 0.05 * a, sd=0.01)
+    x, _ = law.at_knots(found.values)
+    slope = np.linalg.lstsq(found.values["scale"] * law.basis, x, rcond=None)[0]
+    free = replace(found, covariance=found.covariance + np.outer(slope, slope))
+    assert distance(found, curve) > 3
+    assert distance(free, curve) < WITHIN_BAND
+
+
+def test_a_slot_that_no_listed_mechanism_has_has_no_nearest():
+    law = laws()["learned-sliding-friction-by-direction"]
+    assert nearest_listed(Learned(law, {"first": -1.0, "last": 1.0, "scale": 0.1, "z1": 1.0}, np.eye(1))) is None
+
+
+def test_a_map_is_compared_with_faults_of_its_own_sensor():
+    law = laws()["learned-sensor-map-tau-in-by-reading"]
+    assert nearest_listed(learned(law, lambda x: 0.05 * x))["name"] == "torque-scale"
+    assert nearest_listed(learned(laws()["learned-sensor-map-theta-out-by-reading"], lambda x: 0.05 * x)) is None
+
+
+def said(**nearest):
+    law = {
+        "slot": "sliding-friction",
+        "argument_is": "the speed",
+        "indistinguishable": [],
+        "confidence": 0.9,
+        "channel": None,
+        "nearest_listed": nearest or None,
+    }
+    return law_claim(law)
+
+
+def test_the_report_says_whether_it_is_a_listed_law():
+    assert "Within its band this is the law of stribeck" in said(name="stribeck", distance=0.9)
+    assert "No listed mechanism does this (the nearest is stribeck, 7.4 standard" in said(name="stribeck", distance=7.4)
+    assert "No listed mechanism does this; the law" in said()
