@@ -22,6 +22,8 @@ RANGES = {
     ("load-angle", "rad"): (-0.8, 0.8),
     ("distance-since-reversal", "m"): (1e-4, 1e-2),
     ("reading", "N"): (2.0, 18.0),
+    ("tension", "N"): (1.0, 12.0),
+    ("position-along-conduit", "1"): (0.0, 1.0),
     ("reading", "N m"): (-0.1, 0.1),
     ("reading", "rad"): (-1.0, 1.0),
 }
@@ -44,8 +46,8 @@ def learned(law, y, sd=0.03):
     values = {"first": first, "last": last, "scale": 1.0}
     x, _ = law.at_knots(values | dict.fromkeys(law.coefficients, 0.0))
     y = np.linalg.solve(law.shown(x), y(x)) if law.opposes else y(x)
-    if law.opposes is None:
-        y = y / y.mean() - 1 if law.channel is None else y - y.mean()
+    if law.is_centred:
+        y = y / y.mean() - 1 if law.is_factor else y - y.mean()
     scale = 3 * float(np.abs(y).max())
     z = np.linalg.lstsq(scale * law.basis, y, rcond=None)[0]
     z += sd * np.random.default_rng(7).standard_normal(z.size)
@@ -74,6 +76,10 @@ def test_the_law_of_a_listed_mechanism_is_within_the_band_of_that_mechanism(name
         ("pulley-friction", "load", "distance-since-reversal", lambda s: 4e-3 * (1 - np.exp(-s / 6e-4))),
         ("load-stiffening", "load", "load-angle", lambda a: -0.02 * a**3),
         ("backlash", "load", "load-angle", lambda a: -0.05 * np.clip(a, -0.06, 0.06)),
+        ("load-dependent-friction", "sliding-friction", "tension", lambda T: (T / 5) ** -0.3),
+        ("constant-drag", "sliding-friction", "tension", lambda T: 1 + 1.5 / T),
+        ("kink", "sliding-friction", "position-along-conduit", lambda x: 1 + 2 * (1 - abs(x - 0.3) / 0.12).clip(0)),
+        ("termination-compliance", "end-stretch", "tension", lambda T: np.full(T.shape, 3e-5)),
         ("load-cell-scale", "sensor-map", "reading", lambda f: -0.04 * f),
         ("load-cell-drift", "sensor-map", "time", lambda t: 0.07 * t),
     ],
@@ -136,6 +142,7 @@ def test_a_map_is_compared_with_faults_of_its_own_sensor():
 def said(**nearest):
     law = {
         "slot": "sliding-friction",
+        "place": "conduit",
         "argument_is": "the speed",
         "indistinguishable": [],
         "confidence": 0.9,

@@ -5,16 +5,21 @@ import pytest
 
 from ccmodel import mechanisms as registry
 from ccmodel.channels import TAU_IN, THETA_IN, THETA_OUT
+from ccmodel.geometry import ConduitPath
 from ccmodel.mechanisms import Sensing, laws
 from ccmodel.mechanisms.learned import COARSE, FINE, basis
+from ccmodel.mechanisms.tables import Table, pulled, stretched
 from ccmodel.model.load import FixedLoad, SpringLoad
-from tests.general_runs import HALF_LOOP, K_E, MU, run, sine
+from tests.general_runs import HALF_LOOP, K_E, MU, K, L, loop_area, run, sine
 
 EVERY = list(laws().values())
+RANGES = {"tension": (1.0, 12.0), "position-along-conduit": (0.0, 1.0), "distance-since-reversal": (1e-4, 1.0)}
+SCALES = {"end-stretch": 5e-5}
 
 
 def values_of(law, **coefficients):
-    fixed = {"first": -1.0 if law.opposes is None else 1e-4, "last": 1.0, "scale": 0.1}
+    first, last = RANGES.get(law.argument.name, (-1.0, 1.0))
+    fixed = {"first": first, "last": last, "scale": SCALES.get(law.slot, 0.1)}
     return fixed | dict.fromkeys(law.coefficients, 0.0) | coefficients
 
 
@@ -58,6 +63,89 @@ def test_friction_by_direction_is_larger_where_the_cable_slides_towards_the_driv
     for samples, direction in ((slice(560, 600), 1), (slice(810, 850), -1)):
         ratio = response.T1_N[samples] / response.T2_N[samples]
         np.testing.assert_allclose(np.log(ratio), direction * mu_phi * (1 + direction * b), rtol=0.02)
+
+
+def with_values(law, y, scale=None):
+    """The law whose values at its knots are next to these: (name, place, values)."""
+    values = values_of(law) | ({} if scale is None else {"scale": scale})
+    x, _ = law.at_knots(values)
+    z = np.linalg.lstsq(values["scale"] * law.basis, y(x), rcond=None)[0]
+    return law.name, law.place, values | dict(zip(law.coefficients, z.tolist(), strict=True))
+
+
+def largest_difference(one, other):
+    return max(np.abs(one.read[c] - other.read[c]).max() / np.ptp(other.read[c]) for c in one.read)
+
+
+def test_friction_by_tension_is_that_of_a_power_law_with_these_values():
+    """The table has the power law at its knots; between them and of its average little is left."""
+    law = laws()["learned-sliding-friction-by-tension-fine"]
+    x = np.linspace(*RANGES["tension"], FINE[0])
+    power = (x / 5) ** -0.25
+    found = run(sine(), with_values(law, lambda x: (x / 5) ** -0.25 / power.mean() - 1), mu=MU * power.mean())
+    wanted = run(sine(), ("load-dependent-friction", "conduit", {"n": -0.25}))
+    assert largest_difference(found, wanted) < 0.1 * largest_difference(run(sine()), wanted)
+
+
+def test_friction_by_position_is_where_the_bend_is():
+    """Twice the friction in the first half and none in the other is a path that bends in the first half alone."""
+    law = laws()["learned-sliding-friction-by-position-along-conduit-fine"]
+    place = with_values(law, lambda x: np.tanh((0.5 - x) / 0.06))
+    bent = ConduitPath([L / 2, L / 2], [np.pi, 0.0])
+    found, wanted = run(sine(), place), run(sine(), path=bent)
+    assert largest_difference(found, wanted) < 0.2 * largest_difference(run(sine()), wanted)
+
+
+def test_cables_of_a_learned_compliance_are_those_that_settle():
+    """Over its own tension a settling cable has the compliance 1 / (1 - exp(-u / u_s))."""
+    law = laws()["learned-cable-stretch-by-tension-fine"]
+    over_settled = np.linspace(0.2, 10.0, 4000)
+    tension = 2.0 * (over_settled - 1 + np.exp(-over_settled))
+    compliance = lambda T: np.interp(T, tension, 1 / (1 - np.exp(-over_settled)))  # noqa: E731
+    mean = compliance(np.linspace(*RANGES["tension"], FINE[0])).mean()
+    found = run(sine(), with_values(law, lambda T: compliance(T) / mean - 1), k=K / mean)
+    wanted = run(sine(), ("strand-settling", "cable", {"T_scale": 2.0}))
+    assert largest_difference(found, wanted) < 0.1 * largest_difference(run(sine()), wanted)
+
+
+@pytest.mark.parametrize("end", ["drive", "load"])
+def test_a_fastening_of_constant_compliance_is_the_listed_one(end):
+    law = laws()[f"learned-end-stretch-{end}-by-tension"]
+    found = run(sine(), with_values(law, lambda T: np.full(T.size, 4e-5)))
+    wanted = run(sine(), ("termination-compliance", f"{end}-end", {"compliance": 4e-5}))
+    assert largest_difference(found, wanted) < 0.02 * largest_difference(run(sine()), wanted)
+
+
+@pytest.mark.parametrize("name", ["cable-stretch-by-tension", "end-stretch-load-by-tension"])
+def test_a_spring_that_is_learned_makes_no_work(name):
+    """Without friction the work of a cycle is zero, however the spring bends."""
+    law = laws()[f"learned-{name}"]
+    curve = with_values(law, lambda T: values_of(law)["scale"] * 5 * np.sin(T), scale=values_of(law)["scale"] * 5)
+    stiff, bent = run(sine(), mu=1e-9), run(sine(), curve, mu=1e-9)
+    assert largest_difference(bent, stiff) > 1e-3
+    assert abs(loop_area(bent)) < 1e-5 * np.ptp(bent.read[TAU_IN])
+
+
+def test_friction_that_is_learned_is_never_negative():
+    """A law that would fall below zero gives no work."""
+    law = laws()["learned-sliding-friction-by-tension"]
+    r = run(sine(), with_values(law, lambda T: np.linspace(-3.0, 3.0, T.size), scale=3.0))
+    assert loop_area(r) > 0
+    assert registry.get(law.name).settings == {}
+
+
+def test_a_table_of_a_spring_is_inverted_exactly():
+    random = np.random.default_rng(3)
+    table = Table(1.0, 8.0, tuple(random.uniform(0.1, 3.0, 9)))
+    rows = np.repeat(table.rows_of_spring[:, None, None], 2, axis=1)
+    for T in np.concatenate([[-2.0, 0.0, 1.0, 8.0, 12.0], random.uniform(0.0, 9.0, 40)]):
+        stretch = stretched(rows, 0, 1, 0, T)
+        back, slope = pulled(rows, 0, 1, 0, stretch)
+        assert back == pytest.approx(T, abs=1e-9)
+        assert slope == pytest.approx(1 / table.at(T), rel=1e-9)
+    assert stretched(rows, 0, 0, 0, 0.0) == pytest.approx(0.0, abs=1e-12)
+    fine = np.linspace(0.0, 8.0, 20001)
+    assert stretched(rows, 0, 0, 0, 8.0) == pytest.approx(np.trapezoid(table.at(fine), fine), rel=1e-6)
 
 
 def test_a_law_with_memory_is_a_sum_of_maxwell_slip_elements():

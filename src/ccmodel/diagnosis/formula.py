@@ -41,7 +41,7 @@ class Form:
 def _forms(law: Law) -> Iterator[Form]:
     """Formulas from short to long."""
     if law.argument.has_two_values:
-        yield Form("1 + a sign(v)" if law.channel is None else "a sign(v)", lambda x, _: (x,), ("a",), ("y",))
+        yield Form("1 + a sign(v)" if law.is_factor else "a sign(v)", lambda x, _: (x,), ("a",), ("y",))
         return
     yield Form("a + b x", lambda x, _: (x**0, x), ("a", "b"), ("y", "y/x"))
     yield Form("a + b x^2", lambda x, _: (x**0, x**2), ("a", "b"), ("y", "y/x^2"))
@@ -73,7 +73,7 @@ def shortest(
     law : Law
     """
     quantile = normal.ppf(0.5 + COVERAGE / 2)
-    neutral = 1.0 if law.argument.has_two_values and law.channel is None else 0.0
+    neutral = 1.0 if law.argument.has_two_values and law.is_factor else 0.0
     sd = np.maximum((band[1] - band[0]) / (2 * quantile), 1e-3 * max(float(np.ptp(y)), 1e-12))
     for form in _forms(law):
         constants, errors, derivatives = _fitted(form, x, y - neutral, sd)

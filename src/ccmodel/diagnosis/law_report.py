@@ -53,7 +53,7 @@ def curve_of(candidate: CandidateFit, law: Law) -> tuple[NDArray, NDArray, tuple
     y, by_coefficients = shown @ y, values["scale"] * (shown @ law.basis)
     covariance = by_coefficients @ candidate.covariance[np.ix_(some, some)] @ by_coefficients.T
     reach = normal.ppf(0.5 + COVERAGE / 2) * np.sqrt(np.diag(covariance).clip(0.0))
-    neutral = 1.0 if law.channel is None else 0.0
+    neutral = 1.0 if law.is_factor else 0.0
     return x, y + neutral, (y + neutral - reach, y + neutral + reach)
 
 

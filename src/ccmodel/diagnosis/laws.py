@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.channels import THETA_IN
+from ccmodel.channels import CHANNELS, THETA_IN
 from ccmodel.deadline import Deadline, OutOfTimeError
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
@@ -66,7 +66,7 @@ def _motion(base: CandidateFit, i: int) -> Sensing:
     """What the arguments of laws are read from, as the fitted model simulates a recording."""
     o = base.whitened[i].observations
     simulated = simulate(o.given, base.model(o.parameters))
-    channels = {c: simulated[c] for c in o.channels} | {THETA_IN: o.given.theta_in}
+    channels = {c: simulated[c] for c in CHANNELS if c in simulated} | {THETA_IN: o.given.theta_in}
     return Sensing(o.given.recording.time_s, channels, o.parameters.drive_radius_m, o.parameters.load_radius_m)
 
 
@@ -74,11 +74,11 @@ def _proposed(
     base: CandidateFit, discrepancy: Discrepancy, law: Law, motions: Sequence[Sensing], nothing: float
 ) -> Iterator[Proposal]:
     pairs = zip(base.whitened, motions, strict=True)
-    visited = np.concatenate([law.argument.of(m)[w.observations.judged] for w, m in pairs])
+    visited = np.concatenate([law.argument.of(m)[..., w.observations.judged].ravel() for w, m in pairs])
     first, last = law.range_of(visited)
     if not last > first:
         raise ValueError(f"{law.name}: its argument does not vary")
-    unit = 1.0 if law.channel is None else float(np.ptp(np.concatenate([m.channels[law.channel] for m in motions])))
+    unit = _unit_of(law, base, motions)
 
     def hypothesis(scale: float) -> Hypothesis:
         fixed = {"first": first, "last": last, "scale": scale}
@@ -92,6 +92,13 @@ def _proposed(
         linear = _extended(base, base.hypothesis.and_also(one), [J * share / settings.LAW_STEP for J in columns])
         x = dict(zip(linear.values, discrepancy.most_probable(linear).tolist(), strict=True))
         yield Proposal(one, _evidence(discrepancy, linear) - nothing, {name: x[name] for name in one.start})
+
+
+def _unit_of(law: Law, base: CandidateFit, motions: Sequence[Sensing]) -> float:
+    """What sizes of a law's values are shares of: 1 of a factor, a cable's compliance, or a channel's peak to peak."""
+    if law.channel is not None:
+        return float(np.ptp(np.concatenate([m.channels[law.channel] for m in motions])))
+    return 1.0 if law.is_factor else 1 / base.model(base.whitened[0].observations.parameters).stiffness_N_per_m
 
 
 def _sensitivities(base: CandidateFit, hypothesis: Hypothesis, law: Law) -> list[NDArray]:

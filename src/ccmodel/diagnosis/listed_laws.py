@@ -18,7 +18,7 @@ from ccmodel.inference.cross_validation import inverse_of
 from ccmodel.inference.effective_samples import of_recording
 from ccmodel.inference.jacobian import size_of
 from ccmodel.mechanisms.contract import Curve, Parameter
-from ccmodel.mechanisms.learned import SLIGHTEST, Law
+from ccmodel.mechanisms.learned import Law
 
 
 @dataclass(frozen=True)
@@ -83,16 +83,14 @@ class _Distance:
         return cls(learned, curve, x, z, np.linalg.cholesky(learned.covariance))
 
     def errors(self, u: NDArray, signs: Sequence[float]) -> NDArray:
-        """Of the coefficients, and of what no coefficients give; shape (coefficients + knots,)."""
+        """Of the coefficients that follow the listed law as well as they can, shape (coefficients,)."""
         law, scale = self.learned.law, self.learned.values["scale"]
         constants = zip(self.curve.constants, u, signs, strict=True)
         y = self.curve.of(self.x, {p.name: _value(p, one, sign) for p, one, sign in constants})
-        # What is shown of a law with memory is the torque from rest; it has no average that a calibration absorbs.
-        wanted = np.linalg.solve(law.shown(self.x), y) if law.opposes else _without_average(y, law)
+        # What is shown of a law with memory is the torque from rest.
+        wanted = _without_average(y, law) if law.is_centred else np.linalg.solve(law.shown(self.x), y)
         z = np.linalg.lstsq(scale * law.basis, wanted, rcond=None)[0]
-        missed = wanted - scale * law.basis @ z
-        by_coefficients = solve_triangular(self.root, z - self.z, lower=True)
-        return np.concatenate([by_coefficients, missed / (SLIGHTEST * scale)])
+        return solve_triangular(self.root, z - self.z, lower=True)
 
     def cost(self, u: NDArray, signs: Sequence[float]) -> float:
         return 0.5 * float(np.sum(self.errors(u, signs) ** 2))
@@ -112,7 +110,7 @@ class _Distance:
 
 def _without_average(y: NDArray, law: Law) -> NDArray:
     """Values of a law at its knots without what belongs to the calibration: added to 1 for a factor, or to 0."""
-    return y / y.mean() - 1.0 if law.channel is None else y - y.mean()
+    return y / y.mean() - 1.0 if law.is_factor else y - y.mean()
 
 
 def _scaled(p: Parameter, value: float) -> float:

@@ -10,7 +10,14 @@ Source: Gao, Luedtke, Gourdon, Ruths, Israelachvili and Landman, Frictional forc
 molecular to the macroscopic scale, Journal of Physical Chemistry B 108(11), 3410-3425, 2004.
 """
 
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+import numpy as np
+
+from ccmodel.mechanisms.contract import SLIDING_FRICTION, Curve, Mechanism, Parameter
+
+# The drag over mu and the bend: the tension at which it is as large as Coulomb friction. Below a tenth of a newton the
+# factor of friction that it is would grow without bound.
+_AS_LARGE_AT = Parameter("as_large_at", "N", 0.1, 30.0, 1.0, "tension at which the drag equals Coulomb friction")
+FLOOR_N = 0.1
 
 MECHANISM = Mechanism(
     name="constant-drag",
@@ -22,4 +29,12 @@ MECHANISM = Mechanism(
     mistaken_for=("load-dependent-friction", "pulley-friction"),
     depends_on_time=False,
     settings={"drag_N": "f0"},
+    curves=(
+        Curve(
+            SLIDING_FRICTION,
+            "tension",
+            lambda tension, values: 1 + values["as_large_at"] / np.maximum(tension, FLOOR_N),
+            (_AS_LARGE_AT,),
+        ),
+    ),
 )

@@ -15,7 +15,13 @@ Source: Agrawal, Peine and Yao 2010, Section VI: kinks introduced inadvertently.
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from ccmodel.mechanisms.contract import Mechanism, Parameter, Settings
+import numpy as np
+from numpy.typing import NDArray
+
+from ccmodel.mechanisms.contract import SLIDING_FRICTION, Curve, Mechanism, Parameter, Settings
+
+# Half of the width that a law of the position gives to a kink, as a share of the length: a kink itself has none.
+HALF_WIDTH = 0.125
 
 
 class Kink(NamedTuple):
@@ -34,6 +40,15 @@ def _modifies_physics(settings: Settings, values: Mapping[str, float]) -> None:
     settings.kinks += (Kink(values["s"], values["beta"], values["hold"]),)
 
 
+def _of_position(share: NDArray, values: Mapping[str, float]) -> NDArray:
+    """Friction over that of an even bend."""
+    return 1 + values["rise"] * (1 - np.abs(share - values["s"]) / HALF_WIDTH).clip(0.0)
+
+
+_S = Parameter("s", "1", 0.05, 0.95, 0.5, "place, as a share of the length", neutral=0.5, scale="linear")
+# A bend of 0.2 to 1.5 rad over what an even bend of 1 to 9 rad has within the width.
+_RISE = Parameter("rise", "1", 0.1, 15.0, 2.0, "rise of friction at the kink, over that of an even bend")
+
 MECHANISM = Mechanism(
     name="kink",
     text=__doc__,
@@ -42,7 +57,7 @@ MECHANISM = Mechanism(
     places=("conduit",),
     parameters=(
         Parameter("beta", "rad", 0.2, 1.5, 0.6, "angle of the bend"),
-        Parameter("s", "1", 0.05, 0.95, 0.5, "place, as a share of the length", neutral=0.5, scale="linear"),
+        _S,
         Parameter(
             "hold",
             "1",
@@ -60,4 +75,5 @@ MECHANISM = Mechanism(
     depends_on_time=False,
     structures={"kinks": ()},
     modifies_physics=_modifies_physics,
+    curves=(Curve(SLIDING_FRICTION, "position-along-conduit", _of_position, (_RISE, _S)),),
 )

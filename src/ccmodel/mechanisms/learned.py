@@ -27,6 +27,7 @@ from ccmodel.channels import (
     PLACES_OF,
     TAU_IN,
     TAU_OUT,
+    TENSIONS,
     THETA_IN,
     THETA_OUT,
     short_name,
@@ -36,6 +37,8 @@ from ccmodel.channels import (
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import (
     BEARING_TORQUE,
+    CABLE_STRETCH,
+    END_STRETCH,
     LOAD,
     SENSOR_MAP,
     SLIDING_FRICTION,
@@ -43,7 +46,9 @@ from ccmodel.mechanisms.contract import (
     Parameter,
     Sensing,
     Settings,
+    side,
 )
+from ccmodel.mechanisms.tables import Table
 
 # Knots of a law, and the length over which its values are correlated a priori, as a share of its range: at first, and
 # where the recordings show more.
@@ -60,6 +65,8 @@ SLOWEST_M_PER_S = 1e-5
 RANGE, SHORTEST_YIELD = (0.005, 0.995), 0.01
 # Friction is never negative in either direction.
 LARGEST_BIAS = 0.95
+# A spring is never without stretch: its least compliance over its mean.
+LEAST_COMPLIANCE = 0.05
 
 
 @dataclass(frozen=True)
@@ -74,7 +81,8 @@ class Argument:
     meaning : str
         As it stands in a sentence.
     of : callable
-        ``of(sensing)``: its values, shape (n,).
+        ``of(sensing)``: its values, shape (n,); of one that differs along the cables, those at several places, shape
+        (places, n).
     has_two_values : bool
         Whether it is -1 or 1.
     """
@@ -113,33 +121,69 @@ class Law:
     @property
     def name(self) -> str:
         """Its name as a mechanism."""
-        of = "" if self.slot != SENSOR_MAP else f"-{short_name(str(self.channel))}".replace("_", "-")
+        of = ""
+        if self.slot == SENSOR_MAP:
+            of = f"-{short_name(str(self.channel))}".replace("_", "-")
+        if self.slot == END_STRETCH:
+            of = f"-{side(self.place)}"
         fine = "-fine" if self.resolution == FINE else ""
         return f"learned-{self.slot}{of}-by-{self.argument.name}{fine}"
 
     @property
     def unit(self) -> str:
         """Unit of its values."""
-        return "1" if self.channel is None else unit_of(self.channel)
+        if self.channel is not None:
+            return unit_of(self.channel)
+        return "1" if self.is_factor else "m/N"
+
+    @property
+    def is_factor(self) -> bool:
+        """Whether it is a factor, to which its values are added; it is then 1 where it has no effect."""
+        return self.slot in (SLIDING_FRICTION, CABLE_STRETCH)
+
+    @property
+    def is_centred(self) -> bool:
+        """Whether its average belongs to the calibration."""
+        return self.opposes is None and self.slot != END_STRETCH
 
     @property
     def curve_is(self) -> str:
         """What its values are."""
         if self.channel is None:
-            return "factor of the friction coefficient"
+            return _CURVE_IS[self.slot].format(side=side(self.place))
         against = "" if self.opposes is None else ", against the motion"
         return f"added to {symbol_of(self.channel)}{against}, in {self.unit}"
 
     @property
-    def is_local(self) -> bool:
-        """Whether its argument differs along the cable: the solver then has the law in its equations."""
-        return self.slot == SLIDING_FRICTION and self.argument.has_two_values
+    def setting(self) -> str | None:
+        """The solver's setting that takes the law, if it is one of the solver.
+
+        A law whose argument differs along the cables is a number or a table in the solver's equations. The others are
+        functions of a motion, and a setting holds several.
+        """
+        by_argument = _SETTINGS.get((self.slot, self.argument.name), _SETTINGS.get((self.slot, "")))
+        return by_argument and by_argument.format(side=side(self.place))
+
+    def written(self, values: Mapping[str, float], before: Any) -> Any:
+        """The value of its setting that had the value `before`."""
+        first, last, (_, y) = values["first"], values["last"], self.at_knots(values)
+        if self.setting == "direction_bias":
+            return float(np.clip(y[-1], -LARGEST_BIAS, LARGEST_BIAS))
+        if isinstance(before, tuple):
+            return (*before, lambda sensing: self.added(sensing, values))
+        if not y.any():
+            return None
+        if self.slot == SLIDING_FRICTION:
+            return Table(first, last, tuple((1 + y).clip(0.0).tolist()))
+        if self.slot == CABLE_STRETCH:
+            return Table(first, last, tuple((1 + y).clip(LEAST_COMPLIANCE).tolist()))
+        return Table(first, last, tuple(y.clip(0.0).tolist())) if (y > 0).any() else None
 
     @property
     def basis(self) -> NDArray:
         """Derivatives of its values at the knots by its coefficients, shape (knots, coefficients)."""
         knots, length = (2, 1.0) if self.argument.has_two_values else self.resolution
-        return basis(knots, length, self.opposes is None)
+        return basis(knots, length, self.is_centred)
 
     def at_knots(self, values: Mapping[str, float]) -> tuple[NDArray, NDArray]:
         """Its arguments at the knots and its values there, both of shape (knots,)."""
@@ -185,20 +229,14 @@ class Law:
     @cached_property
     def mechanism(self) -> Mechanism:
         """The law as a mechanism."""
-        structure = {SLIDING_FRICTION: "friction_laws", LOAD: "load_laws"}.get(self.slot)
+        setting = self.setting
         physics = observation = None
-        structures: dict[str, Any] = {structure: ()} if structure else {}
-        if self.is_local:
-            structures = {"direction_bias": 0.0}
+        structures: dict[str, Any] = {}
+        if setting is not None:
+            structures = {setting: _NEUTRAL.get(setting)}
 
             def physics(settings: Settings, values: Mapping[str, float]) -> None:
-                settings.direction_bias = float(np.clip(self.at_knots(values)[1][-1], -LARGEST_BIAS, LARGEST_BIAS))
-
-        elif structure is not None:
-
-            def physics(settings: Settings, values: Mapping[str, float]) -> None:
-                of_slot = getattr(settings, structure)
-                setattr(settings, structure, (*of_slot, lambda sensing: self.added(sensing, values)))
+                setattr(settings, setting, self.written(values, getattr(settings, setting)))
 
         else:
 
@@ -232,6 +270,24 @@ class Law:
         )
 
 
+_CURVE_IS = {
+    SLIDING_FRICTION: "factor of the friction coefficient",
+    CABLE_STRETCH: "factor of the cables' compliance",
+    END_STRETCH: "compliance of the cables' fastening at the {side}, in m/N",
+}
+# Settings of the solver by slot and argument, or by slot for all other arguments; and those that are neutral at
+# something else than None.
+_SETTINGS = {
+    (SLIDING_FRICTION, "direction"): "direction_bias",
+    (SLIDING_FRICTION, "tension"): "friction_by_tension",
+    (SLIDING_FRICTION, "position-along-conduit"): "friction_by_position",
+    (SLIDING_FRICTION, ""): "friction_laws",
+    (CABLE_STRETCH, "tension"): "cable_compliance",
+    (END_STRETCH, "tension"): "{side}_end_stretch",
+    (LOAD, ""): "load_laws",
+}
+_NEUTRAL: dict[str, Any] = {"direction_bias": 0.0, "friction_laws": (), "load_laws": ()}
+
 _TEXT = """A law that was learnt from recordings: {what}, by {argument}.
 
 Equation: piecewise linear between knots, and constant beyond them.
@@ -259,6 +315,19 @@ def basis(knots: int, length: float, is_centred: bool) -> NDArray:
     # Eigenvectors have no sign of their own: that of their last entry is made positive.
     root = root * np.where(root[-1] < 0, -1.0, 1.0)
     return root / np.sqrt((root**2).sum() / knots)
+
+
+def end_spring(settings: Settings, end: str) -> tuple[float, Table | None] | None:
+    """Mean compliance of the cables' fastening at "drive" or "load", m/N, and its course over the mean, if any.
+
+    None for a fastening that does not yield.
+    """
+    compliance, law = getattr(settings, f"{end}_end_compliance"), getattr(settings, f"{end}_end_stretch")
+    if law is None:
+        return (compliance, None) if compliance > 0 else None
+    values = compliance + np.array(law.values)
+    mean = float(values.mean())
+    return mean, law._replace(values=tuple((values / mean).clip(LEAST_COMPLIANCE).tolist()))
 
 
 @kernel
@@ -329,6 +398,17 @@ def _log_speed(s: Sensing) -> NDArray:
     return np.log10(np.maximum(s.drive_radius_m * np.abs(_velocity_of(THETA_IN)(s)), SLOWEST_M_PER_S))
 
 
+def _tensions(s: Sensing) -> NDArray:
+    return np.stack([s.channels[c] for c in TENSIONS if c in s.channels]).clip(0.0)
+
+
+TENSION = Argument("tension", "N", "the cable's tension", _tensions)
+POSITION = Argument(
+    "position-along-conduit",
+    "1",
+    "the position along the conduit, from the drive, over its length",
+    lambda s: np.repeat([[0.0], [1.0]], s.time_s.size, axis=1),
+)
 DIRECTION = Argument("direction", "1", "the direction in which the cable slides", _direction, True)
 TIME = Argument("time", "s", "the time since the recording's start", lambda s: s.time_s - s.time_s[0])
 TRAVEL = Argument("travel", "m", "the drive's travel since the recording's start", lambda s: s.drive_travel_m)
@@ -352,8 +432,11 @@ def _of_motion(angle: str, end: str) -> dict[str, Argument]:
 
 def _laws() -> Iterator[Law]:
     drive, load = _of_motion(THETA_IN, "drive"), _of_motion(THETA_OUT, "load")
-    for argument in (DIRECTION, LOG_SPEED, DWELL, drive["since"], TRAVEL, TIME, drive["angle"]):
+    for argument in (DIRECTION, LOG_SPEED, DWELL, drive["since"], TRAVEL, TIME, drive["angle"], TENSION, POSITION):
         yield Law(SLIDING_FRICTION, "conduit", argument)
+    yield Law(CABLE_STRETCH, "cable", TENSION)
+    for end in ("drive-end", "load-end"):
+        yield Law(END_STRETCH, end, TENSION)
     for slot, place, channel, motion, angle in (
         (BEARING_TORQUE, "drive-pulley", TAU_IN, drive, THETA_IN),
         (LOAD, "load", TAU_OUT, load, THETA_OUT),
@@ -364,7 +447,9 @@ def _laws() -> Iterator[Law]:
     for channel in (TAU_IN, TAU_OUT, F_DRIVE, F_LOAD, THETA_OUT):
         reading = Argument("reading", unit_of(channel), f"the reading of {symbol_of(channel)}", _reading(channel))
         place = next(p for p in PLACES_OF[channel] if p.endswith("-sensor"))
-        for argument in (reading, TIME):
+        # A map of tau_in by its angle is a torque of the drive pulley, and theta_out is an angle itself.
+        of_pulley = {F_DRIVE: [drive["angle"]], F_LOAD: [load["angle"]], TAU_OUT: [load["angle"]]}.get(channel, [])
+        for argument in (reading, TIME, *of_pulley):
             yield Law(SENSOR_MAP, place, argument, channel)
 
 

@@ -10,9 +10,14 @@ Separated by: three pretensions: a drag leaves a loss at zero tension, a power l
 Source: Archard, Elastic deformation and the laws of friction, Proceedings of the Royal Society A 243, 190-205, 1957.
 """
 
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
 from ccmodel.elementary import quick_exp, quick_log
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+from ccmodel.mechanisms.contract import SLIDING_FRICTION, Curve, Mechanism, Parameter
 
 # Tension at which mu holds; fixed, so that n can be compared between rigs.
 REFERENCE_N = 5.0
@@ -28,14 +33,21 @@ def power_of_tension(tension: float, n: float) -> tuple[float, float]:
     return factor, n * factor * tension / square
 
 
+def _of_tension(tension: NDArray, values: Mapping[str, float]) -> NDArray:
+    return (np.hypot(tension, FLOOR_N) / REFERENCE_N) ** values["n"]
+
+
+_N = Parameter("n", "1", -0.35, -0.05, -0.15, "exponent of the tension", scale="linear")
+
 MECHANISM = Mechanism(
     name="load-dependent-friction",
     text=__doc__,
     tex=r"\mu(T) = \mu \left(\frac{T}{T_\mathrm{ref}}\right)^{n}, \qquad T_\mathrm{ref} = 5\,\mathrm{N}",
     sentence="the friction coefficient changes with tension to the power {n}",
     places=("conduit",),
-    parameters=(Parameter("n", "1", -0.35, -0.05, -0.15, "exponent of the tension", scale="linear"),),
+    parameters=(_N,),
     mistaken_for=("constant-drag",),
     depends_on_time=False,
     settings={"tension_exponent": "n"},
+    curves=(Curve(SLIDING_FRICTION, "tension", _of_tension, (_N,)),),
 )

@@ -10,12 +10,14 @@ Separated by: a sweep at low pretension: settling depends on the cable's own ten
 Source: Feyrer, Wire Ropes: Tension, Endurance, Reliability, 2nd edition, Springer, 2015, on the rope modulus.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.elementary import quick_exp
 from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+from ccmodel.mechanisms.contract import CABLE_STRETCH, Curve, Mechanism, Parameter
 
 
 @kernel(inline="always")
@@ -35,14 +37,26 @@ def stretch_at(tension: NDArray, settled: NDArray, stiffness: NDArray) -> NDArra
     return stretch
 
 
+def _of_tension(tension: NDArray, values: Mapping[str, float]) -> NDArray:
+    """Compliance over that of a settled cable."""
+    one = np.ones_like(tension)
+    over_settled = stretch_at(np.maximum(tension / values["T_scale"], SLACK_SHARE), one, one)
+    return -1 / np.expm1(-over_settled)
+
+
+# Below this tension over `T_scale` the compliance would grow without bound.
+SLACK_SHARE = 1e-3
+_T_SCALE = Parameter("T_scale", "N", 0.5, 10.0, 2.0, "tension scale of the settling")
+
 MECHANISM = Mechanism(
     name="strand-settling",
     text=__doc__,
     tex=r"T = EA\,\Bigl(u' - u_s\,\bigl(1 - e^{-u'/u_s}\bigr)\Bigr), \qquad u_s = \frac{T_\mathrm{scale}}{EA}",
     sentence="the cables soften where the tension is low, about {T_scale}",
     places=("cable",),
-    parameters=(Parameter("T_scale", "N", 0.5, 10.0, 2.0, "tension scale of the settling"),),
+    parameters=(_T_SCALE,),
     mistaken_for=("backlash", "slack"),
     depends_on_time=False,
     settings={"settling_N": "T_scale"},
+    curves=(Curve(CABLE_STRETCH, "tension", _of_tension, (_T_SCALE,)),),
 )

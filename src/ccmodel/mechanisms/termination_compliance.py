@@ -11,17 +11,22 @@ advanced.
 Source: Agrawal, Peine and Yao 2010, Section V: measured and fitted stiffness.
 """
 
-from ccmodel.mechanisms.contract import Mechanism, Parameter
+import numpy as np
+
+from ccmodel.mechanisms.contract import END_STRETCH, Curve, Mechanism, Parameter
 
 # 4 to 200 % of a cable's own: 1 / 13.88 kN/m is 72 um/N.
+_COMPLIANCE = Parameter("compliance", "m/N", 3e-6, 150e-6, 20e-6, "compliance of one end of each cable")
+
 MECHANISM = Mechanism(
     name="termination-compliance",
     text=__doc__,
     tex=r"\Delta u_\mathrm{end} = \mathrm{compliance}\cdot T_\mathrm{end}",
     sentence="the cables' fastening at the {side} yields by {compliance}",
     places=("drive-end", "load-end"),
-    parameters=(Parameter("compliance", "m/N", 3e-6, 150e-6, 20e-6, "compliance of one end of each cable"),),
+    parameters=(_COMPLIANCE,),
     mistaken_for=("K",),
     depends_on_time=False,
     settings={"{side}_end_compliance": "compliance"},
+    curves=(Curve(END_STRETCH, "tension", lambda tension, c: np.full(tension.shape, c["compliance"]), (_COMPLIANCE,)),),
 )

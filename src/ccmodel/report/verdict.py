@@ -7,7 +7,15 @@ from math import floor, log10
 from ccmodel import mechanisms as registry
 from ccmodel.channels import TABLE, symbol_of
 from ccmodel.diagnosis.settings import SURE, WITHIN_BAND
-from ccmodel.mechanisms.contract import BEARING_TORQUE, LOAD, SENSOR_MAP, SLIDING_FRICTION, side
+from ccmodel.mechanisms.contract import (
+    BEARING_TORQUE,
+    CABLE_STRETCH,
+    END_STRETCH,
+    LOAD,
+    SENSOR_MAP,
+    SLIDING_FRICTION,
+    side,
+)
 
 # By the short names of diagnosis.json.
 SYMBOL = {channel.short_name: channel.symbol for channel in TABLE.values()}
@@ -109,6 +117,8 @@ def headline(diagnosis: Mapping) -> str:
 # What has a law of each slot; that of a sensor is named by its channel.
 IN_SLOT = {
     SLIDING_FRICTION: "Friction along the conduits",
+    CABLE_STRETCH: "The cables' compliance",
+    END_STRETCH: "The compliance of the cables' fastening at the {side}",
     BEARING_TORQUE: "The torque at the drive pulley",
     LOAD: "The load's torque",
 }
@@ -123,6 +133,7 @@ def law_sentence(diagnosis: Mapping) -> str:
 def law_claim(law: Mapping) -> str:
     """What a learned law says, with its confidence."""
     what = f"The error of {symbol_of(law['channel'])}" if law["slot"] == SENSOR_MAP else IN_SLOT[law["slot"]]
+    what = what.format(side=side(law["place"]))
     others = f" (or on {' or '.join(law['indistinguishable'])})" if law["indistinguishable"] else ""
     return (
         f"{what} depends on {law['argument_is']}{others}, confidence {law['confidence']:.2f}. {_resemblance(law)}; the"

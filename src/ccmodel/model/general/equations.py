@@ -21,6 +21,7 @@ from ccmodel.mechanisms.pulley_eccentricity import winding, winding_change
 from ccmodel.mechanisms.relaxation import BRANCHES, lag_weights
 from ccmodel.mechanisms.strand_settling import settling_tension
 from ccmodel.mechanisms.stribeck import renewed
+from ccmodel.mechanisms.tables import interpolated, pulled
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.layout import Physics
 
@@ -35,7 +36,7 @@ def _tensions(ph: Physics, piece: NDArray, slide: NDArray, mean: NDArray, follow
     for c in range(2):
         T, K, k = piece[rows.TENSION, c], piece[rows.TANGENT, c], piece[rows.STIFFNESS, c]
         d, e = slide[rows.NOW, c], piece[rows.STRETCH, c]
-        if not (ph.has_settling or ph.has_relaxation or ph.conduit_compliance > 0):
+        if not (ph.has_settling or ph.has_relaxation or ph.has_spring_table or ph.conduit_compliance > 0):
             for i in range(n1):
                 pull = k[i] * (e[i] + (d[i] - d[i + 1]))
                 share = 1.0 if pull > 0.0 else rows.SLACK_SHARE
@@ -51,6 +52,8 @@ def _tensions(ph: Physics, piece: NDArray, slide: NDArray, mean: NDArray, follow
             for i in range(n1):
                 piece[rows.PULL, c, i] = k[i] * T[i]
                 K[i] = k[i]
+        if ph.has_spring_table:
+            _bend(piece, c)
         for i in range(n1):
             pull, tangent = piece[rows.PULL, c, i], K[i]
             if ph.has_relaxation:
@@ -84,6 +87,16 @@ def _settle(piece: NDArray, c: int) -> None:
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
+def _bend(piece: NDArray, c: int) -> None:
+    """Bend the characteristic of each piece of a cable as its table has it: a compliance by tension, over its mean."""
+    pulls, K = piece[rows.PULL, c], piece[rows.TANGENT, c]
+    for i in range(piece.shape[2]):
+        if piece[rows.SPRING_TABLE + 2, c, i] > 0.0:
+            pulls[i], slope = pulled(piece, rows.SPRING_TABLE, c, i, pulls[i])
+            K[i] *= slope
+
+
+@kernel(error_model="numpy", fastmath=rows.FAST)
 def _set_hold(ph: Physics, piece: NDArray, node: NDArray, c: int) -> None:
     """Tension-dependent friction of each node over the sum of its tensions, and half that sum times its derivative."""
     T, grip, now, slope = piece[rows.TENSION, c], node[rows.GRIP, c], node[rows.GRIP_NOW, c], node[rows.GRIP_SLOPE, c]
@@ -93,6 +106,19 @@ def _set_hold(ph: Physics, piece: NDArray, node: NDArray, c: int) -> None:
         g = quick_tanh(grip[i] * factor)
         now[i] = g
         slope[i] = half * (1.0 - g * g) * grip[i] * by_tension
+
+
+@kernel(error_model="numpy", fastmath=rows.FAST)
+def _set_hold_by_table(ph: Physics, piece: NDArray, node: NDArray, c: int) -> None:
+    """The same where a table gives a factor of friction by tension, beside a power of it."""
+    T, grip, now, slope = piece[rows.TENSION, c], node[rows.GRIP, c], node[rows.GRIP_NOW, c], node[rows.GRIP_SLOPE, c]
+    for i in range(node.shape[2]):
+        half = 0.5 * (max(T[i], 0.0) + max(T[i + 1], 0.0))
+        power, by_power = power_of_tension(half, ph.tension_exponent)
+        factor, by_factor = interpolated(node, rows.FRICTION_TABLE, c, i, half)
+        g = quick_tanh(grip[i] * power * factor)
+        now[i] = g
+        slope[i] = half * (1.0 - g * g) * grip[i] * (by_power * factor + power * by_factor)
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
@@ -145,7 +171,10 @@ def _nodes(ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, dt: float
                 fd[i] *= hold
                 r[i] = T[i] - T[i + 1] - x * hold
         else:
-            if ph.tension_exponent != 0.0:
+            if ph.has_friction_table:
+                _set_hold_by_table(ph, piece, node, c)
+                grip = node[rows.GRIP_NOW, c]
+            elif ph.tension_exponent != 0.0:
                 _set_hold(ph, piece, node, c)
                 grip = node[rows.GRIP_NOW, c]
             for i in range(n):
@@ -235,7 +264,7 @@ def _mean_tension(piece: NDArray, c: int) -> float:
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
 def set_grip(ph: Physics, node: NDArray, slide: NDArray, friction_factor: NDArray, dt: float) -> float:
-    """Set friction of each node over the sum of its tensions; with a power of tension, only its argument mu phi / 2.
+    """Set friction of each node over the sum of its tensions; with a law of tension, only its argument mu phi / 2.
 
     `friction_factor` is that of mu by cable, shape (2,). The contacts' memory of rest at the end of the step follows
     from the slides in `NOW`, the best estimate so far.
@@ -254,7 +283,7 @@ def set_grip(ph: Physics, node: NDArray, slide: NDArray, friction_factor: NDArra
             before[i] = rested[i]
         for i in range(node.shape[2]):
             grip[i] = half_bend[i] * friction_factor[c] * (1.0 + ph.stribeck_rise * rested[i])
-        if ph.tension_exponent == 0.0:
+        if ph.tension_exponent == 0.0 and not ph.has_friction_table:
             for i in range(node.shape[2]):
                 grip[i] = quick_tanh(grip[i])
     return ph.stribeck_rise * change

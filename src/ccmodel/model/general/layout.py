@@ -63,6 +63,8 @@ NOW, STEP, SAVED, LAST, BEFORE = range(5)
 # bristle of the bearing; then speed, bristle and torque (N m) of this step.
 ANGLE, ROTATION, DT, OMEGA, OMEGA_BEFORE, BEARING, OMEGA_NEXT, BEARING_NEXT, TORQUE = range(9)
 PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10 + BRANCHES, 20 + 2 * ELEMENTS, 5, 11, 9
+# Then, in a run that has them, tables (`ccmodel.mechanisms.tables`) of compliance and of friction, each by tension.
+SPRING_TABLE, FRICTION_TABLE = PIECE_ROWS, NODE_ROWS
 
 # Constants of a run: its own, and every setting of the mechanisms.
 if TYPE_CHECKING:
@@ -81,6 +83,8 @@ if TYPE_CHECKING:
         load_damping: float
         kind: int
         general_friction: bool
+        has_spring_table: bool
+        has_friction_table: bool
 
         def __getattr__(self, name: str) -> float: ...
 
@@ -88,7 +92,7 @@ else:
     Physics = namedtuple(
         "Physics",
         "has_settling has_relaxation relaxing_times_s bristle presliding element_m radius stiffness_load load_damping "
-        "kind general_friction " + " ".join(registry.march_settings()),
+        "kind general_friction has_spring_table has_friction_table " + " ".join(registry.march_settings()),
     )
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}  # not nnan: a NaN must be seen

@@ -5,11 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Settings
+from ccmodel.mechanisms.learned import end_spring
 from ccmodel.mechanisms.load_dependent_friction import FLOOR_N, REFERENCE_N
 from ccmodel.mechanisms.pulley_eccentricity import winding
 from ccmodel.mechanisms.relaxation import followed
 from ccmodel.mechanisms.strand_settling import stretch_at
+from ccmodel.mechanisms.tables import stretched
 from ccmodel.model.general import layout as rows
 from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad
 
@@ -27,24 +30,29 @@ def initial_state(
 ) -> NDArray:
     """Write the state under the initial tension into `piece` and `node`; returns the tension of each piece (N)."""
     T = np.stack(profiles)
-    if settings.drive_end_compliance > 0:
+    if end_spring(settings, "drive") is not None:
         T = np.concatenate([T[:, :1], T], axis=1)
-    if settings.load_end_compliance > 0:
+    if end_spring(settings, "load") is not None:
         T = np.concatenate([T, T[:, -1:]], axis=1)
     # The rest shows the tension that relaxation has left so far.
     r = piece[rows.RELAXING]
     branches = followed(physics.relaxing_share, physics.relaxing_times_s, physics.relaxed_share)
     elastic = T / (1 - r * branches.mean())
-    stretch = elastic / piece[rows.STIFFNESS]
+    straight = elastic.copy()
+    if physics.has_spring_table:
+        _straighten(piece, straight)
+    stretch = straight / piece[rows.STIFFNESS]
     settles = piece[rows.LOST] > 0
     if settles.any():
-        stretch[settles] = stretch_at(elastic[settles], piece[rows.LOST][settles], piece[rows.STIFFNESS][settles])
+        stretch[settles] = stretch_at(straight[settles], piece[rows.LOST][settles], piece[rows.STIFFNESS][settles])
     piece[rows.STRETCH], piece[rows.ELASTIC] = stretch, elastic
     piece[rows.BRANCH : rows.BRANCH + branches.size] = branches[:, None, None] * elastic
     both = T[:, :-1] + T[:, 1:]
     factor = friction_factor[:, None] * (1 + physics.stribeck_rise)
     if physics.tension_exponent != 0:
         factor = factor * (np.hypot(both / 2, FLOOR_N) / REFERENCE_N) ** physics.tension_exponent
+    if settings.friction_by_tension is not None:
+        factor = factor * settings.friction_by_tension.at(both / 2)
     hold = np.tanh(node[rows.HALF_BEND] * factor) * both + node[rows.DRAG]
     share = np.divide(T[:, :-1] - T[:, 1:], hold, out=np.zeros_like(both), where=hold > 0)
     # Where friction depends on the direction of sliding, the share is xi + b xi^2.
@@ -52,6 +60,15 @@ def initial_state(
     node[rows.BRISTLE] = np.clip(xi, -1, 1)
     node[rows.ELEMENT : rows.ELEMENT_NEXT] = node[rows.BRISTLE]
     return T
+
+
+@kernel
+def _straighten(piece: NDArray, tension: NDArray) -> None:
+    """Replace, in place, the tension of each piece that has a table by the one that a straight spring would have."""
+    for c in range(2):
+        for i in range(piece.shape[2]):
+            if piece[rows.SPRING_TABLE + 2, c, i] > 0.0:
+                tension[c, i] = stretched(piece, rows.SPRING_TABLE, c, i, tension[c, i])
 
 
 def remove_cable_B(piece: NDArray) -> None:

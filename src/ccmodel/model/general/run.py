@@ -10,6 +10,7 @@ from ccmodel import mechanisms as registry
 from ccmodel.channels import TAU_IN, TAU_OUT, TENSIONS, THETA_IN, THETA_OUT
 from ccmodel.failure import ModelError
 from ccmodel.mechanisms.contract import Sensing, Settings
+from ccmodel.mechanisms.learned import end_spring
 from ccmodel.mechanisms.load_inertia import load_damping
 from ccmodel.mechanisms.presliding import element_lengths
 from ccmodel.mechanisms.pulley_friction import bearing
@@ -215,30 +216,52 @@ def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tu
     ratio_K, ratio_mu = (np.array([[1.0], [r]]) for r in (settings.stiffness_ratio_B, settings.friction_ratio_B))
     EA = transmission.axial_rigidity_N * ratio_K
     segment, cell, length = grid.segment_m, grid.cell_m, transmission.path.length_m
-    drive, extra = settings.drive_end_compliance, int(settings.drive_end_compliance > 0)
-    load = settings.load_end_compliance
+    drive, load = end_spring(settings, "drive"), end_spring(settings, "load")
+    extra = int(drive is not None)
     cells = slice(extra, extra + cell.size)
     segments = slice(extra, extra + segment.size)
-    nodes = cell.size + extra + int(load > 0)
+    nodes = cell.size + extra + int(load is not None)
     piece, node = np.zeros((rows.PIECE_ROWS, 2, nodes + 1)), np.zeros((rows.NODE_ROWS, 2, nodes))
+    friction = transmission.friction_coefficient
+    if settings.friction_by_position is not None:
+        middle_m = (grid.boundary_m[:-1] + grid.boundary_m[1:]) / 2
+        friction = friction * settings.friction_by_position.at(middle_m / length)
     piece[rows.STIFFNESS][:, segments] = EA / segment
     piece[rows.LOST][:, segments] = segment * settings.settling_N / EA
     piece[rows.RELAXING][:, segments] = settings.relaxing_share
     piece[rows.SHARE][:, segments] = segment / length
-    node[rows.HALF_BEND][:, cells] = transmission.friction_coefficient * ratio_mu * grid.cell_rad / 2
+    node[rows.HALF_BEND][:, cells] = friction * ratio_mu * grid.cell_rad / 2
     node[rows.DRAG][:, cells] = settings.drag_N * cell / length
     node[rows.VISCOUS][:, cells] = settings.viscous * cell
-    if drive > 0:
-        piece[rows.STIFFNESS][:, 0] = 1 / drive
-    if load > 0:
-        piece[rows.STIFFNESS][:, -1] = 1 / load
-    return piece, node
+    if drive is not None:
+        piece[rows.STIFFNESS][:, 0] = 1 / drive[0]
+    if load is not None:
+        piece[rows.STIFFNESS][:, -1] = 1 / load[0]
+    ends = [[end[1]] if end is not None else [] for end in (drive, load)]
+    springs = [*ends[0], *[settings.cable_compliance] * segment.size, *ends[1]]
+    by_tension = [settings.friction_by_tension] * nodes
+    return (
+        _with_tables(piece, [None if law is None else law.rows_of_spring for law in springs]),
+        _with_tables(node, [None if law is None else law.rows for law in by_tension]),
+    )
+
+
+def _with_tables(array: NDArray, tables: Sequence[NDArray | None]) -> NDArray:
+    """An array with further rows for the table of each of its columns, if any has one."""
+    most = max((table.size for table in tables if table is not None), default=0)
+    added = np.zeros((most, *array.shape[1:]))
+    for column, table in enumerate(tables):
+        if table is not None:
+            added[: table.size, :, column] = table[:, None]
+    return np.concatenate([array, added])
 
 
 def _physics(transmission: Transmission, load: Load, settings: Settings, elements: int) -> rows.Physics:
     K_e = load.stiffness_Nm_per_rad if isinstance(load, SpringLoad) else 0.0
     K_e = load.parallel_Nm_per_rad if isinstance(load, TorqueLoad) else K_e
     values = {name: float(getattr(settings, name)) for name in registry.march_settings()}
+    has_friction_table = settings.friction_by_tension is not None
+    springs = settings.cable_compliance, settings.drive_end_stretch, settings.load_end_stretch
     return rows.Physics(
         has_settling=settings.settling_N > 0,
         has_relaxation=settings.relaxing_share != 0,
@@ -252,7 +275,9 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
         stiffness_load=float(K_e),
         load_damping=float(load_damping(settings, K_e)),
         kind=rows.PRESCRIBED_ANGLE if isinstance(load, AngleLoad | FixedLoad) else rows.IMPEDANCE,
-        general_friction=bool(settings.tension_exponent != 0 or settings.drag_N != 0 or settings.viscous != 0),
+        general_friction=bool(settings.tension_exponent or settings.drag_N or settings.viscous or has_friction_table),
+        has_spring_table=any(law is not None for law in springs),
+        has_friction_table=has_friction_table,
         **values,
     )
 

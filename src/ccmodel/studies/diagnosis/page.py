@@ -272,13 +272,14 @@ def _law(law: Mapping, found: Diagnosis) -> Figure:
     x, y, low, high = np.array(law["curve"]).T
     figure, axes = subplots(1, 1, figsize=(5.2, 3.1), squeeze=False)
     ax = axes[0][0]
-    if registry.laws()[law["name"]].argument.has_two_values:
+    learned = registry.laws()[law["name"]]
+    if learned.argument.has_two_values:
         ax.errorbar(x, y, [y - low, high - y], fmt="o", color=COLOURS[1], capsize=4, label="learned law, 90 % interval")
         ax.set_xlim(x[0] - 0.5, x[1] + 0.5)
     else:
         ax.fill_between(x, low, high, color=COLOURS[1], alpha=0.25, lw=0, label="90 % band")
         ax.plot(x, y, color=COLOURS[1], lw=1.4, label="learned law")
-    ax.axhline(1.0 if law["channel"] is None else 0.0, color=FAINT, lw=1.0, ls="--", label="calibrated model")
+    ax.axhline(1.0 if learned.is_factor else 0.0, color=FAINT, lw=1.0, ls="--", label="calibrated model")
     ax.set_xlabel(f"{law['argument_is']} ({law['argument_unit']})")
     ax.set_ylabel(law["curve_is"])
     legend_below(figure, axes)
