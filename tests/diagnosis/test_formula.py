@@ -32,6 +32,18 @@ def test_a_curve_is_given_its_own_formula_with_its_constants(y, text, last):
     assert parameters[-1]["low"] < last < parameters[-1]["high"]
 
 
+@pytest.mark.parametrize(
+    ("y", "text", "last"),
+    [(lambda T: 1.6 * T**-0.3, "a x^n", -0.3), (lambda T: 0.7 + 0.8 / T, "a + b/x", 0.8)],
+)
+def test_a_law_of_the_tension_may_be_a_power(y, text, last):
+    x = np.geomspace(0.5, 15.0, 9)
+    found, parameters = formula_of(y(x), law=laws()["learned-sliding-friction-by-tension"], x=x)
+    assert found == text
+    assert parameters[-1]["value"] == pytest.approx(last, rel=0.03)
+    assert parameters[-1]["low"] < last < parameters[-1]["high"]
+
+
 def test_a_wider_band_has_a_shorter_formula():
     y = 1 + 0.02 * X + 0.01 * np.sin(2 * np.pi * X / 0.5)
     assert formula_of(y, sd=0.05)[0] == "a + b x"

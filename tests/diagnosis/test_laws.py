@@ -7,10 +7,12 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+import builders
 from builders import spoil, write_batch
 from ccmodel import cli
 from ccmodel.diagnosis.settings import WITHIN_BAND
 from ccmodel.model.files import read_model_file
+from ccmodel.model.general import Active, simulate
 
 K_TORQUE = 0.0234
 COGGING_NM, PERIOD_RAD = 2e-3, 0.4
@@ -94,3 +96,20 @@ def test_a_mechanism_that_is_taken_off_the_list_is_recognised_in_the_curve(tmp_p
     assert law["nearest_listed"]["name"] == "torque-scale"
     assert law["nearest_listed"]["distance"] < WITHIN_BAND
     assert "this is the law of torque-scale" in said["headline"]
+
+
+def test_friction_by_tension_is_learned_inside_the_solver(tmp_path, monkeypatch):
+    power = Active("load-dependent-friction", "conduit", {"n": -0.3})
+
+    def pair(transmission, load, theta_in, initial):
+        return simulate(transmission, load, np.arange(theta_in.size) / 250, theta_in, initial, [power])
+
+    monkeypatch.setattr(builders, "simulate_pair", pair)
+    batch = spoil(write_batch(tmp_path / "power", pretensions=(9.0, 6.0, 3.5, 2.0)))
+    arguments = ["diagnose", str(batch), "--out", str(tmp_path / "out"), "--without", power.name]
+    done = CliRunner().invoke(cli.app, arguments)
+    assert done.exit_code == 0, done.output
+    (law,) = json.loads((tmp_path / "out" / "diagnosis.json").read_text())["laws"]
+    assert (law["slot"], law["place"], law["arguments"]) == ("sliding-friction", "conduit", ["tension"])
+    assert (law["formula"], law["nearest_listed"]["name"]) == ("a x^n", power.name)
+    assert law["parameters"][-1]["value"] == pytest.approx(-0.3, abs=0.02)

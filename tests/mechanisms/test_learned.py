@@ -80,7 +80,7 @@ def largest_difference(one, other):
 def test_friction_by_tension_is_that_of_a_power_law_with_these_values():
     """The table has the power law at its knots; between them and of its average little is left."""
     law = laws()["learned-sliding-friction-by-tension-fine"]
-    x = np.linspace(*RANGES["tension"], FINE[0])
+    x = np.geomspace(*RANGES["tension"], FINE[0])
     power = (x / 5) ** -0.25
     found = run(sine(), with_values(law, lambda x: (x / 5) ** -0.25 / power.mean() - 1), mu=MU * power.mean())
     wanted = run(sine(), ("load-dependent-friction", "conduit", {"n": -0.25}))
@@ -102,7 +102,7 @@ def test_cables_of_a_learned_compliance_are_those_that_settle():
     over_settled = np.linspace(0.2, 10.0, 4000)
     tension = 2.0 * (over_settled - 1 + np.exp(-over_settled))
     compliance = lambda T: np.interp(T, tension, 1 / (1 - np.exp(-over_settled)))  # noqa: E731
-    mean = compliance(np.linspace(*RANGES["tension"], FINE[0])).mean()
+    mean = compliance(np.geomspace(*RANGES["tension"], FINE[0])).mean()
     found = run(sine(), with_values(law, lambda T: compliance(T) / mean - 1), k=K / mean)
     wanted = run(sine(), ("strand-settling", "cable", {"T_scale": 2.0}))
     assert largest_difference(found, wanted) < 0.1 * largest_difference(run(sine()), wanted)
@@ -136,7 +136,7 @@ def test_friction_that_is_learned_is_never_negative():
 
 def test_a_table_of_a_spring_is_inverted_exactly():
     random = np.random.default_rng(3)
-    table = Table(1.0, 8.0, tuple(random.uniform(0.1, 3.0, 9)))
+    table = Table(np.concatenate([[1.0], np.sort(random.uniform(1.0, 8.0, 7)), [8.0]]), random.uniform(0.1, 3.0, 9))
     rows = np.repeat(table.rows_of_spring[:, None, None], 2, axis=1)
     for T in np.concatenate([[-2.0, 0.0, 1.0, 8.0, 12.0], random.uniform(0.0, 9.0, 40)]):
         stretch = stretched(rows, 0, 1, 0, T)

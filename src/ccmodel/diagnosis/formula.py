@@ -13,6 +13,8 @@ from ccmodel.mechanisms.learned import Law
 
 # Lengths and periods that are tried first: so many, from twice the distance of the knots to twice the range.
 TRIED = 40
+# Exponents that are tried first.
+EXPONENTS = tuple(0.1 * k for k in (*range(-25, 0), *range(1, 26)))
 # Share of the knots at which a formula must lie in the band.
 IN_BAND = 0.9
 
@@ -29,6 +31,9 @@ class Form:
     names, units : tuple of str
         Of the factors, and then of the length; "y" is the unit of the curve, "x" that of its argument.
     has_length : bool
+        Whether the last constant is a length; otherwise all are factors, but for an exponent.
+    has_exponent : bool
+        Whether the last constant is an exponent.
     """
 
     text: str
@@ -36,6 +41,7 @@ class Form:
     names: tuple[str, ...]
     units: tuple[str, ...]
     has_length: bool = False
+    has_exponent: bool = False
 
 
 def _forms(law: Law) -> Iterator[Form]:
@@ -43,6 +49,9 @@ def _forms(law: Law) -> Iterator[Form]:
     if law.argument.has_two_values:
         yield Form("1 + a sign(v)" if law.is_factor else "a sign(v)", lambda x, _: (x,), ("a",), ("y",))
         return
+    if law.is_spaced_by_ratio:
+        yield Form("a x^n", lambda x, n: (x**n,), ("a", "n"), ("y/x^n", "1"), has_exponent=True)
+        yield Form("a + b/x", lambda x, _: (x**0, 1 / x), ("a", "b"), ("y", "y x"))
     yield Form("a + b x", lambda x, _: (x**0, x), ("a", "b"), ("y", "y/x"))
     yield Form("a + b x^2", lambda x, _: (x**0, x**2), ("a", "b"), ("y", "y/x^2"))
     yield Form("a x + b x^3", lambda x, _: (x, x**3), ("a", "b"), ("y/x", "y/x^3"))
@@ -100,17 +109,20 @@ def _fitted(form: Form, x: NDArray, y: NDArray, sd: NDArray) -> tuple[NDArray, N
         factors = np.linalg.lstsq(weighted / size, y / sd, rcond=None)[0] / size
         return factors, weighted @ factors - y / sd
 
-    if not form.has_length:
+    if not form.has_length and not form.has_exponent:
         factors, errors = linear(1.0)
         return factors, errors, np.stack(form.terms(x, 1.0), axis=1) / sd[:, None]
     span = float(np.ptp(x)) or 1.0
-    tried = np.geomspace(2 * span / (len(x) - 1), 2 * span, TRIED).tolist()
+    lengths = np.geomspace(2 * span / (len(x) - 1), 2 * span, TRIED).tolist()
+    tried = EXPONENTS if form.has_exponent else lengths
     start = min(tried, key=lambda length: float(np.sum(linear(length)[1] ** 2)))
     refined = minimize_scalar(
-        lambda length: float(np.sum(linear(length)[1] ** 2)), bounds=(0.8 * start, 1.25 * start), method="bounded"
+        lambda length: float(np.sum(linear(length)[1] ** 2)),
+        bounds=sorted((0.8 * start, 1.25 * start)),
+        method="bounded",
     ).x
     factors, errors = linear(refined)
-    step = 1e-4 * refined
+    step = 1e-4 * abs(refined)
     higher, lower = (np.stack(form.terms(x, refined + s), axis=1) @ factors for s in (step, -step))
     by_length = (higher - lower) / (2 * step) / sd
     terms = np.stack(form.terms(x, refined), axis=1) / sd[:, None]
@@ -119,6 +131,13 @@ def _fitted(form: Form, x: NDArray, y: NDArray, sd: NDArray) -> tuple[NDArray, N
 
 def _unit(unit: str, law: Law) -> str:
     of_argument = law.argument.unit.replace(" ", "*")
-    alone = {"x": of_argument, "y": law.unit}
+    if of_argument == "1":
+        return "1" if unit in ("x", "1") else law.unit.replace(" ", "*")
+    alone = {
+        "x": of_argument,
+        "y": law.unit,
+        "1": "1",
+        "y x": of_argument if law.is_factor else f"{law.unit}*{of_argument}",
+    }
     found = alone.get(unit, unit.replace("y/x", f"{law.unit}/({of_argument})"))
     return found.replace(" ", "*")

@@ -54,7 +54,8 @@ def curve_of(candidate: CandidateFit, law: Law) -> tuple[NDArray, NDArray, tuple
     covariance = by_coefficients @ candidate.covariance[np.ix_(some, some)] @ by_coefficients.T
     reach = normal.ppf(0.5 + COVERAGE / 2) * np.sqrt(np.diag(covariance).clip(0.0))
     neutral = 1.0 if law.is_factor else 0.0
-    return x, y + neutral, (y + neutral - reach, y + neutral + reach)
+    low, high = (law.possible(y + neutral + sign * reach) for sign in (-1, 1))
+    return x, law.possible(y + neutral), (low, high)
 
 
 def indistinguishable(judgement: Judgement, law: Law) -> list[str]:

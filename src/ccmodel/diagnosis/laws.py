@@ -24,6 +24,9 @@ from ccmodel.mechanisms.learned import COARSE, Law
 from ccmodel.model.parameters import mechanism_key
 from ccmodel.model.run import simulate
 
+# An end of a cable may yield as much as the whole cable: its compliances are shares of so many times the cable's.
+MOST_OF_END = 3.0
+
 
 @dataclass(frozen=True)
 class Proposal:
@@ -95,10 +98,12 @@ def _proposed(
 
 
 def _unit_of(law: Law, base: CandidateFit, motions: Sequence[Sensing]) -> float:
-    """What sizes of a law's values are shares of: 1 of a factor, a cable's compliance, or a channel's peak to peak."""
+    """What sizes of a law's values are shares of: 1 of a factor, `MOST_OF_END` cables', or a channel's peak to peak."""
     if law.channel is not None:
         return float(np.ptp(np.concatenate([m.channels[law.channel] for m in motions])))
-    return 1.0 if law.is_factor else 1 / base.model(base.whitened[0].observations.parameters).stiffness_N_per_m
+    if law.is_factor:
+        return 1.0
+    return MOST_OF_END / base.model(base.whitened[0].observations.parameters).stiffness_N_per_m
 
 
 def _sensitivities(base: CandidateFit, hypothesis: Hypothesis, law: Law) -> list[NDArray]:

@@ -63,6 +63,8 @@ SLOWEST_M_PER_S = 1e-5
 # The range of a law's argument, as quantiles of what the recordings visit; and the shortest travel at which an element
 # of a law with memory yields, as a share of the longest.
 RANGE, SHORTEST_YIELD = (0.005, 0.995), 0.01
+# The lowest knot of a law of the tension over the highest one, at least: slack cables have no tension.
+LOWEST_TENSION = 0.02
 # Friction is never negative in either direction.
 LARGEST_BIAS = 0.95
 # A spring is never without stretch: its least compliance over its mean.
@@ -137,6 +139,11 @@ class Law:
         return "1" if self.is_factor else "m/N"
 
     @property
+    def is_spaced_by_ratio(self) -> bool:
+        """Whether its knots have equal ratios: travels to yield, and tensions, of which powers are expected."""
+        return self.opposes is not None or self.argument.name == "tension"
+
+    @property
     def is_factor(self) -> bool:
         """Whether it is a factor, to which its values are added; it is then 1 where it has no effect."""
         return self.slot in (SLIDING_FRICTION, CABLE_STRETCH)
@@ -166,18 +173,21 @@ class Law:
 
     def written(self, values: Mapping[str, float], before: Any) -> Any:
         """The value of its setting that had the value `before`."""
-        first, last, (_, y) = values["first"], values["last"], self.at_knots(values)
+        x, y = self.at_knots(values)
         if self.setting == "direction_bias":
             return float(np.clip(y[-1], -LARGEST_BIAS, LARGEST_BIAS))
         if isinstance(before, tuple):
             return (*before, lambda sensing: self.added(sensing, values))
         if not y.any():
             return None
-        if self.slot == SLIDING_FRICTION:
-            return Table(first, last, tuple((1 + y).clip(0.0).tolist()))
-        if self.slot == CABLE_STRETCH:
-            return Table(first, last, tuple((1 + y).clip(LEAST_COMPLIANCE).tolist()))
-        return Table(first, last, tuple(y.clip(0.0).tolist())) if (y > 0).any() else None
+        if self.is_factor:
+            return Table(x, self.possible(1 + y))
+        return Table(x, self.possible(y)) if (y > 0).any() else None
+
+    def possible(self, y: NDArray) -> NDArray:
+        """Values within what is physically possible: no negative friction or stretch."""
+        low = {SLIDING_FRICTION: 0.0, CABLE_STRETCH: LEAST_COMPLIANCE, END_STRETCH: 0.0}.get(self.slot)
+        return y if low is None else y.clip(low)
 
     @property
     def basis(self) -> NDArray:
@@ -188,13 +198,15 @@ class Law:
     def at_knots(self, values: Mapping[str, float]) -> tuple[NDArray, NDArray]:
         """Its arguments at the knots and its values there, both of shape (knots,)."""
         z = [values[name] for name in self.coefficients]
-        space = np.linspace if self.opposes is None else np.geomspace
+        space = np.geomspace if self.is_spaced_by_ratio else np.linspace
         return space(values["first"], values["last"], len(self.basis)), values["scale"] * (self.basis @ z)
 
     def range_of(self, visited: NDArray) -> tuple[float, float]:
         """First and last knot for the arguments that recordings visit."""
         first, last = np.quantile(visited, RANGE)
-        return (float(last * SHORTEST_YIELD), float(last)) if self.opposes else (float(first), float(last))
+        if self.is_spaced_by_ratio:
+            first = last * SHORTEST_YIELD if self.opposes else max(first, last * LOWEST_TENSION)
+        return float(first), float(last)
 
     def shown(self, x: NDArray) -> NDArray:
         """What its curve shows of its values at the knots, shape (knots, knots).
@@ -325,9 +337,9 @@ def end_spring(settings: Settings, end: str) -> tuple[float, Table | None] | Non
     compliance, law = getattr(settings, f"{end}_end_compliance"), getattr(settings, f"{end}_end_stretch")
     if law is None:
         return (compliance, None) if compliance > 0 else None
-    values = compliance + np.array(law.values)
+    values = compliance + law.values
     mean = float(values.mean())
-    return mean, law._replace(values=tuple((values / mean).clip(LEAST_COMPLIANCE).tolist()))
+    return mean, Table(law.knots, (values / mean).clip(LEAST_COMPLIANCE))
 
 
 @kernel

@@ -1,8 +1,7 @@
-"""Laws given by tables, which the march evaluates: piecewise linear between equally spaced knots, constant beyond them.
+"""Laws given by tables, which the march evaluates: piecewise linear between knots, constant beyond them.
 
 A table stands in consecutive rows of an array of shape (rows, 2, n), so that each node or piece of each cable has its
-own: the first and the last argument, the number of knots, and the values at the knots. A spring's is followed by the
-stretches at the knots.
+own: the number of knots, the arguments there, and the values there. A spring's is followed by its stretches there.
 """
 
 from math import sqrt
@@ -15,16 +14,10 @@ from ccmodel.kernel import kernel
 
 
 class Table(NamedTuple):
-    """A law: its first and last argument, and its values at equally spaced knots."""
+    """A law: its arguments at the knots, increasing, and its values there; both of shape (knots,)."""
 
-    first: float
-    last: float
-    values: tuple[float, ...]
-
-    @property
-    def knots(self) -> NDArray:
-        """Its arguments, shape (knots,)."""
-        return np.linspace(self.first, self.last, len(self.values))
+    knots: NDArray
+    values: NDArray
 
     def at(self, x: NDArray) -> NDArray:
         """Its values at arguments, of their shape."""
@@ -33,63 +26,68 @@ class Table(NamedTuple):
     @property
     def rows(self) -> NDArray:
         """What stands in the rows of an array, shape (rows,)."""
-        return np.array([self.first, self.last, len(self.values), *self.values])
+        return np.concatenate([[self.knots.size], self.knots, self.values])
 
     @property
     def rows_of_spring(self) -> NDArray:
         """The same of a compliance by tension, with its integrals from a tension of zero to the knots."""
-        x, c = self.knots, np.array(self.values)
-        stretches = self.first * c[0] + np.cumsum(np.diff(x, prepend=x[0]) * (c + np.roll(c, 1)) / 2)
+        x, c = self.knots, self.values
+        stretches = x[0] * c[0] + np.cumsum(np.diff(x, prepend=x[0]) * (c + np.roll(c, 1)) / 2)
         return np.concatenate([self.rows, stretches])
+
+
+@kernel
+def _before(rows: NDArray, first: int, knots: int, c: int, i: int, x: float) -> int:
+    """Number of the interval, of those between the `knots` rows from `first`, that has x in it or next to it."""
+    k = 0
+    while k < knots - 2 and x > rows[first + k + 1, c, i]:
+        k += 1
+    return k
 
 
 @kernel
 def interpolated(rows: NDArray, at: int, c: int, i: int, x: float) -> tuple[float, float]:
     """Value of the table in the rows from `at` at an argument, and its derivative."""
-    first, last, knots = rows[at, c, i], rows[at + 1, c, i], int(rows[at + 2, c, i])
-    per_x = (knots - 1) / (last - first)
-    u = (x - first) * per_x
-    if u <= 0.0:
-        return rows[at + 3, c, i], 0.0
-    if u >= knots - 1:
-        return rows[at + 2 + knots, c, i], 0.0
-    k = int(u)
-    low, high = rows[at + 3 + k, c, i], rows[at + 4 + k, c, i]
-    return low + (u - k) * (high - low), (high - low) * per_x
+    knots = int(rows[at, c, i])
+    argument, value = at + 1, at + 1 + knots
+    if x <= rows[argument, c, i]:
+        return rows[value, c, i], 0.0
+    if x >= rows[argument + knots - 1, c, i]:
+        return rows[value + knots - 1, c, i], 0.0
+    k = _before(rows, argument, knots, c, i, x)
+    low, step = rows[value + k, c, i], rows[argument + k + 1, c, i] - rows[argument + k, c, i]
+    slope = (rows[value + k + 1, c, i] - low) / step
+    return low + slope * (x - rows[argument + k, c, i]), slope
 
 
 @kernel
 def stretched(rows: NDArray, at: int, c: int, i: int, tension: float) -> float:
     """Stretch at a tension of the spring in the rows from `at`."""
-    first, last, knots = rows[at, c, i], rows[at + 1, c, i], int(rows[at + 2, c, i])
-    compliance, stretch = at + 3, at + 3 + knots
-    step = (last - first) / (knots - 1)
-    k = min(max(int((tension - first) / step), 0), knots - 2)
-    low = rows[compliance + k, c, i]
-    inside = min(max(tension, first), last) - first - k * step
-    between = inside * (low + 0.5 * inside * (rows[compliance + k + 1, c, i] - low) / step)
+    knots = int(rows[at, c, i])
+    argument, compliance, stretch = at + 1, at + 1 + knots, at + 1 + 2 * knots
+    first, last = rows[argument, c, i], rows[argument + knots - 1, c, i]
+    inside = min(max(tension, first), last)
+    k = _before(rows, argument, knots, c, i, inside)
+    mean = 0.5 * (rows[compliance + k, c, i] + interpolated(rows, at, c, i, inside)[0])
     below = rows[compliance, c, i] * min(tension - first, 0.0)
-    above = rows[stretch - 1, c, i] * max(tension - last, 0.0)
-    return rows[stretch + k, c, i] + between + below + above
+    above = rows[compliance + knots - 1, c, i] * max(tension - last, 0.0)
+    return rows[stretch + k, c, i] + mean * (inside - rows[argument + k, c, i]) + below + above
 
 
 @kernel
 def pulled(rows: NDArray, at: int, c: int, i: int, stretch: float) -> tuple[float, float]:
     """Tension at a stretch of the spring in the rows from `at`, and its derivative: the inverse of `stretched`."""
-    first, last, knots = rows[at, c, i], rows[at + 1, c, i], int(rows[at + 2, c, i])
-    compliance, stretched = at + 3, at + 3 + knots
-    if stretch <= rows[stretched, c, i]:
-        slope = 1.0 / rows[compliance, c, i]
-        return first + slope * (stretch - rows[stretched, c, i]), slope
-    if stretch >= rows[stretched + knots - 1, c, i]:
-        slope = 1.0 / rows[stretched - 1, c, i]
-        return last + slope * (stretch - rows[stretched + knots - 1, c, i]), slope
-    k = 0
-    while stretch > rows[stretched + k + 1, c, i]:
-        k += 1
-    step = (last - first) / (knots - 1)
-    low, beyond = rows[compliance + k, c, i], stretch - rows[stretched + k, c, i]
+    knots = int(rows[at, c, i])
+    argument, compliance, stretches = at + 1, at + 1 + knots, at + 1 + 2 * knots
+    for end in (0, knots - 1):
+        beyond = stretch - rows[stretches + end, c, i]
+        if (beyond <= 0.0) if end == 0 else (beyond >= 0.0):
+            slope = 1.0 / rows[compliance + end, c, i]
+            return rows[argument + end, c, i] + slope * beyond, slope
+    k = _before(rows, stretches, knots, c, i, stretch)
+    low, beyond = rows[compliance + k, c, i], stretch - rows[stretches + k, c, i]
+    step = rows[argument + k + 1, c, i] - rows[argument + k, c, i]
     rise = (rows[compliance + k + 1, c, i] - low) / step
     # The compliance at the tension that is sought; between knots the stretch is a parabola of the tension.
     there = sqrt(low * low + 2.0 * rise * beyond)
-    return first + k * step + 2.0 * beyond / (low + there), 1.0 / there
+    return rows[argument + k, c, i] + 2.0 * beyond / (low + there), 1.0 / there

@@ -91,7 +91,7 @@ def _bend(piece: NDArray, c: int) -> None:
     """Bend the characteristic of each piece of a cable as its table has it: a compliance by tension, over its mean."""
     pulls, K = piece[rows.PULL, c], piece[rows.TANGENT, c]
     for i in range(piece.shape[2]):
-        if piece[rows.SPRING_TABLE + 2, c, i] > 0.0:
+        if piece[rows.SPRING_TABLE, c, i] > 0.0:
             pulls[i], slope = pulled(piece, rows.SPRING_TABLE, c, i, pulls[i])
             K[i] *= slope
 

@@ -67,7 +67,7 @@ def _straighten(piece: NDArray, tension: NDArray) -> None:
     """Replace, in place, the tension of each piece that has a table by the one that a straight spring would have."""
     for c in range(2):
         for i in range(piece.shape[2]):
-            if piece[rows.SPRING_TABLE + 2, c, i] > 0.0:
+            if piece[rows.SPRING_TABLE, c, i] > 0.0:
                 tension[c, i] = stretched(piece, rows.SPRING_TABLE, c, i, tension[c, i])
 
 
