@@ -29,7 +29,8 @@ def cogging(table):
 def learned(tmp_path_factory):
     folder = tmp_path_factory.mktemp("raw")
     batch = spoil(write_batch(folder / "cogging", pretensions=(7.0, 6.0, 5.0)), cogging)
-    done = CliRunner().invoke(cli.app, ["diagnose", str(batch), "--out", str(folder / "out")])
+    arguments = ["diagnose", str(batch), "--out", str(folder / "out"), "--keep-law", "cogging-motor"]
+    done = CliRunner().invoke(cli.app, arguments)
     assert done.exit_code == 0, done.output
     return batch, folder / "out"
 
@@ -73,6 +74,13 @@ def test_the_error_falls_and_the_model_file_has_the_law(learned, tmp_path):
     )
     assert done.exit_code == 0, done.output
     assert pd.read_csv(next((tmp_path / "p").glob("*.csv")))["tau_in_Nm"].abs().max() > 0
+
+
+def test_the_law_is_kept_as_a_mechanism(learned):
+    text = (learned[1] / "cogging_motor.py").read_text()
+    assert 'name="cogging-motor"' in text
+    assert 'laws()["learned-bearing-torque-by-drive-angle-fine"]' in text
+    compile(text, "cogging_motor.py", "exec")
 
 
 def test_the_page_shows_the_curve(learned):

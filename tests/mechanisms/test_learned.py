@@ -154,7 +154,7 @@ def test_a_law_with_memory_is_a_sum_of_maxwell_slip_elements():
     theta = np.concatenate([np.linspace(0, 2, 401), np.linspace(2, -2, 801)[1:], np.linspace(-2, 2, 801)[1:]])
     sensing = Sensing(np.arange(theta.size) * 0.01, {THETA_IN: theta, TAU_IN: 0 * theta}, 1.0, 1.0)
     values = values_of(law, z1=1.0) | {"first": 0.01, "last": 1.0}
-    torque = law.added(sensing, values)
+    torque = law.added(sensing, *law.at_knots(values))
     assert torque[400] == pytest.approx(law.at_knots(values)[1].sum())
     assert torque[1200] == pytest.approx(-torque[400])
     assert torque[2000] == pytest.approx(torque[400])

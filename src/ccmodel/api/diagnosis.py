@@ -12,6 +12,7 @@ from ccmodel.api.batch import Batch, joint_batch
 from ccmodel.api.model import HasModel, as_model
 from ccmodel.api.options import Candidates, Tolerance, check_step, diagnosis_options, progress_of
 from ccmodel.api.recordings import counted
+from ccmodel.diagnosis.kept_law import check_name, file_of, mechanism_file
 from ccmodel.failure import ModelError
 from ccmodel.model.files import Model
 from ccmodel.paths import try_folder, writing
@@ -137,6 +138,35 @@ class Diagnosis:
         """
         with writing(folder) as path:
             write_alone(self._outcome, path)
+
+    def keep_law(self, name: str, folder: str | Path) -> Path | None:
+        """Write the learned law as the file of a mechanism, to be reviewed and added to the list.
+
+        Parameters
+        ----------
+        name : str
+            Of the new mechanism: small letters, with hyphens.
+        folder : str or Path
+
+        Returns
+        -------
+        Path or None
+            The file; None with another verdict than ``learned``.
+
+        Raises
+        ------
+        InputError
+            If a mechanism cannot have this name, or the folder cannot be made or written to.
+        """
+        check_name(name)
+        if self.verdict != "learned" or self._outcome.found is None:
+            return None
+        best, law = self._outcome.found.judgement.best, self.report["laws"][0]
+        with writing(folder) as path:
+            path.mkdir(parents=True, exist_ok=True)
+            file = path / file_of(name)
+            file.write_text(mechanism_file(name, law, best, self.batch.name), encoding="utf-8")
+        return file
 
     def __repr__(self) -> str:
         parts = [f"Diagnosis of {self.headline}", f"verdict: {self.verdict}{self._with_confidence}"]

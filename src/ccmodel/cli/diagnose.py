@@ -59,6 +59,15 @@ def diagnose(
             show_default=False,
         ),
     ] = [],  # noqa: B006
+    keep_law: Annotated[
+        str | None,
+        typer.Option(
+            "--keep-law",
+            metavar="NAME",
+            help="Write a learned law as a mechanism of this name, a Python file in --out.",
+            show_default=False,
+        ),
+    ] = None,
     time_limit: Annotated[
         float | None,
         typer.Option("--time-limit", help="Time for fitting candidates, s; 140 if not given.", show_default=False),
@@ -71,16 +80,19 @@ def diagnose(
     """Decide whether the calibrated model explains a batch; if not, locate and name the physics left out.
 
     Several batches of one rig are diagnosed together, with one stiffness, one friction and one set of mechanisms.
-    Exits with 0 at any verdict, unless --strict is given.
+    Exits with 0 at any verdict, unless --strict is given, or --keep-law and no law was learned.
     """
     import ccmodel
     from ccmodel.api.options import diagnosis_options
+    from ccmodel.diagnosis.kept_law import check_name
 
     output, shares = Output(as_json, quiet), tolerance_of(tolerance)
     # The same check as below, with the names that options have here.
     diagnosis_options(
         shares, step, cycles, candidate, without, freeze, baseline is not None, prefix="--", time_limit_s=time_limit
     )
+    if keep_law is not None:
+        check_name(keep_law, prefix="--")
     with leaving(out), output.progress() as progress:
         found = ccmodel.diagnose(
             batches,
@@ -96,7 +108,12 @@ def diagnose(
             trust_inputs=trust_inputs,
             progress=progress,
         )
+    kept = None if keep_law is None else found.keep_law(keep_law, out)
     output.result({**found.report, "out": out}, found.headline)
     output.hint(f"wrote {out}: diagnosis.json, report.html and the models. Next: ccmodel report {out}")
-    if strict and found.verdict != "agrees":
+    if kept is not None:
+        output.hint(f"wrote {kept}: the law as a mechanism, to be reviewed (docs/how-to/add-a-mechanism.md)")
+    elif keep_law is not None:
+        output.message(f"--keep-law {keep_law}: no law was learned (verdict '{found.verdict}'); no file is written")
+    if (strict and found.verdict != "agrees") or (keep_law is not None and kept is None):
         raise typer.Exit(1)

@@ -71,7 +71,7 @@ unit is a value beside it (`unit`). A value that there is not is `null`. `out` i
 | code | meaning |
 |---|---|
 | 0 | Done. `diagnose` ends with 0 at any verdict. |
-| 1 | Done, with a finding, or something was left out. `diagnose`: only with `--strict`, if the model does not agree. |
+| 1 | Done, with a finding, or something was left out. `diagnose`: only with `--strict`, if the model does not agree, or with `--keep-law`, if no law was learned. |
 | 2 | The input cannot be used: a file, a folder, an option. Standard error has a line for each problem. |
 | 70 | An error of the program: its traceback is on standard error. Please report it. |
 | 130 | Interrupted by Ctrl-C (143: by the request to end, SIGTERM). |

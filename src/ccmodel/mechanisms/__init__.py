@@ -55,7 +55,9 @@ def _declared() -> Iterator[tuple[Mechanism, str]]:
 def _neutral() -> dict[str, Any]:
     neutral: dict[str, Any] = {}
     for mechanism in _registry().values():
-        if taken := neutral.keys() & mechanism.neutral_settings.keys():
+        # A setting that holds several effects is a tuple, to which each of them adds.
+        own = {name for name, value in mechanism.neutral_settings.items() if not isinstance(value, tuple)}
+        if taken := neutral.keys() & own:
             raise ValueError(f"{mechanism.name} declares settings of another mechanism: {', '.join(sorted(taken))}")
         neutral |= mechanism.neutral_settings
     for law in laws().values():

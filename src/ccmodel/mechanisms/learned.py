@@ -42,6 +42,7 @@ from ccmodel.mechanisms.contract import (
     LOAD,
     SENSOR_MAP,
     SLIDING_FRICTION,
+    Curve,
     Mechanism,
     Parameter,
     Sensing,
@@ -94,6 +95,11 @@ class Argument:
     meaning: str
     of: Callable[[Sensing], NDArray]
     has_two_values: bool = False
+
+    @property
+    def depends_on_time(self) -> bool:
+        """Whether it depends on the rate of the motion, not only on its path."""
+        return self.name in ("speed", "dwell", "time")
 
 
 @dataclass(frozen=True)
@@ -171,13 +177,12 @@ class Law:
         by_argument = _SETTINGS.get((self.slot, self.argument.name), _SETTINGS.get((self.slot, "")))
         return by_argument and by_argument.format(side=side(self.place))
 
-    def written(self, values: Mapping[str, float], before: Any) -> Any:
-        """The value of its setting that had the value `before`."""
-        x, y = self.at_knots(values)
+    def written(self, x: NDArray, y: NDArray, before: Any) -> Any:
+        """The value of its setting that had the value `before`, for values at knots; both of shape (knots,)."""
         if self.setting == "direction_bias":
             return float(np.clip(y[-1], -LARGEST_BIAS, LARGEST_BIAS))
         if isinstance(before, tuple):
-            return (*before, lambda sensing: self.added(sensing, values))
+            return (*before, lambda sensing: self.added(sensing, x, y))
         if not y.any():
             return None
         if self.is_factor:
@@ -220,9 +225,8 @@ class Law:
         """Names of its coefficients."""
         return [f"z{k + 1}" for k in range(self.basis.shape[1])]
 
-    def added(self, sensing: Sensing, values: Mapping[str, float]) -> NDArray:
-        """Its values along a run, shape (n,); of a factor, what is added to 1."""
-        x, y = self.at_knots(values)
+    def added(self, sensing: Sensing, x: NDArray, y: NDArray) -> NDArray:
+        """What it adds along a run, to 1 if it is a factor, for values at knots; shape (n,)."""
         if self.opposes is None:
             return np.interp(self.argument.of(sensing), x, y)
         radius = sensing.drive_radius_m if self.opposes == THETA_IN else sensing.load_radius_m
@@ -241,21 +245,6 @@ class Law:
     @cached_property
     def mechanism(self) -> Mechanism:
         """The law as a mechanism."""
-        setting = self.setting
-        physics = observation = None
-        structures: dict[str, Any] = {}
-        if setting is not None:
-            structures = {setting: _NEUTRAL.get(setting)}
-
-            def physics(settings: Settings, values: Mapping[str, float]) -> None:
-                setattr(settings, setting, self.written(values, getattr(settings, setting)))
-
-        else:
-
-            def observation(sensing: Sensing, place: str, values: Mapping[str, float]) -> dict[str, NDArray]:
-                channel = str(self.channel)
-                return {channel: sensing.channels[channel] + self.added(sensing, values)}
-
         unit = self.argument.unit
         fixed = (
             Parameter("first", unit, -inf, inf, 0.0, "argument at the first knot", fixed=True),
@@ -274,12 +263,34 @@ class Law:
             places=(self.place,),
             parameters=fixed + coefficients,
             mistaken_for=(),
-            depends_on_time=True,
+            depends_on_time=self.argument.depends_on_time,
             by_name_only=True,
-            structures=structures,
-            modifies_physics=physics,
-            modifies_observation=observation,
+            **self.acting(self.at_knots),
         )
+
+    def acting(self, at_knots: Callable[[Mapping[str, float]], tuple[NDArray, NDArray]]) -> dict[str, Any]:
+        """Fields of a mechanism that acts as the law, with ``at_knots(values)``: its arguments and values at knots."""
+        setting = self.setting
+
+        def physics(settings: Settings, values: Mapping[str, float]) -> None:
+            setattr(settings, str(setting), self.written(*at_knots(values), getattr(settings, str(setting))))
+
+        def observation(sensing: Sensing, place: str, values: Mapping[str, float]) -> dict[str, NDArray]:
+            channel = str(self.channel)
+            return {channel: sensing.channels[channel] + self.added(sensing, *at_knots(values))}
+
+        if setting is None:
+            return {"modifies_observation": observation}
+        return {"structures": {setting: _NEUTRAL.get(setting)}, "modifies_physics": physics}
+
+    def curve(self, x: NDArray, y: NDArray, strength: Parameter) -> Curve:
+        """What a law looks like that has `strength` times these values at these knots."""
+
+        def of(arguments: NDArray, values: Mapping[str, float]) -> NDArray:
+            return float(self.is_factor) + values[strength.name] * np.interp(arguments, x, self.shown(x) @ y)
+
+        channels = (str(self.channel),) if self.slot == SENSOR_MAP else ()
+        return Curve(self.slot, self.argument.name, of, (strength,), channels)
 
 
 _CURVE_IS = {
