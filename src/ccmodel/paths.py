@@ -5,11 +5,11 @@ of the trial.
 """
 
 import difflib
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import NoReturn
+
+from ccmodel import inputs
 
 BATCH_FILE = "batch.yaml"
 
@@ -53,7 +53,7 @@ def existing_folder(path: str | Path) -> Path:
 
 
 def existing_file(path: str | Path) -> Path:
-    """A file that is read.
+    """A file that is read: a regular one, since a pipe or a device may have no end.
 
     Raises
     ------
@@ -61,7 +61,10 @@ def existing_file(path: str | Path) -> Path:
         If there is none.
     """
     path = Path(path).expanduser()
-    return path if path.exists() and not path.is_dir() else _missing(path, "file", "folder")
+    if not path.exists() or path.is_dir():
+        _missing(path, "file", "folder")
+    _check_regular(path, "")
+    return path
 
 
 def _missing(path: Path, wanted: str, other: str) -> NoReturn:
@@ -107,11 +110,19 @@ def try_file(path: str | Path, option: str = "out") -> Path:
         _refuse(f"{option}: {path}: is a folder; name a file")
     _try(path.parent, path, option)
     if path.exists():
+        _check_regular(path, f"{option}: ")
         try:
             path.open("ab").close()
         except OSError as error:
             _refuse(f"{option}: {path}: cannot be written ({error.strerror})")
     return path
+
+
+def _check_regular(path: Path, option: str) -> None:
+    try:
+        inputs.check_regular(path)
+    except OSError as error:
+        _refuse(f"{option}{path}: {error.strerror}")
 
 
 def _try(folder: Path, named: Path, option: str) -> None:
@@ -129,23 +140,6 @@ def _try(folder: Path, named: Path, option: str) -> None:
             TemporaryFile(dir=folder).close()
     except OSError as error:
         _refuse(f"{option}: {named}: cannot be written ({error.strerror})")
-
-
-@contextmanager
-def writing(path: str | Path) -> Iterator[Path]:
-    """The path of a file or folder to write, in a folder that is made if it is missing.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written.
-    """
-    path = Path(path).expanduser()
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        yield path
-    except OSError as error:
-        _refuse(f"{path}: cannot be written ({error.strerror})")
 
 
 def _refuse(line: str) -> NoReturn:

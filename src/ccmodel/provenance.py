@@ -27,8 +27,14 @@ def files_in(folder: Path) -> list[Path]:
 
 def of_inputs(paths: Iterable[Path], folder: Path = Path()) -> dict:
     """Version of the package and digests of the input files of a result, by path relative to `folder`."""
-    digests = {os.path.relpath(p, folder): hashlib.sha256(Path(p).read_bytes()).hexdigest() for p in paths}
+    digests = {os.path.relpath(p, folder): file_digest(p) for p in paths}
     return {"ccmodel_version": ccmodel.__version__, "sha256": digests}
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file, which need not fit into the memory."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def stamp(module: str, *inputs: Any) -> str:

@@ -84,7 +84,7 @@ def test_what_was_written_is_named(batch, tmp_path):
     returned, _, err = interrupted(code, signal.SIGINT, "diagnose", batch, "--out", out)
     assert returned == 130
     assert err.count("\n") == 1
-    assert f"written so far, the last perhaps not to its end: {out / 'diagnosis.json'};" in err
+    assert f"written so far: {out / 'diagnosis.json'};" in err
 
 
 def test_interruption_as_json(batch, tmp_path):

@@ -1,5 +1,6 @@
 """The verdict inputs-inconsistent: no physics is blamed for recordings that contradict one another."""
 
+import errno
 import json
 
 import pandas as pd
@@ -144,3 +145,24 @@ def test_the_surest_contradiction_stands_first():
     assert [n["why"] for n in said["not_judged"]] == ["is wrong", "is odd", "is cut"]
     assert said["location"]["place"] == "load-sensor"
     assert report("b", [sure, found(column="theta_in_rad")])["location"]["place"] is None
+
+
+def test_a_page_that_cannot_be_written_leaves_the_earlier_diagnosis(dead, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    out.mkdir()
+    earlier = {name: "earlier" for name in ("diagnosis.json", "report.html", "nearest.json", "notes.txt")}
+    for name, text in earlier.items():
+        (out / name).write_text(text)
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(stage, "write_inconsistent", full)
+        told = run("diagnose", dead, "--out", out)
+    assert isinstance(told.exception, InputError)
+    assert str(told.exception) == f"{out}: cannot be written (No space left on device)"
+    assert {file.name: file.read_text() for file in out.iterdir()} == earlier
+    run("diagnose", dead, "--out", out)
+    files = {"diagnosis.json", "report.html", "calibrated.json", "model.json", "notes.txt"}
+    assert {file.name for file in out.iterdir()} == files

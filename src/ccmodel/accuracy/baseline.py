@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from ccmodel import __version__
 from ccmodel.accuracy.comparison import Limits, intervals
 from ccmodel.accuracy.measure import Batches
+from ccmodel.outputs import new_file
 from ccmodel.typed import InputError, TypedModel
 
 FORMAT: Final = 1
@@ -71,7 +72,8 @@ def make_baseline(batches: Batches, limits: Limits, date: str, commit: str, reas
 
 def write_baseline(file: Path, baseline: Baseline) -> None:
     """Write a baseline as JSON: a line for each recording and each channel."""
-    file.write_text(_text(baseline.model_dump(mode="json")) + "\n", encoding="utf-8")
+    with new_file(file) as fresh:
+        fresh.write_text(_text(baseline.model_dump(mode="json")) + "\n", encoding="utf-8")
 
 
 def _text(data: Any, depth: int = 0) -> str:

@@ -91,9 +91,10 @@ def accept(results: Path, reason: str) -> State:
         raise InputError(f"--reason: state why this accuracy is right, for example: {ACCEPT}")
     state = state_of(results)
     commit, date = head()
-    state.baseline.parent.mkdir(parents=True, exist_ok=True)
-    write_baseline(state.baseline, make_baseline(state.batches, state.limits, date, commit, reason.strip()))
+    baseline = make_baseline(state.batches, state.limits, date, commit, reason.strip())
+    # The history first: if the baseline fails, the same command replaces this commit's rows.
     add_rows(state.history, rows_of(state.batches, commit, date, __version__))
+    write_baseline(state.baseline, baseline)
     return state
 
 

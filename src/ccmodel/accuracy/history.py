@@ -12,6 +12,7 @@ from tempfile import TemporaryDirectory
 import pandas as pd
 
 from ccmodel.accuracy.measure import Batches, Simulated, measure
+from ccmodel.outputs import new_file
 from ccmodel.typed import InputError
 
 COLUMNS = (
@@ -60,8 +61,8 @@ def add_rows(file: Path, rows: pd.DataFrame) -> None:
     table = read_history(file)
     table = pd.concat([table[~table["commit"].isin(rows["commit"])], rows], ignore_index=True)
     table = table.sort_values("date", kind="stable")
-    file.parent.mkdir(parents=True, exist_ok=True)
-    table.to_csv(file, index=False, lineterminator="\n")
+    with new_file(file) as fresh:
+        table.to_csv(fresh, index=False, lineterminator="\n")
 
 
 def overview(file: Path) -> str:

@@ -15,7 +15,7 @@ from ccmodel.api.recordings import counted
 from ccmodel.diagnosis.kept_law import check_name, file_of, mechanism_file
 from ccmodel.failure import ModelError
 from ccmodel.model.files import Model
-from ccmodel.paths import try_folder, writing
+from ccmodel.paths import try_folder
 from ccmodel.progress import Progress, within
 from ccmodel.report.verdict import SYMBOL, held_out_errors, nearest_sentence, sentence
 from ccmodel.studies.diagnosis.page import candidates_of
@@ -136,8 +136,7 @@ class Diagnosis:
         InputError
             If the folder cannot be made or written to.
         """
-        with writing(folder) as path:
-            write_alone(self._outcome, path)
+        write_alone(self._outcome, Path(folder))
 
     def keep_law(self, name: str, folder: str | Path) -> Path | None:
         """Write the learned law as the file of a mechanism, to be reviewed and added to the list.

@@ -20,7 +20,7 @@ from ccmodel.failure import ModelError
 from ccmodel.inference.intervals import COVERAGE, Interval
 from ccmodel.model.files import Model, RigConditions
 from ccmodel.model.parameters import Parameters, unit_of_parameter
-from ccmodel.paths import writing
+from ccmodel.outputs import new_file
 from ccmodel.progress import Progress, within
 from ccmodel.studies.diagnosis.run import INGEST, options_of
 from ccmodel.typed import InputError
@@ -160,7 +160,7 @@ class Fit:
         InputError
             If the file cannot be written.
         """
-        with writing(file) as path:
+        with new_file(file) as path:
             path.write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")
 
     def plot_residuals(self) -> "Figure":

@@ -15,7 +15,8 @@ from ccmodel.api.options import progress_of
 from ccmodel.api.recordings import Recordings, counted
 from ccmodel.failure import ModelError
 from ccmodel.model.files import Model, read_model_file
-from ccmodel.paths import existing_file, try_file, try_folder, writing
+from ccmodel.outputs import new_files
+from ccmodel.paths import existing_file, try_file, try_folder
 from ccmodel.progress import Progress, within
 from ccmodel.recording import Recording
 from ccmodel.steps.files import write_channels
@@ -106,8 +107,7 @@ class Prediction(Recordings):
         InputError
             If the folder cannot be made or written to.
         """
-        with writing(folder) as path:
-            path.mkdir(exist_ok=True)
+        with new_files(folder) as path:
             for recording in self.recordings:
                 write_channels(path / f"{recording.id}.csv", recording)
 
@@ -289,8 +289,7 @@ def simulate(
         except (ModelError, ValueError) as error:
             raise InputError(f"{source}: {error}") from None
     if out is not None:
-        with writing(out) as path:
-            write_channels(path, simulated)
+        write_channels(Path(out), simulated)
     return simulated
 
 

@@ -99,4 +99,4 @@ def _left(outs: tuple[Path, ...], written: list[Path]) -> str:
         return f"nothing was written to {' and '.join(map(str, outs))}"
     more = f" and {len(written) - _MOST_NAMED} more" if len(written) > _MOST_NAMED else ""
     names = ", ".join(map(str, written[:_MOST_NAMED]))
-    return f"written so far, the last perhaps not to its end: {names}{more}"
+    return f"written so far: {names}{more}"

@@ -77,8 +77,9 @@ unit is a value beside it (`unit`). A value that there is not is `null`. `out` i
 | 130 | Interrupted by Ctrl-C (143: by the request to end, SIGTERM). |
 | 141 | The reader of standard output has gone, as in `ccmodel check BATCH \\| head -1`. Nothing is printed about it. |
 
-An interrupted command says in one line what it has written and how to go on. A diagnosis, a fit and a simulation write
-their files at the end, and an import replaces its folder as a whole. So an earlier result stays until then.
+An interrupted command says in one line what it has written and how to go on. Files are written beside their place and
+renamed at the end, so that a kill or a full disk leaves the earlier result or the new one, never a mixture: an earlier
+verdict goes first and the new one comes last, an import replaces its folder as a whole, and other files stay.
 
 ## Completion
 

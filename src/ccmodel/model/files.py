@@ -13,7 +13,7 @@ from ccmodel import mechanisms as registry
 from ccmodel.geometry import ConduitPath
 from ccmodel.model.general.run import Active
 from ccmodel.model.parameters import FORMER_NAMES, Parameters
-from ccmodel.paths import writing
+from ccmodel.outputs import new_file
 from ccmodel.recording import FAR_ENDS, ORIGIN, Recording
 from ccmodel.typed import InputError, NotNegative, OneOf, Positive, TypedModel, advice
 
@@ -225,7 +225,7 @@ class Model:
         InputError
             If the file cannot be written.
         """
-        with writing(file) as path:
+        with new_file(file) as path:
             path.write_text(json.dumps(self.as_dict(), indent=1) + "\n")
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 
 from ccmodel.channels import ANGLE_AT, SUM_AT, TENSIONS_AT, THETA_IN, TORQUE_AT
+from ccmodel.outputs import new_file
 from ccmodel.rig.angle import angle_at, resolution_seen
 from ccmodel.rig.batch import DRIVE_ANGLE_COLUMNS, NAMES, recording_id, valid_name
 from ccmodel.rig.calibration import resting_samples
@@ -112,7 +113,8 @@ def draft_batch(folder: Path) -> Path:
         problems = [Problem(str(folder / file), None, text) for file, text in refused.items()]
         none = Problem(str(folder), None, f"has no logs ({', '.join(_suffixes())}): put them there")
         raise InputError.of(*(problems or [none]))
-    path.write_text("\n".join(_content(name, logs, refused)) + "\n", encoding="utf-8")
+    with new_file(path) as fresh:
+        fresh.write_text("\n".join(_content(name, logs, refused)) + "\n", encoding="utf-8")
     return path
 
 

@@ -9,6 +9,7 @@ import pandas as pd
 
 from ccmodel.model.files import read_model_file
 from ccmodel.model.parameters import Parameters
+from ccmodel.outputs import new_file
 from ccmodel.recording import Recording, read_recordings
 from ccmodel.rig.batch import Batch
 
@@ -23,7 +24,8 @@ def read_json(file: Path) -> dict:
 
 def write_json(file: Path, data: dict) -> None:
     """Write plain data as JSON."""
-    Path(file).write_text(json.dumps(data, indent=1) + "\n")
+    with new_file(file) as fresh:
+        fresh.write_text(json.dumps(data, indent=1) + "\n")
 
 
 def estimates_of(recordings_file: Path) -> Parameters | None:
@@ -78,7 +80,8 @@ def read_pairs(recordings_file: Path, simulated_file: Path) -> list[Pair]:
 
 def write_table(file: Path, table: pd.DataFrame, digits: int = 6) -> None:
     """Write a table as CSV."""
-    table.to_csv(file, index=False, float_format=f"%.{digits}g")
+    with new_file(file) as fresh:
+        table.to_csv(fresh, index=False, float_format=f"%.{digits}g")
 
 
 def write_channels(file: Path, recording: Recording) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 
+from ccmodel.outputs import new_file
 from ccmodel.progress import Progress, each_of, silent
 from ccmodel.rig import readers
 from ccmodel.rig.batch import DRIVE_ANGLE_COLUMNS
@@ -90,8 +91,8 @@ def write_guess(files: Sequence[Path], out: Path, progress: Progress = silent) -
     looked_at = {role: names[kinds[key][0][0]] for role, key in roles.items()}
     for role, key in roles.items():
         remarks += [f"{looked_at[role]}: {remark}" for remark in kinds[key][0][1].remarks]
-    out.mkdir(parents=True, exist_ok=True)
-    target.write_text(map_text(guessed, patterns, remarks), encoding="utf-8")
+    with new_file(target) as fresh:
+        fresh.write_text(map_text(guessed, patterns, remarks), encoding="utf-8")
     return GuessedMap(target, guessed, looked_at, remarks)
 
 

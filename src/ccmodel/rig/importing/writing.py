@@ -12,13 +12,15 @@ import numpy as np
 import pandas as pd
 
 import ccmodel
+from ccmodel.outputs import new_folder
+from ccmodel.paths import try_folder
 from ccmodel.progress import Progress, each_of, silent, within
+from ccmodel.provenance import file_digest
 from ccmodel.rig.batch import NAMES, valid_name
 from ccmodel.rig.drafting import draft_batch
 from ccmodel.rig.importing.columns import TIME
 from ccmodel.rig.importing.map import ImportMap, load_map
 from ccmodel.rig.importing.recording import Built, FileError, build
-from ccmodel.rig.importing.replacing import replacing
 from ccmodel.rig.importing.sources import Source, names_of, recordings_of
 from ccmodel.typed import InputError, Problem
 
@@ -85,7 +87,7 @@ def import_files(files: Sequence[Path], map_file: Path, out: Path, progress: Pro
     sources, remarks = recordings_of([Path(f) for f in files], stated)
     names = names_of([file for source in sources for file in source.files.values()])
     built = _build_all(sources, stated, names, within(progress, 0.0, BUILDING))
-    with replacing(out) as fresh:
+    with new_folder(out) as fresh:
         fresh.mkdir()
         writing = each_of(built.items(), within(progress, BUILDING, 1.0), lambda one: f"writing {one[0]}")
         for id_, one in writing:
@@ -95,7 +97,8 @@ def import_files(files: Sequence[Path], map_file: Path, out: Path, progress: Pro
         (fresh / PROVENANCE).write_text(text + "\n", encoding="utf-8")
         if (out / BATCH).exists():
             shutil.copy2(out / BATCH, fresh / BATCH)
-    return Written(out, built, remarks, _draft(out))
+        drafted = _draft(fresh)
+    return Written(out, built, remarks, drafted)
 
 
 def check_folder(out: Path) -> None:
@@ -104,10 +107,11 @@ def check_folder(out: Path) -> None:
     Raises
     ------
     InputError
-        If its name is no batch's, or it holds files that no import wrote.
+        If its name is no batch's, it holds files that no import wrote, or no folder can be made beside it.
     """
     if not valid_name(out.name):
         raise InputError(f"{out}: its name becomes the batch's, and {NAMES}: choose another folder")
+    try_folder(out.parent)
     if not out.exists():
         return
     if not out.is_dir():
@@ -215,7 +219,7 @@ def _sha256(path: Path) -> str:
     if path.is_dir():
         inner = [f"{f.relative_to(path).as_posix()} {_sha256(f)}" for f in sorted(path.rglob("*")) if f.is_file()]
         return hashlib.sha256("\n".join(inner).encode()).hexdigest()
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return file_digest(path)
 
 
 def _draft(folder: Path) -> bool:

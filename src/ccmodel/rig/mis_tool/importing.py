@@ -5,10 +5,10 @@ import re
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from ccmodel.outputs import new_folder
 from ccmodel.progress import Progress, each_of, silent
 from ccmodel.rig.batch import valid_name
 from ccmodel.rig.findings import Finding, LogError
-from ccmodel.rig.importing.replacing import replacing
 from ccmodel.rig.mis_tool.description import write_batch
 from ccmodel.rig.mis_tool.signs import sensor_signs
 from ccmodel.rig.mis_tool.trial import FEWEST_COLUMNS, FEWEST_ROWS, Trial, read_trial
@@ -65,7 +65,7 @@ def import_mis_tool(source: Path, out: Path, progress: Progress = silent) -> Imp
                 f"{out}: would be replaced, but {entry.name} is from no import; give a new or empty folder"
             )
     files = _text_files(source)
-    with replacing(out) as fresh:
+    with new_folder(out) as fresh:
         fresh.mkdir()
         names, findings = _import_into(fresh, files, progress)
         if not names:
@@ -102,7 +102,7 @@ def import_batch(source: Path, out: Path) -> Imported:
     files = _text_files(source)
     if inner := {f.parent for f in files} - {Path(source)}:
         raise InputError(f"{source}: has trials in {min(inner).name}; a batch is made of one folder of trials, name it")
-    with replacing(out) as fresh:
+    with new_folder(out) as fresh:
         findings = _import_folder(files, fresh, out.name)
         if not fresh.exists():
             raise _no_trial(source, files)

@@ -1,6 +1,7 @@
 """A batch, or several of one rig -> a diagnosis: diagnosis.json, a page, and the models that were compared."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from ccmodel.diagnosis.run import diagnose as run
 from ccmodel.failure import ModelError
 from ccmodel.model.files import Model, RigConditions
 from ccmodel.model.parameters import Parameters
+from ccmodel.outputs import new_files
 from ccmodel.progress import Progress, silent
 from ccmodel.recording import Recording
 from ccmodel.report.verdict import headline
@@ -23,6 +25,7 @@ from ccmodel.studies.diagnosis.page import write_diagnosis, write_inconsistent, 
 from ccmodel.studies.diagnosis.settings import MODEL_FILES, Diagnosing
 from ccmodel.typed import InputError
 
+VERDICT, PAGE_FILE = "diagnosis.json", "report.html"
 # The page of a run of the pipeline, seen from the report of a diagnosis.
 PAGE_OF_RUN = "../../index.html"
 # Shares of the time at which the batch is read, and at which the page is written; measured as in `ccmodel.diagnosis`.
@@ -123,20 +126,30 @@ def write(outcome: Outcome, out: Path, page: str | None = None) -> None:
     page : str, optional
         Address of the page of the run, relative to `out`.
     """
-    out.mkdir(parents=True, exist_ok=True)
-    write_json(out / "diagnosis.json", outcome.content)
-    _write_models(out, outcome.models, _without(outcome.content["verdict"]))
-    if outcome.found is None:
-        write_inconsistent(out / "report.html", outcome.content, outcome.recordings, page)
-    else:
-        write_diagnosis(out / "report.html", outcome.found, page)
+    with _new_files(out) as fresh:
+        _write(outcome, fresh, page)
 
 
 def write_alone(outcome: Outcome, out: Path) -> None:
     """Write the files of a diagnosis that no run of the pipeline reads: without the file of a nearest model if none."""
-    write(outcome, out)
-    if not outcome.content["nearest"]:
-        (out / MODEL_FILES["nearest"]).unlink()
+    with _new_files(out) as fresh:
+        _write(outcome, fresh, None)
+        if not outcome.content["nearest"]:
+            (fresh / MODEL_FILES["nearest"]).unlink()
+
+
+def _new_files(out: Path) -> AbstractContextManager[Path]:
+    """Files of a diagnosis, which take the place of an earlier one's together; its verdict goes first."""
+    return new_files(out, last=VERDICT, without=(PAGE_FILE, *MODEL_FILES.values()))
+
+
+def _write(outcome: Outcome, out: Path, page: str | None) -> None:
+    write_json(out / VERDICT, outcome.content)
+    _write_models(out, outcome.models, _without(outcome.content["verdict"]))
+    if outcome.found is None:
+        write_inconsistent(out / PAGE_FILE, outcome.content, outcome.recordings, page)
+    else:
+        write_diagnosis(out / PAGE_FILE, outcome.found, page)
 
 
 def check_options(options: Options, has_baseline: bool, prefix: str = "") -> None:
@@ -172,11 +185,11 @@ def diagnose_recordings(
         outcome = diagnosed(ingested, inputs, options_of(settings), None, progress, settings.trust_inputs)
     except (InputError, ModelError, ValueError) as error:
         reason = str(error)
-        out.mkdir(parents=True, exist_ok=True)
         batches = {"batches": [file.stem for file in recordings_files]} if len(recordings_files) > 1 else {}
-        write_json(out / "diagnosis.json", {"batch": name, **batches, "verdict": None, "why": reason})
-        _write_models(out, {}, dict.fromkeys(MODEL_FILES, reason))
-        write_not_diagnosed(out / "report.html", name, reason, PAGE_OF_RUN)
+        with _new_files(out) as fresh:
+            write_json(fresh / VERDICT, {"batch": name, **batches, "verdict": None, "why": reason})
+            _write_models(fresh, {}, dict.fromkeys(MODEL_FILES, reason))
+            write_not_diagnosed(fresh / PAGE_FILE, name, reason, PAGE_OF_RUN)
         return
     write(outcome, out, PAGE_OF_RUN)
 

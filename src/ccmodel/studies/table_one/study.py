@@ -11,6 +11,7 @@ from pathlib import Path
 import pandas as pd
 
 from ccmodel import provenance
+from ccmodel.outputs import new_file, new_files
 from ccmodel.progress import Progress, silent, within
 from ccmodel.report.figures import FORMATS, save_figure, stamp_figure
 from ccmodel.steps.files import write_json, write_table
@@ -115,10 +116,7 @@ def table_one(settings: Path, out: Path, figure: Path, cores: int = 1, progress:
     study = load_yaml_model(settings, TableOne)
     found = run_study(study, cores, progress)
     ranked = rankings(found.singles, found.pairs, study)
-    out.mkdir(parents=True, exist_ok=True)
     tables = {"cases": found.singles, "pairs": found.pairs, "failed": found.failed, "ranking": ranked}
-    for name, table in tables.items():
-        write_table(out / f"{name}.csv", table)
     summary = {
         "cases": len(found.singles),
         "pairs": len(found.pairs),
@@ -127,11 +125,13 @@ def table_one(settings: Path, out: Path, figure: Path, cores: int = 1, progress:
         "room_for_tau_in_percent": room_for_torque(found.singles, study),
         "provenance": provenance.of_inputs([settings], settings.parent),
     }
-    write_json(out / "summary.json", summary)
-    figure.parent.mkdir(parents=True, exist_ok=True)
     drawn = table_one_figure(ranked, found.singles, study)
     stamp_figure(drawn, provenance.stamp(__name__, study.model_dump(mode="json")))
-    save_figure(drawn, figure, *(out / f"table-one.{ending}" for ending in FORMATS))
+    with new_file(figure) as fresh_figure, new_files(out, last="summary.json") as fresh:
+        for name, table in tables.items():
+            write_table(fresh / f"{name}.csv", table)
+        write_json(fresh / "summary.json", summary)
+        save_figure(drawn, fresh_figure, *(fresh / f"table-one.{ending}" for ending in FORMATS))
     return (
         f"{len(found.singles)} cases of one effect and {len(found.pairs)} of two; {len(found.failed)} could not be "
         f"run, {found.left_out} conditions are beyond the sensors' ranges: {out / 'ranking.csv'}, {figure}"

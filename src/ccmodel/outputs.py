@@ -1,0 +1,123 @@
+"""Files and folders that are written whole: made beside their place, then renamed.
+
+Whatever ends a command (an error, a full disk, a kill), a place holds what was there before or what is new, never half
+of it. What a killed command has left beside the place, the next one that writes there removes.
+"""
+
+import shutil
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ccmodel.typed import InputError
+
+# Before the name of what is being made.
+_UNFINISHED = ".unfinished-"
+
+
+@contextmanager
+def _written(path: Path) -> Iterator[None]:
+    """Say of which file or folder an error of the system is; one of a full disk does not say it."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
+
+
+@contextmanager
+def new_file(path: str | Path) -> Iterator[Path]:
+    """Where to write a file that takes the place of `path` at the end, if nothing was raised.
+
+    Missing folders above it are made.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    path = Path(path).expanduser()
+    with _written(path):
+        place = path.resolve()
+        place.parent.mkdir(parents=True, exist_ok=True)
+        fresh = place.with_name(_UNFINISHED + place.name)
+        try:
+            yield fresh
+            fresh.replace(place)
+        finally:
+            fresh.unlink(missing_ok=True)
+
+
+@contextmanager
+def new_files(folder: str | Path, last: str | None = None, without: Collection[str] = ()) -> Iterator[Path]:
+    """Where to write files that belong together; at the end they take their places in `folder`, if nothing was raised.
+
+    The files that they replace go first, and other files stay. So the files in the folder are never from two runs.
+
+    Parameters
+    ----------
+    folder : str or Path
+        It is made if it is missing.
+    last : str, optional
+        Name of the file that says that the others are complete: the first that goes and the last that comes.
+    without : collection of str
+        Names of files of an earlier run that go even if no new one takes their place.
+
+    Raises
+    ------
+    InputError
+        If they cannot be written.
+    """
+    folder = Path(folder).expanduser()
+    with _written(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        fresh = folder / f"{_UNFINISHED}files"
+        shutil.rmtree(fresh, ignore_errors=True)
+        fresh.mkdir()
+        try:
+            yield fresh
+            names = sorted((file.name for file in fresh.iterdir()), key=lambda name: (name == last, name))
+            for name in (*reversed(names), *without):
+                (folder / name).unlink(missing_ok=True)
+            for name in names:
+                (fresh / name).rename(folder / name)
+        finally:
+            shutil.rmtree(fresh, ignore_errors=True)
+
+
+@contextmanager
+def new_folder(path: str | Path) -> Iterator[Path]:
+    """Where to make a folder that takes the place of `path` as a whole at the end, if nothing was raised.
+
+    Yields
+    ------
+    Path
+        Of the same name as `path`; it does not exist yet.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    path = Path(path).expanduser()
+    with _written(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # In the parent of `path`, since a folder can only be renamed within a file system.
+        work = path.with_name(_UNFINISHED + path.name)
+        fresh, earlier = work / path.name, work / f"earlier-{path.name}"
+        # A command that was killed between the two renamings below.
+        if earlier.exists() and not path.exists():
+            earlier.rename(path)
+        shutil.rmtree(work, ignore_errors=True)
+        work.mkdir()
+        try:
+            yield fresh
+            if path.exists():
+                path.rename(earlier)
+            try:
+                fresh.rename(path)
+            except BaseException:
+                if earlier.exists():
+                    earlier.rename(path)
+                raise
+        finally:
+            shutil.rmtree(work, ignore_errors=True)
