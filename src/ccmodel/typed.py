@@ -23,6 +23,8 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 from ruamel.yaml.tag import Tag
 
+from ccmodel import inputs
+
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 M = TypeVar("M", bound=BaseModel)
@@ -34,6 +36,8 @@ ErrorEntry = Mapping[str, Any]
 
 # Lists and mappings within each other that a file may hold; our own formats need 6.
 MAX_DEPTH = 50
+# Keys and values that a file may hold, those that aliases repeat included; a recording has 20 to 30.
+MAX_VALUES = 100_000
 
 
 @dataclass(frozen=True)
@@ -213,7 +217,12 @@ class _TextKeys(Composer):
 
 
 class _ValuesWithLines(RoundTripConstructor):
-    """Gives the line of every value that cannot be read."""
+    """Gives the line of every value that cannot be read, and does not repeat values without end."""
+
+    def construct_document(self, node: Node) -> Any:
+        if _size(node, {}) > MAX_VALUES:
+            raise _error_at(node, f"its aliases repeat values to more than {MAX_VALUES}: write out what is needed")
+        return super().construct_document(node)
 
     def construct_object(self, node: Node, deep: bool = False) -> Any:
         if node in self.recursive_objects:
@@ -228,6 +237,16 @@ class _ValuesWithLines(RoundTripConstructor):
             raise _error_at(node, text) from error
 
 
+def _size(node: Node, known: dict[int, int]) -> int:
+    """Number of nodes from a node on, counted again at each alias; one within itself counts once."""
+    if id(node) not in known:
+        known[id(node)] = 1
+        inner = [] if isinstance(node, ScalarNode) else node.value
+        parts = (part for entry in inner for part in (entry if isinstance(entry, tuple) else (entry,)))
+        known[id(node)] = 1 + sum(_size(part, known) for part in parts)
+    return known[id(node)]
+
+
 def _error_at(node: Node, text: str) -> MarkedYAMLError:
     return MarkedYAMLError(problem=text, problem_mark=node.start_mark)
 
@@ -238,6 +257,7 @@ def _read_yaml(path: Path) -> CommentedMap:
     reader.Composer, reader.Constructor, reader.max_depth = _TextKeys, _ValuesWithLines, MAX_DEPTH
     line = None
     try:
+        inputs.check_file(path, inputs.DOCUMENT)
         content = reader.load(path.read_text(encoding="utf-8"))
         if isinstance(content, CommentedMap):
             return content
@@ -245,7 +265,7 @@ def _read_yaml(path: Path) -> CommentedMap:
     except FileNotFoundError:
         text = "there is no such file"
     except (OSError, UnicodeDecodeError) as error:
-        text = f"cannot be read as text ({error})"
+        text = f"cannot be read as text ({error.strerror if isinstance(error, OSError) else error})"
     except DuplicateKeyError as error:
         line, text = error.problem_mark.line + 1, error.problem.partition(" with value")[0] + ": remove one"
     except MarkedYAMLError as error:

@@ -18,6 +18,7 @@ from pkgutil import iter_modules
 import numpy as np
 import pandas as pd
 
+from ccmodel import inputs
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers import csv, signatures
 from ccmodel.rig.readers.attempt import COPY, read_apart, read_here
@@ -57,6 +58,7 @@ def read_signals(path: Path, text: TextLayout | None = None) -> SignalFile:
     """
     path = Path(path)
     try:
+        _check_files(path)
         name = _format_of(path)
     except FileNotFoundError:
         raise LogError(None, None, "there is no such file") from None
@@ -67,6 +69,13 @@ def read_signals(path: Path, text: TextLayout | None = None) -> SignalFile:
     if isinstance(result, LogError):
         raise result
     return _checked(result, format)
+
+
+def _check_files(path: Path) -> None:
+    """Raise `OSError` if a file, or one in the folder of a bag, is no regular one or too large."""
+    for file in sorted(path.iterdir()) if path.is_dir() else [path]:
+        if file == path or not file.is_dir():
+            inputs.check_file(file, inputs.LOG)
 
 
 def _format_of(path: Path) -> str:
@@ -126,6 +135,7 @@ def read(path: Path) -> pd.DataFrame:
     """
     path = Path(path)
     try:
+        _check_files(path)
         if (module := signatures.kind_of(path).module) not in (None, "text") and _ending(path) not in csv.SUFFIXES:
             return log_of_signals(read_signals(path), registry()[module].name)
         return csv.read(path)

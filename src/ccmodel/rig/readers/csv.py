@@ -1,10 +1,8 @@
 """Comma-separated values, UTF-8, plain or gzipped: a header, then a row a sample."""
 
 import csv
-import gzip
 import io
 import re
-import zlib
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +10,7 @@ import pandas as pd
 
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers import signatures
+from ccmodel.rig.readers.content import content_of
 
 SUFFIXES = (".csv", ".csv.gz")
 _QUOTED_CELL = re.compile(r'(?<![^,])"([^",]*)"(?![^,])')
@@ -43,29 +42,17 @@ def read(path: Path) -> pd.DataFrame:
 
 
 def _text(path: Path) -> str:
-    raw = path.read_bytes()
     kind = signatures.kind_of(path)
     if kind.module != "text" and kind not in (signatures.UNKNOWN, signatures.EMPTY):
         raise LogError(None, None, signatures.not_text(kind))
-    if raw[:2] == b"\x1f\x8b":
-        raw = _unzipped(raw)
-    elif path.suffix == ".gz" and raw:
+    if path.suffix == ".gz" and kind != signatures.EMPTY and not signatures.is_gzipped(path):
         raise LogError(None, None, "is called .gz but is not gzipped: rename it or copy it again")
+    raw = content_of(path)
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         row = raw[: error.start].count(b"\n") + 1
         raise LogError(row, None, "is not text: the file is damaged, copy it again from the rig") from None
-
-
-def _unzipped(raw: bytes) -> bytes:
-    try:
-        return gzip.decompress(raw)
-    except EOFError:
-        fault = "cut short"
-    except (OSError, zlib.error):
-        fault = "damaged"
-    raise LogError(None, None, f"the gzip stream is {fault}: copy it again from the rig")
 
 
 def _lines(text: str) -> list[str]:

@@ -1,6 +1,5 @@
 """Kind of a file, from its first bytes."""
 
-import gzip
 import os
 import re
 import zlib
@@ -103,6 +102,12 @@ def kind_of(path: Path) -> Kind:
     return inside if inside in (TEXT, EMPTY) else Kind(f"gzipped ({inside.text} inside)", None, "unpack it first")
 
 
+def is_gzipped(path: Path) -> bool:
+    """Whether a file begins as a gzip stream does."""
+    with open(path, "rb") as file:
+        return file.read(len(_GZIP)) == _GZIP
+
+
 def kind_of_bytes(head: bytes) -> Kind:
     """Kind of a file that begins with these bytes."""
     if not head:
@@ -155,8 +160,3 @@ def _unzipped_head(head: bytes) -> bytes:
         return zlib.decompressobj(wbits=31).decompress(head, HEAD)
     except zlib.error:
         return b"damaged"  # the reader of the text says so
-
-
-def unzipped(raw: bytes) -> bytes:
-    """Content of a gzip stream; EOFError if it is cut, OSError or zlib.error if it is damaged."""
-    return gzip.decompress(raw)

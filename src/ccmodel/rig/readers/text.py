@@ -7,7 +7,6 @@ separator, decimal sign and the first sample. Names and units are looked for in 
 import csv
 import io
 import re
-import zlib
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers import signatures
+from ccmodel.rig.readers.content import content_of
 from ccmodel.rig.readers.contract import Format, Signal, SignalFile, TextLayout
 from ccmodel.rig.readers.names import bare_unit, is_unit, split_unit
 from ccmodel.rig.readers.stamps import is_stamp, seconds_of_stamps
@@ -87,7 +87,7 @@ class _Grid:
 def read(path: Path, layout: TextLayout | None = None) -> SignalFile:
     """Read a text file; see `ccmodel.rig.readers`."""
     layout = layout or TextLayout()
-    text, encoding = _decoded(_raw(path), layout.encoding)
+    text, encoding = _decoded(content_of(path), layout.encoding)
     lines, remarks = _lines(text)
     grid = _grid(lines, layout)
     first = _first_row(lines, grid, layout)
@@ -103,19 +103,6 @@ def read(path: Path, layout: TextLayout | None = None) -> SignalFile:
 
 
 FORMAT = Format("text file", (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".lvm", ".tab", ".prn"), read)
-
-
-def _raw(path: Path) -> bytes:
-    raw = path.read_bytes()
-    if raw[:2] != b"\x1f\x8b":
-        return raw
-    try:
-        return signatures.unzipped(raw)
-    except EOFError:
-        fault = "cut short"
-    except (OSError, zlib.error):
-        fault = "damaged"
-    raise LogError(None, None, f"the gzip stream is {fault}: copy it again from the recorder")
 
 
 def _decoded(raw: bytes, encoding: str | None) -> tuple[str, str]:
