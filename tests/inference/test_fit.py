@@ -127,7 +127,7 @@ def test_a_secant_agrees_with_the_errors_at_both_points_and_keeps_what_the_step_
     moved = block.by_secant(step, sizes, errors)
     np.testing.assert_allclose(moved.derivatives @ step[:3], errors - block.errors)
     # Across the step, in units of the sizes.
-    across = np.array([sizes[0] ** 2 * step[1], -sizes[1] ** 2 * step[0], 3.0])
+    across = np.array([sizes[0] ** 2 * step[1], -(sizes[1] ** 2) * step[0], 3.0])
     scaled = across / sizes[:3] ** 2 @ step[:3]
     assert scaled == pytest.approx(0.0, abs=1e-9)
     np.testing.assert_allclose(moved.derivatives @ across, block.derivatives @ across, rtol=1e-9)

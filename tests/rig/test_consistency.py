@@ -271,8 +271,8 @@ def test_a_load_cell_that_errs_in_all_recordings_makes_none_of_them_foreign(tmp_
 def test_a_large_offset_of_a_load_cell_is_no_wrong_friction(tmp_path, end):
     """3 N are half of what friction takes: the tensions' ratio then shows another friction, their rise does not."""
     copy = read_copy(SIMULATED)
-    for table in copy.logs.values():
-        table[f"{end}_load_cell_V"] += 3.0 * copy.description["rig"][end]["load_cell"]["sensitivity_V_per_N"]
+    for log in copy.logs.values():
+        log[f"{end}_load_cell_V"] += 3.0 * copy.description["rig"][end]["load_cell"]["sensitivity_V_per_N"]
     said = said_of(write_copy(copy, tmp_path / "offset"))
     assert not [text for text in said if "friction" in str(text)]
 

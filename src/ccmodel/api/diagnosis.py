@@ -15,6 +15,7 @@ from ccmodel.api.recordings import counted
 from ccmodel.diagnosis.kept_law import check_name, file_of, mechanism_file
 from ccmodel.failure import ModelError
 from ccmodel.model.files import Model
+from ccmodel.outputs import new_file
 from ccmodel.paths import try_folder
 from ccmodel.progress import Progress, within
 from ccmodel.report.verdict import SYMBOL, held_out_errors, nearest_sentence, sentence
@@ -161,10 +162,9 @@ class Diagnosis:
         if self.verdict != "learned" or self._outcome.found is None:
             return None
         best, law = self._outcome.found.judgement.best, self.report["laws"][0]
-        with writing(folder) as path:
-            path.mkdir(parents=True, exist_ok=True)
-            file = path / file_of(name)
-            file.write_text(mechanism_file(name, law, best, self.batch.name), encoding="utf-8")
+        file = Path(folder).expanduser() / file_of(name)
+        with new_file(file) as fresh:
+            fresh.write_text(mechanism_file(name, law, best, self.batch.name), encoding="utf-8")
         return file
 
     def __repr__(self) -> str:

@@ -184,8 +184,8 @@ class Parity:
     def offset_free_ratio(self) -> float | None:
         """The same from how the difference of the sums rises with that of the load's tensions; None if it does not.
 
-        F_drive - F_load = (u - 1) T2 - (1 - 1 / u) T4, whose slope over T2 - T4 is about u - 1. An offset of a load cell
-        is its intercept.
+        F_drive - F_load = (u - 1) T2 - (1 - 1 / u) T4, whose slope over T2 - T4 is about u - 1. An offset of a load
+        cell is its intercept.
         """
         found = []
         for total, pulled, other in self._in_full_slip:
