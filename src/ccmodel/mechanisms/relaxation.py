@@ -58,6 +58,8 @@ def followed(r: float, times: tuple[float, ...], relaxed: float) -> NDArray:
 
 def kept_at_rest(seconds: float, r: float, times: tuple[float, ...], relaxed: float) -> float:
     """Tension at a time into the rest that a recording starts with, over the tension at its first sample."""
+    if r == 0.0:
+        return 1.0
     left = 1 - followed(r, times, relaxed)
     now, then = (1 - r * (1 - np.mean(left * decay)) for decay in (1.0, np.exp(-seconds / np.array(times))))
     return float(then / now)

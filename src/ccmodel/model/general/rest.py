@@ -87,8 +87,8 @@ def load_angle(physics: rows.Physics, T: NDArray, load: Load, series: NDArray) -
     theta, force = 0.0, T[0, -1] - T[1, -1]
     for _ in range(50):
         torque = physics.radius * winding(theta, physics.load_eccentricity, physics.load_eccentricity_rad)[1] * force
-        theta = _angle_at_rest(K, K3, physics.half_gap, torque, load)
-        if physics.load_eccentricity == 0:
+        before, theta = theta, _angle_at_rest(K, K3, physics.half_gap, torque, load)
+        if physics.load_eccentricity == 0 or theta == before:
             break
     return float(theta)
 
@@ -99,7 +99,9 @@ def _deflection(K: float, K3: float, torque: float) -> float:
         return float(np.cbrt(torque / K3))
     z = torque / K
     for _ in range(50 if K3 else 0):
-        z -= (K * z + K3 * z**3 - torque) / (K + 3 * K3 * z * z)
+        before, z = z, z - (K * z + K3 * z**3 - torque) / (K + 3 * K3 * z * z)
+        if z == before:
+            break
     return float(z)
 
 
