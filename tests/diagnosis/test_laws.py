@@ -121,3 +121,38 @@ def test_friction_by_tension_is_learned_inside_the_solver(tmp_path, monkeypatch)
     assert (law["slot"], law["place"], law["arguments"]) == ("sliding-friction", "conduit", ["tension"])
     assert (law["formula"], law["nearest_listed"]["name"]) == ("a x^n", power.name)
     assert law["parameters"][-1]["value"] == pytest.approx(-0.3, abs=0.02)
+
+
+def diagnosed(batch, out):
+    done = CliRunner().invoke(cli.app, ["diagnose", str(batch), "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    return json.loads((out / "diagnosis.json").read_text())
+
+
+def test_a_listed_mechanism_is_named_beside_a_law(tmp_path):
+    def both(table):
+        table["load_current_A"] *= 1.08
+        return cogging(table)
+
+    said = diagnosed(spoil(write_batch(tmp_path / "both", pretensions=(7.0, 6.0, 5.0)), both), tmp_path / "out")
+    assert said["verdict"] == "learned"
+    assert [law["name"] for law in said["laws"]] == ["learned-bearing-torque-by-drive-angle-fine"]
+    (gain,) = said["mechanisms"]
+    assert (gain["name"], gain["place"]) == ("torque-scale", "load-sensor")
+    assert gain["parameters"][0]["value"] == pytest.approx(0.08, abs=0.012)
+    assert "Beside it: the load's torque sensor reads" in said["headline"]
+
+
+def test_a_second_law_is_learned_beside_the_first(tmp_path):
+    def both(table):
+        theta_out = (table["load_encoder_counts"] + 40) * 2 * np.pi / 2000
+        table["load_load_cell_V"] += 0.1 * 0.5 * np.sin(2 * np.pi * theta_out / 0.5)
+        return cogging(table)
+
+    said = diagnosed(spoil(write_batch(tmp_path / "two", pretensions=(7.0, 6.0, 5.0)), both), tmp_path / "out")
+    assert {(law["slot"], *law["arguments"]) for law in said["laws"]} == {
+        ("bearing-torque", "drive-angle"),
+        ("sensor-map", "load-angle"),
+    }
+    assert "The torque at the drive pulley depends" in said["headline"]
+    assert "The error of F_load depends" in said["headline"]

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.discrepancy import Discrepancy, Evidence, evidence_of
-from ccmodel.diagnosis.hypothesis import Hypothesis, law_of
+from ccmodel.diagnosis.hypothesis import Hypothesis, laws_in
 from ccmodel.diagnosis.repeatability import FRICTION, friction_probabilities, log_bayes_factor
 from ccmodel.diagnosis.whitening import Whitened
 
@@ -122,9 +122,9 @@ class Comparison:
         for candidate in [self.base, *self.candidates]:
             evidence, repeats = self.evidence[candidate.hypothesis], log_odds_of_repeats(candidate)
             priors = log_priors(candidate.hypothesis.size, max(self.screened, len(self.candidates)))
-            if law_of(candidate.hypothesis) is not None:
-                # What no list holds is any law of any slot.
-                priors = priors + log((1 - settings.PRIOR_LISTED) / settings.PRIOR_LISTED)
+            # What no list holds is any law of any slot.
+            unlisted = log((1 - settings.PRIOR_LISTED) / settings.PRIOR_LISTED)
+            priors = priors + len(laws_in(candidate.hypothesis)) * unlisted
             complete = evidence.exact
             if candidate is not self.base:
                 by_law = log(settings.SAME_LAW), log(1 - settings.SAME_LAW)

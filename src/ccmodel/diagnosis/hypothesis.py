@@ -126,9 +126,14 @@ def stated_hypothesis(stated: Collection[str]) -> Hypothesis:
     return Hypothesis(tuple((name, place) for name, _, place in parts))
 
 
+def laws_in(hypothesis: Hypothesis) -> list[Law]:
+    """The laws among the mechanisms of a hypothesis."""
+    return [registry.laws()[name] for name, _ in hypothesis.acting if name in registry.laws()]
+
+
 def law_of(hypothesis: Hypothesis) -> Law | None:
-    """The law among the mechanisms of a hypothesis, if there is one."""
-    return next((registry.laws()[name] for name, _ in hypothesis.acting if name in registry.laws()), None)
+    """The first of the laws among the mechanisms of a hypothesis, if there is one."""
+    return next(iter(laws_in(hypothesis)), None)
 
 
 def coefficients_of(hypothesis: Hypothesis) -> dict[str, float]:

@@ -7,7 +7,7 @@ from scipy.stats import norm as normal
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.formula import shortest
-from ccmodel.diagnosis.hypothesis import law_of
+from ccmodel.diagnosis.hypothesis import laws_in
 from ccmodel.diagnosis.laws import unknowns_of, values_of
 from ccmodel.diagnosis.listed_laws import learned_of, nearest_listed
 from ccmodel.diagnosis.verdict import Judgement
@@ -16,33 +16,32 @@ from ccmodel.mechanisms.learned import Law
 
 
 def laws_of(judgement: Judgement) -> list[dict]:
-    """The law of a judgement as the diagnosis format states it; a list of one, or of none with another verdict."""
+    """The laws of a judgement as the diagnosis format states them, none with another verdict than ``learned``."""
+    return [_stated(judgement, law) for law in laws_in(judgement.best.hypothesis) if judgement.verdict == "learned"]
+
+
+def _stated(judgement: Judgement, law: Law) -> dict:
     best = judgement.best
-    law = law_of(best.hypothesis)
-    if judgement.verdict != "learned" or law is None:
-        return []
     x, y, band = curve_of(best, law)
     formula, parameters = shortest(x, y, band, law)
     unit = law.argument.unit
     others = indistinguishable(judgement, law)
-    return [
-        {
-            "place": law.place,
-            "slot": law.slot,
-            "arguments": [law.argument.name],
-            "name": law.name,
-            "channel": law.channel,
-            "argument_unit": unit,
-            "argument_is": law.argument.meaning,
-            "confidence": round(min(settings.MOST_CONFIDENT, judgement.confidence_in_slot(law)), 4),
-            "curve": [[float(v) for v in row] for row in zip(x, y, *band, strict=True)],
-            "curve_is": law.curve_is,
-            "formula": formula,
-            "parameters": parameters,
-            "indistinguishable": others,
-            "nearest_listed": nearest_listed(learned_of(best, law)),
-        }
-    ]
+    return {
+        "place": law.place,
+        "slot": law.slot,
+        "arguments": [law.argument.name],
+        "name": law.name,
+        "channel": law.channel,
+        "argument_unit": unit,
+        "argument_is": law.argument.meaning,
+        "confidence": round(min(settings.MOST_CONFIDENT, judgement.confidence_in_slot(law)), 4),
+        "curve": [[float(v) for v in row] for row in zip(x, y, *band, strict=True)],
+        "curve_is": law.curve_is,
+        "formula": formula,
+        "parameters": parameters,
+        "indistinguishable": others,
+        "nearest_listed": nearest_listed(learned_of(best, law)),
+    }
 
 
 def curve_of(candidate: CandidateFit, law: Law) -> tuple[NDArray, NDArray, tuple[NDArray, NDArray]]:
@@ -60,9 +59,10 @@ def curve_of(candidate: CandidateFit, law: Law) -> tuple[NDArray, NDArray, tuple
 
 def indistinguishable(judgement: Judgement, law: Law) -> list[str]:
     """Other arguments of the same slot that the recordings do not exclude, the most probable first."""
+    acting = {one.argument.name for one in laws_in(judgement.best.hypothesis) if one.is_of_slot(law)}
     by_argument: dict[str, float] = {}
     for hypothesis, p in judgement.confidence.items():
-        other = law_of(hypothesis)
-        if other is not None and other.is_of_slot(law) and other.argument.name != law.argument.name:
-            by_argument[other.argument.name] = by_argument.get(other.argument.name, 0.0) + p
+        for other in laws_in(hypothesis):
+            if other.is_of_slot(law) and other.argument.name not in acting:
+                by_argument[other.argument.name] = by_argument.get(other.argument.name, 0.0) + p
     return sorted((a for a, p in by_argument.items() if p > settings.RIVAL), key=lambda a: -by_argument[a])

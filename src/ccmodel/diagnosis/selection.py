@@ -9,7 +9,7 @@ from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit, fit
 from ccmodel.diagnosis.comparison import Comparison, is_part_of
-from ccmodel.diagnosis.hypothesis import Hypothesis, law_of
+from ccmodel.diagnosis.hypothesis import Hypothesis, law_of, laws_in
 from ccmodel.diagnosis.laws import proposals
 from ccmodel.diagnosis.repeatability import estimated
 from ccmodel.diagnosis.screening import Score, Screening, screen
@@ -93,17 +93,38 @@ class Selection:
         base, discrepancy = found.base, found.discrepancy
         self.progress("learning a law from the recordings", 0.0)
 
-        def fitted(every: Sequence[Law], most: int) -> list[CandidateFit]:
-            leading = proposals(base, discrepancy, every, self.deadline)[:most]
-            return self.fit_all(found.whitened, base, [Score(p.hypothesis, 0.0, p.values) for p in leading])
+        def fitted(every: Sequence[Law], most: int, beside: CandidateFit = base) -> list[CandidateFit]:
+            leading = proposals(beside, discrepancy, every, self.deadline)[:most]
+            return self.fit_all(found.whitened, beside, [Score(p.hypothesis, 0.0, p.values) for p in leading])
 
         first = sorted(fitted(self.laws, settings.LAWS_FITTED), key=lambda c: c.mean_square)
         found_first = [law_of(c.hypothesis) for c in first[: settings.LAWS_REFINED]]
         tried = {law.name for law in found_first if law is not None}
         finer = [law.finer() for law in found_first if law is not None]
         learned = first + fitted([f for f in finer if f is not None and f.name not in tried], settings.LAWS_REFINED)
+        # A listed effect that is far larger hides the law from the calibrated model.
+        listed = min((c for c in found.candidates if c.hypothesis.size == 1), key=lambda c: c.mean_square, default=None)
+        if listed is not None and listed.mean_square - 1 < settings.MOSTLY_LISTED * found.excess:
+            learned += fitted(self.laws, settings.PARTNERS, listed)
         found = found.with_candidates([*found.candidates, *learned])
-        return self.relinearise(found) if found.candidates else found
+        found = self.relinearise(found) if found.candidates else found
+        return self.beside_law(found) if law_of(found.leading[0].hypothesis) is not None else found
+
+    def beside_law(self, found: Comparison) -> Comparison:
+        """The same with what acts beside the leading law, a listed mechanism or a second law, if something is left."""
+        best = found.leading[0]
+        if found.is_enough or self.deadline.has_passed or best.hypothesis.size > 1:
+            return found
+        assert found.discrepancy is not None
+        self.progress(f"looking for what acts beside {best.hypothesis}", 0.0)
+        others = [
+            law for law in self.laws if all(law.finer() != one and law != one for one in laws_in(best.hypothesis))
+        ]
+        scores = [s for s in screen(best, self.mechanisms, self.deadline).singles() if s.gain > settings.WORTH_FITTING]
+        second = proposals(best, found.discrepancy, others, self.deadline)[: settings.PARTNERS]
+        chosen = scores[: settings.PARTNERS] + [Score(p.hypothesis, 0.0, p.values) for p in second]
+        pairs = self.fit_all(found.whitened, best, chosen)
+        return self.relinearise(found.with_candidates([*found.candidates, *pairs])) if pairs else found
 
     def _part(self, low: float, high: float) -> Self:
         """The same, whose work takes these shares of the whole."""

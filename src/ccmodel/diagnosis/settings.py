@@ -236,5 +236,7 @@ LAWS_FITTED, LAWS_REFINED = 8, 2
 LISTED_STARTS = 3
 # Distance, in posterior standard deviations, up to which a learned law is a listed one: half of its 90 % band.
 WITHIN_BAND = 1.645
+# Share of the excess mean square below which what the best single listed mechanism leaves is learned too. Chosen.
+MOSTLY_LISTED = 0.5
 # Laws are learned after sets of so many listed mechanisms, where these do not decide.
 LEARN_AFTER = 2

@@ -10,7 +10,7 @@ from ccmodel.channels import PLACES_OF
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.comparison import Comparison
-from ccmodel.diagnosis.hypothesis import Hypothesis, law_of
+from ccmodel.diagnosis.hypothesis import Hypothesis, law_of, laws_in
 from ccmodel.diagnosis.screening import Score
 from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.mechanisms.learned import Law
@@ -72,8 +72,8 @@ class Judgement:
 
     def confidence_in_slot(self, law: Law) -> float:
         """Probability of the laws of one slot, whatever their argument."""
-        of_slot = ((law_of(hypothesis), p) for hypothesis, p in self.confidence.items())
-        return sum(p for one, p in of_slot if one is not None and one.is_of_slot(law))
+        every = self.confidence.items()
+        return sum(p for hypothesis, p in every if any(one.is_of_slot(law) for one in laws_in(hypothesis)))
 
     @property
     def nearest(self) -> CandidateFit | None:

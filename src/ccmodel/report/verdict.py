@@ -125,9 +125,9 @@ IN_SLOT = {
 
 
 def law_sentence(diagnosis: Mapping) -> str:
-    """What a learned law says, that it is on no list, and what acts beside it."""
+    """What the learned laws say, that they are on no list, and what acts beside them."""
     beside = f" Beside it: {_with_confidence(diagnosis['mechanisms'])}." if diagnosis["mechanisms"] else ""
-    return f"{law_claim(diagnosis['laws'][0])}{beside}"
+    return " ".join(map(law_claim, diagnosis["laws"])) + beside
 
 
 def law_claim(law: Mapping) -> str:
