@@ -94,3 +94,11 @@ def test_what_is_held_stays_as_it_is_unless_it_is_what_has_changed():
     assert changed in {model.and_also(h) for h in single_mechanisms(model=model)}
     assert list(changed.free(changed.start | {key: 7e-3})) == list(changed.start)
     assert [(m.name, m.place) for m in changed.of(known).mechanisms] == [friction]
+
+
+def test_of_a_strength_with_a_state_what_is_left_is_judged():
+    """Half of a running-in of 50 % shows as much as a fresh one of 25 %; no cable is fresh and runs in by 50 %."""
+    running_in = Hypothesis((("running-in", "conduit"),))
+    change, done = (f"running-in/conduit/{name}" for name in ("change", "done"))
+    found = [plausible(running_in, {change: -0.5, done: share}) for share in (0.0, 0.05, 0.5)]
+    assert found == [False, False, True]

@@ -103,8 +103,9 @@ class CandidateFit:
 
     @property
     def is_good(self) -> bool:
-        """Whether no channel is left with a mean square above `GOOD_FIT`."""
-        return max(self.by_channel.values()) <= settings.GOOD_FIT
+        """Whether its mean square is at most `GOOD_FIT`, and no channel is left with an error above `CONSPICUOUS`."""
+        worst = max(self.by_channel.values())
+        return self.mean_square <= settings.GOOD_FIT and worst <= settings.CONSPICUOUS**2
 
     @cached_property
     def prior(self) -> tuple[NDArray, NDArray]:

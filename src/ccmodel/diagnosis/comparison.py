@@ -198,8 +198,41 @@ class Comparison:
 
     @property
     def is_decided(self) -> bool:
-        """Whether the calibrated model or one candidate is complete with a probability of `SURE`."""
-        return max(self.probability_of_base, *self.probability, 0.0) >= settings.SURE
+        """Whether the calibrated model or one candidate is complete with a probability of `SURE`, or one is enough."""
+        return max(self.probability_of_base, *self.probability, 0.0) >= settings.SURE or self.certain is not None
+
+    def confidence_in(self, name: str) -> float:
+        """Probability that a mechanism acts, at whatever place and beside whatever others."""
+        weights = np.logaddexp.reduce(self.log_posterior[1:], axis=1).tolist()
+        pairs = zip(self.candidates, weights, strict=True)
+        return sum(exp(weight) for c, weight in pairs if name in c.hypothesis.names)
+
+    @property
+    def certain(self) -> CandidateFit | None:
+        """The most probable candidate of all mechanisms with the probability `SURE`, if it leaves a good fit.
+
+        What may be missing beside it is then of no consequence.
+        """
+        every = {name for c in self.candidates for name in c.hypothesis.names}
+        sure = sorted(name for name in every if self.confidence_in(name) >= settings.SURE)
+        alone = (c for c in self.leading if sure and list(c.hypothesis.names) == sure)
+        return next((c for c in alone if c.is_plausible and c.is_good), None)
+
+    @property
+    def best_of_list(self) -> CandidateFit | None:
+        """The set that is most probably complete, if it leaves a good fit and no other set of the list does as well.
+
+        Its probability among the complete ones is then `SURE`. Each of its members is more probable than not; how much
+        more, the priors of effects that nobody listed decide.
+        """
+        best = self.most_probable
+        if best is self.base or best.hypothesis.size < 2 or not best.is_good or laws_in(best.hypothesis):
+            return None
+        names, complete = best.hypothesis.names, np.array(self.probability)
+        same = np.array([c.hypothesis.names == names for c in self.candidates])
+        if min(map(self.confidence_in, names)) <= 0.5 or complete[same].sum() < settings.SURE * complete.sum():
+            return None
+        return best
 
     @property
     def most_probable(self) -> CandidateFit:

@@ -3,6 +3,7 @@
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
+from math import prod
 
 from ccmodel import mechanisms as registry
 from ccmodel.diagnosis import settings
@@ -147,12 +148,22 @@ def coefficients_of(hypothesis: Hypothesis) -> dict[str, float]:
 
 
 def plausible(hypothesis: Hypothesis, values: Mapping[str, float]) -> bool:
-    """Whether every strength lies within its plausible range or below it."""
+    """Whether every strength lies within its plausible range or below it.
+
+    Of a mechanism with a state, what is left of its strength when recordings start is looked at: only this shows, and a
+    stronger effect that is nearly over looks the same.
+    """
     return all(
-        _is_plausible(strength, values[mechanism_key(name, place, strength.name)])
+        _is_plausible(strength, _left(name, place, values) * values[mechanism_key(name, place, strength.name)])
         for name, place in hypothesis.acting
         for strength in registry.get(name).strengths
     )
+
+
+def _left(name: str, place: str, values: Mapping[str, float]) -> float:
+    """Share of a mechanism's strength that is left when recordings start, 1 without states."""
+    states = registry.get(name).states
+    return prod(1.0 - values.get(mechanism_key(name, place, state.name), state.neutral) for state in states)
 
 
 def _is_plausible(strength: Parameter, value: float) -> bool:

@@ -75,7 +75,7 @@ class Selection:
             if found.is_enough or self.deadline.has_passed or (size > 2 and found.by_evidence[0].is_good):
                 break
             found = part._part(RELINEARISED, 1.0).extended(found, screening, size)
-            if self.laws and size == settings.LEARN_AFTER and not (found.is_decided or found.by_evidence[0].is_good):
+            if self.laws and size == settings.LEARN_AFTER and not found.is_decided:
                 found = part.learn(found)
                 if law_of(found.leading[0].hypothesis) is not None:
                     break

@@ -191,6 +191,9 @@ NAMED_CHANNEL, NAMED_PHASE = 0.35, 0.7  # Chosen.
 
 # Posterior probability from which a mechanism is named, and from which it is listed as an alternative. Chosen.
 SURE, RIVAL = 0.8, 0.02
+# Error of a channel over its noise up to which what may be missing beside a set of mechanisms is of no consequence.
+# Chosen: it shows when one looks for it, and not by itself. Beyond it, pages say that a channel is explained in part.
+CONSPICUOUS = 1.5
 # Factor on the probability of every set of mechanisms where no recording can be held out, where the initial tension is
 # not observed, and, in proportion, where a tolerance takes the place of noise. Practice: without it two of 21
 # mechanisms concealed in measured recordings were named wrongly.

@@ -68,7 +68,7 @@ class Judgement:
 
     def confidence_in(self, name: str) -> float:
         """Probability that a mechanism acts, at whatever place and beside whatever others."""
-        return sum(p for hypothesis, p in self.confidence.items() if name in hypothesis.names)
+        return self.comparison.confidence_in(name)
 
     def confidence_in_slot(self, law: Law) -> float:
         """Probability of the laws of one slot, whatever their argument."""
@@ -87,8 +87,8 @@ def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
 
     - ``agrees``: nothing is missing in the calibrated model, with a probability above one half.
     - ``explained``: each mechanism of the candidate that is most probably complete has the probability `SURE` at least,
-      and that these and no others are missing has one above one half; or the mechanisms that have the probability
-      `SURE` leave a good fit, so that what may be missing beside them is of no consequence.
+      and that these and no others are missing has one above one half; or those that have it leave a good fit
+      (`Comparison.certain`); or a set leaves a good fit and no other does as well (`Comparison.best_of_list`).
     - ``learned``: something that no list holds is missing, and is a law of one slot with a probability above one half.
     - ``unexplained``: something is missing that no candidate describes, with a probability above one half, and no
       mechanism is part of it with such a probability.
@@ -107,8 +107,9 @@ def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
     listed = [c for c in candidates if law_of(c.hypothesis) is None]
     if comparison.most_probable in listed and _is_explained(found, comparison.most_probable):
         return replace(found, verdict="explained", best=comparison.most_probable)
-    if (sure := _sure(found, listed)) is not None and sure.is_good:
-        return replace(found, verdict="explained", best=sure)
+    sufficient = comparison.certain or comparison.best_of_list
+    if sufficient is not None and law_of(sufficient.hypothesis) is None:
+        return replace(found, verdict="explained", best=sufficient)
     names = {name for c in listed for name in c.hypothesis.names}
     learned = sum(p for hypothesis, p in found.confidence.items() if law_of(hypothesis) is not None)
     if comparison.unlisted + learned > 0.5 and max(map(found.confidence_in, names), default=0.0) <= 0.5:
@@ -121,14 +122,6 @@ def _is_explained(judgement: Judgement, best: CandidateFit) -> bool:
     pairs = zip(judgement.candidates, judgement.probability, strict=True)
     alone = sum(p for c, p in pairs if sorted(c.hypothesis.names) == names)
     return min(map(judgement.confidence_in, names)) >= settings.SURE and alone > 0.5
-
-
-def _sure(judgement: Judgement, listed: Sequence[CandidateFit]) -> CandidateFit | None:
-    """The most probable candidate that has all mechanisms with the probability `SURE`, and no others."""
-    every = {name for c in listed for name in c.hypothesis.names}
-    sure = sorted(name for name in every if judgement.confidence_in(name) >= settings.SURE)
-    alone = (c for c in judgement.comparison.leading if sure and list(c.hypothesis.names) == sure)
-    return next((c for c in alone if c.is_plausible), None)
 
 
 def single_fault_places(comparison: Comparison) -> list[str]:

@@ -23,9 +23,6 @@ IN_WORDS = {channel.short_name: channel.words for channel in TABLE.values()}
 NOT_ACCEPTED = "not accepted"
 # Verdict on recordings that contradict one another or batch.yaml: no model is run.
 INPUTS_INCONSISTENT = "inputs-inconsistent"
-# A held-out error above this many times the noise floor asks for a sentence under a model that is accepted. In the map
-# of a diagnosis it is yellow to the eye.
-CONSPICUOUS = 1.5
 # A unit is printed with a prefix if the value is below a tenth of it; these units take none.
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 _WITHOUT_PREFIX = ("1", "1/m", "kg*m^2")

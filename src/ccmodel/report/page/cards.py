@@ -5,9 +5,9 @@ from math import inf
 from statistics import median
 from typing import Any
 
+from ccmodel.diagnosis.settings import CONSPICUOUS
 from ccmodel.recording import ORIGIN
 from ccmodel.report.verdict import (
-    CONSPICUOUS,
     IN_WORDS,
     INPUTS_INCONSISTENT,
     NOT_ACCEPTED,

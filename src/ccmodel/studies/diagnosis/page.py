@@ -16,6 +16,7 @@ from ccmodel.channels import TABLE, THETA_IN, short_name
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.location import PHASES, mismatch
 from ccmodel.diagnosis.run import Diagnosis
+from ccmodel.diagnosis.settings import CONSPICUOUS
 from ccmodel.diagnosis.verdict import nested_choice
 from ccmodel.mechanisms import catalogue
 from ccmodel.model.parameters import batch_key
@@ -24,7 +25,6 @@ from ccmodel.recording import ORIGIN, Recording
 from ccmodel.report.embedding import asset
 from ccmodel.report.figures import COLOURS, STYLE, legend_below, stamp_figure, subplots, title_figure
 from ccmodel.report.verdict import (
-    CONSPICUOUS,
     NOT_ACCEPTED,
     SYMBOL,
     headline,
