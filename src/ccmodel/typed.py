@@ -155,6 +155,34 @@ def load_yaml_model(path: Path, model: type[M]) -> M:
     return read
 
 
+def load_json_model(path: Path, model: type[M], wrote: str) -> M:
+    """Read a JSON file that this program wrote, perhaps another version of it, into a typed model.
+
+    Parameters
+    ----------
+    path : Path
+    model : type
+        Model of what is needed of its content.
+    wrote : str
+        What writes such a file, in the message.
+
+    Raises
+    ------
+    InputError
+        In one line, if the file cannot be read or does not fit.
+    """
+    try:
+        return model.model_validate_json(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        reason = error.strerror
+    except UnicodeDecodeError:
+        reason = "it is no text"
+    except ValidationError as error:
+        first = error.errors()[0]
+        reason = ": ".join(filter(None, (_dotted(first["loc"]), first["msg"])))
+    raise InputError(f"{path}: is not what {wrote} wrote ({reason})") from None
+
+
 def meaning_at(model: type[BaseModel], loc: Sequence) -> str | None:
     """What a key is, with its unit, in words that follow "fill in"; None where its model does not say so."""
     *parents, key = loc

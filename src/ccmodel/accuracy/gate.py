@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from pydantic import TypeAdapter
+from pydantic import BaseModel
 
 from ccmodel import __version__
 from ccmodel.accuracy.baseline import ACCEPT, make_baseline, read_baseline, write_baseline
@@ -12,11 +12,20 @@ from ccmodel.accuracy.comparison import GAINED, Comparison, Limits, compare
 from ccmodel.accuracy.history import add_rows, commits_in, head, rows_of, run_commit
 from ccmodel.accuracy.measure import Batches
 from ccmodel.progress import Progress, each_of
-from ccmodel.steps.files import read_json
-from ccmodel.typed import InputError
+from ccmodel.typed import InputError, load_json_model
 
 # The study's file in a folder of results.
 STATE = "tables/baseline.json"
+
+
+class _Settings(Limits, extra="ignore"):
+    file: str
+    history: str
+
+
+class _Measured(BaseModel):
+    settings: _Settings
+    measured: Batches
 
 
 @dataclass(frozen=True)
@@ -49,11 +58,9 @@ def state_of(results: Path) -> State:
         raise InputError(
             f"{file}: not there: no run with the key 'baseline' in its configuration came to its end in {results}"
         )
-    content = read_json(file)
-    settings = content["settings"]
-    limits = Limits(coverage=settings["coverage"], reproducibility=settings["reproducibility"])
-    batches = TypeAdapter(Batches).validate_python(content["measured"])
-    return State(Path(settings["file"]), Path(settings["history"]), limits, batches)
+    stated = load_json_model(file, _Measured, "a run")
+    limits = Limits(coverage=stated.settings.coverage, reproducibility=stated.settings.reproducibility)
+    return State(Path(stated.settings.file), Path(stated.settings.history), limits, stated.measured)
 
 
 def check(results: Path) -> tuple[Comparison, str]:

@@ -14,19 +14,20 @@ import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 import pandas as pd
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from ccmodel.channels import CHANNELS
 from ccmodel.errors import error_table
 from ccmodel.failure import ModelError
 from ccmodel.model.model_input import ModelInput
 from ccmodel.model.run import simulate
 from ccmodel.recording import read_provenance
 from ccmodel.steps.files import Fitted, Pair, fitted, read_json, read_pairs
-from ccmodel.typed import TypedModel
+from ccmodel.typed import OneOf, TypedModel
 
 DIGITS = 5
 # Beginning and end of what is compared of a recording, s, and its samples.
@@ -88,7 +89,7 @@ class SetAccuracy(TypedModel):
     """Accuracy of one parameter set on a batch."""
 
     fitted_to: list[str] = Field(description="batches that the set was fitted to")
-    channels: dict[str, ChannelAccuracy]
+    channels: dict[Annotated[str, OneOf(CHANNELS)], ChannelAccuracy]
 
 
 class BatchAccuracy(TypedModel):
@@ -100,6 +101,13 @@ class BatchAccuracy(TypedModel):
     verdict: str | None = Field(None, description="verdict of its diagnosis and what it names; None: not diagnosed")
     recordings: dict[str, Window] = Field(description="what is compared of each recording: from s, to s, samples")
     sets: dict[str, SetAccuracy]
+
+    @model_validator(mode="after")
+    def _a_number_for_each_recording(self) -> Self:
+        for one in (channel for of in self.sets.values() for channel in of.channels.values()):
+            if not len(one.biases) == len(one.errors) == len(self.recordings):
+                raise ValueError("biases and errors have a number for each of the batch's recordings")
+        return self
 
 
 Batches = dict[str, BatchAccuracy]

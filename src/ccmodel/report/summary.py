@@ -3,13 +3,41 @@
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Annotated
+
+from pydantic import BaseModel
 
 from ccmodel.report.page.writing import left_out_of
-from ccmodel.report.verdict import INPUTS_INCONSISTENT, held_out_errors, sentence
+from ccmodel.report.verdict import INPUTS_INCONSISTENT, SYMBOL, held_out_errors, sentence
 from ccmodel.steps.files import read_json
-from ccmodel.typed import InputError
+from ccmodel.typed import InputError, OneOf, Positive, load_json_model
 
-DIAGNOSIS = "diagnosis.json"
+DIAGNOSIS, WRITER = "diagnosis.json", "a diagnosis"
+
+
+class _Error(BaseModel):
+    before: float
+    after: float
+    noise: Positive
+    unit: str
+
+
+class _Fit(BaseModel):
+    error: dict[Annotated[str, OneOf(tuple(SYMBOL))], _Error] = {}
+
+
+class _NotJudged(BaseModel):
+    what: str
+    why: str
+
+
+class _Diagnosis(BaseModel):
+    """What is shown of a diagnosis.json by itself; its sentence is made of more."""
+
+    batch: str
+    verdict: str | None
+    fit: _Fit | None = None
+    not_judged: list[_NotJudged] = []
 
 
 @dataclass(frozen=True)
@@ -85,8 +113,9 @@ def summary_of(folder: Path) -> Summary:
 
 
 def _of_diagnosis(folder: Path) -> Summary:
-    verdict, content = _verdict(folder / DIAGNOSIS), _content(folder / DIAGNOSIS)
-    lines = [f"{one['what']}: {one['why']}" for one in content.get("not_judged", ())]
+    verdict = _verdict(folder / DIAGNOSIS)
+    stated = load_json_model(folder / DIAGNOSIS, _Diagnosis, WRITER)
+    lines = [f"{one.what}: {one.why}" for one in stated.not_judged]
     if verdict.verdict == INPUTS_INCONSISTENT:
         return Summary([verdict], inconsistent=lines, page=verdict.page)
     left_out = [] if verdict.verdict else [f"{verdict.batch}: {verdict.sentence}"]
@@ -94,20 +123,13 @@ def _of_diagnosis(folder: Path) -> Summary:
 
 
 def _verdict(file: Path) -> Verdict:
-    content = _content(file)
+    stated = load_json_model(file, _Diagnosis, WRITER)
+    error = {channel: one.model_dump() for channel, one in stated.fit.error.items()} if stated.fit else {}
+    page = _if_there(file.parent / "report.html")
     try:
-        error = (content.get("fit") or {}).get("error") or {}
-        page = _if_there(file.parent / "report.html")
-        return Verdict(content["batch"], content["verdict"], sentence(content), error, page)
-    except (KeyError, TypeError, AttributeError, ValueError):
-        raise InputError(f"{file}: is not what a diagnosis wrote") from None
-
-
-def _content(file: Path) -> dict:
-    try:
-        return read_json(file)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{file}: cannot be read ({error})") from None
+        return Verdict(stated.batch, stated.verdict, sentence(read_json(file)), error, page)
+    except (LookupError, TypeError, AttributeError, ValueError):
+        raise InputError(f"{file}: is not what {WRITER} wrote") from None
 
 
 def _if_there(file: Path) -> Path | None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from pydantic import BaseModel
 
 from ccmodel.channels import CHANNELS, TABLE_ONE, symbol_of
 from ccmodel.mechanisms import catalogue, names
@@ -22,7 +23,7 @@ from ccmodel.report.page.formats import FILTERS
 from ccmodel.report.verdict import INPUTS_INCONSISTENT
 from ccmodel.rig.findings import Finding
 from ccmodel.steps.files import read_json, write_json
-from ccmodel.typed import InputError
+from ccmodel.typed import InputError, load_json_model
 
 LEFT_OUT = "left-out.json"
 # Shares of the time at which the results are read and the readings collected. Estimated.
@@ -161,18 +162,24 @@ def _messages(
     }
 
 
+class _LeftOut(BaseModel):
+    left_out: list[str]
+    inconsistent: list[str] = []  # a run of before had none
+    warnings: list[str]
+
+
 def left_out_of(results: Path) -> dict[str, list[str]]:
     """Messages of the last run into a results folder: ``left_out``, ``inconsistent`` and ``warnings``.
 
     Raises
     ------
     InputError
-        If no run has finished there.
+        If no run has finished there, or its file cannot be read.
     """
     file = results / LEFT_OUT
     if not file.exists():
         raise InputError(f"{file}: not there, so no run came to its end; its own messages say why")
-    return {"inconsistent": []} | read_json(file)  # a run of before had none
+    return load_json_model(file, _LeftOut, "a run").model_dump()
 
 
 def write_page(file: Path, content: Content) -> None:
