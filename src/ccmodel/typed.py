@@ -38,6 +38,8 @@ ErrorEntry = Mapping[str, Any]
 MAX_DEPTH = 50
 # Keys and values that a file may hold, those that aliases repeat included; a recording has 20 to 30.
 MAX_VALUES = 100_000
+# Letters of a value in a message.
+MOST_SHOWN = 100
 
 
 @dataclass(frozen=True)
@@ -391,8 +393,13 @@ def _wrong_value(e: ErrorEntry) -> str:
     else:
         text = _EXPECTED[e["type"]].format(**context) if e["type"] in _EXPECTED else e["msg"]
     key = _dotted(e["loc"])
-    found = "" if isinstance(e["input"], dict | list) else f", found {e['input']!r}"
+    found = "" if isinstance(e["input"], dict | list) else f", found {_shown(e['input'])}"
     return f"{key}: {text}{found}" if key else f"{text}{found}"
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= MOST_SHOWN else f"{text[: MOST_SHOWN - 3]}..."
 
 
 def _dotted(loc: Sequence) -> str:

@@ -85,7 +85,7 @@ def test_what_has_no_plain_content_has_no_digest():
         content_digest(object())
 
 
-@pytest.mark.parametrize("title", ["short", "long " * 60])
+@pytest.mark.parametrize("title", ["short", "long " * 60, r"costs 5 $ \alpha_{ and 6 $"])
 def test_title_legend_and_stamp_keep_clear_of_the_panels(title):
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(1, 2, figsize=(9, 4))

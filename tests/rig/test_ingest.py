@@ -11,6 +11,7 @@ from ccmodel.rig import ingest
 from ccmodel.rig.batch import valid_name
 from ccmodel.rig.findings import Finding
 from ccmodel.rig.ingest import ingest_batch
+from ccmodel.steps.ingest import ingest as write_ingested
 
 RAW = Path(__file__).parents[2] / "data/raw"
 
@@ -359,6 +360,16 @@ def edit(*keys, value=None, drop=False, new=None):
         (edit("recordings", 1, "id", value=""), "recordings[1].id: a name is letters, digits"),
         (edit("recordings", 1, "file", value=""), "recordings[1].file: must be the log's path"),
         (edit("recordings", 1, "id", value="a/b"), "recordings[1].id: a name is letters, digits"),
+        (edit("recordings", 1, "id", value="a" * 151), "it has at most 150 letters (bytes in UTF-8), found 'aaa"),
+        (edit("recordings", 1, "id", value="ü" * 76), "it has at most 150 letters (bytes in UTF-8), found 'üüü"),
+        (
+            edit("recordings", 1, "excitation", value={"wave": "sine", "frequency_Hz": 10**400}),
+            "recordings[1].excitation: frequency_Hz of a sine is a number that is not negative",
+        ),
+        (
+            edit("recordings", 1, "excitation", value={"wave": "triangle", "amplitude_rad": "large"}),
+            "recordings[1].excitation: amplitude_rad of a triangle is a number that is not negative",
+        ),
         (edit("recordings", 1, "file", value="../one.csv"), "recordings[1].file: a log lies inside"),
         (edit("recordings", 0, "conduit", value=[]), "recordings[0].conduit: needs at least 1 entries, has 0"),
         (edit("rig", "ranges", value={"drive_curent_A": [0, 1]}), "did you mean 'drive_current_A'?"),
@@ -374,6 +385,26 @@ def test_a_bad_description_refuses_the_batch_in_one_line(bench, change, text):
     assert finding.severity == "refused"
     assert finding.file == str(bench.folder / "batch.yaml")
     assert text in finding.text
+
+
+def test_two_spellings_of_one_name_are_given_twice(bench):
+    composed, decomposed = "\u212b", "\u00c5"  # the sign of the ångström and the letter
+    for entry, name in zip(bench.described["recordings"], (composed, decomposed), strict=True):
+        entry["id"] = name
+    (finding,) = ingest_batch(bench.write().folder).findings
+    assert f"recordings: id '{decomposed}' is given to 2 recordings" in finding.text
+
+
+def test_the_longest_name_can_be_written_and_read(bench, tmp_path):
+    name = "ü" * 75
+    bench.described["recordings"][0]["id"] = name
+    write_ingested(bench.write().folder, tmp_path / "bench.nc", tmp_path / "bench.json")
+    assert [r.id for r in read_recordings(tmp_path / "bench.nc")] == [name, "two"]
+
+
+def test_notes_of_another_wave_may_be_anything(bench):
+    bench.described["recordings"][0]["excitation"] = {"wave": "chirp", "frequency_Hz": [0.1, 5.0], "steps": 10**400}
+    assert ingest_batch(bench.write().folder).findings == []
 
 
 def test_one_misspelt_key_of_the_only_recording_is_one_line(bench):

@@ -68,7 +68,7 @@ def letter_panels(axes: Sequence[Axes]) -> None:
 
 def say_in_panel(ax: Axes, text: str) -> None:
     """Write in the middle of an empty panel why it is empty."""
-    ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes, wrap=True)
+    ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes, wrap=True, parse_math=False)
 
 
 def empty_figure(text: str) -> Figure:
@@ -81,9 +81,10 @@ def empty_figure(text: str) -> Figure:
 
 
 def title_figure(figure: Figure, *lines: str) -> None:
-    """Title of a figure; every line is wrapped at the figure's width."""
+    """Title of a figure; every line is wrapped at the figure's width, and a dollar sign is one."""
     characters = int(12 * figure.get_figwidth())
-    figure.suptitle("\n".join(textwrap.fill(line, characters) for line in lines if line), fontsize="medium")
+    text = "\n".join(textwrap.fill(line, characters) for line in lines if line)
+    figure.suptitle(text, fontsize="medium", parse_math=False)
 
 
 def legend_below(figure: Figure, axes: NDArray, columns: int | None = None) -> None:

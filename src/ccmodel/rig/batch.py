@@ -10,6 +10,7 @@ from functools import reduce
 from pathlib import Path, PurePath
 from posixpath import normpath
 from typing import Annotated, Any, Literal, NamedTuple, Self, get_args
+from unicodedata import normalize
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, field_validator, model_validator
@@ -70,12 +71,18 @@ COLUMNS = ("time_s", *DRIVE_ANGLE_COLUMNS, *SENSOR_COLUMNS)
 Sign = Literal[1, -1]
 # Endings that a compressed file has beside that of its content.
 _COMPRESSED = (".gz",)
-NAMES = "a name is letters, digits and -_.+=,@ only and begins with a letter or digit"
+# Bytes of a name in UTF-8. File systems allow 255 and netCDF 256, endings and names of studies included.
+LONGEST_NAME = 150
+NAMES = (
+    "a name is letters, digits and -_.+=,@ only and begins with a letter or digit; it has at most"
+    f" {LONGEST_NAME} letters (bytes in UTF-8)"
+)
 
 
 def valid_name(name: str) -> bool:
     """Whether a batch or recording can have this name: it becomes a folder, a file and a group of a netCDF file."""
-    return all(c.isalnum() or c in "-_.+=,@" for c in name) and (name[:1].isalnum() or name[:1] == "_")
+    letters = all(c.isalnum() or c in "-_.+=,@" for c in name) and (name[:1].isalnum() or name[:1] == "_")
+    return letters and len(name.encode(errors="replace")) <= LONGEST_NAME
 
 
 def recording_id(file: str) -> str:
@@ -89,13 +96,20 @@ def recording_id(file: str) -> str:
     path = PurePath(file)
     stem = path.with_suffix("") if path.suffix in _COMPRESSED else path
     name = re.sub(r"[^\w.+=,@-]+", "-", str(stem.with_suffix(""))).strip("-.") or "recording"
+    name = name.encode()[: LONGEST_NAME - 1].decode(errors="ignore")
     return name if valid_name(name) else f"r{name}"
 
 
 def _checked_name(name: str) -> str:
+    name = _one_spelling(name)
     if not valid_name(name):
         raise ValueError(NAMES)
     return name
+
+
+def _one_spelling(name: str) -> str:
+    """A name as netCDF stores it: letters that look alike, as a composed and a decomposed é, are the same."""
+    return normalize("NFC", name)
 
 
 Name = Annotated[str, AfterValidator(_checked_name)]
@@ -261,6 +275,9 @@ class Piece(TypedModel):
 
 
 Conduit = Annotated[tuple[Piece, ...], Field(min_length=1)]
+# Waves whose amplitude and frequency are compared with the recording (`ccmodel.rig.consistency.parity`).
+WAVES, _NOTED_NUMBERS = ("sine", "triangle"), ("amplitude_rad", "frequency_Hz")
+LARGEST_NUMBER = 1e300
 PRETENSION = "the tension to which each cable was set before the motion, N"
 CONDUIT = "the pieces of the conduit from the drive end, as [{length_m: 1.2, bend_rad: 3.14}]"
 
@@ -292,6 +309,15 @@ class RecordingEntry(TypedModel):
     started_at: Moment = None
     tensioned_at: Moment = None
     note: Any = None
+
+    @field_validator("excitation")
+    @classmethod
+    def _numbers_of_a_sine(cls, excitation: dict[str, Any]) -> dict[str, Any]:
+        for key in _NOTED_NUMBERS if excitation.get("wave") in WAVES else ():
+            number = excitation.get(key)
+            if number is not None and not (type(number) in (int, float) and 0 <= number < LARGEST_NUMBER):
+                raise ValueError(f"{key} of a {excitation['wave']} is a number that is not negative")
+        return excitation
 
     @model_validator(mode="after")
     def _tensioned_before_it_started(self) -> Self:
@@ -392,11 +418,11 @@ def load_batch(folder: Path) -> Batch:
     """
     path = Path(folder) / "batch.yaml"
     folder_name = Path(folder).resolve().name
-    if not valid_name(folder_name):
+    if not valid_name(_one_spelling(folder_name)):
         text = f"{folder_name!r} cannot be a batch's name: {NAMES}; rename the folder"
         raise InputError.of(Problem(str(folder), None, text))
     batch = load_yaml_model(path, Batch)
-    if batch.batch != folder_name:
+    if batch.batch != _one_spelling(folder_name):
         text = f"batch: must be the folder's name, '{folder_name}', found '{batch.batch}': rename either"
         raise InputError.of(Problem(str(path), None, text))
     return batch

@@ -36,7 +36,7 @@ def value_of(recording: Recording, variable: str) -> float | str:
     noted = {"frequency": "frequency_Hz", "load_level": "load_level"}[variable]
     try:
         return float(recording.excitation[noted])
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         return np.nan
 
 

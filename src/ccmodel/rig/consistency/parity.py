@@ -29,7 +29,7 @@ from ccmodel.channels import (
 )
 from ccmodel.recording import Recording
 from ccmodel.rig.angle import passes_of_zero
-from ccmodel.rig.batch import Batch
+from ccmodel.rig.batch import WAVES, Batch
 from ccmodel.rig.consistency import limits
 
 
@@ -112,7 +112,7 @@ class Parity:
         x, rig, entry = self.moving, self.batch.rig, self.recording
         radii = rig.drive.pulley_radius_m, rig.load.pulley_radius_m
         found = {}
-        noted = entry.excitation if entry.excitation.get("wave") in ("sine", "triangle") else {}
+        noted = entry.excitation if entry.excitation.get("wave") in WAVES else {}
         if amplitude := noted.get("amplitude_rad"):
             found["amplitude"] = np.ptp(x[THETA_IN]) / 2 / amplitude
         if (frequency := noted.get("frequency_Hz")) and (marks := crossings(x[THETA_IN])).size > 2:

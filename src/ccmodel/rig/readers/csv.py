@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from ccmodel import inputs
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers import signatures
 from ccmodel.rig.readers.content import content_of
@@ -42,6 +43,7 @@ def read(path: Path) -> pd.DataFrame:
 
 
 def _text(path: Path) -> str:
+    inputs.check_regular(path)
     kind = signatures.kind_of(path)
     if kind.module != "text" and kind not in (signatures.UNKNOWN, signatures.EMPTY):
         raise LogError(None, None, signatures.not_text(kind))
