@@ -169,3 +169,16 @@ def test_slack_holds_no_memory_and_ends_where_it_began():
     assert (response.T_near_N[2:6] == 0).all()
     assert response.T_near_N[1] == pytest.approx(0.1 * e0 / (np.expm1(M) * COMPLIANCE), rel=1e-12)
     assert response.T_near_N[6] == pytest.approx(0.1 * e0 / (-np.expm1(-M) * COMPLIANCE), rel=1e-12)
+
+
+@pytest.mark.parametrize("y", [0.5, 30.0, 45.0, 120.0, 290.0])
+def test_release_along_a_conduit_of_three_hundred(y):
+    """A release of uniform pretension up to the stated limit of mu phi; exp(-y) is far below rounding."""
+    path, T0, m = ConduitPath([LENGTH], [1000.0]), 10.0, 300.0
+    compliance = LENGTH / (m * EA)
+    displacement = -compliance * T0 * (y + np.expm1(-y))
+    found = simulate_cable(path, EA, 0.3, FIXED, np.array([0.0, displacement]), InitialTension.uniform(path, T0))
+    assert found.status is Status.OK
+    assert found.T_near_N[-1] == pytest.approx(T0 * np.exp(-y), rel=1e-10)
+    assert found.T_far_N[-1] == T0
+    assert found.moving_m[-1] == pytest.approx([LENGTH * y / m, LENGTH], rel=1e-12)

@@ -85,6 +85,14 @@ def test_a_cable_longer_than_any_is_in_another_unit(name, tmp_path):
     assert said.startswith("batch.yaml rig.cable.length_m") and "is the length in mm?" in said
 
 
+def test_a_bend_in_degrees_is_no_conduit(tmp_path):
+    copy = read_copy(SIMULATED)
+    for entry in copy.description["recordings"]:
+        entry["conduit"] = [{"length_m": 1.2, "bend_rad": 540.0}]
+    (said,) = said_of(write_copy(copy, tmp_path / "degrees"))
+    assert said.startswith("batch.yaml bend_rad") and "bends by 540 rad: is the bend in degrees?" in said
+
+
 def test_a_nominal_value_is_not_compared(tmp_path):
     copy = read_copy(SIMULATED)
     copy.rig["cable"]["stiffness_N_per_m"] *= 10.0

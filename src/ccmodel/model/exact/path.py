@@ -10,6 +10,9 @@ from ccmodel.geometry import ConduitPath
 
 # Below this mu phi the capstan loss of a piece is less than rounding, and the piece counts as straight.
 STRAIGHT = 1e-15
+# A longer bend, in mu phi, is laid down as several. The tension of a released cable falls by exp(-mu phi) over a bend
+# and is counted as 1 + r, r above -1: that loses digits, and beyond 37 all of them.
+LONGEST_BEND = 5.0
 
 
 # Rows of `PathTables.table`, each seen from one end. m at the nodes. Of the bend after a node: dx / (EA dm), the arc
@@ -53,11 +56,13 @@ def tabulate(path: ConduitPath, friction_coefficient: float, axial_rigidity_N: f
         if m < STRAIGHT:
             straight[-1] += length
         else:
-            nodes.append(nodes[-1] + m)
-            bends.append(length / (m * axial_rigidity_N))
-            starts.append(x)
-            lengths.append(length / m)
-            straight.append(0.0)
+            parts = math.ceil(m / LONGEST_BEND)
+            for part in range(parts):
+                nodes.append(nodes[-1] + m / parts)
+                bends.append(length / (m * axial_rigidity_N))
+                starts.append(x + length * part / parts)
+                lengths.append(length / m)
+                straight.append(0.0)
         x += length
     node, bend, x_start, x_per_m = (np.array(a, dtype=float) for a in (nodes, bends, starts, lengths))
     lump = np.array(straight) / axial_rigidity_N

@@ -33,7 +33,7 @@ _SAME = 1.8
 def wrong_geometry(parities: Sequence[Parity]) -> list[Contradiction]:
     """Radii, and scales of angles: the first that is found, since one makes the other relations wrong."""
     ratios, batch = pooled(parities), parities[0].batch
-    if units := [*_radii(batch), *_lengths(parities, batch)]:
+    if units := [*_radii(batch), *_conduits(parities, batch)]:
         return units
     exchanged = _exchanged(ratios, batch) and float(np.median([p.signs.get("loss", 0.0) for p in parities])) < 0
     return [] if exchanged else _angle_of_one_end(ratios) or _both_angles(ratios)
@@ -77,14 +77,18 @@ def _radii(batch: Batch) -> list[Contradiction]:
     return found
 
 
-def _lengths(parities: Sequence[Parity], batch: Batch) -> list[Contradiction]:
-    """Conduits and a cable that are longer than any, as lengths in mm are."""
+def _conduits(parities: Sequence[Parity], batch: Batch) -> list[Contradiction]:
+    """Conduits and a cable that are longer than any, as lengths in mm are, or bend more, as angles in degrees do."""
     longest = max(parities, key=lambda p: p.recording.path.length_m).recording
     lengths = {
         ("length_m", f"the conduit of {longest.id}"): longest.path.length_m,
         ("rig.cable.length_m", "the cable that has the stated stiffness"): batch.rig.cable.length_m,
     }
-    return [
+    most_bent = max(parities, key=lambda p: p.recording.path.bend_rad).recording
+    bend = most_bent.path.bend_rad
+    text = f"the conduit of {most_bent.id} bends by {bend:g} rad: is the bend in degrees? State bend_rad in rad"
+    bent = [Contradiction("bend_rad", text)] if bend > limits.LARGEST_BEND_RAD else []
+    return bent + [
         Contradiction(key, f"{what} is {length:g} m long: is the length in mm? State {key} in m")
         for (key, what), length in lengths.items()
         if length > limits.LONGEST_PATH_M

@@ -1,0 +1,50 @@
+"""The exact solver over the whole range that is stated for it: a status, or tensions that satisfy the capstan bound."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ccmodel.geometry import ConduitPath
+from ccmodel.model.exact import Status, simulate_pair
+from ccmodel.model.initial import InitialTension
+from ccmodel.model.load import FixedLoad, SpringLoad
+from ccmodel.model.transmission import MAX_FRICTION_ANGLE, Transmission
+
+LOADS = ("fixed", "spring", "free")
+
+
+def decades(low, high):
+    return st.floats(low, high).map(lambda power: 10**power)
+
+
+@st.composite
+def cases(draw, load):
+    """Bends to 300 rad, mu to 1, mu phi to 300, tensions to 500 N, stiffness over six decades, drives that jump."""
+    pieces = draw(st.integers(1, 4))
+    bend, mu = draw(st.floats(0.0, 300.0)), draw(decades(-2, 0))
+    shares = np.array([draw(st.floats(0.0, 1.0)) for _ in range(pieces)]) + 1e-9
+    path = ConduitPath([draw(st.floats(0.05, 1.0)) for _ in range(pieces)], bend * shares / shares.sum())
+    single = load == "fixed" or draw(st.booleans())
+    one = Transmission(path, draw(decades(1, 7)), mu, 0.006, 0.008, single)
+    stiffness = draw(decades(-4, 2)) if load == "spring" else 0.0
+    initial = InitialTension.uniform(path, draw(decades(-2, np.log10(500.0))))
+    steps = np.array(draw(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=60)))
+    theta = draw(decades(-4, 1)) * np.concatenate([[0.0], np.cumsum(steps)])
+    return one, FixedLoad() if load == "fixed" else SpringLoad(stiffness), initial, theta
+
+
+@pytest.mark.parametrize("load", LOADS)
+@settings(max_examples=150)
+@given(data=st.data())
+def test_a_status_or_tensions_within_the_capstan_bound(load, data):
+    one, far, initial, theta = data.draw(cases(load))
+    assert one.friction_coefficient * one.path.bend_rad <= MAX_FRICTION_ANGLE
+    found = simulate_pair(one, far, theta, initial)
+    if found.status is not Status.OK:
+        return
+    bound = one.friction_coefficient * one.path.bend_rad * (1 + 1e-9) + 1e-9
+    for near, beyond in ((found.T1_N, found.T2_N), (found.T3_N, found.T4_N))[: 1 if one.is_single_cable else 2]:
+        assert np.isfinite([near, beyond]).all() and (near >= 0).all() and (beyond >= 0).all()
+        taut = (near > 0) & (beyond > 0)
+        assert np.abs(np.log(near[taut]) - np.log(beyond[taut])).max(initial=0.0) <= bound
