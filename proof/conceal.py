@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import shutil
+import stat
 import subprocess
 import sys
 import sysconfig
@@ -103,10 +104,15 @@ def stage(sources: Path = SOURCES) -> Path:
     -------
     Path
         The folder that holds the copy.
+
+    Raises
+    ------
+    PermissionError
+        If the folder of all copies is another user's, or another user may write there.
     """
-    staged = Path(tempfile.gettempdir()) / f"ccmodel-alone-{os.getuid()}" / digest_of(sources)
+    staged = _own(Path(tempfile.gettempdir()) / f"ccmodel-alone-{os.getuid()}") / digest_of(sources)
     if not staged.exists():
-        fresh = Path(tempfile.mkdtemp(dir=_made(staged.parent)))
+        fresh = Path(tempfile.mkdtemp(dir=staged.parent))
         # Compiled files are copied too. They recognise their sources by time stamps, which copytree keeps.
         shutil.copytree(sources, fresh / "ccmodel")
         (fresh / "caches").mkdir()
@@ -247,6 +253,15 @@ def predict(blinded: Path, models: Mapping[Path, Path], sources: Path = SOURCES)
             if (world / f"out-{k}").exists():
                 shutil.copytree(world / f"out-{k}", out, dirs_exist_ok=True)
     return completed
+
+
+def _own(folder: Path) -> Path:
+    """A folder of this user that nobody else writes to: its name is known, and code in it is run."""
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = folder.lstat()
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        raise PermissionError(f"{folder}: is not this user's alone: remove it, or set TMPDIR to another folder")
+    return folder
 
 
 def _made(folder: Path) -> Path:

@@ -78,3 +78,13 @@ def test_the_catalog_finds_what_it_asks_for():
     usage = yaml.safe_load((ROOT / ".snakemake-workflow-catalog.yml").read_text())["usage"]
     assert usage.keys() == {"mandatory-flags", "software-stack-deployment", "report"}
     assert (ROOT / "workflow/Snakefile").exists() and (ROOT / "config/README.md").exists()
+
+
+@pytest.mark.parametrize("cases", ["1; touch ran", "0", "$(touch ran)"])
+def test_the_proofs_number_of_cases_is_no_command(cases, tmp_path):
+    command = [sys.executable, "-m", "snakemake", "--snakefile", str(ROOT / "proof/Snakefile"), "--dry-run"]
+    command += ["--directory", str(tmp_path), "--workflow-profile", "none", "--cores", "1", "--config"]
+    run = subprocess.run([*command, f"cases={cases}"], capture_output=True, text=True, check=False)
+    assert run.returncode != 0
+    assert "cases: a number of cases is expected" in run.stdout + run.stderr
+    assert not list(tmp_path.rglob("ran"))

@@ -114,6 +114,21 @@ def test_the_staged_package_follows_its_sources(diagnosis):
     assert not (first / "virtualrig").exists()
 
 
+def test_code_is_staged_in_no_folder_of_another_user(diagnosis, tmp_path, monkeypatch):
+    package = diagnosis("pass")
+    monkeypatch.setattr(conceal.tempfile, "gettempdir", lambda: str(tmp_path))
+    place = conceal.stage(package).parent
+    assert place.parent == tmp_path and place.stat().st_mode & 0o777 == 0o700
+    place.chmod(0o777)
+    with pytest.raises(PermissionError, match="is not this user's alone"):
+        conceal.stage(package)
+    place.rename(tmp_path / "elsewhere")
+    place.symlink_to(tmp_path / "elsewhere")
+    (tmp_path / "elsewhere").chmod(0o700)
+    with pytest.raises(PermissionError, match="is not this user's alone"):
+        conceal.stage(package)
+
+
 def test_models_predict_in_sequence_and_a_failure_sets_the_exit_code(batch, diagnosis, tmp_path):
     body = """
 import pathlib, sys
