@@ -33,7 +33,7 @@ from ccmodel.model.session import of_recording
 from ccmodel.model.transmission import Transmission
 from ccmodel.recording import Recording
 
-__all__ = ["PRESCRIBED", "LoadFrom", "ModelInput", "initial_tension", "simulate", "simulate_recording"]
+__all__ = ["PRESCRIBED", "LoadFrom", "ModelInput", "initial_tension", "simulate", "simulate_recording", "transmission_of"]
 
 # A torque at rest is resolved beyond so many times its sensor's accuracy.
 KNOWN_TO = 2.0
@@ -76,14 +76,7 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
     """
     recording = given.recording
     parameters = of_recording(parameters, recording)
-    transmission = Transmission(
-        path=recording.path.with_extra_bend(parameters.extra_bend_rad),
-        axial_rigidity_N=parameters.stiffness_N_per_m * parameters.reference_length_m,
-        friction_coefficient=parameters.friction,
-        drive_radius_m=parameters.drive_radius_m,
-        load_radius_m=parameters.load_radius_m,
-        is_single_cable=recording.far_end is not None,
-    )
+    transmission = transmission_of(recording, parameters)
     load, measured = _load(given, parameters, load_from)
     initial = initial_tension(given, parameters)
     if parameters.drive_encoder_offset:
@@ -91,6 +84,18 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
     channels = _channels(_readings(transmission, load, given, initial, parameters), recording, parameters)
     sources = dict.fromkeys(channels, "model") | dict.fromkeys((THETA_IN, *measured), PRESCRIBED)
     return recording.with_channels(channels, sources, origin="model")
+
+
+def transmission_of(recording: Recording, parameters: Parameters) -> Transmission:
+    """The transmission of a recording: its conduits, and cables and pulleys of the parameters."""
+    return Transmission(
+        path=recording.path.with_extra_bend(parameters.extra_bend_rad),
+        axial_rigidity_N=parameters.stiffness_N_per_m * parameters.reference_length_m,
+        friction_coefficient=parameters.friction,
+        drive_radius_m=parameters.drive_radius_m,
+        load_radius_m=parameters.load_radius_m,
+        is_single_cable=recording.far_end is not None,
+    )
 
 
 def _readings(

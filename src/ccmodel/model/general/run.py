@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,7 +111,21 @@ def simulate(
     return _response(transmission, active, time_s[:solved], theta_in[:solved], out)
 
 
-def _marched(
+class Prepared(NamedTuple):
+    """A pair at rest, ready to march: the arguments of `ccmodel.model.general.march.march` of the same names."""
+
+    physics: rows.Physics
+    piece: NDArray
+    node: NDArray
+    slide: NDArray
+    mean: NDArray
+    load: NDArray
+    drive: tuple[float, float, float]
+    friction_factor: NDArray
+    steps: int
+
+
+def prepared(
     transmission: Transmission,
     load: Load,
     settings: Settings,
@@ -120,8 +135,8 @@ def _marched(
     elements: int,
     steps: int,
     series: NDArray,
-) -> tuple[int, NDArray]:
-    """Number of samples that were solved, and the outputs at all of them, shape (outputs, n).
+) -> Prepared:
+    """The pair before the first sample.
 
     `series` is the load's prescribed torque or angle, shape (n,) or (1,).
     """
@@ -141,11 +156,29 @@ def _marched(
     slide = np.zeros((rows.SLIDE_ROWS, 2, node.shape[2] + 2))
     eccentricity = settings.drive_eccentricity, settings.drive_eccentricity_rad
     drive = (float(transmission.drive_radius_m), float(eccentricity[0]), float(eccentricity[1]))
-    out = np.empty((len(OUTPUTS), time_s.size))
     steps *= _steps(physics, transmission, time_s)
-    solved = march(
-        physics, piece, node, slide, mean, state, time_s, theta_in, drive, friction_factor, series, steps, out
-    )
+    return Prepared(physics, piece, node, slide, mean, state, drive, friction_factor, steps)
+
+
+def _marched(
+    transmission: Transmission,
+    load: Load,
+    settings: Settings,
+    time_s: NDArray,
+    theta_in: NDArray,
+    initial: InitialTension,
+    elements: int,
+    steps: int,
+    series: NDArray,
+) -> tuple[int, NDArray]:
+    """Number of samples that were solved, and the outputs at all of them, shape (outputs, n).
+
+    Parameters as of `prepared`.
+    """
+    at_rest = prepared(transmission, load, settings, time_s, theta_in, initial, elements, steps, series)
+    *state, drive, friction_factor, steps = at_rest
+    out = np.empty((len(OUTPUTS), time_s.size))
+    solved = march(*state, time_s, theta_in, drive, friction_factor, series, steps, out)
     if isinstance(load, TorqueLoad) and load.parallel_Nm_per_rad:
         out[5, :solved] = series[:solved]  # the sensor does not feel the spring in parallel
     if settings.drive_friction_Nm != 0.0:

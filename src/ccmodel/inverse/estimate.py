@@ -1,0 +1,259 @@
+"""A recording's drive side and a model -> the load's torque and angle with intervals."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from ccmodel import mechanisms as registry
+from ccmodel.channels import TAU_OUT, THETA_OUT, ZERO_OF
+from ccmodel.failure import ModelError
+from ccmodel.inverse import exact, general
+from ccmodel.inverse.proximal import FALL, LOOKS_AHEAD, UNIFORM, Proximal
+from ccmodel.inverse.update import BY_MISFIT, EXPECTED, MISFIT, Considered, Drive, Prior, Run, joint_estimate
+from ccmodel.model.general.run import settings_of
+from ccmodel.model.initial import InitialTension
+from ccmodel.model.load import SpringLoad, TorqueLoad
+from ccmodel.model.parameters import Parameters, mechanism_parameter
+from ccmodel.model.run import initial_tension, transmission_of
+from ccmodel.model.session import of_recording
+from ccmodel.recording import Recording
+
+# Friction and initial tension of a recording repeat to 1 % (docs/rig-log-format.md, What recordings are like).
+REPEATS_TO = 0.01
+# Standard deviation of the torque of a load from the law of its spring, as a share: of a spring that is linear to a few
+# per cent, as torsion springs are sold.
+LAW_SHARE = 0.03
+# Standard deviation of the model discrepancy of the drive torque as a share of its peak to peak so far, and travel of the
+# drive over which it is one and the same.
+TOLERANCE, LASTS_RAD = 0.005, 0.1
+# A drive that moves less in a sample than this share of that travel counts as moving by as much.
+SMALLEST_SHARE = 1e-6
+# Standard deviations from the middle to the ends of a 90 % interval.
+HALF_WIDTH = 1.6449
+# Columns of an estimate.
+ESTIMATED = (THETA_OUT, TAU_OUT)
+COLUMNS = tuple(f"{name}{end}" for name in ESTIMATED for end in ("", "_low", "_high"))
+VISIBLE = "load_is_visible"
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """The load of one recording, sample by sample.
+
+    Attributes
+    ----------
+    recording : Recording
+    table : DataFrame
+        Index ``time_s``; ``theta_out_rad`` and ``tau_out_Nm``, each with the ends of its 90 % interval
+        (``theta_out_rad_low`` and so on), and ``load_is_visible``, whether the drive torque responds to the load.
+    notes : tuple of str
+        What of the model was left out.
+    """
+
+    recording: Recording
+    table: pd.DataFrame
+    notes: tuple[str, ...]
+
+
+def estimated(
+    recording: Recording,
+    parameters: Parameters,
+    sds: Mapping[str, float] | None = None,
+    uses_law: bool = True,
+    tolerance: float = TOLERANCE,
+) -> Estimated:
+    """Estimate the load's torque and angle from the drive's side of a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        Of its channels, drive angle, drive torque and the drive's sum of tensions at rest are used.
+    parameters : Parameters
+    sds : mapping of str to float, optional
+        Standard deviations of parameters, by name.
+    uses_law : bool
+        Whether the load's spring, if the model has one, is a source beside the drive torque.
+    tolerance : float
+        Standard deviation of the model discrepancy of the drive torque, as a share of its peak to peak.
+
+    Raises
+    ------
+    ModelError
+        If there is no drive torque, or the model cannot be run.
+    """
+    if recording.far_end == "fixed":
+        raise ModelError(f"{recording.batch}/{recording.id}: the far end is fixed: there is no load to estimate")
+    problem = _Problem.of(recording, parameters, sds or {}, uses_law)
+    nominal = problem.run(problem.parameters)
+    effects, outputs = problem.effects_of_errors(nominal)
+    noise = nominal.noise_variance + problem.discrepancy(tolerance)
+    correction, spread = joint_estimate(
+        nominal.trace, problem.drive.torque_Nm, problem.first_variance, noise, effects, outputs, nominal.by_misfit
+    )
+    ratio = problem.parameters.drive_radius_m / problem.parameters.load_radius_m
+    spread[0] += (problem.proximal.sigma_in * ratio) ** 2
+    middle = nominal.out + correction
+    middle[0] += problem.parameters.theta_out_zero_rad - nominal.out[0, 0]
+    half = HALF_WIDTH * np.sqrt(spread)
+    columns = dict(zip(COLUMNS, (x for m, h in zip(middle, half, strict=True) for x in (m, m - h, m + h)), strict=True))
+    table = pd.DataFrame(columns, index=pd.Index(recording.time_s, name="time_s"))
+    table[VISIBLE] = nominal.trace[BY_MISFIT] > 0.0
+    return Estimated(recording, table, problem.notes)
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """A recording's drive side, the model, and what is uncertain of both."""
+
+    proximal: Proximal
+    parameters: Parameters
+    sds: Mapping[str, float]
+    prior: Prior
+    drive: Drive
+    notes: tuple[str, ...]
+
+    @classmethod
+    def of(
+        cls, recording: Recording, parameters: Parameters, sds: Mapping[str, float], uses_law: bool
+    ) -> "_Problem":
+        parameters = of_recording(parameters, recording)
+        if not uses_law:
+            parameters = replace(parameters, load_stiffness_Nm_per_rad=None)
+        kept, notes = _without_what_looks_ahead(parameters)
+        proximal = Proximal.of(recording)
+        has_law = kept.load_stiffness_Nm_per_rad is not None
+        cables = 1 if recording.far_end else 2
+        locked = cables * kept.stiffness_N_per_m * kept.reference_length_m / recording.path.length_m
+        friction = float(np.hypot(REPEATS_TO, sds.get("friction_coefficient", 0.0) / max(kept.friction_coefficient, 1e-9)))
+        prior = Prior(
+            Considered(friction, proximal.torque_zero_Nm),
+            LAW_SHARE,
+            0.0 if has_law else locked * kept.drive_radius_m * kept.load_radius_m,
+        )
+        drive = Drive(
+            proximal.theta_in,
+            proximal.torque_of(kept),
+            proximal.lasting_variance,
+            np.full(recording.time_s.size, proximal.torque_noise_Nm**2),
+        )
+        return cls(proximal, kept, sds, prior, drive, notes)
+
+    @property
+    def initial(self) -> InitialTension:
+        """Tension before the drive moves."""
+        return initial_tension(self.proximal.model_input(self.parameters), self.parameters)
+
+    @property
+    def first_variance(self) -> float:
+        """Variance of the load's torque before the drive moves, N^2 m^2.
+
+        A rest has errors of its own in the place of it (`_perturbed`).
+        """
+        if self.proximal.rests and self.parameters.pretension_N is None:
+            return 0.0
+        ends = self.initial.tension_A_N[-1], 0.0 if self.proximal.recording.far_end else self.initial.tension_B_N[-1]
+        return float((FALL * UNIFORM * np.hypot(*ends) * self.parameters.load_radius_m) ** 2)
+
+    def run(
+        self,
+        parameters: Parameters,
+        misfit_Nm: NDArray | None = None,
+        shift_rad: float = 0.0,
+        falls: tuple[float, float] = (FALL, FALL),
+    ) -> Run:
+        """A run of the filter, or of the model along a misfit, with the drive shifted after the first sample."""
+        recording = self.proximal.recording
+        transmission = transmission_of(recording, parameters)
+        initial = initial_tension(self.proximal.model_input(parameters, falls), parameters)
+        drive = self.drive
+        if shift_rad:
+            theta = drive.theta_rad + shift_rad
+            theta[0] = drive.theta_rad[0]
+            drive = drive._replace(theta_rad=theta)
+        K_e = parameters.load_stiffness_Nm_per_rad
+        if not parameters.mechanisms and not (K_e is None and parameters.spring_beside_load_Nm_per_rad):
+            return exact.run(transmission, K_e or 0.0, initial, drive, self.prior, misfit_Nm)
+        if K_e is None:
+            rest = (initial.tension_A_N[-1] - initial.tension_B_N[-1]) * transmission.load_radius_m
+            load: SpringLoad | TorqueLoad = TorqueLoad(np.array([rest]), parameters.spring_beside_load_Nm_per_rad)
+        else:
+            load = SpringLoad(K_e, 0.0, parameters.load_gap_position)
+        settings = settings_of(parameters.mechanisms)
+        finer = parameters.refinement
+        return general.run(
+            transmission, load, settings, initial, recording.time_s, drive, self.prior, misfit_Nm, finer
+        )
+
+    def discrepancy(self, tolerance: float) -> NDArray:
+        """Variance of the torque that gives the model discrepancy its weight, shape (n,), N^2 m^2.
+
+        A discrepancy lasts over some travel. White noise of the same weight over that travel stands for it.
+        """
+        torque, travel = self.drive.torque_Nm, np.abs(np.diff(self.drive.theta_rad, prepend=self.drive.theta_rad[0]))
+        # Before the drive has moved far, the tensions tell what its torque will come to.
+        tensions = self.initial.tension_A_N[0] + (0.0 if self.proximal.recording.far_end else self.initial.tension_B_N[0])
+        range_so_far = np.maximum.accumulate(torque) - np.minimum.accumulate(torque)
+        range_so_far = np.maximum(range_so_far, tensions * self.parameters.drive_radius_m)
+        samples = LASTS_RAD / np.maximum(travel, LASTS_RAD * SMALLEST_SHARE)
+        return (tolerance * range_so_far) ** 2 * np.maximum(samples, 1.0)
+
+    def effects_of_errors(self, nominal: Run) -> tuple[NDArray, NDArray]:
+        """Effects of one standard deviation of each lasting error, as of `ccmodel.inverse.update.joint_estimate`."""
+        n = self.drive.theta_rad.size
+        torque, outputs = [np.full(n, self.proximal.torque_zero_Nm)], [np.zeros((2, n))]
+        for run in self._perturbed(nominal.trace[MISFIT]):
+            torque.append(run.trace[EXPECTED] - nominal.trace[EXPECTED])
+            outputs.append(run.out - nominal.out)
+            outputs[-1][0] -= outputs[-1][0, 0]
+        return np.array(torque), np.array(outputs)
+
+    def _perturbed(self, misfit_Nm: NDArray) -> Iterator[Run]:
+        """Runs with one error each, along the same misfit."""
+        p = self.parameters
+        friction = p.friction_scale * (1 + self.prior.considered.friction)
+        yield self.run(replace(p, friction_scale=friction), misfit_Nm)
+        yield self.run(replace(p, pretension_scale=p.pretension_scale * (1 + REPEATS_TO)), misfit_Nm)
+        for name, sd in self._uncertain():
+            yield _either_side(lambda step, name=name: self.run(_raised(p, name, step), misfit_Nm), sd)
+        if self.proximal.rest_offset_rad:
+            yield self.run(p, misfit_Nm, shift_rad=self.proximal.rest_offset_rad)
+        if self.proximal.rests and p.pretension_N is None:
+            other = FALL * (1 - UNIFORM)
+            yield self.run(p, misfit_Nm, falls=(other, FALL))
+            yield self.run(p, misfit_Nm, falls=(FALL, other))
+
+    def _uncertain(self) -> Iterator[tuple[str, float]]:
+        """Further parameters with a standard deviation, and it."""
+        p = self.parameters
+        active = {(m.name, m.place): m.values for m in p.mechanisms}
+        for name, sd in self.sds.items():
+            if name in ("friction_coefficient", "theta_out_zero_rad", *ZERO_OF.values()) or not 0 < sd < np.inf:
+                continue
+            parts = mechanism_parameter(name)
+            if parts is None and "@" not in name and getattr(p, name, None) is not None:
+                yield name, sd
+            elif parts is not None and parts[2] in active.get(parts[:2], {}):
+                yield name, sd
+
+
+def _raised(parameters: Parameters, name: str, by: float) -> Parameters:
+    return parameters.with_values({name: parameters.value_of(name) + by})
+
+
+def _either_side(run: Callable[[float], Run], sd: float) -> Run:
+    """A run with a parameter one standard deviation higher, or lower where the model cannot be higher."""
+    try:
+        return run(sd)
+    except ModelError:
+        return run(-sd)
+
+
+def _without_what_looks_ahead(parameters: Parameters) -> tuple[Parameters, tuple[str, ...]]:
+    """Parameters without mechanisms that no causal estimate can have, and a line on each."""
+    kept = tuple(m for m in parameters.mechanisms if m.name not in (*LOOKS_AHEAD, *registry.laws()))
+    left = [m for m in parameters.mechanisms if m not in kept]
+    notes = tuple(f"{m.name} at {m.place} is left out: it depends on later samples" for m in left)
+    return replace(parameters, mechanisms=kept), notes

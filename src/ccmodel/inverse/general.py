@@ -1,0 +1,318 @@
+"""The load from the drive side with the general solver: a compiled march over the samples.
+
+As `ccmodel.model.general.march`, with the misfit of the load's law as a further unknown of each sample.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ccmodel.failure import ModelError
+from ccmodel.inverse.update import (
+    BY_MISFIT,
+    EXPECTED,
+    GAIN,
+    GROWTH,
+    MISFIT,
+    TRACE_ROWS,
+    Considered,
+    Drive,
+    Prior,
+    Run,
+    gain_of,
+    updated_variance,
+)
+from ccmodel.kernel import borrowed, kernel
+from ccmodel.mechanisms.contract import Settings
+from ccmodel.mechanisms.pulley_eccentricity import winding
+from ccmodel.mechanisms.pulley_friction import bearing
+from ccmodel.model.general import layout as rows
+from ccmodel.model.general.equations import imbalance, set_grip, set_memory
+from ccmodel.model.general.layout import Physics
+from ccmodel.model.general.march import (
+    GRIP_ITERATIONS,
+    GRIP_TOLERANCE,
+    LONGEST_BRISTLE_M,
+    MOST_ATTEMPTS,
+    ROUNDING,
+    SMALLEST_SUBSTEP,
+    _accept,
+)
+from ccmodel.model.general.newton import copy_means, copy_slides, solve, solve_step, solve_with_conduits
+from ccmodel.model.general.run import ELEMENTS, prepared
+from ccmodel.model.initial import InitialTension
+from ccmodel.model.load import SpringLoad, TorqueLoad
+from ccmodel.model.transmission import Transmission
+
+# A torque that changes by less than this share of the load's is hidden by friction: what the model's derivative says
+# there is less than its error.
+HIDDEN = 0.02
+ITERATIONS = 4
+# A misfit that changes the torque by less than this share of its noise, or of 1 N m, is found.
+FOUND, SMALLEST_Nm = 0.01, 1e-10
+# Rows beyond those of the layout, for the solution at the misfit before the update.
+KEPT_SLIDE, KEPT_MEAN = rows.SLIDE_ROWS, rows.MEAN_ROWS
+
+
+@kernel(error_model="numpy")
+def _solve(
+    ph: Physics,
+    piece: NDArray,
+    node: NDArray,
+    slide: NDArray,
+    mean: NDArray,
+    load: NDArray,
+    rotation: float,
+    torque: float,
+    dt: float,
+    bristle: float,
+    friction_factor: NDArray,
+    fixed_grip: bool,
+) -> tuple[bool, float]:
+    """A step with the contacts' memory of rest that its slides make; (converged, rotation of the load)."""
+    solved = False
+    for iteration in range(GRIP_ITERATIONS):
+        if not fixed_grip:
+            change = set_grip(ph, node, slide, friction_factor, dt)
+            if iteration > 0 and change < GRIP_TOLERANCE:
+                break
+        solved, rotation = solve_step(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle)
+        if not solved or ph.stribeck_rise == 0.0:
+            break
+    return solved, rotation
+
+
+@kernel(error_model="numpy")
+def _responses(
+    ph: Physics,
+    piece: NDArray,
+    node: NDArray,
+    slide: NDArray,
+    mean: NDArray,
+    load: NDArray,
+    rotation: float,
+    torque: float,
+    dt: float,
+    bristle: float,
+) -> tuple[float, float]:
+    """Derivatives of T1 - T3 (N per N m) and of the load's angle (rad per N m) by its torque, at a solved step."""
+    follows = set_memory(ph, piece, dt) if ph.has_relaxation else 0.0
+    _, _, _, slope, R = imbalance(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle, follows)
+    # What is out of balance at the nodes is rounding beside 1 N m at the load.
+    if ph.conduit_compliance > 0.0:
+        angle = solve_with_conduits(ph, piece, node, slide, mean, -1.0, slope, R, True)
+    else:
+        angle = solve(piece, node, slide, -1.0, slope, R, True)
+        mean[rows.MEAN_STEP] = 0.0
+    tension = 0.0
+    for c in range(2):
+        gives = ph.conduit_compliance * piece[rows.SHARE, c, 0] * mean[rows.MEAN_STEP, c]
+        tension -= (1.0 - 2.0 * c) * piece[rows.TANGENT, c, 0] * (slide[rows.STEP, c, 1] + gives)
+    return tension, angle
+
+
+@kernel(error_model="numpy")
+def filtered(
+    ph: Physics,
+    piece: NDArray,
+    node: NDArray,
+    slide: NDArray,
+    mean: NDArray,
+    load: NDArray,
+    drive: tuple[float, float, float],
+    friction_factor: NDArray,
+    steps: int,
+    time_s: NDArray,
+    theta_in: NDArray,
+    measured: NDArray,
+    noise_variance: NDArray,
+    drive_variance: NDArray,
+    considered: Considered,
+    law_share: float,
+    free_Nm_per_rad: float,
+    first_misfit: float,
+    trace: NDArray,
+    out: NDArray,
+    by_misfit: NDArray,
+    given: bool,
+) -> int:
+    """Estimate the misfit of the load's law sample by sample, or run along a given one.
+
+    Parameters as of `ccmodel.model.general.march.march` and `ccmodel.inverse.exact.filtered`, with torques (N m) and
+    angles (rad) for forces and displacements. `first_misfit` is the load's torque at rest where it has no law.
+
+    Returns
+    -------
+    int
+        Samples that were solved.
+    """
+    piece, node, slide, mean, load = borrowed((piece, node, slide, mean, load))
+    m = time_s.size
+    attempts, most_attempts = 0, MOST_ATTEMPTS * m * steps
+    last_rotation, before_rotation, last_pull, before_pull, last_dt = 0.0, 0.0, 0.0, 0.0, 0.0
+    misfit, variance = first_misfit, 0.0
+    covariance, effects = np.zeros(2), np.zeros(2)
+    effects[1] = considered.zero
+    node[rows.RESTED] = 1.0
+    set_grip(ph, node, slide, friction_factor[0], 0.0)
+    fixed_grip = ph.stribeck_rise == 0.0 and len(friction_factor) == 1
+    wound_before = winding(theta_in[0], drive[1], drive[2])[0]
+    expected = 0.0
+    for j in range(m):
+        wound, radius_factor, _ = winding(theta_in[j], drive[1], drive[2])
+        pull, wound_before = drive[0] * (wound - wound_before), wound
+        lever = drive[0] * radius_factor
+        dt = time_s[j] - time_s[j - 1] if j > 0 else 0.0
+        factor = friction_factor[min(j, len(friction_factor) - 1)]
+        whole = 1.0 / steps if j > 0 else 1.0
+        done, part, bristle = 0.0, whole, ph.bristle
+        angle_before, expected_before = load[rows.ANGLE], expected
+        gain, response, yields, growth = 0.0, 0.0, 0.0, 0.0
+        if given:
+            misfit = trace[MISFIT, j]
+        while done < 1.0 - ROUNDING:
+            part = min(part, 1.0 - done)
+            step_pull, step_dt = part * pull, part * dt
+            # Extrapolate the last steps, as the march without an unknown load does.
+            is_whole = abs(part - whole) <= ROUNDING and abs(last_dt - step_dt) <= ROUNDING * dt
+            if is_whole and abs(2 * last_pull - before_pull - step_pull) <= 0.05 * abs(step_pull):
+                by_last, by_before = 2.0, -1.0
+            else:
+                ratio = step_pull / last_pull if last_pull * pull > 0.0 else 0.0
+                by_last, by_before = min(ratio, 4.0), 0.0
+            for c in range(2):
+                for i in range(slide.shape[2]):
+                    slide[rows.NOW, c, i] = by_last * slide[rows.LAST, c, i] + by_before * slide[rows.BEFORE, c, i]
+                change = by_last * mean[rows.MEAN_LAST, c] + by_before * mean[rows.MEAN_BEFORE, c]
+                mean[rows.MEAN_NEXT, c] = mean[rows.MEAN, c] + change
+            rotation = by_last * last_rotation + by_before * before_rotation
+            slide[rows.NOW, 0, 0], slide[rows.NOW, 1, 0] = step_pull, -step_pull
+            attempts += 1
+            if attempts > most_attempts:
+                return j
+            solved, rotation = _solve(
+                ph, piece, node, slide, mean, load, rotation, misfit, step_dt, bristle, factor, fixed_grip
+            )
+            if not solved:
+                part *= 0.5
+                last_pull = 0.0
+                if part < SMALLEST_SUBSTEP:
+                    if ph.presliding or bristle >= LONGEST_BRISTLE_M:
+                        return j
+                    bristle *= 10.0
+                    part = whole
+                continue
+            if not given and j > 0 and done + part >= 1.0 - ROUNDING:
+                tension, yields = _responses(ph, piece, node, slide, mean, load, rotation, misfit, step_dt, bristle)
+                response = lever * tension
+                if response < HIDDEN * lever / ph.radius:
+                    response = 0.0
+                n = piece.shape[2] - 1
+                near = max(piece[rows.TENSION, 0, 0], 0.0) - max(piece[rows.TENSION, 1, 0], 0.0)
+                far = max(piece[rows.TENSION, 0, n], 0.0) - max(piece[rows.TENSION, 1, n], 0.0)
+                expected = lever * near
+                turn = theta_in[j] - theta_in[j - 1]
+                angle = load[rows.ANGLE] + rotation
+                growth = (free_Nm_per_rad * turn) ** 2
+                growth += 2.0 * (law_share * ph.stiffness_load) ** 2 * abs(angle * (angle - angle_before))
+                variance += growth
+                noise = noise_variance[j]
+                if turn != 0.0:
+                    noise += drive_variance[j] * ((expected - expected_before) / turn) ** 2
+                noise_variance[j] = noise
+                effects[0] = considered.friction * lever * (near - far)
+                gain = gain_of(variance, covariance, response, effects, noise)
+                prior, prior_rotation = misfit, rotation
+                copy_slides(slide, KEPT_SLIDE, rows.NOW)
+                copy_means(mean, KEPT_MEAN, rows.MEAN_NEXT)
+                for _ in range(ITERATIONS if gain != 0.0 else 0):
+                    change = prior + gain * (measured[j] - expected + response * (misfit - prior)) - misfit
+                    if abs(response * change) <= max(FOUND * np.sqrt(noise), SMALLEST_Nm):
+                        break
+                    misfit += change
+                    solved, rotation = _solve(
+                        ph, piece, node, slide, mean, load, rotation, misfit, step_dt, bristle, factor, fixed_grip
+                    )
+                    if not solved:
+                        # The solver does not reach the new load: the sample keeps the load that was expected.
+                        misfit, rotation, gain = prior, prior_rotation, 0.0
+                        copy_slides(slide, rows.NOW, KEPT_SLIDE)
+                        copy_means(mean, rows.MEAN_NEXT, KEPT_MEAN)
+                        solved, rotation = _solve(
+                            ph, piece, node, slide, mean, load, rotation, misfit, step_dt, bristle, factor, fixed_grip
+                        )
+                        break
+                    near = max(piece[rows.TENSION, 0, 0], 0.0) - max(piece[rows.TENSION, 1, 0], 0.0)
+                    expected = lever * near
+                variance = updated_variance(variance, covariance, response, effects, noise, gain)
+            copy_slides(slide, rows.BEFORE, rows.LAST)
+            copy_slides(slide, rows.LAST, rows.NOW)
+            before_rotation, last_rotation = last_rotation, rotation
+            before_pull, last_pull, last_dt = last_pull, step_pull, step_dt
+            _accept(ph, piece, node, slide, mean, load, rotation, step_dt)
+            done += part
+            part = min(2.0 * part, whole)
+        expected = lever * (max(piece[rows.TENSION, 0, 0], 0.0) - max(piece[rows.TENSION, 1, 0], 0.0))
+        if not given:
+            trace[MISFIT, j], trace[BY_MISFIT, j], trace[GAIN, j] = misfit, response, gain
+            trace[GROWTH, j] = growth
+        trace[EXPECTED, j] = expected
+        out[0, j], out[1, j] = load[rows.ANGLE], load[rows.TORQUE]
+        by_misfit[0, j], by_misfit[1, j] = yields, 1.0 + ph.stiffness_load * yields
+    return m
+
+
+def run(
+    transmission: Transmission,
+    load: SpringLoad | TorqueLoad,
+    settings: Settings,
+    initial: InitialTension,
+    time_s: NDArray,
+    drive: Drive,
+    prior: Prior,
+    misfit_Nm: NDArray | None = None,
+    refinement: int = 1,
+) -> Run:
+    """Estimate the misfit of the load's law, or run along a given `misfit_Nm`, shape (n,).
+
+    A `TorqueLoad` stands for a load without a law; of its torque only the value at rest is used.
+
+    Raises
+    ------
+    ModelError
+        If a step has no solution.
+    """
+    n = time_s.size
+    has_law = isinstance(load, SpringLoad)
+    series = np.zeros(1) if isinstance(load, SpringLoad) else load.torque_Nm
+    at_rest = prepared(
+        transmission, load, settings, time_s, drive.theta_rad, initial, refinement * ELEMENTS, refinement, series
+    )
+    slide, mean = (np.concatenate([a, np.zeros_like(a[:1])]) for a in (at_rest.slide, at_rest.mean))
+    trace, out, by_misfit = np.zeros((TRACE_ROWS, n)), np.empty((2, n)), np.zeros((2, n))
+    if misfit_Nm is not None:
+        trace[MISFIT] = misfit_Nm
+    torque, noise = drive.torque_Nm, drive.torque_variance.copy()
+    # The drive pulley's own bearing follows from its motion.
+    own = settings.drive_friction_Nm * bearing(drive.theta_rad, settings.drive_presliding_rad)
+    solved = filtered(
+        *at_rest._replace(slide=slide, mean=mean),
+        time_s,
+        drive.theta_rad,
+        torque - own,
+        noise,
+        drive.theta_variance,
+        prior.considered,
+        prior.law_share,
+        prior.free_Nm_per_rad,
+        0.0 if has_law else float(series[0]),
+        trace,
+        out,
+        by_misfit,
+        misfit_Nm is not None,
+    )
+    if solved < n:
+        raise ModelError(f"no balance of cables and load was found at sample {solved}")
+    trace[EXPECTED] += own
+    if not has_law:  # the torque is that of the load alone, without a spring beside it
+        out[1], by_misfit[1] = trace[MISFIT], 1.0
+    return Run(trace, out, by_misfit, noise)
