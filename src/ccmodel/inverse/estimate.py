@@ -31,6 +31,8 @@ LAW_SHARE = 0.03
 TOLERANCE, LASTS_RAD = 0.005, 0.1
 # A drive that moves less in a sample than this share of that travel counts as moving by as much.
 SMALLEST_SHARE = 1e-6
+# The effects of errors are simulated on every so many samples, that of a misfit with this share of the tensions.
+EVERY, SHIFT = 4, 0.01
 # Standard deviations from the middle to the ends of a 90 % interval.
 HALF_WIDTH = 1.6449
 # Columns of an estimate.
@@ -88,10 +90,10 @@ def estimated(
         raise ModelError(f"{recording.batch}/{recording.id}: the far end is fixed: there is no load to estimate")
     problem = _Problem.of(recording, parameters, sds or {}, uses_law)
     nominal = problem.run(problem.parameters)
-    effects, outputs = problem.effects_of_errors(nominal)
+    effects, outputs, by_misfit = problem.effects_of_errors(nominal)
     noise = nominal.noise_variance + problem.discrepancy(tolerance)
     correction, spread = joint_estimate(
-        nominal.trace, problem.drive.torque_Nm, problem.first_variance, noise, effects, outputs, nominal.by_misfit
+        nominal.trace, problem.drive.torque_Nm, problem.first_variance, noise, effects, outputs, by_misfit
     )
     ratio = problem.parameters.drive_radius_m / problem.parameters.load_radius_m
     spread[0] += (problem.proximal.sigma_in * ratio) ** 2
@@ -114,6 +116,7 @@ class _Problem:
     prior: Prior
     drive: Drive
     notes: tuple[str, ...]
+    every: int = 1
 
     @classmethod
     def of(
@@ -147,10 +150,16 @@ class _Problem:
         return initial_tension(self.proximal.model_input(self.parameters), self.parameters)
 
     @property
+    def drive_tensions_N(self) -> float:
+        """Sum of the tensions at the drive before it moves."""
+        initial, is_single = self.initial, self.proximal.recording.far_end is not None
+        return float(initial.tension_A_N[0] + (0.0 if is_single else initial.tension_B_N[0]))
+
+    @property
     def first_variance(self) -> float:
         """Variance of the load's torque before the drive moves, N^2 m^2.
 
-        A rest has errors of its own in the place of it (`_perturbed`).
+        A rest has errors of its own in the place of it (`perturbed`).
         """
         if self.proximal.rests and self.parameters.pretension_N is None:
             return 0.0
@@ -171,7 +180,7 @@ class _Problem:
         drive = self.drive
         if shift_rad:
             theta = drive.theta_rad + shift_rad
-            theta[0] = drive.theta_rad[0]
+            theta[0] -= shift_rad
             drive = drive._replace(theta_rad=theta)
         K_e = parameters.load_stiffness_Nm_per_rad
         if not parameters.mechanisms and not (K_e is None and parameters.spring_beside_load_Nm_per_rad):
@@ -184,7 +193,7 @@ class _Problem:
         settings = settings_of(parameters.mechanisms)
         finer = parameters.refinement
         return general.run(
-            transmission, load, settings, initial, recording.time_s, drive, self.prior, misfit_Nm, finer
+            transmission, load, settings, initial, recording.time_s[:: self.every], drive, self.prior, misfit_Nm, finer
         )
 
     def discrepancy(self, tolerance: float) -> NDArray:
@@ -194,23 +203,31 @@ class _Problem:
         """
         torque, travel = self.drive.torque_Nm, np.abs(np.diff(self.drive.theta_rad, prepend=self.drive.theta_rad[0]))
         # Before the drive has moved far, the tensions tell what its torque will come to.
-        tensions = self.initial.tension_A_N[0] + (0.0 if self.proximal.recording.far_end else self.initial.tension_B_N[0])
         range_so_far = np.maximum.accumulate(torque) - np.minimum.accumulate(torque)
-        range_so_far = np.maximum(range_so_far, tensions * self.parameters.drive_radius_m)
+        range_so_far = np.maximum(range_so_far, self.drive_tensions_N * self.parameters.drive_radius_m)
         samples = LASTS_RAD / np.maximum(travel, LASTS_RAD * SMALLEST_SHARE)
         return (tolerance * range_so_far) ** 2 * np.maximum(samples, 1.0)
 
-    def effects_of_errors(self, nominal: Run) -> tuple[NDArray, NDArray]:
-        """Effects of one standard deviation of each lasting error, as of `ccmodel.inverse.update.joint_estimate`."""
-        n = self.drive.theta_rad.size
-        torque, outputs = [np.full(n, self.proximal.torque_zero_Nm)], [np.zeros((2, n))]
-        for run in self._perturbed(nominal.trace[MISFIT]):
-            torque.append(run.trace[EXPECTED] - nominal.trace[EXPECTED])
-            outputs.append(run.out - nominal.out)
-            outputs[-1][0] -= outputs[-1][0, 0]
-        return np.array(torque), np.array(outputs)
+    def effects_of_errors(self, nominal: Run) -> tuple[NDArray, NDArray, NDArray]:
+        """Effects of one standard deviation of each lasting error, and of a misfit, as of `joint_estimate`.
 
-    def _perturbed(self, misfit_Nm: NDArray) -> Iterator[Run]:
+        They change slowly: every `EVERY`-th sample is simulated, and the effects hold until the next.
+        """
+        n = self.drive.theta_rad.size
+        coarse = replace(self, drive=Drive(*(values[::EVERY] for values in self.drive)), every=EVERY)
+        misfit = nominal.trace[MISFIT, ::EVERY]
+        unperturbed = coarse.run(self.parameters, misfit)
+        shift = SHIFT * self.drive_tensions_N * self.parameters.load_radius_m
+        runs = [coarse.run(self.parameters, misfit + shift), *coarse.perturbed(misfit)]
+        torque = np.array([run.trace[EXPECTED] - unperturbed.trace[EXPECTED] for run in runs])
+        outputs = np.array([run.out - unperturbed.out for run in runs])
+        outputs[:, 0] -= outputs[:, 0, :1]
+        held = np.arange(n) // EVERY
+        zero = np.full((1, n), self.proximal.torque_zero_Nm)
+        effects = np.concatenate([zero, torque[1:, held]])
+        return effects, np.concatenate([np.zeros((1, 2, n)), outputs[1:, :, held]]), outputs[0][:, held] / shift
+
+    def perturbed(self, misfit_Nm: NDArray) -> Iterator[Run]:
         """Runs with one error each, along the same misfit."""
         p = self.parameters
         friction = p.friction_scale * (1 + self.prior.considered.friction)

@@ -70,8 +70,8 @@ def start_of(
 
 
 @small_kernel
-def _responses(path: PathTables, state: State, stiffness: float) -> tuple[float, float]:
-    """Drive torque (N) and load displacement (m) by the misfit (N), of a load that moves with the drive."""
+def _response(path: PathTables, state: State, stiffness: float) -> float:
+    """Drive torque by misfit, both as forces at the rims, where the load moves with the drive."""
     total, drive = stiffness, 0.0
     for c in range(2):
         if state.kind[c, rows.MODE] == rows.WHOLE:
@@ -82,11 +82,9 @@ def _responses(path: PathTables, state: State, stiffness: float) -> tuple[float,
         else:
             compliance = end_compliance(state, c, 1)
             if compliance <= 0.0:
-                return 0.0, 0.0
+                return 0.0
             total += 1.0 / compliance
-    if total == 0.0:
-        return 0.0, 0.0
-    return drive / total, -1.0 / total
+    return drive / total if total > 0.0 else 0.0
 
 
 @small_kernel
@@ -108,7 +106,6 @@ def filtered(
     free_N_per_m: float,
     trace: NDArray,
     out: NDArray,
-    by_misfit: NDArray,
     given: bool,
 ) -> None:
     """Estimate the misfit of the load's law sample by sample, or run along a given one.
@@ -136,8 +133,6 @@ def filtered(
         estimated.
     out : ndarray, shape (2, n)
         Displacement of the load's rim (m), and force of the cables on it (N).
-    by_misfit : ndarray, shape (2, n)
-        Derivatives of `out`.
     given : bool
     """
     path, state, saved, before = borrowed(start.path), borrowed(start.state), borrowed(saved), borrowed(before)
@@ -151,7 +146,7 @@ def filtered(
         move = drive[i] - state.value[rows.PAIR, rows.DRIVE]
         direction = 1 if move > 0.0 else -1
         load_before, expected_before = state.value[rows.PAIR, rows.LOAD], expected
-        gain, response, yields, growth = 0.0, 0.0, 0.0, 0.0
+        gain, response, growth = 0.0, 0.0, 0.0
         if move != 0.0:
             # A reversal writes corners, which the copy shares: it is done before the copy is taken.
             reverse(path, state, 0, direction)
@@ -162,7 +157,7 @@ def filtered(
                 copy_state(state, before)
                 step(path, state, saved, direction, drive[i], offset + misfit, stiffness)
                 expected = _drive_torque(state)
-                response, yields = _responses(path, state, stiffness)
+                response = _response(path, state, stiffness)
                 load = state.value[rows.PAIR, rows.LOAD]
                 growth = (free_N_per_m * move) ** 2
                 growth += 2.0 * (law_share * stiffness) ** 2 * abs(load * (load - load_before))
@@ -182,7 +177,7 @@ def filtered(
                     copy_state(before, state)
                     step(path, state, saved, direction, drive[i], offset + misfit, stiffness)
                     expected = _drive_torque(state)
-                    now, yields = _responses(path, state, stiffness)
+                    now = _response(path, state, stiffness)
                     if now > 0.0:
                         response = now
                         gain = gain_of(variance, covariance, response, effects, noise)
@@ -199,7 +194,6 @@ def filtered(
         trace[EXPECTED, i] = expected
         out[0, i] = state.value[rows.PAIR, rows.LOAD]
         out[1, i] = state.value[0, rows.T_LOAD] - state.value[1, rows.T_LOAD]
-        by_misfit[0, i], by_misfit[1, i] = yields, 1.0 + stiffness * yields
 
 
 def run(
@@ -217,7 +211,7 @@ def run(
     R_i, R_o = transmission.drive_radius_m, transmission.load_radius_m
     n = drive.theta_rad.size
     start = start_of(transmission, stiffness_Nm_per_rad, initial, n)
-    trace, out, by_misfit = np.zeros((TRACE_ROWS, n)), np.empty((2, n)), np.zeros((2, n))
+    trace, out = np.zeros((TRACE_ROWS, n)), np.empty((2, n))
     if misfit_Nm is not None:
         trace[MISFIT] = misfit_Nm / R_o
     state, noise = start.state, drive.torque_variance / R_i**2
@@ -237,8 +231,7 @@ def run(
         prior.free_Nm_per_rad / R_i / R_o,
         trace,
         out,
-        by_misfit,
         misfit_Nm is not None,
     )
     trace *= np.array([R_o, R_i, R_i / R_o, R_o / R_i, R_o**2])[:, None]
-    return Run(trace, out * [[1 / R_o], [R_o]], by_misfit * [[1 / R_o**2], [1.0]], noise * R_i**2)
+    return Run(trace, out * [[1 / R_o], [R_o]], noise * R_i**2)

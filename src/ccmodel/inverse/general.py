@@ -82,7 +82,7 @@ def _solve(
 
 
 @kernel(error_model="numpy")
-def _responses(
+def _response(
     ph: Physics,
     piece: NDArray,
     node: NDArray,
@@ -93,21 +93,21 @@ def _responses(
     torque: float,
     dt: float,
     bristle: float,
-) -> tuple[float, float]:
-    """Derivatives of T1 - T3 (N per N m) and of the load's angle (rad per N m) by its torque, at a solved step."""
+) -> float:
+    """Derivative of T1 - T3 by the load's torque at a solved step, N per N m."""
     follows = set_memory(ph, piece, dt) if ph.has_relaxation else 0.0
     _, _, _, slope, R = imbalance(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle, follows)
     # What is out of balance at the nodes is rounding beside 1 N m at the load.
     if ph.conduit_compliance > 0.0:
-        angle = solve_with_conduits(ph, piece, node, slide, mean, -1.0, slope, R, True)
+        solve_with_conduits(ph, piece, node, slide, mean, -1.0, slope, R, True)
     else:
-        angle = solve(piece, node, slide, -1.0, slope, R, True)
+        solve(piece, node, slide, -1.0, slope, R, True)
         mean[rows.MEAN_STEP] = 0.0
     tension = 0.0
     for c in range(2):
         gives = ph.conduit_compliance * piece[rows.SHARE, c, 0] * mean[rows.MEAN_STEP, c]
         tension -= (1.0 - 2.0 * c) * piece[rows.TANGENT, c, 0] * (slide[rows.STEP, c, 1] + gives)
-    return tension, angle
+    return tension
 
 
 @kernel(error_model="numpy")
@@ -132,7 +132,6 @@ def filtered(
     first_misfit: float,
     trace: NDArray,
     out: NDArray,
-    by_misfit: NDArray,
     given: bool,
 ) -> int:
     """Estimate the misfit of the load's law sample by sample, or run along a given one.
@@ -166,7 +165,7 @@ def filtered(
         whole = 1.0 / steps if j > 0 else 1.0
         done, part, bristle = 0.0, whole, ph.bristle
         angle_before, expected_before = load[rows.ANGLE], expected
-        gain, response, yields, growth = 0.0, 0.0, 0.0, 0.0
+        gain, response, growth = 0.0, 0.0, 0.0
         if given:
             misfit = trace[MISFIT, j]
         while done < 1.0 - ROUNDING:
@@ -202,8 +201,7 @@ def filtered(
                     part = whole
                 continue
             if not given and j > 0 and done + part >= 1.0 - ROUNDING:
-                tension, yields = _responses(ph, piece, node, slide, mean, load, rotation, misfit, step_dt, bristle)
-                response = lever * tension
+                response = lever * _response(ph, piece, node, slide, mean, load, rotation, misfit, step_dt, bristle)
                 if response < HIDDEN * lever / ph.radius:
                     response = 0.0
                 n = piece.shape[2] - 1
@@ -257,7 +255,6 @@ def filtered(
             trace[GROWTH, j] = growth
         trace[EXPECTED, j] = expected
         out[0, j], out[1, j] = load[rows.ANGLE], load[rows.TORQUE]
-        by_misfit[0, j], by_misfit[1, j] = yields, 1.0 + ph.stiffness_load * yields
     return m
 
 
@@ -288,7 +285,7 @@ def run(
         transmission, load, settings, time_s, drive.theta_rad, initial, refinement * ELEMENTS, refinement, series
     )
     slide, mean = (np.concatenate([a, np.zeros_like(a[:1])]) for a in (at_rest.slide, at_rest.mean))
-    trace, out, by_misfit = np.zeros((TRACE_ROWS, n)), np.empty((2, n)), np.zeros((2, n))
+    trace, out = np.zeros((TRACE_ROWS, n)), np.empty((2, n))
     if misfit_Nm is not None:
         trace[MISFIT] = misfit_Nm
     torque, noise = drive.torque_Nm, drive.torque_variance.copy()
@@ -307,12 +304,11 @@ def run(
         0.0 if has_law else float(series[0]),
         trace,
         out,
-        by_misfit,
         misfit_Nm is not None,
     )
     if solved < n:
         raise ModelError(f"no balance of cables and load was found at sample {solved}")
     trace[EXPECTED] += own
     if not has_law:  # the torque is that of the load alone, without a spring beside it
-        out[1], by_misfit[1] = trace[MISFIT], 1.0
-    return Run(trace, out, by_misfit, noise)
+        out[1] = trace[MISFIT]
+    return Run(trace, out, noise)

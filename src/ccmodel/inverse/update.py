@@ -71,15 +71,12 @@ class Run(NamedTuple):
     trace : ndarray, shape (5, n)
     out : ndarray, shape (2, n)
         Angle of the load from the start (rad) and torque of the cables on it (N m).
-    by_misfit : ndarray, shape (2, n)
-        Derivatives of `out` by the misfit.
     noise_variance : ndarray, shape (n,)
         Of the measured torque less the expected one: sensor and drive angle.
     """
 
     trace: NDArray
     out: NDArray
-    by_misfit: NDArray
     noise_variance: NDArray
 
 
@@ -141,7 +138,8 @@ def joint_estimate(
     outputs : ndarray, shape (errors, outputs, n)
         The same on each output.
     by_misfit : ndarray, shape (outputs, n)
-        Derivatives of the outputs by the misfit.
+        Derivatives of the outputs by a misfit that has been the same all along: a load that rests holds what it came
+        to rest with.
 
     Returns
     -------
