@@ -15,10 +15,10 @@ from ccmodel.kernel import kernel
 
 # Intensities of white jerk, counts^2 / step^5: from slow sines that pass a count in hundreds of samples to drives that
 # turn within a few.
-INTENSITIES = 10.0 ** np.arange(-13.0, 1.0, 2.0)
+INTENSITIES = 10.0 ** np.arange(-13.0, 0.0, 3.0)
 # Variance of a count's position before any motion, counts^2: uniform.
 UNIFORM_VARIANCE = 1.0 / 12.0
-# Predictions count less by 1/e after so many counts passed or this many samples.
+# A prediction counts less by 1/e after so many samples.
 MEMORY_SAMPLES = 100.0
 
 
