@@ -6,6 +6,8 @@ The public interface is the names in `__all__`:
 - `fit` calibrates the paper's model to it, and gives a `Fit` with an `Interval` of each value;
 - `diagnose` decides whether that model explains the recordings, and gives a `Diagnosis`;
 - `simulate` and `predict` run a `Model`, which a fit or a diagnosis has found or `read_model` reads from a file;
+- `estimate` finds the load's torque and angle from the drive's side of a recording, and `compensate` the drive's motion
+  for a wanted one of the load;
 - `InputError` says in a line for each problem what cannot be used, and what to do.
 
 Nothing else is needed for work with recordings, fits, diagnoses and models. All modules below (``ccmodel.model``,
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from ccmodel.api.batch import Batch, load
     from ccmodel.api.diagnosis import Diagnosis, diagnose
     from ccmodel.api.fit import Fit, fit
+    from ccmodel.api.inverse import Compensation, Estimate, compensate, estimate
     from ccmodel.api.model import Model, Prediction, predict, read_model, simulate
     from ccmodel.inference.intervals import Interval
     from ccmodel.model.parameters import Parameters
@@ -34,7 +37,9 @@ if TYPE_CHECKING:
 # Module of each public name.
 _PLACES = {
     "Batch": "api.batch",
+    "Compensation": "api.inverse",
     "Diagnosis": "api.diagnosis",
+    "Estimate": "api.inverse",
     "Finding": "rig.findings",
     "Fit": "api.fit",
     "InputError": "typed",
@@ -44,7 +49,9 @@ _PLACES = {
     "Prediction": "api.model",
     "Progress": "progress",
     "Recording": "recording",
+    "compensate": "api.inverse",
     "diagnose": "api.diagnosis",
+    "estimate": "api.inverse",
     "fit": "api.fit",
     "load": "api.batch",
     "predict": "api.model",
@@ -54,7 +61,9 @@ _PLACES = {
 
 __all__ = [
     "Batch",
+    "Compensation",
     "Diagnosis",
+    "Estimate",
     "Finding",
     "Fit",
     "InputError",
@@ -65,7 +74,9 @@ __all__ = [
     "Progress",
     "Recording",
     "__version__",
+    "compensate",
     "diagnose",
+    "estimate",
     "fit",
     "load",
     "predict",

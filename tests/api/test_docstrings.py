@@ -31,4 +31,4 @@ def test_examples_in_docstrings_run(module, monkeypatch, tmp_path):
 
 def test_every_function_has_an_example():
     named = {one.name.rpartition(".")[2] for module in MODULES for one in examples_of(module)}
-    assert {"load", "fit", "diagnose", "simulate", "predict", "read_model"} <= named
+    assert {"load", "fit", "diagnose", "simulate", "predict", "estimate", "compensate", "read_model"} <= named

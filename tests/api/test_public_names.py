@@ -51,10 +51,11 @@ def test_no_module_has_the_name_of_a_public_name():
     assert not modules & set(cc.__all__)
 
 
-@pytest.mark.parametrize("name", ["diagnose", "fit", "load", "simulate", "predict"])
+@pytest.mark.parametrize("name", ["compensate", "diagnose", "estimate", "fit", "load", "simulate", "predict"])
 def test_importing_modules_leaves_the_functions(name):
     code = (
         "import json, ccmodel.diagnosis.run, ccmodel.steps.fit, ccmodel.steps.predict, ccmodel.steps.simulate\n"
+        "import ccmodel.inverse.compensate, ccmodel.inverse.estimate\n"
         f"import ccmodel as cc; print(json.dumps([callable(cc.{name}), cc.{name}.__module__.split('.')[1]]))"
     )
     assert in_new_interpreter(code) == [True, "api"]

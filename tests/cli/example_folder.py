@@ -31,6 +31,8 @@ def prepare(folder: Path) -> Path:
     _write_measurements(folder / "measurements")
     time = np.arange(250) / 250
     pd.DataFrame({"time_s": time, "theta_in_rad": 0.5 * np.sin(2 * np.pi * time)}).to_csv(folder / "motion.csv")
+    wanted = pd.DataFrame({"time_s": time, "theta_out_rad": 0.2 * np.sin(np.pi * time) ** 2})
+    wanted.to_csv(folder / "wanted.csv", index=False)
     _write_results(folder)
     _write_table_one(folder / "config/table-one.yaml")
     trial = next((ROOT / "tests/rig/data").glob("*/*.xz"))

@@ -1,5 +1,6 @@
 """Models in use: simulations of motions, predictions of recordings."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from math import inf
@@ -272,7 +273,7 @@ def simulate(
     [7.0, 7.0, 7.0, 7.0]
     """
     known = as_model(model)
-    table, source = _motion(motion)
+    table, source = as_motion(motion)
     if pretension_N is not None and not (isinstance(pretension_N, Real) and 0 <= pretension_N < inf):
         raise InputError(f"pretension_N: a tension that is not negative, N; got {pretension_N!r}")
     if out is not None:
@@ -313,18 +314,32 @@ def as_model(given: Model | HasModel | str | Path) -> Model:
     return given.model
 
 
-def _motion(motion: Motion) -> tuple[pd.DataFrame, str]:
-    """A motion as a checked table, and what it is called in messages."""
+def as_motion(motion: Motion, name: str = "motion", columns: Sequence[str] = MOTION) -> tuple[pd.DataFrame, str]:
+    """A motion as a checked table, and what it is called in messages.
+
+    Parameters
+    ----------
+    motion : DataFrame, xarray Dataset, Recording, str or Path
+    name : str
+        Of the argument.
+    columns : sequence of str
+        Time and angle.
+
+    Raises
+    ------
+    InputError
+        If it cannot be used.
+    """
     if isinstance(motion, str | Path):
-        return read_motion(existing_file(motion)), str(motion)
+        return read_motion(existing_file(motion), columns), str(motion)
     if isinstance(motion, Recording):
         motion = motion.to_frame()
     if isinstance(motion, xr.Dataset):
-        found = [name for name in MOTION if name in motion]
+        found = [one for one in columns if one in motion]
         motion = motion[found].to_dataframe() if found else pd.DataFrame(columns=list(map(str, motion)))
     if not isinstance(motion, pd.DataFrame):
         expected = "a DataFrame, a Dataset, a Recording or a CSV file"
-        raise InputError(f"motion: {expected}; got {'None' if motion is None else type(motion).__name__}")
-    if motion.index.name in MOTION and motion.index.name not in motion:
+        raise InputError(f"{name}: {expected}; got {'None' if motion is None else type(motion).__name__}")
+    if motion.index.name in columns and motion.index.name not in motion:
         motion = motion.reset_index()
-    return checked_motion(motion, "motion"), "motion"
+    return checked_motion(motion, name, columns=columns), name

@@ -14,6 +14,7 @@ from ccmodel.cli import (
     diagnose,
     fit,
     importing,
+    inverse,
     mechanisms,
     predict,
     project,
@@ -40,7 +41,19 @@ app = typer.Typer(
     context_settings={"help_option_names": ["--help", "-h"]},
     pretty_exceptions_enable=False,
 )
-for module in (batches, importing, fit, simulate, predict, diagnose, accuracy, mechanisms, report, project):
+for module in (
+    batches,
+    importing,
+    fit,
+    simulate,
+    predict,
+    inverse,
+    diagnose,
+    accuracy,
+    mechanisms,
+    report,
+    project,
+):
     module.add_to(app)
 
 

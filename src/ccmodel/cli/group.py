@@ -44,7 +44,20 @@ class Commands(FormerOptions):
 
     renamed_in: ClassVar = {"import-mis-tool": {"--batch": "--name"}, "history": {"--file": "--history"}}
     # The way of a batch from logs to a verdict, and then everything else.
-    order = ("init", "import", "check", "fit", "simulate", "predict", "diagnose", "accuracy", "mechanisms", "report")
+    order = (
+        "init",
+        "import",
+        "check",
+        "fit",
+        "simulate",
+        "predict",
+        "estimate",
+        "compensate",
+        "diagnose",
+        "accuracy",
+        "mechanisms",
+        "report",
+    )
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Names of the commands, in the order of the help."""

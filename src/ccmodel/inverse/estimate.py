@@ -1,7 +1,7 @@
 """A recording's drive side and a model -> the load's torque and angle with intervals."""
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pandas as pd
@@ -16,7 +16,7 @@ from ccmodel.inverse.update import BY_MISFIT, EXPECTED, MISFIT, Considered, Driv
 from ccmodel.model.general.run import settings_of
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad, TorqueLoad
-from ccmodel.model.parameters import Parameters, mechanism_parameter
+from ccmodel.model.parameters import Parameters, mechanism_key
 from ccmodel.model.run import initial_tension, transmission_of
 from ccmodel.model.session import of_recording
 from ccmodel.recording import Recording
@@ -26,8 +26,8 @@ REPEATS_TO = 0.01
 # Standard deviation of the torque of a load from the law of its spring, as a share: of a spring that is linear to a few
 # per cent, as torsion springs are sold.
 LAW_SHARE = 0.03
-# Standard deviation of the model discrepancy of the drive torque as a share of its peak to peak so far, and travel of the
-# drive over which it is one and the same.
+# Standard deviation of the model discrepancy of the drive torque as a share of its peak to peak so far, and travel of
+# the drive over which it is one and the same.
 TOLERANCE, LASTS_RAD = 0.005, 0.1
 # A drive that moves less in a sample than this share of that travel counts as moving by as much.
 SMALLEST_SHARE = 1e-6
@@ -119,9 +119,7 @@ class _Problem:
     every: int = 1
 
     @classmethod
-    def of(
-        cls, recording: Recording, parameters: Parameters, sds: Mapping[str, float], uses_law: bool
-    ) -> "_Problem":
+    def of(cls, recording: Recording, parameters: Parameters, sds: Mapping[str, float], uses_law: bool) -> "_Problem":
         parameters = of_recording(parameters, recording)
         if not uses_law:
             parameters = replace(parameters, load_stiffness_Nm_per_rad=None)
@@ -130,7 +128,9 @@ class _Problem:
         has_law = kept.load_stiffness_Nm_per_rad is not None
         cables = 1 if recording.far_end else 2
         locked = cables * kept.stiffness_N_per_m * kept.reference_length_m / recording.path.length_m
-        friction = float(np.hypot(REPEATS_TO, sds.get("friction_coefficient", 0.0) / max(kept.friction_coefficient, 1e-9)))
+        friction = float(
+            np.hypot(REPEATS_TO, sds.get("friction_coefficient", 0.0) / max(kept.friction_coefficient, 1e-9))
+        )
         prior = Prior(
             Considered(friction, proximal.torque_zero_Nm),
             LAW_SHARE,
@@ -234,7 +234,7 @@ class _Problem:
         yield self.run(replace(p, friction_scale=friction), misfit_Nm)
         yield self.run(replace(p, pretension_scale=p.pretension_scale * (1 + REPEATS_TO)), misfit_Nm)
         for name, sd in self._uncertain():
-            yield _either_side(lambda step, name=name: self.run(_raised(p, name, step), misfit_Nm), sd)
+            yield self._either_side(name, sd, misfit_Nm)
         if self.proximal.rest_offset_rad:
             yield self.run(p, misfit_Nm, shift_rad=self.proximal.rest_offset_rad)
         if self.proximal.rests and p.pretension_N is None:
@@ -244,28 +244,18 @@ class _Problem:
 
     def _uncertain(self) -> Iterator[tuple[str, float]]:
         """Further parameters with a standard deviation, and it."""
-        p = self.parameters
-        active = {(m.name, m.place): m.values for m in p.mechanisms}
-        for name, sd in self.sds.items():
-            if name in ("friction_coefficient", "theta_out_zero_rad", *ZERO_OF.values()) or not 0 < sd < np.inf:
-                continue
-            parts = mechanism_parameter(name)
-            if parts is None and "@" not in name and getattr(p, name, None) is not None:
-                yield name, sd
-            elif parts is not None and parts[2] in active.get(parts[:2], {}):
-                yield name, sd
+        known = {f.name for f in fields(Parameters) if getattr(self.parameters, f.name) is not None}
+        known -= {"friction_coefficient", "theta_out_zero_rad", *ZERO_OF.values()}
+        known |= {mechanism_key(m.name, m.place, name) for m in self.parameters.mechanisms for name in m.values}
+        yield from ((name, sd) for name, sd in self.sds.items() if name in known and 0 < sd < np.inf)
 
-
-def _raised(parameters: Parameters, name: str, by: float) -> Parameters:
-    return parameters.with_values({name: parameters.value_of(name) + by})
-
-
-def _either_side(run: Callable[[float], Run], sd: float) -> Run:
-    """A run with a parameter one standard deviation higher, or lower where the model cannot be higher."""
-    try:
-        return run(sd)
-    except ModelError:
-        return run(-sd)
+    def _either_side(self, name: str, sd: float, misfit_Nm: NDArray) -> Run:
+        """A run with a parameter one standard deviation higher, or lower where the model cannot be higher."""
+        value = self.parameters.value_of(name)
+        try:
+            return self.run(self.parameters.with_values({name: value + sd}), misfit_Nm)
+        except ModelError:
+            return self.run(self.parameters.with_values({name: value - sd}), misfit_Nm)
 
 
 def _without_what_looks_ahead(parameters: Parameters) -> tuple[Parameters, tuple[str, ...]]:

@@ -58,9 +58,7 @@ class Start(NamedTuple):
     stiffness: float
 
 
-def start_of(
-    transmission: Transmission, stiffness_Nm_per_rad: float, initial: InitialTension, samples: int
-) -> Start:
+def start_of(transmission: Transmission, stiffness_Nm_per_rad: float, initial: InitialTension, samples: int) -> Start:
     """A transmission at rest on a spring load; a load without a law has a stiffness of zero."""
     path = tabulate(transmission.path, transmission.friction_coefficient, transmission.axial_rigidity_N)
     present = np.array([True, not transmission.is_single_cable])

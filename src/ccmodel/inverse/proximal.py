@@ -120,7 +120,11 @@ class Proximal:
         """Variance of white noise that weighs as much as the error of the angle, which lasts for a count; rad^2."""
         travel = np.abs(np.diff(self.theta_in, prepend=self.theta_in[0]))
         step_rad = self.recording.encoder_step_rad.get(THETA_IN, 0.0)
-        return self.sigma_in**2 * np.maximum(step_rad / np.maximum(travel, step_rad * SMALLEST_SHARE), 1.0) if step_rad else self.sigma_in**2
+        return (
+            self.sigma_in**2 * np.maximum(step_rad / np.maximum(travel, step_rad * SMALLEST_SHARE), 1.0)
+            if step_rad
+            else self.sigma_in**2
+        )
 
     def torque_of(self, parameters: Parameters) -> NDArray:
         """Torque of the drive from its sensor's reading without zero and faults, shape (n,), N m."""

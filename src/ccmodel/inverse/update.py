@@ -81,9 +81,7 @@ class Run(NamedTuple):
 
 
 @small_kernel
-def gain_of(
-    variance: float, covariance: NDArray, by_misfit: float, effects: NDArray, noise_variance: float
-) -> float:
+def gain_of(variance: float, covariance: NDArray, by_misfit: float, effects: NDArray, noise_variance: float) -> float:
     """Gain of the misfit by the torque's innovation; 0 where the torque does not respond to the load."""
     if by_misfit == 0.0:
         return 0.0

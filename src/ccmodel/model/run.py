@@ -33,7 +33,15 @@ from ccmodel.model.session import of_recording
 from ccmodel.model.transmission import Transmission
 from ccmodel.recording import Recording
 
-__all__ = ["PRESCRIBED", "LoadFrom", "ModelInput", "initial_tension", "simulate", "simulate_recording", "transmission_of"]
+__all__ = [
+    "PRESCRIBED",
+    "LoadFrom",
+    "ModelInput",
+    "initial_tension",
+    "simulate",
+    "simulate_recording",
+    "transmission_of",
+]
 
 # A torque at rest is resolved beyond so many times its sensor's accuracy.
 KNOWN_TO = 2.0

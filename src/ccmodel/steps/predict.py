@@ -20,7 +20,10 @@ from ccmodel.typed import InputError
 # Share of reading the logs in the time of a prediction.
 READING = 0.5
 MOTION = ["time_s", THETA_IN]
-_EXPECTED = f"a motion is a CSV with the columns {' and '.join(MOTION)}"
+
+
+def _expected(columns: Sequence[str]) -> str:
+    return f"a motion is a CSV with the columns {' and '.join(columns)}"
 
 
 @dataclass(frozen=True)
@@ -120,8 +123,8 @@ def conditions_of(
     return next(iter(usable.values())) if name is None else usable[name]
 
 
-def read_motion(file: Path) -> pd.DataFrame:
-    """A motion of the drive from a CSV file with the columns time_s and theta_in_rad.
+def read_motion(file: Path, columns: Sequence[str] = MOTION) -> pd.DataFrame:
+    """A motion from a CSV file, that of the drive unless other columns are named.
 
     Raises
     ------
@@ -131,19 +134,19 @@ def read_motion(file: Path) -> pd.DataFrame:
     try:
         table = pd.read_csv(file, skipinitialspace=True, skip_blank_lines=False, low_memory=False)
     except pd.errors.EmptyDataError:
-        raise InputError(f"{file}: is empty; {_EXPECTED}") from None
+        raise InputError(f"{file}: is empty; {_expected(columns)}") from None
     except (OSError, ValueError) as error:
-        raise InputError(f"{file}: {_EXPECTED}; {' '.join(str(error).split())}") from None
+        raise InputError(f"{file}: {_expected(columns)}; {' '.join(str(error).split())}") from None
     head = " ".join(map(str, table.columns))
     for separator, name in ((";", "';'"), ("\t", "a tab")):
-        if separator in head and set(MOTION) & set(head.replace(separator, " ").split()):
+        if separator in head and set(columns) & set(head.replace(separator, " ").split()):
             raise InputError(f"{file}: the separator is {name}; a comma is expected")
     # Blank lines at the end are none of the motion.
     filled = np.flatnonzero(table.notna().any(axis=1))
-    return checked_motion(table[: filled[-1] + 1 if filled.size else 0], str(file), first=2)
+    return checked_motion(table[: filled[-1] + 1 if filled.size else 0], str(file), 2, columns)
 
 
-def checked_motion(table: pd.DataFrame, source: str, first: int = 0) -> pd.DataFrame:
+def checked_motion(table: pd.DataFrame, source: str, first: int = 0, columns: Sequence[str] = MOTION) -> pd.DataFrame:
     """The columns of a motion, if they are numbers and time increases.
 
     Parameters
@@ -153,20 +156,21 @@ def checked_motion(table: pd.DataFrame, source: str, first: int = 0) -> pd.DataF
         What the table is, in messages.
     first : int
         Number of its first row there; the header of a file is row 1.
+    columns : sequence of str
 
     Raises
     ------
     InputError
         With one line on the first fault.
     """
-    if missing := [name for name in MOTION if name not in table]:
-        columns = ", ".join(map(str, table.columns)) or "none"
-        raise InputError(f"{source}: no column {' and no '.join(missing)}; the columns are {columns}")
+    if missing := [name for name in columns if name not in table]:
+        found = ", ".join(map(str, table.columns)) or "none"
+        raise InputError(f"{source}: no column {' and no '.join(missing)}; the columns are {found}")
     if table.empty:
         raise InputError(f"{source}: no samples")
-    table = table[MOTION].reset_index(drop=True)
+    table = table[list(columns)].reset_index(drop=True)
     motion = table.apply(pd.to_numeric, errors="coerce").astype(float)
-    faults = {name: np.flatnonzero(~np.isfinite(motion[name])) for name in MOTION}
+    faults = {name: np.flatnonzero(~np.isfinite(motion[name])) for name in columns}
     faulty = [(rows[0], name) for name, rows in faults.items() if rows.size]
     if faulty:
         row, name = min(faulty, key=lambda one: one[0])

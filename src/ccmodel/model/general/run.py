@@ -175,10 +175,10 @@ def _marched(
 
     Parameters as of `prepared`.
     """
-    at_rest = prepared(transmission, load, settings, time_s, theta_in, initial, elements, steps, series)
-    *state, drive, friction_factor, steps = at_rest
+    at = prepared(transmission, load, settings, time_s, theta_in, initial, elements, steps, series)
+    state = at.physics, at.piece, at.node, at.slide, at.mean, at.load
     out = np.empty((len(OUTPUTS), time_s.size))
-    solved = march(*state, time_s, theta_in, drive, friction_factor, series, steps, out)
+    solved = march(*state, time_s, theta_in, at.drive, at.friction_factor, series, at.steps, out)
     if isinstance(load, TorqueLoad) and load.parallel_Nm_per_rad:
         out[5, :solved] = series[:solved]  # the sensor does not feel the spring in parallel
     if settings.drive_friction_Nm != 0.0:

@@ -1,0 +1,218 @@
+"""The drive's motion that makes the load follow a wanted one: compiled loops over the samples, one for each solver.
+
+The load's angle rises with the drive's, or rests where friction, slack or a gap lets the drive move alone. At each
+sample the drive moves on, in the direction in which the load has to move, until the load has arrived.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ccmodel.inverse.exact import start_of
+from ccmodel.inverse.general import _solve
+from ccmodel.kernel import borrowed, kernel
+from ccmodel.mechanisms.contract import Settings
+from ccmodel.mechanisms.pulley_eccentricity import winding
+from ccmodel.model.exact import state as exact_rows
+from ccmodel.model.exact.cable import reverse
+from ccmodel.model.exact.path import PathTables
+from ccmodel.model.exact.run import settle
+from ccmodel.model.exact.state import State, copy_state
+from ccmodel.model.exact.step import step
+from ccmodel.model.general import layout as rows
+from ccmodel.model.general.equations import set_grip
+from ccmodel.model.general.layout import Physics
+from ccmodel.model.general.march import _accept
+from ccmodel.model.general.newton import copy_slides
+from ccmodel.model.general.run import ELEMENTS, prepared
+from ccmodel.model.initial import InitialTension
+from ccmodel.model.load import SpringLoad
+from ccmodel.model.transmission import Transmission
+
+# The load has arrived within this share of the motion's range.
+ARRIVED = 1e-9
+# Iterations of a sample: doublings of the drive's move, then halvings of its bracket.
+ITERATIONS = 200
+# A drive that has moved by so many ranges of the wanted motion without moving the load never will.
+FURTHEST = 100.0
+# The general solver takes a large move of the drive in parts of this share of the range.
+LARGEST_PART = 0.01
+
+
+@kernel
+def _next_move(low: float, short: float, high: float, over: float, iteration: int) -> float:
+    """A move between one after which the load is `short` (< 0) and one after which it is `over` its place."""
+    if iteration % 3 == 2:
+        return 0.5 * (low + high)
+    move = low - short * (high - low) / (over - short)
+    return move if low < move < high else 0.5 * (low + high)
+
+
+@kernel
+def _followed_exact(
+    path: PathTables,
+    state: State,
+    saved: State,
+    before: State,
+    offset: float,
+    stiffness: float,
+    wanted: NDArray,
+    drive: NDArray,
+) -> int:
+    """Write the drive rim's positions (m) for positions of the load's rim (m); returns the samples that were solved."""
+    path, state, saved, before = borrowed(path), borrowed(state), borrowed(saved), borrowed(before)
+    settle(path, state, saved, offset, stiffness)
+    span = wanted.max() - wanted.min()
+    guess = span / wanted.size
+    for i in range(wanted.size):
+        here = state.value[exact_rows.PAIR, exact_rows.DRIVE]
+        far = wanted[i] - state.value[exact_rows.PAIR, exact_rows.LOAD]
+        drive[i] = here
+        if abs(far) <= ARRIVED * span:
+            continue
+        direction = 1 if far > 0.0 else -1
+        reverse(path, state, 0, direction)
+        reverse(path, state, 1, -direction)
+        copy_state(state, before)
+        low, short, high, over = 0.0, -abs(far), np.inf, 0.0
+        move = max(guess, ARRIVED * span)
+        for iteration in range(ITERATIONS):
+            copy_state(before, state)
+            step(path, state, saved, direction, here + direction * move, offset, stiffness)
+            error = direction * (state.value[exact_rows.PAIR, exact_rows.LOAD] - wanted[i])
+            if abs(error) <= ARRIVED * span or high - low <= 1e-15 * span:
+                break
+            if error < 0.0:
+                low, short = move, error
+            else:
+                high, over = move, error
+            move = 2.0 * move if high == np.inf else _next_move(low, short, high, over, iteration)
+            if move > FURTHEST * span:
+                return i
+        guess = move
+        drive[i] = here + direction * move
+    return wanted.size
+
+
+def exact(
+    transmission: Transmission, stiffness_Nm_per_rad: float, initial: InitialTension, wanted_rad: NDArray
+) -> tuple[NDArray, int]:
+    """Drive angles (rad) for load angles from the rest on, and the number of samples that were solved."""
+    start = start_of(transmission, stiffness_Nm_per_rad, initial, wanted_rad.size)
+    state = start.state
+    saved, before = (
+        state._replace(front=state.front.copy(), value=state.value.copy(), kind=state.kind.copy()) for _ in range(2)
+    )
+    drive = np.zeros(wanted_rad.size)
+    wanted = wanted_rad * transmission.load_radius_m
+    solved = _followed_exact(start.path, state, saved, before, start.offset, start.stiffness, wanted, drive)
+    return drive / transmission.drive_radius_m, solved
+
+
+@kernel
+def _angle_that_winds(wound: float, angle: float, eccentricity: float, eccentricity_rad: float) -> float:
+    """Angle of an eccentric pulley that winds as much as an even one at the angle `wound`, from a guess; rad."""
+    wanted = wound + winding(0.0, eccentricity, eccentricity_rad)[0]
+    for _ in range(50 if eccentricity != 0.0 else 1):
+        now, factor, _ = winding(angle, eccentricity, eccentricity_rad)
+        angle += (wanted - now) / factor
+    return angle
+
+
+@kernel(error_model="numpy")
+def _followed_general(
+    ph: Physics,
+    piece: NDArray,
+    node: NDArray,
+    slide: NDArray,
+    mean: NDArray,
+    load: NDArray,
+    drive: tuple[float, float, float],
+    friction_factor: NDArray,
+    steps: int,
+    time_s: NDArray,
+    wanted: NDArray,
+    theta_in: NDArray,
+) -> int:
+    """Write the drive's angles (rad) for angles of the load (rad); returns the samples that were solved."""
+    piece, node, slide, mean, load = borrowed((piece, node, slide, mean, load))
+    node[rows.RESTED] = 1.0
+    set_grip(ph, node, slide, friction_factor[0], 0.0)
+    fixed_grip = ph.stribeck_rise == 0.0 and len(friction_factor) == 1
+    span = wanted.max() - wanted.min()
+    part = LARGEST_PART * span * ph.radius
+    first, here = load[rows.ANGLE], 0.0
+    guess = span * ph.radius / wanted.size
+    for j in range(wanted.size):
+        dt = time_s[j] - time_s[j - 1] if j > 0 else 0.0
+        factor = friction_factor[min(j, len(friction_factor) - 1)]
+        far = first + wanted[j] - load[rows.ANGLE]
+        direction = 1.0 if far > 0.0 else -1.0
+        arrived = abs(far) <= ARRIVED * span
+        travelled, share = 0.0, 1.0
+        if arrived:
+            # The drive holds; time passes.
+            slide[rows.NOW] = 0.0
+            mean[rows.MEAN_NEXT] = mean[rows.MEAN]
+            solved, rotation = _solve(ph, piece, node, slide, mean, load, 0.0, 0.0, dt, ph.bristle, factor, fixed_grip)
+            if not solved:
+                return j
+            _accept(ph, piece, node, slide, mean, load, rotation, dt)
+        while not arrived:
+            # Where the drive has to move far, it does so in parts, and most of the sample's time is left for the last.
+            low, high = 0.0, np.inf
+            short, over = direction * (load[rows.ANGLE] - first - wanted[j]), 0.0
+            move = min(max(guess, ARRIVED * span * ph.radius), part)
+            step_dt = share * dt
+            solved, rotation, error = False, 0.0, 0.0
+            for iteration in range(ITERATIONS):
+                slide[rows.NOW] = 0.0
+                mean[rows.MEAN_NEXT] = mean[rows.MEAN]
+                slide[rows.NOW, 0, 0], slide[rows.NOW, 1, 0] = direction * move, -direction * move
+                solved, rotation = _solve(
+                    ph, piece, node, slide, mean, load, 0.0, 0.0, step_dt, ph.bristle, factor, fixed_grip
+                )
+                if not solved:
+                    high = np.inf
+                    part, move = 0.5 * part, 0.5 * move
+                    if move < ARRIVED * span * ph.radius:
+                        return j
+                    continue
+                error = direction * (load[rows.ANGLE] + rotation - first - wanted[j])
+                if abs(error) <= ARRIVED * span or high - low <= 1e-12 * span * ph.radius:
+                    arrived = True
+                    break
+                if error < 0.0:
+                    low, short = move, error
+                    if move >= part:
+                        break
+                else:
+                    high, over = move, error
+                move = min(2.0 * move, part) if high == np.inf else _next_move(low, short, high, over, iteration)
+            if not solved:
+                return j
+            guess = move
+            copy_slides(slide, rows.LAST, rows.NOW)
+            _accept(ph, piece, node, slide, mean, load, rotation, step_dt)
+            here += direction * move
+            travelled += move
+            if travelled > FURTHEST * span * ph.radius:
+                return j
+        theta_in[j] = _angle_that_winds(here / drive[0], theta_in[max(j - 1, 0)], drive[1], drive[2])
+    return wanted.size
+
+
+def general(
+    transmission: Transmission,
+    stiffness_Nm_per_rad: float,
+    settings: Settings,
+    initial: InitialTension,
+    time_s: NDArray,
+    wanted_rad: NDArray,
+) -> tuple[NDArray, int]:
+    """As `exact`, with the mechanisms' settings."""
+    theta_in = np.zeros(wanted_rad.size)
+    at_rest = prepared(
+        transmission, SpringLoad(stiffness_Nm_per_rad), settings, time_s, wanted_rad, initial, ELEMENTS, 1, np.zeros(1)
+    )
+    solved = _followed_general(*at_rest, time_s, wanted_rad, theta_in)
+    return theta_in, solved
