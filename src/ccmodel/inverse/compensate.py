@@ -111,13 +111,16 @@ def _drive(given: ModelInput, parameters: Parameters, wanted: NDArray) -> NDArra
 def within_limits(time_s: NDArray, theta: NDArray, limits: Limits) -> NDArray:
     """The motion within limits, centred on where the motion without them jumps; shape (n,), rad.
 
-    The mean of a motion that follows as fast as it may and one that anticipates as late as it may keeps the limit of
-    the speed v. A moving mean over 2 v / a then keeps that of the acceleration a.
+    The mean of a motion that follows at no more than a speed and of one that anticipates at no more than it keeps to
+    that speed, and crosses a jump at half of it. So twice the limit v comes first, which makes jumps ramps of speed v,
+    and then v, which slows what else is too fast. A moving mean over 2 v / a then keeps to the acceleration a.
     """
     if limits.speed_rad_per_s == inf:
         return theta
-    most = limits.speed_rad_per_s * np.diff(time_s)
-    slowed = 0.5 * (_slowed(theta, most) + _slowed(theta[::-1], most[::-1])[::-1])
+    slowed = theta
+    for speed in (2 * limits.speed_rad_per_s, limits.speed_rad_per_s):
+        most = speed * np.diff(time_s)
+        slowed = 0.5 * (_slowed(slowed, most) + _slowed(slowed[::-1], most[::-1])[::-1])
     width = 2 * limits.speed_rad_per_s / limits.acceleration_rad_per_s2
     if width == 0.0:
         return slowed

@@ -223,9 +223,12 @@ class _Problem:
         outputs = np.array([run.out - unperturbed.out for run in runs])
         outputs[:, 0] -= outputs[:, 0, :1]
         held = np.arange(n) // EVERY
+        by_misfit = outputs[0][:, held] / shift
+        # Until the load first shows at the drive, a misfit is no more than a torque that nothing tells of.
+        by_misfit[1, np.cumsum(nominal.trace[BY_MISFIT]) == 0.0] = 1.0
         zero = np.full((1, n), self.proximal.torque_zero_Nm)
         effects = np.concatenate([zero, torque[1:, held]])
-        return effects, np.concatenate([np.zeros((1, 2, n)), outputs[1:, :, held]]), outputs[0][:, held] / shift
+        return effects, np.concatenate([np.zeros((1, 2, n)), outputs[1:, :, held]]), by_misfit
 
     def perturbed(self, misfit_Nm: NDArray) -> Iterator[Run]:
         """Runs with one error each, along the same misfit."""

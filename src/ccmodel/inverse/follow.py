@@ -148,7 +148,7 @@ def _followed_general(
         far = first + wanted[j] - load[rows.ANGLE]
         direction = 1.0 if far > 0.0 else -1.0
         arrived = abs(far) <= ARRIVED * span
-        travelled, share = 0.0, 1.0
+        travelled = 0.0
         if arrived:
             # The drive holds; time passes.
             slide[rows.NOW] = 0.0
@@ -158,18 +158,17 @@ def _followed_general(
                 return j
             _accept(ph, piece, node, slide, mean, load, rotation, dt)
         while not arrived:
-            # Where the drive has to move far, it does so in parts, and most of the sample's time is left for the last.
+            # Where the drive has to move far, it does so in parts, each at the pace of a sample.
             low, high = 0.0, np.inf
             short, over = direction * (load[rows.ANGLE] - first - wanted[j]), 0.0
             move = min(max(guess, ARRIVED * span * ph.radius), part)
-            step_dt = share * dt
             solved, rotation, error = False, 0.0, 0.0
             for iteration in range(ITERATIONS):
                 slide[rows.NOW] = 0.0
                 mean[rows.MEAN_NEXT] = mean[rows.MEAN]
                 slide[rows.NOW, 0, 0], slide[rows.NOW, 1, 0] = direction * move, -direction * move
                 solved, rotation = _solve(
-                    ph, piece, node, slide, mean, load, 0.0, 0.0, step_dt, ph.bristle, factor, fixed_grip
+                    ph, piece, node, slide, mean, load, 0.0, 0.0, dt, ph.bristle, factor, fixed_grip
                 )
                 if not solved:
                     high = np.inf
@@ -192,7 +191,7 @@ def _followed_general(
                 return j
             guess = move
             copy_slides(slide, rows.LAST, rows.NOW)
-            _accept(ph, piece, node, slide, mean, load, rotation, step_dt)
+            _accept(ph, piece, node, slide, mean, load, rotation, dt)
             here += direction * move
             travelled += move
             if travelled > FURTHEST * span * ph.radius:

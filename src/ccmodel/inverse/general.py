@@ -309,6 +309,6 @@ def run(
     if solved < n:
         raise ModelError(f"no balance of cables and load was found at sample {solved}")
     trace[EXPECTED] += own
-    if not has_law:  # the torque is that of the load alone, without a spring beside it
+    if isinstance(load, TorqueLoad) and load.parallel_Nm_per_rad:  # the load's own torque, without the spring beside it
         out[1] = trace[MISFIT]
     return Run(trace, out, noise)

@@ -1,0 +1,140 @@
+"""Estimates of recordings: what they use, that they look at nothing later, and what their intervals contain."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from inverse_runs import EVEN, GROWING, K_E, PAIR, PARAMETERS, TIME_S, recording
+
+from ccmodel.failure import ModelError
+from ccmodel.inverse.estimate import COLUMNS, VISIBLE, estimated
+from ccmodel.inverse.proximal import Proximal, true_torque
+from ccmodel.model.exact import simulate_pair
+from ccmodel.model.general import Active
+from ccmodel.model.load import SpringLoad
+
+COUNT = 0.00314
+
+
+@pytest.fixture(scope="module")
+def sprung():
+    return simulate_pair(PAIR, SpringLoad(K_E), GROWING, EVEN)
+
+
+@pytest.fixture(scope="module")
+def seen(sprung):
+    """With an encoder of 2000 counts, noise, and a stated accuracy; the motion begins after a rest."""
+    noise = np.random.default_rng(1).normal(0, 1e-4, TIME_S.size)
+    accuracy = {"tau_in_Nm": 1e-4, "theta_in_rad": COUNT}
+    theta = COUNT * np.round(GROWING / COUNT)
+    steps = {"theta_in_rad": COUNT}
+    return recording(sprung, theta, sprung.tau_in_Nm + noise, accuracy=accuracy, encoder_step_rad=steps)
+
+
+WITH_MECHANISM = replace(PARAMETERS, mechanisms=(Active("presliding", "conduit", {"z0": 5e-5}),))
+
+
+def test_without_noise_the_load_is_near_exact(sprung):
+    table = estimated(recording(sprung, GROWING), PARAMETERS).table
+    true = sprung.theta_out_rad - sprung.theta_out_rad[0]
+    assert np.abs(table["theta_out_rad"] - true).max() < 1e-6 * np.ptp(true)
+    assert np.abs(table["tau_out_Nm"] - sprung.tau_out_Nm).max() < 1e-6 * np.ptp(sprung.tau_out_Nm)
+
+
+@pytest.mark.parametrize("parameters", [PARAMETERS, WITH_MECHANISM], ids=["exact", "general"])
+@pytest.mark.parametrize("uses_law", [True, False])
+def test_no_value_depends_on_later_samples(seen, parameters, uses_law):
+    cut = 900
+    channels = {name: values.copy() for name, values in seen.channels.items()}
+    channels["theta_in_rad"][cut:] = channels["theta_in_rad"][cut] + COUNT * (np.arange(TIME_S.size - cut) // 2)
+    channels["tau_in_Nm"][cut:] += 0.02
+    before = estimated(seen, parameters, {"stiffness_N_per_m": 50.0}, uses_law).table
+    after = estimated(replace(seen, channels=channels), parameters, {"stiffness_N_per_m": 50.0}, uses_law).table
+    assert before.iloc[:cut].equals(after.iloc[:cut])
+    assert not before.iloc[cut:].equals(after.iloc[cut:])
+
+
+@pytest.mark.parametrize("parameters", [PARAMETERS, WITH_MECHANISM], ids=["exact", "general"])
+def test_sensors_at_the_load_are_not_used(seen, parameters):
+    blind = replace(seen, channels={c: seen[c] for c in ("theta_in_rad", "tau_in_Nm")})
+    assert estimated(seen, parameters).table.equals(estimated(blind, parameters).table)
+
+
+def test_intervals_widen_where_friction_hides_a_load_without_a_law(seen):
+    table = estimated(seen, PARAMETERS, uses_law=False).table
+    width = (table["tau_out_Nm_high"] - table["tau_out_Nm_low"]).to_numpy()
+    visible = table[VISIBLE].to_numpy()
+    assert 0.6 < visible.mean() < 0.95
+    ends = np.flatnonzero(~visible[:-1] & visible[1:])
+    begins = [np.flatnonzero(visible[:end])[-1] for end in ends if end > 100]
+    longest = [(begin, end) for begin, end in zip(begins, ends[-len(begins) :], strict=True) if end - begin > 20]
+    assert len(longest) == 6
+    for begin, end in longest:
+        assert width[end] > 1.5 * width[begin]
+        assert (np.diff(width[begin + 1 : end + 1]) > -1e-4 * width[end]).all()
+
+
+def test_uncertain_parameters_widen_the_intervals(seen):
+    def width(**sds):
+        # Before the drive torque has told much of the parameters.
+        table = estimated(seen, PARAMETERS, sds, uses_law=False).table.iloc[60:110]
+        return float((table["theta_out_rad_high"] - table["theta_out_rad_low"]).median())
+
+    assert width(stiffness_N_per_m=2500.0) > 1.05 * width()
+    assert width(friction_coefficient=0.03) > 1.05 * width()
+    # A parameter that the model does not have, and one without a finite interval, change nothing.
+    assert width(**{"kink/conduit/bend": 1.0, "load_radius_m": np.inf}) == width()
+
+
+def test_the_law_of_the_load_narrows_the_intervals(seen):
+    widths = [
+        (table["tau_out_Nm_high"] - table["tau_out_Nm_low"]).iloc[500:].median()
+        for table in (estimated(seen, PARAMETERS, uses_law=law).table for law in (True, False))
+    ]
+    assert widths[0] < 0.7 * widths[1]
+
+
+def test_columns(seen):
+    table = estimated(seen, PARAMETERS).table
+    assert tuple(table) == (*COLUMNS, VISIBLE)
+    assert table.index.name == "time_s"
+    assert np.isfinite(table[list(COLUMNS)]).all(axis=None)
+    moving = table.iloc[50:]
+    for name in ("theta_out_rad", "tau_out_Nm"):
+        assert (moving[f"{name}_low"] < moving[name]).all() and (moving[name] < moving[f"{name}_high"]).all()
+
+
+def test_before_the_load_shows_its_torque_is_uncertain_and_its_angle_is_not(seen):
+    first = estimated(seen, PARAMETERS).table.iloc[0]
+    # A cable of 7.3 N loses up to a fifth along the conduit, and the recording does not begin with a rest.
+    assert 2e-3 < first["tau_out_Nm_high"] < 2e-2
+    assert first["theta_out_rad_high"] < COUNT
+
+
+def test_faults_of_the_torque_sensor_are_undone():
+    true = np.linspace(-0.1, 0.1, 50)
+    time_s = np.arange(50) / 50
+    scaled = (Active("torque-scale", "drive-sensor", {"gain": 0.08}),)
+    assert np.allclose(true_torque(scaled, time_s, true, 1.08 * true), true, rtol=1e-8)
+
+
+def test_what_looks_ahead_is_left_out_and_named(seen):
+    windup = Active("drive-windup", "drive-pulley", {"compliance": 0.2, "lost_motion": 0.05})
+    found = estimated(seen, replace(PARAMETERS, mechanisms=(windup,)))
+    assert found.notes == ("drive-windup at drive-pulley is left out: it depends on later samples",)
+    assert found.table.equals(estimated(seen, PARAMETERS).table)
+
+
+def test_what_cannot_be_estimated_is_refused(seen):
+    with pytest.raises(ModelError, match="b/r: no drive torque"):
+        estimated(replace(seen, channels={"theta_in_rad": seen["theta_in_rad"]}), PARAMETERS)
+    with pytest.raises(ModelError, match="far end is fixed"):
+        estimated(replace(seen, far_end="fixed"), PARAMETERS)
+
+
+def test_the_noise_is_that_of_the_rest(seen):
+    resting = replace(seen, rest_s=0.5, channels={**seen.channels, "tau_in_Nm": seen["tau_in_Nm"] * 0})
+    draw = np.random.default_rng(2).normal(0, 3e-4, TIME_S.size)
+    resting.channels["tau_in_Nm"][:] = draw
+    assert Proximal.of(resting).torque_noise_Nm == pytest.approx(3e-4, rel=0.2)
+    assert Proximal.of(seen).torque_noise_Nm == 1e-4
