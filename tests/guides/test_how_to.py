@@ -104,6 +104,16 @@ def test_watch(tmp_path):
     assert len(followed("watch", tmp_path).skipped) == 2
 
 
+def test_estimate_the_load(tmp_path):
+    (tmp_path / "data/raw").mkdir(parents=True)
+    import_batch(RUNS, "batch.yaml", tmp_path / "data/raw/my-rig")
+    import_batch(LATER, "later.yaml", tmp_path / "data/raw/later")
+    guide = followed("estimate-the-load", tmp_path)
+    assert guide.skipped == []
+    estimated = pd.read_csv(tmp_path / "estimated/run5.csv")
+    assert set(estimated["load_is_visible"]) == {0, 1}
+
+
 def test_every_guide_is_followed_here():
     followed_here = set(re.findall(r'followed\("([\w-]+)"', Path(__file__).read_text(encoding="utf-8")))
     assert {page.stem for page in PAGES} - {"cluster"} == followed_here
