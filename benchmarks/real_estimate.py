@@ -90,8 +90,14 @@ def by_model(batch: Path, model_file: Path, held_out: str, tolerance: float) -> 
         parameters = hypothesis.of(fitted[0].parameters).with_values(solution.values)
         sds = dict(zip(solution.values, np.sqrt(np.diag(solution.covariance)), strict=True))
         for i in np.flatnonzero(out):
-            found[i] = estimated(ingested.recordings[i], parameters, sds, tolerance=tolerance)
+            found[i] = _as_read(estimated(ingested.recordings[i], parameters, sds, tolerance=tolerance), parameters)
     return found
+
+
+def _as_read(found: Estimated, parameters: Parameters) -> Estimated:
+    """An estimate as the torque sensor at the load, whose zero the model was fitted with, would read it."""
+    torques = [name for name in found.table if name.startswith("tau_out")]
+    return replace(found, table=found.table.assign(**(found.table[torques] + parameters.tau_out_zero_Nm)))
 
 
 def by_regressor(batch: Path, channel: str, held_out: str) -> list[NDArray]:

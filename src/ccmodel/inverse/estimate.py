@@ -88,12 +88,17 @@ def estimated(
     """
     if recording.far_end == "fixed":
         raise ModelError(f"{recording.batch}/{recording.id}: the far end is fixed: there is no load to estimate")
-    problem = _Problem.of(recording, parameters, sds or {}, uses_law)
+    problem = _Problem.of(recording, parameters, sds or {}, uses_law).with_discrepancy(tolerance)
     nominal = problem.run(problem.parameters)
     effects, outputs, by_misfit = problem.effects_of_errors(nominal)
-    noise = nominal.noise_variance + problem.discrepancy(tolerance)
     correction, spread = joint_estimate(
-        nominal.trace, problem.drive.torque_Nm, problem.first_variance, noise, effects, outputs, by_misfit
+        nominal.trace,
+        problem.drive.torque_Nm,
+        problem.first_variance,
+        nominal.noise_variance,
+        effects,
+        outputs,
+        by_misfit,
     )
     ratio = problem.parameters.drive_radius_m / problem.parameters.load_radius_m
     spread[0] += (problem.proximal.sigma_in * ratio) ** 2
@@ -196,8 +201,8 @@ class _Problem:
             transmission, load, settings, initial, recording.time_s[:: self.every], drive, self.prior, misfit_Nm, finer
         )
 
-    def discrepancy(self, tolerance: float) -> NDArray:
-        """Variance of the torque that gives the model discrepancy its weight, shape (n,), N^2 m^2.
+    def with_discrepancy(self, tolerance: float) -> "_Problem":
+        """The same with the model discrepancy in the variance of the torque.
 
         A discrepancy lasts over some travel. White noise of the same weight over that travel stands for it.
         """
@@ -205,8 +210,9 @@ class _Problem:
         # Before the drive has moved far, the tensions tell what its torque will come to.
         range_so_far = np.maximum.accumulate(torque) - np.minimum.accumulate(torque)
         range_so_far = np.maximum(range_so_far, self.drive_tensions_N * self.parameters.drive_radius_m)
-        samples = LASTS_RAD / np.maximum(travel, LASTS_RAD * SMALLEST_SHARE)
-        return (tolerance * range_so_far) ** 2 * np.maximum(samples, 1.0)
+        samples = np.maximum(LASTS_RAD / np.maximum(travel, LASTS_RAD * SMALLEST_SHARE), 1.0)
+        variance = self.drive.torque_variance + (tolerance * range_so_far) ** 2 * samples
+        return replace(self, drive=self.drive._replace(torque_variance=variance))
 
     def effects_of_errors(self, nominal: Run) -> tuple[NDArray, NDArray, NDArray]:
         """Effects of one standard deviation of each lasting error, and of a misfit, as of `joint_estimate`.

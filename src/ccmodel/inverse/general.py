@@ -45,7 +45,7 @@ from ccmodel.model.transmission import Transmission
 
 # A torque that changes by less than this share of the load's is hidden by friction: what the model's derivative says
 # there is less than its error.
-HIDDEN = 0.02
+HIDDEN = 0.1
 ITERATIONS = 4
 # A misfit that changes the torque by less than this share of its noise, or of 1 N m, is found.
 FOUND, SMALLEST_Nm = 0.01, 1e-10
