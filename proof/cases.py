@@ -3,6 +3,7 @@
 import hashlib
 import json
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
@@ -40,6 +41,11 @@ class Truth:
     law : str
         Empty if the rig's law of the effect is that of the mechanism, otherwise the name of another published law
         (`Twin.other_laws`).
+    slot, argument : str
+        Slot of the rig in which the effect is a law of one quantity, and this quantity, as the diagnosis format names
+        them; empty for an effect that is none.
+    curve : tuple of (float, float)
+        The law as a table: arguments and values (`virtualrig.effects.contract.TrueLaw`).
     """
 
     name: str
@@ -50,6 +56,9 @@ class Truth:
     unit: str
     values: dict[str, float]
     law: str = ""
+    slot: str = ""
+    argument: str = ""
+    curve: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -62,7 +71,7 @@ class Case:
         A hash, which reveals neither the kind nor the effects.
     seed : int
     requested : dict
-        Requested kind and effect; None where they were drawn.
+        Requested kind and effect; None where they were drawn. Of a case of a family also its strength.
     kind : str
         clean, single, pair, triple, unlisted, removed or poor.
     protocol : str
@@ -83,7 +92,7 @@ class Case:
 
     name: str
     seed: int
-    requested: dict[str, str | None]
+    requested: dict[str, Any]
     kind: str
     protocol: str
     truth: tuple[Truth, ...]
@@ -126,7 +135,7 @@ class Case:
         return hashlib.sha256(json.dumps(self.key, sort_keys=True).encode()).hexdigest()
 
 
-def draw(seed: int, kind: str | None = None, effect: str | None = None) -> Case:
+def draw(seed: int, kind: str | None = None, effect: str | None = None, strength: float | None = None) -> Case:
     """Draw a case.
 
     Parameters
@@ -136,15 +145,22 @@ def draw(seed: int, kind: str | None = None, effect: str | None = None) -> Case:
         One of the plan's kinds; drawn by their shares if not given.
     effect : str, optional
         Name of the effect of a single, removed, poor or unlisted case; drawn if not given.
+    strength : float, optional
+        Strength of that effect, 0 to 1; drawn if not given.
     """
     plan = read_plan()
-    requested = {"kind": kind, "effect": effect}
+    requested: dict[str, Any] = {"kind": kind, "effect": effect}
+    if strength is not None:
+        requested |= {"strength": strength}
     random = np.random.default_rng(np.random.SeedSequence([seed, 0xCA5E]))
     kind = kind or _one_of(plan.kinds, random)
     protocol_name = _protocol_of(kind, plan, random)
     protocol = plan.protocols[protocol_name]
     spring = log_uniform(plan.rig.load_stiffness_Nm_per_rad, random)
-    drawn = [_effect(*chosen, spring, plan.other_law_share, random) for chosen in _chosen(kind, effect, plan, random)]
+    chosen = _chosen(kind, effect, plan, random)
+    if strength is not None:
+        chosen = [(twin, strength) for twin, _ in chosen]
+    drawn = [_effect(*one, spring, plan.other_law_share, random) for one in chosen]
     truth = tuple(t for t, _ in drawn)
     campaign = draw_campaign(seed, plan, spring, Effects.model_validate(merged([e for _, e in drawn])), random)
     truth = tuple(_in_rig(t, campaign) for t in truth)
@@ -158,7 +174,7 @@ def draw(seed: int, kind: str | None = None, effect: str | None = None) -> Case:
         without = tuple(t.name for t in truth)
         truth = tuple(Truth(**asdict(t) | {"name": f"unlisted-{t.name}"}) for t in truth)
     return Case(
-        name=_name(seed, kind, effect),
+        name=_name(seed, kind, effect, strength),
         seed=seed,
         requested=requested,
         kind=kind,
@@ -172,8 +188,9 @@ def draw(seed: int, kind: str | None = None, effect: str | None = None) -> Case:
     )
 
 
-def _name(seed: int, kind: str, effect: str | None) -> str:
-    return "case-" + hashlib.sha256(f"name {seed} {kind} {effect}".encode()).hexdigest()[:10]
+def _name(seed: int, kind: str, effect: str | None, strength: float | None) -> str:
+    of_family = "" if strength is None else f" {strength}"
+    return "case-" + hashlib.sha256(f"name {seed} {kind} {effect}{of_family}".encode()).hexdigest()[:10]
 
 
 def _one_of(shares: dict[str, float], random: Generator) -> str:
@@ -220,6 +237,12 @@ def _effect(twin: Twin, strength: float, spring: float, other: float, random: Ge
 
 
 def _in_rig(truth: Truth, campaign: Campaign) -> Truth:
-    """The true values, including what follows the same law in this rig and no recording separates from the effect."""
-    in_rig = TWINS[truth.name].in_rig
-    return replace(truth, values=in_rig(truth.values, campaign)) if in_rig else truth
+    """The true values, including what follows the same law in this rig and no recording separates; and the law."""
+    twin = TWINS[truth.name]
+    if twin.in_rig:
+        truth = replace(truth, values=twin.in_rig(truth.values, campaign))
+    if twin.law is None:
+        return truth
+    law = twin.law(campaign.rig, truth.place)
+    curve = tuple(zip(law.x.tolist(), law.y.tolist(), strict=True))
+    return replace(truth, slot=law.slot, argument=law.argument, curve=curve)

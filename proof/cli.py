@@ -16,6 +16,8 @@ from proof import conceal
 from proof.archive import pack, unpack
 from proof.build import build as build_case
 from proof.cases import SEVERAL, Case, draw
+from proof.families import FAMILIES
+from proof.families import family as family_of
 from proof.plan import read_plan
 
 
@@ -81,6 +83,20 @@ def run(
 ) -> None:
     """Record cases and diagnose each in isolation; results of the same sources are kept."""
     _judge_each(cases_of(seed, count, kind, effect), out, regressors, cores)
+
+
+@app.command()
+def family(
+    out: Out,
+    name: Annotated[str, typer.Argument(help="removed or unlisted.")],
+    seed: Seed = 0,
+    count: Annotated[int | None, typer.Option(min=1, help="Number of cases; the plan's if not given.")] = None,
+    cores: Cores = 1,
+) -> None:
+    """Run a family of cases of laws that the list lacks: every effect in turn, at two strengths."""
+    if name not in FAMILIES:
+        raise typer.BadParameter(f"there is no family {name!r}; there are {', '.join(FAMILIES)}")
+    _judge_each(list(family_of(name, seed, count)), out, False, cores)
 
 
 @app.command()

@@ -144,6 +144,13 @@ class FixedCase(Strict):
     effect: str | None = None
 
 
+class FamiliesPlan(Strict):
+    """Cases of each family of laws that the list lacks, and the strengths at which each effect comes."""
+
+    cases: PositiveInt
+    strengths: tuple[Share, ...] = Field(min_length=1)
+
+
 class Full(Strict):
     """The full validation: its number of cases, and how many of them a run without further options takes."""
 
@@ -172,6 +179,7 @@ class Plan(Strict):
     time_limit_s: PositiveFloat
     quick: tuple[FixedCase, ...]
     full: Full
+    families: FamiliesPlan
 
     @property
     def effects(self) -> dict[str, Twin]:

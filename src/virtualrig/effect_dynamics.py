@@ -23,6 +23,7 @@ from virtualrig.effect_march import (
 from virtualrig.effects import Effects, laws, numbers, strand_settling
 from virtualrig.effects.presliding import BoucWenPresliding, DahlPresliding, IwanPresliding
 from virtualrig.effects.pulley_friction import PulleyFriction
+from virtualrig.effects.unlisted_ageing_contact import FIRST_S, OLDEST_S
 from virtualrig.grid import Grid
 from virtualrig.trajectory import Preparation, Trajectory, check_tensions
 
@@ -171,7 +172,7 @@ def _initial_state(
     tension = np.stack([initial_tension(grid, *of, preparation.pretension_N) for of in zip(grip, share, strict=True)])
     both = tension[:, :-1] + tension[:, 1:]
     strength = np.vectorize(lambda y, T: slow_friction(physics, y, T, 0.0, 0.0, 0.0))(half_bend, both / 2)
-    hold = np.tanh(strength) * (1 + physics.stribeck_rise) * both + drag
+    hold = (np.tanh(strength) * (1 + physics.stribeck_rise) * both + drag) * _oldest(physics, FIRST_S)
     wanted = np.divide(tension[:, :-1] - tension[:, 1:], hold, out=np.zeros_like(hold), where=hold > 0)
     friction = np.vectorize(lambda force, z: friction_law(physics, force, z, 0.0))
     bristle, before = wanted, np.full_like(wanted, np.nan)
@@ -197,7 +198,8 @@ def _relaxed(
 
 def _elongation(physics: Physics, tension: NDArray, stiffness: NDArray, settling: NDArray) -> NDArray:
     """Elongation of each segment under its tension, m; all of one shape."""
-    ideal = tension / stiffness
+    beyond = np.maximum(tension - physics.yield_tension, 0.0) * physics.yield_share / (1 - physics.yield_share)
+    ideal = (tension + beyond) / stiffness
     if physics.settling_law == strand_settling.HYPERBOLIC:
         return np.sqrt((ideal + settling) ** 2 - settling**2)
     if physics.settling_law == strand_settling.TOE:
@@ -218,8 +220,9 @@ def _load_angle(physics: Physics, tension_difference: float) -> float:
         pull = physics.radius * roundness(theta, load_shape(physics)) * tension_difference
         return float(spring_torque(physics, theta) - pull)
 
-    # No law is softer than the linear spring beyond its gap, and no pulley twice as large.
-    furthest = physics.half_gap + 2 * physics.radius * abs(tension_difference) / physics.spring
+    # No law but detents is softer than the linear spring beyond its gap, and no pulley twice as large.
+    largest = 2 * (physics.radius * abs(tension_difference) + physics.detent)
+    furthest = physics.half_gap + largest / physics.spring
     return float(brentq(excess, -furthest, furthest, xtol=1e-14))
 
 
@@ -234,7 +237,7 @@ def _stable_step(
 ) -> float:
     """Time step (s) for the stiffest state: everything stuck at the highest tension allowed."""
     limit = numerics.tension_limit_N
-    factor = 1 + physics.stribeck_rise
+    factor = (1 + physics.stribeck_rise) * _oldest(physics)
     for law in laws("slow_friction"):
         factor *= law.bound(physics, limit)
     hold = 2 * np.tanh(half_bend.max(axis=0) * factor) * limit + drag
@@ -248,12 +251,18 @@ def _stable_step(
     torsion = (
         np.hypot(physics.spring, physics.exponential * torque)
         + physics.bumper
+        + physics.detent * physics.detent_number
         + 3 * physics.cubic * beyond**2
         + physics.bearing_torque / physics.bearing_angle
         + physics.hysteresis_torque / physics.hysteresis_angle
     )
     spring, pulley_mass = torsion / radius**2 / 2, physics.inertia / (physics.radius * 2 - radius) ** 2 / 2
     return stable_step(stiffness.max(axis=0), mass, bristle, spring, pulley_mass, numerics)
+
+
+def _oldest(physics: Physics, age_s: float = OLDEST_S) -> float:
+    """Factor of friction at an age of the contacts."""
+    return float(1 + physics.ageing_rise * np.log10(1 + age_s / physics.ageing_shortest))
 
 
 def _bearing_torque(theta: NDArray, friction: PulleyFriction | None, pull_N: NDArray) -> NDArray | float:

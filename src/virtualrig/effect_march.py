@@ -13,6 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from virtualrig.effects import Effects, cached, chained, numbers, strand_settling, stribeck
+from virtualrig.effects.unlisted_ageing_contact import FIRST_S, OLDEST_S
 from virtualrig.effects.viscous_friction import REFERENCE_M_PER_S
 
 SLOW_S = 1e-4
@@ -93,6 +94,8 @@ def spring_torque(p: Physics, theta: float) -> float:
         further += p.spring * (np.sinh(p.exponential * beyond) / p.exponential - beyond)
     if p.bumper > 0.0:
         further += p.bumper * (max(beyond - p.bumper_at, 0.0) + min(beyond + p.bumper_at, 0.0))
+    if p.detent > 0.0:
+        further += p.detent * (np.sin(p.detent_number * theta + p.detent_phase) - np.sin(p.detent_phase))
     return p.spring * beyond + further
 
 
@@ -166,6 +169,15 @@ def _renew(p: Physics, rested: NDArray, w: NDArray, dt: float) -> None:
 
 
 @njit(error_model="numpy")
+def _age(p: Physics, hold: NDArray, age: NDArray, w: NDArray, dt: float) -> None:
+    """Strengthen one cable's contacts by their age, which their sliding speed `w` renews."""
+    for i in range(age.size):
+        renewed = 1.0 + dt * abs(w[i + 1]) / p.ageing_renewal
+        age[i] = min((age[i] + dt) / renewed, OLDEST_S)
+        hold[i] *= 1.0 + p.ageing_rise * np.log10(1.0 + age[i] / p.ageing_shortest)
+
+
+@njit(error_model="numpy")
 def _set_elastic(
     p: Physics,
     elastic: NDArray,
@@ -193,6 +205,9 @@ def _set_elastic(
                 elastic[i] = stiffness[i] * (e * e / (4 * s) if e < 2 * s else e - s)
             else:
                 elastic[i] = stiffness[i] * (np.sqrt(e * e + s * s) - s)
+    if p.yield_share > 0.0:
+        for i in range(n1):
+            elastic[i] -= p.yield_share * max(elastic[i] - p.yield_tension, 0.0)
 
 
 @cached
@@ -245,6 +260,7 @@ def march(
     strength = np.empty((2, nodes))
     hold = np.empty(nodes)
     rested = np.ones((2, nodes))
+    age = np.full((2, nodes), FIRST_S)
     start_mean = np.zeros(2)
     shortening = np.zeros(2)
     for c in range(2):
@@ -312,6 +328,8 @@ def march(
                 w = v[c]
                 z = bristle[c]
                 _set_hold(p, hold, strength[c], rested[c], drag, T)
+                if p.ageing_rise > 0.0:
+                    _age(p, hold, age[c], w, dt)
                 if thins:
                     _set_keep(p, keep, drag_rate, viscous_rate, w, dt)
                 for i in range(nodes):

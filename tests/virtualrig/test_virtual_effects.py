@@ -7,13 +7,13 @@ import pytest
 from pydantic import ValidationError
 from virtual_runs import changed, channels, plan_of, strung
 
-from virtualrig import dynamics, effect_dynamics
+from virtualrig import dynamics, effect_dynamics, effect_march
 from virtualrig.campaign import prepare, run
 from virtualrig.config import Campaign
-from virtualrig.effects import Effects
+from virtualrig.effects import TWINS, Effects
 from virtualrig.grid import make_grid
 from virtualrig.sensors import Side, sensed
-from virtualrig.trajectory import Trajectory
+from virtualrig.trajectory import Preparation, Trajectory
 
 ALONE = {
     "presliding-dahl": {"presliding": {"law": "dahl", "length_m": 1e-4}},
@@ -62,6 +62,13 @@ ALONE = {
     "bumper": {"load": {"bumper_Nm_per_rad": 0.05, "bumper_at_rad": 0.2}},
     "directional": {"directional_friction": {"bias": 0.2}},
     "positional": {"positional_friction": {"rise": 0.2, "period_m": 0.01}},
+    "yielding-liner": {"yielding_liner": {"rise": 0.4, "tension_N": 8.0, "width_N": 1.0}},
+    "breathing": {"breathing_friction": {"swing": 0.2, "period_s": 3.0, "phase_rad": 0.3}},
+    "worn-coating": {"worn_coating": {"rise": 0.4, "travel_m": 4e-3, "width_m": 5e-4}},
+    "strengthening-liner": {"strengthening_liner": {"rise": 0.2, "speed_m_per_s": 1e-3}},
+    "ageing": {"ageing_contact": {"rise": 0.1, "shortest_s": 0.02, "renewal_m": 2e-4}},
+    "detents": {"load": {"detent_Nm": 2e-3, "detent_number": 12.0, "detent_phase_rad": 0.7}},
+    "yielding-cable": {"yielding_cable": {"share": 0.4, "tension_N": 8.0}},
 }
 TENSIONS = ("T1_N", "T2_N", "T3_N", "T4_N")
 
@@ -120,7 +127,8 @@ def test_it_rests_in_balance_and_then_acts(coarse, recorded, name):
     t, ideal = recorded(name), recorded("none")
     rest = t.time_s <= 0.05
     # At rest tensions change where the cable relaxes, and hardly where bristles hold less from moment to moment.
-    settles = {"relaxation": 0.15, "running-in": 1e-3, "hyperbolic-running-in": 1e-3}.get(name, 1e-6)
+    slowly = ("running-in", "hyperbolic-running-in", "breathing", "ageing")
+    settles = ({"relaxation": 0.15} | dict.fromkeys(slowly, 1e-3)).get(name, 1e-6)
     for tension in TENSIONS:
         assert np.ptp(getattr(t, tension)[rest]) < settles * 7.3, tension
     seen, wanted = channels(coarse, t) | {"tau_in": t.tau_in_Nm}, channels(coarse, ideal)
@@ -147,6 +155,93 @@ def test_friction_knows_its_direction(campaign, recorded):
     slip, loss = full_slip(t), campaign.rig.cable.friction_coefficient * np.pi
     np.testing.assert_allclose(np.log(t.T1_N / t.T2_N)[slip], 1.2 * loss, rtol=5e-3)
     np.testing.assert_allclose(np.log(t.T4_N / t.T3_N)[slip], 0.8 * loss, rtol=5e-3)
+
+
+def true_law(coarse, name):
+    """The law of the one effect of `ALONE`, as the proof's answers have it."""
+    rig = changed(coarse, rig__effects=Effects.model_validate(ALONE[name])).rig
+    twins = [twin for twin in TWINS.values() if twin.fields.get("rig", {}).keys() & ALONE[name].keys()]
+    (twin,) = twins or [TWINS["unlisted-detent-load"]]
+    return twin.law(rig, twin.places[0])
+
+
+def test_friction_follows_the_table_of_its_law(coarse, recorded):
+    """Along a cable in full slip dT / (f T) is mu dphi: its integral from end to end is mu pi."""
+    loss = coarse.rig.cable.friction_coefficient * np.pi
+    for name in ("yielding-liner", "load-dependent", "breathing", "worn-coating", "strengthening-liner"):
+        t, law = recorded(name), true_law(coarse, name)
+        rate = 0.006 * np.abs(np.gradient(t.theta_in_rad, t.time_s))
+        travel = 0.006 * np.abs(np.diff(t.theta_in_rad, prepend=t.theta_in_rad[0])).cumsum()
+        state = {"time": t.time_s, "travel": travel, "speed": np.log10(rate.clip(1e-9))}
+        for k in np.flatnonzero(full_slip(t))[::10]:
+            T = np.geomspace(t.T2_N[k], t.T1_N[k], 400)
+            x = T if law.argument == "tension" else np.full(400, state[law.argument][k])
+            found = np.trapezoid(1 / (T * np.interp(x, law.x, law.y)), T)
+            assert found == pytest.approx(loss, rel=0.015), name
+
+
+def test_contacts_that_have_rested_hold_more_by_their_age(coarse, recorded):
+    """In motion at 15 mm/s a contact is 13 ms old: friction is that of this age."""
+    t, law = recorded("ageing"), true_law(coarse, "ageing")
+    k = np.flatnonzero(full_slip(t))[5]
+    speed = 0.006 * np.gradient(t.theta_in_rad, t.time_s)[k]
+    expected = coarse.rig.cable.friction_coefficient * np.pi * np.interp(np.log10(2e-4 / speed), law.x, law.y)
+    assert np.log(t.T1_N[k] / t.T2_N[k]) == pytest.approx(expected, rel=0.02)
+
+
+def test_detents_are_on_top_of_the_springs_torque(coarse, recorded):
+    t, law = recorded("detents"), true_law(coarse, "detents")
+    slip = full_slip(t) & (t.theta_out_rad < law.x[-1])
+    over = t.tau_out_Nm - coarse.rig.load.spring_stiffness_Nm_per_rad * t.theta_out_rad
+    assert slip.sum() > 20
+    np.testing.assert_allclose(over[slip], np.interp(t.theta_out_rad[slip], law.x, law.y), atol=2e-4)
+
+
+def test_a_cable_that_yields_has_the_compliance_of_its_law(coarse):
+    """Elongation and tension are inverse, and the elongation is the integral of the law's compliance."""
+    rig = changed(coarse, rig__effects=Effects.model_validate(ALONE["yielding-cable"]))
+    physics = effect_dynamics._physics(rig.rig, rig.numerics, Preparation(0.1, 7.3, (0.0, 0.0)))
+    law, tension = true_law(coarse, "yielding-cable"), np.array([[2.0, 8.0, 8.5, 14.0, 19.0]])
+    one = np.ones_like(tension)
+    stretch = effect_dynamics._elongation(physics, tension, one, 0 * one)
+    fine = np.linspace(0.0, 20.0, 20001)
+    compliance = np.where(fine > 8.0, np.interp(12.0, law.x, law.y), np.interp(4.0, law.x, law.y))
+    whole = np.concatenate([[0.0], np.cumsum(np.diff(fine) * compliance[1:])])
+    np.testing.assert_allclose(stretch[0], np.interp(tension[0], fine, whole), atol=2e-3)
+    back = np.empty(5)
+    effect_march._set_elastic(physics, back, np.zeros(6), stretch[0], one[0], 0 * one[0], 0 * one[0], 0.0, False)
+    np.testing.assert_allclose(back, tension[0], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "side", "faults"),
+    [
+        ("unlisted-cogging-motor", "torque_Nm", {"cogging_Nm": 2e-3, "cogging_poles": 14.0, "cogging_phase_rad": 0.4}),
+        ("unlisted-windage", "torque_Nm", {"windage_Nms2": 1e-3}),
+        ("unlisted-bent-load-cell", "force_N", {"force_curvature_per_N": -4e-3}),
+        ("unlisted-side-force", "force_N", {"side_force_N": 0.3, "side_force_lobes": 3.0, "side_force_phase_rad": 1.0}),
+        ("unlisted-breathing-torque-zero", "torque_Nm", {"zero_swing_Nm": 1e-3, "zero_period_s": 8.0}),
+        ("unlisted-torque-curvature", "torque_Nm", {"torque_curvature_per_Nm2": 20.0}),
+        ("unlisted-encoder-runout", "angle_rad", {"angle_runout_rad": 0.02, "angle_runout_phase_rad": 0.3}),
+        ("torque-scale", "torque_Nm", {"torque_gain": 0.05}),
+        ("load-cell-scale", "force_N", {"load_cell_gain": 0.05}),
+        ("load-cell-drift", "force_N", {"load_cell_drift_N_per_s": 0.1, "load_cell_warm_up_s": 3.0}),
+    ],
+)
+def test_a_sensor_reads_more_by_the_table_of_its_law(campaign, name, side, faults):
+    twin, time_s = TWINS[name], np.linspace(0, 8, 2001)
+    place = "drive-sensor" if "drive-pulley" in twin.places else twin.places[0]
+    group = {"drive-sensor": "drive_sensors", "load-sensor": "load_sensors"}[place]
+    rig = changed(campaign, rig__effects=Effects.model_validate({group: faults})).rig
+    truth = Side(0.5 * np.sin(time_s), 0.06 * np.cos(time_s), 12 + 5 * np.sin(2 * time_s))
+    law = twin.law(rig, place)
+    of_side = dict(zip(("angle_rad", "torque_Nm", "force_N"), truth, strict=True))
+    speed = np.gradient(truth.angle_rad, time_s)
+    x = {"reading": of_side[side], "time": time_s, "speed": speed}.get(law.argument, truth.angle_rad)
+    read = sensed(time_s, truth, rig, getattr(rig.effects, group))
+    added = getattr(read, side) - of_side[side]
+    assert np.ptp(added) > 0
+    np.testing.assert_allclose(added, np.interp(x, law.x, law.y), atol=0.03 * np.ptp(added))
 
 
 def test_relaxation_decays_with_both_time_constants(recorded):

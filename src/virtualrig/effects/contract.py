@@ -11,8 +11,10 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Annotated, Any, NamedTuple
 
+import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
@@ -34,6 +36,58 @@ Read = Callable[[Side, Side, Any, NDArray, float], Side]
 # Settings of the rig's effects, and the answer.
 Seeded = tuple[dict, dict[str, float]]
 Seed = Callable[[float, Mapping[str, float], str, float], Seeded]
+
+
+class TrueLaw(NamedTuple):
+    """An effect as a law of one quantity at one slot of the rig, as the diagnosis format names these.
+
+    Attributes
+    ----------
+    slot, argument : str
+    x, y : ndarray, shape (n,)
+        Arguments, and there a factor of friction or of a compliance, or what is added to a torque or a reading. Up to
+        what a calibration absorbs. Empty for a law that is none of a single quantity.
+    """
+
+    slot: str
+    argument: str
+    x: NDArray = np.empty(0)
+    y: NDArray = np.empty(0)
+
+
+# What the proof's recordings visit: tensions (N), times (s), the drive's travel (m), angles (rad), speeds of the cable
+# (log10(m/s)) and of a pulley (rad/s), sums of tensions (N), torques (N m), ages of contacts (log10(s)).
+TENSIONS_N, TIMES_S, TRAVELS_M, ANGLES_RAD = (0.5, 20.0), (0.0, 10.0), (0.0, 0.05), (-0.6, 0.6)
+LOG_SPEEDS, SPEEDS_RAD_PER_S, FORCES_N, TORQUES_NM, LOG_AGES = (
+    (-4.0, -1.2),
+    (-2.5, 2.5),
+    (4.0, 20.0),
+    (-0.07, 0.07),
+    (-2, 0.5),
+)
+POINTS = 129
+# Fields of a side that a sensor reads, by the argument of its map.
+SIDE = {"angle": "angle_rad", "torque": "torque_Nm", "force": "force_N"}
+
+
+def along(between: Range) -> NDArray:
+    """Arguments of a table, shape (POINTS,)."""
+    return np.linspace(*between, POINTS)
+
+
+def slow_factor(value: Any, numbers: Mapping[str, Any], argument: str, x: NDArray) -> NDArray:
+    """Factor of a law of slow friction over "tension", "time", "travel" or "position" alone, shape of `x`."""
+    state = dict.fromkeys(("tension", "time", "travel", "position"), 0.0) | {"tension": 5.0}
+    p = SimpleNamespace(**numbers)
+    return np.array([value.py_func(p, 1.0, *(state | {argument: float(one)}).values()) for one in x])
+
+
+def added_by(read: "Read", faults: Any, of: str, over: str, x: NDArray, radius_m: float = 1.0) -> NDArray:
+    """What a fault adds to a side's "angle", "torque" or "force" where one of these, or the time, is `x`."""
+    zero = np.zeros_like(x)
+    side = Side(*(x if over == name else zero for name in SIDE))
+    time_s = x if over == "time" else np.arange(x.size, dtype=float)
+    return getattr(read(side, side, faults, time_s, radius_m), SIDE[of]) - getattr(side, SIDE[of])
 
 
 class Law(NamedTuple):
@@ -90,6 +144,8 @@ class Twin:
     read : callable or None
         ``read(reading, truth, faults, time_s, radius_m)``: what one side's sensors read, from what they read without
         this fault and from the truth.
+    law : callable or None
+        ``law(rig, place)``: the effect as a law of one quantity (`TrueLaw`), for a rig that has it at a place.
     in_rig : callable or None
         ``in_rig(values, campaign)``: an answer's values with what else in a rig has the same law.
     """
@@ -108,6 +164,7 @@ class Twin:
     friction: Law | None = None
     read: Read | None = None
     in_rig: Callable[[dict[str, float], Any], dict[str, float]] | None = None
+    law: Callable[[Any, str], TrueLaw] | None = None
 
 
 def group_of(place: str) -> str:

@@ -3,14 +3,26 @@
 As a cell warms up, its drift falls off exponentially.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from virtualrig.effects.contract import Range, Read, Seeded, Side, Twin, group_of
+from virtualrig.effects.contract import (
+    FORCES_N,
+    TIMES_S,
+    Range,
+    Read,
+    Seeded,
+    Side,
+    TrueLaw,
+    Twin,
+    added_by,
+    along,
+    group_of,
+)
 from virtualrig.strict import NonNegative
 
 
@@ -32,6 +44,16 @@ def _crosstalk(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_
     return reading._replace(force_N=reading.force_N + faults.load_cell_crosstalk * truth.torque_Nm / radius_m)
 
 
+def _map(read: Read, argument: str) -> Callable[[Any, str], TrueLaw]:
+    over, between = {"reading": ("force", FORCES_N), "time": ("time", TIMES_S)}[argument]
+
+    def law(rig: Any, place: str) -> TrueLaw:
+        x, faults = along(between), getattr(rig.effects, group_of(place))
+        return TrueLaw("sensor-map", argument, x, added_by(read, faults, "force", over, x))
+
+    return law
+
+
 def _twin(name: str, field: str, parameter: str, size: Range, unit: str, read: Read) -> Twin:
     return Twin(
         name=name,
@@ -50,13 +72,14 @@ def _warming(size: float, also: Mapping[str, float], place: str, spring: float) 
 
 
 TWINS = (
-    _twin("load-cell-scale", "load_cell_gain", "gain", (0.005, 0.1), "1", _scale),
+    replace(_twin("load-cell-scale", "load_cell_gain", "gain", (0.005, 0.1), "1", _scale), law=_map(_scale, "reading")),
     _twin("load-cell-offset", "load_cell_offset_N", "offset", (0.1, 3.0), "N", _offset),
     replace(
         _twin("load-cell-drift", "load_cell_drift_N_per_s", "rate", (0.005, 0.2), "N/s", _drift),
         fields={"sensors": {"load_cell_drift_N_per_s": (float, 0.0), "load_cell_warm_up_s": (NonNegative, 0.0)}},
         also={"warm_up_s": (2.0, 8.0)},
         other_laws={"warm-up": _warming},
+        law=_map(_drift, "time"),
     ),
     _twin("load-cell-crosstalk", "load_cell_crosstalk", "crosstalk", (0.005, 0.1), "1", _crosstalk),
 )

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from pydantic import Field, PositiveFloat
 
-from virtualrig.effects.contract import Law, Seed, Seeded, Twin
+from virtualrig.effects.contract import TENSIONS_N, Law, Seed, Seeded, TrueLaw, Twin, along, slow_factor
 from virtualrig.strict import Strict
 
 # The logarithm leaves this share of the friction coefficient at least.
@@ -54,6 +54,12 @@ def _bound(p: Any, tension_N: float) -> float:
     return ratio**p.tension_exponent
 
 
+def _law(rig: Any, place: str) -> TrueLaw:
+    tension = along(TENSIONS_N)
+    factor = slow_factor(_value, _numbers(rig.effects), "tension", tension)
+    return TrueLaw("sliding-friction", "tension", tension, factor)
+
+
 def _seeding(law: str) -> Seed:
     def seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
         settings = {"law": law, "exponent": -size, "reference_N": also["reference_N"], "floor_N": also["floor_N"]}
@@ -72,5 +78,6 @@ TWIN = Twin(
     seed=_seeding("power"),
     other_laws={"logarithmic": _seeding("logarithmic")},
     numbers=_numbers,
+    law=_law,
     slow_friction=Law(_value, _bound),
 )

@@ -1,11 +1,12 @@
 """A load spring that stiffens beyond the gap: with the cube of its angle, exponentially like tissue, or at a bumper."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
-from virtualrig.effects.contract import FULL_STROKE_RAD, Seeded, Twin
+from virtualrig.effects.contract import ANGLES_RAD, FULL_STROKE_RAD, Seeded, TrueLaw, Twin, along
 from virtualrig.strict import NonNegative
 
 
@@ -27,6 +28,16 @@ def _bumper(size: float, also: Mapping[str, float], place: str, spring: float) -
     return {"load": {"bumper_Nm_per_rad": stiffness, "bumper_at_rad": begins}}, {}
 
 
+def _law(rig: Any, place: str) -> TrueLaw:
+    load, spring, theta = rig.effects.load, rig.load.spring_stiffness_Nm_per_rad, along(ANGLES_RAD)
+    torque = load.cubic_Nm_per_rad3 * theta**3
+    if load.exponential_per_rad:
+        torque = spring * (np.sinh(load.exponential_per_rad * theta) / load.exponential_per_rad - theta)
+    if load.bumper_Nm_per_rad:
+        torque = load.bumper_Nm_per_rad * (theta - np.clip(theta, -load.bumper_at_rad, load.bumper_at_rad))
+    return TrueLaw("load", "load-angle", theta, torque)
+
+
 TWIN = Twin(
     name="load-stiffening",
     fields={
@@ -42,6 +53,7 @@ TWIN = Twin(
     unit="1",
     also={"begins_share": (0.3, 0.7)},
     seed=_seed,
+    law=_law,
     other_laws={"exponential": _exponential, "bumper": _bumper},
     numbers=lambda effects: {
         "cubic": effects.load.cubic_Nm_per_rad3,

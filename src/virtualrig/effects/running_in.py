@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from pydantic import Field, PositiveFloat
 
-from virtualrig.effects.contract import Law, Seeded, Twin
+from virtualrig.effects.contract import TIMES_S, TRAVELS_M, Law, Seeded, TrueLaw, Twin, along, slow_factor
 from virtualrig.strict import Strict
 
 
@@ -45,6 +45,13 @@ def _value(p: Any, y: float, tension: float, time: float, travel: float, positio
     return y * (1.0 + p.run_in_change * (a / (1.0 + a) if p.run_in_is_hyperbolic else -np.expm1(-a)))
 
 
+def _true_law(rig: Any, place: str) -> TrueLaw:
+    """The law of a fresh contact."""
+    by_travel = rig.effects.running_in.over == "travel_m"
+    argument, x = ("travel", along(TRAVELS_M)) if by_travel else ("time", along(TIMES_S))
+    return TrueLaw("sliding-friction", argument, x, slow_factor(_value, _numbers(rig.effects), argument, x))
+
+
 def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     # By wear where the time constant comes out short.
     if also["tau"] < 10:
@@ -69,5 +76,6 @@ TWIN = Twin(
     seed=_seed,
     other_laws={"hyperbolic": _hyperbolic},
     numbers=_numbers,
+    law=_true_law,
     slow_friction=Law(_value, lambda p, tension_N: max(1.0, 1 + p.run_in_change)),
 )

@@ -8,9 +8,11 @@ with the logarithm of the speed over two decades about it (Dieterich, Journal of
 from collections.abc import Mapping
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import PositiveFloat
 
-from virtualrig.effects.contract import Seed, Seeded, Twin
+from virtualrig.effects.contract import LOG_SPEEDS, Seed, Seeded, TrueLaw, Twin, along
 from virtualrig.strict import NonNegative, Strict
 
 # Laws, and their numbers in the time loop.
@@ -29,6 +31,21 @@ class Stribeck(Strict):
     speed_m_per_s: PositiveFloat
     exponent: PositiveFloat = 1.0
     renewal_m: PositiveFloat = 20e-6
+
+
+def _steady(given: Stribeck, speed: NDArray) -> NDArray:
+    """Law g of steady sliding, as in the time loop."""
+    s = speed / given.speed_m_per_s
+    if given.law == "hess-soom":
+        return 1 / (1 + s) ** 2
+    if given.law == "logarithmic":
+        return (1 - np.log1p(10 * s) / np.log1p(100)).clip(0.0)
+    return np.exp(-(s**given.exponent))
+
+
+def _law(rig: Any, place: str) -> TrueLaw:
+    given, log_speed = rig.effects.stribeck, along(LOG_SPEEDS)
+    return TrueLaw("sliding-friction", "speed", log_speed, 1 + given.rise * _steady(given, 10**log_speed))
 
 
 def _numbers(effects: Any) -> dict[str, Any]:
@@ -65,4 +82,5 @@ TWIN = Twin(
     seed=_seed,
     other_laws={law: _another(law) for law in ("hess-soom", "logarithmic")},
     numbers=_numbers,
+    law=_law,
 )

@@ -4,11 +4,16 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from virtualrig.effects.contract import Side, Twin, group_of
+from virtualrig.effects.contract import TORQUES_NM, Side, TrueLaw, Twin, added_by, along, group_of
 
 
 def _read(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: float) -> Side:
     return reading._replace(torque_Nm=(1 + faults.torque_gain) * reading.torque_Nm)
+
+
+def _law(rig: Any, place: str) -> TrueLaw:
+    tau, faults = along(TORQUES_NM), getattr(rig.effects, group_of(place))
+    return TrueLaw("sensor-map", "reading", tau, added_by(_read, faults, "torque", "torque", tau))
 
 
 TWIN = Twin(
@@ -20,4 +25,5 @@ TWIN = Twin(
     signed=True,
     seed=lambda size, also, place, spring: ({group_of(place): {"torque_gain": size}}, {"gain": size}),
     read=_read,
+    law=_law,
 )

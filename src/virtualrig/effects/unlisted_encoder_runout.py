@@ -6,12 +6,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from virtualrig.effects.contract import Seeded, Side, Twin, group_of
+from virtualrig.effects.contract import ANGLES_RAD, Seeded, Side, TrueLaw, Twin, added_by, along, group_of
 
 
 def _read(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: float) -> Side:
     runout = faults.angle_runout_rad * np.sin(reading.angle_rad + faults.angle_runout_phase_rad)
     return reading._replace(angle_rad=reading.angle_rad + runout)
+
+
+def _law(rig: Any, place: str) -> TrueLaw:
+    theta, faults = along(ANGLES_RAD), getattr(rig.effects, group_of(place))
+    return TrueLaw("sensor-map", "reading", theta, added_by(_read, faults, "angle", "angle", theta))
 
 
 def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
@@ -26,4 +31,5 @@ TWIN = Twin(
     unit="rad",
     seed=_seed,
     read=_read,
+    law=_law,
 )

@@ -2,9 +2,10 @@
 
 from typing import Any
 
+import numpy as np
 from pydantic import PositiveFloat
 
-from virtualrig.effects.contract import Twin
+from virtualrig.effects.contract import ANGLES_RAD, TrueLaw, Twin, along
 from virtualrig.strict import NonNegative, Strict
 
 
@@ -23,6 +24,13 @@ def _numbers(effects: Any) -> dict[str, Any]:
     }
 
 
+def _law(rig: Any, place: str) -> TrueLaw:
+    """The torque that builds up from rest, by the travel of the pulley's rim."""
+    given, angle = rig.effects.hysteretic_load, along((0.0, ANGLES_RAD[1]))
+    torque = given.torque_Nm * -np.expm1(-angle / given.angle_rad)
+    return TrueLaw("load", "distance-since-reversal", rig.pulley_radius_m * angle, torque)
+
+
 TWIN = Twin(
     name="unlisted-hysteretic-load",
     fields={"rig": {"hysteretic_load": (HystereticLoad | None, None)}},
@@ -35,4 +43,5 @@ TWIN = Twin(
         {},
     ),
     numbers=_numbers,
+    law=_law,
 )

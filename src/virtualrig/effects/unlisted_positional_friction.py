@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 from pydantic import Field, PositiveFloat
 
-from virtualrig.effects.contract import Law, Seeded, Twin
+from virtualrig.effects.contract import ANGLES_RAD, Law, Seeded, TrueLaw, Twin, along, slow_factor
 from virtualrig.strict import Strict
 
 
@@ -33,6 +33,12 @@ def _value(p: Any, y: float, tension: float, time: float, travel: float, positio
     return y * (1.0 + p.wear_rise * np.sin(2 * np.pi * position / p.wear_period + p.wear_phase))
 
 
+def _law(rig: Any, place: str) -> TrueLaw:
+    theta = along(ANGLES_RAD)
+    factor = slow_factor(_value, _numbers(rig.effects), "position", rig.pulley_radius_m * theta)
+    return TrueLaw("sliding-friction", "drive-angle", theta, factor)
+
+
 def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     wear = {"rise": size, "period_m": also["period_m"], "phase_rad": also["phase"]}
     return {"positional_friction": wear}, {}
@@ -47,5 +53,6 @@ TWIN = Twin(
     also={"period_m": (2e-3, 1e-2)},
     seed=_seed,
     numbers=_numbers,
+    law=_law,
     slow_friction=Law(_value, lambda p, tension_N: 1 + p.wear_rise),
 )

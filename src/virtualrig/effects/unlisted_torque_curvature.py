@@ -4,12 +4,17 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from virtualrig.effects.contract import Side, Twin, group_of
+from virtualrig.effects.contract import TORQUES_NM, Side, TrueLaw, Twin, added_by, along, group_of
 
 
 def _read(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: float) -> Side:
     factor = 1 + faults.torque_curvature_per_Nm2 * reading.torque_Nm**2
     return reading._replace(torque_Nm=factor * reading.torque_Nm)
+
+
+def _law(rig: Any, place: str) -> TrueLaw:
+    tau, faults = along(TORQUES_NM), getattr(rig.effects, group_of(place))
+    return TrueLaw("sensor-map", "reading", tau, added_by(_read, faults, "torque", "torque", tau))
 
 
 TWIN = Twin(
@@ -21,4 +26,5 @@ TWIN = Twin(
     signed=True,
     seed=lambda size, also, place, spring: ({group_of(place): {"torque_curvature_per_Nm2": size}}, {}),
     read=_read,
+    law=_law,
 )

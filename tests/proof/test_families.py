@@ -1,0 +1,87 @@
+"""Families of laws that the diagnosis's list lacks: every effect in turn, with its law as a table in the answer."""
+
+import json
+from collections import Counter
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from proof.cases import draw
+from proof.cli import app
+from proof.families import family, members_of
+from proof.plan import read_plan
+from virtualrig.effects import TWINS
+
+PLAN = read_plan()
+# As the diagnosis format names them.
+SLOTS = {"sliding-friction", "cable-stretch", "end-stretch", "bearing-torque", "drive-train", "load", "sensor-map"}
+ARGUMENTS = {
+    *("tension", "speed", "direction", "distance-since-reversal", "dwell", "time", "travel"),
+    *("position-along-conduit", "drive-angle", "load-angle", "reading"),
+}
+
+
+@pytest.mark.parametrize("name", ["removed", "unlisted"])
+def test_a_family_has_every_effect_at_every_strength(name):
+    cases = list(family(name, 7000))
+    effects = list(PLAN.effects if name == "removed" else PLAN.unlisted)
+    found = Counter(case.truth[0].name.removeprefix("unlisted-") for case in cases)
+    assert set(found) == {effect.removeprefix("unlisted-") for effect in effects}
+    assert max(found.values()) - min(found.values()) <= 1
+    assert len(cases) == len({case.name for case in cases}) == PLAN.families.cases
+    strengths = [case.truth[0].strength for case in cases]
+    assert set(strengths[: len(effects)]) == {PLAN.families.strengths[0]}
+    assert set(strengths) == set(PLAN.families.strengths)
+    assert len(members_of(name, PLAN)) == len(effects) * len(PLAN.families.strengths)
+
+
+def test_the_laws_that_the_list_never_had_are_of_many_slots_and_arguments():
+    laws = [draw(1, "unlisted", name).truth[0] for name in PLAN.unlisted]
+    assert len(laws) >= 12
+    assert {law.slot for law in laws} >= SLOTS - {"end-stretch", "drive-train"}
+    assert len({law.argument for law in laws}) >= 9
+
+
+@pytest.mark.parametrize("name", [name for name, twin in TWINS.items() if twin.law is not None])
+def test_the_law_of_each_effect_is_recorded_as_a_table(name):
+    kind = "unlisted" if name in PLAN.unlisted else "removed"
+    for seed in range(3):
+        case = draw(seed, kind, name, 0.9)
+        (truth,) = json.loads(json.dumps(case.key))["truth"]
+        assert truth["slot"] in SLOTS
+        assert truth["argument"] in ARGUMENTS
+        x, y = np.array(truth["curve"]).T
+        assert np.isfinite(y).all()
+        assert (np.diff(x) > 0).all()
+        assert np.ptp(y) > 0
+        larger, smaller = (np.array(draw(seed, kind, name, s).truth[0].curve)[:, 1] for s in (0.9, 0.3))
+        assert np.ptp(larger) > np.ptp(smaller)
+
+
+def test_every_unlisted_effect_has_a_law():
+    assert all(twin.law is not None for twin in PLAN.unlisted.values())
+
+
+def test_a_removed_effect_is_no_candidate_and_its_answer_has_the_law():
+    case = next(iter(family("removed", 5)))
+    assert case.without == (case.truth[0].name.removeprefix("unlisted-"),)
+    case = draw(5, "removed", "stribeck", 0.9)
+    assert (case.truth[0].slot, case.truth[0].argument) == ("sliding-friction", "speed")
+    factor = np.array(case.truth[0].curve)[:, 1]
+    assert factor[0] == pytest.approx(1 + case.truth[0].size, rel=0.2)
+    assert factor[0] > factor[-1]
+
+
+def test_a_strength_that_is_stated_leaves_other_cases_as_they_are():
+    stated, drawn = draw(3, "removed", "kink", 0.5), draw(3, "removed", "kink")
+    assert stated.truth[0].strength == 0.5
+    assert stated.campaign.rig.cable == drawn.campaign.rig.cable
+    assert stated.name != drawn.name
+    assert draw(stated.seed, **stated.requested) == stated
+
+
+def test_a_family_that_there_is_not_is_refused(tmp_path):
+    done = CliRunner().invoke(app, ["family", "strange", "--out", str(tmp_path)])
+    assert done.exit_code == 2
+    assert "there is no family 'strange'; there are removed, unlisted" in done.output
