@@ -20,7 +20,8 @@ from ccmodel.inverse.compensate import WANTED, Limits, compensated
 from ccmodel.inverse.estimate import TOLERANCE, VISIBLE, Estimated, estimated
 from ccmodel.model.files import Model
 from ccmodel.model.parameters import Parameters
-from ccmodel.paths import try_file, try_folder, writing
+from ccmodel.outputs import new_file, new_files
+from ccmodel.paths import try_file, try_folder
 from ccmodel.progress import Progress, each_of, within
 from ccmodel.steps.files import write_table
 from ccmodel.steps.predict import READING, conditions_of
@@ -85,8 +86,7 @@ class Estimate(Mapping[str, pd.DataFrame]):
         InputError
             If the folder cannot be made or written to.
         """
-        with writing(folder) as path:
-            path.mkdir(exist_ok=True)
+        with new_files(folder) as path:
             for id, table in self._tables.items():
                 write_table(path / f"{id}.csv", table.reset_index().astype({VISIBLE: int}), digits=9)
 
@@ -233,7 +233,7 @@ class Compensation:
         InputError
             If the file cannot be written.
         """
-        with writing(file) as path:
+        with new_file(file) as path:
             write_table(path, self.table, digits=9)
 
     def __repr__(self) -> str:
