@@ -23,7 +23,7 @@ $(VENV)/.ready: requirements.lock pyproject.toml
 
 # A run that left something out, or whose model is less accurate than accepted, says what, and has failed.
 define run_pipeline
-	@$(BIN)/snakemake --cores $(CORES) --configfile $(1) \
+	@$(BIN)/python workflow/run.py $(2) $(BIN)/snakemake --cores $(CORES) --configfile $(1) \
 	  || { echo "The run did not come to its end; the messages above say why" >&2; exit 1; }
 	@echo "The report is $(2)/index.html"
 	@status=0; $(BIN)/ccmodel report $(2) || status=1; $(or $(3),true) || status=1; exit $$status
