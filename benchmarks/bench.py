@@ -16,6 +16,9 @@ exact_vs_arithmetic
     Slope of log time over log number of elements; 1 is linear.
 ..._bytes_per_sample_beyond_outputs
     Growth of the peak memory per sample, less the growth of the returned arrays.
+estimate_vs_exact, estimate_vs_general_presliding
+    Time per sample of an estimate of the load from the drive's side, encoder counts and intervals included, over that
+    of one run of the same solver on the same motion.
 error_ratio_at_equal_speed
     `work_precision.error_ratio_at_equal_speed`.
 """
@@ -36,6 +39,7 @@ import work_precision
 from clock import us_per_sample
 from numba import njit
 
+from ccmodel.inverse.estimate import estimated
 from ccmodel.model import exact, general, paper
 
 ROOT = Path(__file__).parents[1]
@@ -182,6 +186,19 @@ def of_processes(cold: bool) -> dict[str, float]:
     return figures
 
 
+def of_estimates() -> dict[str, float]:
+    """Measurements of estimates of the load from the drive's side, of a load without a law."""
+    case, drive = cases.half_loop(), cases.sine(20, 0.6)
+    figures = {}
+    for model, active in (("exact", ()), ("general_presliding", cases.presliding())):
+        recording, parameters = cases.as_recording(case, drive, active)
+        samples = drive.size
+        times = us_per_sample(lambda r=recording, p=parameters: estimated(r, p, uses_law=False), samples, repeats=5)
+        figures[f"estimate_{model}_us_per_sample"] = times
+        figures[f"estimate_vs_{model}"] = times / (general_us(drive, active) if active else exact_us(case, drive))
+    return figures
+
+
 def main() -> None:
     """Measure, print and write all values."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -190,6 +207,7 @@ def main() -> None:
     arguments = parser.parse_args()
     figures = of_exact()
     figures |= of_general()
+    figures |= of_estimates()
     figures |= of_paper(figures["exact_1_pieces_us_per_sample"])
     figures |= of_memory()
     figures |= of_processes(arguments.cold)

@@ -7,10 +7,12 @@ from numpy.typing import NDArray
 
 from ccmodel import mechanisms
 from ccmodel.geometry import ConduitPath
-from ccmodel.model.general import Active
+from ccmodel.model.general import Active, simulate
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad
+from ccmodel.model.parameters import Parameters
 from ccmodel.model.transmission import Transmission
+from ccmodel.recording import Recording
 
 SAMPLES_A_CYCLE = 1000
 # The paper's own step, 0.25 ms, at its 1 Hz.
@@ -50,6 +52,36 @@ def paper(loops: float = 3, pieces: int = 1) -> Case:
         SpringLoad(0.03),
         InitialTension.uniform(path, 10.0),
     )
+
+
+def as_recording(case: Case, theta_in: NDArray, active: tuple[Active, ...]) -> tuple[Recording, Parameters]:
+    """A run of a pair as a recording with counts of 2000 a turn, and the parameters that it was made with."""
+    t, count = case.transmission, 2 * np.pi / 2000
+    parameters = Parameters(
+        stiffness_N_per_m=t.axial_rigidity_N / t.path.length_m,
+        reference_length_m=t.path.length_m,
+        friction_coefficient=t.friction_coefficient,
+        drive_radius_m=t.drive_radius_m,
+        load_radius_m=t.load_radius_m,
+        load_stiffness_Nm_per_rad=case.load.stiffness_Nm_per_rad,
+        mechanisms=tuple(active),
+    )
+    time_s = np.arange(theta_in.size) / SAMPLES_A_CYCLE
+    torque = simulate(t, case.load, time_s, theta_in, case.initial, active).complete().tau_in_Nm
+    channels = {"theta_in_rad": count * np.round(theta_in / count), "tau_in_Nm": torque}
+    recording = Recording(
+        "bench",
+        "run",
+        "model",
+        time_s,
+        channels,
+        dict.fromkeys(channels, "model"),
+        float(case.initial.tension_A_N[0]),
+        t.path,
+        accuracy={"tau_in_Nm": 1e-4},
+        encoder_step_rad={"theta_in_rad": count},
+    )
+    return recording, parameters
 
 
 def half_loop() -> Case:

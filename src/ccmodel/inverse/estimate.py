@@ -88,17 +88,15 @@ def estimated(
     """
     if recording.far_end == "fixed":
         raise ModelError(f"{recording.batch}/{recording.id}: the far end is fixed: there is no load to estimate")
-    problem = _Problem.of(recording, parameters, sds or {}, uses_law).with_discrepancy(tolerance)
-    nominal = problem.run(problem.parameters)
+    problem = _Problem.of(recording, parameters, sds or {}, uses_law)
+    once, samples = problem.discrepancy(tolerance)
+    # The joint filter is linear about this run, which therefore stays nearer to the measured torque than the whole
+    # weight of the discrepancy would let it, and further from it than the noise of single samples.
+    nominal = problem.with_noise(once * np.sqrt(samples)).run(problem.parameters)
+    noise = nominal.noise_variance + once * (samples - np.sqrt(samples))
     effects, outputs, by_misfit = problem.effects_of_errors(nominal)
     correction, spread = joint_estimate(
-        nominal.trace,
-        problem.drive.torque_Nm,
-        problem.first_variance,
-        nominal.noise_variance,
-        effects,
-        outputs,
-        by_misfit,
+        nominal.trace, problem.drive.torque_Nm, problem.first_variance, noise, effects, outputs, by_misfit
     )
     ratio = problem.parameters.drive_radius_m / problem.parameters.load_radius_m
     spread[0] += (problem.proximal.sigma_in * ratio) ** 2
@@ -201,18 +199,21 @@ class _Problem:
             transmission, load, settings, initial, recording.time_s[:: self.every], drive, self.prior, misfit_Nm, finer
         )
 
-    def with_discrepancy(self, tolerance: float) -> "_Problem":
-        """The same with the model discrepancy in the variance of the torque.
+    def discrepancy(self, tolerance: float) -> tuple[NDArray, NDArray]:
+        """Variance of the model discrepancy of the torque (N^2 m^2), and the samples over which it lasts; shapes (n,).
 
-        A discrepancy lasts over some travel. White noise of the same weight over that travel stands for it.
+        White noise of their product weighs as much as one discrepancy over these samples.
         """
         torque, travel = self.drive.torque_Nm, np.abs(np.diff(self.drive.theta_rad, prepend=self.drive.theta_rad[0]))
         # Before the drive has moved far, the tensions tell what its torque will come to.
         range_so_far = np.maximum.accumulate(torque) - np.minimum.accumulate(torque)
         range_so_far = np.maximum(range_so_far, self.drive_tensions_N * self.parameters.drive_radius_m)
         samples = np.maximum(LASTS_RAD / np.maximum(travel, LASTS_RAD * SMALLEST_SHARE), 1.0)
-        variance = self.drive.torque_variance + (tolerance * range_so_far) ** 2 * samples
-        return replace(self, drive=self.drive._replace(torque_variance=variance))
+        return (tolerance * range_so_far) ** 2, samples
+
+    def with_noise(self, variance: NDArray) -> "_Problem":
+        """The same with more noise in the torque, a variance of shape (n,)."""
+        return replace(self, drive=self.drive._replace(torque_variance=self.drive.torque_variance + variance))
 
     def effects_of_errors(self, nominal: Run) -> tuple[NDArray, NDArray, NDArray]:
         """Effects of one standard deviation of each lasting error, and of a misfit, as of `joint_estimate`.
