@@ -70,10 +70,11 @@ def is_closing(recording: Recording) -> NDArray:
     return np.sign(later - earlier) == np.sign(np.median(recording["tau_out_Nm"]))
 
 
-def by_model(batch: Path, model_file: Path, held_out: str, tolerance: float) -> list[Estimated]:
-    """By recording, the estimate of its load by a model that was fitted to others."""
+def by_model(batch: Path, model_file: Path, held_out: str) -> list[Estimated]:
+    """By recording, the estimate of its load by a model that was fitted to others, with the diagnosis's tolerances."""
     ingested = ingest_batch(batch)
     stated = load_config(CONFIG).diagnosing
+    tolerances = {"tolerance": stated.tolerance["tau_in_Nm"], "angle_tolerance": stated.tolerance["theta_out_rad"]}
     model = read_model_file(model_file).parameters
     estimates = Parameters.estimated(ingested.batch.rig)
     short = [first_cycles(r, stated.cycles) for r in ingested.recordings]
@@ -90,7 +91,7 @@ def by_model(batch: Path, model_file: Path, held_out: str, tolerance: float) -> 
         parameters = hypothesis.of(fitted[0].parameters).with_values(solution.values)
         sds = dict(zip(solution.values, np.sqrt(np.diag(solution.covariance)), strict=True))
         for i in np.flatnonzero(out):
-            found[i] = _as_read(estimated(ingested.recordings[i], parameters, sds, tolerance=tolerance), parameters)
+            found[i] = _as_read(estimated(ingested.recordings[i], parameters, sds, **tolerances), parameters)
     return found
 
 
@@ -128,11 +129,11 @@ def _about_mean(values: NDArray, recording: Recording, channel: str) -> NDArray:
     return values - values[judged(recording)].mean() if channel.startswith("theta") else values
 
 
-def rows(batch: Path, model_file: Path, tolerance: float, with_regressor: bool) -> list[dict]:
+def rows(batch: Path, model_file: Path, with_regressor: bool) -> list[dict]:
     """A row for each channel and way of holding out: errors of the estimate and of the regressor."""
     found = []
     for held_out in HELD_OUT:
-        estimates = by_model(batch, model_file, held_out, tolerance)
+        estimates = by_model(batch, model_file, held_out)
         for channel in TARGETS:
             errors, inside, closing, visible = [], [], [], []
             for one in estimates:
@@ -184,11 +185,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("model", type=Path, help="model file of a diagnosis")
     parser.add_argument("batch", type=Path, help="the imported batch of that diagnosis")
-    parser.add_argument("--tolerance", type=float, default=0.02, help="model discrepancy, share of the torque's range")
     parser.add_argument("--no-regressor", action="store_true", help="leave the regressor out")
     parser.add_argument("--out", type=Path, help="JSON file that gets the rows")
     arguments = parser.parse_args()
-    found = rows(arguments.batch, arguments.model, arguments.tolerance, not arguments.no_regressor)
+    found = rows(arguments.batch, arguments.model, not arguments.no_regressor)
     if arguments.out:
         arguments.out.write_text(json.dumps(found, indent=1) + "\n")
 

@@ -71,11 +71,20 @@ def test_an_unknown_load_and_a_tolerance_change_the_estimate(estimate, fitted, b
     assert width(wide) > 1.5 * width(estimate["t-6N"])
 
 
+def test_a_tolerance_of_the_angle_widens_its_interval_alone(estimate, fitted, batch):
+    plain, wide = estimate["t-6N"], cc.estimate(fitted, batch, tolerance={"theta_out_rad": 0.01})["t-6N"]
+    sd, own = ((t["theta_out_rad_high"] - t["theta_out_rad"]).iloc[-1] / 1.6449 for t in (wide, plain))
+    assert sd**2 - own**2 == pytest.approx((0.01 * np.ptp(plain["theta_out_rad"])) ** 2, rel=1e-3)
+    assert wide["tau_out_Nm_high"].equals(plain["tau_out_Nm_high"])
+
+
 @pytest.mark.parametrize(
     ("options", "line"),
     [
-        ({"tolerance": 0}, r"tolerance: a share of the torque's peak to peak, above zero; got 0"),
+        ({"tolerance": 0}, "tolerance: a share of peak to peak, above zero; got 0"),
         ({"tolerance": "2 %"}, "tolerance: .* got '2 %'"),
+        ({"tolerance": {"tau_in_Nm": 0.01, "theta_out_rad": -1}}, "tolerance: .* got -1"),
+        ({"tolerance": {"F_load_N": 0.01}}, "tolerance: an estimate has those of .* got 'F_load_N'"),
     ],
 )
 def test_options_of_an_estimate_that_cannot_be_used_are_named(fitted, batch, options, line):
@@ -87,7 +96,7 @@ def test_a_tolerance_of_another_channel_is_refused(fitted, folder, tmp_path, mon
     fitted.save(tmp_path / "fit.json")
     words = ["estimate", folder, "--model", tmp_path / "fit.json", "--out", tmp_path / "out"]
     code, _, err = run(monkeypatch, capsys, *words, "--tolerance", "tau_out_Nm=0.02")
-    assert (code, err) == (2, "--tolerance: an estimate has one, of tau_in_Nm; got tau_out_Nm\n")
+    assert (code, err) == (2, "tolerance: an estimate has those of tau_in_Nm and theta_out_rad; got 'tau_out_Nm'\n")
 
 
 @pytest.fixture(scope="module")

@@ -14,10 +14,10 @@ from ccmodel.api.batch import Batch, as_batch
 from ccmodel.api.model import HasModel, Motion, as_model, as_motion
 from ccmodel.api.options import progress_of
 from ccmodel.api.recordings import counted
-from ccmodel.channels import TAU_OUT, THETA_IN, THETA_OUT, unit_of
+from ccmodel.channels import TAU_IN, TAU_OUT, THETA_IN, THETA_OUT, unit_of
 from ccmodel.failure import ModelError
 from ccmodel.inverse.compensate import WANTED, Limits, compensated
-from ccmodel.inverse.estimate import TOLERANCE, VISIBLE, Estimated, estimated
+from ccmodel.inverse.estimate import VISIBLE, Estimated, estimated
 from ccmodel.model.files import Model
 from ccmodel.model.parameters import Parameters
 from ccmodel.outputs import new_file, new_files
@@ -28,6 +28,8 @@ from ccmodel.steps.predict import READING, conditions_of
 from ccmodel.typed import InputError, advice
 
 WANTED_MOTION = ["time_s", THETA_OUT]
+# Parameters of `estimated` by channel.
+_TOLERANCES = {TAU_IN: "tolerance", THETA_OUT: "angle_tolerance"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -109,7 +111,7 @@ def estimate(
     out: str | Path | None = None,
     *,
     unknown_load: bool = False,
-    tolerance: float | None = None,
+    tolerance: float | Mapping[str, float] | None = None,
     progress: bool | Progress = False,
 ) -> Estimate:
     """Estimate the load's torque and angle from the drive's angle and torque, causally, sample by sample.
@@ -128,8 +130,9 @@ def estimate(
         Folder for the estimates, a CSV for each recording; `Estimate.save` writes them later.
     unknown_load : bool
         Whether the load is unknown, though the model has the law of a spring.
-    tolerance : float, optional
-        Standard deviation of the model discrepancy of the drive torque, as a share of its peak to peak; 0.005 without.
+    tolerance : float or mapping of str to float, optional
+        Standard deviation of the model discrepancy, as a share of peak to peak: of the drive torque, or by channel of
+        ``tau_in_Nm`` (0.005 if not stated) and ``theta_out_rad`` (0).
     progress : bool or callable
         True shows progress; a callable gets ``(text, share of the work done)``.
 
@@ -152,9 +155,7 @@ def estimate(
 'load_is_visible']
     """
     known = as_model(model)
-    share = (
-        TOLERANCE if tolerance is None else _positive(tolerance, "tolerance", "a share of the torque's peak to peak")
-    )
+    shares = _shares(tolerance)
     if out is not None:
         try_folder(out)
     sds = {name: sd for name, one in known.intervals.items() if (sd := one.get("sd")) is not None}
@@ -167,7 +168,7 @@ def estimate(
         texts = within(report, READING, 1.0)
         for recording in each_of(batch.recordings, texts, lambda one: f"estimating the load of {one.batch}/{one.id}"):
             try:
-                found = estimated(recording, known.parameters, sds, not unknown_load, share)
+                found = estimated(recording, known.parameters, sds, not unknown_load, **shares)
             except (ModelError, ValueError) as error:
                 left_out.append(f"{recording.batch}/{recording.id}: {error}")
                 continue
@@ -180,6 +181,22 @@ def estimate(
     if out is not None:
         result.save(out)
     return result
+
+
+def _shares(tolerance: float | Mapping[str, float] | None) -> dict[str, float]:
+    """Tolerances as `estimated` takes them.
+
+    Raises
+    ------
+    InputError
+        If one is no share, or of a channel that has none.
+    """
+    if tolerance is None:
+        return {}
+    stated = tolerance if isinstance(tolerance, Mapping) else {TAU_IN: tolerance}
+    if other := [repr(name) for name in stated if name not in _TOLERANCES]:
+        raise InputError(f"tolerance: an estimate has those of {' and '.join(_TOLERANCES)}; got {', '.join(other)}")
+    return {_TOLERANCES[n]: _positive(x, "tolerance", "a share of peak to peak") for n, x in stated.items()}
 
 
 def _errors(found: Estimated, parameters: Parameters) -> list[tuple]:

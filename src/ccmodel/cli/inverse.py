@@ -49,9 +49,9 @@ def estimate(
     import ccmodel
 
     output = Output(as_json, quiet)
-    share = _torque_tolerance(tolerance)
+    shares = tolerance_of(tolerance)
     with leaving(out), output.progress() as progress:
-        found = ccmodel.estimate(model, batch, out, unknown_load=unknown_load, tolerance=share, progress=progress)
+        found = ccmodel.estimate(model, batch, out, unknown_load=unknown_load, tolerance=shares, progress=progress)
     lines = [found.errors.to_string(index=False, float_format="{:.3g}".format)] if len(found.errors) else []
     errors, visible = found.errors.to_dict("records"), found.visible_share.to_dict()
     data = {"out": out, "errors": errors, "visible_share": visible, "notes": found.notes, "left_out": found.left_out}
@@ -62,25 +62,6 @@ def estimate(
         output.finding(line, "refused")
     if found.left_out:
         raise typer.Exit(1)
-
-
-def _torque_tolerance(stated: list[str]) -> float | None:
-    """The tolerance of the drive torque.
-
-    Raises
-    ------
-    InputError
-        If one of another channel is stated.
-    """
-    from ccmodel.channels import TAU_IN
-    from ccmodel.typed import InputError
-
-    share = tolerance_of(stated)
-    if not isinstance(share, dict):
-        return share
-    if list(share) != [TAU_IN]:
-        raise InputError(f"--tolerance: an estimate has one, of {TAU_IN}; got {', '.join(share)}")
-    return share[TAU_IN]
 
 
 def compensate(

@@ -66,6 +66,7 @@ def estimated(
     sds: Mapping[str, float] | None = None,
     uses_law: bool = True,
     tolerance: float = TOLERANCE,
+    angle_tolerance: float = 0.0,
 ) -> Estimated:
     """Estimate the load's torque and angle from the drive's side of a recording.
 
@@ -79,7 +80,9 @@ def estimated(
     uses_law : bool
         Whether the load's spring, if the model has one, is a source beside the drive torque.
     tolerance : float
-        Standard deviation of the model discrepancy of the drive torque, as a share of its peak to peak.
+        Standard deviation of the model discrepancy of the drive torque, as a share of its peak to peak so far.
+    angle_tolerance : float
+        The same of the load's angle, which widens its interval.
 
     Raises
     ------
@@ -102,6 +105,8 @@ def estimated(
     spread[0] += (problem.proximal.sigma_in * ratio) ** 2
     middle = nominal.out + correction
     middle[0] += problem.parameters.theta_out_zero_rad - nominal.out[0, 0]
+    range_so_far = np.maximum.accumulate(middle[0]) - np.minimum.accumulate(middle[0])
+    spread[0] += (angle_tolerance * range_so_far) ** 2
     half = HALF_WIDTH * np.sqrt(spread)
     columns = dict(zip(COLUMNS, (x for m, h in zip(middle, half, strict=True) for x in (m, m - h, m + h)), strict=True))
     table = pd.DataFrame(columns, index=pd.Index(recording.time_s, name="time_s"))
