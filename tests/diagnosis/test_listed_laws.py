@@ -9,7 +9,7 @@ from ccmodel import mechanisms
 from ccmodel.diagnosis.listed_laws import Learned, distance, nearest_listed
 from ccmodel.diagnosis.settings import WITHIN_BAND
 from ccmodel.mechanisms import laws
-from ccmodel.mechanisms.learned import COARSE, FINE
+from ccmodel.mechanisms.learned import FINE
 from ccmodel.report.verdict import law_claim
 
 # What recordings visit of each argument.
@@ -35,7 +35,8 @@ def law_of(curve):
     return next(
         law
         for law in laws().values()
-        if (law.slot, law.argument.name, law.resolution) == (curve.slot, curve.argument, COARSE)
+        if law.is_first
+        and (law.slot, law.argument.name) == (curve.slot, curve.argument)
         and (not curve.channels or law.channel in curve.channels)
     )
 

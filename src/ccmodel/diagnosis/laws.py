@@ -20,7 +20,7 @@ from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.failure import ModelError
 from ccmodel.inference.pool import each
 from ccmodel.mechanisms import Sensing, laws
-from ccmodel.mechanisms.learned import COARSE, Law
+from ccmodel.mechanisms.learned import Law
 from ccmodel.model.parameters import mechanism_key
 from ccmodel.model.run import simulate
 
@@ -147,4 +147,4 @@ def values_of(candidate: CandidateFit, law: Law) -> dict[str, float]:
 
 def first_laws() -> list[Law]:
     """The laws that are tried first: every one with few knots, and those of an angle, which may repeat, with many."""
-    return [law for law in laws().values() if law.resolution == COARSE or law.argument.unit == "rad"]
+    return [law for law in laws().values() if law.is_first or law.argument.unit == "rad"]

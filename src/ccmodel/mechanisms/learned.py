@@ -52,8 +52,9 @@ from ccmodel.mechanisms.contract import (
 from ccmodel.mechanisms.tables import Table
 
 # Knots of a law, and the length over which its values are correlated a priori, as a share of its range: at first, and
-# where the recordings show more.
-COARSE, FINE = (9, 0.25), (25, 0.08)
+# where the recordings show more. The fastening of a cable is smooth at first: with more coefficients its law would be
+# less probable than friction that vanishes next to it, which yields alike.
+COARSE, FINE, SMOOTH = (9, 0.25), (25, 0.08), (9, 1.0)
 # Shares of a law's standard deviation below which a direction of its coefficients is left out.
 SLIGHTEST = 0.02
 # A reversal is a motion back by more than this, which noise of the encoder does not reach.
@@ -134,7 +135,7 @@ class Law:
             of = f"-{short_name(str(self.channel))}".replace("_", "-")
         if self.slot == END_STRETCH:
             of = f"-{side(self.place)}"
-        fine = "-fine" if self.resolution == FINE else ""
+        fine = "" if self.is_first else "-fine"
         return f"learned-{self.slot}{of}-by-{self.argument.name}{fine}"
 
     @property
@@ -238,9 +239,14 @@ class Law:
         return (self.slot, self.place) == (other.slot, other.place) and is_same_sensor
 
     def finer(self) -> "Law | None":
-        """The same law with more knots, if there is one."""
-        is_finest = self.argument.has_two_values or self.opposes is not None or self.resolution == FINE
-        return None if is_finest else replace(self, resolution=FINE)
+        """The same law with more coefficients, if there is one."""
+        is_finest = self.argument.has_two_values or self.opposes is not None or not self.is_first
+        return None if is_finest else replace(self, resolution=COARSE if self.slot == END_STRETCH else FINE)
+
+    @property
+    def is_first(self) -> bool:
+        """Whether it is tried before the same law with more coefficients."""
+        return self.resolution == (SMOOTH if self.slot == END_STRETCH else COARSE)
 
     @cached_property
     def mechanism(self) -> Mechanism:
@@ -459,7 +465,7 @@ def _laws() -> Iterator[Law]:
         yield Law(SLIDING_FRICTION, "conduit", argument)
     yield Law(CABLE_STRETCH, "cable", TENSION)
     for end in ("drive-end", "load-end"):
-        yield Law(END_STRETCH, end, TENSION)
+        yield Law(END_STRETCH, end, TENSION, resolution=SMOOTH)
     for slot, place, channel, motion, angle in (
         (BEARING_TORQUE, "drive-pulley", TAU_IN, drive, THETA_IN),
         (LOAD, "load", TAU_OUT, load, THETA_OUT),
