@@ -87,6 +87,16 @@ def test_friction_by_tension_is_that_of_a_power_law_with_these_values():
     assert largest_difference(found, wanted) < 0.1 * largest_difference(run(sine()), wanted)
 
 
+def test_a_table_acts_beside_a_power_of_the_tension():
+    law = laws()["learned-sliding-friction-by-tension-fine"]
+    part = np.geomspace(*RANGES["tension"], FINE[0]) ** -0.15
+    table = with_values(law, lambda x: x**-0.15 / part.mean() - 1)
+    mu = MU * part.mean() * 5**0.15
+    both = run(sine(), [table, ("load-dependent-friction", "conduit", {"n": -0.1})], mu=mu)
+    wanted = run(sine(), ("load-dependent-friction", "conduit", {"n": -0.25}))
+    assert largest_difference(both, wanted) < 0.1 * largest_difference(run(sine()), wanted)
+
+
 def test_friction_by_position_is_where_the_bend_is():
     """Twice the friction in the first half and none in the other is a path that bends in the first half alone."""
     law = laws()["learned-sliding-friction-by-position-along-conduit-fine"]

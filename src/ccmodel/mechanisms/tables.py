@@ -36,7 +36,7 @@ class Table(NamedTuple):
         return np.concatenate([self.rows, stretches])
 
 
-@kernel
+@kernel(inline="always")
 def _before(rows: NDArray, first: int, knots: int, c: int, i: int, x: float) -> int:
     """Number of the interval, of those between the `knots` rows from `first`, that has x in it or next to it."""
     k = 0
@@ -45,7 +45,7 @@ def _before(rows: NDArray, first: int, knots: int, c: int, i: int, x: float) -> 
     return k
 
 
-@kernel
+@kernel(inline="always")
 def interpolated(rows: NDArray, at: int, c: int, i: int, x: float) -> tuple[float, float]:
     """Value of the table in the rows from `at` at an argument, and its derivative."""
     knots = int(rows[at, c, i])
@@ -74,7 +74,7 @@ def stretched(rows: NDArray, at: int, c: int, i: int, tension: float) -> float:
     return rows[stretch + k, c, i] + mean * (inside - rows[argument + k, c, i]) + below + above
 
 
-@kernel
+@kernel(inline="always")
 def pulled(rows: NDArray, at: int, c: int, i: int, stretch: float) -> tuple[float, float]:
     """Tension at a stretch of the spring in the rows from `at`, and its derivative: the inverse of `stretched`."""
     knots = int(rows[at, c, i])

@@ -114,11 +114,18 @@ def _set_hold_by_table(ph: Physics, piece: NDArray, node: NDArray, c: int) -> No
     T, grip, now, slope = piece[rows.TENSION, c], node[rows.GRIP, c], node[rows.GRIP_NOW, c], node[rows.GRIP_SLOPE, c]
     for i in range(node.shape[2]):
         half = 0.5 * (max(T[i], 0.0) + max(T[i + 1], 0.0))
-        power, by_power = power_of_tension(half, ph.tension_exponent)
-        factor, by_factor = interpolated(node, rows.FRICTION_TABLE, c, i, half)
-        g = quick_tanh(grip[i] * power * factor)
+        now[i], slope[i] = interpolated(node, rows.FRICTION_TABLE, c, i, half)
+    if ph.tension_exponent != 0.0:
+        for i in range(node.shape[2]):
+            half = 0.5 * (max(T[i], 0.0) + max(T[i + 1], 0.0))
+            power, by_power = power_of_tension(half, ph.tension_exponent)
+            slope[i] = power * slope[i] + by_power * now[i]
+            now[i] *= power
+    for i in range(node.shape[2]):
+        half = 0.5 * (max(T[i], 0.0) + max(T[i + 1], 0.0))
+        g = quick_tanh(grip[i] * now[i])
         now[i] = g
-        slope[i] = half * (1.0 - g * g) * grip[i] * (by_power * factor + power * by_factor)
+        slope[i] = half * (1.0 - g * g) * grip[i] * slope[i]
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
