@@ -2,6 +2,7 @@
 
 import errno
 import json
+from dataclasses import dataclass, replace
 
 import pandas as pd
 import pytest
@@ -16,6 +17,7 @@ from ccmodel.studies.diagnosis import run as stage
 from ccmodel.studies.diagnosis.inconsistent import report
 from ccmodel.studies.diagnosis.settings import Diagnosing
 from ccmodel.typed import InputError
+from model_runs import CABLE
 
 KEYS = {
     "format", "batch", "verdict", "is_held", "location", "mechanisms", "alternatives", "likeliest", "nearest", "fit",
@@ -166,3 +168,25 @@ def test_a_page_that_cannot_be_written_leaves_the_earlier_diagnosis(dead, tmp_pa
     run("diagnose", dead, "--out", out)
     files = {"diagnosis.json", "report.html", "calibrated.json", "model.json", "notes.txt"}
     assert {file.name for file in out.iterdir()} == files
+
+
+def test_a_stiffness_in_another_unit_is_no_physics_unless_it_is_trusted(batch, monkeypatch):
+    @dataclass
+    class Found:
+        report: dict
+        calibrated: None = None
+
+        def model(self, _):
+            return replace(CABLE, stiffness_N_per_m=7500.0)
+
+    read = rig.ingest_batch(batch)
+    cable = read.stated.rig.cable.model_copy(update={"stiffness_N_per_m": 13.88})
+    stated = read.stated.model_copy(update={"rig": read.stated.rig.model_copy(update={"cable": cable})})
+    monkeypatch.setattr(stage, "run", lambda *_: Found({"verdict": "agrees"}))
+    monkeypatch.setattr(stage, "headline", lambda report: report["verdict"])
+    said = stage.diagnosed(replace(read, batch=stated), {}).content
+    assert said["verdict"] == "inputs-inconsistent"
+    assert said["not_judged"][0]["what"] == "batch.yaml, rig.cable.stiffness_N_per_m"
+    assert "13.88, and the fit to the recordings ends at 7.5e+03 N/m, 540 times as much" in said["not_judged"][0]["why"]
+    assert stage.diagnosed(replace(read, batch=stated), {}, trust_inputs=True).content["verdict"] == "agrees"
+    assert stage.diagnosed(read, {}).content["verdict"] == "agrees"

@@ -9,6 +9,7 @@ from made_up_batch import T0, Bench, table
 
 from benchmarks.input_mistakes import MISTAKES, Copy, outcome, read_copy, said_of, write_copy
 from ccmodel.rig.consistency.clocks import drift_of
+from ccmodel.rig.consistency.fitted import contradicted_by_fit
 from ccmodel.rig.consistency.parity import Parity, closed_part, crossings, white_noise
 from ccmodel.rig.consistency.signs import EXCHANGED, FAULTS, explanation, negative_relations
 from ccmodel.rig.ingest import ingest_batch
@@ -293,3 +294,26 @@ def test_no_offset_of_a_load_cell_acts_on_the_rise_of_tensions():
         assert shifted.offset_free_ratio == pytest.approx(found.offset_free_ratio, rel=1e-6)
         assert found.offset_free_ratio == pytest.approx(found.log_ratio, rel=0.4)
         assert abs(shifted.log_ratio - found.log_ratio) > 0.05
+
+
+@pytest.mark.parametrize("factor", [0.1, 10.0])
+def test_times_that_make_the_noted_frequency_another_are_named(factor, tmp_path):
+    copy = read_copy(Path("data/raw/half-loop"))
+    for log in copy.logs.values():
+        log["time_s"] *= factor
+    (said,) = said_of(write_copy(copy, tmp_path / "half-loop"))
+    assert said.startswith("batch.yaml time_s")
+    assert f"the drive moves at {1 / factor:.3g} times the frequency that is noted" in said
+
+
+@pytest.mark.parametrize("fitted, named", [(7500.0, True), (600.0, True), (12.0, False), (2.0, False)])
+def test_a_stated_stiffness_that_a_fit_contradicts(fitted, named, tmp_path):
+    copy = read_copy(Path("data/raw/loops"))
+    copy.rig["cable"]["stiffness_N_per_m"] = 13.88
+    batch = ingest_batch(write_copy(copy, tmp_path / "loops")).stated
+    found = contradicted_by_fit(fitted, batch)
+    assert [f.is_inconsistent for f in found] == [True] * named
+    assert all("rig.cable.stiffness_N_per_m is 13.88" in f.text for f in found)
+    copy.rig["nominal"] = ["cable.stiffness_N_per_m"]
+    batch = ingest_batch(write_copy(copy, tmp_path / "nominal")).stated
+    assert contradicted_by_fit(fitted, batch) == []

@@ -22,6 +22,7 @@ from ccmodel.model.files import Model, RigConditions
 from ccmodel.model.parameters import Parameters, unit_of_parameter
 from ccmodel.outputs import new_file
 from ccmodel.progress import Progress, within
+from ccmodel.rig.consistency.fitted import contradicted_by_fit
 from ccmodel.studies.diagnosis.run import INGEST, options_of
 from ccmodel.typed import InputError
 
@@ -98,6 +99,8 @@ class Fit:
                 " values depend on how its errors are weighted, which no interval contains; diagnose() finds what is"
                 " missing"
             )
+        wrong = contradicted_by_fit(self.model.parameters.stiffness_N_per_m, self.batch._file)
+        found += [f"{finding.place}: {finding.text}" for finding in wrong]
         found += [f"{name} stands at one of its bounds" for name in self.at_bound]
         if len(self.recordings) == 1:
             found.append(

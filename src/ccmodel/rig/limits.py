@@ -65,7 +65,7 @@ ABOVE_NOISE_SDS = 10
 # Duration of an initial rest. Less is the time to the first count of a motion.
 SHORTEST_REST_S = 0.1
 # Steps of time that no log of a moving rig has, s: the times are in ms or µs, or in days.
-SHORTEST_STEP_S, LONGEST_STEP_S = 2e-6, 0.2
+SHORTEST_STEP_S, LONGEST_STEP_S = 5e-6, 0.2
 # A change of an angle stands out if it is this factor and so many counts above all changes of the samples near it.
 OUTSTANDING_FACTOR, OUTSTANDING_GRAINS, NEAR_SAMPLES = 2.5, 2.0, 12
 # An impossible reading of an analog channel: it is farther from the median of so many neighbours on each side than any

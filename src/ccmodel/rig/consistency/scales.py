@@ -43,6 +43,7 @@ def wrong_scales(parities: Sequence[Parity]) -> list[Contradiction]:
     """Scale of the load torque, and stated values of spring, cable and pretension that the recordings contradict."""
     ratios, batch = pooled(parities), parities[0].batch
     found = (_load_torque(ratios) or _spring(ratios, batch)) + _pretension(ratios) + _cable(ratios, batch)
+    found += _frequency(ratios)
     return [*found, *_accuracies(parities)]
 
 
@@ -204,6 +205,18 @@ def _pretension(ratios: Mapping[str, float]) -> list[Contradiction]:
     name = next(name for name, side in sides.items() if side).rsplit(" ", 1)[1]
     text = f"the sums of tensions at rest are {values} twice the stated pretension; check rig.{name}.load_cell"
     return [Contradiction(SUM_AT[name], text, None, LIKELY)]
+
+
+def _frequency(ratios: Mapping[str, float]) -> list[Contradiction]:
+    """Scale of time, from the noted frequency of a sine or triangle."""
+    ratio = ratios.get("frequency")
+    if not beyond(ratio, limits.FREQUENCY_FACTOR):
+        return []
+    text = (
+        f"the drive moves at {ratio:.3g} times the frequency that is noted: are the times in another unit than s?"
+        " Correct time_s, or excitation.frequency_Hz, which is in Hz"
+    )
+    return [Contradiction("time_s", text, None, LIKELY)]
 
 
 def _cable(ratios: Mapping[str, float], batch: Batch) -> list[Contradiction]:

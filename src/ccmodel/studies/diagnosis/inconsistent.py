@@ -58,7 +58,7 @@ def _location(contradictions: Sequence[Finding]) -> dict:
     ends = {_end_of(f.column) for f in contradictions}
     places = [f"{end}-sensor" for end in ends if end is not None and len(ends) == 1]
     where = f" {TEXT[places[0]]}" if places else ""
-    text = f"The inputs contradict one another{where}; no model was fitted."
+    text = f"The inputs contradict one another{where}; no model is given."
     return {"place": places[0] if places else None, "places": places, "channels": [], "phases": [], "text": text}
 
 

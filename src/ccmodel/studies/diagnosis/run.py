@@ -16,6 +16,7 @@ from ccmodel.outputs import new_files
 from ccmodel.progress import Progress, silent
 from ccmodel.recording import Recording
 from ccmodel.report.verdict import headline
+from ccmodel.rig.consistency.fitted import contradicted_by_fit
 from ccmodel.rig.ingest import Ingested
 from ccmodel.rig.joint import together
 from ccmodel.steps.files import write_json
@@ -43,7 +44,7 @@ class Outcome:
     recordings : sequence of Recording
         Of the batch.
     found : Diagnosis or None
-        None if the inputs contradict one another, so that no model was fitted.
+        None if the inputs contradict one another, so that there is no verdict on the physics.
     """
 
     content: dict
@@ -99,6 +100,10 @@ def diagnosed(
         return Outcome(_complete(_with_batches(report, ingested), inputs), ingested.recordings)
     estimates = Parameters.estimated(ingested.stated.rig)
     found = run(ingested.recordings, estimates, options, baseline, _not_judged(ingested), progress)
+    fitted = found.model(found.calibrated).stiffness_N_per_m
+    if not trust_inputs and (wrong := contradicted_by_fit(fitted, ingested.stated)):
+        report = inconsistent.report(ingested.stated.batch, [*findings, *wrong], options.freeze, bool(ingested.parts))
+        return Outcome(_complete(_with_batches(report, ingested), inputs), ingested.recordings)
     found = replace(found, report=_with_batches(found.report, ingested))
     return Outcome(_complete(found.report, inputs), ingested.recordings, found)
 
