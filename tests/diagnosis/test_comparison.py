@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from ccmodel.deadline import UNLIMITED, Deadline
 from ccmodel.diagnosis import comparison as comparisons
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.comparison import Comparison, imitation, log_priors
@@ -347,6 +348,32 @@ def test_a_further_mechanism_is_not_credited_with_a_worse_minimum_of_a_part(monk
     found = selection.extended(Comparison.of(recordings, base, [stuck], SCREENED), None, 2)
     assert found.leading[0].hypothesis.acting == (SCALE,)
     assert found.leading[0].mean_square == pytest.approx(single.mean_square, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("left_by_pair", "until", "order"),
+    [
+        (10.0, UNLIMITED, ["set of 2", "set of 3", "set of 4", "laws"]),
+        (25.0, UNLIMITED, ["set of 2", "laws", "set of 3", "set of 4"]),
+        (10.0, Deadline(0.0), ["laws"]),
+    ],
+)
+def test_laws_come_where_sets_do_not_lead_on_or_their_time_is_over(monkeypatch, left_by_pair, until, order):
+    single = fitted(31.0, KINK), evidence(size=30.0)
+    sets = [(KINK, SCALE), (KINK, SCALE, FRICTION), (KINK, SCALE, FRICTION, STRIBECK)]
+    left = [left_by_pair, left_by_pair / 4, left_by_pair / 10]
+    steps = []
+
+    def of(size):
+        pairs = zip(left[: size - 1], sets, strict=False)
+        further = [(fitted(1 + m, *s), evidence(*2 * (NONE - 300 / len(s),), size=m)) for m, s in pairs]
+        return compared(evidence(), single, *further, model=fitted(600.0))
+
+    monkeypatch.setattr(Selection, "relinearise", lambda self, found: found)
+    monkeypatch.setattr(Selection, "extended", lambda self, f, s, size: steps.append(f"set of {size}") or of(size))
+    monkeypatch.setattr(Selection, "learn", lambda self, found: steps.append("laws") or found)
+    Selection({}, [], laws=(None,), sets_until=until).further(of(1), None)
+    assert steps == order
 
 
 def test_the_covariance_is_linearised_about_the_best_candidate(monkeypatch):

@@ -255,6 +255,18 @@ class Comparison:
         weights = np.logaddexp.reduce(self.log_weights[1:], axis=1)
         return [self.candidates[k] for k in np.argsort(-weights, kind="stable")]
 
+    def leads_on(self, size: int) -> bool:
+        """Whether the best set of `size` mechanisms leaves at most half of what the best smaller one leaves.
+
+        Larger sets are then worth their time; a law that no list holds is better looked for otherwise.
+        """
+        ranked = [self.base, *self.candidates]
+        left, before = (
+            min((self.left_by(c) for c in ranked if is_size(c.hypothesis.size)), default=np.inf)
+            for is_size in (lambda s: s == size, lambda s: s < size)
+        )
+        return bool(left <= settings.LEADING_ON * before)
+
     def log_weight(self, candidate: CandidateFit) -> float:
         """Log posterior of a candidate, complete or not."""
         return float(np.logaddexp.reduce(self.log_posterior[1 + self.candidates.index(candidate)]))

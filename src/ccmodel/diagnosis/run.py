@@ -192,7 +192,7 @@ def diagnose(
     ModelError
         If the model cannot be run on any of the recordings.
     """
-    deadline = Deadline.after(options.time_limit_s)
+    deadline, sets_until = (Deadline.after(share * options.time_limit_s) for share in (1.0, settings.SETS_SHARE))
     found = calibrate(recordings, estimates, options, baseline, within(progress, 0.0, CALIBRATED))
     tested, whitened = found.tested, found.whitened
     unjudged = [*map(dict, not_judged), *found.not_judged]
@@ -202,7 +202,7 @@ def diagnose(
     mechanisms = single_mechanisms(options.without, tested.hypothesis)
     forced = [stated_hypothesis(stated) for stated in options.forced_candidates]
     of_selection = within(progress, CALIBRATED, SELECTED)
-    selection = Selection(tested.free, mechanisms, forced, first_laws(), of_selection, deadline)
+    selection = Selection(tested.free, mechanisms, forced, first_laws(), of_selection, deadline, sets_until)
     comparison, scores = selection.run(whitened, found.fit)
     if deadline.has_passed:
         why = f"the time limit of {options.time_limit_s:g} s was reached before all of them were fitted"

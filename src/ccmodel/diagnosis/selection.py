@@ -24,6 +24,7 @@ from ccmodel.progress import Progress, silent, within
 # sets. Of a set size's share, those at which the covariance is linearised and the further mechanisms are screened.
 # Measured on two batches, data/raw/loops and half-loop; they only serve the estimate of the time left.
 SCREENED, FITTED = 0.15, 0.35
+SIZES = settings.MOST_MECHANISMS - 1
 RELINEARISED, PARTNERS_SCREENED = 0.3, 0.5
 
 
@@ -42,8 +43,8 @@ class Selection:
     laws : sequence of Law
         Laws that may be learned where something is missing that is on no list.
     progress : Progress
-    deadline : Deadline
-        When the selection ends with what was fitted until then.
+    deadline, sets_until : Deadline
+        When the selection ends with what was fitted until then; and when sets are to be fitted before laws are learned.
     """
 
     free: Mapping[str, Free]
@@ -52,6 +53,7 @@ class Selection:
     laws: Sequence[Law] = ()
     progress: Progress = field(default=silent)
     deadline: Deadline = UNLIMITED
+    sets_until: Deadline = UNLIMITED
 
     def run(self, whitened: Sequence[Whitened], base: CandidateFit) -> tuple[Comparison, list[Score]]:
         """Select from all mechanisms; the comparison of what was fitted, and the screening scores."""
@@ -66,26 +68,35 @@ class Selection:
         chosen = [s.hypothesis for s in leading]
         forced = [Score(h, 0.0, h.start) for h in self.forced if h not in chosen]
         singles = self._part(SCREENED, FITTED).fit_all(whitened, base, [*leading, *forced])
-        found = nothing.with_candidates(singles)
-        step = (1.0 - FITTED) / (settings.MOST_MECHANISMS - 1)
-        for size in range(2, settings.MOST_MECHANISMS + 1):
-            part = self._part(FITTED + (size - 2) * step, FITTED + (size - 1) * step)
-            if not found.is_enough:
-                found = part._part(0.0, RELINEARISED).relinearise(found)
-            if found.is_enough or self.deadline.has_passed or (size > 2 and found.by_evidence[0].is_good):
-                break
-            found = part._part(RELINEARISED, 1.0).extended(found, screening, size)
-            if self.laws and size == settings.LEARN_AFTER and not found.is_decided:
-                found = part.learn(found)
-                if law_of(found.leading[0].hypothesis) is not None:
-                    break
-            if found.by_evidence[0].hypothesis.size < size:
-                break
+        found = self._part(FITTED, 1.0).further(nothing.with_candidates(singles), screening)
         # Candidates are compared, and their parameters estimated, under the best one's own covariance: about a model
         # that lacks something, friction seems to scatter.
         if found.candidates and found.probability_of_base < 0.5:
             found = self.relinearise(found)
         return found, scores
+
+    def further(self, found: Comparison, screening: Screening) -> Comparison:
+        """The same with sets of listed mechanisms, and with laws where sets do not lead on.
+
+        Sets come first, within a share of the time, as long as each size leaves at most half of what the smaller one
+        does. Then laws compete with them, and then larger sets if nothing is decided yet.
+        """
+        sets, size = replace(self, deadline=self.sets_until), 2
+        while size <= settings.MOST_MECHANISMS:
+            part = sets._part((size - 2) / SIZES, (size - 1) / SIZES)
+            if not found.is_enough:
+                found = part._part(0.0, RELINEARISED).relinearise(found)
+            if found.is_enough or part.deadline.has_passed or (size > 2 and found.by_evidence[0].is_good):
+                break
+            found = part._part(RELINEARISED, 1.0).extended(found, screening, size)
+            if not found.leads_on(size) and sets.laws and not found.is_decided:
+                found, sets = self.learn(found), replace(self, laws=())
+                if law_of(found.leading[0].hypothesis) is not None:
+                    break
+            if found.by_evidence[0].hypothesis.size < size:
+                break
+            size += 1
+        return self.learn(found) if sets.laws and not (found.is_decided or found.is_enough) else found
 
     def learn(self, found: Comparison) -> Comparison:
         """The same with laws that no list holds: the leading ones, and the best of them with more knots."""

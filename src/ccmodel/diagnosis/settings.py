@@ -241,5 +241,7 @@ LISTED_STARTS = 3
 WITHIN_BAND = 1.645
 # Share of the excess mean square below which what the best single listed mechanism leaves is learned too. Chosen.
 MOSTLY_LISTED = 0.5
-# Laws are learned after sets of so many listed mechanisms, where these do not decide.
-LEARN_AFTER = 2
+# Share of the time after which no further set is fitted before laws are learned. Chosen: laws take some 40 s.
+SETS_SHARE = 0.6
+# Share of what smaller sets leave that a larger one leaves at most if still larger ones come before laws. Chosen.
+LEADING_ON = 0.5
