@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from builders import recording
 from ccmodel.diagnosis.comparison import Comparison
-from ccmodel.diagnosis.location import location, prominent
+from ccmodel.diagnosis.location import PHASES, location, phases_of, prominent
 from ccmodel.diagnosis.verdict import Judgement
 from ccmodel.diagnosis.whitening import whiten
 from ccmodel.model.general.run import Active
+from ccmodel.model.run import ModelInput
 from made_observations import NOISE, PARAMETERS, batch, calibrated
 
 
@@ -81,3 +83,17 @@ def test_noise_makes_no_channel_prominent():
     square = {"theta_out": 2.1**2, "tau_in": 1.15**2, "tau_out": 1.3**2, "F_drive": 0.9**2}
     assert prominent(square, 0.35) == ["theta_out", "tau_out"]
     assert prominent({"theta_out": 0.9, "tau_in": 0.8}, 0.35) == ["theta_out"]
+
+
+def test_phases_of_a_rest_and_a_triangle_by_hand():
+    """Rest of 1 s, up by 1 rad, down by 1 rad; the neighbourhood of a reversal is a quarter of the stroke."""
+    time_s = np.arange(0.0, 5.0, 0.01)
+    theta = np.interp(time_s, [0.0, 1.0, 3.0, 5.0], [0.0, 0.0, 1.0, 0.0])
+    phase = phases_of(ModelInput.prescribed(recording(), time_s, theta, 5.0))
+
+    def at(second):
+        return PHASES[phase[round(100 * second)]]
+
+    assert {at(second) for second in (0.1, 0.5, 0.9)} == {"at rest"}
+    assert {at(second) for second in (1.1, 1.4, 3.1, 3.4)} == {"after a reversal"}
+    assert {at(second) for second in (1.6, 2.9, 3.6, 4.9)} == {"under way"}

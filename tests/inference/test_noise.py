@@ -1,9 +1,12 @@
 """What counts may be wrong by."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from ccmodel.inference.noise import PHASES, rounding_errors
+from ccmodel.inference.effective_samples import IN_DIAGNOSIS
+from ccmodel.inference.noise import PHASES, SensorNoise, repeated, rounding_errors, sensor_noise
 
 STEP = 0.003
 
@@ -22,3 +25,38 @@ def test_counts_of_an_angle_are_wrong_alike_while_it_rests():
     errors = rounding_errors(angle, STEP)
     assert np.ptp(errors[:, 100:], axis=1).max() < 1e-12
     assert np.ptp(errors[:, :100], axis=1).min() > 0.9 * STEP
+
+
+def noise_of(rest, accuracy=None, step=None, values=(0.0, 1.0)):
+    stated = {} if accuracy is None else {"c": accuracy}
+    steps = {} if step is None else {"c": step}
+    recording = SimpleNamespace(channels={"c": np.asarray(values)}, accuracy=stated, encoder_step_rad=steps)
+    return sensor_noise(SimpleNamespace(recording=recording, resting={"c": np.asarray(rest)}))["c"]
+
+
+def test_a_counted_angle_has_the_deviation_of_its_step():
+    assert noise_of(np.zeros(100), step=STEP).sd == pytest.approx(STEP / np.sqrt(12))
+
+
+def test_the_scatter_at_rest_has_no_bias_and_no_drift_in_it():
+    random = np.random.default_rng(1)
+    drift = 0.5 * np.arange(40)
+    found = [noise_of(drift + random.standard_normal(40)) for _ in range(3000)]
+    assert {one.source for one in found} == {"rest"}
+    assert np.mean([one.sd**2 for one in found]) == pytest.approx(1.0, rel=0.03)
+
+
+def test_a_short_rest_shows_nothing_and_a_quiet_one_little_less_than_the_accuracy():
+    assert noise_of(np.zeros(19), accuracy=0.2) == SensorNoise(0.2, "assumed")
+    assert noise_of(np.zeros(100), accuracy=0.2).sd == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize("at_rest, found", [(1.9, SensorNoise(1.9, "rest")), (2.1, SensorNoise(1.0, "cycles"))])
+def test_a_rest_that_scatters_twice_as_much_as_cycles_is_none(at_rest, found):
+    assert repeated(SensorNoise(at_rest, "rest"), 1.0, 5.0) == found
+
+
+def test_cycles_and_rest_are_weighed_by_their_degrees_of_freedom():
+    found = repeated(SensorNoise(1.0, "rest"), 4.0, 0.2)
+    assert IN_DIAGNOSIS == 20
+    assert found.sd**2 == pytest.approx((4.0 * 1.0 + 4.0 * 4.0) / 8.0)

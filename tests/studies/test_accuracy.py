@@ -5,10 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from builders import recording
 from ccmodel.model.run import simulate_recording
 from ccmodel.studies.accuracy.settings import Accuracy
-from ccmodel.studies.accuracy.study import BY_RECORDING, Case, bias_and_scatter, comparison_table, summary
+from ccmodel.studies.accuracy.study import (
+    BY_RECORDING,
+    Case,
+    bias_and_scatter,
+    comparison_table,
+    sensor_uncertainty,
+    summary,
+)
 from ccmodel.studies.claims import model_runs
+from ccmodel.studies.loops.measures import Quantity
 from ccmodel.studies.loops.settings import Measuring
 from model_runs import CABLE, STUDY
 
@@ -27,6 +36,31 @@ def test_known_bias_and_scatter_are_recovered():
     assert found.delta == pytest.approx(1.2, rel=0.003)
     assert found.sigma_M == pytest.approx(0.08, rel=0.03)
     assert not found.limited
+
+
+def test_the_bias_is_that_of_the_values_and_not_of_their_logarithms():
+    found = bias_and_scatter(*made(1.2, 0.2, 0.15, 200_000), sigma_E=0.15, coverage=0.9)
+    assert found.delta == pytest.approx(1.2, rel=0.004)
+
+
+def test_the_scatter_of_three_pairs_by_hand():
+    found = bias_and_scatter(np.exp([0.0, 0.1, 0.2]), np.ones(3), sigma_E=0.0, coverage=0.9)
+    assert found.sigma_M == pytest.approx(0.1)
+
+
+def test_the_uncertainty_of_a_quantity_is_that_of_two_readings():
+    one = recording(tau_in_Nm=np.sin, tau_out_Nm=np.cos, theta_out_rad=np.sin)
+    one = replace(one, accuracy={"theta_in_rad": 3e-3, "tau_out_Nm": 4e-3}, encoder_step_rad={"theta_in_rad": 0.012})
+    share = Quantity("a share", "%", 100.0, lambda cycle: 0.0, ("tau_out_Nm",))
+    assert sensor_uncertainty(share, one) == pytest.approx(100.0 * np.sqrt(2) * 4e-3)
+    share = replace(share, channels=("theta_in_rad",))
+    assert sensor_uncertainty(share, one) == pytest.approx(100.0 * np.sqrt(2) * 0.012 / np.sqrt(12))
+    ratio = replace(share, channels=("theta_in_rad", "tau_out_Nm"))
+    slope = np.ptp(one["theta_in_rad"]) / np.ptp(one["tau_out_Nm"])
+    assert sensor_uncertainty(ratio, one) == pytest.approx(
+        100.0 * np.sqrt(2) * np.hypot(0.012 / np.sqrt(12), slope * 4e-3)
+    )
+    assert sensor_uncertainty(replace(share, channels=("tau_in_Nm",)), one) is None
 
 
 def test_the_bias_lies_in_its_interval_as_often_as_stated():
