@@ -6,7 +6,7 @@ CORES ?= 2
 # The former name of REGRESSORS.
 REGRESSORS ?= $(RIVALS)
 
-.PHONY: help results real data test docs bench accuracy-gate input-checks diagnosis-settings decision-rules form-errors \
+.PHONY: help results real data test fuzz docs bench accuracy-gate input-checks diagnosis-settings decision-rules form-errors \
   joint-rigs outside-rigs past several-effects table-one coverage proof proof-full proof-real slurm-test lint lock clean
 
 help:  ## list the targets
@@ -44,6 +44,10 @@ data: $(VENV)/.ready  ## record data/raw again with the virtual rig
 test: $(VENV)/.ready  ## run the tests and the linters
 	$(BIN)/python -m pytest -n $$(($(CORES) + 1)) --dist loadfile --no-loadscope-reorder
 	$(MAKE) --no-print-directory lint
+
+fuzz: $(VENV)/.ready  ## damage batches and files, and run the exact solver, FUZZ times as often as the tests do: docs/trust.md
+	FUZZ=$(or $(FUZZ),60) $(BIN)/python -m pytest -n $(CORES) --dist loadfile tests/rig/test_damaged_batches.py \
+	  tests/report/test_damaged_files.py tests/model/test_stated_limits.py
 
 # A fresh environment every time: a build that reuses the last one's is silent about pages it does not read again.
 docs: $(VENV)/.ready  ## build the documents: results/docs/html/index.html; a warning or a dead link is an error

@@ -10,6 +10,7 @@ from ccmodel.model.exact import Status, simulate_pair
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import FixedLoad, SpringLoad
 from ccmodel.model.transmission import MAX_FRICTION_ANGLE, Transmission
+from fuzzing import examples
 
 LOADS = ("fixed", "spring", "free")
 
@@ -35,7 +36,7 @@ def cases(draw, load):
 
 
 @pytest.mark.parametrize("load", LOADS)
-@settings(max_examples=150)
+@settings(max_examples=examples(150))
 @given(data=st.data())
 def test_a_status_or_tensions_within_the_capstan_bound(load, data):
     one, far, initial, theta = data.draw(cases(load))

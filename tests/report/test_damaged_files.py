@@ -16,6 +16,7 @@ from ccmodel.model.general.run import Active
 from ccmodel.model.parameters import Parameters
 from ccmodel.report.summary import summary_of
 from ccmodel.typed import InputError
+from fuzzing import examples
 
 ODD = [None, 3, -1e400, "", [], {}, "x", True, [[]], {"a": 1}, "\ud800", 10**400]
 BASELINE = Path(__file__).parents[2] / "config/accuracy-baseline.json"
@@ -80,7 +81,7 @@ READ = {
 
 
 @pytest.mark.parametrize("name", READ)
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(150), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_damaged_file_is_one_line(name, tmp_path, data):
     good, read = READ[name]

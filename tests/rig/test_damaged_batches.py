@@ -11,6 +11,7 @@ from made_up_batch import description, table
 
 from ccmodel.rig.ingest import ingest_batch
 from ccmodel.rig.overview import overview_of
+from fuzzing import examples
 
 LOGS = {name: table(n=300, seed=seed).to_csv(index=False) for seed, name in enumerate(("one", "two"), start=1)}
 ODD = [
@@ -123,13 +124,13 @@ def folder(tmp_path):
     return tmp_path / "bench"
 
 
-@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(80), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(text=descriptions())
 def test_a_damaged_description(folder, text):
     checked(folder, text, {name: log.encode() for name, log in LOGS.items()})
 
 
-@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(80), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(one=logs(LOGS["one"]), two=logs(LOGS["two"]))
 def test_damaged_logs(folder, one, two):
     checked(folder, yaml.safe_dump(description()).encode(), {"one": one, "two": two})

@@ -96,6 +96,7 @@ REFUSED = {
     "whole line without its end": (write_bytes(lambda raw: raw[:-1]), 401, None, "the last line is cut"),
     "only commas left of a line": (write_bytes(lambda raw: raw + b",,"), 402, None, "the last line is cut"),
     "time back": (cell(30, 0, "0.05"), 30, "time_s", "time must increase, found 0.05 s after 0.112 s"),
+    "time that stands": (cell(30, 0, "0.112"), 30, "time_s", "time must increase, found 0.112 s after 0.112 s"),
     "gross gap": (frame(lambda t: t.drop(index=range(100, 150))), 102, "time_s", "a gap of 0.204 s"),
     "many gaps": (frame(lambda t: t.drop(index=range(150, 400, 2))), None, "time_s", "gaps"),
     "drive stuck": (changed("drive_encoder_counts", lambda t: 7), None, "drive_encoder_counts", "stands still"),

@@ -1,0 +1,88 @@
+"""What a run takes from a recording: its zero, its load, its tension sensors, and the initial profile, by hand."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from builders import recording
+from ccmodel.geometry import ConduitPath
+from ccmodel.model.initial import InitialTension
+from ccmodel.model.load import AngleLoad, FixedLoad, SpringLoad, TorqueLoad
+from ccmodel.model.run import _by_torque_alone, _load, _zeroed
+from model_runs import CABLE
+
+THETA = np.linspace(1.0, 2.0, 301)
+
+
+def moved(rest_s, settled_s, **channels):
+    return replace(recording(settled_s=settled_s, **channels), rest_s=rest_s)
+
+
+def read(t):
+    return 10.0 + t
+
+
+@pytest.mark.parametrize("settled_s", [0.0, 0.5])
+def test_the_zero_is_that_of_the_rest(settled_s):
+    found = _zeroed(THETA, moved(0.5, settled_s, theta_out_rad=read))
+    assert found == pytest.approx(THETA - THETA[0])
+
+
+@pytest.mark.parametrize("rest_s", [0.0, 0.5])
+def test_without_a_rest_of_use_the_judged_samples_have_the_recordings_mean(rest_s):
+    one = moved(rest_s, 1.0, theta_out_rad=read)
+    judged = one.time_s >= 1.0
+    found = _zeroed(THETA, one)
+    assert found[judged].mean() == pytest.approx(one["theta_out_rad"][judged].mean())
+    assert np.ptp(found - THETA) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_without_a_rest_and_without_that_angle_the_first_sample_is_the_zero():
+    assert _zeroed(THETA, moved(0.0, 1.0)) == pytest.approx(THETA - THETA[0])
+
+
+@pytest.mark.parametrize(
+    "channels, alone",
+    [(("tau_in_Nm",), True), (("F_drive_N",), False), (("tau_in_Nm", "F_drive_N"), False), ((), False)],
+)
+def test_a_tension_is_that_of_the_torque_where_there_is_no_load_cell(channels, alone):
+    assert _by_torque_alone("drive", recording(**dict.fromkeys(channels, np.cos))) is alone
+
+
+def given(far_end=None, **measured):
+    one = replace(recording(), far_end=far_end)
+    values = dict.fromkeys(("theta_out", "tau_out", "F_load")) | measured
+    return SimpleNamespace(recording=one, **values)
+
+
+TORQUE, FORCE = np.full(301, 0.02), np.full(301, 5.0)
+
+
+def test_the_load_of_a_run():
+    spring, zeros = CABLE, replace(CABLE, tau_out_zero_Nm=0.005, F_load_zero_N=1.0)
+    none = replace(zeros, load_stiffness_Nm_per_rad=None)
+    load, measured = _load(given(tau_out=TORQUE), spring, "law")
+    assert isinstance(load, SpringLoad) and load.stiffness_Nm_per_rad == 0.05 and measured == ()
+    for parameters, source in ((zeros, "torque"), (none, "law")):
+        load, measured = _load(given(tau_out=TORQUE), parameters, source)
+        assert isinstance(load, TorqueLoad) and measured == ("tau_out_Nm",)
+        assert load.torque_Nm == pytest.approx(0.015)
+    assert isinstance(_load(given("fixed"), none, "law")[0], FixedLoad)
+    load, measured = _load(given("measured-motion", theta_out=THETA), none, "law")
+    assert isinstance(load, AngleLoad) and measured == ("theta_out_rad",)
+    load, measured = _load(given("measured-tension", F_load=FORCE, tau_out=TORQUE), none, "law")
+    assert load.torque_Nm == pytest.approx(4.0 * none.load_radius_m) and measured == ("F_load_N", "T2_N")
+    load, measured = _load(given("measured-tension", tau_out=TORQUE), zeros, "law")
+    assert isinstance(load, TorqueLoad) and measured == ("tau_out_Nm",)
+
+
+@pytest.mark.parametrize("curvature, reached", [(0.5, 0.5), (-0.5, -0.5), (1.0, 1.0), (3.0, 1.0), (-3.0, -1.0)])
+def test_the_middle_of_an_initial_profile_is_off_by_a_share_of_what_friction_holds(curvature, reached):
+    path, mu = ConduitPath([1.2], [2.0]), 0.3
+    initial = InitialTension.between_ends(path, mu, (8.0, 6.0), (6.0, 8.0), (curvature, curvature))
+    held = 0.5 * mu * 2.0 - 0.5 * np.log(8.0 / 6.0)
+    for tension in (initial.tension_A_N, initial.tension_B_N):
+        assert tension[1] == pytest.approx(np.sqrt(48.0) * np.exp(reached * held))
+    initial.log_slopes(path, mu)
