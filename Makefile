@@ -6,8 +6,8 @@ CORES ?= 2
 # The former name of REGRESSORS.
 REGRESSORS ?= $(RIVALS)
 
-.PHONY: help results real data test fuzz docs bench accuracy-gate input-checks diagnosis-settings decision-rules form-errors \
-  joint-rigs outside-rigs past several-effects table-one coverage proof proof-full proof-real slurm-test lint lock clean
+.PHONY: help results real data test fuzz docs bench accuracy-gate input-checks diagnosis-settings decision-rules \
+  form-errors joint-rigs outside-rigs past several-effects table-one coverage proof proof-full proof-real slurm-test lint lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12

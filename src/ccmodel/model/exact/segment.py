@@ -62,6 +62,12 @@ def displacement_gain(front: NDArray, c: int, end: int, sigma: int, r: float) ->
 
 
 @small_kernel
+def _over(numerator: float, denominator: float) -> float:
+    """A quotient; 0 for a motion so small that its square is 0 in double precision."""
+    return numerator / denominator if denominator != 0.0 else 0.0
+
+
+@small_kernel
 def solve_segment(
     front: NDArray, c: int, end: int, sigma: int, weight_P: float, weight_d: float, residual: float
 ) -> float:
@@ -71,7 +77,7 @@ def solve_segment(
     b = weight_P * P_e + weight_d * T_e * E
     if slope == 1.0:
         a = b + weight_d * T_e * sigma * bend
-        return residual / (b + sqrt(max(0.0, b * b + a * residual)))
+        return _over(residual, b + sqrt(max(0.0, b * b + a * residual)))
     return _solve_sloping(slope, b, weight_d * T_e * sigma * bend, residual, log1p(front[2 * c + end, R_STOP]))
 
 
@@ -85,7 +91,7 @@ def _solve_sloping(slope: float, b: float, k: float, residual: float, y_stop: fl
     gain = 1.0 + slope
     linear = b * gain
     square = 0.5 * gain * (b * gain + k)
-    y = 2.0 * residual / (linear + sqrt(max(0.0, linear * linear + 4.0 * square * residual)))
+    y = _over(2.0 * residual, linear + sqrt(max(0.0, linear * linear + 4.0 * square * residual)))
     for _ in range(60):
         if not (min(near, far) < y < max(near, far)):
             y = 0.5 * (near + far)
