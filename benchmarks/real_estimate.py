@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from real_model import CONFIG
 from real_regressor import SETTINGS, STEP_S, _fitted, _mean_squares, features, folds, rms
+from scipy.signal import butter, sosfiltfilt
 
 from ccmodel.config import load_config
 from ccmodel.diagnosis.calibration import calibration
@@ -40,6 +41,7 @@ from ccmodel.rig.ingest import ingest_batch
 
 TARGETS = ("tau_out_Nm", "theta_out_rad")
 HELD_OUT = ("trials", "load_level")
+CLOSING_RAD_PER_S = 0.25
 # Trials of one fold: each rate and each level once at most.
 FOLDS = 5
 
@@ -60,14 +62,14 @@ def judged(recording: Recording) -> NDArray:
 
 
 def is_closing(recording: Recording) -> NDArray:
-    """Whether each sample is of a stroke on which the load is moved against its torque, shape (n,).
+    """Whether each sample is of a closing stroke, as O'Neill and others select them.
 
-    The jaw's torque has one sign in a trial, and a load that resists is moved in its direction.
+    The jaw closes at more than 0.25 rad/s after a third-order low-pass at 50 Hz without delay; the first and the last
+    second are left out.
     """
-    theta = recording["theta_out_rad"]
-    lag = max(1, round(0.05 * recording.rate_Hz))
-    later, earlier = np.roll(theta, -lag), np.roll(theta, lag)
-    return np.sign(later - earlier) == np.sign(np.median(recording["tau_out_Nm"]))
+    angle = sosfiltfilt(butter(3, 50.0, fs=recording.rate_Hz, output="sos"), recording["theta_out_rad"])
+    speed, time_s = np.gradient(angle, recording.time_s), recording.time_s
+    return (speed > CLOSING_RAD_PER_S) & (time_s > time_s[0] + 1.0) & (time_s < time_s[-1] - 1.0)
 
 
 def by_model(batch: Path, model_file: Path, held_out: str) -> list[Estimated]:
@@ -146,7 +148,8 @@ def rows(batch: Path, model_file: Path, with_regressor: bool) -> list[dict]:
                 inside.append(
                     ((table[f"{channel}_low"] + shift <= true) & (true <= table[f"{channel}_high"] + shift))[use]
                 )
-                closing.append((estimate - true)[use & is_closing(r)])
+                if (chosen := use & is_closing(r)).any():
+                    closing.append((estimate - true)[chosen])
                 visible.append((estimate - true)[use & table[VISIBLE].to_numpy()])
             row = {
                 "batch": batch.name,
