@@ -42,6 +42,7 @@ def drawn(law):
     first, last = RANGES.get(law.argument.name, (-1.0, 1.0))
     fixed = {"first": first, "last": last, "scale": SCALES.get(law.slot, 0.1)}
     z = np.random.default_rng(5).standard_normal(len(law.coefficients))
+    z[0] = 1.0 + abs(z[0])  # the mean of a compliance, which is none where it is negative
     values = dict(zip(law.coefficients, z.tolist(), strict=True))
     keys = [
         {mechanism_key(law.name, law.place, name): value for name, value in some.items()} for some in (fixed, values)
