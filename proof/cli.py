@@ -178,6 +178,20 @@ def score(
         raise typer.Exit(1)
 
 
+@app.command()
+def laws(
+    results: Annotated[Path, typer.Argument(exists=True, file_okay=False, help="Folder with one folder a case.")],
+) -> None:
+    """Score the laws that were learned in the families, against the tables of the answers."""
+    from proof.laws import score_of_laws
+    from proof.outcome import read_outcomes
+
+    for one in score_of_laws(read_outcomes(results)):
+        value = one["rate"] if "rate" in one else one["value"]
+        share = "-" if value is None else f"{value:.0%} ({one['low']:.0%} to {one['high']:.0%})"
+        typer.echo(f"{one['what']:62s}{one['n']:4d}  {share:24s} wanted {one['target']:.0%}")
+
+
 def _report_misses(misses: list[dict]) -> None:
     for miss in misses:
         truth, reported = ", ".join(miss["truth"]) or "clean", ", ".join(miss["identified"])

@@ -1,0 +1,101 @@
+"""The score of learned laws against the tables in the answers: slot, argument, curve, and the nearest listed law."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proof.families import FAMILIES
+from proof.intervals import bootstrap, count
+from proof.outcome import DECISION_THRESHOLD, Outcome, is_located, same_place
+
+# A confident law of a wrong slot counts as wrong if its model's error is above so many noise floors.
+STILL_WRONG = 2.0
+# Slots whose values are factors, and those in which an average belongs to nothing but the law.
+FACTORS, NOT_CENTRED = ("sliding-friction", "cable-stretch"), ("end-stretch",)
+PREFIX = "unlisted-"
+
+
+def score_of_laws(outcomes: Sequence[Outcome]) -> list[dict]:
+    """Rates of the families of laws that the list lacks; the targets are those that the families were made for."""
+    every = [o for o in outcomes if o.kind in FAMILIES]
+    visible = [o for o in every if o.is_visible]
+    with_slot = [o for o in visible if _truth(o).get("slot")]
+    found = [o for o in with_slot if law_in_slot(o) is not None and _truth(o)["curve"]]
+    removed = [o for o in visible if o.kind == "removed" and _laws(o)]
+    gaps = [gap for o in visible if (gap := o.gap_closed) is not None]
+    shares = [share for o in found if (share := inside(o)) is not None]
+    return [
+        bootstrap("visible: gap to the floor closed, median", gaps, np.median, 0.8),
+        count("visible: at least 60 % of the gap closed", gaps, lambda gap: gap >= 0.6, 0.9),
+        count("visible: slot or place right", visible, is_slot_right, 0.85),
+        count("visible: argument right or among those not told apart", with_slot, is_argument_right, 0.8),
+        bootstrap("true curve inside the 90 % band, share of the points", shares, np.mean, 0.85),
+        count("removed, a law learned: the mechanism is the nearest listed", removed, is_recognised, 0.8),
+        count("no confident wrong law", every, lambda o: not is_confidently_wrong_law(o), 0.98),
+    ]
+
+
+def _truth(o: Outcome) -> dict:
+    return o.key["truth"][0]
+
+
+def _laws(o: Outcome) -> list[dict]:
+    return (o.diagnosis or {}).get("laws") or []
+
+
+def law_in_slot(o: Outcome) -> dict | None:
+    """The first law of the true slot at the true place; None if there is none."""
+    truth = _truth(o)
+    return next((w for w in _laws(o) if w["slot"] == truth["slot"] and same_place(w["place"], truth["place"])), None)
+
+
+def is_slot_right(o: Outcome) -> bool:
+    """Whether a law of the true slot was learned; of an effect that no slot holds, or without laws, the place."""
+    return law_in_slot(o) is not None if _truth(o).get("slot") and _laws(o) else is_located(o)
+
+
+def is_argument_right(o: Outcome) -> bool:
+    """Whether the law depends on the true quantity, or on one that the recordings do not tell from it."""
+    law = law_in_slot(o)
+    return law is not None and _truth(o)["argument"] in [*law["arguments"], *law["indistinguishable"]]
+
+
+def is_recognised(o: Outcome) -> bool:
+    """Whether the nearest listed law is that of the mechanism that was removed."""
+    name = _truth(o)["name"].removeprefix(PREFIX)
+    return any((law["nearest_listed"] or {}).get("name") == name for law in _laws(o))
+
+
+def is_confidently_wrong_law(o: Outcome) -> bool:
+    """Whether a law of another slot is stated with confidence, and its model is still wrong."""
+    sure = [law for law in _laws(o) if law["confidence"] >= DECISION_THRESHOLD]
+    return bool(sure) and not is_slot_right(o) and not o.error_after <= STILL_WRONG
+
+
+def inside(o: Outcome) -> float | None:
+    """Share of a curve's points at which the true law is inside its band; None for another argument than the true one.
+
+    The true law has what a calibration absorbs as the curve has it: a factor of a factor, an average of what is added,
+    and a slope of what is added by an angle.
+    """
+    law, truth = law_in_slot(o), _truth(o)
+    if law is None or law["arguments"] != [truth["argument"]]:
+        return None
+    x, y, low, high = np.array(law["curve"]).T
+    true_x, true_y = np.array(truth["curve"]).T
+    visited = (x >= true_x[0]) & (x <= true_x[-1])
+    if not visited.any():
+        return None
+    true = absorbed(np.interp(x, true_x, true_y)[visited], x[visited], y[visited], truth)
+    return float(np.mean((true >= low[visited]) & (true <= high[visited])))
+
+
+def absorbed(true: NDArray, x: NDArray, y: NDArray, truth: Mapping) -> NDArray:
+    """True values with what a calibration absorbs as in the curve `y`; all of shape (n,)."""
+    if truth["slot"] in NOT_CENTRED:
+        return true
+    if truth["slot"] in FACTORS:
+        return true * y.mean() / true.mean()
+    is_by_angle = truth["argument"].endswith("-angle") and x.size > 1
+    return true + np.polyval(np.polyfit(x, y - true, 1 if is_by_angle else 0), x)

@@ -1,0 +1,93 @@
+"""The score of learned laws, for answers and diagnoses for which it is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from proof.laws import inside, is_confidently_wrong_law, is_slot_right, score_of_laws
+from proof.outcome import Outcome
+
+X = np.linspace(0.5, 12.0, 9)
+
+
+def answer(kind="unlisted", name="unlisted-yielding-liner", slot="sliding-friction", argument="tension", y=None):
+    curve = [] if y is None else np.column_stack([np.linspace(0.1, 15, 60), y(np.linspace(0.1, 15, 60))]).tolist()
+    truth = {"name": name, "place": "conduit", "slot": slot, "argument": argument, "curve": curve, "severity": 2}
+    return {"case": "case-1", "kind": kind, "protocol": "rich", "recorded": "rich", "truth": [truth]}
+
+
+def law(y, sd=0.02, **changed):
+    stated = {
+        "slot": "sliding-friction",
+        "place": "conduit",
+        "arguments": ["tension"],
+        "indistinguishable": [],
+        "confidence": 0.95,
+        "curve": np.column_stack([X, y(X), y(X) - 1.645 * sd, y(X) + 1.645 * sd]).tolist(),
+        "nearest_listed": {"name": "constant-drag", "distance": 3.0},
+    }
+    return stated | changed
+
+
+def outcome(key, *laws, after=1.1):
+    diagnosis = {"verdict": "learned", "place": "conduit", "mechanisms": [], "alternatives": [], "laws": list(laws)}
+    return Outcome(key, diagnosis, errors={"tau_in_Nm": {"before": 9.0, "after": after, "floor": 1.0}})
+
+
+def rising(x):
+    return 1 + 0.3 / (1 + np.exp(-(x - 6.0)))
+
+
+def of(what, *outcomes):
+    return next(one for one in score_of_laws(outcomes) if what in one["what"])
+
+
+def test_a_true_curve_is_inside_whatever_the_calibration_has_of_it():
+    """Friction is a factor of a factor that is fitted."""
+    right = outcome(answer(y=lambda x: 0.8 * rising(x)), law(rising))
+    assert inside(right) == 1.0
+    shifted = outcome(answer(y=rising), law(lambda x: rising(x) + 0.2 * np.sin(x)))
+    assert inside(shifted) < 0.6
+    assert inside(outcome(answer(y=rising, argument="time"), law(rising))) is None
+
+
+@pytest.mark.parametrize(("argument", "expected"), [("drive-angle", 1.0), ("speed", 0.0)])
+def test_only_a_law_of_an_angle_has_its_slope_from_the_calibration(argument, expected):
+    key = answer(slot="bearing-torque", argument=argument, y=lambda x: 2e-3 * np.sin(x))
+    learned = law(lambda x: 2e-3 * np.sin(x) + 0.01 * x - 0.3, sd=1e-5, slot="bearing-torque", arguments=[argument])
+    assert inside(outcome(key, learned)) == pytest.approx(expected, abs=0.2)
+
+
+def test_slots_and_arguments_are_counted():
+    right = outcome(answer(y=rising), law(rising))
+    untold = outcome(answer(y=rising, argument="speed"), law(rising, indistinguishable=["speed"]))
+    elsewhere = outcome(answer(y=rising), law(rising, slot="cable-stretch"))
+    assert [is_slot_right(o) for o in (right, untold, elsewhere)] == [True, True, False]
+    assert of("argument right", right, untold, elsewhere)["k"] == 2
+    assert of("slot or place", right, untold, elsewhere)["k"] == 2
+    assert of("median", right)["value"] == pytest.approx((9.0 - 1.1) / 8.0)
+
+
+def test_what_no_slot_holds_is_scored_on_its_place():
+    key = answer("removed", "unlisted-presliding", slot="", argument="")
+    assert is_slot_right(outcome(key, law(rising)))
+    far = outcome(key, law(rising))
+    assert not is_slot_right(replace(far, diagnosis=far.diagnosis | {"place": "load-sensor"}))
+
+
+def test_a_removed_mechanism_is_recognised_in_the_nearest_law():
+    key = answer("removed", "unlisted-constant-drag", slot="", argument="")
+    assert of("nearest listed", outcome(key, law(rising)))["k"] == 1
+    none = outcome(key, law(rising, nearest_listed=None))
+    assert of("nearest listed", none)["k"] == 0
+    assert of("nearest listed", outcome(answer(y=rising), law(rising)))["n"] == 0
+
+
+def test_a_confident_law_of_a_wrong_slot_is_wrong_if_its_model_is():
+    key = answer(y=rising)
+    wrong = law(rising, slot="load", place="load")
+    assert is_confidently_wrong_law(outcome(key, wrong, after=4.0))
+    assert not is_confidently_wrong_law(outcome(key, wrong, after=1.5))
+    assert not is_confidently_wrong_law(outcome(key, wrong | {"confidence": 0.6}, after=4.0))
+    assert not is_confidently_wrong_law(outcome(key, law(rising), after=4.0))
