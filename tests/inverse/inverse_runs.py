@@ -4,6 +4,7 @@ import numpy as np
 
 from ccmodel.geometry import ConduitPath
 from ccmodel.inverse import exact, general
+from ccmodel.inverse.estimate import WANDERS_RAD
 from ccmodel.inverse.update import BY_MISFIT, Considered, Drive, Prior
 from ccmodel.model.general.active import active_of
 from ccmodel.model.general.run import settings_of
@@ -18,7 +19,7 @@ PATH = ConduitPath([L], [np.pi])
 PAIR = Transmission(PATH, K * L, MU, R, R)
 EVEN = InitialTension.uniform(PATH, T0)
 PARAMETERS = Parameters(K, L, MU, R, R, K_E)
-LOCKED = 2 * K * R * R
+WANDER = (2 * K * R * R) ** 2 * WANDERS_RAD
 RATE_HZ = 500
 # A sine that grows, so that the load goes where it has not been, and its times.
 TIME_S = np.arange(3 * RATE_HZ + 1) / RATE_HZ
@@ -31,7 +32,7 @@ def drive_side(theta, torque, noise_Nm=0.0):
 
 
 def prior(has_law, friction=0.0):
-    return Prior(Considered(friction, 0.0), 0.03 if has_law else 0.0, 0.0 if has_law else LOCKED)
+    return Prior(Considered(friction, 0.0), 0.03 if has_law else 0.0, 0.0 if has_law else WANDER)
 
 
 def estimate_exactly(response, theta, stiffness, transmission=PAIR, initial=EVEN, has_law=None):

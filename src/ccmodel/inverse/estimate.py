@@ -12,7 +12,7 @@ from ccmodel.channels import TAU_OUT, THETA_OUT, ZERO_OF
 from ccmodel.failure import ModelError
 from ccmodel.inverse import exact, general
 from ccmodel.inverse.proximal import FALL, LOOKS_AHEAD, UNIFORM, Proximal
-from ccmodel.inverse.update import BY_MISFIT, EXPECTED, MISFIT, Considered, Drive, Prior, Run, joint_estimate
+from ccmodel.inverse.update import BY_MISFIT, EXPECTED, MISFIT, Considered, Drive, Prior, Run, joint_estimate, variances
 from ccmodel.model.general.run import settings_of
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad, TorqueLoad
@@ -29,6 +29,11 @@ LAW_SHARE = 0.03
 # Standard deviation of the model discrepancy of the drive torque as a share of its peak to peak so far, and travel of
 # the drive over which it is one and the same.
 TOLERANCE, LASTS_RAD = 0.005, 0.1
+# Travel over which it counts once in the run that the joint filter is linear about.
+NEARER_RAD = 0.01
+# Travel over which the torque of a load without a law changes as that of a locked one does, independently of the travel
+# before: a tenth of what the drive crosses at a reversal, or less.
+WANDERS_RAD = 3e-3
 # A drive that moves less in a sample than this share of that travel counts as moving by as much.
 SMALLEST_SHARE = 1e-6
 # The effects of errors are simulated on every so many samples, that of a misfit with this share of the tensions.
@@ -92,15 +97,23 @@ def estimated(
     if recording.far_end == "fixed":
         raise ModelError(f"{recording.batch}/{recording.id}: the far end is fixed: there is no load to estimate")
     problem = _Problem.of(recording, parameters, sds or {}, uses_law)
-    once, samples = problem.discrepancy(tolerance)
+    once, nearer, lasting = problem.discrepancy(tolerance)
     # The joint filter is linear about this run, which therefore stays nearer to the measured torque than the whole
     # weight of the discrepancy would let it, and further from it than the noise of single samples.
-    nominal = problem.with_noise(once * np.sqrt(samples)).run(problem.parameters)
-    noise = nominal.noise_variance + once * (samples - np.sqrt(samples))
+    nominal = problem.with_noise(once * nearer).run(problem.parameters)
     effects, outputs, by_misfit = problem.effects_of_errors(nominal)
-    correction, spread = joint_estimate(
-        nominal.trace, problem.drive.torque_Nm, problem.first_variance, noise, effects, outputs, by_misfit
-    )
+    if problem.parameters.load_stiffness_Nm_per_rad is not None:
+        noise = nominal.noise_variance + once * (lasting - nearer)
+        measured = problem.drive.torque_Nm
+        errors = problem.first_variance, noise, effects, outputs, by_misfit
+        correction, spread = joint_estimate(nominal.trace, measured, *errors)
+    else:
+        # Without a law, the torque hardly tells an error of friction or tension from a load: no error is estimated, and
+        # the model discrepancy is one of them.
+        effects = np.concatenate([effects, np.sqrt(once)[None]])
+        outputs = np.concatenate([outputs, np.zeros_like(outputs[:1])])
+        errors = problem.first_variance, nominal.noise_variance, effects, outputs, by_misfit
+        correction, spread = np.zeros_like(nominal.out), variances(nominal.trace, *errors)
     ratio = problem.parameters.drive_radius_m / problem.parameters.load_radius_m
     spread[0] += (problem.proximal.sigma_in * ratio) ** 2
     middle = nominal.out + correction
@@ -142,7 +155,7 @@ class _Problem:
         prior = Prior(
             Considered(friction, proximal.torque_zero_Nm),
             LAW_SHARE,
-            0.0 if has_law else locked * kept.drive_radius_m * kept.load_radius_m,
+            0.0 if has_law else (locked * kept.drive_radius_m * kept.load_radius_m) ** 2 * WANDERS_RAD,
         )
         drive = Drive(
             proximal.theta_in,
@@ -204,17 +217,18 @@ class _Problem:
             transmission, load, settings, initial, recording.time_s[:: self.every], drive, self.prior, misfit_Nm, finer
         )
 
-    def discrepancy(self, tolerance: float) -> tuple[NDArray, NDArray]:
-        """Variance of the model discrepancy of the torque (N^2 m^2), and the samples over which it lasts; shapes (n,).
+    def discrepancy(self, tolerance: float) -> tuple[NDArray, NDArray, NDArray]:
+        """Variance of the model discrepancy of the torque (N^2 m^2), and samples over `NEARER_RAD` and `LASTS_RAD`.
 
-        White noise of their product weighs as much as one discrepancy over these samples.
+        All have shape (n,). White noise of variance times samples weighs as much as one discrepancy over these samples.
         """
         torque, travel = self.drive.torque_Nm, np.abs(np.diff(self.drive.theta_rad, prepend=self.drive.theta_rad[0]))
         # Before the drive has moved far, the tensions tell what its torque will come to.
         range_so_far = np.maximum.accumulate(torque) - np.minimum.accumulate(torque)
         range_so_far = np.maximum(range_so_far, self.drive_tensions_N * self.parameters.drive_radius_m)
-        samples = np.maximum(LASTS_RAD / np.maximum(travel, LASTS_RAD * SMALLEST_SHARE), 1.0)
-        return (tolerance * range_so_far) ** 2, samples
+        travel = np.maximum(travel, LASTS_RAD * SMALLEST_SHARE)
+        nearer, lasting = (np.maximum(length / travel, 1.0) for length in (NEARER_RAD, LASTS_RAD))
+        return (tolerance * range_so_far) ** 2, nearer, lasting
 
     def with_noise(self, variance: NDArray) -> "_Problem":
         """The same with more noise in the torque, a variance of shape (n,)."""

@@ -101,7 +101,7 @@ def filtered(
     drive_variance: NDArray,
     considered: Considered,
     law_share: float,
-    free_N_per_m: float,
+    wander_N2_per_m: float,
     trace: NDArray,
     out: NDArray,
     given: bool,
@@ -124,8 +124,8 @@ def filtered(
         Of forces at the rim.
     law_share : float
         Standard deviation of the law's misfit, as a share of the force of its spring.
-    free_N_per_m : float
-        Standard deviation of the change of a load without a law, per travel of the drive.
+    wander_N2_per_m : float
+        Growth of the variance of a load without a law, per travel of the drive.
     trace : ndarray, shape (5, n)
         Rows of `ccmodel.inverse.update`, as forces; with `given`, the misfit in it is that of the run, and nothing is
         estimated.
@@ -157,7 +157,7 @@ def filtered(
                 expected = _drive_torque(state)
                 response = _response(path, state, stiffness)
                 load = state.value[rows.PAIR, rows.LOAD]
-                growth = (free_N_per_m * move) ** 2
+                growth = wander_N2_per_m * abs(move)
                 growth += 2.0 * (law_share * stiffness) ** 2 * abs(load * (load - load_before))
                 variance += growth
                 noise = noise_variance[i] + drive_variance[i] * ((expected - expected_before) / move) ** 2
@@ -226,7 +226,7 @@ def run(
         drive.theta_variance * R_i**2,
         Considered(prior.considered.friction, prior.considered.zero / R_i),
         prior.law_share,
-        prior.free_Nm_per_rad / R_i / R_o,
+        prior.wander_N2m2_per_rad / R_i / R_o**2,
         trace,
         out,
         misfit_Nm is not None,

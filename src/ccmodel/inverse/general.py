@@ -128,7 +128,7 @@ def filtered(
     drive_variance: NDArray,
     considered: Considered,
     law_share: float,
-    free_Nm_per_rad: float,
+    wander_N2m2_per_rad: float,
     first_misfit: float,
     trace: NDArray,
     out: NDArray,
@@ -210,7 +210,7 @@ def filtered(
                 expected = lever * near
                 turn = theta_in[j] - theta_in[j - 1]
                 angle = load[rows.ANGLE] + rotation
-                growth = (free_Nm_per_rad * turn) ** 2
+                growth = wander_N2m2_per_rad * abs(turn)
                 growth += 2.0 * (law_share * ph.stiffness_load) ** 2 * abs(angle * (angle - angle_before))
                 variance += growth
                 noise = noise_variance[j]
@@ -300,7 +300,7 @@ def run(
         drive.theta_variance,
         prior.considered,
         prior.law_share,
-        prior.free_Nm_per_rad,
+        prior.wander_N2m2_per_rad,
         0.0 if has_law else float(series[0]),
         trace,
         out,

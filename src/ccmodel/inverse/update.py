@@ -53,14 +53,13 @@ class Prior(NamedTuple):
     considered : Considered
     law_share : float
         Standard deviation of the misfit of a load's law, as a share of its torque.
-    free_Nm_per_rad : float
-        Standard deviation of the change of the torque of a load without a law, per turn of the drive; 0 for one with a
-        law.
+    wander_N2m2_per_rad : float
+        Growth of the variance of the torque of a load without a law, per turn of the drive; 0 for one with a law.
     """
 
     considered: Considered
     law_share: float
-    free_Nm_per_rad: float
+    wander_N2m2_per_rad: float
 
 
 class Run(NamedTuple):
@@ -180,3 +179,32 @@ def joint_estimate(
                 for k in range(size):
                     left[y, i] += h[j] * P[j, k] * h[k]
     return correction, np.maximum(left, 0.0)
+
+
+@kernel
+def variances(
+    trace: NDArray,
+    first_variance: float,
+    noise_variance: NDArray,
+    effects: NDArray,
+    outputs: NDArray,
+    by_misfit: NDArray,
+) -> NDArray:
+    """Variances of the outputs of a run that considers all lasting errors and estimates none, shape (outputs, n).
+
+    Parameters as of `joint_estimate`.
+    """
+    errors, kinds, n = outputs.shape
+    covariance, now = np.zeros(errors), np.empty(errors)
+    variance, found = first_variance, np.empty((kinds, n))
+    for i in range(n):
+        for j in range(errors):
+            now[j] = effects[j, i]
+        variance += trace[GROWTH, i]
+        variance = updated_variance(variance, covariance, trace[BY_MISFIT, i], now, noise_variance[i], trace[GAIN, i])
+        for y in range(kinds):
+            total = by_misfit[y, i] ** 2 * variance
+            for j in range(errors):
+                total += outputs[j, y, i] * (outputs[j, y, i] + 2.0 * by_misfit[y, i] * covariance[j])
+            found[y, i] = max(total, 0.0)
+    return found
