@@ -213,6 +213,29 @@ def test_a_cable_that_yields_has_the_compliance_of_its_law(coarse):
     np.testing.assert_allclose(back, tension[0], rtol=1e-12)
 
 
+@pytest.mark.parametrize("name", ["settling", "settling-exponential", "settling-toe"])
+def test_a_settling_cable_has_the_compliance_of_its_law(coarse, name):
+    rig, law = changed(coarse, rig__effects=Effects.model_validate(ALONE[name])), true_law(coarse, name)
+    physics = effect_dynamics._physics(rig.rig, rig.numerics, Preparation(0.1, 7.3, (0.0, 0.0)))
+    scale, step = np.full(law.x.shape, 3.0), 1e-4
+    more, less = (effect_dynamics._elongation(physics, law.x + s, np.ones_like(scale), scale) for s in (step, -step))
+    compliance = (more - less) / (2 * step)
+    np.testing.assert_allclose(compliance, law.y, rtol=2e-3)
+
+
+def test_a_gap_and_a_bearing_are_what_their_laws_say(coarse):
+    for name in ("backlash", "soft-gap"):
+        rig = changed(coarse, rig__effects=Effects.model_validate(ALONE[name]))
+        physics = effect_dynamics._physics(rig.rig, rig.numerics, Preparation(0.1, 7.3, (0.0, 0.0)))
+        law = TWINS["backlash"].law(rig.rig, "load-pulley")
+        torque = [effect_march.spring_torque(physics, theta) - physics.spring * theta for theta in law.x]
+        np.testing.assert_allclose(torque, law.y, atol=1e-12)
+    rig = changed(coarse, rig__effects=Effects.model_validate(ALONE["drive-bearing"])).rig
+    law = TWINS["pulley-friction"].law(rig, "drive-pulley")
+    course = 4e-3 * effect_march.bearing_course(law.x / rig.pulley_radius_m, 1e-3)
+    np.testing.assert_allclose(course, law.y, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("name", "side", "faults"),
     [

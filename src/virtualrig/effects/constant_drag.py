@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from virtualrig.effects.contract import OpenShare, Seeded, Twin
+from virtualrig.effects.contract import OpenShare, Seeded, TrueLaw, Twin
 from virtualrig.strict import NonNegative
 
 
@@ -19,4 +19,5 @@ TWIN = Twin(
     also={"share": (0.02, 0.98)},
     seed=lambda size, also, place, spring: ({"drag_N": size}, {"f0": size}),
     other_laws={"seal": _seal},
+    law=lambda rig, place: TrueLaw("sliding-friction", "tension"),
 )

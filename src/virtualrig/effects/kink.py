@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from virtualrig.effects.contract import OpenShare, Seeded, Twin
+from virtualrig.effects.contract import OpenShare, Seeded, TrueLaw, Twin
 from virtualrig.strict import NonNegative, Strict
 
 
@@ -33,4 +33,5 @@ TWIN = Twin(
     also={"s": (0.15, 0.85), "spread_m": (0.01, 0.06)},
     seed=_seed,
     other_laws={"spread": _spread},
+    law=lambda rig, place: TrueLaw("sliding-friction", "position-along-conduit"),
 )

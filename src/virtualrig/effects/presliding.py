@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
-from virtualrig.effects.contract import Seeded, Twin
+from virtualrig.effects.contract import Seeded, TrueLaw, Twin
 from virtualrig.strict import Strict
 
 
@@ -77,5 +77,6 @@ TWIN = Twin(
     also={"spread": (3.0, 15.0), "exponent": (0.4, 3.0)},  # longest over shortest element; of Bouc and Wen
     seed=_seed,
     other_laws={"bouc-wen": _bouc_wen},
+    law=lambda rig, place: TrueLaw("sliding-friction", "distance-since-reversal"),
     numbers=_numbers,
 )

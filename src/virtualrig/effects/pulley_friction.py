@@ -6,9 +6,10 @@ The torque of a preloaded ball bearing is constant, that of a plain bearing is i
 from collections.abc import Mapping
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import PositiveFloat
 
-from virtualrig.effects.contract import Seeded, Twin, group_of
+from virtualrig.effects.contract import ANGLES_RAD, Seeded, TrueLaw, Twin, along, group_of
 from virtualrig.strict import NonNegative, Strict
 
 
@@ -40,6 +41,14 @@ def _proportional(size: float, also: Mapping[str, float], place: str, spring: fl
     return settings, values
 
 
+def _law(rig: Any, place: str) -> TrueLaw:
+    """The torque that builds up from rest, by the travel of the pulley's rim; at the cables' tensions at rest."""
+    given, angle = getattr(rig.effects, group_of(place)).friction, along((0.0, ANGLES_RAD[1]))
+    torque = given.torque_Nm * -np.expm1(-angle / given.presliding_rad)
+    slot = "bearing-torque" if place == "drive-pulley" else "load"
+    return TrueLaw(slot, "distance-since-reversal", rig.pulley_radius_m * angle, torque)
+
+
 TWIN = Twin(
     name="pulley-friction",
     fields={"pulley": {"friction": (PulleyFriction | None, None)}},
@@ -50,4 +59,5 @@ TWIN = Twin(
     seed=_seed,
     other_laws={"proportional": _proportional},
     numbers=_numbers,
+    law=_law,
 )

@@ -3,9 +3,10 @@
 from collections.abc import Mapping
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import PositiveFloat
 
-from virtualrig.effects.contract import Seed, Seeded, Twin
+from virtualrig.effects.contract import TENSIONS_N, Seed, Seeded, TrueLaw, Twin, along
 from virtualrig.strict import Strict
 
 # Laws, and their numbers in the time loop.
@@ -40,6 +41,21 @@ def _seeding(law: str) -> Seed:
     return seed
 
 
+def _law(rig: Any, place: str) -> TrueLaw:
+    """The compliance over that of a settled cable: the derivative of the elongation by the tension."""
+    given, tension = rig.effects.strand_settling, along(TENSIONS_N)
+    ratio = tension / given.tension_scale_N
+    if given.law == "hyperbolic":
+        compliance = (ratio + 1) / np.sqrt((ratio + 1) ** 2 - 1)
+    elif given.law == "toe":
+        compliance = np.maximum(1 / np.sqrt(ratio), 1.0)
+    else:
+        elongation = np.geomspace(1e-3, 1e3, 20001)
+        over = np.interp(ratio, elongation + np.expm1(-elongation), elongation)
+        compliance = -1 / np.expm1(-over)
+    return TrueLaw("cable-stretch", "tension", tension, compliance)
+
+
 TWIN = Twin(
     name="strand-settling",
     fields={"rig": {"strand_settling": (StrandSettling | None, None)}},
@@ -49,4 +65,5 @@ TWIN = Twin(
     seed=_seeding("exponential"),
     other_laws={law: _seeding(law) for law in ("hyperbolic", "toe")},
     numbers=_numbers,
+    law=_law,
 )

@@ -1,8 +1,11 @@
 """Compliances without friction in series at either end of both cables, linear or of a knot that beds in."""
 
 from collections.abc import Mapping
+from typing import Any
 
-from virtualrig.effects.contract import Seeded, Twin
+import numpy as np
+
+from virtualrig.effects.contract import TENSIONS_N, Seeded, TrueLaw, Twin, along
 from virtualrig.strict import NonNegative, Strict
 
 
@@ -25,6 +28,15 @@ def _knot(size: float, also: Mapping[str, float], place: str, spring: float) -> 
     return {"termination_compliance": {f"{end}_m_per_N": size, f"{end}_bedding_N": also["bedding_N"]}}, {}
 
 
+def _law(rig: Any, place: str) -> TrueLaw:
+    """The compliance of one end; a knot's falls to it as a settling cable's does (`strand_settling`, hyperbolic)."""
+    ends, tension = rig.effects.termination_compliance, along(TENSIONS_N)
+    end = place.removesuffix("-end")
+    compliance, bedding = getattr(ends, f"{end}_m_per_N"), getattr(ends, f"{end}_bedding_N")
+    beyond = tension / bedding + 1 if bedding else np.full(tension.size, np.inf)
+    return TrueLaw("end-stretch", "tension", tension, compliance / np.sqrt(1 - beyond**-2.0))
+
+
 TWIN = Twin(
     name="termination-compliance",
     fields={"rig": {"termination_compliance": (TerminationCompliance, TerminationCompliance())}},
@@ -33,5 +45,6 @@ TWIN = Twin(
     unit="m/N",
     seed=_seed,
     other_laws={"knot": _knot},
+    law=_law,
     also={"bedding_N": (0.5, 4.0)},
 )

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from virtualrig.effects.contract import Seeded, Twin
+from virtualrig.effects.contract import Seeded, TrueLaw, Twin
 from virtualrig.strict import NonNegative
 
 # Speed at which the drag of every power is that of the linear law, m/s.
@@ -43,6 +43,7 @@ TWIN = Twin(
     unit="N s/m^2",
     seed=lambda size, also, place, spring: ({"viscous_Ns_per_m2": size}, {"c": size}),
     other_laws={"power": _thinning},
+    law=lambda rig, place: TrueLaw("sliding-friction", "speed"),
     also={"power": (0.3, 0.7)},
     numbers=lambda effects: {"viscous_power": effects.viscous_power},
     in_rig=_in_rig,
