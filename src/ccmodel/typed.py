@@ -25,8 +25,10 @@ from ruamel.yaml.tag import Tag
 
 from ccmodel import inputs
 
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
+# No value of a rig in SI units comes near; the square of a larger one overflows in places.
+LARGEST = 1e30
+Positive = Annotated[float, Field(gt=0, lt=LARGEST)]
+NotNegative = Annotated[float, Field(ge=0, lt=LARGEST)]
 M = TypeVar("M", bound=BaseModel)
 # Path of a value: keys and indices from the top of a file. `Borrowed` gives the file's own path of a value.
 Loc = tuple[str | int, ...]

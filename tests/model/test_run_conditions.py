@@ -8,9 +8,10 @@ import pytest
 
 from builders import recording
 from ccmodel.geometry import ConduitPath
+from ccmodel.model.general.run import Active
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, FixedLoad, SpringLoad, TorqueLoad
-from ccmodel.model.run import _by_torque_alone, _load, _zeroed
+from ccmodel.model.run import _by_torque_alone, _load, _true_at_rest, _zeroed
 from model_runs import CABLE
 
 THETA = np.linspace(1.0, 2.0, 301)
@@ -30,10 +31,10 @@ def test_the_zero_is_that_of_the_rest(settled_s):
     assert found == pytest.approx(THETA - THETA[0])
 
 
-@pytest.mark.parametrize("rest_s", [0.0, 0.5])
-def test_without_a_rest_of_use_the_judged_samples_have_the_recordings_mean(rest_s):
-    one = moved(rest_s, 1.0, theta_out_rad=read)
-    judged = one.time_s >= 1.0
+@pytest.mark.parametrize("rest_s, settled_s", [(0.0, 1.0), (0.5, 1.0), (0.0, 0.0)])
+def test_without_a_rest_of_use_the_judged_samples_have_the_recordings_mean(rest_s, settled_s):
+    one = moved(rest_s, settled_s, theta_out_rad=read)
+    judged = one.time_s >= settled_s
     found = _zeroed(THETA, one)
     assert found[judged].mean() == pytest.approx(one["theta_out_rad"][judged].mean())
     assert np.ptp(found - THETA) == pytest.approx(0.0, abs=1e-12)
@@ -86,3 +87,16 @@ def test_the_middle_of_an_initial_profile_is_off_by_a_share_of_what_friction_hol
     for tension in (initial.tension_A_N, initial.tension_B_N):
         assert tension[1] == pytest.approx(np.sqrt(48.0) * np.exp(reached * held))
     initial.log_slopes(path, mu)
+
+
+@pytest.mark.parametrize(
+    "far_end, stiffness, tau_out", [(None, 0.05, 0.010), (None, None, 0.011), ("fixed", None, 0.010)]
+)
+def test_a_torque_that_is_the_load_keeps_its_reading_and_others_are_freed_of_their_sensors_fault(
+    far_end, stiffness, tau_out
+):
+    fault = Active("torque-scale", "load-sensor", {"gain": 0.1})
+    parameters = replace(CABLE, load_stiffness_Nm_per_rad=stiffness, mechanisms=(fault,))
+    rest = {"time_s": 0.1, "tau_in_Nm": 0.01, "tau_out_Nm": 0.011, "F_drive_N": 14.0, "F_load_N": 14.0}
+    one = SimpleNamespace(recording=replace(recording(), far_end=far_end), resting_mean=rest)
+    assert _true_at_rest(one, parameters)["tau_out_Nm"] == pytest.approx(tau_out)

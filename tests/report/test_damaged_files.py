@@ -19,6 +19,7 @@ from ccmodel.typed import InputError
 from fuzzing import examples
 
 ODD = [None, 3, -1e400, "", [], {}, "x", True, [[]], {"a": 1}, "\ud800", 10**400]
+odd = st.sampled_from(ODD).map(copy.deepcopy)
 BASELINE = Path(__file__).parents[2] / "config/accuracy-baseline.json"
 
 
@@ -39,11 +40,11 @@ def damaged(draw, good):
         for one in above:
             inner = inner[one]
         if inner in ([], {}) or not isinstance(inner, dict | list):
-            data = draw(st.sampled_from(ODD))
+            data = draw(odd)
         elif draw(st.booleans()):
             del inner[key]
         else:
-            inner[key] = draw(st.sampled_from(ODD))
+            inner[key] = draw(odd)
     content = bytearray(json.dumps(data).encode())
     if draw(st.integers(0, 4)) == 0:
         content[draw(st.integers(0, len(content) - 1))] = draw(st.integers(0, 255))

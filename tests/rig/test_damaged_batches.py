@@ -1,6 +1,7 @@
 """Batches damaged at random: a check has a result, or findings of one line that name the file."""
 
 import copy
+import warnings
 from pathlib import Path
 
 import pytest
@@ -102,9 +103,11 @@ def checked(folder: Path, description_: bytes, tables: dict[str, bytes]) -> None
     (folder / "batch.yaml").write_bytes(description_)
     for name, content in tables.items():
         (folder / f"{name}.csv").write_bytes(content)
-    found = ingest_batch(folder)
-    for recording in found.recordings:
-        overview_of(recording)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        found = ingest_batch(folder)
+        for recording in found.recordings:
+            overview_of(recording)
     for finding in found.findings:
         assert "\n" not in str(finding)
         assert Path(finding.file).parent == folder

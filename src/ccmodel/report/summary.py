@@ -128,7 +128,7 @@ def _verdict(file: Path) -> Verdict:
     page = _if_there(file.parent / "report.html")
     try:
         return Verdict(stated.batch, stated.verdict, sentence(read_json(file)), error, page)
-    except (LookupError, TypeError, AttributeError, ValueError):
+    except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError):
         raise InputError(f"{file}: is not what {WRITER} wrote") from None
 
 

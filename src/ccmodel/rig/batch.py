@@ -31,6 +31,7 @@ from ccmodel.channels import (
 from ccmodel.geometry import ConduitPath
 from ccmodel.recording import FAR_ENDS
 from ccmodel.typed import (
+    LARGEST,
     Borrowed,
     FillIn,
     InputError,
@@ -277,7 +278,6 @@ class Piece(TypedModel):
 Conduit = Annotated[tuple[Piece, ...], Field(min_length=1)]
 # Waves whose amplitude and frequency are compared with the recording (`ccmodel.rig.consistency.parity`).
 WAVES, _NOTED_NUMBERS = ("sine", "triangle"), ("amplitude_rad", "frequency_Hz")
-LARGEST_NUMBER = 1e300
 PRETENSION = "the tension to which each cable was set before the motion, N"
 CONDUIT = "the pieces of the conduit from the drive end, as [{length_m: 1.2, bend_rad: 3.14}]"
 
@@ -315,7 +315,7 @@ class RecordingEntry(TypedModel):
     def _numbers_of_a_sine(cls, excitation: dict[str, Any]) -> dict[str, Any]:
         for key in _NOTED_NUMBERS if excitation.get("wave") in WAVES else ():
             number = excitation.get(key)
-            if number is not None and not (type(number) in (int, float) and 0 <= number < LARGEST_NUMBER):
+            if number is not None and not (type(number) in (int, float) and 0 <= number < LARGEST):
                 raise ValueError(f"{key} of a {excitation['wave']} is a number that is not negative")
         return excitation
 

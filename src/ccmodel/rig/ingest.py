@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
 import pandas as pd
 
 from ccmodel.progress import Progress, each_of, silent, within
@@ -78,6 +79,9 @@ class Ingested:
             raise InputError("\n".join(refused) or f"{source}: no recording that can be used")
 
 
+# A damaged cell or constant may be so large that its square overflows. It is named by the checks, and numpy's own lines
+# name no file.
+@np.errstate(over="ignore", invalid="ignore")
 def ingest_batch(folder: Path, progress: Progress = silent) -> Ingested:
     """Read a batch of rig logs.
 
