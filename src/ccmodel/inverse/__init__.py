@@ -8,8 +8,9 @@ general solver), on top of the law or in its place. A step of the solver gives t
 expects. The estimate is the maximum of the posterior of f, by Newton's method: an iterated extended Kalman filter with
 one state. Errors of friction and of the torque sensor's zero last for a whole recording; the filter considers them
 without estimating them (Schmidt, Application of state-space methods to navigation problems, Advances in Control Systems
-3, 1966). After the run, each uncertain parameter is perturbed by one standard deviation along the same f, and the
-filter's error covariance with all of them gives the intervals.
+3, 1966). After the run, each uncertain parameter is perturbed by one standard deviation along the same f. If the load
+has a law, one linear filter about the run estimates f and all parameters jointly; otherwise they are considered only.
+Either covariance gives the intervals.
 
 Where the friction front from the drive has not reached the load, T does not depend on f. The estimate is then the
 model's own, its interval widens, and the sample is marked as hidden.
