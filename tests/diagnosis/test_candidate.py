@@ -21,8 +21,9 @@ KEY = "conduit-compliance/conduit/compliance"
 
 
 def test_the_discretisation_shift_is_that_of_a_fit_on_the_finer_solver(monkeypatch):
-    """Recordings of the paper's model: a compliance that is found is noise and discretisation error."""
-    recordings = batch()
+    """Recordings of a compliant conduit on the finer solver."""
+    compliant = Active("conduit-compliance", "conduit", {"compliance": 2e-5})
+    recordings = batch(truth=replace(PARAMETERS, mechanisms=(compliant,), refinement=settings.REFINEMENT))
     base = calibrated(recordings)
     hypothesis = Hypothesis((("conduit-compliance", "conduit"),))
     found = fit(recordings, hypothesis, base.free, base.values | {KEY: 1e-5})
