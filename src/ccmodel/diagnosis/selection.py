@@ -79,21 +79,25 @@ class Selection:
         """The same with sets of listed mechanisms, and with laws where sets do not lead on.
 
         Sets come first, within a share of the time, as long as each size leaves at most half of what the smaller one
-        does. Then laws compete with them, and then larger sets if nothing is decided yet.
+        does. Then laws compete with them. Larger sets follow if nothing is decided yet.
         """
         sets, size = replace(self, deadline=self.sets_until), 2
         while size <= settings.MOST_MECHANISMS:
             part = sets._part((size - 2) / SIZES, (size - 1) / SIZES)
             if not found.is_enough:
                 found = part._part(0.0, RELINEARISED).relinearise(found)
-            if found.is_enough or part.deadline.has_passed or (size > 2 and found.by_evidence[0].is_good):
+            if found.is_enough or (size > 2 and found.by_evidence[0].is_good):
                 break
             found = part._part(RELINEARISED, 1.0).extended(found, screening, size)
-            if not found.leads_on(size) and sets.laws and not found.is_decided:
+            is_over = part.deadline.has_passed
+            if sets.laws and (is_over or not found.leads_on(size)) and not found.is_decided:
                 found, sets = self.learn(found), replace(self, laws=())
                 if law_of(found.leading[0].hypothesis) is not None:
                     break
-            if found.by_evidence[0].hypothesis.size < size:
+                if is_over:
+                    continue
+            listed = next(c for c in found.by_evidence if law_of(c.hypothesis) is None)
+            if is_over or listed.hypothesis.size < size:
                 break
             size += 1
         return self.learn(found) if sets.laws and not (found.is_decided or found.is_enough) else found

@@ -25,8 +25,7 @@ class Judgement:
     verdict : {"agrees", "explained", "learned", "undecided", "unexplained"}
     best : CandidateFit
         The most probable candidate if the verdict is explained, the most probable one with a law if it is learned, the
-        most probable one of listed mechanisms, whether complete or not, if it is undecided, otherwise the calibrated
-        model.
+        listed one with the highest evidence if it is undecided, otherwise the calibrated model.
     comparison : Comparison
     candidates : list of CandidateFit
         Those of the comparison, by descending probability.
@@ -114,7 +113,10 @@ def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
     learned = sum(p for hypothesis, p in found.confidence.items() if law_of(hypothesis) is not None)
     if comparison.unlisted + learned > 0.5 and max(map(found.confidence_in, names), default=0.0) <= 0.5:
         return replace(found, verdict="unexplained", single_fault_places=single_fault_places(comparison))
-    return replace(found, verdict="undecided", best=next(c for c in comparison.leading if law_of(c.hypothesis) is None))
+    # Whether its last member is missing or imitates something, the set with the highest evidence predicts best.
+    return replace(
+        found, verdict="undecided", best=next(c for c in comparison.by_evidence if law_of(c.hypothesis) is None)
+    )
 
 
 def _is_explained(judgement: Judgement, best: CandidateFit) -> bool:
