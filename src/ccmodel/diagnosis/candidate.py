@@ -33,7 +33,6 @@ SEARCH = Search(
     most_evaluations=settings.FIT_EVALUATIONS,
     retreats=False,
     own_units=True,
-    secants=True,
 )
 
 
@@ -190,7 +189,8 @@ def fit(
     unknowns |= _with_priors(whitened, hypothesis, unknowns)
     modelled = _with_states(whitened, hypothesis, {n: f.start for n, f in unknowns.items()})
     problem = Problem(modelled, unknowns, weight=mean_weight)
-    search = replace(SEARCH, deadline=deadline)
+    # Runs of the paper's model are cheap, and its cost is rough where much is missing.
+    search = replace(SEARCH, deadline=deadline, secants=bool(hypothesis.baseline or hypothesis.acting))
     solution = _search(problem, hypothesis, search)
     further = replace(search, most_evaluations=settings.START_EVALUATIONS)
     has_states = any(registry.get(name).states for name, _ in hypothesis.baseline + hypothesis.acting)
