@@ -150,8 +150,8 @@ def coefficients_of(hypothesis: Hypothesis) -> dict[str, float]:
 def plausible(hypothesis: Hypothesis, values: Mapping[str, float]) -> bool:
     """Whether every strength lies within its plausible range or below it.
 
-    Of a mechanism with a state, what is left of its strength when recordings start is looked at: only this shows, and a
-    stronger effect that is nearly over looks the same.
+    A mechanism with a state is judged by the part of its strength that is still to come when recordings start. Only
+    this part shows: a stronger effect that is nearly over looks the same.
     """
     return all(
         _is_plausible(strength, _left(name, place, values) * values[mechanism_key(name, place, strength.name)])
