@@ -4,6 +4,7 @@ import numpy as np
 
 from ccmodel.geometry import ConduitPath
 from ccmodel.model.general import Active, simulate
+from ccmodel.model.general.run import NO_MOTOR
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad
 from ccmodel.model.transmission import Transmission
@@ -22,7 +23,19 @@ def sine(amplitude=0.6, cycles=2, samples=500):
     return amplitude * np.sin(2 * np.pi * np.arange(cycles * samples + 1) / samples)
 
 
-def run(theta_in, mechanisms=(), *, period_s=1.0, path=HALF_LOOP, T=T0, load=None, elements=32, samples=500, **kw):
+def run(
+    theta_in,
+    mechanisms=(),
+    *,
+    period_s=1.0,
+    path=HALF_LOOP,
+    T=T0,
+    load=None,
+    elements=32,
+    samples=500,
+    motor=NO_MOTOR,
+    **kw,
+):
     """A run in which `samples` samples take `period_s`; one mechanism may be given as (name, place, values)."""
     if mechanisms and isinstance(mechanisms[0], str):
         mechanisms = [mechanisms]
@@ -30,7 +43,7 @@ def run(theta_in, mechanisms=(), *, period_s=1.0, path=HALF_LOOP, T=T0, load=Non
     time_s = np.arange(theta_in.size) * period_s / samples
     initial = InitialTension.uniform(path, T) if np.isscalar(T) else T
     response = simulate(
-        transmission(path, **kw), load or SpringLoad(K_E), time_s, theta_in, initial, active, elements=elements
+        transmission(path, **kw), load or SpringLoad(K_E), time_s, theta_in, initial, active, elements, motor=motor
     )
     return response.complete()
 

@@ -19,5 +19,5 @@ def test_zeros_are_parameters_and_places_are_places():
 
 
 def test_tensions_are_derived_and_the_drive_angle_is_given():
-    assert set(CHANNELS) - set(MEASURED) == {"theta_in_rad", "T1_N", "T2_N", "T3_N", "T4_N"}
+    assert set(CHANNELS) - set(MEASURED) == {"theta_in_rad", "theta_motor_rad", "T1_N", "T2_N", "T3_N", "T4_N"}
     assert set(TABLE_ONE) <= set(TABLE)

@@ -29,8 +29,8 @@ class Channel:
     zero : str or None
         Parameter of the model that is the sensor's zero.
     measured : bool
-        Whether a sensor reads it and models are compared on it. The drive angle is the model's input; tensions are
-        derived from torques and sums.
+        Whether a sensor reads it and models are compared on it. The drive angle and the
+        motor's are the model's input; tensions are derived from torques and sums.
     scale : float
         Factor from SI units to `plot_unit`.
     plot_unit : str
@@ -69,7 +69,7 @@ class Channel:
         return f"{self.label} ({self.plot_unit or self.unit})"
 
 
-THETA_IN, THETA_OUT = "theta_in_rad", "theta_out_rad"
+THETA_IN, THETA_OUT, THETA_MOTOR = "theta_in_rad", "theta_out_rad", "theta_motor_rad"
 TAU_IN, TAU_OUT = "tau_in_Nm", "tau_out_Nm"
 F_DRIVE, F_LOAD = "F_drive_N", "F_load_N"
 T1, T2, T3, T4 = "T1_N", "T2_N", "T3_N", "T4_N"
@@ -93,6 +93,8 @@ TABLE = {
         Channel(T2, "load", "T2", "$T_2$", "tension $T_2$ at the load, cable A"),
         Channel(T3, "drive", "T3", "$T_3$", "tension $T_3$ at the drive, cable B"),
         Channel(T4, "load", "T4", "$T_4$", "tension $T_4$ at the load, cable B"),
+        Channel(THETA_MOTOR, "drive", "θ_motor", r"$\theta_{motor}$",
+                r"motor angle $\theta_{motor}$ at the drive pulley"),
     )
 }  # fmt: skip
 

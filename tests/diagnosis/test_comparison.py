@@ -169,6 +169,14 @@ def test_a_set_that_alone_leaves_a_good_fit_is_named_although_something_unlisted
         assert 0.5 < found.confidence_in("pulley-friction") < SURE
 
 
+@pytest.mark.parametrize(("calibrated", "said"), [(1.6, "explained"), (1.45, "undecided")])
+def test_a_good_fit_shows_nothing_where_the_calibrated_model_has_one(calibrated, said):
+    kink, pair = (fitted(1.3, KINK), evidence(size=0.3)), (fitted(1.0, FRICTION, KINK), evidence(NONE, size=0.03))
+    found = verdict(evidence(size=calibrated - 1.0), kink, pair, model=fitted(calibrated))
+    assert min(map(found.confidence_in, ("kink", "pulley-friction"))) > 0.5
+    assert found.verdict == said
+
+
 def test_a_search_goes_on_from_what_may_be_an_imitation():
     """The pair takes off half of what the kink leaves, as an imitation would, and as one of three effects would."""
     kink, pair = (fitted(60.0, KINK), evidence(NONE - 100, NONE - 90, size=59.0)), fitted(30.0, KINK, SCALE)

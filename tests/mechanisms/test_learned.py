@@ -30,7 +30,6 @@ def learned(law, **coefficients):
 def test_laws_are_found_by_name_and_are_on_no_list():
     assert not set(laws()) & set(registry.names())
     assert all(registry.get(name).name == name for name in laws())
-    assert all(registry.get(name).by_name_only for name in laws())
 
 
 @pytest.mark.parametrize("resolution", [COARSE, FINE])

@@ -7,7 +7,6 @@ import pytest
 
 from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
-from ccmodel.mechanisms.drive_windup import STANDSTILL_RAD, torque_of_train
 from ccmodel.mechanisms.presliding import element_lengths
 from ccmodel.mechanisms.pulley_friction import PRESLIDING_RAD
 from ccmodel.mechanisms.relaxation import BRANCHES, branch_times, followed, kept_at_rest, relaxed_after
@@ -406,52 +405,6 @@ def test_inertia_grows_with_the_square_of_the_frequency():
         torque = r.tau_out_Nm - K_E * r.theta_out_rad
         extra.append(np.abs(np.fft.rfft(last_cycle(torque))[1]))
     assert extra[1] / extra[0] == pytest.approx(4.0, rel=0.02)
-
-
-MOTOR = {"compliance": 0.2, "lost_motion": 0.01}
-STANDING = 1e-9
-
-
-def driven_by_a_motor(samples, cycles=3, amplitude=0.3, stiffness=0.2, friction=0.02):
-    """A pulley on a spring, with friction, behind a train: its angle, its torque, and that which its law alone gives.
-
-    While the pulley stands, its law gives the torque of its last direction.
-    """
-    phi = amplitude * np.sin(2 * np.pi * np.arange(cycles * samples + 1) / samples)
-    compliance, lost = MOTOR["compliance"], MOTOR["lost_motion"]
-    theta, taut, side, found = 0.0, 0.0, 0.0, []
-    for angle in phi:
-        # The train's other end, through what is lost; then the pulley, which friction holds.
-        taut = min(max(taut, angle - lost / 2), angle + lost / 2)
-        tau = (taut - theta) / compliance
-        if abs(tau - stiffness * theta) > friction:
-            side = np.sign(tau - stiffness * theta)
-            theta = (taut / compliance - side * friction) / (stiffness + 1 / compliance)
-            tau = stiffness * theta + side * friction
-        found.append((theta, tau, stiffness * theta + side * friction))
-    return np.arange(phi.size) / samples, *np.array(found).T
-
-
-@pytest.mark.parametrize("samples", [200, 1000])
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_windup_predicts_the_torque_while_the_pulley_stands(samples, sign):
-    """Against a train that is followed step by step: to a twelfth of what the pulley's law alone errs by there."""
-    time_s, theta, true, law = driven_by_a_motor(samples)
-    read = sign * torque_of_train(time_s, sign * theta, sign * law, MOTOR["compliance"], MOTOR["lost_motion"])
-    settled = (time_s > 0.6) & (time_s < 2.6)
-    stands = settled & (np.abs(np.gradient(theta)) < STANDING)
-    assert 0.05 < stands.mean() < 0.3
-    assert rms(read[stands], true[stands]) < rms(law[stands], true[stands]) / 12
-    assert rms(read[settled], true[settled]) < rms(law[settled], true[settled]) / 12
-
-
-def test_a_windup_shows_at_reversals_only():
-    theta = sine()
-    torque = 0.05 * np.sign(np.gradient(theta)) + 0.1 * theta
-    read = torque_of_train(np.arange(theta.size) / 500, theta, torque, 0.2, 0.01)
-    changed = read != torque
-    assert changed.any()
-    assert (np.abs(theta[changed]) > 0.6 - STANDSTILL_RAD).all()
 
 
 # Sensors: only the channel of the fault changes

@@ -18,7 +18,7 @@ PLAN = read_plan()
 
 def test_the_plan_has_every_candidate_mechanism_at_all_its_places():
     every = map(mechanisms.get, mechanisms.names())
-    listed = {mechanism.name: set(mechanism.places) for mechanism in every if not mechanism.by_name_only}
+    listed = {mechanism.name: set(mechanism.places) for mechanism in every if not mechanism.needs}
     assert {name: set(spec.places) for name, spec in PLAN.effects.items()} == listed
     assert TWINS.keys() == {*PLAN.effects, *PLAN.unlisted}
 

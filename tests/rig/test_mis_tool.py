@@ -40,7 +40,7 @@ def trial(frequency=0.5, level=0.2, seed=0, seconds=8.0):
         (-1000 * level + 150 * np.tanh(5 * speed) + rng.normal(0, 3, time.size)).round(),
         np.full(time.size, level),
         speed,
-        drive,
+        (17.5 * drive).round(),
         drive,
     ]
     return np.column_stack(columns)
@@ -75,7 +75,8 @@ def test_a_nested_data_set(tmp_path):
     assert first.excitation["frequency_Hz"] == pytest.approx(0.3, abs=0.001)
     assert second.settled_s == 4.0
     assert second.origin == "rig"
-    assert set(second.channels) == {"theta_in_rad", "theta_out_rad", "tau_in_Nm", "tau_out_Nm"}
+    assert set(second.channels) == {"theta_in_rad", "theta_out_rad", "tau_in_Nm", "tau_out_Nm", "theta_motor_rad"}
+    assert ingested.batch.rig.drive.motor_sign == 1
     samples = trial(0.5, 0.4)
     assert second["theta_in_rad"] == pytest.approx((samples[:, 1] - 680) * 2 * np.pi / 8192)
     assert second["tau_in_Nm"] == pytest.approx(-samples[:, 2] * NM_PER_COUNT)
@@ -244,7 +245,13 @@ def test_the_shipped_recordings_are_measured_and_without_a_finding():
     for recording in ingested.recordings:
         assert recording.origin == "rig"
         assert recording.time_s[-1] > 19 and np.median(np.diff(recording.time_s)) == pytest.approx(1e-3)
-        assert set(recording.channels) == {"theta_in_rad", "theta_out_rad", "tau_in_Nm", "tau_out_Nm"}
+        assert set(recording.channels) == {
+            "theta_in_rad",
+            "theta_out_rad",
+            "tau_in_Nm",
+            "tau_out_Nm",
+            "theta_motor_rad",
+        }
 
 
 @pytest.mark.skipif(DATA is None, reason=WHY_NO_DATA)

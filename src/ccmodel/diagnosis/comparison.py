@@ -211,8 +211,11 @@ class Comparison:
     def certain(self) -> CandidateFit | None:
         """The most probable candidate of all mechanisms with the probability `SURE`, if it leaves a good fit.
 
-        What may be missing beside it is then of no consequence.
+        What may be missing beside it is then of no consequence. Where the calibrated model leaves a good fit itself, a
+        good fit shows nothing.
         """
+        if self.base.is_good:
+            return None
         every = {name for c in self.candidates for name in c.hypothesis.names}
         sure = sorted(name for name in every if self.confidence_in(name) >= settings.SURE)
         alone = (c for c in self.leading if sure and list(c.hypothesis.names) == sure)
@@ -223,10 +226,10 @@ class Comparison:
         """The set that is most probably complete, if it leaves a good fit and no other set of the list does as well.
 
         Its probability among the complete ones is then `SURE`. Each of its members is more probable than not; how much
-        more, the priors of effects that nobody listed decide.
+        more, the priors of effects that nobody listed decide. None where the calibrated model leaves a good fit itself.
         """
         best = self.most_probable
-        if best is self.base or best.hypothesis.size < 2 or not best.is_good or laws_in(best.hypothesis):
+        if self.base.is_good or best is self.base or best.hypothesis.size < 2 or not best.is_good or laws_in(best.hypothesis):
             return None
         names, complete = best.hypothesis.names, np.array(self.probability)
         same = np.array([c.hypothesis.names == names for c in self.candidates])

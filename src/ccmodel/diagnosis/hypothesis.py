@@ -114,9 +114,14 @@ class Hypothesis:
 PAPER = Hypothesis()
 
 
-def single_mechanisms(without: Collection[str] = (), model: Hypothesis = PAPER) -> list[Hypothesis]:
-    """Every mechanism of the registry at each of its places, unless it is excluded or fitted in the model already."""
-    names = [name for name in registry.names() if name not in without and not registry.get(name).by_name_only]
+def single_mechanisms(
+    without: Collection[str] = (), model: Hypothesis = PAPER, recorded: Collection[str] = ()
+) -> list[Hypothesis]:
+    """Every mechanism of the registry at each of its places, unless it is excluded or fitted in the model already.
+
+    Of those that need a channel, the ones whose channel was recorded.
+    """
+    names = [name for name in registry.names() if name not in without and set(registry.get(name).needs) <= {*recorded}]
     every = ((name, place) for name in names for place in registry.get(name).places)
     return [Hypothesis((acting,)) for acting in every if model.is_frozen or acting not in model.baseline]
 

@@ -162,6 +162,11 @@ def calibrate(
     return Calibration(tested, whitened, fit(whitened, tested.hypothesis, tested.free, first.values), missing)
 
 
+def _recorded_by_all(recordings: Sequence[Recording]) -> set[str]:
+    """Channels that every recording has."""
+    return set.intersection(*(set(recording.channels) for recording in recordings))
+
+
 @_one_thread
 def diagnose(
     recordings: Sequence[Recording],
@@ -199,7 +204,7 @@ def diagnose(
     if options.freeze:
         why = "frozen at the baseline's values, as requested"
         unjudged.append({"what": "stiffness, friction and everything else that a calibration would fit", "why": why})
-    mechanisms = single_mechanisms(options.without, tested.hypothesis)
+    mechanisms = single_mechanisms(options.without, tested.hypothesis, _recorded_by_all(recordings))
     forced = [stated_hypothesis(stated) for stated in options.forced_candidates]
     of_selection = within(progress, CALIBRATED, SELECTED)
     selection = Selection(tested.free, mechanisms, forced, first_laws(), of_selection, deadline, sets_until)

@@ -15,7 +15,7 @@ from ccmodel.model.parameters import Parameters
 from ccmodel.recording import Recording
 
 # Sensors with these faults read what comes later, so that no causal estimate can undo them.
-LOOKS_AHEAD = ("drive-windup", "time-skew")
+LOOKS_AHEAD = ("time-skew",)
 # White noise of a torque is measured over so many samples of the rest at least.
 FEWEST_AT_REST = 20
 # Cables are tensioned from the drive against friction: towards the load their tension falls, most often by a tenth, and

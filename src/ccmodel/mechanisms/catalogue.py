@@ -159,7 +159,7 @@ def _look_alikes(mechanism: Mechanism) -> str:
 
 
 def _role(mechanism: Mechanism) -> str:
-    """What it changes, and whether a diagnosis considers it unasked."""
+    """What it changes, and what it needs."""
     if mechanism.modifies_observation is not None:
         role = "It modifies the observation: the sensors' readings after a run."
     elif mechanism.drift is not None:
@@ -167,7 +167,8 @@ def _role(mechanism: Mechanism) -> str:
     else:
         settings = ", ".join(f"`{name}`" for name in mechanism.neutral_settings)
         role = f"It modifies the physics: the general solver's {settings}."
-    return role + (" A diagnosis considers it only as a forced candidate." if mechanism.by_name_only else "")
+    needs = ", ".join(f"`{channel}`" for channel in mechanism.needs)
+    return role + (f" A diagnosis considers it where {needs} was recorded." if needs else "")
 
 
 def _facts(mechanism: Mechanism) -> list[tuple[str, str]]:

@@ -214,8 +214,8 @@ class Mechanism:
         Look-alikes: other mechanisms, or `PAPER_LOOK_ALIKES`.
     depends_on_time : bool
         Whether its effect depends on the rate of the motion, not only on its path.
-    by_name_only : bool
-        Whether a diagnosis considers it only as a forced candidate.
+    needs : tuple of str
+        Channels without which it has no effect: a diagnosis considers it where they were recorded.
     settings : mapping of str to str
         The solver's settings that take a parameter's value, and the parameter's name; "{side}" in a setting stands for
         the side of the place. They reach the march.
@@ -241,7 +241,7 @@ class Mechanism:
     parameters: tuple[Parameter, ...]
     mistaken_for: tuple[str, ...]
     depends_on_time: bool
-    by_name_only: bool = False
+    needs: tuple[str, ...] = ()
     settings: Mapping[str, str] = field(default_factory=dict)
     structures: Mapping[str, Any] = field(default_factory=dict)
     modifies_physics: Callable[[Settings, Mapping[str, float]], None] | None = None

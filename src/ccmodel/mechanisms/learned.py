@@ -270,7 +270,6 @@ class Law:
             parameters=fixed + coefficients,
             mistaken_for=(),
             depends_on_time=self.argument.depends_on_time,
-            by_name_only=True,
             **self.acting(self.at_knots),
         )
 

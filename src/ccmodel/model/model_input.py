@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
-from ccmodel.channels import F_LOAD, TAU_OUT, THETA_IN, THETA_OUT
+from ccmodel.channels import F_LOAD, TAU_OUT, THETA_IN, THETA_MOTOR, THETA_OUT
 from ccmodel.encoder.reconstruction import reconstruct_motion
 from ccmodel.encoder.smoothing import DRAWS, OFFSET_SCORES
 from ccmodel.recording import Recording, stride
@@ -47,6 +47,8 @@ class ModelInput:
     resting : mapping of str to ndarray
         Readings of each channel while the drive did not move, and time_s, each of shape (resting samples,); empty
         without a rest.
+    theta_motor : ndarray, shape (n,), or None
+        The motor's angle at the drive pulley, rad; None where it was not recorded.
     """
 
     recording: Recording
@@ -57,6 +59,7 @@ class ModelInput:
     tau_out: NDArray | None
     F_load: NDArray | None
     resting: Mapping[str, NDArray]
+    theta_motor: NDArray | None = None
 
     @classmethod
     def of(cls, recording: Recording, step_s: float | None = None) -> "ModelInput":
@@ -76,6 +79,7 @@ class ModelInput:
             _every(tau_out, every),
             _every(F_load, every),
             resting,
+            recording[THETA_MOTOR][::every] if THETA_MOTOR in recording else None,
         )
 
     @classmethod

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Literal
 
+import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.channels import (
@@ -113,12 +114,23 @@ def _readings(
     if parameters.mechanisms or not isinstance(load, SpringLoad | FixedLoad):
         time_s = given.recording.time_s
         finer = parameters.refinement
+        solver = finer * general.ELEMENTS, finer, _motor(given)
         by_general = general.simulate(
-            transmission, load, time_s, given.theta_in, initial, parameters.mechanisms, finer * general.ELEMENTS, finer
+            transmission, load, time_s, given.theta_in, initial, parameters.mechanisms, *solver
         )
         return by_general.complete().read
     response = exact.simulate_pair(transmission, load, given.theta_in, initial)
     return response.complete().channels(given.theta_in)
+
+
+def _motor(given: ModelInput) -> general.Motor:
+    """The motor that moves the drive pulley, where it was recorded; the pulley's encoder leaves half a step open."""
+    if given.theta_motor is None:
+        return general.NO_MOTOR
+    recording = given.recording
+    within = recording.encoder_step_rad.get(THETA_IN, 0.0) / 2
+    judged = slice(int(np.searchsorted(recording.time_s, recording.settled_s)), None)
+    return general.Motor(given.theta_motor, within, judged)
 
 
 def _channels(read: Mapping[str, NDArray], recording: Recording, parameters: Parameters) -> dict[str, NDArray]:

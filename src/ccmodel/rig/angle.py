@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ccmodel.channels import ANGLE_AT
+from ccmodel.channels import ANGLE_AT, THETA_MOTOR
 from ccmodel.rig import limits
-from ccmodel.rig.batch import RAW_COLUMNS, End
+from ccmodel.rig.batch import RAW_COLUMNS, End, Rig
 
 
 @dataclass(frozen=True)
@@ -122,6 +122,18 @@ def angle_at(table: pd.DataFrame, end: str, counts_per_rev: float | None, step_r
         return Angle(angle, np.round((values - values[0]) / step_rad), step_rad, True, 1.0, key, True)
     width = noise_width(table["time_s"].to_numpy(), values)
     return Angle(angle, values, 1.0, False, width, key, step_rad is not None)
+
+
+def angle_of_motor(table: pd.DataFrame, rig: Rig) -> Angle | None:
+    """The motor's angle at the drive pulley, as a log has it; None if it has none."""
+    (counts,), per_rev = RAW_COLUMNS[THETA_MOTOR], rig.drive.motor_counts_per_rev
+    key = "rig.drive.motor_counts_per_rev"
+    if counts in table:
+        rad = 2 * np.pi / per_rev if per_rev else None
+        return Angle(counts, table[counts].to_numpy(), rad, True, 1.0, key, per_rev is not None)
+    if THETA_MOTOR not in table:
+        return None
+    return Angle(THETA_MOTOR, table[THETA_MOTOR].to_numpy(), 1.0, False, limits.FINE_STEP_RAD, key, True)
 
 
 def noise_width(time_s: NDArray, angle_rad: NDArray) -> float:

@@ -25,6 +25,7 @@ from ccmodel.channels import (
     TAU_OUT,
     TENSIONS_AT,
     THETA_IN,
+    THETA_MOTOR,
     THETA_OUT,
     TORQUE_AT,
 )
@@ -54,6 +55,7 @@ RAW_COLUMNS = {
     TAU_OUT: ("load_torque_counts", "load_current_A"),
     F_DRIVE: ("drive_load_cell_V",),
     F_LOAD: ("load_load_cell_V",),
+    THETA_MOTOR: ("motor_encoder_counts",),
 }
 # One of these is the input of the model.
 DRIVE_ANGLE_COLUMNS = (*RAW_COLUMNS[THETA_IN], THETA_IN)
@@ -65,6 +67,7 @@ SENSOR_COLUMNS = (
     "load_torque_counts",
     "drive_load_cell_V",
     "load_load_cell_V",
+    "motor_encoder_counts",
     *(channel for channel in CHANNELS if channel != THETA_IN),
 )
 COLUMNS = ("time_s", *DRIVE_ANGLE_COLUMNS, *SENSOR_COLUMNS)
@@ -155,6 +158,15 @@ class Side(TypedModel):
     load_cell: LoadCell | None = None
 
 
+class DriveSide(Side):
+    """The drive end; `motor_counts_per_rev` converts the counts of an encoder at the motor, before gear and shaft."""
+
+    motor_counts_per_rev: Annotated[
+        Positive | None, FillIn("the counts of the motor's encoder per revolution of the drive pulley")
+    ] = None
+    motor_sign: Sign = 1
+
+
 class LoadSide(Side):
     """The load end; without a spring the load is the torque or motion measured at the load pulley."""
 
@@ -198,7 +210,7 @@ class Rig(TypedModel):
 
     transmission: Literal["pull-pull", "single-cable"] = "pull-pull"
     far_end: Annotated[str, OneOf(FAR_ENDS)] | None = None
-    drive: Side
+    drive: DriveSide
     load: LoadSide
     cable: Cable
     accuracy: Accuracy

@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ccmodel.channels import TENSIONS
+from ccmodel.channels import TENSIONS, THETA_MOTOR
 from ccmodel.rig import limits
 from ccmodel.rig.angle import Angle, angle_of
-from ccmodel.rig.batch import Accuracy, End, LoadCell, Rig, TorqueSensor
+from ccmodel.rig.batch import RAW_COLUMNS, Accuracy, End, LoadCell, Rig, TorqueSensor
 
 
 @dataclass
@@ -75,6 +75,7 @@ def calibrate(table: pd.DataFrame, rig: Rig) -> Calibrated:
             _add_angle(result, table, end, angle, resting, rig.accuracy)
         _add_sensors(result, table, end, rig.accuracy)
         (_single_tension if rig.far_end else _tensions)(result, end, rig.accuracy.load_cell_N)
+    _add_motor(result, table, rig, resting)
     _note_unused(result, table, rig)
     return result
 
@@ -106,6 +107,23 @@ def _add_angle(
     )
     if angle.step_rad:
         result.encoder_step_rad[end.angle] = angle.step_rad
+
+
+def _add_motor(result: Calibrated, table: pd.DataFrame, rig: Rig, resting: int) -> None:
+    """Add the motor's angle at the drive pulley, zero at rest or at the first sample."""
+    counts = RAW_COLUMNS[THETA_MOTOR][0]
+    per_rev, sign = rig.drive.motor_counts_per_rev, rig.drive.motor_sign
+    if THETA_MOTOR in table:
+        values, step, formula = table[THETA_MOTOR].to_numpy(), 1.0, f"{THETA_MOTOR} of the log"
+    elif counts in table and per_rev:
+        values, step, formula = table[counts].to_numpy(), 2 * np.pi / per_rev, f"{counts} * 2 pi / {per_rev:g}"
+    else:
+        if counts in table:
+            result.unused[counts] = _lacks("rig.drive.motor_counts_per_rev")
+        return
+    zero = values[: max(resting, 1)].mean()
+    formula = f"{'-' if sign < 0 else ''}({formula}), from its value at the start"
+    result.add(THETA_MOTOR, sign * step * (values - zero), formula, rig.accuracy.encoder_rad)
 
 
 def _add_sensors(result: Calibrated, table: pd.DataFrame, end: End, accuracy: Accuracy) -> None:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from ccmodel.channels import CHANNELS, F_LOAD, SUM_AT, T2, TAU_OUT, TENSIONS, THETA_OUT, TORQUE_AT
+from ccmodel.channels import CHANNELS, F_LOAD, SUM_AT, T2, TAU_OUT, TENSIONS, THETA_MOTOR, THETA_OUT, TORQUE_AT
 from ccmodel.rig.batch import RAW_COLUMNS, SENSOR_COLUMNS, Batch, Rig, Side
 from ccmodel.rig.findings import Defect, LogError
 from ccmodel.typed import meaning_at
@@ -121,6 +121,9 @@ def _stated(rig: Rig) -> list[_Sensor]:
         if end.name == "load":
             columns = {"encoder_counts_per_rev": "load_encoder_counts", "angle_resolution_rad": end.angle}
             sensors += _sensor(key, side, columns, (end.angle,), (end.angle,))
+        else:
+            columns = {"motor_counts_per_rev": RAW_COLUMNS[THETA_MOTOR][0]}
+            sensors += _sensor(key, side, columns, (THETA_MOTOR,), (THETA_MOTOR,))
         columns = {"torque_sensor": f"{end.name}_torque_counts", "torque_constant_Nm_per_A": f"{end.name}_current_A"}
         sensors += _sensor(key, side, columns, (end.torque, *end.tensions), (end.torque, *end.tensions))
         columns = {"load_cell": f"{end.name}_load_cell_V"}

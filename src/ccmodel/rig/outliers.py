@@ -9,13 +9,16 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from ccmodel.channels import THETA_IN, THETA_OUT
+from ccmodel.channels import THETA_IN, THETA_MOTOR, THETA_OUT
 from ccmodel.rig import limits
 from ccmodel.rig.batch import RAW_COLUMNS
 from ccmodel.rig.findings import Defect
 
 # A pulley's angle has checks of its own: a cell that is off is a counter that lost counts.
-NOT_ANALOG = ("time_s", *(column for angle in (THETA_IN, THETA_OUT) for column in (angle, *RAW_COLUMNS[angle])))
+NOT_ANALOG = (
+    "time_s",
+    *(column for angle in (THETA_IN, THETA_OUT, THETA_MOTOR) for column in (angle, *RAW_COLUMNS[angle])),
+)
 # The readings that one is compared with: so many on each side, without itself.
 NEIGHBOURS = np.ones(2 * limits.OUTLIER_NEIGHBOURS + 1, bool)
 NEIGHBOURS[limits.OUTLIER_NEIGHBOURS] = False

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ccmodel.channels import TAU_OUT
 from ccmodel.rig import limits
-from ccmodel.rig.angle import Angle, angle_of, resolution_seen, smallest_step
+from ccmodel.rig.angle import Angle, angle_of, angle_of_motor, resolution_seen, smallest_step
 from ccmodel.rig.batch import Rig
 from ccmodel.rig.findings import Defect, LogError
 from ccmodel.rig.log import length, longest_run, runs
@@ -46,16 +46,21 @@ def check_sensors(table: pd.DataFrame, rig: Rig, largest_travel: float) -> tuple
             _check_steps(table, angle)
     _check_drive(table, drive, load)
     defects, dead = _missing_steps(table, drive), []
+    motor = angle_of_motor(table, rig)
     is_small = drive_travel(table, rig) < limits.SMALL_TRAVEL_FRACTION * largest_travel
     for column in table.columns.drop(["time_s", drive.column]):
         load_here = load if load is not None and column == load.column else None
-        if fault := _dead(table, column) if load_here is None else _dead_load(table, load_here, rig):
+        if motor is not None and column == motor.column:
+            fault = _dead(table, column) or _jump(table, motor)
+        else:
+            fault = _dead(table, column) if load_here is None else _dead_load(table, load_here, rig)
+        if fault:
             contradicts = fault.contradicts and not (is_small and load_here is not None and fault.row is None)
             defects.append(fault._replace(text=f"{fault.text}: column not used", contradicts=contradicts))
             dead.append(column)
         elif load_here is not None:
             defects += _missing_steps(table, load_here) + _load_stands(table, drive, load_here)
-        else:
+        elif motor is None or column != motor.column:
             # A sensor at the end of its range repeats one value: it is clipped and not frozen.
             defects += _saturated(table, column, drive, rig.ranges.get(column)) or _frozen(table, column, drive)
     return table.drop(columns=dead), defects

@@ -62,6 +62,8 @@ NOW, STEP, SAVED, LAST, BEFORE = range(5)
 # load, shape (rows,): angle (rad), rotation (rad) and duration (s) of the last step, speed (rad/s), speed before that,
 # bristle of the bearing; then speed, bristle and torque (N m) of this step.
 ANGLE, ROTATION, DT, OMEGA, OMEGA_BEFORE, BEARING, OMEGA_NEXT, BEARING_NEXT, TORQUE = range(9)
+# drive pulley, shape (3,): angle, middle of the range that its encoder leaves open (rad); bristle of its bearing.
+DRIVE_ANGLE, DRIVE_MIDDLE, DRIVE_BEARING = range(3)
 PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10 + BRANCHES, 20 + 2 * ELEMENTS, 5, 11, 9
 # Then, in a run that has them, tables (`ccmodel.mechanisms.tables`) of compliance and of friction, each by tension.
 SPRING_TABLE, FRICTION_TABLE = PIECE_ROWS, NODE_ROWS

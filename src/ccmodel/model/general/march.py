@@ -5,11 +5,13 @@ cable B. Displacements count towards the drive end. A step solves the equations 
 `ccmodel.model.general.newton`.
 """
 
+import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.kernel import borrowed, kernel
-from ccmodel.mechanisms.presliding import ELEMENTS
-from ccmodel.mechanisms.pulley_eccentricity import winding
+from ccmodel.mechanisms.drive_train import train_torque
+from ccmodel.mechanisms.presliding import ELEMENTS, dahl
+from ccmodel.mechanisms.pulley_eccentricity import winding, winding_change
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.equations import relax, renew_contacts, set_grip
 from ccmodel.model.general.layout import Physics
@@ -30,6 +32,9 @@ SMALLEST_SUBSTEP = 1.0 / 4096
 # A run ends after so many attempts at a step on average. Without this limit a single sample may take thousands of
 # steps, and a search that strays to such a model never ends.
 MOST_ATTEMPTS = 30
+# The drive train's torque and the transmission's agree within this, N m.
+TRAIN_TOLERANCE_NM = 1e-6
+TRAIN_ITERATIONS = 30
 # Shares of a sample and its time add up to the whole within this.
 ROUNDING = 1e-9
 
@@ -71,6 +76,86 @@ def _accept(
 
 
 @kernel(error_model="numpy")
+def _at_drive_angle(
+    ph: Physics,
+    piece: NDArray,
+    node: NDArray,
+    slide: NDArray,
+    mean: NDArray,
+    load: NDArray,
+    rotation: float,
+    torque: float,
+    dt: float,
+    bristle: float,
+    drive: tuple[float, float, float],
+    pulley: NDArray,
+    angle: float,
+    motor: float,
+) -> tuple[bool, float, float]:
+    """Solve a step with the drive pulley at `angle`.
+
+    Returns whether it was solved, the load's rotation, and the torque on the drive pulley over that of the train (N m),
+    which rises with the angle.
+    """
+    pull = drive[0] * winding_change(pulley[rows.DRIVE_ANGLE], angle - pulley[rows.DRIVE_ANGLE], drive[1], drive[2])
+    slide[rows.NOW, 0, 0], slide[rows.NOW, 1, 0] = pull, -pull
+    solved, rotation = solve_step(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle)
+    R = drive[0] * winding(angle, drive[1], drive[2])[1]
+    cables = R * (max(piece[rows.TENSION, 0, 0], 0.0) - max(piece[rows.TENSION, 1, 0], 0.0))
+    turned = angle - pulley[rows.DRIVE_ANGLE]
+    bearing = ph.drive_friction_Nm * dahl(pulley[rows.DRIVE_BEARING], turned, ph.drive_presliding_rad)[0]
+    return solved, rotation, cables + bearing - train_torque(motor - angle, ph.train_compliance, ph.train_half_gap)
+
+
+@kernel(error_model="numpy")
+def _solve_with_train(
+    ph: Physics,
+    piece: NDArray,
+    node: NDArray,
+    slide: NDArray,
+    mean: NDArray,
+    load: NDArray,
+    rotation: float,
+    torque: float,
+    dt: float,
+    bristle: float,
+    drive: tuple[float, float, float],
+    pulley: NDArray,
+    lowest: float,
+    highest: float,
+    motor: float,
+) -> tuple[bool, float, float]:
+    """Solve a step with the drive pulley where the train balances it, or at the end of its range nearest to that.
+
+    Returns whether it was solved, the load's rotation and the pulley's angle.
+    """
+    step = ph, piece, node, slide, mean, load
+    rest = torque, dt, bristle, drive, pulley
+    # The pulley usually stays at the end of its range at which it was.
+    rising = pulley[rows.DRIVE_ANGLE] - pulley[rows.DRIVE_MIDDLE] <= 0.0
+    near, far = (lowest, highest) if rising else (highest, lowest)
+    solved, rotation, at_near = _at_drive_angle(*step, rotation, *rest, near, motor)
+    if not solved or (at_near >= 0.0) == rising:
+        return solved, rotation, near
+    solved, rotation, at_far = _at_drive_angle(*step, rotation, *rest, far, motor)
+    if not solved or (at_far >= 0.0) != rising:
+        return solved, rotation, far
+    angle = far
+    # The false position, with the Illinois rule.
+    for _ in range(TRAIN_ITERATIONS):
+        angle = (near * at_far - far * at_near) / (at_far - at_near)
+        solved, rotation, excess = _at_drive_angle(*step, rotation, *rest, angle, motor)
+        if not solved or abs(excess) <= TRAIN_TOLERANCE_NM:
+            break
+        if (excess >= 0.0) == (at_far >= 0.0):
+            at_near *= 0.5
+        else:
+            near, at_near = far, at_far
+        far, at_far = angle, excess
+    return solved, rotation, angle
+
+
+@kernel(error_model="numpy")
 def march(
     ph: Physics,
     piece: NDArray,
@@ -80,6 +165,8 @@ def march(
     load: NDArray,
     time_s: NDArray,
     theta_in: NDArray,
+    motor: NDArray,
+    within_rad: float,
     drive: tuple[float, float, float],
     friction_factor: NDArray,
     series: NDArray,
@@ -96,6 +183,11 @@ def march(
         sample is solved at the drive's first position, which balances a start that is out of balance.
     time_s, theta_in : ndarray, shape (m,)
         Times (s), and angle of the drive pulley (rad).
+    motor : ndarray, shape (m,) or (1,)
+        Angle of the motor at the drive pulley, rad; a single value where it was not measured.
+    within_rad : float
+        With a drive train, the drive pulley is where the train balances the transmission, but no further than this
+        from `theta_in`: what its encoder leaves open.
     drive : tuple of float
         The drive pulley's radius (m), eccentricity, and the latter's angle (rad).
     friction_factor : ndarray, shape (m, 2) or (1, 2)
@@ -105,9 +197,9 @@ def march(
         throughout.
     steps : int
         Steps from one sample to the next; a step without a solution is halved.
-    out : ndarray, shape (7, m)
+    out : ndarray, shape (8, m)
         Filled with T1, T2, T3, T4 (N), load angle (rad), the load's torque and that of the cables on the drive
-        pulley (N m).
+        pulley (N m), and the drive pulley's angle (rad).
 
     Returns
     -------
@@ -118,11 +210,14 @@ def march(
     m, n = time_s.size, node.shape[2]
     attempts, most_attempts = 0, MOST_ATTEMPTS * m * steps
     last_rotation, before_rotation, last_pull, before_pull, last_dt = 0.0, 0.0, 0.0, 0.0, 0.0
+    angle = theta_in[0]
     node[rows.RESTED] = 1.0
     set_grip(ph, node, slide, friction_factor[0], 0.0)
     fixed_grip = ph.stribeck_rise == 0.0 and len(friction_factor) == 1
     prescribed = ph.kind == rows.PRESCRIBED_ANGLE
     wound_before = winding(theta_in[0], drive[1], drive[2])[0]
+    has_train = ph.train_compliance > 0.0 and motor.size > 1
+    pulley = np.array([theta_in[0], theta_in[0], 0.0])
     for j in range(m):
         wound, radius_factor, _ = winding(theta_in[j], drive[1], drive[2])
         pull, wound_before = drive[0] * (wound - wound_before), wound
@@ -134,6 +229,8 @@ def march(
         while done < 1.0 - ROUNDING:
             part = min(part, 1.0 - done)
             step_pull, step_dt = part * pull, part * dt
+            share = done + part
+            middle = theta_in[j] - (1.0 - share) * (theta_in[j] - theta_in[max(j - 1, 0)])
             # Extrapolate the last steps, scaled to the drive's step while the drive continues in its direction.
             expected = 2 * last_pull - before_pull
             is_whole = abs(part - whole) <= ROUNDING and abs(last_dt - step_dt) <= ROUNDING * dt
@@ -163,7 +260,17 @@ def march(
                     change = set_grip(ph, node, slide, friction_factor[min(j, len(friction_factor) - 1)], step_dt)
                     if iteration > 0 and change < GRIP_TOLERANCE:
                         break
-                solved, rotation = solve_step(ph, piece, node, slide, mean, load, rotation, torque, step_dt, bristle)
+                if has_train:
+                    at_motor = motor[j] - (1.0 - share) * (motor[j] - motor[max(j - 1, 0)])
+                    solved, rotation, angle = _solve_with_train(
+                        ph, piece, node, slide, mean, load, rotation, torque, step_dt, bristle,
+                        drive, pulley, middle - within_rad, middle + within_rad, at_motor,
+                    )  # fmt: skip
+                else:
+                    angle = middle
+                    solved, rotation = solve_step(
+                        ph, piece, node, slide, mean, load, rotation, torque, step_dt, bristle
+                    )
                 if not solved or ph.stribeck_rise == 0.0:
                     break
             if not solved:
@@ -180,6 +287,10 @@ def march(
             before_rotation, last_rotation = last_rotation, rotation
             before_pull, last_pull, last_dt = last_pull, step_pull, step_dt
             _accept(ph, piece, node, slide, mean, load, rotation, step_dt)
+            if has_train:
+                turned = angle - pulley[rows.DRIVE_ANGLE]
+                pulley[rows.DRIVE_BEARING] = dahl(pulley[rows.DRIVE_BEARING], turned, ph.drive_presliding_rad)[0]
+                pulley[rows.DRIVE_ANGLE], pulley[rows.DRIVE_MIDDLE] = angle, middle
             done += part
             part = min(2.0 * part, whole)
         out[0, j], out[1, j] = max(piece[rows.TENSION, 0, 0], 0.0), max(piece[rows.TENSION, 0, n], 0.0)
@@ -191,5 +302,9 @@ def march(
             out[5, j] = R * (out[1, j] - out[3, j]) - bearing
         else:
             out[5, j] = load[rows.TORQUE]
+        out[7, j] = theta_in[j]
+        if has_train:
+            out[7, j] = angle
+            radius_factor = winding(angle, drive[1], drive[2])[1]
         out[6, j] = drive[0] * radius_factor * (out[0, j] - out[2, j])
     return m

@@ -31,11 +31,35 @@ ELEMENTS = 32
 # Further passes of the march for laws of the load: each leaves the share of the error that the law's stiffness is of
 # that of the cables.
 LOAD_LAW_PASSES = 3
+# The run that only gives the mean torsion of a drive train has cells of so many times the length.
+COARSER = 4
 # Outputs of the march, row by row.
-OUTPUTS = (*TENSIONS, THETA_OUT, TAU_OUT, TAU_IN)
+OUTPUTS = (*TENSIONS, THETA_OUT, TAU_OUT, TAU_IN, THETA_IN)
 # A step covers no more than this phase of a load that rings, up to so many steps a sample. A load that rings faster,
 # near half the sampling rate and above, shows its inertia in the samples but not its ringing, and needs only a few.
 RINGING_STEP_RAD, MOST_STEPS, UNRESOLVED_STEPS = 0.15, 16, 2
+
+
+class Motor(NamedTuple):
+    """The motor behind the drive train, and what the drive pulley's own encoder leaves open.
+
+    Attributes
+    ----------
+    angle_rad : ndarray, shape (n,) or (1,)
+        The motor's angle at the drive pulley (over the gear's ratio), from any zero; a single value where it was not
+        measured.
+    within_rad : float
+        The drive pulley's motion is known within this.
+    judged : slice
+        Samples over which the train's mean torsion is that of the torque in the mean: the angles have no common zero.
+    """
+
+    angle_rad: NDArray
+    within_rad: float = 0.0
+    judged: slice = slice(None)
+
+
+NO_MOTOR = Motor(np.zeros(1))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,10 +71,13 @@ class GeneralResponse(PairResponse):
     time_s : ndarray, shape (n,)
     read : mapping of str to ndarray
         Readings of the sensors: theta_in_rad, theta_out_rad, tau_in_Nm, tau_out_Nm, F_drive_N, F_load_N.
+    drive_angle_rad : ndarray, shape (n,)
+        The drive pulley's angle; behind a drive train it differs from theta_in by what the encoder leaves open.
     """
 
     time_s: NDArray
     read: Mapping[str, NDArray]
+    drive_angle_rad: NDArray
 
 
 def simulate(
@@ -62,6 +89,7 @@ def simulate(
     mechanisms: Sequence[Active] = (),
     elements: int = ELEMENTS,
     steps: int = 1,
+    motor: Motor = NO_MOTOR,
 ) -> GeneralResponse:
     """Run the pair through a motion of the drive pulley.
 
@@ -80,6 +108,8 @@ def simulate(
         Cells of each cable.
     steps : int
         Steps from one sample to the next, multiplied by what a ringing load needs.
+    motor : Motor
+        Moves the drive pulley through a drive train, if `mechanisms` has one.
 
     Returns
     -------
@@ -99,16 +129,35 @@ def simulate(
     series = _series(load)
     _check(time_s, theta_in, series, elements)
     series = np.zeros(1) if series is None else series
-    arguments = transmission, load, settings, time_s, theta_in, initial, elements, steps
-    solved, out = _marched(*arguments, series)
+    arguments = transmission, load, settings, time_s, theta_in, initial
+    if settings.train_compliance > 0.0 and motor.angle_rad.size > 1:
+        coarse = max(elements // COARSER, 1)
+        motor = _zeroed(motor, settings, *_marched(*arguments, coarse, steps, series))
+    else:
+        motor = NO_MOTOR
+    arguments = *arguments, elements, steps
+    solved, out = _marched(*arguments, series, motor)
     # A law of the load takes the load's motion from the pass before. A load that is held or driven has no law.
     has_law = bool(settings.load_laws) and not isinstance(load, AngleLoad | FixedLoad)
     for _ in range(LOAD_LAW_PASSES if has_law and solved == time_s.size else 0):
         motion = Sensing(time_s, {THETA_OUT: out[4]}, transmission.drive_radius_m, transmission.load_radius_m)
-        solved, out = _marched(*arguments, series + sum(law(motion) for law in settings.load_laws))
+        solved, out = _marched(*arguments, series + sum(law(motion) for law in settings.load_laws), motor)
         if solved < time_s.size:
             break
     return _response(transmission, active, time_s[:solved], theta_in[:solved], out)
+
+
+def _zeroed(motor: Motor, settings: Settings, solved: int, out: NDArray) -> Motor:
+    """The motor's angle, whose mean difference from the drive pulley's is the mean torsion of a run without train.
+
+    `solved` and `out` are that run's; without a sample that counts, the motor begins where the pulley does.
+    """
+    judged = slice(*motor.judged.indices(solved))
+    tau_in, theta_in = (out[OUTPUTS.index(channel), judged] for channel in (TAU_IN, THETA_IN))
+    torsion = settings.train_compliance * tau_in + settings.train_half_gap * np.sign(tau_in)
+    excess = motor.angle_rad[judged] - theta_in - torsion
+    zero = excess.mean() if excess.size else motor.angle_rad[0] - out[OUTPUTS.index(THETA_IN), 0]
+    return motor._replace(angle_rad=motor.angle_rad - zero)
 
 
 class Prepared(NamedTuple):
@@ -170,6 +219,7 @@ def _marched(
     elements: int,
     steps: int,
     series: NDArray,
+    motor: Motor = NO_MOTOR,
 ) -> tuple[int, NDArray]:
     """Number of samples that were solved, and the outputs at all of them, shape (outputs, n).
 
@@ -178,11 +228,12 @@ def _marched(
     at = prepared(transmission, load, settings, time_s, theta_in, initial, elements, steps, series)
     state = at.physics, at.piece, at.node, at.slide, at.mean, at.load
     out = np.empty((len(OUTPUTS), time_s.size))
-    solved = march(*state, time_s, theta_in, at.drive, at.friction_factor, series, at.steps, out)
+    drive = motor.angle_rad, motor.within_rad, at.drive
+    solved = march(*state, time_s, theta_in, *drive, at.friction_factor, series, at.steps, out)
     if isinstance(load, TorqueLoad) and load.parallel_Nm_per_rad:
         out[5, :solved] = series[:solved]  # the sensor does not feel the spring in parallel
     if settings.drive_friction_Nm != 0.0:
-        out[6, :solved] += settings.drive_friction_Nm * bearing(theta_in[:solved], settings.drive_presliding_rad)
+        out[6, :solved] += settings.drive_friction_Nm * bearing(out[7, :solved], settings.drive_presliding_rad)
     return solved, out
 
 
@@ -205,13 +256,13 @@ def _response(
 ) -> GeneralResponse:
     """Outputs of the march up to the last sample of `time_s`, and what the sensors read of them."""
     response = PairResponse(
-        **dict(zip(OUTPUTS, out[:, : time_s.size], strict=True)),
+        **{name: row for name, row in zip(OUTPUTS, out[:, : time_s.size], strict=True) if name != THETA_IN},
         status=Status.OK if time_s.size == out.shape[1] else Status.NO_CONVERGENCE,
         reached=time_s.size,
     )
     radii = transmission.drive_radius_m, transmission.load_radius_m
     read = read_by_sensors(active, time_s, response.channels(theta_in), radii)
-    return GeneralResponse(**vars(response), time_s=time_s, read=read)
+    return GeneralResponse(**vars(response), time_s=time_s, read=read, drive_angle_rad=out[7, : time_s.size])
 
 
 def settings_of(mechanisms: Sequence[Active]) -> Settings:

@@ -17,7 +17,14 @@ INSTRUMENT = Path(__file__).with_name("instrument.yaml")
 # Notice of the licence, and citation with what the import changes: beside every batch that is derived of the data set.
 LICENSE, SOURCE = (Path(__file__).with_name(name) for name in ("LICENSE", "SOURCE.md"))
 PRETENSION_N, CONDUIT = 10.0, {"length_m": 0.5, "bend_rad": 6.2832}
-LOGGED = ["time_s", "drive_encoder_counts", "load_encoder_counts", "drive_torque_counts", "load_torque_counts"]
+LOGGED = [
+    "time_s",
+    "drive_encoder_counts",
+    "load_encoder_counts",
+    "drive_torque_counts",
+    "load_torque_counts",
+    "motor_encoder_counts",
+]
 
 
 def write_batch(folder: Path, trials: Mapping[str, Trial], signs: Mapping[str, Mapping]) -> None:
@@ -27,6 +34,8 @@ def write_batch(folder: Path, trials: Mapping[str, Trial], signs: Mapping[str, M
     yaml.width = 120
     described = yaml.load(INSTRUMENT)
     described["batch"] = folder.name
+    if not any("motor_encoder_counts" in trial.samples for trial in trials.values()):
+        del described["rig"]["drive"]["motor_counts_per_rev"]
     for end in signs:
         described["rig"][end] |= signs[end]
     for name, trial in trials.items():
@@ -41,7 +50,7 @@ def write_batch(folder: Path, trials: Mapping[str, Trial], signs: Mapping[str, M
 def _write_log(path: Path, trial: Trial) -> None:
     # Without a time stamp, so that a trial always gives the same file.
     compression = {"method": "gzip", "compresslevel": 9, "mtime": 0}
-    table = trial.samples[LOGGED].round({"time_s": 6}).convert_dtypes()
+    table = trial.samples.filter(LOGGED).round({"time_s": 6}).convert_dtypes()
     table.to_csv(path, index=False, compression=compression)
 
 

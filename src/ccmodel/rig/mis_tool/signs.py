@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ccmodel.rig.mis_tool.trial import Trial
 
 DRIVE_ANGLE, LOAD_ANGLE = "drive_encoder_counts", "load_encoder_counts"
+MOTOR_ANGLE = "motor_encoder_counts"
 DRIVE_TORQUE, LOAD_TORQUE = "drive_torque_counts", "load_torque_counts"
 
 # A sign is in doubt if a smaller share of the trials supports it, or if the median of their strengths is lower.
@@ -28,7 +29,14 @@ def sensor_signs(trials: Sequence[Trial]) -> tuple[dict[str, dict[str, int]], li
         for t in trials
     ]
     load = _majority("load torque", strengths, doubts)
-    return {"drive": {"torque_sign": drive}, "load": {"encoder_sign": angle, "torque_sign": load}}, doubts
+    sides: dict[str, dict[str, int]] = {
+        "drive": {"torque_sign": drive},
+        "load": {"encoder_sign": angle, "torque_sign": load},
+    }
+    if with_motor := [t for t in trials if MOTOR_ANGLE in t.samples]:
+        motor = _majority("motor encoder", [_correlation(t, DRIVE_ANGLE, MOTOR_ANGLE) for t in with_motor], doubts)
+        sides["drive"]["motor_sign"] = motor
+    return sides, doubts
 
 
 def _correlation(trial: Trial, one: str, other: str) -> float:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ccmodel.rig.findings import LogError
 
-# Columns by their position; the others (back-end command, motor encoder, target) are not used.
+# Columns by their position; the others (motor current, back-end command, target) are not used.
 COLUMNS = {
     0: "time_s",
     1: "drive_encoder_counts",
@@ -23,8 +23,9 @@ COLUMNS = {
     4: "load_encoder_counts",
     5: "load_torque_counts",
     6: "load_command",
+    8: "motor_encoder_counts",
 }
-FEWEST_COLUMNS = 6  # all but the load command
+FEWEST_COLUMNS = 6  # all but the load command and what follows it
 # Rows of a trial: half a second at 1 kHz.
 FEWEST_ROWS = 500
 # Duration of the start-up transient, s, from the page of the data set.
