@@ -25,6 +25,8 @@ class RealCase:
         "name at place" of the mechanism that the baseline lacks.
     without : tuple of str
         Mechanisms removed from the diagnosis's candidates.
+    recordings : tuple of str
+        The test recordings of a control; empty for all.
     """
 
     seed: int
@@ -33,6 +35,7 @@ class RealCase:
     size: float = 0.0
     removed: str | None = None
     without: tuple[str, ...] = ()
+    recordings: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -55,6 +58,7 @@ def cases_of(plan: RealPlan, model: dict) -> list[RealCase]:
     cases: list[dict] = [{}, *(_draw(plan, fault, 0) for fault in plan.faults)]
     for removed in map(label, model["mechanisms"]):
         cases += [{"removed": removed, "without": without} for without in ((), (name_of(removed),))]
+    cases += [{"recordings": control} for control in plan.controls]
     cases += [_draw(plan, fault, repeat) for repeat in range(1, plan.repeats) for fault in plan.faults]
     return [RealCase(plan.seed, number, **case) for number, case in enumerate(cases)]
 

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 # Drive travel over which a drag reverses after a reversal of the motion, rad: a few counts of the encoder.
 DRAG_REVERSAL_RAD = 4e-3
+# Periods of a cogging torque in a revolution of the spindle, which turns by a sixth of one.
+COGS = 24
 
 Rig = Mapping[str, Mapping]
 Fault = Callable[[pd.DataFrame, Rig, float], pd.DataFrame]
@@ -95,16 +97,35 @@ def drag_with_load(log: pd.DataFrame, rig: Rig, size: float) -> pd.DataFrame:
     return _add_torque(log, rig, "drive", share * _direction(log, rig))
 
 
+def drag_in_one_direction(log: pd.DataFrame, rig: Rig, size: float) -> pd.DataFrame:
+    """A friction torque of size (N m) against the drive's motion to greater angles only."""
+    return _add_torque(log, rig, "drive", size * np.maximum(_direction(log, rig), 0.0))
+
+
+def cogging(log: pd.DataFrame, rig: Rig, size: float) -> pd.DataFrame:
+    """A torque of amplitude size (N m) that the drive's angle decides, with `COGS` periods a revolution."""
+    return _add_torque(log, rig, "drive", size * np.sin(COGS * angle_rad(log, rig, "drive")))
+
+
+def bent_torque_sensor(log: pd.DataFrame, rig: Rig, size: float) -> pd.DataFrame:
+    """A drive torque sensor that reads its largest torque size (a share) too high, and lower ones less, by a square."""
+    torque = torque_Nm(log, rig, "drive")
+    return _add_torque(log, rig, "drive", size * torque * np.abs(torque) / np.abs(torque).max())
+
+
 FAULTS: dict[str, Fault] = {
     "gain-of-drive-torque": gain("drive"),
     "gain-of-load-torque": gain("load"),
-    "late-drive-side": delay("drive_encoder_counts", "drive_torque_counts", "drive_current_A"),
+    "late-drive-side": delay("drive_encoder_counts", "drive_torque_counts", "drive_current_A", "motor_encoder_counts"),
     "late-load-side": delay("load_encoder_counts", "load_torque_counts", "load_current_A"),
     "late-drive-torque": delay("drive_torque_counts", "drive_current_A"),
     "drift-of-drive-torque": drift("drive"),
     "lost-motion-of-jaw": lost_motion,
     "drag": drag,
     "drag-with-load": drag_with_load,
+    "drag-in-one-direction": drag_in_one_direction,
+    "cogging": cogging,
+    "bent-torque-sensor": bent_torque_sensor,
 }
 
 

@@ -27,7 +27,7 @@ def real_page(outcomes: Sequence[RealOutcome], plan: RealPlan, baseline: Path, e
     earlier : str
         The present page, whose hand-written part is kept.
     """
-    control = next((o for o in outcomes if o.case.is_control), None)
+    controls = [_control(o) for o in outcomes if o.case.is_control]
     seeded = [_fault_row(o, plan) for o in outcomes if o.case.fault]
     removed = [_removed_row(o) for o in outcomes if o.case.removed]
     by_hand = earlier[earlier.index(BY_HAND) :] if BY_HAND in earlier else f"{BY_HAND}\n\nNot written yet.\n"
@@ -38,9 +38,11 @@ def real_page(outcomes: Sequence[RealOutcome], plan: RealPlan, baseline: Path, e
 
 {_summary(outcomes)}
 
-## Control
+## Controls
 
-The test recordings without a fault: {_control(control)}
+Test recordings without a fault:
+
+{chr(10).join(controls) or "Not run."}
 
 ## Seeded faults
 
@@ -49,15 +51,15 @@ The test recordings without a fault: {_control(control)}
   tolerance.
 - **Right**: the mechanism is identified or among the alternatives, at its place, or an equivalent that no recording
   distinguishes from it (a gain at one end is an inverse gain at the other). If no candidate models the fault, right is
-  `unexplained` or `undecided` at any place, with no mechanism stated with confidence.
+  `learned`, `unexplained` or `undecided` at any place, with no mechanism stated with confidence.
 
 {_rows(_FAULT_HEAD, seeded)}
 
 ## Mechanisms removed from the baseline
 
 The test recordings without a fault, with one mechanism removed from the baseline. If this mechanism is a candidate, a
-diagnosis is right that identifies it with its value. Otherwise a diagnosis is right if it is `unexplained` or
-`undecided` at the place of the mechanism.
+diagnosis is right that identifies it with its value. Otherwise a diagnosis is right if it is `learned`, `unexplained`
+or `undecided` at the place of the mechanism.
 
 {_rows(_REMOVED_HEAD, removed)}
 
@@ -107,8 +109,9 @@ def _rows(head: list[str], rows: list[list[str]]) -> str:
     return table(head, rows) if rows else "Not run."
 
 
-def _control(o: RealOutcome | None) -> str:
-    return f"`{_reported(o)}`, {classification(o)}; mean square {_mean_square(o)}." if o else "not run."
+def _control(o: RealOutcome) -> str:
+    which = _ids(o.case.recordings) or "all"
+    return f"- {which}: {_reported(o)}, {classification(o)}; mean square {_mean_square(o)}."
 
 
 def _fault_row(o: RealOutcome, plan: RealPlan) -> list[str]:
@@ -133,6 +136,8 @@ def _reported(o: RealOutcome) -> str:
         return f"none ({o.failure[-120:]})"
     if o.claims:
         return f"{o.verdict}: " + "; ".join(f"{label(m)} ({m['confidence']:.2f})" for m in o.claims)
+    if o.laws:
+        return "learned: " + "; ".join(f"{w['slot']} at {w['place']} by {', '.join(w['arguments'])}" for w in o.laws)
     nearest = (o.diagnosis.get("nearest") or {"mechanisms": []})["mechanisms"]
     return f"{o.verdict}, nearest {' + '.join(map(label, nearest))}" if nearest else o.verdict
 

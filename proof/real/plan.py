@@ -36,8 +36,9 @@ class RealPlan(Strict):
     step_s: PositiveFloat
     cycles: PositiveInt
     tolerance: Share
-    forced_candidates: tuple[tuple[str, ...], ...]
+    time_limit_s: PositiveFloat
     tolerances: tuple[Share, ...] = Field(min_length=1)
+    controls: tuple[tuple[str, ...], ...] = ()
     repeats: PositiveInt
     faults: dict[str, FaultPlan]
 
@@ -47,6 +48,8 @@ class RealPlan(Strict):
             raise ValueError(f"faults: there is no {', '.join(sorted(unknown))}; there are {', '.join(FAULTS)}")
         if both := set(self.training) & set(self.test):
             raise ValueError(f"training and test share {', '.join(sorted(both))}")
+        if strays := {name for control in self.controls for name in control} - set(self.test):
+            raise ValueError(f"controls: {', '.join(sorted(strays))} is no test recording")
         return self
 
 

@@ -32,8 +32,7 @@ def find_baseline(plan: RealPlan, source: Path, out: Path, report: Report, sourc
     with tempfile.TemporaryDirectory(prefix="training-") as folder:
         batch = Path(folder) / "known"
         write_batch(source, plan.training, batch)
-        candidates = [word for names in plan.forced_candidates for word in ("--candidate", ", ".join(names))]
-        options = [*_options(plan, plan.tolerance), *candidates]
+        options = [*_options(plan, plan.tolerance), "--time-limit", f"{plan.time_limit_s:g}"]
         diagnosis = _diagnosed(batch, out / "first", options, None, sources)
         which = "nearest.json" if diagnosis["verdict"] == "unexplained" and diagnosis.get("nearest") else "model.json"
         shutil.copy(out / "first" / which, out / BASELINE)
@@ -99,7 +98,7 @@ def judge_real(
     out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="case-") as folder:
         batch, known = Path(folder) / case.name, Path(folder) / "baseline.json"
-        changed = write_batch(source, plan.test, batch, case.fault, case.size)
+        changed = write_batch(source, case.recordings or plan.test, batch, case.fault, case.size)
         digest = folder_digest(batch)
         known.write_text(json.dumps(without_mechanism(model, case.removed)), encoding="utf-8")
         started = conceal.core_s()
@@ -123,13 +122,14 @@ def judge_real(
 
 
 def _read_diagnosis(out: Path) -> dict:
-    """The scored part of a diagnosis: verdict, place, mechanisms with values, and residual mean squares."""
+    """The scored part of a diagnosis: verdict, place, mechanisms with values, laws, and residual mean squares."""
     content = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
     return {
         "verdict": content["verdict"],
         "place": (content.get("location") or {}).get("place"),
         "mechanisms": content["mechanisms"],
         "alternatives": content["alternatives"],
+        "laws": [{key: law[key] for key in ("place", "slot", "arguments", "confidence")} for law in content["laws"]],
         "nearest": content.get("nearest"),
         "mean_square": content["fit"]["mean_square"],
     }

@@ -70,9 +70,15 @@ class RealOutcome:
         return [*self.diagnosis["mechanisms"], *self.diagnosis["alternatives"]] if self.diagnosis else []
 
     @property
+    def laws(self) -> list[dict]:
+        """The laws that the diagnosis found, the first one first."""
+        return self.diagnosis.get("laws", []) if self.diagnosis else []
+
+    @property
     def is_located(self) -> bool:
-        """Whether the reported place is the right one, or equivalent to it."""
-        return bool(self.diagnosis) and same_place(self.diagnosis["place"], self.truth.place)
+        """Whether the reported place, or that of the law that was found, is the right one or equivalent to it."""
+        places = [law["place"] for law in self.laws[:1]] or [self.diagnosis["place"]] if self.diagnosis else []
+        return any(same_place(place, self.truth.place) for place in places)
 
     @property
     def right_labels(self) -> tuple[str, ...]:
@@ -127,6 +133,8 @@ def classification(o: RealOutcome) -> str:
             return "true negative" if o.truth.place is None else "false negative"
         case "inputs-inconsistent":
             return "inputs called inconsistent"
+        case "learned":
+            return "learned, right place" if o.is_located else "learned, other place"
         case "unexplained":
             return "unexplained, right place" if o.is_located else "unexplained, other place"
         case "explained":
@@ -154,7 +162,7 @@ def is_right(o: RealOutcome) -> bool:
     if o.truth.place is None:
         return found == "true negative"
     if not o.right_labels:
-        is_open = o.verdict in ("unexplained", "undecided") and not o.confidently_wrong
+        is_open = o.verdict in ("unexplained", "undecided", "learned") and not o.confidently_wrong
         return is_open and (o.is_located or not o.case.without)
     if o.case.removed:
         return found == "identified" and bool(is_size_recovered(o))

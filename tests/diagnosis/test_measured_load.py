@@ -145,7 +145,7 @@ def test_a_tolerance_that_cannot_be_used_is_refused(stated, said):
 def test_the_configuration_for_the_public_recordings_says_how_they_would_be_diagnosed():
     config = load_config(Path(__file__).parents[2] / "config" / "real.yaml")
     assert all(0 < share < 0.05 for share in config.diagnosing.tolerance.values())
-    assert config.diagnosing.forced_candidates
+    assert not config.diagnosing.forced_candidates
 
 
 def test_a_fit_starts_from_a_slack_cable_too_where_the_initial_tension_is_not_observed():

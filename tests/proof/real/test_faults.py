@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from proof.real.faults import DRAG_REVERSAL_RAD, FAULTS, angle_rad, play, torque_Nm, write_batch
+from proof.real.faults import COGS, DRAG_REVERSAL_RAD, FAULTS, angle_rad, play, torque_Nm, write_batch
 
 COUNTS = {
     "drive": {
@@ -136,6 +136,30 @@ def test_a_drag_with_the_load_is_a_share_of_its_torque(in_counts):
     load = np.abs(torque_Nm(in_counts, COUNTS, "load"))
     assert load.max() > 2 * load.min()
     np.testing.assert_allclose(added[upwards], 0.3 * load[upwards], atol=2.1e-5)
+
+
+def test_laws_that_no_list_holds(in_counts):
+    theta, torque = angle_rad(in_counts, COUNTS, "drive"), torque_Nm(in_counts, COUNTS, "drive")
+    moves = np.abs(np.cos(2 * np.pi * 0.5 * TIME_S)) > 0.2
+    rising = np.cos(np.pi * TIME_S) > 0
+    count = 2.1e-5
+
+    def added(fault, size):
+        return torque_Nm(FAULTS[fault](in_counts, COUNTS, size), COUNTS, "drive") - torque
+
+    one_way = added("drag-in-one-direction", 0.01)
+    assert np.abs(one_way[moves & ~rising]).max() < count
+    np.testing.assert_allclose(one_way[moves & rising][5:], 0.01, atol=count)
+    np.testing.assert_allclose(added("cogging", 0.005), 0.005 * np.sin(COGS * theta), atol=count)
+    bent = added("bent-torque-sensor", 0.2)
+    assert np.abs(bent).max() == pytest.approx(0.2 * np.abs(torque).max(), rel=0.01)
+    np.testing.assert_allclose(bent, 0.2 * torque * np.abs(torque) / np.abs(torque).max(), atol=count)
+
+
+def test_the_motor_is_late_with_the_drive_side(in_counts):
+    log = in_counts.assign(motor_encoder_counts=35 * in_counts["drive_encoder_counts"])
+    after = FAULTS["late-drive-side"](log, COUNTS, 0.02)
+    assert np.abs(after["motor_encoder_counts"] - 35 * after["drive_encoder_counts"]).max() <= 35
 
 
 @pytest.fixture

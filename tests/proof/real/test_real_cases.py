@@ -46,6 +46,7 @@ def stand_in(monkeypatch):
             "location": {"place": "drive-pulley"},
             "mechanisms": [],
             "alternatives": [],
+            "laws": [],
             "nearest": None if baseline else {"mechanisms": [], "mean_square": 1.5},
             "fit": {"mean_square": {"calibrated": 0.3, "extended": 0.2}},
             "arguments": arguments,
@@ -63,7 +64,7 @@ def stand_in(monkeypatch):
 def plan():
     faults = {k: v for k, v in read_real_plan().faults.items() if k in ("drag", "gain-of-load-torque")}
     changed = {"training": ("a", "b"), "test": ("c", "d"), "tolerances": (0.04, 0.06, 0.1), "faults": faults}
-    return read_real_plan().model_copy(update=changed | {"repeats": 1})
+    return read_real_plan().model_copy(update=changed | {"repeats": 1, "controls": (("c",),)})
 
 
 @pytest.fixture
@@ -118,7 +119,8 @@ def test_the_tolerance_is_the_first_that_agrees_on_the_training_recordings(basel
     assert [t["verdict"] for t in found["tried"].values()] == ["unexplained", "agrees"]
     assert json.loads((baseline / run.BASELINE).read_text()) == MODEL
     first = json.loads((baseline / "first" / "diagnosis.json").read_text())
-    assert "pulley-friction at drive-pulley, presliding at conduit" in first["arguments"]
+    assert "--time-limit" in first["arguments"]
+    assert "--candidate" not in first["arguments"]
     assert "--freeze" not in first["arguments"]
     assert "--freeze" in json.loads((baseline / "tolerance-0.06" / "diagnosis.json").read_text())["arguments"]
 
@@ -138,14 +140,15 @@ def test_every_case_gets_its_frozen_baseline(plan, batch, baseline, tmp_path):
         assert result["failure"] is None
         diagnosis = json.loads((out / "diagnosis.json").read_text())
         assert "--freeze" in diagnosis["arguments"]
-        received[case.fault, case.removed, case.without] = diagnosis["arguments"], diagnosis["baseline"]
-    assert received[None, None, ()][1] == received["drag", None, ()][1] == MODEL
+        which = case.fault, case.removed, case.without, *case.recordings
+        received[which] = diagnosis["arguments"], diagnosis["baseline"]
+    assert received[None, None, ()][1] == received[None, None, (), "c"][1] == received["drag", None, ()][1] == MODEL
     arguments, known = received[None, "presliding at conduit", ("presliding",)]
     assert [m["name"] for m in known["mechanisms"]] == ["pulley-friction"]
     assert arguments[arguments.index("--without") + 1] == "presliding"
 
     outcomes = read_real_outcomes(plan, tmp_path / "results")
-    assert len(outcomes) == len(received) == 7
+    assert len(outcomes) == len(received) == 8
     # A result with another answer's digest, or with tampering, counts as none.
     one = outcomes[1]
     result = json.loads((tmp_path / "results" / "cases" / one.case.name / "result.json").read_text())
@@ -155,12 +158,14 @@ def test_every_case_gets_its_frozen_baseline(plan, batch, baseline, tmp_path):
     assert page.endswith(f"{BY_HAND}\n\nKept.\n")
     assert "drag with load" not in page
     assert page.count("| gain of load torque |") == 1
-    assert "- Right diagnoses: 1 of 7.\n- Confident misidentifications, with a confidence of 0.8 or more: 0.\n" in page
+    assert "- Right diagnoses: 2 of 8.\n- Confident misidentifications, with a confidence of 0.8 or more: 0.\n" in page
 
 
 def test_an_inconsistent_plan_is_refused():
     stated = yaml.safe_load(PLAN.read_text())
     with pytest.raises(ValueError, match="there is no gian"):
         RealPlan.model_validate(stated | {"faults": {"gian": {"size": [1, 2], "unit": "1"}}})
+    with pytest.raises(ValueError, match="trial-10 is no test recording"):
+        RealPlan.model_validate(stated | {"controls": [["trial-10"]]})
     with pytest.raises(ValueError, match="share trial-00"):
         RealPlan.model_validate(stated | {"training": stated["test"]})

@@ -53,6 +53,14 @@ def with_values(o, label, **values):
     return o
 
 
+@pytest.mark.parametrize(("place", "right"), [("drive-pulley", True), ("load", False)])
+def test_a_law_stands_for_a_mechanism_off_the_list_where_it_acts(place, right):
+    o = judged("learned", place="conduit", removed=PULLEY, without=OFF)
+    o.diagnosis["laws"] = [{"place": place, "slot": "bearing-torque", "arguments": ["angle"], "confidence": 0.9}]
+    assert classification(o) == ("learned, right place" if right else "learned, other place")
+    assert is_right(o) == right
+
+
 GAIN, DRIFT = {"fault": "gain-of-drive-torque"}, {"fault": "drift-of-drive-torque"}
 
 
