@@ -65,8 +65,8 @@ def fitted(mean_square, *acting, **values):
         BASE_VALUES | own,
         residuals,
         [],
-        np.eye(1),
-        np.ones(1),
+        np.zeros((len(BASE_VALUES | own),) * 2),
+        np.full(len(BASE_VALUES | own), np.inf),
         [BASE_VALUES] * 8,
         residuals,
     )
@@ -175,6 +175,23 @@ def test_a_good_fit_shows_nothing_where_the_calibrated_model_has_one(calibrated,
     found = verdict(evidence(size=calibrated - 1.0), kink, pair, model=fitted(calibrated))
     assert min(map(found.confidence_in, ("kink", "pulley-friction"))) > 0.5
     assert found.verdict == said
+
+
+@pytest.mark.parametrize(("deviation", "degrees", "named"), [(0.2, 9.0, True), (0.45, 9.0, False), (0.3, 1.0, False)])
+def test_a_strength_that_scatters_between_recordings_is_not_named(deviation, degrees, named):
+    """The deviation is in units of the strength; what is clear on ten recordings is not on two."""
+    strength = fitted(1.0, FRICTION, KINK).values["pulley-friction/drive-pulley/friction_torque"]
+    both = fitted(1.0, FRICTION, KINK)
+    spreads = [deviation * strength if name.startswith("pulley-friction") else 0.0 for name in both.values]
+    both = replace(both, covariance=np.diag(spreads) ** 2, degrees_of_freedom=np.full(len(spreads), degrees))
+    t2 = deviation**-2
+    expected = (degrees + 1) / 2 * np.log1p(t2 / degrees) - np.log(degrees + 1) / 2
+    assert both.log_support(*FRICTION) == pytest.approx(expected)
+    assert both.log_support(*KINK) == np.inf
+    kink = fitted(1.3, KINK), evidence(NONE - 40.0, NONE - 45.0, size=0.3)
+    found = verdict(evidence(), kink, (both, evidence(NONE)), model=fitted(600.0))
+    assert (found.confidence_in("pulley-friction") > SURE) == named
+    assert found.confidence_in("kink") > SURE
 
 
 def test_a_search_goes_on_from_what_may_be_an_imitation():

@@ -131,6 +131,28 @@ class CandidateFit:
         # With infinite degrees of freedom this is the normal distribution's quantile.
         return student.ppf(0.5 + COVERAGE / 2, self.degrees_of_freedom) * self.standard_deviations(shift)
 
+    def log_support(self, name: str, place: str) -> float:
+        """Logarithm of the Bayes factor of a mechanism over none by the scatter of its strength between recordings.
+
+        The evidence takes all samples for independent; here each recording is one observation of the strength. With the
+        statistic t = strength over its jackknife standard deviation, on nu degrees of freedom, Schwarz's approximation
+        is (1 + t^2 / nu)^((nu + 1) / 2) / (nu + 1)^(1 / 2) (Kass and Raftery, Bayes factors, Journal of the American
+        Statistical Association 90(430), 773-795, 1995, doi:10.1080/01621459.1995.10476572). It is that of the clearest
+        strength; infinite for a law, which has none, and where nothing scatters.
+        """
+        deviations = dict(zip(self.values, self.standard_deviations().tolist(), strict=True))
+        degrees = dict(zip(self.values, self.degrees_of_freedom.tolist(), strict=True))
+        most = -np.inf
+        for strength in registry.get(name).strengths:
+            key = mechanism_key(name, place, strength.name)
+            distance, deviation, nu = self.values[key] - strength.neutral, deviations[key], degrees[key]
+            if not deviation > 0.0:
+                return np.inf
+            t2 = (distance / deviation) ** 2
+            by_recordings = (nu + 1) / 2 * np.log1p(t2 / nu) - np.log(nu + 1) / 2 if np.isfinite(nu) else t2 / 2
+            most = max(most, float(by_recordings))
+        return most if np.isfinite(most) else np.inf
+
     def intervals(self) -> dict[str, Interval]:
         """The 90 % interval of each unknown of the calibration, within its bounds."""
         rows = zip(self.values.items(), self.half_widths(), self.standard_deviations(), strict=True)

@@ -29,6 +29,9 @@ from ccmodel.diagnosis.hypothesis import Hypothesis, laws_in
 from ccmodel.diagnosis.repeatability import FRICTION, friction_probabilities, log_bayes_factor
 from ccmodel.diagnosis.whitening import Whitened
 
+# Beyond it, an exponential function is infinite.
+LARGEST_EXPONENT = 700.0
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -159,7 +162,10 @@ class Comparison:
         before, resolution = self.left_by(part), self.evidence[candidate.hypothesis].resolution
         before = max(before, self.evidence[part.hypothesis].resolution, 1e-12)
         share, smallest = (min(x / before, 1.0) for x in (self.left_by(candidate), resolution))
-        return imitation(share, smallest, part is not self.base)
+        has_part = part is not self.base
+        further = set(candidate.hypothesis.acting) - set(part.hypothesis.acting)
+        support = min(candidate.log_support(*one) for one in further)
+        return limited(imitation(share, smallest, has_part), prior_of_further(has_part), support)
 
     def left_by(self, candidate: CandidateFit) -> float:
         """Mean square that a candidate leaves above the noise.
@@ -229,7 +235,9 @@ class Comparison:
         more, the priors of effects that nobody listed decide. None where the calibrated model leaves a good fit itself.
         """
         best = self.most_probable
-        if self.base.is_good or best is self.base or best.hypothesis.size < 2 or not best.is_good or laws_in(best.hypothesis):
+        if self.base.is_good or best is self.base or best.hypothesis.size < 2:
+            return None
+        if not best.is_good or laws_in(best.hypothesis):
             return None
         names, complete = best.hypothesis.names, np.array(self.probability)
         same = np.array([c.hypothesis.names == names for c in self.candidates])
@@ -340,12 +348,26 @@ def imitation(share: float, smallest: float, has_part: bool) -> NDArray:
     further = settings.PRIOR_FURTHER if has_part else 1.0
     found = np.array(
         [
-            further * settings.PRIOR_LISTED * of_its_own,
+            prior_of_further(has_part) * of_its_own,
             (1 - further) * of_others,
             further * (1 - settings.PRIOR_LISTED),
         ]
     )
     return found / found.sum()
+
+
+def limited(probabilities: NDArray, prior: float, log_support: float) -> NDArray:
+    """Probabilities as of `imitation`, the first of which has no more than a prior and a Bayes factor give it."""
+    most = 1.0 / (1.0 + (1.0 - prior) / prior * exp(-min(log_support, LARGEST_EXPONENT)))
+    if probabilities[0] <= most:
+        return probabilities
+    others = probabilities[1:] * (1.0 - most) / probabilities[1:].sum()
+    return np.array([most, *others])
+
+
+def prior_of_further(has_part: bool) -> float:
+    """Prior probability that a mechanism of the list is missing, beside others or alone where something is."""
+    return (settings.PRIOR_FURTHER if has_part else 1.0) * settings.PRIOR_LISTED
 
 
 def log_odds_of_repeats(candidate: CandidateFit) -> float:

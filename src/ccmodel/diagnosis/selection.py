@@ -64,7 +64,7 @@ class Selection:
         nothing = Comparison.of(whitened, base, [], len(self.mechanisms))
         fewest = settings.FEWEST_FITTED if nothing.unlisted > 0.5 else 0
         worth = [s for k, s in enumerate(scores) if s.values and (s.gain > settings.WORTH_FITTING or k < fewest)]
-        leading = worth[: settings.MOST_FITTED]
+        leading = worth[: settings.MOST_FITTED if self.is_tension_observed else settings.MOST_FITTED_IF_UNOBSERVED]
         chosen = [s.hypothesis for s in leading]
         forced = [Score(h, 0.0, h.start) for h in self.forced if h not in chosen]
         singles = self._part(SCREENED, FITTED).fit_all(whitened, base, [*leading, *forced])
@@ -74,6 +74,11 @@ class Selection:
         if found.candidates and found.probability_of_base < 0.5:
             found = self.relinearise(found)
         return found, scores
+
+    @property
+    def is_tension_observed(self) -> bool:
+        """Whether a rest shows the initial tension, so that no fit has to find it."""
+        return "pretension_share" not in self.free
 
     def further(self, found: Comparison, screening: Screening) -> Comparison:
         """The same with sets of listed mechanisms, and with laws where sets do not lead on.
@@ -217,7 +222,7 @@ class Selection:
         models = [best.model(w.observations.parameters) for w in found.whitened]
 
         def starts(candidate: CandidateFit) -> list[dict[str, float]]:
-            if candidate is best or "pretension_share" not in self.free:
+            if candidate is best or self.is_tension_observed:
                 return [candidate.values]
             return [candidate.values, candidate.values | {name: best.values[name] for name in self.free}]
 

@@ -122,6 +122,10 @@ WORTH_FITTING = 0.01
 # Most mechanisms that are fitted, and how many at least if the calibrated model is inadequate: screening is linear, and
 # a ringing load or backlash is not. Chosen.
 MOST_FITTED, FEWEST_FITTED = 6, 3
+# Where the initial tension is not observed, friction of a bearing and of the cables are confounded with it. The cost
+# has several minima, and the screening is linear about one of them: on 50 trials of a da Vinci grasper, the mechanism
+# that takes off 60 % of the mean square has the ninth score, 2 %. Chosen.
+MOST_FITTED_IF_UNOBSERVED = 10
 
 # --- Model discrepancy: a Gaussian process on the residuals
 
