@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.inverse.exact import start_of
-from ccmodel.inverse.general import _solve
 from ccmodel.kernel import borrowed, kernel
 from ccmodel.mechanisms.contract import Settings
 from ccmodel.mechanisms.pulley_eccentricity import winding
@@ -21,7 +20,7 @@ from ccmodel.model.exact.step import step
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.equations import set_grip
 from ccmodel.model.general.layout import Physics
-from ccmodel.model.general.march import _accept
+from ccmodel.model.general.march import accept, solve_with_contacts
 from ccmodel.model.general.newton import copy_slides
 from ccmodel.model.general.run import ELEMENTS, prepared
 from ccmodel.model.initial import InitialTension
@@ -153,10 +152,12 @@ def _followed_general(
             # The drive holds; time passes.
             slide[rows.NOW] = 0.0
             mean[rows.MEAN_NEXT] = mean[rows.MEAN]
-            solved, rotation = _solve(ph, piece, node, slide, mean, load, 0.0, 0.0, dt, ph.bristle, factor, fixed_grip)
+            solved, rotation = solve_with_contacts(
+                ph, piece, node, slide, mean, load, 0.0, 0.0, dt, ph.bristle, factor, fixed_grip
+            )
             if not solved:
                 return j
-            _accept(ph, piece, node, slide, mean, load, rotation, dt)
+            accept(ph, piece, node, slide, mean, load, rotation, dt)
         while not arrived:
             # Where the drive has to move far, it does so in parts, each at the pace of a sample.
             low, high = 0.0, np.inf
@@ -167,7 +168,7 @@ def _followed_general(
                 slide[rows.NOW] = 0.0
                 mean[rows.MEAN_NEXT] = mean[rows.MEAN]
                 slide[rows.NOW, 0, 0], slide[rows.NOW, 1, 0] = direction * move, -direction * move
-                solved, rotation = _solve(
+                solved, rotation = solve_with_contacts(
                     ph, piece, node, slide, mean, load, 0.0, 0.0, dt, ph.bristle, factor, fixed_grip
                 )
                 if not solved:
@@ -191,7 +192,7 @@ def _followed_general(
                 return j
             guess = move
             copy_slides(slide, rows.LAST, rows.NOW)
-            _accept(ph, piece, node, slide, mean, load, rotation, dt)
+            accept(ph, piece, node, slide, mean, load, rotation, dt)
             here += direction * move
             travelled += move
             if travelled > FURTHEST * span * ph.radius:

@@ -29,15 +29,16 @@ from ccmodel.model.general import layout as rows
 from ccmodel.model.general.equations import imbalance, set_grip, set_memory
 from ccmodel.model.general.layout import Physics
 from ccmodel.model.general.march import (
-    GRIP_ITERATIONS,
-    GRIP_TOLERANCE,
     LONGEST_BRISTLE_M,
     MOST_ATTEMPTS,
     ROUNDING,
     SMALLEST_SUBSTEP,
-    _accept,
+    accept,
+    expect,
+    remember,
+    solve_with_contacts,
 )
-from ccmodel.model.general.newton import copy_means, copy_slides, solve, solve_step, solve_with_conduits
+from ccmodel.model.general.newton import copy_means, copy_slides, solve, solve_with_conduits
 from ccmodel.model.general.run import ELEMENTS, prepared
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad, TorqueLoad
@@ -51,34 +52,6 @@ ITERATIONS = 4
 FOUND, SMALLEST_Nm = 0.01, 1e-10
 # Rows beyond those of the layout, for the solution at the misfit before the update.
 KEPT_SLIDE, KEPT_MEAN = rows.SLIDE_ROWS, rows.MEAN_ROWS
-
-
-@kernel(error_model="numpy")
-def _solve(
-    ph: Physics,
-    piece: NDArray,
-    node: NDArray,
-    slide: NDArray,
-    mean: NDArray,
-    load: NDArray,
-    rotation: float,
-    torque: float,
-    dt: float,
-    bristle: float,
-    friction_factor: NDArray,
-    fixed_grip: bool,
-) -> tuple[bool, float]:
-    """A step with the contacts' memory of rest that its slides make; (converged, rotation of the load)."""
-    solved = False
-    for iteration in range(GRIP_ITERATIONS):
-        if not fixed_grip:
-            change = set_grip(ph, node, slide, friction_factor, dt)
-            if iteration > 0 and change < GRIP_TOLERANCE:
-                break
-        solved, rotation = solve_step(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle)
-        if not solved or ph.stribeck_rise == 0.0:
-            break
-    return solved, rotation
 
 
 @kernel(error_model="numpy")
@@ -147,7 +120,7 @@ def filtered(
     piece, node, slide, mean, load = borrowed((piece, node, slide, mean, load))
     m = time_s.size
     attempts, most_attempts = 0, MOST_ATTEMPTS * m * steps
-    last_rotation, before_rotation, last_pull, before_pull, last_dt = 0.0, 0.0, 0.0, 0.0, 0.0
+    past = np.zeros(rows.PAST_ROWS)
     misfit, variance = first_misfit, 0.0
     covariance, effects = np.zeros(2), np.zeros(2)
     effects[1] = considered.zero
@@ -171,29 +144,17 @@ def filtered(
         while done < 1.0 - ROUNDING:
             part = min(part, 1.0 - done)
             step_pull, step_dt = part * pull, part * dt
-            # Extrapolate the last steps, as the march without an unknown load does.
-            is_whole = abs(part - whole) <= ROUNDING and abs(last_dt - step_dt) <= ROUNDING * dt
-            if is_whole and abs(2 * last_pull - before_pull - step_pull) <= 0.05 * abs(step_pull):
-                by_last, by_before = 2.0, -1.0
-            else:
-                ratio = step_pull / last_pull if last_pull * pull > 0.0 else 0.0
-                by_last, by_before = min(ratio, 4.0), 0.0
-            for c in range(2):
-                for i in range(slide.shape[2]):
-                    slide[rows.NOW, c, i] = by_last * slide[rows.LAST, c, i] + by_before * slide[rows.BEFORE, c, i]
-                change = by_last * mean[rows.MEAN_LAST, c] + by_before * mean[rows.MEAN_BEFORE, c]
-                mean[rows.MEAN_NEXT, c] = mean[rows.MEAN, c] + change
-            rotation = by_last * last_rotation + by_before * before_rotation
-            slide[rows.NOW, 0, 0], slide[rows.NOW, 1, 0] = step_pull, -step_pull
+            is_whole = abs(part - whole) <= ROUNDING and abs(past[rows.LAST_DT] - step_dt) <= ROUNDING * dt
+            rotation = expect(slide, mean, past, pull, step_pull, is_whole)
             attempts += 1
             if attempts > most_attempts:
                 return j
-            solved, rotation = _solve(
+            solved, rotation = solve_with_contacts(
                 ph, piece, node, slide, mean, load, rotation, misfit, step_dt, bristle, factor, fixed_grip
             )
             if not solved:
                 part *= 0.5
-                last_pull = 0.0
+                past[rows.LAST_PULL] = 0.0
                 if part < SMALLEST_SUBSTEP:
                     if ph.presliding or bristle >= LONGEST_BRISTLE_M:
                         return j
@@ -227,7 +188,7 @@ def filtered(
                     if abs(response * change) <= max(FOUND * np.sqrt(noise), SMALLEST_Nm):
                         break
                     misfit += change
-                    solved, rotation = _solve(
+                    solved, rotation = solve_with_contacts(
                         ph, piece, node, slide, mean, load, rotation, misfit, step_dt, bristle, factor, fixed_grip
                     )
                     if not solved:
@@ -235,18 +196,15 @@ def filtered(
                         misfit, rotation, gain = prior, prior_rotation, 0.0
                         copy_slides(slide, rows.NOW, KEPT_SLIDE)
                         copy_means(mean, rows.MEAN_NEXT, KEPT_MEAN)
-                        solved, rotation = _solve(
+                        solved, rotation = solve_with_contacts(
                             ph, piece, node, slide, mean, load, rotation, misfit, step_dt, bristle, factor, fixed_grip
                         )
                         break
                     near = max(piece[rows.TENSION, 0, 0], 0.0) - max(piece[rows.TENSION, 1, 0], 0.0)
                     expected = lever * near
                 variance = updated_variance(variance, covariance, response, effects, noise, gain)
-            copy_slides(slide, rows.BEFORE, rows.LAST)
-            copy_slides(slide, rows.LAST, rows.NOW)
-            before_rotation, last_rotation = last_rotation, rotation
-            before_pull, last_pull, last_dt = last_pull, step_pull, step_dt
-            _accept(ph, piece, node, slide, mean, load, rotation, step_dt)
+            remember(slide, past, rotation, step_pull, step_dt)
+            accept(ph, piece, node, slide, mean, load, rotation, step_dt)
             done += part
             part = min(2.0 * part, whole)
         expected = lever * (max(piece[rows.TENSION, 0, 0], 0.0) - max(piece[rows.TENSION, 1, 0], 0.0))

@@ -62,6 +62,9 @@ NOW, STEP, SAVED, LAST, BEFORE = range(5)
 # load, shape (rows,): angle (rad), rotation (rad) and duration (s) of the last step, speed (rad/s), speed before that,
 # bristle of the bearing; then speed, bristle and torque (N m) of this step.
 ANGLE, ROTATION, DT, OMEGA, OMEGA_BEFORE, BEARING, OMEGA_NEXT, BEARING_NEXT, TORQUE = range(9)
+# past, shape (rows,): rotations of the load (rad) and pulls (m) of the last two steps; duration of the last (s).
+LAST_ROTATION, ROTATION_BEFORE, LAST_PULL, PULL_BEFORE, LAST_DT = range(5)
+PAST_ROWS = 5
 # drive pulley, shape (3,): angle, middle of the range that its encoder leaves open (rad); bristle of its bearing.
 DRIVE_ANGLE, DRIVE_MIDDLE, DRIVE_BEARING = range(3)
 PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10 + BRANCHES, 20 + 2 * ELEMENTS, 5, 11, 9

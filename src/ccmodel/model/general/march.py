@@ -40,7 +40,70 @@ ROUNDING = 1e-9
 
 
 @kernel(error_model="numpy")
-def _accept(
+def expect(slide: NDArray, mean: NDArray, past: NDArray, pull: float, step_pull: float, is_whole: bool) -> float:
+    """Write the slides and mean tensions that a step is expected to have; returns the load's rotation.
+
+    The last steps are extrapolated, scaled to the drive's step while the drive continues in its direction. `pull` (m)
+    is that of the whole sample, `step_pull` that of the step; `is_whole` says whether the step is as long as the last.
+    """
+    last_pull = past[rows.LAST_PULL]
+    if is_whole and abs(2 * last_pull - past[rows.PULL_BEFORE] - step_pull) <= 0.05 * abs(step_pull):
+        by_last, by_before = 2.0, -1.0
+    else:
+        ratio = step_pull / last_pull if last_pull * pull > 0.0 else 0.0
+        by_last, by_before = min(ratio, 4.0), 0.0
+    for c in range(2):
+        for i in range(slide.shape[2]):
+            slide[rows.NOW, c, i] = by_last * slide[rows.LAST, c, i] + by_before * slide[rows.BEFORE, c, i]
+        change = by_last * mean[rows.MEAN_LAST, c] + by_before * mean[rows.MEAN_BEFORE, c]
+        mean[rows.MEAN_NEXT, c] = mean[rows.MEAN, c] + change
+    slide[rows.NOW, 0, 0], slide[rows.NOW, 1, 0] = step_pull, -step_pull
+    return by_last * past[rows.LAST_ROTATION] + by_before * past[rows.ROTATION_BEFORE]
+
+
+@kernel
+def remember(slide: NDArray, past: NDArray, rotation: float, step_pull: float, step_dt: float) -> None:
+    """Keep a solved step for `expect`."""
+    copy_slides(slide, rows.BEFORE, rows.LAST)
+    copy_slides(slide, rows.LAST, rows.NOW)
+    past[rows.ROTATION_BEFORE], past[rows.LAST_ROTATION] = past[rows.LAST_ROTATION], rotation
+    past[rows.PULL_BEFORE], past[rows.LAST_PULL] = past[rows.LAST_PULL], step_pull
+    past[rows.LAST_DT] = step_dt
+
+
+@kernel(error_model="numpy")
+def solve_with_contacts(
+    ph: Physics,
+    piece: NDArray,
+    node: NDArray,
+    slide: NDArray,
+    mean: NDArray,
+    load: NDArray,
+    rotation: float,
+    torque: float,
+    dt: float,
+    bristle: float,
+    friction_factor: NDArray,
+    fixed_grip: bool,
+) -> tuple[bool, float]:
+    """Solve a step with the contacts' memory of rest that its slides make; (converged, rotation of the load).
+
+    The memory depends on the slides: on the expected ones first, then on the solved ones.
+    """
+    solved = False
+    for iteration in range(GRIP_ITERATIONS):
+        if not fixed_grip:
+            change = set_grip(ph, node, slide, friction_factor, dt)
+            if iteration > 0 and change < GRIP_TOLERANCE:
+                break
+        solved, rotation = solve_step(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle)
+        if not solved or ph.stribeck_rise == 0.0:
+            break
+    return solved, rotation
+
+
+@kernel(error_model="numpy")
+def accept(
     ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, mean: NDArray, load: NDArray, rotation: float, dt: float
 ) -> None:
     """Make a solved step the state."""
@@ -87,6 +150,8 @@ def _at_drive_angle(
     torque: float,
     dt: float,
     bristle: float,
+    friction_factor: NDArray,
+    fixed_grip: bool,
     drive: tuple[float, float, float],
     pulley: NDArray,
     angle: float,
@@ -99,7 +164,9 @@ def _at_drive_angle(
     """
     pull = drive[0] * winding_change(pulley[rows.DRIVE_ANGLE], angle - pulley[rows.DRIVE_ANGLE], drive[1], drive[2])
     slide[rows.NOW, 0, 0], slide[rows.NOW, 1, 0] = pull, -pull
-    solved, rotation = solve_step(ph, piece, node, slide, mean, load, rotation, torque, dt, bristle)
+    solved, rotation = solve_with_contacts(
+        ph, piece, node, slide, mean, load, rotation, torque, dt, bristle, friction_factor, fixed_grip
+    )
     R = drive[0] * winding(angle, drive[1], drive[2])[1]
     cables = R * (max(piece[rows.TENSION, 0, 0], 0.0) - max(piece[rows.TENSION, 1, 0], 0.0))
     turned = angle - pulley[rows.DRIVE_ANGLE]
@@ -119,6 +186,8 @@ def _solve_with_train(
     torque: float,
     dt: float,
     bristle: float,
+    friction_factor: NDArray,
+    fixed_grip: bool,
     drive: tuple[float, float, float],
     pulley: NDArray,
     lowest: float,
@@ -130,7 +199,7 @@ def _solve_with_train(
     Returns whether it was solved, the load's rotation and the pulley's angle.
     """
     step = ph, piece, node, slide, mean, load
-    rest = torque, dt, bristle, drive, pulley
+    rest = torque, dt, bristle, friction_factor, fixed_grip, drive, pulley
     # The pulley usually stays at the end of its range at which it was.
     rising = pulley[rows.DRIVE_ANGLE] - pulley[rows.DRIVE_MIDDLE] <= 0.0
     near, far = (lowest, highest) if rising else (highest, lowest)
@@ -209,8 +278,7 @@ def march(
     piece, node, slide, mean, load = borrowed((piece, node, slide, mean, load))
     m, n = time_s.size, node.shape[2]
     attempts, most_attempts = 0, MOST_ATTEMPTS * m * steps
-    last_rotation, before_rotation, last_pull, before_pull, last_dt = 0.0, 0.0, 0.0, 0.0, 0.0
-    angle = theta_in[0]
+    past = np.zeros(rows.PAST_ROWS)
     node[rows.RESTED] = 1.0
     set_grip(ph, node, slide, friction_factor[0], 0.0)
     fixed_grip = ph.stribeck_rise == 0.0 and len(friction_factor) == 1
@@ -218,34 +286,21 @@ def march(
     wound_before = winding(theta_in[0], drive[1], drive[2])[0]
     has_train = ph.train_compliance > 0.0 and motor.size > 1
     pulley = np.array([theta_in[0], theta_in[0], 0.0])
+    angle, middle = theta_in[0], theta_in[0]
     for j in range(m):
         wound, radius_factor, _ = winding(theta_in[j], drive[1], drive[2])
         pull, wound_before = drive[0] * (wound - wound_before), wound
         prescribed_value = series[min(j, series.size - 1)]
         rise = prescribed_value - series[min(j - 1, series.size - 1)] if j > 0 else 0.0
         dt = time_s[j] - time_s[j - 1] if j > 0 else 0.0
+        factor = friction_factor[min(j, len(friction_factor) - 1)]
         whole = 1.0 / steps if j > 0 else 1.0
         done, part, bristle = 0.0, whole, ph.bristle
         while done < 1.0 - ROUNDING:
             part = min(part, 1.0 - done)
             step_pull, step_dt = part * pull, part * dt
-            share = done + part
-            middle = theta_in[j] - (1.0 - share) * (theta_in[j] - theta_in[max(j - 1, 0)])
-            # Extrapolate the last steps, scaled to the drive's step while the drive continues in its direction.
-            expected = 2 * last_pull - before_pull
-            is_whole = abs(part - whole) <= ROUNDING and abs(last_dt - step_dt) <= ROUNDING * dt
-            if is_whole and abs(expected - step_pull) <= 0.05 * abs(step_pull):
-                by_last, by_before = 2.0, -1.0
-            else:
-                ratio = step_pull / last_pull if last_pull * pull > 0.0 else 0.0
-                by_last, by_before = min(ratio, 4.0), 0.0
-            for c in range(2):
-                for i in range(n + 2):
-                    slide[rows.NOW, c, i] = by_last * slide[rows.LAST, c, i] + by_before * slide[rows.BEFORE, c, i]
-                change = by_last * mean[rows.MEAN_LAST, c] + by_before * mean[rows.MEAN_BEFORE, c]
-                mean[rows.MEAN_NEXT, c] = mean[rows.MEAN, c] + change
-            rotation = by_last * last_rotation + by_before * before_rotation
-            slide[rows.NOW, 0, 0], slide[rows.NOW, 1, 0] = step_pull, -step_pull
+            is_whole = abs(part - whole) <= ROUNDING and abs(past[rows.LAST_DT] - step_dt) <= ROUNDING * dt
+            rotation = expect(slide, mean, past, pull, step_pull, is_whole)
             value = prescribed_value - (1.0 - done - part) * rise
             if prescribed:
                 rotation = value - load[rows.ANGLE]
@@ -253,40 +308,29 @@ def march(
             attempts += 1
             if attempts > most_attempts:
                 return j
-            solved = False
-            for iteration in range(GRIP_ITERATIONS):
-                # The contacts' memory depends on the slides: on the extrapolated ones first, then on the solved ones.
-                if not fixed_grip:
-                    change = set_grip(ph, node, slide, friction_factor[min(j, len(friction_factor) - 1)], step_dt)
-                    if iteration > 0 and change < GRIP_TOLERANCE:
-                        break
-                if has_train:
-                    at_motor = motor[j] - (1.0 - share) * (motor[j] - motor[max(j - 1, 0)])
-                    solved, rotation, angle = _solve_with_train(
-                        ph, piece, node, slide, mean, load, rotation, torque, step_dt, bristle,
-                        drive, pulley, middle - within_rad, middle + within_rad, at_motor,
-                    )  # fmt: skip
-                else:
-                    angle = middle
-                    solved, rotation = solve_step(
-                        ph, piece, node, slide, mean, load, rotation, torque, step_dt, bristle
-                    )
-                if not solved or ph.stribeck_rise == 0.0:
-                    break
+            if has_train:
+                left = 1.0 - done - part
+                middle = theta_in[j] - left * (theta_in[j] - theta_in[max(j - 1, 0)])
+                at_motor = motor[j] - left * (motor[j] - motor[max(j - 1, 0)])
+                solved, rotation, angle = _solve_with_train(
+                    ph, piece, node, slide, mean, load, rotation, torque, step_dt, bristle, factor, fixed_grip,
+                    drive, pulley, middle - within_rad, middle + within_rad, at_motor,
+                )  # fmt: skip
+            else:
+                solved, rotation = solve_with_contacts(
+                    ph, piece, node, slide, mean, load, rotation, torque, step_dt, bristle, factor, fixed_grip
+                )
             if not solved:
                 part *= 0.5
-                last_pull = 0.0
+                past[rows.LAST_PULL] = 0.0
                 if part < SMALLEST_SUBSTEP:
                     if ph.presliding or bristle >= LONGEST_BRISTLE_M:
                         return j
                     bristle *= 10.0
                     part = whole
                 continue
-            copy_slides(slide, rows.BEFORE, rows.LAST)
-            copy_slides(slide, rows.LAST, rows.NOW)
-            before_rotation, last_rotation = last_rotation, rotation
-            before_pull, last_pull, last_dt = last_pull, step_pull, step_dt
-            _accept(ph, piece, node, slide, mean, load, rotation, step_dt)
+            remember(slide, past, rotation, step_pull, step_dt)
+            accept(ph, piece, node, slide, mean, load, rotation, step_dt)
             if has_train:
                 turned = angle - pulley[rows.DRIVE_ANGLE]
                 pulley[rows.DRIVE_BEARING] = dahl(pulley[rows.DRIVE_BEARING], turned, ph.drive_presliding_rad)[0]
