@@ -2,7 +2,13 @@
 
 import gzip
 import os
+import struct
+import tracemalloc
+import zlib
 
+import h5py
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from ccmodel import inputs
@@ -95,3 +101,60 @@ def test_a_file_that_a_command_reads_or_writes_is_a_regular_one(tmp_path):
         existing_file(pipe)
     with pytest.raises(InputError, match=f"^--out: {pipe}: {PIPE}$"):
         try_file(pipe, "--out")
+
+
+def hdf5_bomb(path):
+    with h5py.File(path, "w") as file:
+        file.create_dataset("a", shape=(10**11,), dtype="f8", chunks=(10**6,), compression="gzip")
+
+
+def netcdf_bomb(path):
+    with h5py.File(path, "w") as file:
+        for name in "ab":  # each is below the limit, both are not
+            file.create_dataset(name, shape=(10**7,), dtype="f8", chunks=(10**6,), compression="gzip")
+
+
+def mat73_bomb(path):
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file.create_dataset("log/a", shape=(10**11,), dtype="f8", chunks=(10**6,), compression="gzip")
+    with open(path, "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: PCWIN64".ljust(124) + b"\x00\x02IM")
+
+
+def mat5_bomb(path):
+    packer = zlib.compressobj(9)
+    packed = b"".join(packer.compress(bytes(10**7)) for _ in range(11)) + packer.flush()
+    path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + struct.pack("<II", 15, len(packed)) + packed)
+
+
+def parquet_bomb(path):
+    one = pa.table({"a": pa.DictionaryArray.from_arrays(pa.array([0] * 10**6, pa.int8()), pa.array([1.0]))})
+    with pq.ParquetWriter(path, one.schema) as writer:
+        for _ in range(13):
+            writer.write_table(one)
+
+
+@pytest.mark.parametrize(
+    ("name", "make"),
+    [
+        ("a.h5", hdf5_bomb),
+        ("a.nc", netcdf_bomb),
+        ("a.mat", mat73_bomb),
+        ("b.mat", mat5_bomb),
+        ("a.parquet", parquet_bomb),
+    ],
+)
+def test_what_unpacks_to_too_much_is_refused_before_it_is_read(name, make, tmp_path, monkeypatch):
+    monkeypatch.setenv(inputs.UNPACKED, "100")
+    make(tmp_path / name)
+    assert (tmp_path / name).stat().st_size < 2e6
+    tracemalloc.start()
+    try:
+        with pytest.raises(LogError) as error:
+            readers.read_signals(tmp_path / name)
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    expected = f"unpacks to what is larger than 100 MB; if that is right, set {inputs.UNPACKED} to its MB"
+    assert error.value.args[2] == expected
+    assert most < 20e6

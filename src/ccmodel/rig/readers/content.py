@@ -1,4 +1,4 @@
-"""Content of a text log, unpacked if it is gzipped."""
+"""Content of a text log, unpacked if it is gzipped; and the limit on what any compressed file may unpack to."""
 
 import gzip
 import io
@@ -28,6 +28,11 @@ def content_of(path: Path) -> bytes:
         raise LogError(None, None, "the gzip stream is cut short: copy it again from the recorder") from None
     except (OSError, zlib.error):
         raise LogError(None, None, "the gzip stream is damaged: copy it again from the recorder") from None
-    if len(unpacked) > most:
-        raise LogError(None, None, f"unpacks to what is {inputs.too_large(inputs.UNPACKED)}")
+    check_unpacked(len(unpacked))
     return unpacked
+
+
+def check_unpacked(size: float) -> None:
+    """Raise `LogError` if a file unpacks to more bytes than the limit (`ccmodel.inputs`)."""
+    if size > inputs.largest_bytes(inputs.UNPACKED):
+        raise LogError(None, None, f"unpacks to what is {inputs.too_large(inputs.UNPACKED)}")

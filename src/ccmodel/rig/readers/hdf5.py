@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers.attempt import COPY
 from ccmodel.rig.readers.columns import Columns
+from ccmodel.rig.readers.content import check_unpacked
 from ccmodel.rig.readers.contract import Format, SignalFile
 
 _UNIT_KEYS = ("unit", "units", "Unit", "Units", "UNIT", "UNITS", "unit_string")
@@ -29,12 +30,19 @@ def read(path: Path) -> SignalFile:
 
     columns = Columns()
     with h5py.File(path, "r") as file:
-        for name, dataset in _datasets(h5py, file):
+        found = list(_datasets(h5py, file))
+        check_unpacked(sum(size_of(dataset) for _, dataset in found))
+        for name, dataset in found:
             _add(columns, name, dataset)
     return SignalFile(tuple(columns.signals), None, columns.remarks())
 
 
 FORMAT = Format("HDF5 file", (".h5", ".hdf5", ".hdf", ".he5", ".nc"), read, extra="hdf5", apart=True)
+
+
+def size_of(dataset: Any) -> int:
+    """Bytes of an array in memory; 0 of one without values."""
+    return (dataset.size or 0) * dataset.dtype.itemsize
 
 
 def _datasets(h5py: Any, group: Any, path: str = "", above: tuple = ()) -> Iterator[tuple[str, Any]]:

@@ -4,6 +4,8 @@ Both versions are read into plain data first: a struct is a dict, a struct array
 an object of a MATLAB class an `_Object`. Then signals are looked for in the same way.
 """
 
+import struct
+import zlib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple, TypeGuard
@@ -13,7 +15,9 @@ import numpy as np
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers import signatures
 from ccmodel.rig.readers.columns import Columns
+from ccmodel.rig.readers.content import check_unpacked
 from ccmodel.rig.readers.contract import Format, SignalFile
+from ccmodel.rig.readers.hdf5 import size_of
 
 _TIME_KEYS = ("time", "Time", "t")
 _DATA_KEYS = ("data", "Data", "values", "Values", "value", "Value")
@@ -21,6 +25,9 @@ _UNIT_KEYS = ("unit", "Unit", "units", "Units")
 _NAME_KEYS = ("name", "Name", "label")
 # Structs within each other; a file of a rig has a few.
 _DEPTH = 20
+# Bytes of the header of a v5 file and of the tag of each of its elements; the type of a compressed one; bytes that are
+# unpacked at a time to count them.
+V5_HEADER, V5_TAG, V5_COMPRESSED, CHUNK = 128, 8, 15, 1 << 20
 
 
 class _Object(NamedTuple):
@@ -174,6 +181,7 @@ def _text(struct: Any, keys: Iterable[str]) -> str:
 def _of_v5(path: Path) -> dict[str, Any]:
     from scipy.io import loadmat
 
+    _check_unpacked_v5(path)
     variables = loadmat(path)
     found = {}
     for name, value in variables.items():
@@ -185,6 +193,29 @@ def _of_v5(path: Path) -> dict[str, Any]:
         else:
             found[name] = _plain_v5(value)
     return found
+
+
+def _check_unpacked_v5(path: Path) -> None:
+    """Raise `LogError` if the compressed elements of a file unpack to more than the limit.
+
+    What they unpack to is counted, not kept. A damaged element is left to the library, which says what is wrong.
+    """
+    raw, at, total = path.read_bytes(), V5_HEADER, 0
+    order = "<" if raw[V5_HEADER - 2 : V5_HEADER] == b"IM" else ">"
+    while at + V5_TAG <= len(raw):
+        kind, size = struct.unpack_from(f"{order}II", raw, at)
+        packed = raw[at + V5_TAG : at + V5_TAG + size]
+        at += V5_TAG + size
+        if kind != V5_COMPRESSED:
+            continue
+        stream = zlib.decompressobj()
+        try:
+            while packed:
+                total += len(stream.decompress(packed, CHUNK))
+                packed = stream.unconsumed_tail
+                check_unpacked(total)
+        except zlib.error:
+            return
 
 
 def _plain_v5(value: Any) -> Any:
@@ -212,6 +243,9 @@ def _of_v73(path: Path) -> dict[str, Any]:
     import h5py
 
     with h5py.File(path, "r") as file:
+        sizes: list[int] = []
+        file.visititems(lambda name, item: sizes.append(size_of(item)) if isinstance(item, h5py.Dataset) else None)
+        check_unpacked(sum(sizes))
         return {name: _plain_v73(h5py, file, file[name]) for name in file if not name.startswith("#")}
 
 

@@ -7,15 +7,20 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from ccmodel.rig.readers.content import check_unpacked
 from ccmodel.rig.readers.contract import Format, Signal, SignalFile
 from ccmodel.rig.readers.stamps import seconds_of_times
 
+BYTES_OF_A_NUMBER = 8
 _UNIT_KEYS = (b"unit", b"units", b"Unit", b"Units")
 
 
 def read(path: Path) -> SignalFile:
     """Read a Parquet file; structures are flattened, lists of one length are a signal an element."""
-    table = pq.ParquetFile(path).read()
+    file = pq.ParquetFile(path)
+    # A column of one value takes next to nothing in the file, whatever its length.
+    check_unpacked(file.metadata.num_rows * file.metadata.num_columns * BYTES_OF_A_NUMBER)
+    table = file.read()
     while any(pa.types.is_struct(field.type) for field in table.schema):
         table = table.flatten()
     signals, left_out, started = [], [], None
