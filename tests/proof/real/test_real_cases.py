@@ -165,7 +165,7 @@ def test_an_inconsistent_plan_is_refused():
     stated = yaml.safe_load(PLAN.read_text())
     with pytest.raises(ValueError, match="there is no gian"):
         RealPlan.model_validate(stated | {"faults": {"gian": {"size": [1, 2], "unit": "1"}}})
-    with pytest.raises(ValueError, match="trial-10 is no test recording"):
-        RealPlan.model_validate(stated | {"controls": [["trial-10"]]})
-    with pytest.raises(ValueError, match="share trial-00"):
+    with pytest.raises(ValueError, match="trial-11 is no test recording"):
+        RealPlan.model_validate(stated | {"controls": [["trial-11"]]})
+    with pytest.raises(ValueError, match="share trial-01"):
         RealPlan.model_validate(stated | {"training": stated["test"]})
