@@ -77,6 +77,7 @@ def test_a_nested_data_set(tmp_path):
     assert second.origin == "rig"
     assert set(second.channels) == {"theta_in_rad", "theta_out_rad", "tau_in_Nm", "tau_out_Nm", "theta_motor_rad"}
     assert ingested.batch.rig.drive.motor_sign == 1
+    assert "cable.stiffness_N_per_m" in ingested.batch.rig.nominal
     samples = trial(0.5, 0.4)
     assert second["theta_in_rad"] == pytest.approx((samples[:, 1] - 680) * 2 * np.pi / 8192)
     assert second["tau_in_Nm"] == pytest.approx(-samples[:, 2] * NM_PER_COUNT)
