@@ -81,11 +81,11 @@ have the digest {tolerance["diagnosis"]}.
 - **Isolation**: the diagnosis runs in a process that can reach only a copy of the batch and the baseline. No answer is
   on disk, and no file name reveals the fault.
 - **Baseline**: identified from {len(plan.training)} training recordings ({_ids(plan.training)}) with a tolerance of
-  {100 * plan.tolerance:g} % of peak to peak. The verdict was `{first["verdict"]}`{_nearest_words(first)}:
+  {_tolerance(plan)} of peak to peak. The verdict was `{first["verdict"]}`{_nearest_words(first)}:
   {_mechanisms(model)}. Its cross-validated mean square is {_nearest_mean_square(first):.2f} times the square of the
   tolerance.
-- **Tolerance**: {100 * tolerance["tolerance"]:g} % of peak to peak, the first of a rising sequence at which the
-  diagnosis of the training recordings with the frozen baseline is `agrees`: {_sequence(tolerance)}.
+- **Tolerance**: {tolerance["tolerance_factor"]:g} times that, the first of a rising sequence at which the diagnosis of
+  the training recordings with the frozen baseline is `agrees`: {_sequence(tolerance)}.
 - **Test**: the other {len(plan.test)} recordings ({_ids(plan.test)}), diagnosed with the frozen baseline (`--freeze`):
   only the zeros of the two torques are fitted.
 """
@@ -170,8 +170,11 @@ def _mechanisms(model: dict) -> str:
     return " and ".join(f"{mechanism} ({value})" for mechanism, value in values)
 
 
+def _tolerance(plan: RealPlan) -> str:
+    return " and ".join(f"{100 * share:g} % ({channel})" for channel, share in plan.tolerance.items())
+
+
 def _sequence(tolerance: dict) -> str:
     return ", ".join(
-        f"{100 * float(a):g} % ({t['verdict']}, mean square {t['mean_square']:.2f})"
-        for a, t in tolerance["tried"].items()
+        f"{a} times ({t['verdict']}, mean square {t['mean_square']:.2f})" for a, t in tolerance["tried"].items()
     )

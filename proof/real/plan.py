@@ -35,9 +35,9 @@ class RealPlan(Strict):
     test: tuple[str, ...] = Field(min_length=2)
     step_s: PositiveFloat
     cycles: PositiveInt
-    tolerance: Share
+    tolerance: dict[str, Share]
     time_limit_s: PositiveFloat
-    tolerances: tuple[Share, ...] = Field(min_length=1)
+    tolerance_factors: tuple[PositiveFloat, ...] = Field(min_length=1)
     controls: tuple[tuple[str, ...], ...] = ()
     repeats: PositiveInt
     faults: dict[str, FaultPlan]

@@ -4,6 +4,7 @@ import json
 import shutil
 import tempfile
 from collections.abc import Callable
+from itertools import chain
 from pathlib import Path
 
 from proof import conceal
@@ -32,22 +33,22 @@ def find_baseline(plan: RealPlan, source: Path, out: Path, report: Report, sourc
     with tempfile.TemporaryDirectory(prefix="training-") as folder:
         batch = Path(folder) / "known"
         write_batch(source, plan.training, batch)
-        options = [*_options(plan, plan.tolerance), "--time-limit", f"{plan.time_limit_s:g}"]
+        options = [*_options(plan, 1.0), "--time-limit", f"{plan.time_limit_s:g}"]
         diagnosis = _diagnosed(batch, out / "first", options, None, sources)
         which = "nearest.json" if diagnosis["verdict"] == "unexplained" and diagnosis.get("nearest") else "model.json"
         shutil.copy(out / "first" / which, out / BASELINE)
         report(f"baseline: {diagnosis['verdict']}, {which}")
-        for tolerance in plan.tolerances:
-            to = out / f"tolerance-{tolerance:g}"
-            diagnosis = _diagnosed(batch, to, _frozen(plan, tolerance), out / BASELINE, sources)
+        for factor in plan.tolerance_factors:
+            to = out / f"tolerance-{factor:g}"
+            diagnosis = _diagnosed(batch, to, _frozen(plan, factor), out / BASELINE, sources)
             mean_square = diagnosis["fit"]["mean_square"]["calibrated"]
-            tried[f"{tolerance:g}"] = {"verdict": diagnosis["verdict"], "mean_square": mean_square}
-            report(f"frozen baseline, tolerance {tolerance:g}: {diagnosis['verdict']}")
+            tried[f"{factor:g}"] = {"verdict": diagnosis["verdict"], "mean_square": mean_square}
+            report(f"frozen baseline, {factor:g} times the tolerance: {diagnosis['verdict']}")
             if diagnosis["verdict"] == "agrees":
-                found = {"tolerance": tolerance, "tried": tried, "diagnosis": conceal.digest_of(sources)}
+                found = {"tolerance_factor": factor, "tried": tried, "diagnosis": conceal.digest_of(sources)}
                 (out / TOLERANCE).write_text(json.dumps(found, indent=1), encoding="utf-8")
                 return
-    raise ValueError(f"the baseline agrees with none of the tolerances {plan.tolerances}: {tried}")
+    raise ValueError(f"the baseline agrees with none of the tolerances {plan.tolerance_factors}: {tried}")
 
 
 def _diagnosed(batch: Path, out: Path, options: list[str], baseline: Path | None, sources: Path) -> dict:
@@ -62,12 +63,13 @@ def _diagnosed(batch: Path, out: Path, options: list[str], baseline: Path | None
     return diagnosis
 
 
-def _options(plan: RealPlan, tolerance: float) -> list[str]:
-    return ["--tolerance", f"{tolerance:g}", "--step", f"{plan.step_s:g}", "--cycles", str(plan.cycles)]
+def _options(plan: RealPlan, factor: float) -> list[str]:
+    tolerances = (("--tolerance", f"{channel}={factor * share:g}") for channel, share in plan.tolerance.items())
+    return [*chain.from_iterable(tolerances), "--step", f"{plan.step_s:g}", "--cycles", str(plan.cycles)]
 
 
-def _frozen(plan: RealPlan, tolerance: float) -> list[str]:
-    return [*_options(plan, tolerance), "--freeze"]
+def _frozen(plan: RealPlan, factor: float) -> list[str]:
+    return [*_options(plan, factor), "--freeze"]
 
 
 def judge_real(
@@ -93,7 +95,7 @@ def judge_real(
     report : callable
         Called with one line on the outcome.
     """
-    tolerance = json.loads((baseline / TOLERANCE).read_text(encoding="utf-8"))["tolerance"]
+    factor = json.loads((baseline / TOLERANCE).read_text(encoding="utf-8"))["tolerance_factor"]
     model = json.loads((baseline / BASELINE).read_text(encoding="utf-8"))
     out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="case-") as folder:
@@ -102,7 +104,7 @@ def judge_real(
         digest = folder_digest(batch)
         known.write_text(json.dumps(without_mechanism(model, case.removed)), encoding="utf-8")
         started = conceal.core_s()
-        options = _frozen(plan, tolerance)
+        options = _frozen(plan, factor)
         completed = conceal.diagnose(batch, out, case.without, options=options, baseline=known)
     result = {
         "case": case.name,
@@ -110,7 +112,7 @@ def judge_real(
         "key": case.digest,
         "sources": conceal.digest_of(),
         "batch": digest,
-        "tolerance": tolerance,
+        "tolerance_factor": factor,
         "tampering": list(completed.tampering),
         "failure": None if completed.is_usable else completed.failure,
         "diagnosis": _read_diagnosis(out) if completed.is_usable else None,

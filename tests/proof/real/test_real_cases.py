@@ -37,12 +37,13 @@ def stand_in(monkeypatch):
     def run(commands, folder, sources):
         (arguments,), out = commands, folder / "out"
         out.mkdir()
-        tolerance = float(arguments[arguments.index("--tolerance") + 1])
+        channel, _, share = arguments[arguments.index("--tolerance") + 1].partition("=")
+        factor = float(share) / read_real_plan().tolerance[channel]
         baseline = None
         if "--baseline" in arguments:
             baseline = json.loads((folder / arguments[arguments.index("--baseline") + 1]).read_text())
         diagnosis = {
-            "verdict": "agrees" if baseline and tolerance >= 0.06 else "unexplained",
+            "verdict": "agrees" if baseline and factor >= 3.0 else "unexplained",
             "location": {"place": "drive-pulley"},
             "mechanisms": [],
             "alternatives": [],
@@ -63,7 +64,7 @@ def stand_in(monkeypatch):
 @pytest.fixture
 def plan():
     faults = {k: v for k, v in read_real_plan().faults.items() if k in ("drag", "gain-of-load-torque")}
-    changed = {"training": ("a", "b"), "test": ("c", "d"), "tolerances": (0.04, 0.06, 0.1), "faults": faults}
+    changed = {"training": ("a", "b"), "test": ("c", "d"), "tolerance_factors": (2.0, 3.0, 5.0), "faults": faults}
     return read_real_plan().model_copy(update=changed | {"repeats": 1, "controls": (("c",),)})
 
 
@@ -115,18 +116,18 @@ def test_names_are_unique_and_reveal_nothing():
 
 def test_the_tolerance_is_the_first_that_agrees_on_the_training_recordings(baseline):
     found = json.loads((baseline / run.TOLERANCE).read_text())
-    assert found["tolerance"] == 0.06
+    assert found["tolerance_factor"] == 3.0
     assert [t["verdict"] for t in found["tried"].values()] == ["unexplained", "agrees"]
     assert json.loads((baseline / run.BASELINE).read_text()) == MODEL
     first = json.loads((baseline / "first" / "diagnosis.json").read_text())
     assert "--time-limit" in first["arguments"]
     assert "--candidate" not in first["arguments"]
     assert "--freeze" not in first["arguments"]
-    assert "--freeze" in json.loads((baseline / "tolerance-0.06" / "diagnosis.json").read_text())["arguments"]
+    assert "--freeze" in json.loads((baseline / "tolerance-3" / "diagnosis.json").read_text())["arguments"]
 
 
 def test_a_baseline_that_never_agrees_is_refused(plan, batch, tmp_path):
-    few = plan.model_copy(update={"tolerances": (0.02, 0.04)})
+    few = plan.model_copy(update={"tolerance_factors": (1.0, 2.0)})
     with pytest.raises(ValueError, match="none of the tolerances"):
         find_baseline(few, batch, tmp_path / "model", lambda line: None)
 
