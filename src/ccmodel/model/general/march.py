@@ -146,7 +146,6 @@ def _at_drive_angle(
     slide: NDArray,
     mean: NDArray,
     load: NDArray,
-    rotation: float,
     torque: float,
     dt: float,
     bristle: float,
@@ -154,6 +153,7 @@ def _at_drive_angle(
     fixed_grip: bool,
     drive: tuple[float, float, float],
     pulley: NDArray,
+    rotation: float,
     angle: float,
     motor: float,
 ) -> tuple[bool, float, float]:
@@ -198,22 +198,21 @@ def _solve_with_train(
 
     Returns whether it was solved, the load's rotation and the pulley's angle.
     """
-    step = ph, piece, node, slide, mean, load
-    rest = torque, dt, bristle, friction_factor, fixed_grip, drive, pulley
+    step = ph, piece, node, slide, mean, load, torque, dt, bristle, friction_factor, fixed_grip, drive, pulley
     # The pulley usually stays at the end of its range at which it was.
     rising = pulley[rows.DRIVE_ANGLE] - pulley[rows.DRIVE_MIDDLE] <= 0.0
     near, far = (lowest, highest) if rising else (highest, lowest)
-    solved, rotation, at_near = _at_drive_angle(*step, rotation, *rest, near, motor)
+    solved, rotation, at_near = _at_drive_angle(*step, rotation, near, motor)
     if not solved or (at_near >= 0.0) == rising:
         return solved, rotation, near
-    solved, rotation, at_far = _at_drive_angle(*step, rotation, *rest, far, motor)
+    solved, rotation, at_far = _at_drive_angle(*step, rotation, far, motor)
     if not solved or (at_far >= 0.0) != rising:
         return solved, rotation, far
     angle = far
     # The false position, with the Illinois rule.
     for _ in range(TRAIN_ITERATIONS):
         angle = (near * at_far - far * at_near) / (at_far - at_near)
-        solved, rotation, excess = _at_drive_angle(*step, rotation, *rest, angle, motor)
+        solved, rotation, excess = _at_drive_angle(*step, rotation, angle, motor)
         if not solved or abs(excess) <= TRAIN_TOLERANCE_NM:
             break
         if (excess >= 0.0) == (at_far >= 0.0):

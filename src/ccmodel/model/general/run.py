@@ -129,19 +129,18 @@ def simulate(
     series = _series(load)
     _check(time_s, theta_in, series, elements)
     series = np.zeros(1) if series is None else series
-    arguments = transmission, load, settings, time_s, theta_in, initial
+    pair = transmission, load, settings, time_s, theta_in, initial
     if settings.train_compliance > 0.0 and motor.angle_rad.size > 1:
         coarse = max(elements // COARSER, 1)
-        motor = _zeroed(motor, settings, *_marched(*arguments, coarse, steps, series))
+        motor = _zeroed(motor, settings, *_marched(*pair, coarse, steps, series))
     else:
         motor = NO_MOTOR
-    arguments = *arguments, elements, steps
-    solved, out = _marched(*arguments, series, motor)
+    solved, out = _marched(*pair, elements, steps, series, motor)
     # A law of the load takes the load's motion from the pass before. A load that is held or driven has no law.
     has_law = bool(settings.load_laws) and not isinstance(load, AngleLoad | FixedLoad)
     for _ in range(LOAD_LAW_PASSES if has_law and solved == time_s.size else 0):
         motion = Sensing(time_s, {THETA_OUT: out[4]}, transmission.drive_radius_m, transmission.load_radius_m)
-        solved, out = _marched(*arguments, series + sum(law(motion) for law in settings.load_laws), motor)
+        solved, out = _marched(*pair, elements, steps, series + sum(law(motion) for law in settings.load_laws), motor)
         if solved < time_s.size:
             break
     return _response(transmission, active, time_s[:solved], theta_in[:solved], out)
