@@ -15,6 +15,7 @@ from ccmodel.channels import (
     TAU_OUT,
     TENSIONS,
     THETA_IN,
+    THETA_MOTOR,
     THETA_OUT,
 )
 from ccmodel.rig.consistency import limits
@@ -22,6 +23,7 @@ from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
 from ccmodel.rig.consistency.parity import Parity, speed, white_noise
 from ccmodel.rig.sensor_checks import is_noisy
 
+ANGLES = {*ANGLE_AT.values(), THETA_MOTOR}
 # A comparison of a recording with the others of its batch.
 Check = Callable[[Parity, Sequence[Parity]], Contradiction | None]
 
@@ -48,9 +50,9 @@ def copied_channels(parities: Sequence[Parity]) -> list[Contradiction]:
     for k, parity in enumerate(parities):
         for earlier in parities[:k]:
             copied = [c for c in CHANNELS if c not in TENSIONS and _is_copy(parity, earlier, c)]
-            # The same command gives the same counts of the drive, and perhaps of the load: angles that agree together
-            # are no copies.
-            if set(copied) - set(ANGLE_AT.values()) or copied == [THETA_OUT]:
+            # The same command gives the same counts of motor and drive, and perhaps of the load: angles that agree
+            # together are no copies.
+            if set(copied) - ANGLES or copied == [THETA_OUT]:
                 names, ids = ", ".join(copied), (parity.recording.id, earlier.recording.id)
                 repeat = f"{names} of {ids[0]} repeat those of {ids[1]}, sample by sample"
                 text = f"{repeat}: noise does not repeat; one of the two logs holds a copy"
@@ -69,7 +71,7 @@ def _is_copy(one: Parity, other: Parity, channel: str) -> bool:
     changes = (np.abs(a) > scale) | (np.abs(b) > scale)
     if changes.sum() < limits.FEWEST_SAMPLES:
         return False
-    is_angle = channel in ANGLE_AT.values()
+    is_angle = channel in ANGLES
     equal = float(np.mean(np.abs(a - b)[changes] <= scale))
     if equal <= (limits.COPIED_ANGLE if is_angle else limits.COPIED_NOISE):
         return False
