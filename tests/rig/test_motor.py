@@ -61,12 +61,6 @@ def stand_still(table):
     table["motor_encoder_counts"] = 7
 
 
-def test_two_runs_of_one_command_are_no_copies(bench):
-    angles = ["drive_encoder_counts", "load_encoder_counts", "motor_encoder_counts"]
-    bench.tables["two"][angles] = bench.tables["one"][angles]
-    assert not [f for f in ingest_batch(bench.write().folder).findings if "repeat" in f.text]
-
-
 @pytest.mark.parametrize("damage", [lose_counts, stand_still])
 def test_a_faulty_motor_encoder_is_named_and_not_used(bench, damage):
     damage(bench.tables["one"])
