@@ -194,6 +194,25 @@ def test_a_strength_that_scatters_between_recordings_is_not_named(deviation, deg
     assert found.confidence_in("kink") > SURE
 
 
+def test_the_strength_of_a_mechanism_with_a_state_is_what_is_left_of_it():
+    """Strength 0.4, of which 0.1 is left; where both scatter together, that is known to a tenth."""
+    acting = ("running-in", "conduit")
+    one = fitted(1.0, acting, **{f"running-in/conduit/{n}": v for n, v in {"change": -0.4, "done": 0.75}.items()})
+    names = list(one.values)
+    change, done = names.index("running-in/conduit/change"), names.index("running-in/conduit/done")
+    apart, together = np.zeros((2, len(names), len(names)))
+    apart[change, change], apart[done, done] = 0.2**2, 0.125**2  # 0.05 each of what is left
+    together[change, change], together[done, done] = apart[change, change], apart[done, done]
+    together[change, done] = together[done, change] = -0.2 * 0.125 * 0.98
+    degrees = np.full(len(names), 9.0)
+
+    def support(covariance):
+        return replace(one, covariance=covariance, degrees_of_freedom=degrees).log_support(*acting)
+
+    assert support(apart) == pytest.approx(5 * np.log1p(2.0 / 9) - np.log(10) / 2)
+    assert support(together) == pytest.approx(5 * np.log1p(100.0 / 9) - np.log(10) / 2)
+
+
 def test_a_search_goes_on_from_what_may_be_an_imitation():
     """The pair takes off half of what the kink leaves, as an imitation would, and as one of three effects would."""
     kink, pair = (fitted(60.0, KINK), evidence(NONE - 100, NONE - 90, size=59.0)), fitted(30.0, KINK, SCALE)

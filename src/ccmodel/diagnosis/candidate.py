@@ -138,17 +138,22 @@ class CandidateFit:
         statistic t = strength over its jackknife standard deviation, on nu degrees of freedom, Schwarz's approximation
         is (1 + t^2 / nu)^((nu + 1) / 2) / (nu + 1)^(1 / 2) (Kass and Raftery, Bayes factors, Journal of the American
         Statistical Association 90(430), 773-795, 1995, doi:10.1080/01621459.1995.10476572). It is that of the clearest
-        strength; infinite for a law, which has none, and where nothing scatters.
+        strength; infinite for a law, which has none, and where nothing scatters. Of a mechanism with states, the
+        strength is what is left of it when the recordings start.
         """
-        deviations = dict(zip(self.values, self.standard_deviations().tolist(), strict=True))
-        degrees = dict(zip(self.values, self.degrees_of_freedom.tolist(), strict=True))
+        mechanism, names = registry.get(name), list(self.values)
+        states = [names.index(mechanism_key(name, place, state.name)) for state in mechanism.states]
+        left = 1.0 - np.array([self.values[names[k]] for k in states])
         most = -np.inf
-        for strength in registry.get(name).strengths:
-            key = mechanism_key(name, place, strength.name)
-            distance, deviation, nu = self.values[key] - strength.neutral, deviations[key], degrees[key]
-            if not deviation > 0.0:
+        for strength in mechanism.strengths:
+            k = names.index(mechanism_key(name, place, strength.name))
+            whole, nu = self.values[names[k]] - strength.neutral, float(self.degrees_of_freedom[k])
+            # The derivatives of what is left: by the strength, and by each state.
+            slopes = [float(left.prod()), *(-whole * float(np.delete(left, i).prod()) for i in range(left.size))]
+            variance = np.array(slopes) @ self.covariance[np.ix_([k, *states], [k, *states])] @ np.array(slopes)
+            if not variance > 0.0:
                 return np.inf
-            t2 = (distance / deviation) ** 2
+            t2 = (whole * float(left.prod())) ** 2 / variance
             by_recordings = (nu + 1) / 2 * np.log1p(t2 / nu) - np.log(nu + 1) / 2 if np.isfinite(nu) else t2 / 2
             most = max(most, float(by_recordings))
         return most if np.isfinite(most) else np.inf
