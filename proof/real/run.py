@@ -131,7 +131,9 @@ def _read_diagnosis(out: Path) -> dict:
         "place": (content.get("location") or {}).get("place"),
         "mechanisms": content["mechanisms"],
         "alternatives": content["alternatives"],
-        "laws": [{key: law[key] for key in ("place", "slot", "arguments", "confidence")} for law in content["laws"]],
+        "laws": [
+            {key: law[key] for key in ("place", "slot", "arguments", "confidence")} for law in content.get("laws", [])
+        ],
         "nearest": content.get("nearest"),
         "mean_square": content["fit"]["mean_square"],
     }
