@@ -7,7 +7,7 @@ CORES ?= 2
 REGRESSORS ?= $(RIVALS)
 
 .PHONY: help results real data test fuzz docs bench accuracy-gate input-checks diagnosis-settings decision-rules \
-  form-errors joint-rigs outside-rigs past several-effects table-one coverage proof proof-full proof-real slurm-test lint lock clean
+  form-errors joint-rigs outside-rigs past several-effects table-one coverage proof proof-full proof-real slurm-test lint lock sbom clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -122,6 +122,9 @@ lint: $(VENV)/.ready
 lock:  ## pin the newest versions that fit pyproject.toml (needs uv)
 	uv pip compile pyproject.toml --all-extras --universal --python-version 3.11 --upgrade --generate-hashes \
 	  --no-emit-index-url --no-header -o requirements.lock
+
+sbom: $(VENV)/.ready  ## list the pinned packages with hashes and licences: sbom.json, docs/dependencies.md
+	$(BIN)/python -m benchmarks.sbom
 
 clean:  ## remove everything the pipeline made
 	rm -rf results .snakemake
