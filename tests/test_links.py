@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-TOP = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "data/README.md")]
+FILES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", "config/README.md", "data/README.md")
+TOP = [ROOT / name for name in FILES]
 PAGES = [*TOP, *sorted((ROOT / "docs").rglob("*.md"))]
 
 
