@@ -2,11 +2,13 @@
 
 import gzip
 import os
+import re
 import struct
 import tracemalloc
 import zlib
 
 import h5py
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -16,6 +18,7 @@ from ccmodel.paths import existing_file, try_file
 from ccmodel.rig import readers
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.ingest import ingest_batch
+from ccmodel.rig.readers.attempt import read_here
 from ccmodel.typed import MAX_VALUES, InputError
 
 PIPE = "it is a pipe; a regular file is needed"
@@ -134,27 +137,85 @@ def parquet_bomb(path):
             writer.write_table(one)
 
 
+def mat73_references(path):
+    """A hundred cells that refer to one array of 8 MB."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        one = file.create_dataset("#refs#/a", shape=(10**6,), dtype="f8", chunks=(10**6,), compression="gzip")
+        cells = file.create_dataset("cells", (100,), dtype=h5py.ref_dtype)
+        cells[:] = [one.ref] * 100
+        cells.attrs["MATLAB_class"] = np.bytes_("cell")
+    with open(path, "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: PCWIN64".ljust(124) + b"\x00\x02IM")
+
+
+def parquet_lists(path):
+    """A single row: a list of 13 million numbers."""
+    numbers = pa.DictionaryArray.from_arrays(pa.array(np.zeros(13 * 10**6, np.int8)), pa.array([1.0]))
+    pq.write_table(pa.table({"a": pa.ListArray.from_arrays([0, len(numbers)], numbers.dictionary_decode())}), path)
+
+
 @pytest.mark.parametrize(
-    ("name", "make"),
+    ("name", "make", "memory"),
     [
-        ("a.h5", hdf5_bomb),
-        ("a.nc", netcdf_bomb),
-        ("a.mat", mat73_bomb),
-        ("b.mat", mat5_bomb),
-        ("a.parquet", parquet_bomb),
+        ("a.h5", hdf5_bomb, 20e6),
+        ("a.nc", netcdf_bomb, 20e6),
+        ("a.mat", mat73_bomb, 20e6),
+        ("b.mat", mat5_bomb, 20e6),
+        ("c.mat", mat73_references, 110e6),  # it is read until the limit
+        ("a.parquet", parquet_bomb, 20e6),
+        ("b.parquet", parquet_lists, 20e6),
     ],
 )
-def test_what_unpacks_to_too_much_is_refused_before_it_is_read(name, make, tmp_path, monkeypatch):
+def test_what_unpacks_to_too_much_is_refused_before_it_is_read(name, make, memory, tmp_path, monkeypatch):
     monkeypatch.setenv(inputs.UNPACKED, "100")
     make(tmp_path / name)
     assert (tmp_path / name).stat().st_size < 2e6
+    format = next(one for one in readers.registry().values() if (tmp_path / name).suffix in one.suffixes)
+    # Arrow's memory is not Python's.
+    monkeypatch.setattr(pq.ParquetFile, "read", lambda *_, **__: pytest.fail("it is read"))
     tracemalloc.start()
     try:
-        with pytest.raises(LogError) as error:
-            readers.read_signals(tmp_path / name)
+        # In this process: a process of its own would hide the memory it takes.
+        refusal = read_here(format, tmp_path / name)
         most = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    expected = f"unpacks to what is larger than 100 MB; if that is right, set {inputs.UNPACKED} to its MB"
-    assert error.value.args[2] == expected
-    assert most < 20e6
+    advice = f"larger than 100 MB; if that is right, set {inputs.UNPACKED} to its MB"
+    found = re.fullmatch(rf"unpacks to at least (\S+) MB, which is {advice}", refusal.args[2])
+    assert float(found[1]) > 100
+    assert most < memory
+
+
+def test_text_of_a_parquet_file_is_not_unpacked(tmp_path):
+    # 10,000 rows repeat one text of 0.1 MB, which the file holds once.
+    count = 10**4
+    long = pa.DictionaryArray.from_arrays(pa.array(np.zeros(count, np.int16)), pa.array(["x" * 10**5]))
+    numbers = pa.array(range(count))
+    columns = {"b.text": long, "a": numbers, "s": pa.StructArray.from_arrays([long, numbers], "tn")}
+    pq.write_table(pa.table(columns), tmp_path / "a.parquet")
+    assert (tmp_path / "a.parquet").stat().st_size < 1e6
+    found = readers.read_signals(tmp_path / "a.parquet")
+    assert [signal.name for signal in found.signals] == ["a", "s/n"]
+    assert found.remarks == ("columns without numbers are left out: b/text, s/t",)
+    assert pa.default_memory_pool().max_memory() < 0.5e9
+
+
+@pytest.mark.parametrize("kind", ["virtual", "external", "link.h5", "link.mat"])
+def test_an_hdf5_file_reads_no_other_file(kind, tmp_path):
+    secret, log = tmp_path / "secret", tmp_path / ("a.mat" if kind.endswith("mat") else "a.h5")
+    with h5py.File(secret, "w") as file:
+        file["s"] = np.arange(5.0)
+    with h5py.File(log, "w", userblock_size=512) as file:
+        if kind == "virtual":
+            layout = h5py.VirtualLayout((5,), "f8")
+            layout[:] = h5py.VirtualSource(str(secret), "s", (5,))
+            file.create_virtual_dataset("x", layout)
+        elif kind == "external":
+            file.create_dataset("x", (5,), "f8", external=[(str(secret), 0, 40)])
+        else:
+            file["x"] = h5py.ExternalLink(str(secret), "s")
+    if log.suffix == ".mat":
+        with open(log, "r+b") as file:
+            file.write(b"MATLAB 7.3 MAT-file, Platform: PCWIN64".ljust(124) + b"\x00\x02IM")
+    with pytest.raises(LogError, match="is in another file .*secret.*: give that file"):
+        readers.read_signals(log)

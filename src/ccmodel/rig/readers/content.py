@@ -28,11 +28,25 @@ def content_of(path: Path) -> bytes:
         raise LogError(None, None, "the gzip stream is cut short: copy it again from the recorder") from None
     except (OSError, zlib.error):
         raise LogError(None, None, "the gzip stream is damaged: copy it again from the recorder") from None
-    check_unpacked(len(unpacked))
+    if len(unpacked) > most:
+        raise LogError(None, None, f"unpacks to what is {inputs.too_large(inputs.UNPACKED)}")
     return unpacked
 
 
 def check_unpacked(size: float) -> None:
     """Raise `LogError` if a file unpacks to more bytes than the limit (`ccmodel.inputs`)."""
     if size > inputs.largest_bytes(inputs.UNPACKED):
-        raise LogError(None, None, f"unpacks to what is {inputs.too_large(inputs.UNPACKED)}")
+        found = f"unpacks to at least {size / 1e6:.4g} MB"
+        raise LogError(None, None, f"{found}, which is {inputs.too_large(inputs.UNPACKED)}")
+
+
+class Unpacked:
+    """Counts what the parts of a file unpack to, each before it is read."""
+
+    def __init__(self) -> None:
+        self.size = 0
+
+    def add(self, size: int) -> None:
+        """Count `size` bytes more; raise `LogError` if that is above the limit."""
+        self.size += size
+        check_unpacked(self.size)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers.attempt import COPY
 from ccmodel.rig.readers.columns import Columns
-from ccmodel.rig.readers.content import check_unpacked
+from ccmodel.rig.readers.content import Unpacked
 from ccmodel.rig.readers.contract import Format, SignalFile
 
 _UNIT_KEYS = ("unit", "units", "Unit", "Units", "UNIT", "UNITS", "unit_string")
@@ -31,7 +31,9 @@ def read(path: Path) -> SignalFile:
     columns = Columns()
     with h5py.File(path, "r") as file:
         found = list(_datasets(h5py, file))
-        check_unpacked(sum(size_of(dataset) for _, dataset in found))
+        unpacked = Unpacked()
+        for name, dataset in found:
+            unpacked.add(size_in(file, name, dataset))
         for name, dataset in found:
             _add(columns, name, dataset)
     return SignalFile(tuple(columns.signals), None, columns.remarks())
@@ -40,8 +42,20 @@ def read(path: Path) -> SignalFile:
 FORMAT = Format("HDF5 file", (".h5", ".hdf5", ".hdf", ".he5", ".nc"), read, extra="hdf5", apart=True)
 
 
-def size_of(dataset: Any) -> int:
-    """Bytes of an array in memory; 0 of one without values."""
+def size_in(file: Any, name: str, dataset: Any) -> int:
+    """Bytes of an array in memory; 0 of one without values.
+
+    Raises
+    ------
+    LogError
+        If the values are in another file: a log is one file, and a batch from others must not read what is not in it.
+    """
+    others = [source.file_name for source in dataset.virtual_sources()] if dataset.is_virtual else []
+    others += [part[0] for part in dataset.external or ()]
+    if dataset.file.filename != file.filename:
+        others.append(dataset.file.filename)
+    if others:
+        raise LogError(None, None, f"'{name}' is in another file ({others[0]}): give that file")
     return (dataset.size or 0) * dataset.dtype.itemsize
 
 

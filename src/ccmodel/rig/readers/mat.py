@@ -15,9 +15,9 @@ import numpy as np
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers import signatures
 from ccmodel.rig.readers.columns import Columns
-from ccmodel.rig.readers.content import check_unpacked
+from ccmodel.rig.readers.content import Unpacked
 from ccmodel.rig.readers.contract import Format, SignalFile
-from ccmodel.rig.readers.hdf5 import size_of
+from ccmodel.rig.readers.hdf5 import size_in
 
 _TIME_KEYS = ("time", "Time", "t")
 _DATA_KEYS = ("data", "Data", "values", "Values", "value", "Value")
@@ -200,7 +200,7 @@ def _check_unpacked_v5(path: Path) -> None:
 
     What they unpack to is counted, not kept. A damaged element is left to the library, which says what is wrong.
     """
-    raw, at, total = path.read_bytes(), V5_HEADER, 0
+    raw, at, unpacked = path.read_bytes(), V5_HEADER, Unpacked()
     order = "<" if raw[V5_HEADER - 2 : V5_HEADER] == b"IM" else ">"
     while at + V5_TAG <= len(raw):
         kind, size = struct.unpack_from(f"{order}II", raw, at)
@@ -211,9 +211,8 @@ def _check_unpacked_v5(path: Path) -> None:
         stream = zlib.decompressobj()
         try:
             while packed:
-                total += len(stream.decompress(packed, CHUNK))
+                unpacked.add(len(stream.decompress(packed, CHUNK)))
                 packed = stream.unconsumed_tail
-                check_unpacked(total)
         except zlib.error:
             return
 
@@ -243,13 +242,12 @@ def _of_v73(path: Path) -> dict[str, Any]:
     import h5py
 
     with h5py.File(path, "r") as file:
-        sizes: list[int] = []
-        file.visititems(lambda name, item: sizes.append(size_of(item)) if isinstance(item, h5py.Dataset) else None)
-        check_unpacked(sum(sizes))
-        return {name: _plain_v73(h5py, file, file[name]) for name in file if not name.startswith("#")}
+        unpacked = Unpacked()
+        return {name: _plain_v73(h5py, file, file[name], unpacked) for name in file if not name.startswith("#")}
 
 
-def _plain_v73(h5py: Any, file: Any, item: Any, depth: int = 0) -> Any:
+def _plain_v73(h5py: Any, file: Any, item: Any, unpacked: Unpacked, depth: int = 0) -> Any:
+    # What is read is counted, not what the file holds: many cells may refer to one array.
     kind = item.attrs.get("MATLAB_class", b"")
     kind = kind.decode(errors="replace") if isinstance(kind, bytes) else str(kind)
     if depth > _DEPTH:
@@ -257,7 +255,7 @@ def _plain_v73(h5py: Any, file: Any, item: Any, depth: int = 0) -> Any:
     if item.attrs.get("MATLAB_object_decode", 0) in (1, 3) or "MATLAB_sparse" in item.attrs:
         return _Object("sparse" if "MATLAB_sparse" in item.attrs else kind or "MATLAB")
     if isinstance(item, h5py.Group):
-        fields = {k: _plain_v73(h5py, file, item[k], depth + 1) for k in item}
+        fields = {k: _plain_v73(h5py, file, item[k], unpacked, depth + 1) for k in item}
         # A struct array holds a list of references for each field.
         if fields and all(isinstance(item[k], h5py.Dataset) and _is_array_of_fields(item[k]) for k in item):
             count = min(len(v) for v in fields.values())
@@ -265,9 +263,10 @@ def _plain_v73(h5py: Any, file: Any, item: Any, depth: int = 0) -> Any:
         return fields
     if item.attrs.get("MATLAB_empty"):
         return {"char": "", "cell": [], "struct": []}.get(kind, np.zeros(0))
+    unpacked.add(size_in(file, item.name.strip("/"), item))
     if item.dtype.kind == "O":
         references = np.ravel(item[()].T)
-        return [_plain_v73(h5py, file, file[r], depth + 1) for r in references]
+        return [_plain_v73(h5py, file, file[r], unpacked, depth + 1) for r in references]
     value = item[()]
     if kind == "char":
         return "".join(map(chr, np.ravel(np.asarray(value).T.astype(np.int64), order="C")))

@@ -1,6 +1,8 @@
 """Parquet: a table of columns, with units in the metadata of the fields."""
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -18,14 +20,13 @@ _UNIT_KEYS = (b"unit", b"units", b"Unit", b"Units")
 def read(path: Path) -> SignalFile:
     """Read a Parquet file; structures are flattened, lists of one length are a signal an element."""
     file = pq.ParquetFile(path)
-    # A column of one value takes next to nothing in the file, whatever its length.
-    check_unpacked(file.metadata.num_rows * file.metadata.num_columns * BYTES_OF_A_NUMBER)
-    table = file.read()
-    while any(pa.types.is_struct(field.type) for field in table.schema):
-        table = table.flatten()
+    leaves = [file.schema.column(i) for i in range(file.metadata.num_columns)]
+    check_unpacked(sum(_sizes(file.metadata, leaves)))
+    named = _flat(file.schema_arrow.empty_table()).schema.names
+    table = _flat(file.read(columns=[leaf.path for leaf in leaves if not _is_text(leaf)]))
     signals, left_out, started = [], [], None
     for field, column in zip(table.schema, table.columns, strict=True):
-        name = field.name.replace(".", "/") if "." in field.name else field.name
+        name = field.name.replace(".", "/")
         unit = _unit(field)
         values = column.combine_chunks()
         if pa.types.is_dictionary(values.type):
@@ -44,12 +45,40 @@ def read(path: Path) -> SignalFile:
         elif _is_number(values.type):
             signals.append(Signal(name, unit, _floats(values)))
         else:
-            left_out.append(name)
-    remarks = [f"columns without numbers are left out: {', '.join(left_out)}"] if left_out else []
+            left_out.append(field.name)
+    texts = set(left_out) | (set(named) - set(table.schema.names))
+    left_out = [name for name in dict.fromkeys(named) if name in texts]
+    remarks = (
+        [f"columns without numbers are left out: {', '.join(name.replace('.', '/') for name in left_out)}"]
+        if left_out
+        else []
+    )
     return SignalFile(tuple(signals), started, tuple(remarks))
 
 
 FORMAT = Format("Parquet file", (".parquet", ".pq"), read)
+
+
+def _is_text(leaf: Any) -> bool:
+    """Whether a column holds text or bytes: no signal, and nothing in the file bounds their length in memory."""
+    return leaf.physical_type == "BYTE_ARRAY" and leaf.logical_type.type != "DECIMAL"
+
+
+def _sizes(metadata: Any, leaves: Sequence[Any]) -> Iterator[int]:
+    """Bytes in memory of each column that is read, by the number of its values.
+
+    A column of one value takes next to nothing in the file, whatever its length; and a list may have many values a row.
+    """
+    for i, leaf in enumerate(leaves):
+        if not _is_text(leaf):
+            count = sum(metadata.row_group(group).column(i).num_values for group in range(metadata.num_row_groups))
+            yield max(count, metadata.num_rows) * max(BYTES_OF_A_NUMBER, leaf.length)
+
+
+def _flat(table: pa.Table) -> pa.Table:
+    while any(pa.types.is_struct(field.type) for field in table.schema):
+        table = table.flatten()
+    return table
 
 
 def _unit(field: pa.Field) -> str:
