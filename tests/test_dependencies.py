@@ -1,6 +1,7 @@
 """pyproject.toml names every dependency, and the conda environment of the jobs has the same list."""
 
 import ast
+import re
 import sys
 import tomllib
 from importlib.metadata import packages_distributions
@@ -67,3 +68,11 @@ def test_the_conda_environment_has_the_same_dependencies():
     wanted = by_name(PROJECT["dependencies"])
     assert {name: listed[name] for name in listed.keys() - INSTALLS} == wanted
     assert listed.keys() >= INSTALLS
+
+
+def test_container_and_proof_install_the_locked_packages_by_hash():
+    for file in ("Containerfile", "proof/environment.post-deploy.sh", "Makefile"):
+        installs = re.findall(r"pip install (?:[^\n]*\\\n)*[^\n]*", (ROOT / file).read_text(encoding="utf-8"))
+        assert any("--require-hashes" in line and "requirements.lock" in line for line in installs), file
+        # The package itself: nothing is fetched for it.
+        assert all("--require-hashes" in line or "--no-deps --no-build-isolation" in line for line in installs), file
