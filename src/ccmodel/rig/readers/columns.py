@@ -5,10 +5,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.rig.readers.content import Unpacked
 from ccmodel.rig.readers.contract import Signal
 
 # Columns of a matrix that may be signals; a matrix with more is a picture or a map.
 MOST_COLUMNS = 64
+BYTES_OF_A_NUMBER = np.dtype(float).itemsize
 
 
 @dataclass
@@ -19,6 +21,7 @@ class Columns:
     text: list[str] = field(default_factory=list)
     scalars: list[str] = field(default_factory=list)
     others: list[str] = field(default_factory=list)
+    unpacked: Unpacked = field(default_factory=Unpacked)
 
     def add(self, name: str, unit: str, values: NDArray | None, time: NDArray | None = None) -> None:
         """Add an array; None is one without numbers.
@@ -49,6 +52,8 @@ class Columns:
             self.others.append(name)
 
     def _append(self, name: str, unit: str, values: NDArray, time: NDArray | None) -> None:
+        # Numbers of one byte in a file take eight here.
+        self.unpacked.add(len(values) * BYTES_OF_A_NUMBER)
         time = np.asarray(time, float) if time is not None and len(time) == len(values) else None
         self.signals.append(Signal(name, unit, np.asarray(values, float), time))
 

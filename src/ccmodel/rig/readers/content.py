@@ -3,6 +3,7 @@
 import gzip
 import io
 import zlib
+from dataclasses import dataclass
 from pathlib import Path
 
 from ccmodel import inputs
@@ -33,20 +34,15 @@ def content_of(path: Path) -> bytes:
     return unpacked
 
 
-def check_unpacked(size: float) -> None:
-    """Raise `LogError` if a file unpacks to more bytes than the limit (`ccmodel.inputs`)."""
-    if size > inputs.largest_bytes(inputs.UNPACKED):
-        found = f"unpacks to at least {size / 1e6:.4g} MB"
-        raise LogError(None, None, f"{found}, which is {inputs.too_large(inputs.UNPACKED)}")
-
-
+@dataclass
 class Unpacked:
-    """Counts what the parts of a file unpack to, each before it is read."""
+    """Bytes that a file has unpacked to so far; they are added before the memory is taken."""
 
-    def __init__(self) -> None:
-        self.size = 0
+    size: int = 0
 
     def add(self, size: int) -> None:
-        """Count `size` bytes more; raise `LogError` if that is above the limit."""
+        """Count further bytes; raise `LogError` if they are above the limit (`ccmodel.inputs`)."""
         self.size += size
-        check_unpacked(self.size)
+        if self.size > inputs.largest_bytes(inputs.UNPACKED):
+            found = f"{self.size / 1e6:.0f} MB or more, which is {inputs.too_large(inputs.UNPACKED)}"
+            raise LogError(None, None, f"unpacks to {found}")

@@ -31,9 +31,7 @@ def read(path: Path) -> SignalFile:
     columns = Columns()
     with h5py.File(path, "r") as file:
         found = list(_datasets(h5py, file))
-        unpacked = Unpacked()
-        for name, dataset in found:
-            unpacked.add(size_in(file, name, dataset))
+        Unpacked().add(sum(size_of(dataset) for _, dataset in found))
         for name, dataset in found:
             _add(columns, name, dataset)
     return SignalFile(tuple(columns.signals), None, columns.remarks())
@@ -42,20 +40,13 @@ def read(path: Path) -> SignalFile:
 FORMAT = Format("HDF5 file", (".h5", ".hdf5", ".hdf", ".he5", ".nc"), read, extra="hdf5", apart=True)
 
 
-def size_in(file: Any, name: str, dataset: Any) -> int:
-    """Bytes of an array in memory; 0 of one without values.
-
-    Raises
-    ------
-    LogError
-        If the values are in another file: a log is one file, and a batch from others must not read what is not in it.
-    """
-    others = [source.file_name for source in dataset.virtual_sources()] if dataset.is_virtual else []
-    others += [part[0] for part in dataset.external or ()]
-    if dataset.file.filename != file.filename:
-        others.append(dataset.file.filename)
+def size_of(dataset: Any) -> int:
+    """Bytes of an array in memory, 0 of one without values; raise `LogError` if its values are in another file."""
+    others = [name for name, *_ in dataset.external or ()]
+    if dataset.is_virtual:
+        others += [source.file_name for source in dataset.virtual_sources() if source.file_name != "."]
     if others:
-        raise LogError(None, None, f"'{name}' is in another file ({others[0]}): give that file")
+        raise LogError(None, None, f"values of '{dataset.name}' are in another file ({others[0]}): give that file")
     return (dataset.size or 0) * dataset.dtype.itemsize
 
 
@@ -104,4 +95,5 @@ def _time_axis(dataset: Any) -> NDArray | None:
     unit = _unit(dict(scale.attrs)).partition(" since ")[0].strip()
     if unit not in _SECONDS or scale.shape != dataset.shape[:1] or scale.dtype.kind not in "iuf":
         return None
+    size_of(scale)
     return scale[()].astype(float) * _SECONDS[unit]

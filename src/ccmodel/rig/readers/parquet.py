@@ -1,33 +1,35 @@
 """Parquet: a table of columns, with units in the metadata of the fields."""
 
-from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from ccmodel.rig.readers.content import check_unpacked
+from ccmodel.rig.readers.columns import BYTES_OF_A_NUMBER
+from ccmodel.rig.readers.content import Unpacked
 from ccmodel.rig.readers.contract import Format, Signal, SignalFile
 from ccmodel.rig.readers.stamps import seconds_of_times
 
-BYTES_OF_A_NUMBER = 8
 _UNIT_KEYS = (b"unit", b"units", b"Unit", b"Units")
 
 
 def read(path: Path) -> SignalFile:
     """Read a Parquet file; structures are flattened, lists of one length are a signal an element."""
-    file = pq.ParquetFile(path)
-    leaves = [file.schema.column(i) for i in range(file.metadata.num_columns)]
-    check_unpacked(sum(_sizes(file.metadata, leaves)))
-    named = _flat(file.schema_arrow.empty_table()).schema.names
-    table = _flat(file.read(columns=[leaf.path for leaf in leaves if not _is_text(leaf)]))
+    metadata = pq.read_metadata(path)
+    Unpacked().add(_size(metadata))
+    # A text that is repeated is kept once.
+    table = pq.ParquetFile(path, metadata=metadata, read_dictionary=_texts(metadata)).read()
+    while any(pa.types.is_struct(field.type) for field in table.schema):
+        table = table.flatten()
     signals, left_out, started = [], [], None
     for field, column in zip(table.schema, table.columns, strict=True):
-        name = field.name.replace(".", "/")
+        name = field.name.replace(".", "/") if "." in field.name else field.name
         unit = _unit(field)
+        if pa.types.is_dictionary(column.type) and not _has_numbers(column.type.value_type):
+            left_out.append(name)
+            continue
         values = column.combine_chunks()
         if pa.types.is_dictionary(values.type):
             values = values.dictionary_decode()
@@ -45,40 +47,36 @@ def read(path: Path) -> SignalFile:
         elif _is_number(values.type):
             signals.append(Signal(name, unit, _floats(values)))
         else:
-            left_out.append(field.name)
-    texts = set(left_out) | (set(named) - set(table.schema.names))
-    left_out = [name for name in dict.fromkeys(named) if name in texts]
-    remarks = (
-        [f"columns without numbers are left out: {', '.join(name.replace('.', '/') for name in left_out)}"]
-        if left_out
-        else []
-    )
+            left_out.append(name)
+    remarks = [f"columns without numbers are left out: {', '.join(left_out)}"] if left_out else []
     return SignalFile(tuple(signals), started, tuple(remarks))
 
 
 FORMAT = Format("Parquet file", (".parquet", ".pq"), read)
 
 
-def _is_text(leaf: Any) -> bool:
-    """Whether a column holds text or bytes: no signal, and nothing in the file bounds their length in memory."""
-    return leaf.physical_type == "BYTE_ARRAY" and leaf.logical_type.type != "DECIMAL"
+def _size(metadata: pq.FileMetaData) -> int:
+    """Bytes of the numbers of a file in memory, and of its pages once unpacked, whichever are more.
 
-
-def _sizes(metadata: Any, leaves: Sequence[Any]) -> Iterator[int]:
-    """Bytes in memory of each column that is read, by the number of its values.
-
-    A column of one value takes next to nothing in the file, whatever its length; and a list may have many values a row.
+    A column of one value takes next to nothing in the file, whatever its length. A list counts with its elements.
     """
-    for i, leaf in enumerate(leaves):
-        if not _is_text(leaf):
-            count = sum(metadata.row_group(group).column(i).num_values for group in range(metadata.num_row_groups))
-            yield max(count, metadata.num_rows) * max(BYTES_OF_A_NUMBER, leaf.length)
+    numbers = pages = 0
+    for group in map(metadata.row_group, range(metadata.num_row_groups)):
+        for i in range(group.num_columns):
+            column, width = group.column(i), max(BYTES_OF_A_NUMBER, metadata.schema.column(i).length)
+            numbers += max(column.num_values, group.num_rows) * width
+            pages += column.total_uncompressed_size
+    return max(numbers, pages)
 
 
-def _flat(table: pa.Table) -> pa.Table:
-    while any(pa.types.is_struct(field.type) for field in table.schema):
-        table = table.flatten()
-    return table
+def _texts(metadata: pq.FileMetaData) -> list[str]:
+    """Paths of the columns of texts and bytes of any length; a decimal number may be stored so too."""
+    columns = map(metadata.schema.column, range(metadata.num_columns))
+    return [c.path for c in columns if c.physical_type == "BYTE_ARRAY" and c.logical_type.type != "DECIMAL"]
+
+
+def _has_numbers(kind: pa.DataType) -> bool:
+    return _is_number(kind) or pa.types.is_temporal(kind)
 
 
 def _unit(field: pa.Field) -> str:
