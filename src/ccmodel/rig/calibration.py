@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ccmodel.channels import TENSIONS, THETA_MOTOR
 from ccmodel.rig import limits
-from ccmodel.rig.angle import Angle, angle_of
-from ccmodel.rig.batch import RAW_COLUMNS, Accuracy, End, LoadCell, Rig, TorqueSensor
+from ccmodel.rig.angle import Angle, angle_of, angle_of_motor
+from ccmodel.rig.batch import Accuracy, End, LoadCell, Rig, TorqueSensor
 
 
 @dataclass
@@ -111,19 +111,20 @@ def _add_angle(
 
 def _add_motor(result: Calibrated, table: pd.DataFrame, rig: Rig, resting: int) -> None:
     """Add the motor's angle at the drive pulley, zero at rest or at the first sample."""
-    counts = RAW_COLUMNS[THETA_MOTOR][0]
-    per_rev, sign = rig.drive.motor_counts_per_rev, rig.drive.motor_sign
-    if THETA_MOTOR in table:
-        values, step, formula = table[THETA_MOTOR].to_numpy(), 1.0, f"{THETA_MOTOR} of the log"
-    elif counts in table and per_rev:
-        values, step, formula = table[counts].to_numpy(), 2 * np.pi / per_rev, f"{counts} * 2 pi / {per_rev:g}"
-    else:
-        if counts in table:
-            result.unused[counts] = _lacks("rig.drive.motor_counts_per_rev")
+    angle, sign = angle_of_motor(table, rig), rig.drive.motor_sign
+    if angle is None:
         return
+    if angle.rad_per_unit is None:
+        result.unused[angle.column] = _lacks(angle.key)
+        return
+    values = angle.values
+    if angle.counted:
+        formula = f"{angle.column} * 2 pi / {rig.drive.motor_counts_per_rev:g}"
+    else:
+        formula = f"{angle.column} of the log"
     zero = values[: max(resting, 1)].mean()
     formula = f"{'-' if sign < 0 else ''}({formula}), from its value at the start"
-    result.add(THETA_MOTOR, sign * step * (values - zero), formula, rig.accuracy.encoder_rad)
+    result.add(THETA_MOTOR, sign * angle.rad_per_unit * (values - zero), formula, rig.accuracy.encoder_rad)
 
 
 def _add_sensors(result: Calibrated, table: pd.DataFrame, end: End, accuracy: Accuracy) -> None:

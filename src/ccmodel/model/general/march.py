@@ -200,13 +200,13 @@ def _solve_with_train(
     """
     step = ph, piece, node, slide, mean, load, torque, dt, bristle, friction_factor, fixed_grip, drive, pulley
     # The pulley usually stays at the end of its range at which it was.
-    rising = pulley[rows.DRIVE_ANGLE] - pulley[rows.DRIVE_MIDDLE] <= 0.0
-    near, far = (lowest, highest) if rising else (highest, lowest)
+    was_low = pulley[rows.DRIVE_ANGLE] - pulley[rows.DRIVE_MIDDLE] <= 0.0
+    near, far = (lowest, highest) if was_low else (highest, lowest)
     solved, rotation, at_near = _at_drive_angle(*step, rotation, near, motor)
-    if not solved or (at_near >= 0.0) == rising:
+    if not solved or (at_near >= 0.0) == was_low:
         return solved, rotation, near
     solved, rotation, at_far = _at_drive_angle(*step, rotation, far, motor)
-    if not solved or (at_far >= 0.0) != rising:
+    if not solved or (at_far >= 0.0) != was_low:
         return solved, rotation, far
     angle = far
     # The false position, with the Illinois rule.
