@@ -76,7 +76,7 @@ def test_a_log_that_unpacks_to_more_than_the_limit_is_refused(read, tmp_path, mo
     monkeypatch.setenv(inputs.UNPACKED, "1")
     with pytest.raises(LogError) as error:
         read(bomb)
-    assert f"unpacks to what is larger than 1 MB; if that is right, set {inputs.UNPACKED}" in error.value.args[2]
+    assert f"which is larger than 1 MB; if that is right, set {inputs.UNPACKED}" in error.value.args[2]
 
 
 def test_aliases_that_repeat_one_another_are_refused(written):

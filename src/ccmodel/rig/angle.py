@@ -8,10 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
 
 from ccmodel.channels import ANGLE_AT, THETA_MOTOR
 from ccmodel.rig import limits
 from ccmodel.rig.batch import RAW_COLUMNS, End, Rig
+
+# The samples near one, without itself and its neighbours, with which a lost count may share the jump.
+NEAR = np.ones(2 * limits.NEAR_SAMPLES + 1, bool)
+NEAR[limits.NEAR_SAMPLES - 1 : limits.NEAR_SAMPLES + 2] = False
 
 
 @dataclass(frozen=True)
@@ -68,11 +73,9 @@ class Angle:
         -------
         ndarray of bool, shape (n - 1,)
         """
-        step, n = np.diff(time_s), limits.NEAR_SAMPLES
+        step = np.diff(time_s)
         change = np.abs(np.diff(self.values)) / np.maximum(step / np.median(step), 1.0)
-        windows = np.lib.stride_tricks.sliding_window_view(np.pad(change, n, mode="reflect"), 2 * n + 1)
-        # Beside the sample itself are its neighbours, with which a lost count may share the jump.
-        near = np.delete(windows, [n - 1, n, n + 1], axis=1).max(axis=1)
+        near = maximum_filter(change, footprint=NEAR, mode="mirror")
         return change > limits.OUTSTANDING_FACTOR * near + limits.OUTSTANDING_GRAINS * self.grain
 
     def still_samples(self) -> int:

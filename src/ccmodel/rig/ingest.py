@@ -114,7 +114,9 @@ def ingest_batch(folder: Path, progress: Progress = silent) -> Ingested:
     findings = [_finding(name, batch_file, "warning", defect) for defect in columns.warnings]
     recordings, used_files = [], []
     checking = each_of(files, within(progress, READ, CHECKED), lambda file: f"checking {Path(file).name}")
-    for entry, file, (log, refusals) in zip(batch.recordings, checking, logs, strict=True):
+    for k, (entry, file) in enumerate(zip(batch.recordings, checking, strict=True)):
+        # The table is given up, since channels take its place.
+        (log, refusals), logs[k], tables[k] = logs[k], (None, []), None
         if log is not None:
             used, refusals = _attempt(name, file, _recording, batch, entry, file, log, columns, travel)
             if used is not None:

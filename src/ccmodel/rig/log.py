@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.ndimage import find_objects, label
+from numpy.typing import NDArray
 
 from ccmodel.rig import limits, readers
 from ccmodel.rig.batch import COLUMNS, DRIVE_ANGLE_COLUMNS, RAW_COLUMNS
 from ccmodel.rig.findings import Defect, LogError
-from ccmodel.rig.outliers import drop_outliers
+from ccmodel.rig.outliers import drop_outliers, without
 from ccmodel.typed import nearest
 
 # Similarity from which an unknown column is a misspelling of a known one. Below it, the rig logs more than the format
@@ -101,8 +101,10 @@ def _numbers(raw: pd.DataFrame) -> pd.DataFrame:
 
 def _drop_bad(table: pd.DataFrame, warnings: list[Defect]) -> pd.DataFrame:
     """Drop the few rows in which a cell is empty or not finite."""
-    bad = ~np.isfinite(table.to_numpy())
-    for column, is_bad in zip(table.columns, bad.T, strict=True):
+    any_bad = np.zeros(len(table), bool)
+    # Columns by position: a log of ten million samples takes most of the memory, and is not copied as a whole.
+    for k, column in enumerate(table.columns):
+        is_bad = ~np.isfinite(table.iloc[:, k].to_numpy())
         if not is_bad.any():
             continue
         row = int(table.index[is_bad][0])
@@ -113,16 +115,19 @@ def _drop_bad(table: pd.DataFrame, warnings: list[Defect]) -> pd.DataFrame:
             raise LogError(row, column, f"{is_bad.sum()} cells have no number, {run} of them in a row")
         many = f"{is_bad.sum()} cells have no number: their rows are" if is_bad.sum() > 1 else "no number: row"
         warnings.append(Defect(row, column, f"{many} dropped"))
-    return table[~bad.any(axis=1)]
+        any_bad |= is_bad
+    return without(table, any_bad)
 
 
 def _drop_repeated(table: pd.DataFrame, warnings: list[Defect]) -> pd.DataFrame:
     """Drop samples that repeat the one before in all columns, time included."""
-    repeated = (table.diff() == 0).all(axis=1)
+    repeated = np.arange(len(table)) > 0
+    for _, values in table.items():
+        repeated[1:] &= values.to_numpy()[1:] == values.to_numpy()[:-1]
     if count := repeated.sum():
         text = "the same sample again: dropped" + (f" ({count} such rows in all)" if count > 1 else "")
         warnings.append(Defect(int(table.index[repeated][0]), None, text))
-    return table[~repeated]
+    return without(table, repeated)
 
 
 def _check_time(time: pd.Series, warnings: list[Defect]) -> None:
@@ -175,14 +180,26 @@ def _gap_text(count: int, longest: float, usual: float, uneven: bool) -> str:
     return f"{what} of {longest:.4g} s where a step is {usual:.4g} s"
 
 
-def runs(flags: np.ndarray) -> list[slice]:
-    """All runs of true values."""
-    return [run for (run,) in find_objects(label(flags)[0])]
+def runs(flags: NDArray, shortest: int = 1) -> list[slice]:
+    """All runs of true values with so many samples or more."""
+    starts, stops = _ends_of_runs(flags)
+    is_long = stops - starts >= shortest
+    return [slice(a, b) for a, b in zip(starts[is_long].tolist(), stops[is_long].tolist(), strict=True)]
 
 
-def longest_run(flags: np.ndarray) -> slice:
+def _ends_of_runs(flags: NDArray) -> tuple[NDArray, NDArray]:
+    """First sample of each run of true values, and the first one after it."""
+    changes = np.flatnonzero(np.diff(flags, prepend=False, append=False))
+    return changes[::2], changes[1::2]
+
+
+def longest_run(flags: NDArray) -> slice:
     """The longest run of true values, the first of several; empty if there is none."""
-    return max(runs(flags), key=length, default=slice(0, 0))
+    starts, stops = _ends_of_runs(flags)
+    if not starts.size:
+        return slice(0, 0)
+    longest = int(np.argmax(stops - starts))
+    return slice(int(starts[longest]), int(stops[longest]))
 
 
 def length(run: slice) -> int:

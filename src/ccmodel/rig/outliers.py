@@ -52,7 +52,12 @@ def drop_outliers(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Defect]]:
             )
             warnings.append(Defect(int(table.index[at]), column, text))
             is_bad[found] = True
-    return table[~is_bad], warnings
+    return without(table, is_bad), warnings
+
+
+def without(table: pd.DataFrame, rows: NDArray) -> pd.DataFrame:
+    """A table without some of its rows; the table itself if there are none."""
+    return table[~rows] if rows.any() else table
 
 
 def outliers(values: NDArray) -> NDArray:

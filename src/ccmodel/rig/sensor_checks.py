@@ -132,8 +132,8 @@ def _is_noisy(table: pd.DataFrame, column: str, drive: Angle, odd: NDArray, most
     """
     at_rest = np.zeros(len(table), bool)
     at_rest[: drive.still_samples()] = True
-    for run in runs(np.diff(drive.values, prepend=np.nan) == 0):
-        at_rest[run] |= length(run) > limits.FROZEN_SAMPLES
+    for run in runs(np.diff(drive.values, prepend=np.nan) == 0, limits.FROZEN_SAMPLES + 1):
+        at_rest[run] = True
     change = np.diff(table[column].to_numpy(), prepend=np.nan)
     repeats = (change == 0)[at_rest & ~odd]
     if repeats.size > limits.FROZEN_SAMPLES:
@@ -271,12 +271,9 @@ def _standstills(table: pd.DataFrame, values: NDArray) -> list[slice]:
     """Parts of a log in which a sensor keeps one value for long."""
     time = table["time_s"].to_numpy()
     # The sample before a run of repeats has the same value.
-    parts = [slice(run.start - 1, run.stop) for run in runs(np.diff(values, prepend=np.nan) == 0)]
-    return [
-        part
-        for part in parts
-        if length(part) > limits.FROZEN_SAMPLES + 1 and time[part.stop - 1] - time[part.start] > limits.FROZEN_S
-    ]
+    repeats = runs(np.diff(values, prepend=np.nan) == 0, limits.FROZEN_SAMPLES + 1)
+    parts = [slice(run.start - 1, run.stop) for run in repeats]
+    return [part for part in parts if time[part.stop - 1] - time[part.start] > limits.FROZEN_S]
 
 
 def _saturated(

@@ -78,5 +78,7 @@ EQUAL_CYCLES, FEWEST_CROSSINGS = 0.05, 4
 
 # Share of equal changes from which a channel is a copy: sensors with noise, and angles, whose counts agree by chance.
 COPIED_NOISE, COPIED_ANGLE = 0.5, 0.98
+# Changes by which pairs of recordings are compared first, and the share of them from which all are compared.
+COMPARED_CHANGES, MAYBE_COPIED = 400, 0.25
 # White noise over the stated accuracy above which a channel has noise, and not only digits.
 NOISE_OVER_ACCURACY = 0.1

@@ -51,7 +51,7 @@ class Parity:
     def moving(self) -> Mapping[str, NDArray]:
         """Channels after the initial rest and the start-up transient."""
         r = self.recording
-        kept = r.time_s >= max(r.settled_s, r.rest_s)
+        kept = slice(int(np.searchsorted(r.time_s, max(r.settled_s, r.rest_s))), None)
         return {name: values[kept] for name, values in r.channels.items()} | {"time_s": r.time_s[kept]}
 
     def without_cell_error(self, end: str, offset_N: float, drift_N_per_s: float) -> "Parity":
@@ -156,6 +156,17 @@ class Parity:
         resting = white_noise(at_rest)
         return resting if moving > limits.CHATTER * resting else moving
 
+    @cached_property
+    def stroke_rad(self) -> float:
+        """Peak to peak of the drive angle, rad."""
+        return float(np.ptp(self.moving[THETA_IN]))
+
+    @cached_property
+    def frequency_per_s(self) -> float:
+        """Speed of the drive over its angle, each as a root mean square, 1/s."""
+        x = self.moving
+        return float(np.std(speed(x[THETA_IN], x["time_s"])) / max(np.std(x[THETA_IN]), 1e-12))
+
     @property
     def capstan(self) -> float:
         """Stated mu phi."""
@@ -231,7 +242,12 @@ class Parity:
             or not np.ptp(tension) > 0
         ):
             return None
-        (variance, covariance), (_, of_tension) = np.cov(length, tension)
+        length -= length.mean()
+        tension -= tension.mean()
+        # Over the same number of samples, which cancels below.
+        variance, covariance, of_tension = (
+            np.einsum("i,i", a, b) for a, b in ((length, length), (length, tension), (tension, tension))
+        )
         if covariance == 0:
             return None
         return float(covariance / variance), float(of_tension / covariance)

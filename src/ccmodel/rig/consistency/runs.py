@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ccmodel.channels import (
     ANGLE_AT,
@@ -20,7 +21,7 @@ from ccmodel.channels import (
 )
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
-from ccmodel.rig.consistency.parity import Parity, speed, white_noise
+from ccmodel.rig.consistency.parity import Parity, white_noise
 from ccmodel.rig.sensor_checks import is_noisy
 
 ANGLES = {*ANGLE_AT.values(), THETA_MOTOR}
@@ -47,18 +48,44 @@ def foreign_runs(parities: Sequence[Parity]) -> list[Contradiction]:
 def copied_channels(parities: Sequence[Parity]) -> list[Contradiction]:
     """Channels of a recording that repeat those of another, change by change."""
     found = []
+    channels = [c for c in CHANNELS if c not in TENSIONS]
+    alike = {channel: _alike(parities, channel) for channel in channels}
     for k, parity in enumerate(parities):
-        for earlier in parities[:k]:
-            copied = [c for c in CHANNELS if c not in TENSIONS and _is_copy(parity, earlier, c)]
+        for e in np.flatnonzero(np.any([alike[c][k, :k] for c in channels], axis=0)).tolist():
+            earlier = parities[e]
+            copied = [c for c in channels if alike[c][k, e] and _is_copy(parity, earlier, c)]
             # The same command gives the same counts of motor and drive, and perhaps of the load: angles that agree
             # together are no copies.
             if set(copied) - ANGLES or copied == [THETA_OUT]:
                 names, ids = ", ".join(copied), (parity.recording.id, earlier.recording.id)
                 repeat = f"{names} of {ids[0]} repeat those of {ids[1]}, sample by sample"
                 text = f"{repeat}: noise does not repeat; one of the two logs holds a copy"
-                if all(c in copied for c in CHANNELS if c not in TENSIONS and c in parity.recording):
+                if all(c in copied for c in channels if c in parity.recording):
                     text = f"{ids[0]} holds the same samples as {ids[1]}: take one of the two recordings out"
                 found.append(Contradiction(names, text, parity.recording.id))
+    return found
+
+
+def _alike(parities: Sequence[Parity], channel: str) -> NDArray:
+    """Whether pairs of recordings may be copies in a channel, by some of its changes; shape (n, n), False above k = l.
+
+    A thousand recordings have half a million pairs: all changes are compared of a few only.
+    """
+    n = len(parities)
+    having = [k for k, p in enumerate(parities) if channel in p.recording]
+    found = np.zeros((n, n), bool)
+    if not having:
+        return found
+    shortest = min(parities[k].recording.time_s.size for k in having)
+    at = np.unique(np.linspace(0, shortest - 2, limits.COMPARED_CHANGES, dtype=int))
+    values = np.array([parities[k].recording[channel][[at, at + 1]] for k in having])
+    changes = values[:, 1] - values[:, 0]
+    scale = 1e-9 * np.abs(values).max(initial=0.0)
+    for row, k in enumerate(having):
+        same = np.abs(changes[:row] - changes[row]) <= scale
+        moved = (np.abs(changes[:row]) > scale) | (np.abs(changes[row]) > scale)
+        few = moved.sum(axis=1) < limits.FEWEST_SAMPLES
+        found[k, having[:row]] = few | ((same & moved).sum(axis=1) > limits.MAYBE_COPIED * moved.sum(axis=1))
     return found
 
 
@@ -181,13 +208,11 @@ def deviations_of(parity: Parity, others: Sequence[Parity]) -> dict[str, float]:
 
 
 def _stroke(parity: Parity) -> float:
-    return float(np.ptp(parity.moving[THETA_IN]))
+    return parity.stroke_rad
 
 
 def _frequency(parity: Parity) -> float:
-    """Speed over angle, each as a root mean square, 1/s."""
-    x = parity.moving
-    return float(np.std(speed(x[THETA_IN], x["time_s"])) / max(np.std(x[THETA_IN]), 1e-12))
+    return parity.frequency_per_s
 
 
 def _tension(parity: Parity) -> float:

@@ -1,37 +1,57 @@
 """Content of a text log, unpacked if it is gzipped; and the limit on what any compressed file may unpack to."""
 
 import gzip
-import io
 import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 from ccmodel import inputs
 from ccmodel.rig.findings import LogError
 
+# Of a block of what is read as a whole.
+BLOCK_BYTES = 1_000_000
 
-def content_of(path: Path) -> bytes:
-    """Bytes of a file; of a gzipped one, of what is inside.
+
+def blocks_of(path: Path, size: int) -> Iterator[bytes]:
+    """Content of a text file in blocks of whole lines, of a gzipped one what is inside; each of about `size` bytes.
 
     Raises
     ------
     LogError
         If the gzip stream is cut or damaged, or unpacks to more than the limit (`ccmodel.inputs`).
     """
-    raw = path.read_bytes()
-    if raw[:2] != b"\x1f\x8b":
-        return raw
-    most = int(inputs.largest_bytes(inputs.UNPACKED))
+    unpacked, rest = Unpacked(), b""
+    with open(path, "rb") as file:
+        is_gzipped = file.read(2) == b"\x1f\x8b"
+        file.seek(0)
+        stream: IO[bytes] = gzip.GzipFile(fileobj=file) if is_gzipped else file
+        while block := _read(stream, size):
+            if is_gzipped:
+                unpacked.add(len(block))
+            whole, end, rest_of_block = block.rpartition(b"\n")
+            if end:
+                yield rest + whole + end
+                rest = rest_of_block
+            else:
+                rest += block
+    if rest:
+        yield rest
+
+
+def _read(stream: IO[bytes], size: int) -> bytes:
     try:
-        with gzip.open(io.BytesIO(raw)) as stream:
-            unpacked = stream.read(most + 1)
+        return stream.read(size)
     except EOFError:
         raise LogError(None, None, "the gzip stream is cut short: copy it again from the recorder") from None
-    except (OSError, zlib.error):
+    except (gzip.BadGzipFile, zlib.error):
         raise LogError(None, None, "the gzip stream is damaged: copy it again from the recorder") from None
-    if len(unpacked) > most:
-        raise LogError(None, None, f"unpacks to what is {inputs.too_large(inputs.UNPACKED)}")
-    return unpacked
+
+
+def content_of(path: Path) -> bytes:
+    """Bytes of a file, of a gzipped one of what is inside; raises as `blocks_of`."""
+    return b"".join(blocks_of(path, BLOCK_BYTES))
 
 
 @dataclass
