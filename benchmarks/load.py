@@ -2,7 +2,7 @@
 
 A rig without a missing effect is simulated under ten conditions. Batches of 10, 100 and 1,000 recordings are logs of
 these runs, each with sensor noise of its own. The pipeline runs on each of them: ingest, fit, simulation, study,
-diagnosis and page. The long log repeats one run until it has ten million samples; `ccmodel check` and an ingest read it.
+diagnosis and page. The long log repeats one run until it has ten million samples; `ccmodel check` reads it.
 
 Memory is the highest that a process and its children had resident together, sampled every 50 ms. Pages that
 processes share count once for each of them.

@@ -15,7 +15,6 @@ from ccmodel.channels import (
     TAU_IN,
     TAU_OUT,
     TENSIONS,
-    THETA_IN,
     THETA_MOTOR,
     THETA_OUT,
 )
