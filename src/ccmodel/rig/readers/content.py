@@ -4,8 +4,8 @@ import gzip
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from io import BufferedReader
 from pathlib import Path
-from typing import IO
 
 from ccmodel import inputs
 from ccmodel.rig.findings import LogError
@@ -26,7 +26,7 @@ def blocks_of(path: Path, size: int) -> Iterator[bytes]:
     with open(path, "rb") as file:
         is_gzipped = file.read(2) == b"\x1f\x8b"
         file.seek(0)
-        stream: IO[bytes] = gzip.GzipFile(fileobj=file) if is_gzipped else file
+        stream: gzip.GzipFile | BufferedReader = gzip.GzipFile(fileobj=file) if is_gzipped else file
         while block := _read(stream, size):
             if is_gzipped:
                 unpacked.add(len(block))
@@ -40,7 +40,7 @@ def blocks_of(path: Path, size: int) -> Iterator[bytes]:
         yield rest
 
 
-def _read(stream: IO[bytes], size: int) -> bytes:
+def _read(stream: gzip.GzipFile | BufferedReader, size: int) -> bytes:
     try:
         return stream.read(size)
     except EOFError:

@@ -25,7 +25,9 @@ def read(path: Path) -> pd.DataFrame:
 
     It is read in blocks of lines: text takes many times the memory of its numbers.
     """
-    header, columns, row = [], [], 2
+    header: list[str] = []
+    columns: list[_Column] = []
+    row = 2
     for lines in _blocks(path):
         if not header:
             header, lines = _header(lines[0]), lines[1:]
@@ -97,7 +99,8 @@ def _blocks(path: Path) -> Iterator[list[str]]:
     if path.suffix == ".gz" and kind != signatures.EMPTY and not signatures.is_gzipped(path):
         raise LogError(None, None, "is called .gz but is not gzipped: rename it or copy it again")
     # Empty lines wait for the next block, since they may be the end of the file.
-    rows, waiting = 0, []
+    rows = 0
+    waiting: list[str] = []
     for raw in blocks_of(path, BLOCK_BYTES):
         try:
             text = raw.decode("utf-8" if rows else "utf-8-sig")
