@@ -151,6 +151,19 @@ def packed_empty_structs(path):
     path.write_bytes(MAT5 + struct.pack("<II", 15, len(packed)) + packed)
 
 
+EMPTY_STRUCTS = mat5_array(2, (1, 10**8), b"", NO_FIELDS)
+
+
+def structs_in_a_cell(path):
+    path.write_bytes(MAT5 + mat5_array(1, (1, 1), b"a", EMPTY_STRUCTS))
+
+
+def structs_in_a_packed_struct(path):
+    one_field = struct.pack("<HHiII", 5, 4, 32, 1, 32) + b"f".ljust(32, b"\0")
+    packed = zlib.compress(mat5_array(2, (1, 1), b"a", one_field + EMPTY_STRUCTS))
+    path.write_bytes(MAT5 + struct.pack("<II", 15, len(packed)) + packed)
+
+
 def characters(path):
     path.write_bytes(MAT5 + mat5_array(4, (1, 10**8), b"a", struct.pack("<II", 16, 0)))
 
@@ -222,8 +235,10 @@ def read_measured(path):
         ("a.mat", mat73_bomb, 800_000),
         ("links.mat", mat73_links, 104),
         ("b.mat", mat5_bomb, 101),
-        ("structs.mat", empty_structs, 800),
-        ("packed.mat", packed_empty_structs, 800),
+        ("structs.mat", empty_structs, 10_000),
+        ("packed.mat", packed_empty_structs, 10_000),
+        ("cell.mat", structs_in_a_cell, 10_000),
+        ("struct.mat", structs_in_a_packed_struct, 10_000),
         ("characters.mat", characters, 800),
         ("a.parquet", parquet_bomb, 104),
         ("b.parquet", parquet_lists, 160),

@@ -4,18 +4,14 @@ Both versions are read into plain data first: a struct is a dict, a struct array
 an object of a MATLAB class an `_Object`. Then signals are looked for in the same way.
 """
 
-import math
-import struct
-import zlib
 from collections.abc import Iterable
-from contextlib import suppress
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple, TypeGuard
+from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
 
 from ccmodel.rig.findings import LogError
-from ccmodel.rig.readers import signatures
+from ccmodel.rig.readers import mat5_size, signatures
 from ccmodel.rig.readers.columns import Columns
 from ccmodel.rig.readers.content import Unpacked
 from ccmodel.rig.readers.contract import Format, SignalFile
@@ -27,13 +23,6 @@ _UNIT_KEYS = ("unit", "Unit", "units", "Units")
 _NAME_KEYS = ("name", "Name", "label")
 # Structs within each other; a file of a rig has a few.
 _DEPTH = 20
-# Bytes of the header of a v5 file and of the tag of each of its elements; the type of a compressed one; bytes that are
-# unpacked at a time to count them.
-V5_HEADER, V5_TAG, V5_COMPRESSED, CHUNK = 128, 8, 15, 1 << 20
-
-# Classes of v5 (cell, struct, object, char) whose arrays may be declared longer than the file is, since an element may
-# take no byte there; bytes of an element in memory; first bytes of an array, which have its class and its shape.
-_WITHOUT_BYTES, _POINTER, _HEAD = (1, 2, 3, 4), 8, 256
 
 
 class _Object(NamedTuple):
@@ -187,7 +176,7 @@ def _text(struct: Any, keys: Iterable[str]) -> str:
 def _of_v5(path: Path) -> dict[str, Any]:
     from scipy.io import loadmat
 
-    _check_unpacked_v5(path)
+    mat5_size.count(path)
     unpacked = Unpacked()
     variables = loadmat(path)
     found = {}
@@ -202,50 +191,6 @@ def _of_v5(path: Path) -> dict[str, Any]:
     return found
 
 
-def _check_unpacked_v5(path: Path) -> None:
-    """Raise `LogError` if the elements of a file unpack to more than the limit, or declare more.
-
-    What they unpack to is counted, not kept. A damaged element is left to the library, which says what is wrong.
-    """
-    unpacked = Unpacked()
-    with path.open("rb") as file:
-        order = "<" if file.read(V5_HEADER).endswith(b"IM") else ">"
-        while len(tag := file.read(V5_TAG)) == V5_TAG:
-            kind, size = struct.unpack(f"{order}II", tag)
-            end = file.tell() + size
-            if kind == V5_COMPRESSED:
-                with suppress(zlib.error):
-                    _count(file, size, unpacked, order)
-            else:
-                unpacked.add(_declared(file.read(min(size, _HEAD)), order))
-            file.seek(end)
-
-
-def _declared(head: bytes, order: str) -> int:
-    """Bytes in memory of an array whose elements need none in the file, from its first bytes; 0 of another one."""
-    if len(head) < 24:
-        return 0
-    flags, _, length = struct.unpack_from(f"{order}I4xII", head, 8)
-    if flags & 0xFF not in _WITHOUT_BYTES:
-        return 0
-    shape = np.frombuffer(head[24 : 24 + length // 4 * 4], f"{order}i4")
-    return math.prod(map(int, shape)) * _POINTER
-
-
-def _count(file: BinaryIO, size: int, unpacked: Unpacked, order: str) -> None:
-    """Count the bytes to which the next `size` bytes of a file unpack, and what the array in them declares."""
-    start = file.tell()
-    first = zlib.decompressobj().decompress(file.read(min(size, CHUNK)), V5_TAG + _HEAD)
-    unpacked.add(_declared(first[V5_TAG:], order))
-    file.seek(start)
-    stream = zlib.decompressobj()
-    while size > 0 and (packed := file.read(min(size, CHUNK))):
-        size -= len(packed)
-        while packed:
-            unpacked.add(len(stream.decompress(packed, CHUNK)))
-            packed = stream.unconsumed_tail
-
-
 def _plain_v5(value: Any, unpacked: Unpacked) -> Any:
     from scipy.io.matlab import MatlabFunction, MatlabObject, MatlabOpaque
 
@@ -258,11 +203,11 @@ def _plain_v5(value: Any, unpacked: Unpacked) -> Any:
     if not isinstance(value, np.ndarray):
         return _Object("sparse")
     if value.dtype.names:
-        unpacked.add(value.size * _POINTER)
+        unpacked.add(value.size * mat5_size.ELEMENT)
         structs = [{k: _plain_v5(entry[k], unpacked) for k in value.dtype.names} for entry in value.flat]
         return structs[0] if len(structs) == 1 else structs
     if value.dtype.kind == "O":
-        unpacked.add(value.size * _POINTER)
+        unpacked.add(value.size * mat5_size.ELEMENT)
         return [_plain_v5(entry, unpacked) for entry in value.flat]
     if value.dtype.kind in "US":
         return str(value.flat[0]) if value.size == 1 else "\n".join(map(str, value.flat))
@@ -296,7 +241,7 @@ def _plain_v73(h5py: Any, file: Any, item: Any, unpacked: Unpacked, depth: int =
         return fields
     if item.attrs.get("MATLAB_empty"):
         return {"char": "", "cell": [], "struct": []}.get(kind, np.zeros(0))
-    unpacked.add(item.size * _POINTER if kind == "char" else size_of(item))
+    unpacked.add(item.size * mat5_size.CHARACTER if kind == "char" else size_of(item))
     if item.dtype.kind == "O":
         references = np.ravel(item[()].T)
         return [_plain_v73(h5py, file, file[r], unpacked, depth + 1) for r in references]
