@@ -26,10 +26,10 @@ def semicolons(path: Path) -> Path:
     return text(path, ";", ",", encoding="cp1252", header="Prüfstand 7\nZeit [s],Winkel [°],Moment (Nm)\n")
 
 
-def mat5(path: Path) -> Path:
+def mat5(path: Path, compression=True) -> Path:
     from scipy.io import savemat
 
-    savemat(path, {"time": TIME, "angle": ANGLE, "torque": TORQUE}, do_compression=True)
+    savemat(path, {"time": TIME, "angle": ANGLE, "torque": TORQUE}, do_compression=compression)
     return path
 
 
@@ -69,6 +69,16 @@ def mdf4(path: Path, compression=0) -> Path:
     return path
 
 
+def mdf3(path: Path) -> Path:
+    from asammdf import MDF, Signal
+
+    with MDF(version="3.30") as file:
+        signals = [Signal(ANGLE, TIME, name="angle", unit="deg"), Signal(TORQUE, TIME, name="torque", unit="Nm")]
+        file.append(signals)
+        file.save(path, overwrite=True)
+    return path
+
+
 def tdms(path: Path) -> Path:
     from nptdms import ChannelObject, TdmsWriter
 
@@ -82,23 +92,25 @@ def tdms(path: Path) -> Path:
     return path
 
 
-def parquet(path: Path) -> Path:
+def parquet(path: Path, compression="snappy", dictionary=True) -> Path:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     units = {"time": "s", "angle": "deg", "torque": "Nm"}
     schema = pa.schema([pa.field(name, pa.float64(), metadata={"unit": unit}) for name, unit in units.items()])
-    pq.write_table(pa.table([TIME, ANGLE, TORQUE], schema=schema), path)
+    pq.write_table(
+        pa.table([TIME, ANGLE, TORQUE], schema=schema), path, compression=compression, use_dictionary=dictionary
+    )
     return path
 
 
-def hdf5(path: Path) -> Path:
+def hdf5(path: Path, compression="gzip") -> Path:
     import h5py
 
     with h5py.File(path, "w") as file:
         rig = file.create_group("rig")
         for name, values, unit in (("time", TIME, "s"), ("angle", ANGLE, "deg"), ("torque", TORQUE, "Nm")):
-            rig.create_dataset(name, data=values, compression="gzip").attrs["units"] = unit
+            rig.create_dataset(name, data=values, compression=compression).attrs["units"] = unit
         rig["time"].make_scale()
         rig["angle"].dims[0].attach_scale(rig["time"])
         rig["torque"].dims[0].attach_scale(rig["time"])
@@ -118,28 +130,34 @@ def _joint_states(writer, store, serialise, header: dict) -> None:
         writer.write(connection, at + int(1e6 * (1 + 4 * abs(np.sin(37 * t)))), serialise(message, state.__msgtype__))
 
 
-def ros1(path: Path) -> Path:
+def ros1(path: Path, compression=None) -> Path:
     from rosbags.rosbag1 import Writer
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC)
-    with Writer(path) as writer:
+    writer = Writer(path)
+    if compression:
+        writer.set_compression(Writer.CompressionFormat[compression])
+    with writer:
         _joint_states(writer, store, store.serialize_ros1, {"seq": 0})
     return path
 
 
-def ros2(folder: Path, plugin="MCAP") -> Path:
-    from rosbags.rosbag2 import StoragePlugin, Writer
+def ros2(folder: Path, plugin="MCAP", compressed=False) -> Path:
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_HUMBLE)
-    with Writer(folder, version=9, storage_plugin=StoragePlugin[plugin]) as writer:
+    writer = Writer(folder, version=9, storage_plugin=StoragePlugin[plugin])
+    if compressed:
+        writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    with writer:
         _joint_states(writer, store, store.serialize_cdr, {})
     return folder
 
 
-def mcap(path: Path) -> Path:
-    return next(ros2(path.parent / "bag_mcap").glob("*.mcap")).rename(path)
+def mcap(path: Path, compressed=False) -> Path:
+    return next(ros2(path.parent / f"bag_{path.stem}_mcap", compressed=compressed).glob("*.mcap")).rename(path)
 
 
 def db3(path: Path) -> Path:

@@ -10,9 +10,11 @@ import zlib
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+import sample_files as sample
 
 from ccmodel import inputs
 from ccmodel.paths import existing_file, try_file
@@ -194,12 +196,67 @@ def parquet_lists(path):
     pq.write_table(pa.table({"a": pa.chunked_array([rows] * 20)}), path)
 
 
+def mdf_bomb(path):
+    from asammdf import MDF, Signal
+
+    zeros = np.zeros(7 * 10**6)
+    with MDF(version="4.10") as file:
+        file.append([Signal(zeros, zeros, name="a")])
+        file.save(path, compression=2)
+
+
+def tdms_channels(path):
+    """The bytes of a card that 60 channels read: each is a million numbers."""
+
+    def text(value):
+        return struct.pack("<I", len(value)) + value
+
+    int8, buffer, offset, bits, scale = 1, 0, 0, 0, 0
+    scaler = struct.pack("<5I", int8, buffer, offset, bits, scale)
+    index = struct.pack("<IIIQI", 0x1269, int8, 1, 10**6, 1) + scaler
+    objects = b"".join(text(b"/'card'/'%d'" % i) + index + struct.pack("<III", 1, 1, 0) for i in range(60))
+    metadata = struct.pack("<I", 60) + objects
+    contents = 2 | 4 | 8 | 128  # metadata of new objects, and raw data of a card
+    lead_in = b"TDSm" + struct.pack("<IIQQ", contents, 4713, len(metadata) + 10**6, len(metadata))
+    path.write_bytes(lead_in + metadata + bytes(10**6))
+
+
+def texts(writer, distribution, serialise, count=110):
+    """A bag with texts of a MB."""
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores[distribution])
+    message = store.types["std_msgs/msg/String"](data="x" * 10**6)
+    raw = getattr(store, serialise)(message, message.__msgtype__)
+    with writer:
+        connection = writer.add_connection("/a", message.__msgtype__, typestore=store)
+        for i in range(count):
+            writer.write(connection, i, raw)
+
+
+def bag_bomb(path):
+    from rosbags.rosbag1 import Writer
+
+    writer = Writer(path)
+    writer.set_compression(Writer.CompressionFormat["BZ2"])
+    texts(writer, "ROS1_NOETIC", "serialize_ros1")
+
+
+def mcap_bomb(path):
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+
+    writer = Writer(path.parent / "bag", version=9, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    texts(writer, "ROS2_HUMBLE", "serialize_cdr")
+    next((path.parent / "bag").glob("*.mcap")).rename(path)
+
+
 # Reads a file in a fresh process. The growth of its peak includes what libraries written in C take. `ru_maxrss` is no
 # measure of it, since a process inherits that from the one that starts it.
 MEASURE = r"""
 import re, sys
 from pathlib import Path
-import h5py, numpy, pandas, pyarrow.parquet, scipy.io
+import asammdf, h5py, nptdms, numpy, pandas, pyarrow.parquet, rosbags.highlevel, scipy.io
 from ccmodel.rig.readers import attempt, registry, signatures
 
 path = Path(sys.argv[1])
@@ -242,6 +299,10 @@ def read_measured(path):
         ("characters.mat", characters, 800),
         ("a.parquet", parquet_bomb, 104),
         ("b.parquet", parquet_lists, 160),
+        ("a.mf4", mdf_bomb, 101),
+        ("a.tdms", tdms_channels, 480),
+        ("a.bag", bag_bomb, 101),
+        ("a.mcap", mcap_bomb, 101),
     ],
 )
 def test_what_unpacks_to_too_much_is_refused_before_it_is_read(name, make, found, tmp_path, monkeypatch):
@@ -254,6 +315,42 @@ def test_what_unpacks_to_too_much_is_refused_before_it_is_read(name, make, found
     assert float(said.split()[2]) == pytest.approx(found, rel=0.02)
     # Links are counted as they are read, up to the limit; numbers of one byte are read as such before they are refused.
     assert most < {mat73_links: 150, bytes_bomb: 60}.get(make, 20)
+
+
+@pytest.mark.parametrize("mode", ["MESSAGE", "FILE"])
+def test_what_a_folder_of_a_bag_unpacks_to_is_counted(mode, tmp_path, monkeypatch):
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+
+    writer = Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.SQLITE3)
+    writer.set_compression(CompressionMode[mode], CompressionFormat.ZSTD)
+    texts(writer, "ROS2_HUMBLE", "serialize_cdr", count=3)
+    monkeypatch.setenv(inputs.UNPACKED, "2")
+    with pytest.raises(LogError, match="or more, which is larger than 2 MB"):
+        readers.read_signals(tmp_path / "bag")
+    monkeypatch.setenv(inputs.UNPACKED, "4")
+    with pytest.raises(LogError, match="holds no signals of numbers"):
+        readers.read_signals(tmp_path / "bag")
+
+
+@pytest.mark.parametrize("name", ["log.bag", "log.mcap", "log.db3"])
+def test_the_numbers_of_messages_are_counted(name, tmp_path, monkeypatch):
+    path = sample.WRITERS[name](tmp_path / name)
+    # An angle, a torque and two times of 500 messages are 16 kB.
+    monkeypatch.setenv(inputs.UNPACKED, "0.017")
+    assert len(readers.read_signals(path).signals) == 2
+    monkeypatch.setenv(inputs.UNPACKED, "0.015")
+    with pytest.raises(LogError, match="unpacks to 0 MB or more, which is larger than 0.015 MB"):
+        readers.read_signals(path)
+
+
+def test_channels_of_an_mdf_file_are_counted_as_numbers(tmp_path, monkeypatch):
+    path = sample.mdf3(tmp_path / "log.mdf")
+    # Two signals and their times, 500 samples each.
+    monkeypatch.setenv(inputs.UNPACKED, "0.0121")
+    assert len(readers.read_signals(path).signals) == 2
+    monkeypatch.setenv(inputs.UNPACKED, "0.0119")
+    with pytest.raises(LogError, match="unpacks to 0 MB or more"):
+        readers.read_signals(path)
 
 
 @IN_LINUX

@@ -1,21 +1,37 @@
 """MDF, the measurement data format of ASAM (versions 3 and 4): channel groups, each with its own time."""
 
+import mmap
+import struct
+import zlib
+from collections.abc import Iterator
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ccmodel.rig.readers.columns import Columns
+from ccmodel.rig.readers.columns import BYTES_OF_A_NUMBER, Columns
+from ccmodel.rig.readers.content import Unpacked
 from ccmodel.rig.readers.contract import Format, SignalFile
+
+# First bytes of a compressed block of data of version 4, and its header: kind of the data in it, way of compression, a
+# parameter, and the sizes of what is inside and of what is in the file. Ways of zlib.
+_PACKED, _HEADER, _HEADER_AT, _ZLIB = b"##DZ", "<2sBBIQQ", 24, (0, 1)
+# Bytes that are unpacked at a time.
+_PIECE = 1 << 20
+# Type of a channel of version 4 whose values have any length, as texts have.
+_ANY_LENGTH = 1
 
 
 def read(path: Path) -> SignalFile:
     """Read an MDF file; a sample that the file marks as invalid is nan."""
     from asammdf import MDF
 
+    _count_packed(path)
     columns = Columns()
     with MDF(str(path)) as file:
+        Unpacked().add(sum(map(_size, file.groups)))
         for index, group in enumerate(file.groups):
             _add_group(columns, file, index, group)
         started = file.header.start_time
@@ -25,10 +41,54 @@ def read(path: Path) -> SignalFile:
 FORMAT = Format("MDF file", (".mf4", ".mdf", ".dat", ".mf3"), read, extra="mdf", apart=True)
 
 
+def _count_packed(path: Path) -> None:
+    """Raise `LogError` if the compressed blocks of a file unpack to more than the limit; some are read on opening it.
+
+    Nothing of it is kept. A damaged block is left to the library.
+    """
+    unpacked = Unpacked()
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        for at in _found(content, _PACKED):
+            with suppress(struct.error, zlib.error):
+                _, way, _, _, inside, size = struct.unpack_from(_HEADER, content, at + _HEADER_AT)
+                start = at + _HEADER_AT + struct.calcsize(_HEADER)
+                if way in _ZLIB:
+                    _count_zlib(content[start : start + size], unpacked)
+                else:
+                    unpacked.add(inside)
+
+
+def _found(content: mmap.mmap, word: bytes) -> Iterator[int]:
+    at = content.find(word)
+    while at >= 0:
+        yield at
+        at = content.find(word, at + 1)
+
+
+def _count_zlib(packed: bytes, unpacked: Unpacked) -> None:
+    stream = zlib.decompressobj()
+    while packed:
+        unpacked.add(len(stream.decompress(packed, _PIECE)))
+        packed = stream.unconsumed_tail
+
+
+def _size(group: Any) -> int:
+    """Bytes of a group in memory: its records, or its channels as numbers, which may share their bytes in a record."""
+    block = group.channel_group
+    record = block.samples_byte_nr + getattr(block, "invalidation_bytes_nr", 0)
+    return int(block.cycles_nr) * max(int(record), len(group.channels) * BYTES_OF_A_NUMBER)
+
+
 def _add_group(columns: Columns, file: Any, index: int, group: Any) -> None:
     master = file.masters_db.get(index)
     prefix = _group_name(group)
-    wanted = [(None, index, i) for i in range(len(group.channels)) if i != master]
+    wanted = []
+    for i, channel in enumerate(group.channels):
+        if file.version >= "4" and channel.channel_type == _ANY_LENGTH:
+            # An array of texts is as wide as the longest of them.
+            columns.add(prefix + channel.name, "", None)
+        elif i != master:
+            wanted.append((None, index, i))
     # Names of states ("on", "off") stay the numbers that they stand for.
     for signal in file.select(wanted, copy_master=False, ignore_value2text_conversions=True):
         values = signal.samples

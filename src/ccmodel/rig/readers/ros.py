@@ -3,7 +3,8 @@
 The first message of a topic shows where its numbers are. Every further message is read at the same places.
 """
 
-from collections.abc import Iterator
+from array import array
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.rig.findings import LogError
-from ccmodel.rig.readers import signatures
+from ccmodel.rig.readers import ros_size, signatures
+from ccmodel.rig.readers.columns import BYTES_OF_A_NUMBER
+from ccmodel.rig.readers.content import Unpacked
 from ccmodel.rig.readers.contract import Format, Signal, SignalFile
 
 # Elements of an array that may be signals; a longer one is a picture, a cloud or a scan.
@@ -39,12 +42,47 @@ class _Place(NamedTuple):
 
 @dataclass
 class _Series:
-    """Messages of a topic that have their numbers at the same places."""
+    """Messages of a topic that have their numbers at the same places: arrays of plain numbers, a message after another.
+
+    Attributes
+    ----------
+    places : list of _Place
+    values : list of array of float
+        By place.
+    misfits : list of int
+        By place, messages that have another number of elements there.
+    received, stamps : array of int
+        Times, ns.
+    """
 
     places: list[_Place]
-    rows: list[list] = field(default_factory=list)
-    received: list[int] = field(default_factory=list)
-    stamps: list[int] = field(default_factory=list)
+    values: "list[array[float]]" = field(init=False)
+    misfits: list[int] = field(init=False)
+    received: "array[int]" = field(default_factory=lambda: array("q"))
+    stamps: "array[int]" = field(default_factory=lambda: array("q"))
+
+    def __post_init__(self) -> None:
+        self.values = [array("d") for _ in self.places]
+        self.misfits = [0] * len(self.places)
+
+    @property
+    def numbers(self) -> int:
+        """Numbers that are kept of a message."""
+        return 2 + sum(max(len(place.elements), 1) for place in self.places)
+
+    def add(self, message: Any, received: int) -> None:
+        """Keep the numbers of a message."""
+        for i, place in enumerate(self.places):
+            found = _number_at(message, place.steps)
+            if not place.elements:
+                self.values[i].append(np.nan if found is None else float(found))
+            elif found is not None and len(found) == len(place.elements):
+                self.values[i].extend(np.asarray(found, float).tolist())
+            else:
+                self.values[i].extend([np.nan] * len(place.elements))
+                self.misfits[i] += 1
+        self.received.append(received)
+        self.stamps.append(_stamp(message))
 
 
 def read(path: Path) -> SignalFile:
@@ -62,15 +100,22 @@ def read(path: Path) -> SignalFile:
         raise LogError(
             None, None, f"is {kind.text}, which is read only under its own ending: rename it to {kind.advice}"
         )
+    ros_size.count(path)
     topics: dict[str, dict[tuple[str, ...], _Series]] = {}
     unknown: set[str] = set()
+    unpacked = Unpacked()
     with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as bag:
+        _count_packed_messages(bag)
         known = {c.id: c.msgtype in bag.typestore.fielddefs for c in bag.connections}
         for connection, received, raw in bag.messages():
             if not known[connection.id]:
                 unknown.add(connection.topic)
                 continue
-            _collect(topics.setdefault(connection.topic, {}), bag.deserialize(raw, connection.msgtype), received)
+            series = _series(
+                topics.setdefault(connection.topic, {}), message := bag.deserialize(raw, connection.msgtype)
+            )
+            unpacked.add(series.numbers * BYTES_OF_A_NUMBER)
+            series.add(message, received)
     remarks = [f"topics of an unknown message type are left out: {', '.join(sorted(unknown))}"] if unknown else []
     if empty := [topic for topic, series in topics.items() if not any(s.places for s in series.values())]:
         remarks.append(f"topics without numbers are left out: {', '.join(sorted(empty))}")
@@ -85,14 +130,22 @@ _REPAIR = "repair it with 'rosbag reindex' (ROS 1) or 'ros2 bag reindex' (ROS 2)
 FORMAT = Format("ROS bag", (".bag", ".mcap", ".db3"), read, extra="ros", repair=_REPAIR)
 
 
-def _collect(topic: dict, message: Any, received: int) -> None:
+def _count_packed_messages(bag: Any) -> None:
+    """Raise `LogError` if messages that are compressed one by one unpack to more than the limit."""
+    unpacked = Unpacked()
+    for reader in bag.readers:
+        if getattr(reader, "compression_mode", None) == "message":
+            for storage in reader.storage.storages:
+                for _, _, raw in storage.messages(storage.connections):
+                    ros_size.count_packed(raw, "zstd", unpacked)
+
+
+def _series(topic: dict[tuple[str, ...], _Series], message: Any) -> _Series:
+    """Messages of a topic that have the places of this one."""
     names = _names_in(message)
-    series = topic.get(names)
-    if series is None:
-        series = topic[names] = _Series(list(_places(message, (), ())))
-    series.rows.append([_number_at(message, place.steps) for place in series.places])
-    series.received.append(received)
-    series.stamps.append(_stamp(message))
+    if names not in topic:
+        topic[names] = _Series(list(_places(message, (), ())))
+    return topic[names]
 
 
 def _names_in(message: Any) -> tuple[str, ...]:
@@ -155,7 +208,7 @@ def _stamp(message: Any) -> int:
     return stamp.sec * _NS + stamp.nanosec if stamp is not None else 0
 
 
-def _clock(series: _Series) -> tuple[list[int], bool]:
+def _clock(series: _Series) -> tuple[Sequence[int], bool]:
     """Times of messages in ns, and whether their stamps are of another clock than the bag's.
 
     Stamps of another clock (a simulation) are moved to begin when the first message arrived.
@@ -177,7 +230,10 @@ def _signals(topic: str, by_names: dict, zero: int, remarks: list[str]) -> Itera
             remarks.append(f"stamps of {topic} are of another clock: moved to begin when its first message arrived")
         time = np.array([t - zero for t in times]) / _NS
         for i, place in enumerate(series.places):
-            values = _block([row[i] for row in series.rows], len(place.elements), f"{topic}/{place.name}", remarks)
+            values = np.array(series.values[i]).reshape(len(time), -1)
+            if count := series.misfits[i]:
+                where = f"{topic}/{place.name}"
+                remarks.append(f"{where}: {count} messages have another number of elements and are read as no number")
             for k, column in enumerate(values.T):
                 name = "/".join(p for p in (topic.strip("/"), place.name, *place.elements[k : k + 1]) if p)
                 chunks.setdefault(name, []).append((time, column))
@@ -187,15 +243,3 @@ def _signals(topic: str, by_names: dict, zero: int, remarks: list[str]) -> Itera
         # Several nodes may publish the same joint under lists of names that differ.
         order = np.argsort(time, kind="stable") if len(parts) > 1 else slice(None)
         yield Signal(name, units[name], values[order], time[order])
-
-
-def _block(values: list, width: int, name: str, remarks: list[str]) -> NDArray:
-    """Numbers of all messages at one place, shape (messages, elements); nan where a message has another length."""
-    if not width:
-        return np.array([np.nan if v is None else v for v in values], float)[:, None]
-    fits = [v is not None and len(v) == width for v in values]
-    if not all(fits):
-        count = len(fits) - sum(fits)
-        remarks.append(f"{name}: {count} messages have another number of elements and are read as no number")
-    missing = np.full(width, np.nan)
-    return np.array([v if fit else missing for v, fit in zip(values, fits, strict=True)], float)
