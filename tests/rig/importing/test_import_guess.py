@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_up_lab import counts, recording, write_text
 
-from ccmodel.rig.importing import import_files, write_guess
+from ccmodel.rig.importing import import_files, shapes, write_guess
 from ccmodel.rig.importing.map import load_map
 from ccmodel.typed import InputError
 
@@ -365,3 +365,9 @@ def test_times_of_an_uneven_clock_are_still_times(tmp_path):
         tmp_path, {"millis [ms]": np.cumsum(steps).astype(float), "motor angle [rad]": R["theta_in_rad"]}
     )
     assert (guessed.time.signal, guessed.time.unit) == ("millis", "ms")
+
+
+def test_numbers_of_a_damaged_file_say_nothing_of_a_sign():
+    angle, torque = np.resize([0.0, 1e308, -1e308], 30), np.resize([1e308, -1e308], 30)
+    with np.errstate(all="ignore"):
+        assert shapes.sign_of_drive_torque(angle, torque) is None

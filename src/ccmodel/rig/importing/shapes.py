@@ -118,4 +118,4 @@ def roughness(values: NDArray) -> float:
 
 
 def _sign(value: float, threshold: float) -> int | None:
-    return None if abs(value) < threshold else int(np.sign(value))
+    return int(np.sign(value)) if abs(value) >= threshold else None
