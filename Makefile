@@ -47,7 +47,7 @@ test: $(VENV)/.ready  ## run the tests and the linters
 
 fuzz: $(VENV)/.ready  ## damage batches and files, and run the exact solver, FUZZ times as often as the tests do: docs/trust.md
 	FUZZ=$(or $(FUZZ),60) $(BIN)/python -m pytest -n $(CORES) --dist loadfile tests/rig/test_damaged_batches.py \
-	  tests/report/test_damaged_files.py tests/model/test_stated_limits.py
+	  tests/rig/test_damaged_signals.py tests/report/test_damaged_files.py tests/model/test_stated_limits.py
 
 # A fresh environment every time: a build that reuses the last one's is silent about pages it does not read again.
 docs: $(VENV)/.ready  ## build the documents: results/docs/html/index.html; a warning or a dead link is an error

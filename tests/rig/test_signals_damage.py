@@ -1,6 +1,7 @@
 """Damaged files of every format: each is read, or refused in one clear line that says what to do."""
 
 import gzip
+import struct
 import subprocess
 import sys
 
@@ -29,7 +30,7 @@ FORMATS = {
 TEXT = ("log.csv", "semicolons.txt")
 # Words of which each refusal has one: what to do.
 REMEDIES = """copy it again|rename it|record it again|export it|is no table|save it|reindex|give the|fetch|unpack
-|must be stated""".replace("\n", "").split("|")
+|must be stated|if that is right""".replace("\n", "").split("|")
 
 
 @pytest.fixture(scope="module")
@@ -160,6 +161,24 @@ def test_a_library_that_ends_the_process_is_one_line(tmp_path, monkeypatch):
     monkeypatch.setattr(attempt, "_CHILD", "import time; time.sleep(60)")
     monkeypatch.setattr(attempt, "_PATIENCE_S", 0.2)
     assert "not read after 0 s" in refusal(tmp_path / "log.h5")
+
+
+def test_a_library_that_goes_round_in_circles_is_one_line(sound, tmp_path, monkeypatch):
+    (tmp_path / "log.h5").write_bytes(sound["log.h5"])
+    circles = (
+        "from ccmodel.rig.readers import attempt; attempt.read_here = lambda *_: any(iter(int, 1)); attempt._main()"
+    )
+    monkeypatch.setattr(attempt, "_CHILD", circles)
+    monkeypatch.setattr(attempt, "_COMPUTING_S", 3.0)
+    assert "(not read after 3 s of computing)" in refusal(tmp_path / "log.h5")
+
+
+def test_an_mdf_file_with_records_of_a_huge_length_is_refused_at_once(sound, tmp_path):
+    raw = bytearray(sound["log.mf4"])
+    # Bytes for marks of invalid samples in each record: asammdf would take minutes over them.
+    struct.pack_into("<I", raw, raw.find(b"##CG") + 100, 0xEE000000)
+    (tmp_path / "log.mf4").write_bytes(raw)
+    assert refusal(tmp_path / "log.mf4").startswith("unpacks to 1996489 MB or more")
 
 
 LIBRARIES = {"h5py": "hdf5", "asammdf": "mdf", "nptdms": "tdms", "rosbags": "ros"}

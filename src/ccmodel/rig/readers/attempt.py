@@ -6,8 +6,10 @@ format with such a library is read in a process of its own.
 
 import io
 import logging
+import math
 import os
 import pickle
+import signal
 import subprocess
 import sys
 import warnings
@@ -20,8 +22,9 @@ from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers.contract import Format, SignalFile, TextLayout
 
 COPY = "copy it again from the recorder"
-# Time for a file of its own process: a sound one takes a second for tens of MB.
-_PATIENCE_S, _PATIENCE_S_PER_MB = 60.0, 1.0
+# Time for a file of its own process: a sound one takes a second for tens of MB. A library that goes round in circles on
+# a damaged file uses the processor all the time; one that waits for a slow disk does not.
+_PATIENCE_S, _COMPUTING_S, _S_PER_MB = 60.0, 8.0, 1.0
 _CHILD = "from ccmodel.rig.readers.attempt import _main; _main()"
 
 
@@ -51,8 +54,9 @@ def read_here(format: Format, path: Path, text: TextLayout | None = None) -> Sig
 
 def read_apart(name: str, format: Format, path: Path) -> SignalFile | LogError:
     """As `read_here`, in a process of its own; `name` is the module of the format."""
-    patience = _PATIENCE_S + _PATIENCE_S_PER_MB * path.stat().st_size / 1e6
-    command = [sys.executable, "-c", _CHILD, name, str(path)]
+    more = _S_PER_MB * path.stat().st_size / 1e6
+    patience, computing = _PATIENCE_S + more, _COMPUTING_S + more
+    command = [sys.executable, "-c", _CHILD, name, str(path), str(computing)]
     # A library that fails on a damaged file leaves its temporary files behind.
     with TemporaryDirectory(prefix="ccmodel-read-") as scratch:
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p), "TMPDIR": scratch}
@@ -60,6 +64,8 @@ def read_apart(name: str, format: Format, path: Path) -> SignalFile | LogError:
             child = subprocess.run(command, capture_output=True, env=environment, timeout=patience, check=False)
         except subprocess.TimeoutExpired:
             return _damaged(format, f"not read after {patience:.0f} s")
+    if child.returncode == -getattr(signal, "SIGXCPU", 0) != 0:
+        return _damaged(format, f"not read after {computing:.0f} s of computing")
     return pickle.loads(child.stdout) if child.returncode == 0 else _damaged(format, "its library fails on it")
 
 
@@ -69,9 +75,20 @@ def _main() -> None:
 
     result = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    name, path = sys.argv[1:]
+    name, path, computing = sys.argv[1:]
+    limit_computing(float(computing))
     pickle.dump(read_here(registry()[name], Path(path)), result, protocol=5)
     result.close()
+
+
+def limit_computing(seconds: float = _COMPUTING_S) -> None:
+    """Let the system end this process after a time of computing; Windows has no such limit."""
+    try:
+        import resource
+    except ImportError:
+        return
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(seconds), math.ceil(seconds) + 1))
 
 
 def _damaged(format: Format, detail: str) -> LogError:

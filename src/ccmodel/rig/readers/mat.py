@@ -12,6 +12,7 @@ import numpy as np
 
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers import mat5_size, signatures
+from ccmodel.rig.readers.attempt import COPY
 from ccmodel.rig.readers.columns import Columns
 from ccmodel.rig.readers.content import Unpacked
 from ccmodel.rig.readers.contract import Format, SignalFile
@@ -76,7 +77,7 @@ def _add(columns: Columns, name: str, value: Any, unit: str, objects: list, dept
     """Add what a variable or a field of a struct holds."""
     if depth > _DEPTH:
         raise LogError(
-            None, None, f"'{name[:40]}...' has more than {_DEPTH} structs in each other: the file is damaged"
+            None, None, f"'{name[:40]}...' has more than {_DEPTH} structs in each other: it is damaged, {COPY}"
         )
     if isinstance(value, _Object):
         objects.append((name, value.kind))
@@ -229,7 +230,7 @@ def _plain_v73(h5py: Any, file: Any, item: Any, unpacked: Unpacked, depth: int =
     kind = item.attrs.get("MATLAB_class", b"")
     kind = kind.decode(errors="replace") if isinstance(kind, bytes) else str(kind)
     if depth > _DEPTH:
-        raise LogError(None, None, f"has more than {_DEPTH} structs in each other: the file is damaged")
+        raise LogError(None, None, f"has more than {_DEPTH} structs in each other: it is damaged, {COPY}")
     if item.attrs.get("MATLAB_object_decode", 0) in (1, 3) or "MATLAB_sparse" in item.attrs:
         return _Object("sparse" if "MATLAB_sparse" in item.attrs else kind or "MATLAB")
     if isinstance(item, h5py.Group):
