@@ -100,11 +100,11 @@ def _numbers(raw: pd.DataFrame) -> pd.DataFrame:
 
 
 def _drop_bad(table: pd.DataFrame, warnings: list[Defect]) -> pd.DataFrame:
-    """Drop the few rows in which a cell is empty or not finite."""
+    """Drop the few rows in which a cell is empty, or what is calculated from it would not be finite."""
     any_bad = np.zeros(len(table), bool)
     # Columns by position: a log of ten million samples takes most of the memory, and is not copied as a whole.
     for k, column in enumerate(table.columns):
-        is_bad = ~np.isfinite(table.iloc[:, k].to_numpy())
+        is_bad = ~(np.abs(table.iloc[:, k].to_numpy()) < limits.LARGEST_NUMBER)
         if not is_bad.any():
             continue
         row = int(table.index[is_bad][0])
