@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ccmodel.channels import CABLES, CHANNELS, TENSIONS, unit_of
 from ccmodel.geometry import ConduitPath
+from ccmodel.outputs import new_file
 from ccmodel.typed import InputError, advice
 
 if TYPE_CHECKING:
@@ -194,7 +195,8 @@ def write_recordings(path: Path, recordings: list[Recording], provenance: Mappin
     """Write recordings to a netCDF file, one group each, with `provenance` (versions, hashes) on the root."""
     root = xr.Dataset(attrs={"format": "ccmodel recordings 1", "provenance": json.dumps(provenance)})
     groups = {recording.id: _to_dataset(recording) for recording in recordings}
-    xr.DataTree.from_dict({"/": root, **groups}).to_netcdf(path, engine="netcdf4")
+    with new_file(path) as fresh:
+        xr.DataTree.from_dict({"/": root, **groups}).to_netcdf(fresh, engine="netcdf4")
 
 
 def read_recordings(path: Path) -> list[Recording]:

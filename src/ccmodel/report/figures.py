@@ -13,6 +13,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
 
 from ccmodel.channels import CABLES, TABLE, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
+from ccmodel.outputs import new_file
 from ccmodel.recording import Recording
 
 # The palette of Okabe and Ito without its yellow, which is too faint on white; readable with any colour vision.
@@ -130,7 +131,8 @@ def save_figure(figure: Figure, *files: Path) -> None:
     with matplotlib.rc_context(_FILES):
         _lay_out(figure)
         for file in map(Path, files):
-            figure.savefig(file, dpi=150, metadata=_METADATA.get(file.suffix))
+            with new_file(file) as fresh:
+                figure.savefig(fresh, dpi=150, metadata=_METADATA.get(file.suffix))
 
 
 def _lay_out(figure: Figure) -> None:

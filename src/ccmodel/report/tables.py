@@ -7,6 +7,7 @@ import pandas as pd
 
 from ccmodel import provenance
 from ccmodel.errors import error_table
+from ccmodel.outputs import new_file
 from ccmodel.progress import Progress, each_of, silent
 from ccmodel.steps.files import read_pairs, write_table
 
@@ -21,4 +22,5 @@ def tabulate_errors(
     # Pandas writes these attributes to the Parquet file.
     table.attrs = provenance.of_inputs(file for _, *files in runs for file in files)
     write_table(csv_file, table)
-    table.to_parquet(parquet_file, index=False)
+    with new_file(parquet_file) as fresh:
+        table.to_parquet(fresh, index=False)

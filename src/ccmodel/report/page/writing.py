@@ -14,6 +14,7 @@ from pydantic import BaseModel
 
 from ccmodel.channels import CHANNELS, TABLE_ONE, symbol_of
 from ccmodel.mechanisms import catalogue, names
+from ccmodel.outputs import new_file
 from ccmodel.progress import Progress, each_of, silent, within
 from ccmodel.recording import ORIGIN, read_recordings
 from ccmodel.report.embedding import as_json, asset, with_figures
@@ -197,7 +198,9 @@ def write_page(file: Path, content: Content) -> None:
         inconsistent=content.inconsistent, warnings=content.warnings,
         notes={_batch_of(b): b["batch"]["note"] for b in content.batches if b["batch"] and b["batch"].get("note")},
     )  # fmt: skip
-    file.write_text(with_figures(text, file.parent), encoding="utf-8")
+    text = with_figures(text, file.parent)
+    with new_file(file) as fresh:
+        fresh.write_text(text, encoding="utf-8")
 
 
 def _batch_of(summary: Mapping) -> str:
