@@ -7,7 +7,8 @@ CORES ?= 2
 REGRESSORS ?= $(RIVALS)
 
 .PHONY: help results real data test fuzz docs bench accuracy-gate input-checks diagnosis-settings decision-rules \
-  form-errors joint-rigs outside-rigs past several-effects table-one coverage proof proof-full proof-real slurm-test lint lock sbom clean
+  form-errors joint-rigs outside-rigs past several-effects table-one coverage proof proof-full proof-real slurm-test \
+  kills same-bytes lint lock sbom clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -109,6 +110,12 @@ proof-real: $(VENV)/.ready  ## seed faults in the public da Vinci recordings and
 
 slurm-test: $(VENV)/.ready  ## run the pipeline and N cases of the proof as jobs of a local Slurm, and as ever; compare
 	BATCHES="$(BATCHES)" CASES="$(N)" tests/slurm/run
+
+kills: $(VENV)/.ready  ## kill the pipeline and three commands fifty times, fill their disk, and run them again: docs/trust.md
+	$(BIN)/python -m benchmarks.kills --seed $(or $(SEED),0)
+
+same-bytes: $(VENV)/.ready  ## compare runs with other cores, threads, hashes, locale, time zone and folder: docs/trust.md
+	$(BIN)/python -m benchmarks.same_bytes
 
 lint: $(VENV)/.ready
 	$(BIN)/ruff check .
