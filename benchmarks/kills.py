@@ -4,8 +4,8 @@ The pipeline, a diagnosis, an import and ``ccmodel accuracy accept`` run on smal
 which gives the files that it has to make and the time it takes. Then it is killed (SIGKILL, with all its processes) at
 moments drawn over this time; for every second kill, the result of an earlier version is in place. After a kill, the
 place has to hold the earlier result, the new one, or what the command promises between them. Then the command runs
-again, without any help, and has to end with the same files as the undisturbed run. Last, each runs with its earlier
-result in place on a disk that is nearly full.
+again, without any help, and has to end with the same files as the undisturbed run. Last, each runs on a full disk that
+holds an earlier result, and on a disk with room for half of the result.
 
 A kill is a line of kills.jsonl. An interrupted run goes on behind the last line, as long as the sources are the same.
 Exits with 1 if anything was lost, mixed or different.
@@ -40,10 +40,10 @@ TUTORIAL = ROOT / "docs/tutorial"
 LOGS = ("logs/run1.csv", "logs/run2.csv")
 UNFINISHED = ".unfinished-"
 VERDICT = "diagnosis.json"
-# A moment that was drawn may lie behind the end of a run that was faster than the undisturbed one.
+# A moment that was drawn may lie behind the end of a run that was faster than those before.
 DRAWS = 10
-# Smaller results are written to a disk without any free byte, others to one with room for half of them.
-SMALL_BYTES = 64_000
+# Disks by their name: the working folder that is put on them, and the share of the result that they have room for.
+DISKS = {"full disk": ("older", 0.0), "room for half": ("fresh", 0.5)}
 SPARE_BYTES = 8_000_000
 
 
@@ -275,11 +275,14 @@ def _undisturbed(command: Command, inputs: Path, work: Path, ended: Path) -> flo
 
 def kill(of: Reference, which: str, random: np.random.Generator) -> dict:
     """Kill a command at a random moment, look at what is there, and run it again; what was found."""
+    longest_s = of.took_s
     for _ in range(DRAWS):
-        at_s = random.uniform(0, of.took_s)
+        at_s = random.uniform(0, longest_s)
         of.begin(which)
+        started = time.monotonic()
         if killed(of.command.line, of.work, at_s):
             break
+        longest_s = time.monotonic() - started
     else:
         return {"at_s": at_s, "state": "wrong", "why": "it always ended before it was killed"}
     state = of.command.state(of.there(), of.before[which], of.ended[which])
@@ -328,18 +331,18 @@ def _working_in(folder: Path) -> bool:
     return False
 
 
-def full_disk(of: Reference) -> dict:
-    """Run a command on a disk that is nearly full, look at what is there, make room, and run it again."""
-    size = sum(map(len, of.ended["older"].values()))
-    free = size // 2 if size > SMALL_BYTES else 0
-    with small_disk(of.work, free) as (begin, limit, clear):
-        begin(partial(of.begin, "older"))
+def on_disk(of: Reference, disk: str) -> dict:
+    """Run a command on a disk that is too small, look at what is there, make room, and run it again."""
+    which, share = DISKS[disk]
+    before, after = of.before[which], of.ended[which]
+    with small_disk(of.work, round(share * sum(map(len, after.values())))) as (begin, limit, clear):
+        begin(partial(of.begin, which))
         why = _fails(of, limit)
-        state = of.command.state(of.there(), of.before["older"], of.ended["older"])
+        state = of.command.state(of.there(), before, after)
         if state == "wrong" or (state != "before" and of.command.says_one_line):
-            why.append(f"the earlier result is not there: {_some(differing(of.there(), of.before['older']))}")
+            why.append(f"the earlier result is not there: {_some(differing(of.there(), before))}")
         clear()
-        why += ends_as_ever(of, "older")
+        why += ends_as_ever(of, which)
     return {"at_s": None, "state": state, "why": "; ".join(why)}
 
 
@@ -393,9 +396,9 @@ def _some(names: list[str]) -> str:
 
 
 def kills_of(name: str, count: int, seed: int, out: Path) -> Iterator[dict]:
-    """Rows of a command's kills and of its full disk, those of an earlier run first."""
+    """Rows of a command's kills and of its small disks, those of an earlier run first."""
     done = {(row["command"], row["number"]): row for row in _rows(out / "kills.jsonl")}
-    numbers = [*range(count), "full disk"]
+    numbers = [*range(count), *DISKS]
     yield from (done[name, number] for number in numbers if (name, number) in done)
     if all((name, number) in done for number in numbers):
         return
@@ -404,8 +407,8 @@ def kills_of(name: str, count: int, seed: int, out: Path) -> Iterator[dict]:
         if (name, number) in done:
             continue
         row = {"command": name, "number": number}
-        if number == "full disk":
-            row |= {"older": True} | full_disk(of)
+        if number in DISKS:
+            row |= {"older": DISKS[number][0] == "older"} | on_disk(of, number)
         else:
             which = "older" if number % 2 else "fresh"
             random = np.random.default_rng([seed, [*COMMANDS].index(name), number])
@@ -422,12 +425,12 @@ def _rows(file: Path) -> list[dict]:
 def table(rows: list[dict]) -> str:
     """Counts by command, as a table of Markdown."""
     lines = [
-        "| command | kills | with an earlier result | state after the kill | full disks | failed |",
+        "| command | kills | with an earlier result | state after the kill | small disks | failed |",
         "|---|---|---|---|---|---|",
     ]
     for name in dict.fromkeys(row["command"] for row in rows):
         own = [row for row in rows if row["command"] == name]
-        kills = [row for row in own if row["number"] != "full disk"]
+        kills = [row for row in own if row["number"] not in DISKS]
         states = ", ".join(f"{state} {n}" for state, n in sorted(Counter(row["state"] for row in kills).items()))
         failed = sum(bool(row["why"]) for row in own)
         older = sum(row["older"] for row in kills)

@@ -6,7 +6,10 @@ import pytest
 
 from benchmarks import same_bytes
 from benchmarks.compared_files import differing, files_in
+from benchmarks.same_bytes import Variant
 
+# What changes together in one run; without the German locale on the machine, the locale is the one with ASCII.
+VARIED = ("2 threads of BLAS", "hash seed 1", "decimal comma", "time zone of St John's")
 CODE = "import os; os.mkdir('results'); open('results/page', 'w').write({})"
 
 
@@ -30,6 +33,16 @@ def test_what_depends_on_hashes_time_zone_locale_threads_or_folder_is_found(othe
     assert other("os.environ['LC_ALL']") == {"two cores", "decimal comma"}
     assert other("'OMP:' + os.environ['OMP_NUM_THREADS']") == {"two cores", "2 threads of BLAS", "4 threads of BLAS"}
     assert other("(os.getcwd())") == {"two cores", "another folder"}
+
+
+def test_an_undecided_diagnosis_has_the_same_bytes_under_other_circumstances(tmp_path, monkeypatch):
+    every = [same_bytes.VARIANTS[name].environment for name in VARIED]
+    other = Variant({key: value for one in every for key, value in one.items()}, folder="elsewhere")
+    monkeypatch.setattr(same_bytes, "VARIANTS", {same_bytes.REFERENCE: Variant(), "other": other})
+    monkeypatch.setattr(same_bytes, "missing", lambda _: "")
+    same_bytes.prepare(tmp_path / "inputs")
+    found = list(same_bytes.rows(["other"], ["undecided"], tmp_path / "inputs", tmp_path / "out"))
+    assert [(row["variant"], row["why"]) for row in found] == [("reference", ""), ("other", "")]
 
 
 def test_another_verdict_and_a_run_that_fails_are_named(tmp_path, monkeypatch):
