@@ -29,7 +29,7 @@ def files_in(folder: Path, places: Iterable[str]) -> dict[str, bytes]:
     """
     found = [file for place in places for file in [folder / place, *(folder / place).rglob("*")] if file.is_file()]
     named = {file.relative_to(folder).as_posix(): file for file in found}
-    kept = {name: file for name, file in named.items() if not any(fnmatch(name, times) for times in TIMES)}
+    kept = {name: file for name, file in named.items() if not any(fnmatch(f"/{name}", times) for times in TIMES)}
     return {name: undated(name, file.read_bytes()) for name, file in sorted(kept.items())}
 
 

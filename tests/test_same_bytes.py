@@ -63,5 +63,6 @@ def test_times_and_dates_do_not_count_and_all_else_does(tmp_path):
         (tmp_path / run / "config/baseline.json").write_text(json.dumps({"date": date, "commit": "abc"}))
     one, other = (files_in(tmp_path / run, ["results", "config"]) for run in ("a", "b"))
     assert len(one) == 2 and not differing(one, other)
+    assert files_in(tmp_path / "a/results", ["."]) == {}
     (tmp_path / "b/config/history.csv").write_text("commit,date\nabd,2026-01-01T10:00:00+00:00\n")
     assert differing(one, files_in(tmp_path / "b", ["config"])) == ["config/history.csv"]
