@@ -1,4 +1,7 @@
-"""The exact solver over the whole range that is stated for it: a status, or tensions that satisfy the capstan bound."""
+"""The solvers over the whole range that is stated for them: a status, or an answer that satisfies the mechanics.
+
+These are the capstan bound of each cable, the balance of the load pulley, and the load's law.
+"""
 
 import numpy as np
 import pytest
@@ -7,6 +10,7 @@ from hypothesis import strategies as st
 
 from ccmodel.geometry import ConduitPath
 from ccmodel.model.exact import Status, simulate_pair
+from ccmodel.model.general import simulate
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import FixedLoad, SpringLoad
 from ccmodel.model.transmission import MAX_FRICTION_ANGLE, Transmission
@@ -41,14 +45,40 @@ def cases(draw, load):
 def test_a_status_or_tensions_within_the_capstan_bound(load, data):
     one, far, initial, theta = data.draw(cases(load))
     assert one.friction_coefficient * one.path.bend_rad <= MAX_FRICTION_ANGLE
-    found = simulate_pair(one, far, theta, initial)
+    check_mechanics(one, far, initial, simulate_pair(one, far, theta, initial), solved_to=1e-9)
+
+
+@pytest.mark.parametrize("load", LOADS)
+@settings(max_examples=examples(50), deadline=None)
+@given(data=st.data(), elements=st.sampled_from([1, 8, 32]))
+def test_the_general_solver_too(load, data, elements):
+    one, far, initial, theta = data.draw(cases(load))
+    found = simulate(one, far, 0.01 * np.arange(theta.size), theta, initial, elements=elements)
+    # What a step whose search stalls is accepted with (`ccmodel.model.general.newton.LOOSE_TOLERANCE`).
+    check_mechanics(one, far, initial, found, solved_to=1e-5)
+
+
+def check_mechanics(one, far, initial, found, solved_to):
+    """Nothing is claimed of a run that ended with a status.
+
+    Forces balance within `solved_to` times the largest tension, that of the start included.
+    """
     if found.status is not Status.OK:
         return
+    both = ((found.T1_N, found.T2_N), (found.T3_N, found.T4_N))[: 1 if one.is_single_cable else 2]
+    error_N = solved_to * max(np.max(both), initial.tension_A_N.max())
     bound = one.friction_coefficient * one.path.bend_rad * (1 + 1e-9) + 1e-9
-    for near, beyond in ((found.T1_N, found.T2_N), (found.T3_N, found.T4_N))[: 1 if one.is_single_cable else 2]:
+    for near, beyond in both:
         assert np.isfinite([near, beyond]).all() and (near >= 0).all() and (beyond >= 0).all()
-        taut = (near > 0) & (beyond > 0)
-        assert np.abs(np.log(near[taut]) - np.log(beyond[taut])).max(initial=0.0) <= bound
+        low, high = np.minimum(near, beyond), np.maximum(near, beyond)
+        assert (high - error_N <= np.exp(np.minimum(bound, 700.0)) * (low + error_N)).all()
+    difference = found.T2_N - (0.0 if one.is_single_cable else found.T4_N)
+    assert found.tau_out_Nm == pytest.approx(one.load_radius_m * difference, abs=one.load_radius_m * error_N)
+    if isinstance(far, SpringLoad):
+        by_spring = far.stiffness_Nm_per_rad * found.theta_out_rad
+        assert found.tau_out_Nm == pytest.approx(by_spring, rel=1e-6, abs=one.load_radius_m * error_N)
+    else:
+        assert found.theta_out_rad == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("drive", [4.8e-307, 1e-200, 5e-324])
