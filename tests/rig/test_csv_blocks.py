@@ -27,6 +27,7 @@ WHOLE = {
 }
 REFUSED = {
     "cell missing": changed(50, ",", ""),
+    "an empty line between": "".join([*LINES[:30], "\n", *LINES[30:]]),
     "cut": LOG[:-4],
     "commas left of a line": LOG + ",,",
     "nothing": "",
