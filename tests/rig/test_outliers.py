@@ -48,7 +48,7 @@ def test_an_impossible_reading_may_lie_within_the_range():
 
 
 @pytest.mark.parametrize("column", ["drive_current_A", "load_current_A", "drive_load_cell_V", "load_load_cell_V"])
-@pytest.mark.parametrize("factor", [4, 1000, 1e200])
+@pytest.mark.parametrize("factor", [4, 1000, 1e90])
 def test_a_log_with_an_impossible_reading_is_read_without_its_row(bench, column, factor):
     healthy = table()
     damaged = healthy.copy()
