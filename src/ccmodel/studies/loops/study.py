@@ -6,13 +6,14 @@ from functools import partial
 from typing import Any
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from scipy.ndimage import uniform_filter1d
 
 from ccmodel.channels import TABLE, TAU_IN, TAU_OUT, THETA_IN
-from ccmodel.errors import is_compared, last_cycle
+from ccmodel.errors import error_table, is_compared, last_cycle
 from ccmodel.model.run import PRESCRIBED
 from ccmodel.recording import ORIGIN
 from ccmodel.report import figures
@@ -27,6 +28,8 @@ SETTINGS = Study
 DIFFERENCE = "Δ: model − recording; pale: samples, line: moving mean"
 # With more conditions than this in a panel, each has a panel of its own.
 CONDITIONS_IN_A_PANEL = 6
+# A figure with more panels than this is not read any more, and a PNG file of some hundreds would be too high.
+PANELS = 48
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +98,10 @@ def loops_figure(
         panels = {_joined(row, label): {"": group} for row, by in panels.items() for label, group in by.items()}
         looks = {"": ALONE}
     compared = [c for c in (x, y) if any(is_compared(*pair, c) for pair in pairs)]
+    drawn_of_all = ""
+    if len(panels) > PANELS:
+        drawn_of_all = f"{PANELS} of {len(panels)} panels, evenly spread from the smallest error to the largest"
+        panels = _spread(panels, compared)
     # Without any simulation there is still a strip, which says so.
     channels = compared or [c for c in (x, y) if c != THETA_IN]
     figure, cells = _grid(len(panels), len(channels), columns=2 if len(panels) in (2, 4) else 3)
@@ -105,7 +112,7 @@ def loops_figure(
         for strip, channel in zip(strips, channels, strict=True):
             _residuals(strip, drawn, channel, smoothing_share)
             _finish_strip(strip, f"Δ {TABLE[channel].tex} ({_unit(channel)})")
-    _title_and_legend(figure, pairs, study, "", {label: look for label, look in looks.items() if label})
+    _title_and_legend(figure, pairs, study, drawn_of_all, {label: look for label, look in looks.items() if label})
     return figure
 
 
@@ -129,6 +136,20 @@ def _of_row(conditions: Mapping[str, Sequence[Pair]], row: Sequence[Pair]) -> di
     ids = {id(recorded) for recorded, _ in row}
     of_row = {label: [pair for pair in group if id(pair[0]) in ids] for label, group in conditions.items()}
     return {label: group for label, group in of_row.items() if group}
+
+
+def _spread(
+    panels: Mapping[str, Mapping[str, Sequence[Pair]]], compared: Sequence[str]
+) -> dict[str, Mapping[str, Sequence[Pair]]]:
+    """`PANELS` of the panels, evenly spread by error; those of the smallest and the largest error are among them."""
+    errors = []
+    for by in panels.values():
+        table = error_table([pair for group in by.values() for pair in group], "")
+        errors.append(table.loc[table.channel.isin(compared), "nrmse_percent"].max())
+    ranks = np.linspace(0, len(errors) - 1, PANELS).round().astype(int)
+    # Panels without a simulation or without motion have no error; they come last.
+    chosen = set(np.argsort(errors, kind="stable")[ranks])
+    return {title: by for i, (title, by) in enumerate(panels.items()) if i in chosen}
 
 
 def _grid(cells: int, strips: int, columns: int, shared: bool = True) -> tuple[Figure, list[tuple[Axes, list[Axes]]]]:
