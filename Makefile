@@ -8,7 +8,7 @@ REGRESSORS ?= $(RIVALS)
 
 .PHONY: help results real data test fuzz docs bench accuracy-gate input-checks diagnosis-settings decision-rules \
   form-errors joint-rigs outside-rigs past several-effects table-one coverage proof proof-full proof-real slurm-test \
-  kills same-bytes lint lock sbom clean
+  kills same-bytes load mutants lint lock sbom clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -116,6 +116,12 @@ kills: $(VENV)/.ready  ## kill the pipeline and three commands fifty times, fill
 
 same-bytes: $(VENV)/.ready  ## compare runs with other cores, threads, hashes, locale, time zone and folder: docs/trust.md
 	$(BIN)/python -m benchmarks.same_bytes
+
+load: $(VENV)/.ready  ## run the pipeline on 10, 100 and 1,000 recordings, and read a log of ten million samples: docs/trust.md
+	$(BIN)/python -m benchmarks.load --out results/load
+
+mutants: $(VENV)/.ready  ## run the tests on N wrong operators, numbers and conditions; goes on where it was stopped: docs/trust.md
+	$(BIN)/python -m benchmarks.mutants --count $(or $(N),300) --seed $(or $(SEED),0) --out results/mutants-$(or $(SEED),0)
 
 lint: $(VENV)/.ready
 	$(BIN)/ruff check .

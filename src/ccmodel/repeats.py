@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t
 
+from ccmodel.distributions import student_quantile
 from ccmodel.recording import Recording
 
 _REPEAT = re.compile(r"-[a-z]$")
@@ -78,7 +78,7 @@ class Estimate:
 
     def half_width(self, coverage: float) -> float:
         """Half width of that interval, with repeats; NaN without."""
-        return float(t.ppf(0.5 + coverage / 2, self.freedom) * self.sd)
+        return float(student_quantile(0.5 + coverage / 2, self.freedom) * self.sd)
 
 
 def estimates(groups: Sequence[Sequence[float]], relative: bool) -> list[Estimate]:

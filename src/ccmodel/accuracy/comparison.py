@@ -35,10 +35,10 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 from pydantic import Field
-from scipy.stats import t
 
 from ccmodel.accuracy.measure import BatchAccuracy, Batches, ChannelAccuracy
 from ccmodel.channels import symbol_of
+from ccmodel.distributions import student_quantile
 from ccmodel.repeats import pooled_scatter, without_repeat
 from ccmodel.typed import TypedModel
 
@@ -197,7 +197,8 @@ def intervals(batches: Batches, limits: Limits) -> Iterator[tuple[str, str, str,
     for batch, parameters, channel in places:
         one = batches[batch].sets[parameters].channels[channel]
         sd, freedom = _scatter(batches, batch, parameters, channel, lambda one: one.biases)
-        reach = float(t.isf(tail / 2, freedom) * sd * np.sqrt(2 / _numbers(one.biases).size)) if freedom else None
+        bias_sd = sd * np.sqrt(2 / _numbers(one.biases).size)
+        reach = float(-student_quantile(tail / 2, freedom) * bias_sd) if freedom else None
         bias = [None, None] if reach is None else [one.bias - reach, one.bias + reach]
         # ln of error and scatter move alike in the mean: both are roots of mean squares over the same samples.
         reach = _reach_again(batches, batches, batch, parameters, channel, tail)
@@ -254,7 +255,7 @@ def _reach_again(
     for one in (of[batch].sets[parameters].channels[channel] for of in (accepted, now)):
         squares = _numbers(one.errors) ** 2
         variance += sd**2 * float(((squares / squares.sum()) ** 2).sum()) + one.fit_sd**2
-    return float(t.isf(tail, freedom) * np.sqrt(variance))
+    return float(-student_quantile(tail, freedom) * np.sqrt(variance))
 
 
 def _scatter(batches: Batches, batch: str, parameters: str, channel: str, values: Values) -> tuple[float, int]:

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
-from scipy.stats import t as student
 
 from ccmodel.api.batch import Batch, as_batch, check_consistent
 from ccmodel.api.options import Tolerance, check_step, progress_of, settings_of
 from ccmodel.api.recordings import counted
 from ccmodel.diagnosis.run import Calibration, calibrate
 from ccmodel.diagnosis.settings import GOOD_FIT
+from ccmodel.distributions import student_quantile
 from ccmodel.failure import ModelError
 from ccmodel.inference.intervals import COVERAGE, Interval
 from ccmodel.model.files import Model, RigConditions
@@ -200,7 +200,7 @@ class Fit:
     def _source_of_intervals(self) -> str:
         """Where the intervals come from, and how far they reach at most."""
         fewest = float(self._calibration.fit.degrees_of_freedom.min())
-        reach = f"{student.ppf(0.5 + COVERAGE / 2, fewest):.1f} standard deviations to each side"
+        reach = f"{student_quantile(0.5 + COVERAGE / 2, fewest):.1f} standard deviations to each side"
         n = len(self.recordings)
         if n == 1:
             return f"90 % intervals: from the noise of the single recording, {reach}"

@@ -6,14 +6,13 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm as normal
-from scipy.stats import t as student
 
 from ccmodel import mechanisms as registry
 from ccmodel.deadline import UNLIMITED, Deadline
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.hypothesis import Hypothesis, plausible
 from ccmodel.diagnosis.whitening import Whitened, with_states_of
+from ccmodel.distributions import normal_quantile, student_quantile
 from ccmodel.failure import ModelError
 from ccmodel.inference.cross_validation import inverse_of, leave_one_out
 from ccmodel.inference.effective_samples import mean_weight, of_recording, prior_spread
@@ -129,7 +128,7 @@ class CandidateFit:
     def half_widths(self, shift: NDArray | float = 0.0) -> NDArray:
         """Half-width of each unknown's 90 % interval, shape (unknowns,)."""
         # With infinite degrees of freedom this is the normal distribution's quantile.
-        return student.ppf(0.5 + COVERAGE / 2, self.degrees_of_freedom) * self.standard_deviations(shift)
+        return student_quantile(0.5 + COVERAGE / 2, self.degrees_of_freedom) * self.standard_deviations(shift)
 
     def log_support(self, name: str, place: str) -> float:
         """Logarithm of the Bayes factor of a mechanism over none by the scatter of its strength between recordings.
@@ -286,7 +285,8 @@ def at_least_by_information(
         J = block.derivatives[: w.measured.size + len(w.scalar_nuisances)]
         information += of_recording(w.observations) * (J.T @ J + np.diag(prior))
     variance, least = np.diag(covariance).clip(0.0), np.diag(inverse_of(information, problem.sizes))
-    wider = normal.ppf(0.5 + COVERAGE / 2) ** 2 * least > student.ppf(0.5 + COVERAGE / 2, degrees) ** 2 * variance
+    normal, student = normal_quantile(0.5 + COVERAGE / 2), student_quantile(0.5 + COVERAGE / 2, degrees)
+    wider = normal**2 * least > student**2 * variance
     ratio = np.sqrt(np.divide(least, variance, out=np.ones_like(least), where=wider & (variance > 0)))
     covariance = covariance * np.outer(ratio, ratio) + np.diag(np.where(variance > 0, 0.0, least))
     return covariance, np.where(wider, np.inf, degrees)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
-from scipy.stats import norm as normal
 
+from ccmodel.distributions import normal_quantile
 from ccmodel.inference.intervals import COVERAGE
 from ccmodel.mechanisms.learned import Law
 
@@ -81,7 +81,7 @@ def shortest(
         Lower and upper end of its 90 % band.
     law : Law
     """
-    quantile = normal.ppf(0.5 + COVERAGE / 2)
+    quantile = normal_quantile(0.5 + COVERAGE / 2)
     neutral = 1.0 if law.argument.has_two_values and law.is_factor else 0.0
     sd = np.maximum((band[1] - band[0]) / (2 * quantile), 1e-3 * max(float(np.ptp(y)), 1e-12))
     for form in _forms(law):

@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm as normal
 
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
@@ -11,6 +10,7 @@ from ccmodel.diagnosis.hypothesis import laws_in
 from ccmodel.diagnosis.laws import unknowns_of, values_of
 from ccmodel.diagnosis.listed_laws import learned_of, nearest_listed
 from ccmodel.diagnosis.verdict import Judgement
+from ccmodel.distributions import normal_quantile
 from ccmodel.inference.intervals import COVERAGE
 from ccmodel.mechanisms.learned import Law
 
@@ -51,7 +51,7 @@ def curve_of(candidate: CandidateFit, law: Law) -> tuple[NDArray, NDArray, tuple
     shown = law.shown(x)
     y, by_coefficients = shown @ y, values["scale"] * (shown @ law.basis)
     covariance = by_coefficients @ candidate.covariance[np.ix_(some, some)] @ by_coefficients.T
-    reach = normal.ppf(0.5 + COVERAGE / 2) * np.sqrt(np.diag(covariance).clip(0.0))
+    reach = normal_quantile(0.5 + COVERAGE / 2) * np.sqrt(np.diag(covariance).clip(0.0))
     neutral = 1.0 if law.is_factor else 0.0
     low, high = (law.possible(y + neutral + sign * reach) for sign in (-1, 1))
     return x, law.possible(y + neutral), (low, high)

@@ -25,11 +25,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as fisher
-from scipy.stats import t as student
 
 from ccmodel.channels import MEASURED, THETA_IN, ZERO_OF, short_name, unit_of
 from ccmodel.diagnosis import settings
+from ccmodel.distributions import fisher_tail, student_tail
 from ccmodel.inference.observations import Observations
 from ccmodel.recording import Recording
 
@@ -240,7 +239,7 @@ def log_bayes_factor(probability: float) -> float:
 def within_probability(found: Deviations, groups: Sequence[Sequence[int]]) -> float:
     """Probability of at least this scatter of friction within conditions, if its spread is the stated one."""
     within, freedom, _ = found.sum_of_squares(groups)
-    return float(fisher.sf(within / freedom, freedom, settings.SPREAD_FREEDOM)) if freedom else 1.0
+    return fisher_tail(within / freedom, freedom, settings.SPREAD_FREEDOM) if freedom else 1.0
 
 
 def between_probability(found: Deviations, groups: Sequence[Sequence[int]], is_fitted: bool = True) -> float:
@@ -255,7 +254,7 @@ def between_probability(found: Deviations, groups: Sequence[Sequence[int]], is_f
     if between_freedom < 1:
         return 1.0
     ratio = max(between, 0.0) / between_freedom / _posterior(within, freedom) ** 2
-    return float(fisher.sf(ratio, between_freedom, settings.SPREAD_FREEDOM + freedom))
+    return fisher_tail(ratio, between_freedom, settings.SPREAD_FREEDOM + freedom)
 
 
 def sequences(whitened: Sequence["Whitened"]) -> list[list[int]]:
@@ -278,7 +277,7 @@ def trend_probability(found: Deviations, runs: Sequence[Sequence[int]]) -> float
         return 1.0
     left = values - _slope(at, values) * at
     sd = np.sqrt((settings.SPREAD_FREEDOM + float(left @ left)) / freedom / float(at @ at))
-    return float(2 * student.sf(abs(_slope(at, values)) / sd, freedom))
+    return 2 * student_tail(abs(_slope(at, values)) / sd, freedom)
 
 
 def without_trend(found: Deviations, runs: Sequence[Sequence[int]]) -> Deviations:

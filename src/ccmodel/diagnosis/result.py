@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm as normal
 
 from ccmodel import mechanisms as registry
 from ccmodel.channels import short_name, unit_of
@@ -14,6 +13,7 @@ from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.law_report import laws_of
 from ccmodel.diagnosis.observations import NotJudged
 from ccmodel.diagnosis.verdict import Judgement, nested_choice
+from ccmodel.distributions import normal_quantile
 from ccmodel.failure import ModelError
 from ccmodel.inference.intervals import COVERAGE
 from ccmodel.model.parameters import Parameters, mechanism_key
@@ -175,7 +175,7 @@ def least_strength(candidate: CandidateFit, strength: str, state: str) -> float:
     by_both = np.array([1 - mean, -value])
     spread = np.sqrt(max(by_both @ candidate.covariance[np.ix_(some, some)] @ by_both, 0.0)) / abs(value * (1 - mean))
     least_over = min(states[state] for states in own)
-    return float(abs(value) * (1 - least_over) * np.exp(-normal.ppf(0.5 + COVERAGE / 2) * spread))
+    return float(abs(value) * (1 - least_over) * np.exp(-normal_quantile(0.5 + COVERAGE / 2) * spread))
 
 
 def held_out_errors(judgement: Judgement, calibrated: CandidateFit, chosen: Sequence[CandidateFit]) -> dict[str, dict]:

@@ -14,14 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
-from scipy.stats import chi2, norm, t
 
+from ccmodel.distributions import chi2_tail, normal_quantile, student_quantile
 from ccmodel.inference.least_squares import Solution, information_and_gradient
 from ccmodel.inference.problem import Block, Problem
 from ccmodel.repeats import condition_of, pooled_scatter
 
 COVERAGE = 0.90
-REACH = float(norm.ppf(0.5 + COVERAGE / 2))  # Standard deviations from the middle to the end of an interval.
+REACH = normal_quantile(0.5 + COVERAGE / 2)  # Standard deviations from the middle to the end of an interval.
 # Residuals further apart in time than this share of a recording count as uncorrelated.
 CORRELATED_SHARE = 0.05
 # Residuals of a fit are smaller than errors, and their autocovariance is itself an estimate: the factor by which
@@ -106,7 +106,7 @@ def covariance(problem: Problem, solution: Solution) -> NDArray:
     noise = np.diag((problem.prior_precision * scatter_scale(problem, solution)) ** 2)
     drives, rounded = problem.drive_errors(solution.x), problem.rounding_errors(solution.x)
     # A variance from few draws is itself uncertain: Student's quantile over that of the normal distribution.
-    few = (t.ppf(0.5 + COVERAGE / 2, max(sum(map(len, drives)), 1)) / REACH) ** 2
+    few = (student_quantile(0.5 + COVERAGE / 2, max(sum(map(len, drives)), 1)) / REACH) ** 2
     for block, drive, rounding in zip(solution.blocks, drives, rounded, strict=True):
         at = np.ix_(block.columns, block.columns)
         in_residuals = [residual_part(block, inverse[at], errors) for errors in (drive, rounding)]
@@ -220,7 +220,7 @@ def scatter(problem: Problem, solution: Solution) -> dict[str, Scatter]:
         for e, value in zip(problem.observations, solution.x[at].tolist(), strict=True):
             alike[condition_of(e.given.recording)].append(value)
         of_repeats, freedom = pooled_scatter(list(alike.values()), relative=False)
-        about = float(np.sqrt(square / n)), float(chi2.sf(square, n))
+        about = float(np.sqrt(square / n)), chi2_tail(square, n)
         found[name] = Scatter(free.spread, free.spread * about[0], about[1], of_repeats if freedom else None, freedom)
     return found
 

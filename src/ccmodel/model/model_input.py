@@ -6,7 +6,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
 from ccmodel.channels import F_LOAD, TAU_OUT, THETA_IN, THETA_MOTOR, THETA_OUT
 from ccmodel.encoder.reconstruction import reconstruct_motion
@@ -173,4 +172,7 @@ def _filtered(recording: Recording, channel: str) -> NDArray | None:
     rate = 1 / np.median(np.diff(recording.time_s))
     if rate <= 2.5 * LOAD_CUTOFF_HZ:
         return recording[channel]
+    # Here, as it takes 0.4 s to import, and most commands meet no measured load.
+    from scipy.signal import butter, sosfiltfilt
+
     return sosfiltfilt(butter(2, LOAD_CUTOFF_HZ, fs=rate, output="sos"), recording[channel])

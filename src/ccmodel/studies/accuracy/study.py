@@ -24,9 +24,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from scipy.stats import t
 
 from ccmodel.channels import MEASURED, TENSIONS, THETA_IN, short_name
+from ccmodel.distributions import student_quantile
 from ccmodel.failure import ModelError
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import PRESCRIBED, ModelInput, simulate
@@ -105,7 +105,7 @@ def bias_and_scatter(
     used = min(sigma_E, limit)
     sigma_M = np.sqrt(variance - used**2)
     centre = mean + (sigma_M**2 - used**2) / 2
-    reach = t.ppf(0.5 + coverage / 2, M.size - 1) * np.sqrt(variance / M.size)
+    reach = student_quantile(0.5 + coverage / 2, M.size - 1) * np.sqrt(variance / M.size)
     delta, low, high = np.exp([centre, centre - reach, centre + reach]).tolist()
     return BiasAndScatter(delta, low, high, float(sigma_M), float(used), bool(sigma_E > limit), M.size)
 

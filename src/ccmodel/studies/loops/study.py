@@ -138,9 +138,7 @@ def _of_row(conditions: Mapping[str, Sequence[Pair]], row: Sequence[Pair]) -> di
     return {label: group for label, group in of_row.items() if group}
 
 
-def _spread(
-    panels: Mapping[str, Mapping[str, Sequence[Pair]]], compared: Sequence[str]
-) -> dict[str, Mapping[str, Sequence[Pair]]]:
+def _spread(panels: Mapping[str, dict[str, list[Pair]]], compared: Sequence[str]) -> dict[str, dict[str, list[Pair]]]:
     """`PANELS` of the panels, evenly spread by error; those of the smallest and the largest error are among them."""
     errors = []
     for by in panels.values():

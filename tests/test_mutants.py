@@ -1,0 +1,29 @@
+"""Which tests a mutant meets, and which mutants are drawn."""
+
+from pathlib import Path
+
+from cosmic_ray.work_item import MutationSpec, WorkItem
+
+from benchmarks.mutants import files_for, sample
+
+ROOT = Path(__file__).parents[1]
+
+
+def item(line, operator, job):
+    at = {"start_pos": (line, 0), "end_pos": (line, 5), "definition_name": None, "operator_args": {}}
+    spec = MutationSpec(module_path="src/ccmodel/a.py", operator_name=operator, occurrence=0, **at)
+    return WorkItem(job_id=job, mutations=(spec,))
+
+
+def test_the_tests_that_import_a_module_come_first():
+    direct, folder = files_for(Path("src/ccmodel/rig/outliers.py"), ROOT)
+    assert "tests/rig/test_outliers.py" in direct
+    assert folder == ["tests/rig"]
+
+
+def test_one_mutant_is_drawn_of_a_place_and_none_of_a_union_of_types():
+    items = tuple(item(line, f"core/Add_{n}", f"{line}-{n}") for line in range(5) for n in range(9))
+    items += (item(7, "core/ReplaceBinaryOperator_BitOr_Add", "union"),)
+    drawn = sample(items, 100, seed=1)
+    assert sorted(job.partition("-")[0] for job in drawn) == list("01234")
+    assert len(sample(items, 3, seed=1)) == 3
