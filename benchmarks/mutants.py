@@ -18,7 +18,7 @@ from collections import Counter
 from pathlib import Path
 
 from cosmic_ray.work_db import WorkDB, use_db
-from cosmic_ray.work_item import TestOutcome, WorkerOutcome, WorkItem, WorkResult
+from cosmic_ray.work_item import TestOutcome, WorkItem
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("model", "inference", "rig", "diagnosis", "accuracy", "studies")
@@ -64,18 +64,18 @@ def prepare(out: Path, count: int, seed: int) -> None:
     config = CONFIG.format(modules=modules, timeout=TIMEOUT_S, python=sys.executable)
     (tree / "mutants.toml").write_text(config, encoding="utf-8")
     run_in(tree, "-m", "cosmic_ray.cli", "init", "mutants.toml", "new.sqlite")
-    with use_db(tree / "new.sqlite", WorkDB.Mode.open) as session:
-        drawn = sample(session.work_items, count, seed)
-        others = [item.job_id for item in session.work_items if item.job_id not in drawn]
-        session.set_multiple_results(others, WorkResult(WorkerOutcome.SKIPPED))
-        modules = {item.mutations[0].module_path for item in session.work_items if item.job_id in drawn}
+    with use_db(tree / "new.sqlite", WorkDB.Mode.open) as every:
+        drawn = sample(every.work_items, count, seed)
+    modules = {item.mutations[0].module_path for item in drawn}
     files = sorted({file for module in modules for some in files_for(module, tree) for file in some})
     run_in(tree, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *files)
-    (tree / "new.sqlite").rename(out / "session.sqlite")
+    with use_db(out / "new.sqlite", WorkDB.Mode.create) as session:
+        session.add_work_items(drawn)
+    (out / "new.sqlite").rename(out / "session.sqlite")
 
 
-def sample(items: tuple[WorkItem, ...], count: int, seed: int) -> set[str]:
-    """Ids of some mutants, one at each of `count` places."""
+def sample(items: tuple[WorkItem, ...], count: int, seed: int) -> list[WorkItem]:
+    """Some mutants, one at each of `count` places."""
     at: dict[tuple, list[WorkItem]] = {}
     for item in items:
         (mutation,) = item.mutations
@@ -83,8 +83,13 @@ def sample(items: tuple[WorkItem, ...], count: int, seed: int) -> set[str]:
             at.setdefault((str(mutation.module_path), mutation.start_pos), []).append(item)
     draw = random.Random(seed)
     places = draw.sample(sorted(at), min(count, len(at)))
-    # Ids are new in each session: mutants are drawn by what they do.
-    return {draw.choice(sorted(at[p], key=lambda i: (i.mutations[0].operator_name, str(i)))).job_id for p in places}
+    return [draw.choice(sorted(at[place], key=_what_it_does)) for place in places]
+
+
+def _what_it_does(item: WorkItem) -> tuple[str, int, str]:
+    """A mutant without its id, which is new in each session."""
+    (mutation,) = item.mutations
+    return mutation.operator_name, mutation.occurrence, str(mutation.operator_args)
 
 
 def run_in(tree: Path, *arguments: str) -> None:
@@ -116,8 +121,6 @@ def report(out: Path) -> None:
     died, tried, survivors = Counter[str](), Counter[str](), []
     with use_db(out / "session.sqlite", WorkDB.Mode.open) as session:
         for item, result in session.completed_work_items:
-            if result.worker_outcome == WorkerOutcome.SKIPPED:
-                continue
             room = item.mutations[0].module_path.parts[2]
             tried[room] += 1
             if result.test_outcome == TestOutcome.SURVIVED:

@@ -24,6 +24,7 @@ def test_the_tests_that_import_a_module_come_first():
 def test_one_mutant_is_drawn_of_a_place_and_none_of_a_union_of_types():
     items = tuple(item(line, f"core/Add_{n}", f"{line}-{n}") for line in range(5) for n in range(9))
     items += (item(7, "core/ReplaceBinaryOperator_BitOr_Add", "union"),)
-    drawn = sample(items, 100, seed=1)
+    drawn = [one.job_id for one in sample(items, 100, seed=1)]
     assert sorted(job.partition("-")[0] for job in drawn) == list("01234")
     assert len(sample(items, 3, seed=1)) == 3
+    assert sample(items[::-1], 100, seed=1) == sample(items, 100, seed=1)
