@@ -7,6 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
+import netCDF4
 import numpy as np
 import pandas as pd
 import xarray as xr
@@ -193,10 +194,23 @@ def stride(recording: Recording, step_s: float | None) -> int:
 
 def write_recordings(path: Path, recordings: list[Recording], provenance: Mapping) -> None:
     """Write recordings to a netCDF file, one group each, with `provenance` (versions, hashes) on the root."""
-    root = xr.Dataset(attrs={"format": "ccmodel recordings 1", "provenance": json.dumps(provenance)})
-    groups = {recording.id: _to_dataset(recording) for recording in recordings}
-    with new_file(path) as fresh:
-        xr.DataTree.from_dict({"/": root, **groups}).to_netcdf(fresh, engine="netcdf4")
+    # By netCDF4, as xarray writes each variable as soon as it is defined. The library then closes the definitions of
+    # the whole file once a variable: a thousand recordings took 200 s instead of 5 s.
+    values = []
+    with new_file(path) as fresh, netCDF4.Dataset(fresh, "w") as root:
+        root.setncatts({"format": "ccmodel recordings 1", "provenance": json.dumps(provenance)})
+        for recording in recordings:
+            group, dataset = root.createGroup(recording.id), _to_dataset(recording)
+            group.setncatts(dataset.attrs)
+            for dimension, size in dataset.sizes.items():
+                group.createDimension(str(dimension), size)
+            for name, column in dataset.variables.items():
+                dimensions = tuple(map(str, column.dims))
+                variable = group.createVariable(str(name), column.dtype, dimensions, fill_value=np.nan)
+                variable.setncatts(column.attrs)
+                values.append((variable, column.values))
+        for variable, written in values:
+            variable[:] = written
 
 
 def read_recordings(path: Path) -> list[Recording]:
