@@ -17,12 +17,14 @@ M = MU * BEND
 PATH = ConduitPath([LENGTH], [BEND])
 
 
-def stored(profile):
-    """Integral of T^2 / (2 EA) over a profile whose ln T is linear between points, J."""
+def stored(profile, axial_rigidity_N=EA):
+    """Integral of T^2 / (2 EA) over a profile whose ln T is linear between points, J; a slack cable stores nothing."""
     T0, T1 = profile.tension_N[:-1], profile.tension_N[1:]
+    if not profile.tension_N.any():
+        return 0.0
     rise = 2 * np.log(T1 / T0)
     mean = np.where(np.abs(rise) > 1e-4, (T1**2 - T0**2) / np.where(rise == 0, 1, rise), T0 * T1 * (1 + rise**2 / 24))
-    return float((mean * np.diff(profile.x_m)).sum() / (2 * EA))
+    return float((mean * np.diff(profile.x_m)).sum() / (2 * axial_rigidity_N))
 
 
 # Each stroke is smooth: a front on its direction, or the whole cable sliding. (start's slope, tension, displacement)

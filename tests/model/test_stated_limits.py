@@ -1,12 +1,14 @@
 """The solvers over the whole range that is stated for them: a status, or an answer that satisfies the mechanics.
 
-These are the capstan bound of each cable, the balance of the load pulley, and the load's law.
+These are the capstan bound of each cable, the balance of the load pulley, the load's law, and that friction gives no
+energy.
 """
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from test_exact_energy import stored
 
 from ccmodel.geometry import ConduitPath
 from ccmodel.model.exact import Status, simulate_pair
@@ -79,6 +81,30 @@ def check_mechanics(one, far, initial, found, solved_to):
         assert found.tau_out_Nm == pytest.approx(by_spring, rel=1e-6, abs=one.load_radius_m * error_N)
     else:
         assert found.theta_out_rad == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("load", LOADS)
+@settings(max_examples=examples(40), deadline=None)
+@given(data=st.data())
+def test_no_motion_gives_more_energy_than_it_takes(load, data):
+    one, far, initial, corners = data.draw(cases(load))
+    fine = np.linspace(0, corners.size - 1, 200 * (corners.size - 1) + 1)
+    theta = np.interp(fine, np.arange(corners.size), corners)
+    found = simulate_pair(one, far, theta, initial, record_profiles_at=[0, theta.size - 1])
+    if found.status is not Status.OK:
+        return
+    work_J = np.trapezoid(found.tau_in_Nm, theta)
+    before_J, after_J = (stored_J(one, far, found, at) for at in (0, theta.size - 1))
+    # The torque changes in one direction between two samples; the trapezoids err by no more than this.
+    quadrature_J = 0.5 * np.abs(np.diff(found.tau_in_Nm) * np.diff(theta)).sum()
+    assert work_J - (after_J - before_J) >= -quadrature_J - 1e-9 * (before_J + after_J)
+
+
+def stored_J(one, far, found, at):
+    """Energy in the cables and the load's spring at one sample, J."""
+    spring = far.stiffness_Nm_per_rad if isinstance(far, SpringLoad) else 0.0
+    cables = sum(stored(profile, one.axial_rigidity_N) for profile in found.profiles[at])
+    return cables + 0.5 * spring * found.theta_out_rad[at] ** 2
 
 
 @pytest.mark.parametrize("drive", [4.8e-307, 1e-200, 5e-324])
