@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.stats import binom
+from scipy.stats import t as student
 
 from ccmodel.inference import intervals
 from ccmodel.inference.fit import fit
@@ -203,6 +204,24 @@ def test_what_rounding_does_to_a_fit_stands_in_its_covariance(solved):
     moved = scores @ np.linalg.inv(information)
     shared = slice(0, len(problem.shared))
     np.testing.assert_allclose(np.diag(said)[shared], moved.var(axis=0)[shared], rtol=0.25)
+
+
+def test_a_variance_from_few_draws_of_the_drives_motion_is_wider(solved):
+    """By Student's quantile over the normal one, squared: draws that come four times say the same of the variance."""
+    problem, solution = solved
+    # With residuals of nothing, from which no draw subtracts.
+    silent = replace(solution, blocks=[replace(b, errors=np.zeros_like(b.errors)) for b in solution.blocks])
+
+    def with_draws(times):
+        given = [replace(e.given, drive_deviations=np.tile(e.given.drive_deviations, (times, 1))) for e in each]
+        drawn = [replace(e, given=one) for e, one in zip(each, given, strict=True)]
+        return np.diag(covariance(Problem(drawn, problem.shared, problem.own), silent))[: len(problem.shared)]
+
+    each = problem.observations
+    draws = sum(len(e.given.drive_deviations) for e in each)
+    wider = (student.ppf(0.95, draws) / student.ppf(0.95, 4 * draws)) ** 2
+    assert (with_draws(1) - with_draws(0)) / (with_draws(4) - with_draws(0)) == pytest.approx(wider, rel=1e-3)
+    assert wider > 1.01
 
 
 def test_nine_out_of_ten_intervals_hold_the_truth():
