@@ -1,8 +1,9 @@
 """Memory and time of many recordings and of one long log: ``python -m benchmarks.load --out DIR``.
 
 A rig without a missing effect is simulated under ten conditions. Batches of 10, 100 and 1,000 recordings are logs of
-these runs, each with sensor noise of its own. The pipeline runs on each of them: ingest, fit, simulation, study,
-diagnosis and page. The long log repeats one run until it has ten million samples; `ccmodel check` reads it.
+these runs, each with noise, instants and a load angle of its own: otherwise some logs of a run have the same counts,
+and are taken for copies. The pipeline runs on each of them: ingest, fit, simulation, study, diagnosis and page. The
+long log repeats one run until it has ten million samples; `ccmodel check` reads it.
 
 Memory is the highest that a process and its children had resident together, sampled every 50 ms. Pages that
 processes share count once for each of them.
@@ -15,21 +16,26 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import fields
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import psutil
 import yaml
+from numpy.random import Generator
 
 from proof.build import simulate
 from proof.cases import draw
 from virtualrig.campaign import as_yaml, compress, description, log_name, prepare, recording_generator
 from virtualrig.sensors import DECIMALS, log
+from virtualrig.trajectory import Trajectory
 
 ROOT = Path(__file__).parents[1]
 SEED, CONDITIONS, SIZES, LONG_SAMPLES = 91000, 10, (10, 100, 1000), 10_000_000
 SAMPLED_EVERY_S = 0.05
+# Relative standard deviation of the load's angle from run to run, below what the encoder's count resolves in a fit.
+RUN_TO_RUN = 2e-3
 
 
 def measured(command: Sequence[str], out: Path) -> dict:
@@ -68,11 +74,20 @@ def write_batches(raw: Path, sizes: Sequence[int]) -> None:
             plan, trajectory = runs[k % len(runs)]
             named.append(plan.model_copy(update={"id": f"run-{k + 1:04d}"}))
             if not (folder / log_name(named[-1])).exists():
-                read = log(trajectory, campaign.sensors, campaign.rig, random)
+                read = log(repeated(trajectory, random), campaign.sensors, campaign.rig, random)
                 (folder / log_name(named[-1])).write_bytes(compress(read))
         note = "recordings of a simulated rig, repeated with other noise"
         described = as_yaml(description(campaign, folder.name, note, named))
         (folder / "batch.yaml").write_text(described, encoding="utf-8")
+
+
+def repeated(trajectory: Trajectory, random: Generator) -> Trajectory:
+    """A run as it comes once more: the load's angle differs by `RUN_TO_RUN`, and the clock by part of a sample."""
+    share, scale = random.uniform(), 1 + RUN_TO_RUN * random.normal()
+    values = {f.name: getattr(trajectory, f.name) for f in fields(trajectory)}
+    between = {name: (1 - share) * of[:-1] + share * of[1:] for name, of in values.items()}
+    between |= {"time_s": trajectory.time_s[:-1], "theta_out_rad": scale * between["theta_out_rad"]}
+    return Trajectory(**between)
 
 
 def write_long_log(folder: Path) -> None:

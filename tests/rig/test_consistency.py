@@ -10,7 +10,7 @@ from made_up_batch import T0, Bench, table
 from benchmarks.input_mistakes import MISTAKES, Copy, outcome, read_copy, said_of, write_copy
 from ccmodel.rig.consistency.clocks import drift_of
 from ccmodel.rig.consistency.fitted import contradicted_by_fit
-from ccmodel.rig.consistency.parity import Parity, closed_part, crossings, white_noise
+from ccmodel.rig.consistency.parity import Parity, closed_part, crossings, speed, white_noise
 from ccmodel.rig.consistency.signs import EXCHANGED, FAULTS, explanation, negative_relations
 from ccmodel.rig.ingest import ingest_batch
 from proof.build import record
@@ -317,3 +317,10 @@ def test_a_stated_stiffness_that_a_fit_contradicts(fitted, named, tmp_path):
     copy.rig["nominal"] = ["cable.stiffness_N_per_m"]
     batch = ingest_batch(write_copy(copy, tmp_path / "nominal")).stated
     assert contradicted_by_fit(fitted, batch) == []
+
+
+def test_the_speed_of_a_log_with_few_samples_a_second_is_not_late():
+    time_s = np.arange(20.0)
+    # Exact for a parabola, but for the constant that averaging adds, if the window is as long on either side.
+    assert np.diff(speed(time_s**2, time_s))[4:-4] == pytest.approx(2.0)
+    assert speed(time_s**2, time_s)[10] == pytest.approx(20.0)

@@ -57,3 +57,15 @@ def test_every_file_that_cannot_be_read_is_one_line(tmp_path, run):
     assert (code, out) == (2, "")
     assert [line[:8] for line in err.splitlines()] == ["fast.txt", "slow.txt"]
     assert not (tmp_path / "batch").exists()
+
+
+def test_a_file_whose_columns_cannot_be_joined_is_one_line(tmp_path, run):
+    files, batch = lab(tmp_path / "lab"), tmp_path / "batch"
+    assert run("import", *files, "--out", batch)[0] == 0
+    text = files[0].read_text(encoding="utf-8").splitlines()
+    without = ["\t".join([*line.split("\t")[:2], "", line.split("\t")[3]]) for line in text[6:]]
+    files[0].write_text("\n".join([*text[:6], *without]) + "\n", encoding="utf-8")
+    _, _, err = run("import", *files, "--map", batch / "map.yaml", "--out", batch)
+    (line,) = [line for line in err.splitlines() if "has 5 numbers only" in line]
+    assert line.startswith("fast.txt") and "take F_drive_N out of the map" in line
+    assert "Traceback" not in err
