@@ -22,6 +22,8 @@ from cosmic_ray.work_item import TestOutcome, WorkItem
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("model", "inference", "rig", "diagnosis", "accuracy", "studies")
+# Folders of tests of a room, where not only the one of its name: the general solver is tested by what mechanisms do.
+TESTS = {"model": ("tests/model", "tests/mechanisms")}
 # A union of types in an annotation is no calculation.
 NO_MUTANTS = re.compile("BitOr|BitXor|BitAnd")
 TIMEOUT_S = 900
@@ -41,7 +43,7 @@ def files_for(module: Path, tree: Path = Path()) -> list[list[str]]:
     imports = re.compile(rf"\b{re.escape(name)}\b|from {re.escape(name.rpartition('.')[0])} import .*\b{module.stem}\b")
     files = sorted((tree / "tests").rglob("test_*.py"))
     direct = [str(file.relative_to(tree)) for file in files if imports.search(file.read_text(encoding="utf-8"))]
-    return [some for some in (direct, [f"tests/{module.parts[2]}"]) if some]
+    return [some for some in (direct, [*TESTS.get(module.parts[2], (f"tests/{module.parts[2]}",))]) if some]
 
 
 def test() -> int:

@@ -93,15 +93,6 @@ def test_initial_profiles_within_friction_hold():
     assert r.theta_out_rad[-1] == pytest.approx((6.0 - 7.5) * R / K_E, rel=1e-6)
 
 
-@pytest.mark.parametrize("T", [T0, 3 * T0])
-def test_what_friction_of_any_law_holds_at_rest_is_held(T):
-    """Nothing moves as long as the drive rests, whatever friction depends on."""
-    law = ("load-dependent-friction", "conduit", {"n": -0.3})
-    profile = InitialTension.between_ends(HALF_LOOP, 0.5 * MU, (1.2 * T, T), (T, 1.1 * T))
-    r = run(np.zeros(5), law, T=profile)
-    assert [getattr(r, name)[-1] for name in TENSIONS] == pytest.approx([1.2 * T, T, T, 1.1 * T], rel=1e-6)
-
-
 def test_what_friction_holds_at_rest_it_holds_at_a_kink_too():
     kink = ("kink", "conduit", {"beta": 1.0, "s": 0.3})
     limit = np.exp(MU * (np.pi + 1.0))
