@@ -34,7 +34,7 @@ from virtualrig.trajectory import Trajectory
 ROOT = Path(__file__).parents[1]
 SEED, CONDITIONS, SIZES, LONG_SAMPLES = 91000, 10, (10, 100, 1000), 10_000_000
 SAMPLED_EVERY_S = 0.05
-# Relative standard deviation of the load's angle from run to run, below what the encoder's count resolves in a fit.
+# Relative standard deviation of the load's strokes from run to run.
 RUN_TO_RUN = 2e-3
 
 
@@ -82,10 +82,11 @@ def write_batches(raw: Path, sizes: Sequence[int]) -> None:
 
 
 def repeated(trajectory: Trajectory, random: Generator) -> Trajectory:
-    """A run as it comes once more: the load's angle differs by `RUN_TO_RUN`, and the clock by part of a sample."""
-    share, scale = random.uniform(), 1 + RUN_TO_RUN * random.normal()
+    """A run as it comes once more: the load's strokes differ by `RUN_TO_RUN`, and the clock by part of a sample."""
+    share, (up, down) = random.uniform(), 1 + RUN_TO_RUN * random.normal(size=2)
     values = {f.name: getattr(trajectory, f.name) for f in fields(trajectory)}
     between = {name: (1 - share) * of[:-1] + share * of[1:] for name, of in values.items()}
+    scale = np.where(between["theta_out_rad"] > 0, up, down)
     between |= {"time_s": trajectory.time_s[:-1], "theta_out_rad": scale * between["theta_out_rad"]}
     return Trajectory(**between)
 

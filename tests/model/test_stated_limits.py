@@ -10,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_exact_energy import stored
 
+from ccmodel import mechanisms
 from ccmodel.geometry import ConduitPath
 from ccmodel.model.exact import Status, simulate_pair
-from ccmodel.model.general import simulate
+from ccmodel.model.general import Active, simulate
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import FixedLoad, SpringLoad
 from ccmodel.model.transmission import MAX_FRICTION_ANGLE, Transmission
@@ -58,6 +59,22 @@ def test_the_general_solver_too(load, data, elements):
     found = simulate(one, far, 0.01 * np.arange(theta.size), theta, initial, elements=elements)
     # What a step whose search stalls is accepted with (`ccmodel.model.general.newton.LOOSE_TOLERANCE`).
     check_mechanics(one, far, initial, found, solved_to=1e-5)
+
+
+@pytest.mark.parametrize("name", mechanisms.names())
+@settings(max_examples=examples(5), deadline=None)
+@given(data=st.data())
+def test_the_general_solver_with_each_mechanism_has_a_status_or_tensions_that_no_cable_pushes_with(name, data):
+    one, far, initial, theta = data.draw(cases(data.draw(st.sampled_from(("spring", "free")))))
+    mechanism = mechanisms.get(name)
+    values = {p.name: p.at(data.draw(st.floats(0.0, 1.0))) for p in mechanism.parameters}
+    signs = {p.name: data.draw(st.sampled_from((-1, 1))) if p.signed else 1 for p in mechanism.parameters}
+    active = Active(name, data.draw(st.sampled_from(mechanism.places)), {n: signs[n] * v for n, v in values.items()})
+    found = simulate(one, far, 0.01 * np.arange(theta.size), theta, initial, [active], elements=8)
+    if found.status is Status.OK:
+        ends = [found.T1_N, found.T2_N, *(() if one.is_single_cable else (found.T3_N, found.T4_N))]
+        assert np.isfinite([*ends, found.theta_out_rad, found.tau_in_Nm, found.tau_out_Nm]).all()
+        assert np.min(ends) >= 0
 
 
 def check_mechanics(one, far, initial, found, solved_to):

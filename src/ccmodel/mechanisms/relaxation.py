@@ -28,8 +28,8 @@ from ccmodel.mechanisms.contract import SLIDING_FRICTION, Curve, Mechanism, Para
 
 # Branches of the chain.
 BRANCHES = 4
-# A branch that has followed by this share has settled.
-SETTLED = 1.0 - 1e-12
+# Cables of which less than this share has followed are fresh, and those of which less is left have settled.
+FRESH = 1e-12
 
 
 def branch_times(tau: float, spread: float) -> tuple[float, ...]:
@@ -45,7 +45,9 @@ def relaxed_after(seconds: float, r: float, tau: float, spread: float = 1.0) -> 
 
 def followed(r: float, times: tuple[float, ...], relaxed: float) -> NDArray:
     """Share of the elastic tension that each branch has followed at a state `relaxed`, shape (branches,)."""
-    wanted, tau = min(relaxed / (1 - r + r * relaxed), SETTLED), np.array(times)
+    wanted, tau = min(relaxed / (1 - r + r * relaxed), 1.0 - FRESH), np.array(times)
+    if wanted < FRESH:
+        return np.zeros(tau.size)
 
     def excess(seconds: float) -> float:
         return float(np.mean(-np.expm1(-seconds / tau))) - wanted

@@ -44,6 +44,8 @@ def read_by_sensors(
     active: Sequence[Active], time_s: NDArray, channels: dict[str, NDArray], radii: tuple[float, float]
 ) -> dict[str, NDArray]:
     """Readings of the sensors (n samples a channel) from true values, with the faults that act on them."""
+    if time_s.size == 0:  # a run that ended before its first sample
+        return channels
     for a in active:
         mechanism = registry.get(a.name)
         if mechanism.modifies_observation is not None:
