@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from ccmodel.diagnosis.candidate import CandidateFit
-from ccmodel.diagnosis.discrepancy import Discrepancy, Modes, Products, _log_evidence, evidence_of
+from ccmodel.diagnosis.discrepancy import Discrepancy, Modes, Products, _log_evidence, _weight, evidence_of
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from made_observations import batch, calibrated
 
@@ -117,7 +117,14 @@ def test_the_tolerance_counts_once_for_all_recordings(recordings, discrepancy):
     assert by_tolerance < by_noise
 
 
+@pytest.mark.parametrize(("share", "weight"), [(0.0, 1.0), (0.5, 0.625), (1.0, 0.25)])
+def test_what_a_tolerance_allows_weighs_as_one_recording_of_all(recordings, share, weight):
+    one = replace(recordings[0], observations=_allowing(recordings[0].observations, share))
+    n = one.measured.shape[1]
+    assert _weight(one, samples=n, recordings=4) == pytest.approx(weight)
+
+
 def _allowing(o, share):
     """The same observations with a tolerance that makes up a share of each variance."""
-    sigma = np.ptp(o.measured, axis=1, keepdims=True) / np.sqrt(share) * np.ones_like(o.measured)
-    return replace(o, sigma=sigma, tolerance=np.ones(len(o.channels)))
+    sigma = np.ptp(o.measured, axis=1, keepdims=True) * np.ones_like(o.measured)
+    return replace(o, sigma=sigma, tolerance=np.full(len(o.channels), np.sqrt(share)))

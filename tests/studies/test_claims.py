@@ -117,6 +117,14 @@ def test_the_figures_say_what_was_simulated(found, tmp_path):
     assert "simulated (no recording)" in said
 
 
+def test_every_panel_shows_recordings_and_model(found):
+    figure = recordings_figure(list(found.values()), "")
+    for ax in figure.axes:
+        drawn = {line.get_marker() for line in ax.lines if np.isfinite(np.asarray(line.get_ydata(), float)).any()}
+        assert "_" in drawn, f"no model in the panel {ax.get_xlabel()}, {ax.get_ylabel()}"
+        assert ax.containers, f"no recording in the panel {ax.get_xlabel()}, {ax.get_ylabel()}"
+
+
 def test_without_repeats_there_is_no_interval_and_it_is_said():
     pairs = pairs_over([(model_runs.even(STUDY, n * np.pi), 2.5) for n in (1, 2)])[::2]
     claim = claims_of({"bend": pairs, "pretension": [], "radius": []}, None, CLAIMS, HOW)[0]
