@@ -1,8 +1,11 @@
 """Compiled code is not taken from the cache once a source it was made from has changed."""
 
 import ast
+import os
 import re
 import shutil
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -10,7 +13,8 @@ import numba
 import pytest
 
 import ccmodel
-from ccmodel import provenance
+from ccmodel import kernel, provenance
+from ccmodel.elementary import quick_exp
 from ccmodel.kernel import TESTED_NUMBA, check_numba
 from ccmodel.mechanisms.presliding import dahl
 from ccmodel.model.exact.run import run
@@ -66,6 +70,37 @@ def test_a_change_elsewhere_does_not(digest_of_copy):
     with (copy / "report" / "figures.py").open("a") as file:
         file.write("# a change\n")
     assert digest("ccmodel.model.general.march") == before
+
+
+CALLS = """
+import pathlib, sys, time
+from ccmodel.elementary import quick_exp
+here = pathlib.Path(sys.argv[1])
+(here / sys.argv[2]).touch()
+while len(list(here.iterdir())) < 3:
+    time.sleep(0.01)
+quick_exp(1.0)
+"""
+
+
+def test_processes_that_need_a_kernel_at_once_end_with_one_compilation(tmp_path):
+    """Each compilation writes a file of its own; the others load it."""
+    package = tmp_path / "source/ccmodel"
+    shutil.copytree(Path(ccmodel.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
+    (ready := tmp_path / "ready").mkdir()
+    environment = os.environ | {"PYTHONPATH": str(package.parent)}
+    commands = [[sys.executable, "-c", CALLS, str(ready), str(k)] for k in range(3)]
+    started = [subprocess.Popen(command, env=environment, cwd=tmp_path) for command in commands]
+    assert [process.wait() for process in started] == [0, 0, 0]
+    assert len(list((package / "__pycache__").glob("elementary.quick_exp*.nbc"))) == 1
+
+
+def test_a_kernel_is_compiled_under_a_lock_of_its_own(monkeypatch):
+    locked = []
+    monkeypatch.setattr(kernel.fcntl, "flock", lambda file, kind: locked.append(Path(file.name).name))
+    quick_exp.compile((numba.float32,))
+    (name,) = locked
+    assert name.startswith("elementary.quick_exp") and name.endswith(".lock")
 
 
 def test_the_tested_range_of_numba_is_that_of_the_package():

@@ -1,15 +1,23 @@
 """Compilation of kernels with numba, and a cache on disk that is keyed by all of a kernel's sources."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
+from pathlib import Path
 from typing import Any, TypeVar, overload
 from uuid import uuid4
 
 import numba
 from numba import njit, types
+from numba.core.compiler_lock import global_compiler_lock
 from numba.extending import intrinsic
 
 from ccmodel.provenance import source_digest
+
+try:
+    import fcntl
+except ImportError:  # Windows: there each process compiles for itself
+    fcntl = None  # type: ignore[assignment]
 
 # Versions of numba with which the private attributes used here were tested: from the first, below the second. The range
 # in pyproject.toml is the same.
@@ -72,7 +80,40 @@ def kernel(function: Any = None, **options: Any) -> Any:
     if cache := getattr(compiled, "_cache", None):
         files = cache._cache_file
         files._data_name_pattern = files._data_name_pattern.replace("{", f"{_PROCESS}-{{")
+        _compile_once(compiled, Path(cache.cache_path) / f"{files._index_name}.lock")
     return compiled
+
+
+def _compile_once(compiled: Any, lock: Path) -> None:
+    """Let processes that need a kernel at the same time wait for the one that compiles it, and take it from the cache.
+
+    Otherwise each of the first jobs of a pipeline, and each process that runs tests, compiles all kernels.
+    """
+    compile_here = compiled.compile
+
+    def compile(signature: Any) -> Any:
+        # numba's own lock first, as a thread that compiles a caller holds it while it compiles this kernel.
+        with global_compiler_lock, _held(lock):
+            return compile_here(signature)
+
+    compiled.compile = compile
+
+
+_HELD: set[Path] = set()
+
+
+@contextmanager
+def _held(lock: Path) -> Iterator[None]:
+    """The only process in here, as far as the file system knows locks; a killed process lets go of its own."""
+    with ExitStack() as stack:
+        if fcntl and lock not in _HELD:
+            # On a file system without locks, each process compiles for itself.
+            with suppress(OSError):
+                lock.parent.mkdir(parents=True, exist_ok=True)
+                fcntl.flock(stack.enter_context(lock.open("w")), fcntl.LOCK_EX)
+                _HELD.add(lock)
+                stack.callback(_HELD.remove, lock)
+        yield
 
 
 def _ignore_literals(compiled: Any) -> None:
