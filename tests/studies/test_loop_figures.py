@@ -182,9 +182,11 @@ def test_of_very_many_recordings_some_are_drawn_from_the_best_to_the_worst():
         off = {"tau_out_Nm": simulated["tau_out_Nm"] + 0.001 * ((number * 37) % 200)}
         return recorded, simulated.with_channels(simulated.channels | off, simulated.derived_from, "model")
 
-    drawn = draw([one(number) for number in range(200)], rows="recording")
+    drawn = draw([one(number) for number in range(200)], rows="recording", variable="recording")
     titles = [ax.get_title(loc="left") for ax in drawn.axes if ax.get_title(loc="left")]
     assert len(titles) == 48 and titles == sorted(titles)
     worst = next(n for n in range(200) if n * 37 % 200 == 199)
     assert {"b/000", f"b/{worst:03d}"} <= set(titles)
     assert "48 of 200 panels" in drawn.get_suptitle()
+    (legend,) = drawn.legends
+    assert len(legend.get_texts()) == 2, "the titles of the panels name the recordings"

@@ -94,7 +94,10 @@ def loops_figure(
     conditions = by_label(pairs, study.variable)
     looks = dict(zip(conditions, map(_look, range(len(conditions))), strict=True))
     panels = {row: _of_row(conditions, row_pairs) for row, row_pairs in rows.items()}
-    if apart or max(map(len, panels.values())) > CONDITIONS_IN_A_PANEL:
+    if all(list(by) == [row] for row, by in panels.items()):
+        # Each condition is a panel, whose title names it.
+        panels, looks = {row: {"": by[row]} for row, by in panels.items()}, {"": ALONE}
+    elif apart or max(map(len, panels.values())) > CONDITIONS_IN_A_PANEL:
         panels = {_joined(row, label): {"": group} for row, by in panels.items() for label, group in by.items()}
         looks = {"": ALONE}
     compared = [c for c in (x, y) if any(is_compared(*pair, c) for pair in pairs)]
@@ -104,6 +107,7 @@ def loops_figure(
         panels = _spread(panels, compared)
     # Without any simulation there is still a strip, which says so.
     channels = compared or [c for c in (x, y) if c != THETA_IN]
+    in_panels = {label for by in panels.values() for label in by if label}
     figure, cells = _grid(len(panels), len(channels), columns=2 if len(panels) in (2, 4) else 3)
     for (title, by), (loop, strips) in zip(panels.items(), cells, strict=True):
         drawn = {looks[label]: group for label, group in by.items()}
@@ -112,7 +116,8 @@ def loops_figure(
         for strip, channel in zip(strips, channels, strict=True):
             _residuals(strip, drawn, channel, smoothing_share)
             _finish_strip(strip, f"Δ {TABLE[channel].tex} ({_unit(channel)})")
-    _title_and_legend(figure, pairs, study, drawn_of_all, {label: look for label, look in looks.items() if label})
+    named = {label: look for label, look in looks.items() if label in in_panels}
+    _title_and_legend(figure, pairs, study, drawn_of_all, named)
     return figure
 
 
