@@ -43,6 +43,15 @@ def test_the_coefficients_make_smooth_curves_of_variance_one(resolution, is_cent
     assert np.mean(np.diff(curves, axis=0) ** 2) < 0.5 * np.mean(curves**2)
 
 
+@pytest.mark.parametrize("law", EVERY, ids=lambda law: f"{law.name}-{law.place}")
+def test_a_law_with_more_knots_is_no_second_law(law):
+    alike = [one for one in EVERY if one.has_the_quantity_of(law)]
+    assert law in alike and (law.finer() is None or law.finer() in alike)
+    assert {(one.slot, one.place, one.channel, one.argument, one.opposes) for one in alike} == {
+        (law.slot, law.place, law.channel, law.argument, law.opposes)
+    }
+
+
 @pytest.mark.parametrize("law", [law for law in EVERY if law.is_first], ids=lambda law: law.name)
 def test_without_coefficients_a_law_changes_nothing_and_with_one_it_does(law):
     theta_in = sine(cycles=1)

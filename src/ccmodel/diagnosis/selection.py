@@ -137,9 +137,8 @@ class Selection:
             return found
         assert found.discrepancy is not None
         self.progress(f"looking for what acts beside {best.hypothesis}", 0.0)
-        others = [
-            law for law in self.laws if all(law.finer() != one and law != one for one in laws_in(best.hypothesis))
-        ]
+        acting = laws_in(best.hypothesis)
+        others = [law for law in self.laws if not any(law.has_the_quantity_of(one) for one in acting)]
         scores = [s for s in screen(best, self.mechanisms, self.deadline).singles() if s.gain > settings.WORTH_FITTING]
         second = proposals(best, found.discrepancy, others, self.deadline)[: settings.PARTNERS]
         chosen = scores[: settings.PARTNERS] + [Score(p.hypothesis, 0.0, p.values) for p in second]

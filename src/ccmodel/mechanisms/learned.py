@@ -238,6 +238,10 @@ class Law:
         is_same_sensor = self.slot != SENSOR_MAP or self.channel == other.channel
         return (self.slot, self.place) == (other.slot, other.place) and is_same_sensor
 
+    def has_the_quantity_of(self, other: "Law") -> bool:
+        """Whether it is the other law, with as many knots or not."""
+        return replace(self, resolution=other.resolution) == other
+
     def finer(self) -> "Law | None":
         """The same law with more coefficients, if there is one."""
         is_finest = self.argument.has_two_values or self.opposes is not None or not self.is_first
