@@ -48,8 +48,10 @@ def test_an_impossible_reading_may_lie_within_the_range():
 
 
 @pytest.mark.parametrize("column", ["drive_current_A", "load_current_A", "drive_load_cell_V", "load_load_cell_V"])
-@pytest.mark.parametrize("factor", [4, 1000, 1e90])
-def test_a_log_with_an_impossible_reading_is_read_without_its_row(bench, column, factor):
+@pytest.mark.parametrize(
+    ("factor", "why"), [(4, "far from those near it"), (1000, "far from those near it"), (1e200, "no number")]
+)
+def test_a_log_with_an_impossible_reading_is_read_without_its_row(bench, column, factor, why):
     healthy = table()
     damaged = healthy.copy()
     damaged.loc[250, column] = factor * np.abs(healthy[column]).max()
@@ -58,7 +60,7 @@ def test_a_log_with_an_impossible_reading_is_read_without_its_row(bench, column,
     ingested = ingest_batch(bench.folder)
     (finding,) = ingested.findings
     assert (finding.row, finding.column, finding.severity) == (252, column, "warning")
-    assert "far from those near it" in finding.text and finding.text.endswith("row dropped")
+    assert why in finding.text and finding.text.endswith("row dropped")
     healthy.drop(index=250).to_csv(bench.log(), index=False)
     without = ingest_batch(bench.folder).recordings[0]
     for channel, values in ingested.recordings[0].channels.items():
