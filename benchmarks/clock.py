@@ -1,9 +1,14 @@
-"""Processor time of a call: the least of several repeats, since other processes can only add to it."""
+"""Processor time of a call: the least of several repeats, since other processes can only add to it.
+
+And a time limit for diagnoses whose verdicts are counted.
+"""
 
 import time
 from collections.abc import Callable
 
 REPEATS = 5
+# A time limit that no diagnosis reaches, s: its verdict then depends on its limit on model runs alone.
+NEVER_S = 1e6
 
 
 def seconds(function: Callable[[], object], repeats: int = REPEATS) -> float:

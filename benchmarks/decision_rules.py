@@ -25,6 +25,7 @@ import numpy as np
 import pandas as pd
 
 import ccmodel
+from benchmarks.clock import NEVER_S
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.comparison import Comparison, log_odds_of_repeats, log_priors
@@ -35,7 +36,6 @@ from proof.cases import draw
 from proof.intervals import count, text_of
 from proof.judge import judge
 from proof.outcome import Outcome, outcome
-from proof.plan import read_plan
 
 PRESENT, FORMER = "present", "former"
 
@@ -96,7 +96,7 @@ def run(seed: int, former: Path, out: Path) -> dict:
     with tempfile.TemporaryDirectory() as folder:
         batch = Path(folder) / case.name
         record(case, case.recordings, batch)
-        found = ccmodel.diagnose(batch, without=list(case.without), time_limit_s=read_plan().time_limit_s)
+        found = ccmodel.diagnose(batch, without=list(case.without), time_limit_s=NEVER_S)
     report = found.report
     decisions = {
         PRESENT: {

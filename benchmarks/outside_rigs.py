@@ -31,6 +31,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 import ccmodel
+from benchmarks.clock import NEVER_S
 from ccmodel.inference.pool import set_threads
 from proof.build import noise_floor, simulate
 from proof.plan import read_plan
@@ -315,7 +316,7 @@ def diagnose(results: Path, folder: Path, name: str) -> str:
     if (out / "extended").exists():
         return f"{name}: done"
     started = time.process_time()
-    found = ccmodel.diagnose(folder / "cases" / name)
+    found = ccmodel.diagnose(folder / "cases" / name, time_limit_s=NEVER_S)
     found.save(out)
     for model, into in ((found.calibrated, "calibrated"), (found.model, "extended")):
         if model is not None:

@@ -1,9 +1,10 @@
 """Rigs with several concealed effects, each of them visible by itself: which of them does the diagnosis name?
 
-``python -m benchmarks.several_effects --kind triple --seed S --count N --out DIR`` draws cases one seed after the
-other. A case's rig is first recorded with each of its effects alone. An effect is visible by itself if the recalibrated
-model is then off by the proof's `VISIBLE` noise floors on the held-out recordings. The first N cases all of whose
-effects are visible are diagnosed as the proof does; how many were drawn for them is printed with the rates.
+``python -m benchmarks.several_effects --kind triple --seed S --count N --out DIR`` draws a rig for each seed, with
+eight effects in random order. The rig is recorded with one effect at a time, until as many are visible by themselves
+as its kind has; it has these. An effect is visible by itself if the recalibrated model is then off by the proof's
+`VISIBLE` noise floors on the held-out recordings. The first N such rigs are diagnosed as the proof does; how many
+effects were tried for them is printed with the rates.
 """
 
 import argparse
@@ -12,6 +13,7 @@ import tempfile
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 import ccmodel
 from ccmodel.inference.pool import set_threads
@@ -42,22 +44,35 @@ def visible_alone(case: Case) -> bool:
     return max(over) >= VISIBLE
 
 
-def judged(seed: int, kind: str, out: Path) -> dict:
-    """Result of a case: its effects, whether each is visible alone, and what was named; read again if it exists.
+def visible_case(seed: int, size: int) -> tuple[Case | None, int]:
+    """A rig with as many effects that are visible by themselves, and how many were tried; None if there are not."""
+    drawn, visible = draw(seed, "many"), []
+    for k in range(len(drawn.truth)):
+        if visible_alone(drawn.having([k])):
+            visible.append(k)
+        if len(visible) == size:
+            return drawn.having(visible), k + 1
+    return None, len(drawn.truth)
 
-    A case with an effect that is not visible is not diagnosed, and has no ``verdict``.
+
+def judged(seed: int, kind: str, out: Path) -> dict:
+    """Result of a rig: its effects, and what was named; read again if it exists.
+
+    A rig with too few visible effects is not diagnosed, and has no ``verdict``.
     """
     set_threads(1)
-    case = draw(seed, kind)
-    file = out / case.name / "several.json"
+    file = out / f"{kind}-{seed}" / "several.json"
     if file.exists():
         return json.loads(file.read_text(encoding="utf-8"))
-    row = {"case": case.name, "seed": seed, "protocol": case.protocol, "true": [t.name for t in case.truth]}
-    row["visible"] = all(visible_alone(case.alone(k)) for k in range(len(row["true"])))
-    if row["visible"]:
-        result = judge(case, out / case.name, report=lambda text: None, with_follow_ups=False)
+    case, tried = visible_case(seed, SEVERAL[kind])
+    row: dict[str, Any] = {"seed": seed, "tried": tried, "visible": case is not None}
+    if case is not None:
+        result = judge(case, file.parent, report=lambda text: None, with_follow_ups=False)
         found = outcome(result)
         row |= {
+            "case": case.name,
+            "protocol": case.protocol,
+            "true": [t.name for t in case.truth],
             "verdict": found.verdict,
             "failure": found.failure,
             "named": [m["name"] for m in found.identified],
@@ -89,26 +104,26 @@ def rates(rows: list[dict], size: int) -> list[dict]:
 def main() -> None:
     """Diagnose the cases and print a line for each, then the rates."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--kind", choices=SEVERAL, default="triple")
+    parser.add_argument("--kind", choices=("pair", "triple"), default="triple")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--cores", type=int, default=2)
     parser.add_argument("--out", type=Path, required=True)
     asked = parser.parse_args()
-    rows, drawn = [], 0
+    rows, tried = [], 0
     seeds = count(asked.seed)
     with ProcessPoolExecutor(asked.cores) as pool:
         waiting = {pool.submit(judged, next(seeds), asked.kind, asked.out) for _ in range(asked.cores)}
         while waiting:
             ready, waiting = wait(waiting, return_when=FIRST_COMPLETED)
             for done in ready:
-                drawn += 1
+                tried += done.result()["tried"]
                 if done.result()["visible"]:
                     rows.append(done.result())
                     print(json.dumps(rows[-1]), flush=True)
                 if len(rows) + len(waiting) < asked.count:
                     waiting.add(pool.submit(judged, next(seeds), asked.kind, asked.out))
-    print(f"{drawn} cases drawn, {len(rows)} with every effect visible by itself")
+    print(f"{tried} effects tried, {len(rows)} rigs of {SEVERAL[asked.kind]} that are visible by themselves")
     for one in rates(rows, SEVERAL[asked.kind]):
         print(text_of(one))
 

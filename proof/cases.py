@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -18,7 +19,7 @@ from virtualrig.effects.contract import Twin
 CLEAN = "none"
 SEVERITIES = 3
 # Kinds of cases with several effects, and their number.
-SEVERAL = {"pair": 2, "triple": 3}
+SEVERAL = {"pair": 2, "triple": 3, "many": 8}
 
 
 @dataclass(frozen=True)
@@ -71,9 +72,10 @@ class Case:
         A hash, which reveals neither the kind nor the effects.
     seed : int
     requested : dict
-        Requested kind and effect; None where they were drawn. Of a case of a family also its strength.
+        Requested kind and effect; None where they were drawn. Of a case of a family also its strength, and where it
+        has only some of its effects, which.
     kind : str
-        clean, single, pair, triple, unlisted, removed or poor.
+        clean, single, pair, triple, many, unlisted, removed or poor.
     protocol : str
         Name of the protocol in the plan.
     truth : tuple of Truth
@@ -102,11 +104,15 @@ class Case:
     kept_back: tuple[RecordingPlan, ...]
     effects: tuple[Effects, ...] = ()
 
-    def alone(self, k: int) -> "Case":
-        """The same rig and recordings with one of the concealed effects."""
-        rig = self.campaign.rig.model_copy(update={"effects": self.effects[k]})
-        campaign = self.campaign.model_copy(update={"rig": rig})
-        return replace(self, name=f"{self.name}-{k}", truth=self.truth[k : k + 1], campaign=campaign)
+    def having(self, which: Sequence[int]) -> "Case":
+        """The same rig and recordings with these of the concealed effects only."""
+        effects = tuple(self.effects[k] for k in which)
+        together = Effects.model_validate(merged([e.model_dump(exclude_unset=True) for e in effects]))
+        campaign = self.campaign.model_copy(update={"rig": self.campaign.rig.model_copy(update={"effects": together})})
+        name = "-".join([self.name, *map(str, which)])
+        truth = tuple(self.truth[k] for k in which)
+        requested = self.requested | {"having": list(which)}
+        return replace(self, name=name, requested=requested, truth=truth, campaign=campaign, effects=effects)
 
     @property
     def key(self) -> dict:
@@ -135,7 +141,13 @@ class Case:
         return hashlib.sha256(json.dumps(self.key, sort_keys=True).encode()).hexdigest()
 
 
-def draw(seed: int, kind: str | None = None, effect: str | None = None, strength: float | None = None) -> Case:
+def draw(
+    seed: int,
+    kind: str | None = None,
+    effect: str | None = None,
+    strength: float | None = None,
+    having: Sequence[int] | None = None,
+) -> Case:
     """Draw a case.
 
     Parameters
@@ -147,6 +159,8 @@ def draw(seed: int, kind: str | None = None, effect: str | None = None, strength
         Name of the effect of a single, removed, poor or unlisted case; drawn if not given.
     strength : float, optional
         Strength of that effect, 0 to 1; drawn if not given.
+    having : sequence of int, optional
+        Which of its effects the rig has; all of them if not given.
     """
     plan = read_plan()
     requested: dict[str, Any] = {"kind": kind, "effect": effect}
@@ -173,7 +187,7 @@ def draw(seed: int, kind: str | None = None, effect: str | None = None, strength
     if kind == "removed":
         without = tuple(t.name for t in truth)
         truth = tuple(Truth(**asdict(t) | {"name": f"unlisted-{t.name}"}) for t in truth)
-    return Case(
+    case = Case(
         name=_name(seed, kind, effect, strength),
         seed=seed,
         requested=requested,
@@ -186,6 +200,7 @@ def draw(seed: int, kind: str | None = None, effect: str | None = None, strength
         kept_back=draw_held_out(protocol, plan, conditions, random),
         effects=tuple(Effects.model_validate(merged([e])) for _, e in drawn),
     )
+    return case if having is None else case.having(having)
 
 
 def _name(seed: int, kind: str, effect: str | None, strength: float | None) -> str:

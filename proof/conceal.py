@@ -218,7 +218,9 @@ def diagnose(
         world = Path(folder)
         # Time stamps are not copied: they would show how long each file took to make.
         shutil.copytree(batch, world / batch.name, copy_function=shutil.copyfile)
-        arguments = [*options, *(argument for name in without for argument in ("--without", name))]
+        # No verdict depends on the clock: the time limit is that of the process.
+        arguments = [*options, "--time-limit", str(TIMEOUT_S)]
+        arguments += [argument for name in without for argument in ("--without", name)]
         if baseline is not None:
             shutil.copy(baseline, world / "baseline.json")
             arguments += ["--baseline", "baseline.json"]

@@ -15,7 +15,6 @@ from proof.build import folder_digest, noise_floors, record
 from proof.cases import Case
 from proof.follow_up import follow_ups
 from proof.measured import CHANNELS, error_squares
-from proof.plan import read_plan
 
 DRIVE_COLUMNS = ("time_s", "drive_encoder_counts")
 # Model files of a diagnosis: with recalibrated parameters alone, and with the identified mechanisms.
@@ -63,13 +62,12 @@ def judge(
         record(case, case.recordings, batch)
         report(f"{case.name}: diagnosing, {conceal.core_s() - started:.0f} s of one core so far")
         digest = folder_digest(batch)
-        limit = ("--time-limit", f"{read_plan().time_limit_s:g}")
-        completed = conceal.diagnose(batch, out, case.without, sources, limit)
+        completed = conceal.diagnose(batch, out, case.without, sources)
         report(f"{case.name}: predicting held-out recordings, {conceal.core_s() - started:.0f} s of one core so far")
         diagnosis = _read_diagnosis(out / "diagnosis.json") if completed.is_usable else None
         held_out = _compare_with_held_out(case, batch, out, sources, with_regressors) if diagnosis else _HeldOut()
         took_s = conceal.core_s() - started
-        again, further = _Again(case, sources, limit), {}
+        again, further = _Again(case, sources), {}
         if diagnosis and with_follow_ups:
             further = follow_ups(case, out / "diagnosis.json", batch, Path(folder), again.diagnosed)
     result = {
@@ -128,12 +126,11 @@ class _Again:
 
     case: Case
     sources: Path
-    options: tuple[str, ...]
     tampering: tuple[str, ...] = ()
 
     def diagnosed(self, batch: Path, out: Path) -> dict | None:
         """Diagnose a batch of the case; None without a usable result."""
-        completed = conceal.diagnose(batch, out, self.case.without, self.sources, self.options)
+        completed = conceal.diagnose(batch, out, self.case.without, self.sources)
         self.tampering += completed.tampering
         return _read_diagnosis(out / "diagnosis.json") if completed.is_usable else None
 

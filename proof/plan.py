@@ -176,7 +176,6 @@ class Plan(Strict):
     protocols: dict[str, Protocol]
     kept_back: KeptBackPlan
     order: tuple[str, ...]
-    time_limit_s: PositiveFloat
     quick: tuple[FixedCase, ...]
     full: Full
     families: FamiliesPlan

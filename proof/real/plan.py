@@ -36,7 +36,7 @@ class RealPlan(Strict):
     step_s: PositiveFloat
     cycles: PositiveInt
     tolerance: dict[str, Share]
-    time_limit_s: PositiveFloat
+    run_limit: PositiveInt
     tolerance_factors: tuple[PositiveFloat, ...] = Field(min_length=1)
     controls: tuple[tuple[str, ...], ...] = ()
     repeats: PositiveInt

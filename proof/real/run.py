@@ -33,7 +33,7 @@ def find_baseline(plan: RealPlan, source: Path, out: Path, report: Report, sourc
     with tempfile.TemporaryDirectory(prefix="training-") as folder:
         batch = Path(folder) / "known"
         write_batch(source, plan.training, batch)
-        options = [*_options(plan, 1.0), "--time-limit", f"{plan.time_limit_s:g}"]
+        options = [*_options(plan, 1.0), "--run-limit", str(plan.run_limit)]
         diagnosis = _diagnosed(batch, out / "first", options, None, sources)
         which = "nearest.json" if diagnosis["verdict"] == "unexplained" and diagnosis.get("nearest") else "model.json"
         shutil.copy(out / "first" / which, out / BASELINE)

@@ -188,3 +188,12 @@ def test_the_noise_floor_adds_sensors_and_repeatability(poor, monkeypatch):
     count = 2 * np.pi / 2000 / np.sqrt(12)
     # Two counts of the load and, once the drive moves, one of the drive.
     assert floor["theta_out_rad"] == pytest.approx(np.sqrt(3) * count, rel=0.05)
+
+
+def test_a_rig_that_has_some_of_its_effects_is_otherwise_the_same():
+    whole = draw(5, "many")
+    part = whole.having([1, 3])
+    assert part.truth == (whole.truth[1], whole.truth[3])
+    assert (part.recordings, part.kept_back) == (whole.recordings, whole.kept_back)
+    assert draw(5, **part.requested).digest == part.digest != whole.digest
+    assert [whole.having([k]).campaign.rig.effects for k in range(8)] == list(whole.effects)

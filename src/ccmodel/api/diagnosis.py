@@ -208,6 +208,7 @@ def diagnose(
     step_s: float | None = None,
     cycles: int | None = None,
     candidates: Candidates = (),
+    run_limit: int | None = None,
     time_limit_s: float | None = None,
     trust_inputs: bool = False,
     progress: bool | Progress = False,
@@ -235,8 +236,12 @@ def diagnose(
     candidates : str or sequence
         Mechanisms at their places, which are fitted in full whatever the screening says: ``"kink at conduit"``; or up
         to four together, as ``"kink at conduit, backlash at load-pulley"`` or as a sequence; or a sequence of these.
+    run_limit : int, optional
+        Runs of the model, each on one recording, after which no further candidate is fitted; by default 50,000, which
+        take two cores about two minutes. The report says so. The verdict does not depend on the machine as long as this
+        limit comes first.
     time_limit_s : float, optional
-        Time after which no further candidate is fitted, s, by default 140; the report says so.
+        Time after which no further candidate is fitted, s, by default 160.
 
     Returns
     -------
@@ -260,7 +265,15 @@ def diagnose(
     Model: ...; pulley-friction at drive-pulley + presliding at conduit + ..., fitted to half-loop, ...
     """
     options = diagnosis_options(
-        tolerance, step_s, cycles, candidates, without, freeze, baseline is not None, time_limit_s=time_limit_s
+        tolerance,
+        step_s,
+        cycles,
+        candidates,
+        without,
+        freeze,
+        baseline is not None,
+        run_limit=run_limit,
+        time_limit_s=time_limit_s,
     )
     known = None if baseline is None else as_model(baseline).parameters
     if out is not None:

@@ -22,7 +22,12 @@ Tolerance = float | Mapping[str, float]
 # Candidates that are fitted whatever the screening says: one, or several, each of them one to four mechanisms together.
 Candidates = str | Sequence[str | Sequence[str]]
 # Name of an option on the command line, where it has another one.
-_ON_COMMAND_LINE = {"step_s": "step", "candidates": "candidate", "time_limit_s": "time-limit"}
+_ON_COMMAND_LINE = {
+    "step_s": "step",
+    "candidates": "candidate",
+    "run_limit": "run-limit",
+    "time_limit_s": "time-limit",
+}
 
 
 def diagnosis_options(
@@ -34,6 +39,7 @@ def diagnosis_options(
     freeze: bool = False,
     has_baseline: bool = False,
     prefix: str = "",
+    run_limit: int | None = None,
     time_limit_s: float | None = None,
 ) -> Options:
     """Checked options of a diagnosis; `prefix` as of `settings_of`.
@@ -44,7 +50,8 @@ def diagnosis_options(
         A line for each option that cannot be used.
     """
     names = (without,) if isinstance(without, str) else tuple(without)
-    options = options_of(settings_of(tolerance, step_s, cycles, candidates, prefix, time_limit_s), names, freeze)
+    stated = settings_of(tolerance, step_s, cycles, candidates, prefix, run_limit, time_limit_s)
+    options = options_of(stated, names, freeze)
     check_options(options, has_baseline, prefix)
     return options
 
@@ -55,6 +62,7 @@ def settings_of(
     cycles: int | None = None,
     candidates: Candidates = (),
     prefix: str = "",
+    run_limit: int | None = None,
     time_limit_s: float | None = None,
 ) -> Diagnosing:
     """Checked settings of a fit or a diagnosis.
@@ -65,6 +73,7 @@ def settings_of(
         As of `ccmodel.diagnose`.
     prefix : str
         What stands before the names of options in messages, "--" on the command line.
+    run_limit : int, optional
     time_limit_s : float, optional
         As of `ccmodel.diagnose`.
 
@@ -76,8 +85,8 @@ def settings_of(
     stated_candidates = [candidates] if isinstance(candidates, str) else candidates
     forced = [_together(one) if isinstance(one, str) else list(one) for one in stated_candidates]
     stated: dict[str, Any] = {"step_s": step_s, "cycles": cycles, "forced_candidates": forced}
-    if time_limit_s is not None:
-        stated["time_limit_s"] = time_limit_s
+    limits = {"run_limit": run_limit, "time_limit_s": time_limit_s}
+    stated |= {name: limit for name, limit in limits.items() if limit is not None}
     if isinstance(tolerance, Mapping):
         if unknown := [repr(name) for name in tolerance if name not in MEASURED]:
             text = f"a channel is one of {', '.join(MEASURED)}; got {', '.join(unknown)}"

@@ -68,9 +68,13 @@ def diagnose(
             show_default=False,
         ),
     ] = None,
+    run_limit: Annotated[
+        float | None,
+        typer.Option("--run-limit", help="Model runs for fitting candidates; 50000 if not given.", show_default=False),
+    ] = None,
     time_limit: Annotated[
         float | None,
-        typer.Option("--time-limit", help="Time for fitting candidates, s; 140 if not given.", show_default=False),
+        typer.Option("--time-limit", help="Time for fitting candidates, s; 160 if not given.", show_default=False),
     ] = None,
     trust_inputs: TrustInputs = False,
     strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 unless the model agrees.")] = False,
@@ -89,7 +93,16 @@ def diagnose(
     output, shares = Output(as_json, quiet), tolerance_of(tolerance)
     # The same check as below, with the names that options have here.
     diagnosis_options(
-        shares, step, cycles, candidate, without, freeze, baseline is not None, prefix="--", time_limit_s=time_limit
+        shares,
+        step,
+        cycles,
+        candidate,
+        without,
+        freeze,
+        baseline is not None,
+        prefix="--",
+        run_limit=run_limit,
+        time_limit_s=time_limit,
     )
     if keep_law is not None:
         check_name(keep_law, prefix="--")
@@ -104,6 +117,7 @@ def diagnose(
             step_s=step,
             cycles=cycles,
             candidates=candidate,
+            run_limit=run_limit,
             time_limit_s=time_limit,
             trust_inputs=trust_inputs,
             progress=progress,

@@ -52,8 +52,11 @@ class Options:
     freeze : bool
         Whether a baseline keeps its values, except for sensor zeros that are not observed at rest. The diagnosis then
         finds what has changed on the rig since the baseline was fitted.
+    run_limit : int
+        Runs of the model, each on one recording, after which no further candidate is fitted: the verdict is on what was
+        fitted until then. It does not depend on the machine.
     time_limit_s : float
-        Time after which no further candidate is fitted, s: the verdict is on what was fitted until then.
+        The same as a time, s.
     """
 
     tolerance: Tolerance = 0.0
@@ -62,7 +65,12 @@ class Options:
     forced_candidates: Sequence[Sequence[str]] = ()
     without: Collection[str] = ()
     freeze: bool = False
+    run_limit: int = settings.RUN_LIMIT
     time_limit_s: float = settings.TIME_LIMIT_S
+
+    def deadline(self, share: float = 1.0) -> Deadline:
+        """When a share of both limits is over, counted from now."""
+        return Deadline.after(share * self.time_limit_s, share * self.run_limit)
 
 
 @dataclass(frozen=True)
@@ -197,7 +205,7 @@ def diagnose(
     ModelError
         If the model cannot be run on any of the recordings.
     """
-    deadline, sets_until = (Deadline.after(share * options.time_limit_s) for share in (1.0, settings.SETS_SHARE))
+    deadline, sets_until = options.deadline(), options.deadline(settings.SETS_SHARE)
     found = calibrate(recordings, estimates, options, baseline, within(progress, 0.0, CALIBRATED))
     tested, whitened = found.tested, found.whitened
     unjudged = [*map(dict, not_judged), *found.not_judged]
@@ -210,7 +218,10 @@ def diagnose(
     selection = Selection(tested.free, mechanisms, forced, first_laws(), of_selection, deadline, sets_until)
     comparison, scores = selection.run(whitened, found.fit)
     if deadline.has_passed:
-        why = f"the time limit of {options.time_limit_s:g} s was reached before all of them were fitted"
+        limit = f"the limit of {options.run_limit:,} model runs"
+        if deadline.is_late:
+            limit = f"the time limit of {options.time_limit_s:g} s"
+        why = f"{limit} was reached before all of them were fitted"
         unjudged.append({"what": "further candidates", "why": why})
     progress("deciding the verdict", SELECTED)
     judgement = judge(comparison, scores)

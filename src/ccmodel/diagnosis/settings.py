@@ -169,9 +169,13 @@ MOST_MECHANISMS = 4
 # Candidates to which a further mechanism is added, by the size of the set; further ones that are fitted with each; and
 # sets of the first screening that are fitted. Chosen for time.
 FIRSTS, PARTNERS, LINEAR_SETS = {2: 2, 3: 1, 4: 1}, 3, 2
-# Time after which no further candidate is fitted, s. Chosen: the verdict and its report take some 20 s more, and the
-# whole less than three minutes.
-TIME_LIMIT_S = 140.0
+# Runs of the model, each on one recording, after which no further candidate is fitted. Chosen: they take two cores that
+# do nothing else about two minutes. (On one core, a run and all that a diagnosis does with it took 4.2 ms in
+# data/raw/rich, with recordings of 1,251 samples, and 2.9 ms in data/raw/da-vinci, with 215.)
+RUN_LIMIT = 50_000
+# Time after which no further candidate is fitted, s, for slower machines. Chosen: the verdict and its report take some
+# 20 s more, and the whole three minutes.
+TIME_LIMIT_S = 160.0
 # Candidates of which none is complete that are fitted again about the best of them. Chosen for time.
 CONTENDERS = 4
 # Excess mean square over that of the best candidate above which a rival is not fitted again about it. Chosen for time:
@@ -245,7 +249,7 @@ LISTED_STARTS = 3
 WITHIN_BAND = 1.645
 # Share of the excess mean square below which what the best single listed mechanism leaves is learned too. Chosen.
 MOSTLY_LISTED = 0.5
-# Share of the time after which no further set is fitted before laws are learned. Chosen: laws take some 40 s.
+# Share of both limits after which no further set is fitted before laws are learned. Chosen: laws take some 40 s.
 SETS_SHARE = 0.6
 # Share of what smaller sets leave that a larger one leaves at most if still larger ones come before laws. Chosen.
 LEADING_ON = 0.5

@@ -1,7 +1,7 @@
 """Work on every recording, side by side, on as many threads as the run was given.
 
-Compiled solvers release Python's lock, so threads are enough. Results come in the order of the recordings and do not
-depend on the number of threads.
+Compiled solvers release Python's lock, so threads are enough. Results come in the order of the recordings. Neither they
+nor the work that is done depend on the number of threads.
 """
 
 import multiprocessing
@@ -10,6 +10,8 @@ import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
+from typing import Any
 
 _threads: int | None = None
 
@@ -26,17 +28,30 @@ def threads() -> int:
 
 
 def each(items: Sequence, work: Callable) -> list:
-    """``work(i, item)`` for every item; results in their order.
+    """``work(i, item)`` for every item, also if one of them fails; results in their order.
 
     Raises
     ------
     Exception
-        The first that any of the calls raised.
+        Of the first item whose work failed.
     """
     if threads() == 1:
-        return [work(i, item) for i, item in enumerate(items)]
-    with ThreadPoolExecutor(threads()) as pool:
-        return list(pool.map(work, range(len(items)), items))
+        attempts = [_attempt(work, i, item) for i, item in enumerate(items)]
+    else:
+        with ThreadPoolExecutor(threads()) as pool:
+            attempts = list(pool.map(partial(_attempt, work), range(len(items)), items))
+    for _, failure in attempts:
+        if failure is not None:
+            raise failure
+    return [result for result, _ in attempts]
+
+
+def _attempt(work: Callable, i: int, item: Any) -> tuple[Any, Exception | None]:
+    """The result of work, and the error with which it failed."""
+    try:
+        return work(i, item), None
+    except Exception as failure:  # raised again by `each`
+        return None, failure
 
 
 @contextmanager

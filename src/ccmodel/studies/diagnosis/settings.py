@@ -5,7 +5,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from ccmodel import mechanisms
-from ccmodel.diagnosis.settings import MOST_MECHANISMS, TIME_LIMIT_S
+from ccmodel.diagnosis.settings import MOST_MECHANISMS, RUN_LIMIT, TIME_LIMIT_S
 from ccmodel.steps.settings import Tolerance
 from ccmodel.typed import TypedModel
 
@@ -25,6 +25,11 @@ class Diagnosing(TypedModel):
     forced_candidates: list[list[str]] = Field(
         default_factory=list,
         description="one to four mechanisms each, 'name at place', to fit in full whatever the screening says",
+    )
+    run_limit: int = Field(
+        RUN_LIMIT,
+        gt=0,
+        description="runs of the model after which no further candidate is fitted; the verdict says so",
     )
     time_limit_s: float = Field(
         TIME_LIMIT_S, gt=0, description="time after which no further candidate is fitted, s; the verdict says so"
