@@ -5,15 +5,17 @@ import pytest
 
 from ccmodel import mechanisms as registry
 from ccmodel.channels import TAU_IN, THETA_IN, THETA_OUT
+from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.mechanisms import Sensing, laws
 from ccmodel.mechanisms.learned import COARSE, FINE, basis
+from ccmodel.mechanisms.presliding import Contacts
 from ccmodel.mechanisms.tables import Table, pulled, stretched
 from ccmodel.model.load import FixedLoad, SpringLoad
 from tests.general_runs import HALF_LOOP, K_E, MU, K, L, loop_area, run, sine
 
 EVERY = list(laws().values())
-RANGES = {"tension": (1.0, 12.0), "position-along-conduit": (0.0, 1.0), "distance-since-reversal": (1e-4, 1.0)}
+RANGES = {"tension": (1.0, 12.0), "position-along-conduit": (0.0, 1.0), "distance-since-reversal": (1e-5, 1.0)}
 SCALES = {"end-stretch": 5e-5}
 
 
@@ -178,6 +180,48 @@ def test_a_law_with_memory_is_a_sum_of_maxwell_slip_elements():
     assert torque[2000] == pytest.approx(torque[400])
     up, down = torque[1200:2001], torque[400:1201]
     np.testing.assert_allclose(up, -down, atol=1e-12)
+
+
+def test_a_law_of_the_sliding_distance_is_a_sum_of_elements_at_every_contact():
+    """With the shares of the mechanism's elements at its knots, it acts and looks as the mechanism does."""
+    law = laws()["learned-sliding-friction-by-distance-since-reversal"]
+    values = values_of(law) | {"first": 1e-5, "last": 2e-3, "scale": 0.3}
+    travel, _ = law.at_knots(values)
+    spread = float(travel[5] / travel[2])
+    alike = {"z0": float(travel[2]) / 2 * spread**0.5, "spread": spread, "creep": 0.0}
+    shares = np.isin(np.arange(travel.size), [2, 3, 4, 5]) / 4
+    by_law, by_mechanism = Contacts.of_law(travel[2:6], shares[2:6]), Contacts.of_mechanism(**alike)
+    assert by_law.element_m == pytest.approx(by_mechanism.element_m)
+    assert by_law.element_share == pytest.approx(by_mechanism.element_share)
+    assert (by_law.creep, by_law.elements) == (0.0, by_mechanism.elements)
+    # A law is smooth over its knots, so that it has these shares nearly.
+    z = np.linalg.lstsq(values["scale"] * law.basis, shares, rcond=None)[0]
+    theta_in = sine(cycles=2)
+    found = run(theta_in, (law.name, "conduit", values | dict(zip(law.coefficients, z, strict=True))))
+    expected, without = run(theta_in, ("presliding", "conduit", alike)), run(theta_in)
+    for channel in (TAU_IN, THETA_OUT):
+        change = np.abs(expected.read[channel] - without.read[channel]).max()
+        assert np.abs(found.read[channel] - expected.read[channel]).max() <= 0.1 * change
+    # What is shown is friction over that of sliding after a reversal: from -1 to 1.
+    at = np.array([1e-9, *travel])
+    curve = 1 + law.shown(travel, at) @ shares
+    assert curve[[0, -1]] == pytest.approx([-1.0, 1.0], abs=1e-3)
+    (listed,) = registry.get("presliding").curves
+    np.testing.assert_allclose(listed.of(at, alike), curve, atol=1e-9)
+    there = law.determined_at(travel)
+    np.testing.assert_allclose(law.behind(travel, listed.of(there, alike)), shares, atol=1e-9)
+
+
+def test_more_than_all_friction_does_not_build_up():
+    shares = np.full(4, 0.5)
+    found = Contacts.of_law(np.geomspace(1e-5, 1e-3, 4), shares)
+    assert (sum(found.element_share), found.creep) == pytest.approx((1.0, 0.0))
+
+
+def test_friction_builds_up_by_one_law_only():
+    law = learned(laws()["learned-sliding-friction-by-distance-since-reversal"], z1=1.0)
+    with pytest.raises(ModelError, match="keep one of them"):
+        run(sine(cycles=1), [law, ("presliding", "conduit", {"z0": 5e-5})])
 
 
 def test_a_load_that_is_held_has_no_law():

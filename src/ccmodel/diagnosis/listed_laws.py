@@ -86,9 +86,9 @@ class _Distance:
         """Of the coefficients that follow the listed law as well as they can, shape (coefficients,)."""
         law, scale = self.learned.law, self.learned.values["scale"]
         constants = zip(self.curve.constants, u, signs, strict=True)
-        y = self.curve.of(self.x, {p.name: _value(p, one, sign) for p, one, sign in constants})
-        # What is shown of a law with memory is the torque from rest.
-        wanted = _without_average(y, law) if law.is_centred else np.linalg.solve(law.shown(self.x), y)
+        at = law.determined_at(self.x)
+        y = self.curve.of(at, {p.name: _value(p, one, sign) for p, one, sign in constants})
+        wanted = _without_average(y, law) if law.is_centred else law.behind(self.x, y)
         z = np.linalg.lstsq(scale * law.basis, wanted, rcond=None)[0]
         return solve_triangular(self.root, z - self.z, lower=True)
 

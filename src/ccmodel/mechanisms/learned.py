@@ -69,6 +69,9 @@ RANGE, SHORTEST_YIELD = (0.005, 0.995), 0.01
 LOWEST_TENSION = 0.02
 # Friction is never negative in either direction.
 LARGEST_BIAS = 0.95
+# A law of the sliding distance opposes the motion of each contact; the shortest travel after which it yields, over the
+# drive's longest.
+CONTACTS, SHORTEST_OF_CONTACTS = "contacts", 0.002
 # A spring is never without stretch: its least compliance over its mean.
 LEAST_COMPLIANCE = 0.05
 
@@ -115,7 +118,9 @@ class Law:
         The channel that a torque or a reading is added to; None for a factor of friction.
     opposes : str or None
         The angle whose motion a friction torque with memory opposes: each of its knots is the travel at which a
-        Maxwell-slip element yields, and its value there is the torque of that element.
+        Maxwell-slip element yields, and its value there is the torque of that element. With `CONTACTS`, it opposes the
+        sliding of each contact: a knot is the travel since a reversal at which an element yields, and the value is its
+        share of friction.
     resolution : (int, float)
         Number of knots, and correlation length.
     """
@@ -163,6 +168,8 @@ class Law:
     @property
     def curve_is(self) -> str:
         """What its values are."""
+        if self.opposes == CONTACTS:
+            return "friction over that of sliding, after a reversal"
         if self.channel is None:
             return _CURVE_IS[self.slot].format(side=side(self.place))
         against = "" if self.opposes is None else ", against the motion"
@@ -186,6 +193,8 @@ class Law:
             return (*before, lambda sensing: self.added(sensing, x, y))
         if not y.any():
             return None
+        if self.opposes == CONTACTS:
+            return Table(x, y)
         if self.is_factor:
             return Table(x, self.possible(1 + y))
         return Table(x, self.possible(y)) if (y > 0).any() else None
@@ -193,7 +202,8 @@ class Law:
     def possible(self, y: NDArray) -> NDArray:
         """Values within what is physically possible: no negative friction or stretch."""
         low = {SLIDING_FRICTION: 0.0, CABLE_STRETCH: LEAST_COMPLIANCE, END_STRETCH: 0.0}.get(self.slot)
-        return y if low is None else y.clip(low)
+        # After a reversal, friction acts in the former direction at first.
+        return y if low is None or self.opposes == CONTACTS else y.clip(low)
 
     @property
     def basis(self) -> NDArray:
@@ -211,15 +221,29 @@ class Law:
         """First and last knot for the arguments that recordings visit."""
         first, last = np.quantile(visited, RANGE)
         if self.is_spaced_by_ratio:
-            first = last * SHORTEST_YIELD if self.opposes else max(first, last * LOWEST_TENSION)
+            shortest = SHORTEST_OF_CONTACTS if self.opposes == CONTACTS else SHORTEST_YIELD
+            first = last * shortest if self.opposes else max(first, last * LOWEST_TENSION)
         return float(first), float(last)
 
-    def shown(self, x: NDArray) -> NDArray:
-        """What its curve shows of its values at the knots, shape (knots, knots).
+    def shown(self, x: NDArray, at: NDArray | None = None) -> NDArray:
+        """What its curve shows of its values at the knots `x`, at the knots or at others, shape (arguments, knots).
 
-        Of a law with memory it is the torque that builds up from rest; otherwise these values.
+        Of a torque with memory it is what builds up from rest, and of the contacts what they lack of sliding friction
+        after a reversal from sliding; otherwise these values.
         """
-        return np.eye(len(x)) if self.opposes is None else np.minimum(x[:, None] / x, 1.0)
+        if self.opposes is None:
+            return np.eye(len(x))
+        built_up = np.minimum((x if at is None else at)[:, None] / x, 1.0)
+        return -2.0 * (1.0 - built_up) if self.opposes == CONTACTS else built_up
+
+    def determined_at(self, x: NDArray) -> NDArray:
+        """Arguments at which its curve determines its values at the knots, shape (knots,)."""
+        # The first element has yielded at its knot, and nothing yields beyond the last one.
+        return np.concatenate([[x[0] / 2], x[:-1]]) if self.opposes == CONTACTS else x
+
+    def behind(self, x: NDArray, curve: NDArray) -> NDArray:
+        """Its values at the knots, from its curve at `determined_at`; both of shape (knots,)."""
+        return np.linalg.solve(self.shown(x, self.determined_at(x)), curve - float(self.is_factor))
 
     @property
     def coefficients(self) -> list[str]:
@@ -313,6 +337,7 @@ _SETTINGS = {
     (SLIDING_FRICTION, "direction"): "direction_bias",
     (SLIDING_FRICTION, "tension"): "friction_by_tension",
     (SLIDING_FRICTION, "position-along-conduit"): "friction_by_position",
+    (SLIDING_FRICTION, "distance-since-reversal"): "contact_elements",
     (SLIDING_FRICTION, ""): "friction_laws",
     (CABLE_STRETCH, "tension"): "cable_compliance",
     (END_STRETCH, "tension"): "{side}_end_stretch",
@@ -448,6 +473,11 @@ LOG_SPEED = Argument("speed", "log10(m/s)", "the logarithm of the cables' speed 
 DWELL = Argument("dwell", "log10(s)", "the logarithm of the contacts' age", _age)
 
 
+SLIDING = Argument(
+    "distance-since-reversal", "m", "a contact's sliding since its last reversal", _since_reversal_of(THETA_IN)
+)
+
+
 def _of_motion(angle: str, end: str) -> dict[str, Argument]:
     """Arguments of the motion of one pulley."""
     return {
@@ -464,8 +494,9 @@ def _of_motion(angle: str, end: str) -> dict[str, Argument]:
 
 def _laws() -> Iterator[Law]:
     drive, load = _of_motion(THETA_IN, "drive"), _of_motion(THETA_OUT, "load")
-    for argument in (DIRECTION, LOG_SPEED, DWELL, drive["since"], TRAVEL, TIME, drive["angle"], TENSION, POSITION):
+    for argument in (DIRECTION, LOG_SPEED, DWELL, TRAVEL, TIME, drive["angle"], TENSION, POSITION):
         yield Law(SLIDING_FRICTION, "conduit", argument)
+    yield Law(SLIDING_FRICTION, "conduit", SLIDING, opposes=CONTACTS)
     yield Law(CABLE_STRETCH, "cable", TENSION)
     for end in ("drive-end", "load-end"):
         yield Law(END_STRETCH, end, TENSION, resolution=SMOOTH)

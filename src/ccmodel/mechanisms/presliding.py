@@ -16,6 +16,7 @@ Source: Iwan, Journal of Applied Mechanics 33(4), 893-900, 1966, doi:10.1115/1.3
 """
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,53 @@ from ccmodel.mechanisms.contract import SLIDING_FRICTION, Curve, Mechanism, Para
 ELEMENTS = 4
 # Longest over shortest length unless a model states it.
 SPREAD = 4.0
+# Most elements of a contact: as many as a learned law has.
+MOST_ELEMENTS = 9
+# Length of the bristle beside the elements of a learned law, which stands for friction that is there at once, m.
+SHORTEST_BRISTLE_M = 1e-8
+
+
+class Contacts(NamedTuple):
+    """How friction builds up at the contacts: elements that yield, and a bristle of Dahl's law.
+
+    Attributes
+    ----------
+    bristle_m : float
+        Length of the bristle.
+    creep : float
+        Its share of friction.
+    element_m : tuple of float
+        Lengths of the elements; of `MOST_ELEMENTS` those beyond `elements` are of no account.
+    element_share : tuple of float
+        Their shares of friction, which add up to 1 with `creep`.
+    elements : int
+    """
+
+    bristle_m: float
+    creep: float
+    element_m: tuple[float, ...]
+    element_share: tuple[float, ...]
+    elements: int
+
+    @classmethod
+    def of_mechanism(cls, z0: float, spread: float, creep: float) -> "Contacts":
+        """Those of the mechanism."""
+        return cls._of(z0, creep, element_lengths(z0, spread), ((1.0 - creep) / ELEMENTS,) * ELEMENTS)
+
+    @classmethod
+    def of_law(cls, travel_m: NDArray, shares: NDArray) -> "Contacts":
+        """Those whose elements have these shares of friction, and yield after these travels since a reversal, m.
+
+        After a reversal from sliding an element has twice its length to go. What is left of friction is there at once.
+        """
+        shares = shares / max(float(shares.sum()), 1.0)
+        lengths = (float(travel) / 2 for travel in travel_m)
+        return cls._of(SHORTEST_BRISTLE_M, 1.0 - float(shares.sum()), tuple(lengths), tuple(map(float, shares)))
+
+    @classmethod
+    def _of(cls, bristle_m: float, creep: float, lengths: tuple[float, ...], shares: tuple[float, ...]) -> "Contacts":
+        none = (0.0,) * (MOST_ELEMENTS - len(shares))
+        return cls(float(bristle_m), float(creep), lengths + (1.0,) * len(none), shares + none, len(shares))
 
 
 @kernel(inline="always")
@@ -45,11 +93,39 @@ def element_lengths(z0: float, spread: float) -> tuple[float, ...]:
 
 
 def _since_reversal(travel: NDArray, values: Mapping[str, float]) -> NDArray:
-    """Friction over that of sliding, by the travel since a reversal from sliding: of a bristle."""
-    return 1 - 2 * np.exp(-travel / values["z0"])
+    """Friction over that of sliding, by the travel since a reversal from sliding."""
+    z0, creep = values["z0"], values["creep"]
+    lengths = np.array(element_lengths(z0, values["spread"]))
+    by_elements = np.maximum(1 - travel[:, None] / (2 * lengths), 0.0).mean(axis=1)
+    return 1 - 2 * ((1 - creep) * by_elements + creep * np.exp(-travel / z0))
 
 
-_Z0 = Parameter("z0", "m", 5e-6, 200e-6, 50e-6, "middle sliding length over which friction builds up")
+_PARAMETERS = (
+    Parameter("z0", "m", 5e-6, 200e-6, 50e-6, "middle sliding length over which friction builds up"),
+    Parameter(
+        "spread",
+        "1",
+        1.0,
+        30.0,
+        SPREAD,
+        "longest over shortest of these lengths",
+        neutral=SPREAD,
+        screening_grid=(0.4,),
+        default=SPREAD,
+    ),
+    Parameter(
+        "creep",
+        "1",
+        0.0,
+        1.0,
+        0.5,
+        "share of a bristle of Dahl's law, whose small loops creep",
+        neutral=1.0,
+        scale="linear",
+        screening_grid=(0.5,),
+        default=1.0,
+    ),
+)
 
 MECHANISM = Mechanism(
     name="presliding",
@@ -61,34 +137,9 @@ MECHANISM = Mechanism(
     ),
     sentence="friction builds up over {z0} of sliding",
     places=("conduit",),
-    parameters=(
-        _Z0,
-        Parameter(
-            "spread",
-            "1",
-            1.0,
-            30.0,
-            SPREAD,
-            "longest over shortest of these lengths",
-            neutral=SPREAD,
-            screening_grid=(0.4,),
-            default=SPREAD,
-        ),
-        Parameter(
-            "creep",
-            "1",
-            0.0,
-            1.0,
-            0.5,
-            "share of a bristle of Dahl's law, whose small loops creep",
-            neutral=1.0,
-            scale="linear",
-            screening_grid=(0.5,),
-            default=1.0,
-        ),
-    ),
+    parameters=_PARAMETERS,
     mistaken_for=("termination-compliance",),
     depends_on_time=False,
     settings={"bristle_m": "z0", "bristle_spread": "spread", "bristle_creep": "creep"},
-    curves=(Curve(SLIDING_FRICTION, "distance-since-reversal", _since_reversal, (_Z0,)),),
+    curves=(Curve(SLIDING_FRICTION, "distance-since-reversal", _since_reversal, _PARAMETERS),),
 )

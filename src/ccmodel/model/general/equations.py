@@ -16,7 +16,7 @@ from ccmodel.elementary import quick_tanh
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.backlash import dead_zone
 from ccmodel.mechanisms.load_dependent_friction import power_of_tension
-from ccmodel.mechanisms.presliding import ELEMENTS, dahl
+from ccmodel.mechanisms.presliding import MOST_ELEMENTS, dahl
 from ccmodel.mechanisms.pulley_eccentricity import winding, winding_change
 from ccmodel.mechanisms.relaxation import BRANCHES, lag_weights
 from ccmodel.mechanisms.strand_settling import settling_tension
@@ -129,19 +129,20 @@ def _set_hold_by_table(ph: Physics, piece: NDArray, node: NDArray, c: int) -> No
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
-def _elements(ph: Physics, node: NDArray, d: NDArray, c: int) -> None:
-    """Friction of each node of a cable over its limit, from its elements and its bristle, and its derivative."""
+def _elements(ph: Physics, node: NDArray, d: NDArray, c: int, length: float) -> None:
+    """Friction of each node of a cable over its limit, from its elements and its bristle of `length` (m), and its
+    derivative.
+    """
     x, slope = node[rows.BRISTLE_NEXT, c], node[rows.GIVES, c]
-    before, after, length = node[rows.ELEMENT + ELEMENTS, c], node[rows.ELEMENT_NEXT + ELEMENTS, c], ph.bristle
+    before, after = node[rows.ELEMENT + MOST_ELEMENTS, c], node[rows.ELEMENT_NEXT + MOST_ELEMENTS, c]
     for i in range(node.shape[2]):
         after[i], by_slide = dahl(before[i], d[i + 1], length)
         # Where nothing has slid yet, the slope differs between the two directions.
-        slope[i] = ph.bristle_creep * (by_slide if d[i + 1] != 0.0 else 1.0 / length)
-        x[i] = ph.bristle_creep * after[i]
-    share = (1.0 - ph.bristle_creep) / ELEMENTS
-    for k in range(ELEMENTS):
+        slope[i] = ph.creep * (by_slide if d[i + 1] != 0.0 else 1.0 / length)
+        x[i] = ph.creep * after[i]
+    for k in range(ph.elements):
         before, after = node[rows.ELEMENT + k, c], node[rows.ELEMENT_NEXT + k, c]
-        inverse = 1.0 / ph.element_m[k]
+        inverse, share = 1.0 / ph.element_m[k], ph.element_share[k]
         for i in range(node.shape[2]):
             trial = before[i] + d[i + 1] * inverse
             after[i] = min(max(trial, -1.0), 1.0)
@@ -160,7 +161,7 @@ def _nodes(ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, dt: float
         grip, before = node[rows.GRIP, c], node[rows.BRISTLE, c]
         p, q, fd, r = node[rows.NEAR, c], node[rows.FAR, c], node[rows.GIVES, c], node[rows.EXCESS, c]
         if ph.presliding:
-            _elements(ph, node, d, c)
+            _elements(ph, node, d, c, bristle)
         else:
             inverse = 1.0 / bristle
             for i in range(n):

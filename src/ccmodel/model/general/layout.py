@@ -8,7 +8,7 @@ from collections import namedtuple
 from typing import TYPE_CHECKING, NamedTuple
 
 from ccmodel import mechanisms as registry
-from ccmodel.mechanisms.presliding import ELEMENTS
+from ccmodel.mechanisms.presliding import MOST_ELEMENTS
 from ccmodel.mechanisms.relaxation import BRANCHES
 
 IMPEDANCE, PRESCRIBED_ANGLE = 0, 1
@@ -42,7 +42,7 @@ BRANCH = 10
     GRIP_SLOPE,
 ) = range(18)
 # Then the elements of presliding friction and its creeping one, -1 to 1: state, and result of the step.
-ELEMENT, ELEMENT_NEXT = 18, 19 + ELEMENTS
+ELEMENT, ELEMENT_NEXT = 18, 19 + MOST_ELEMENTS
 # slide, shape (rows, 2, n + 2): drive end, nodes, load end, m. Of this step, of Newton's step, and of those before.
 NOW, STEP, SAVED, LAST, BEFORE = range(5)
 # mean, shape (rows, 2): mean tension of a cable, which a compliant conduit responds to, N.
@@ -67,7 +67,7 @@ LAST_ROTATION, ROTATION_BEFORE, LAST_PULL, PULL_BEFORE, LAST_DT = range(5)
 PAST_ROWS = 5
 # drive pulley, shape (3,): angle, middle of the range that its encoder leaves open (rad); bristle of its bearing.
 DRIVE_ANGLE, DRIVE_MIDDLE, DRIVE_BEARING = range(3)
-PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10 + BRANCHES, 20 + 2 * ELEMENTS, 5, 11, 9
+PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10 + BRANCHES, 20 + 2 * MOST_ELEMENTS, 5, 11, 9
 # Then, in a run that has them, tables (`ccmodel.mechanisms.tables`) of compliance and of friction, each by tension.
 SPRING_TABLE, FRICTION_TABLE = PIECE_ROWS, NODE_ROWS
 
@@ -82,7 +82,10 @@ if TYPE_CHECKING:
         relaxing_times_s: tuple[float, ...]
         bristle: float
         presliding: bool
+        creep: float
         element_m: tuple[float, ...]
+        element_share: tuple[float, ...]
+        elements: int
         radius: float
         stiffness_load: float
         load_damping: float
@@ -96,8 +99,9 @@ if TYPE_CHECKING:
 else:
     Physics = namedtuple(
         "Physics",
-        "has_settling has_relaxation relaxing_times_s bristle presliding element_m radius stiffness_load load_damping "
-        "kind general_friction has_spring_table has_friction_table " + " ".join(registry.march_settings()),
+        "has_settling has_relaxation relaxing_times_s bristle presliding creep element_m element_share elements radius "
+        "stiffness_load load_damping kind general_friction has_spring_table has_friction_table "
+        + " ".join(registry.march_settings()),
     )
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}  # not nnan: a NaN must be seen

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ccmodel.kernel import borrowed, kernel
 from ccmodel.mechanisms.drive_train import train_torque
-from ccmodel.mechanisms.presliding import ELEMENTS, dahl
+from ccmodel.mechanisms.presliding import MOST_ELEMENTS, dahl
 from ccmodel.mechanisms.pulley_eccentricity import winding, winding_change
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.equations import relax, renew_contacts, set_grip
@@ -123,9 +123,11 @@ def accept(
         for i in range(n):
             node[rows.BRISTLE, c, i] = node[rows.BRISTLE_NEXT, c, i]
         if ph.presliding:
-            for k in range(ELEMENTS + 1):
+            for k in range(ph.elements):
                 for i in range(n):
                     node[rows.ELEMENT + k, c, i] = node[rows.ELEMENT_NEXT + k, c, i]
+            for i in range(n):
+                node[rows.ELEMENT + MOST_ELEMENTS, c, i] = node[rows.ELEMENT_NEXT + MOST_ELEMENTS, c, i]
     if ph.has_relaxation:
         relax(ph, piece, dt)
     if ph.stribeck_rise > 0.0 and dt > 0.0:
@@ -323,7 +325,7 @@ def march(
                 part *= 0.5
                 past[rows.LAST_PULL] = 0.0
                 if part < SMALLEST_SUBSTEP:
-                    if ph.presliding or bristle >= LONGEST_BRISTLE_M:
+                    if bristle >= LONGEST_BRISTLE_M:
                         return j
                     bristle *= 10.0
                     part = whole

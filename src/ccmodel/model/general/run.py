@@ -13,7 +13,7 @@ from ccmodel.failure import ModelError
 from ccmodel.mechanisms.contract import Sensing, Settings
 from ccmodel.mechanisms.learned import end_spring
 from ccmodel.mechanisms.load_inertia import load_damping
-from ccmodel.mechanisms.presliding import element_lengths
+from ccmodel.mechanisms.presliding import Contacts
 from ccmodel.mechanisms.pulley_friction import bearing
 from ccmodel.mechanisms.relaxation import branch_times
 from ccmodel.model.general import layout as rows
@@ -344,16 +344,18 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
     K_e = load.parallel_Nm_per_rad if isinstance(load, TorqueLoad) else K_e
     values = {name: float(getattr(settings, name)) for name in registry.march_settings()}
     has_friction_table = settings.friction_by_tension is not None
+    contacts, has_presliding = _contacts(settings)
     springs = settings.cable_compliance, settings.drive_end_stretch, settings.load_end_stretch
     return rows.Physics(
         has_settling=settings.settling_N > 0,
         has_relaxation=settings.relaxing_share != 0,
         relaxing_times_s=branch_times(settings.relaxing_time_s, settings.relaxing_spread),
-        bristle=float(settings.bristle_m)
-        if settings.bristle_m > 0
-        else _coulomb_bristle(transmission, settings, elements),
-        presliding=settings.bristle_m > 0,
-        element_m=element_lengths(settings.bristle_m, settings.bristle_spread),
+        bristle=contacts.bristle_m if has_presliding else _coulomb_bristle(transmission, settings, elements),
+        presliding=has_presliding,
+        creep=contacts.creep,
+        element_m=contacts.element_m,
+        element_share=contacts.element_share,
+        elements=contacts.elements,
         radius=float(transmission.load_radius_m),
         stiffness_load=float(K_e),
         load_damping=float(load_damping(settings, K_e)),
@@ -363,6 +365,17 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
         has_friction_table=has_friction_table,
         **values,
     )
+
+
+def _contacts(settings: Settings) -> tuple[Contacts, bool]:
+    """How friction builds up at the contacts, and whether it does."""
+    law = settings.contact_elements
+    if law is None:
+        by_mechanism = settings.bristle_m, settings.bristle_spread, settings.bristle_creep
+        return Contacts.of_mechanism(*by_mechanism), settings.bristle_m > 0
+    if settings.bristle_m > 0:
+        raise ModelError("friction builds up by presliding and by a law of the sliding distance: keep one of them")
+    return Contacts.of_law(law.knots, law.values), True
 
 
 def _steps(physics: rows.Physics, transmission: Transmission, time_s: NDArray) -> int:
