@@ -16,6 +16,7 @@ from ccmodel.report.verdict import law_claim
 RANGES = {
     ("speed", "log10(m/s)"): (-3.5, -1.0),
     ("speed", "rad/s"): (-3.0, 3.0),
+    ("speed", "m/s"): (0.0, 0.05),
     ("time", "s"): (0.0, 25.0),
     ("travel", "m"): (0.0, 0.6),
     ("drive-angle", "rad"): (-2.5, 2.5),
@@ -36,7 +37,7 @@ def law_of(curve):
         law
         for law in laws().values()
         if law.is_first
-        and (law.slot, law.argument.name) == (curve.slot, curve.argument)
+        and (law.slot, law.argument.name, law.is_drag) == (curve.slot, curve.argument, curve.is_drag)
         and (not curve.channels or law.channel in curve.channels)
     )
 

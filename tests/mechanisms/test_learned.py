@@ -20,8 +20,8 @@ SCALES = {"end-stretch": 5e-5}
 
 
 def values_of(law, **coefficients):
-    first, last = RANGES.get(law.argument.name, (-1.0, 1.0))
-    fixed = {"first": first, "last": last, "scale": SCALES.get(law.slot, 0.1)}
+    first, last = (0.0, 0.05) if law.is_drag else RANGES.get(law.argument.name, (-1.0, 1.0))
+    fixed = {"first": first, "last": last, "scale": 1.0 if law.is_drag else SCALES.get(law.slot, 0.1)}
     return fixed | dict.fromkeys(law.coefficients, 0.0) | coefficients
 
 
@@ -210,6 +210,29 @@ def test_a_law_of_the_sliding_distance_is_a_sum_of_elements_at_every_contact():
     np.testing.assert_allclose(listed.of(at, alike), curve, atol=1e-9)
     there = law.determined_at(travel)
     np.testing.assert_allclose(law.behind(travel, listed.of(there, alike)), shares, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "drag_N_per_m"),
+    [
+        (("viscous-friction", "conduit", {"c": 60.0}), lambda speed: 60.0 * speed),
+        (("constant-drag", "conduit", {"f0": 0.5}), lambda speed: np.full(speed.shape, 0.5 / L)),
+    ],
+    ids=lambda one: one[0] if isinstance(one, tuple) else "",
+)
+def test_a_drag_by_speed_is_that_of_each_contact(mechanism, drag_N_per_m):
+    """A law that is proportional to the speed is viscous friction, and a constant one the constant drag."""
+    law = laws()["learned-sliding-friction-drag-by-speed"]
+    values = values_of(law)
+    x, _ = law.at_knots(values)
+    z = np.linalg.lstsq(values["scale"] * law.basis, drag_N_per_m(x), rcond=None)[0]
+    values |= dict(zip(law.coefficients, z, strict=True))
+    assert law.at_knots(values)[1] == pytest.approx(drag_N_per_m(x), abs=0.05)
+    theta_in = sine(cycles=2)
+    found, expected, without = run(theta_in, (law.name, "conduit", values)), run(theta_in, mechanism), run(theta_in)
+    for channel in (TAU_IN, THETA_OUT):
+        change = np.abs(expected.read[channel] - without.read[channel]).max()
+        assert np.abs(found.read[channel] - expected.read[channel]).max() <= 0.05 * change
 
 
 def test_more_than_all_friction_does_not_build_up():

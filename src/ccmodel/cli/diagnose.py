@@ -69,7 +69,7 @@ def diagnose(
         ),
     ] = None,
     run_limit: Annotated[
-        float | None,
+        int | None,
         typer.Option("--run-limit", help="Model runs for fitting candidates; 50000 if not given.", show_default=False),
     ] = None,
     time_limit: Annotated[

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.channels import CHANNELS, THETA_IN
+from ccmodel.channels import CHANNELS, TENSIONS, THETA_IN
 from ccmodel.deadline import Deadline, OutOfTimeError
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
@@ -98,11 +98,18 @@ def _proposed(
 
 
 def _unit_of(law: Law, base: CandidateFit, motions: Sequence[Sensing]) -> float:
-    """What sizes of a law's values are shares of: 1 of a factor, `MOST_OF_END` cables', or a channel's peak to peak."""
+    """What sizes of a law's values are shares of: 1 of a factor, Coulomb friction per length of conduit of a drag,
+    `MOST_OF_END` cables', or a channel's peak to peak.
+    """
     if law.channel is not None:
         return float(np.ptp(np.concatenate([m.channels[law.channel] for m in motions])))
     if law.is_factor:
         return 1.0
+    if law.is_drag:
+        o = base.whitened[0].observations
+        model, path = base.model(o.parameters), o.given.recording.path
+        tension_N = np.mean([m.channels[c].clip(0.0).mean() for m in motions for c in TENSIONS if c in m.channels])
+        return float(model.friction_coefficient * tension_N * path.bend_rad / path.length_m)
     return MOST_OF_END / base.model(base.whitened[0].observations.parameters).stiffness_N_per_m
 
 

@@ -54,7 +54,7 @@ def nearest_listed(learned: Learned) -> dict[str, str | float] | None:
 
 
 def _is_comparable(law: Law, curve: Curve) -> bool:
-    is_same = (curve.slot, curve.argument) == (law.slot, law.argument.name)
+    is_same = (curve.slot, curve.argument, curve.is_drag) == (law.slot, law.argument.name, law.is_drag)
     return is_same and (not curve.channels or law.channel in curve.channels)
 
 

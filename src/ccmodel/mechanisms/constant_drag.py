@@ -18,6 +18,7 @@ from ccmodel.mechanisms.contract import SLIDING_FRICTION, Curve, Mechanism, Para
 # factor of friction that it is would grow without bound.
 _AS_LARGE_AT = Parameter("as_large_at", "N", 0.1, 30.0, 1.0, "tension at which the drag equals Coulomb friction")
 FLOOR_N = 0.1
+_PER_LENGTH = Parameter("per_length", "N/m", 0.1, 5.0, 0.5, "drag over the length of the conduit")
 
 MECHANISM = Mechanism(
     name="constant-drag",
@@ -35,6 +36,13 @@ MECHANISM = Mechanism(
             "tension",
             lambda tension, values: 1 + values["as_large_at"] / np.maximum(tension, FLOOR_N),
             (_AS_LARGE_AT,),
+        ),
+        Curve(
+            SLIDING_FRICTION,
+            "speed",
+            lambda speed, values: np.full(speed.shape, values["per_length"]),
+            (_PER_LENGTH,),
+            is_drag=True,
         ),
     ),
 )

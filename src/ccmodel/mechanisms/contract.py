@@ -134,6 +134,8 @@ class Curve:
         Constants that are fitted to the learned law.
     channels : tuple of str
         Channels whose map it can be; empty for all.
+    is_drag : bool
+        Whether it is a drag per length of conduit, N/m, and no factor of friction.
     """
 
     slot: str
@@ -141,6 +143,7 @@ class Curve:
     of: Callable[[NDArray, Mapping[str, float]], NDArray]
     constants: tuple[Parameter, ...]
     channels: tuple[str, ...] = ()
+    is_drag: bool = False
 
 
 class Settings:

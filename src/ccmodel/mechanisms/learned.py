@@ -123,6 +123,8 @@ class Law:
         share of friction.
     resolution : (int, float)
         Number of knots, and correlation length.
+    is_drag : bool
+        Whether it is a drag per length of conduit that does not depend on the tension, and no factor of friction.
     """
 
     slot: str
@@ -131,6 +133,7 @@ class Law:
     channel: str | None = None
     opposes: str | None = None
     resolution: tuple[int, float] = COARSE
+    is_drag: bool = False
 
     @property
     def name(self) -> str:
@@ -140,6 +143,8 @@ class Law:
             of = f"-{short_name(str(self.channel))}".replace("_", "-")
         if self.slot == END_STRETCH:
             of = f"-{side(self.place)}"
+        if self.is_drag:
+            of = "-drag"
         fine = "" if self.is_first else "-fine"
         return f"learned-{self.slot}{of}-by-{self.argument.name}{fine}"
 
@@ -148,6 +153,8 @@ class Law:
         """Unit of its values."""
         if self.channel is not None:
             return unit_of(self.channel)
+        if self.is_drag:
+            return "N/m"
         return "1" if self.is_factor else "m/N"
 
     @property
@@ -158,18 +165,20 @@ class Law:
     @property
     def is_factor(self) -> bool:
         """Whether it is a factor, to which its values are added; it is then 1 where it has no effect."""
-        return self.slot in (SLIDING_FRICTION, CABLE_STRETCH)
+        return self.slot in (SLIDING_FRICTION, CABLE_STRETCH) and not self.is_drag
 
     @property
     def is_centred(self) -> bool:
         """Whether its average belongs to the calibration."""
-        return self.opposes is None and self.slot != END_STRETCH
+        return self.opposes is None and self.slot != END_STRETCH and not self.is_drag
 
     @property
     def curve_is(self) -> str:
         """What its values are."""
         if self.opposes == CONTACTS:
             return "friction over that of sliding, after a reversal"
+        if self.is_drag:
+            return "drag of a cable per length of conduit, in N/m"
         if self.channel is None:
             return _CURVE_IS[self.slot].format(side=side(self.place))
         against = "" if self.opposes is None else ", against the motion"
@@ -182,6 +191,8 @@ class Law:
         A law whose argument differs along the cables is a number or a table in the solver's equations. The others are
         functions of a motion, and a setting holds several.
         """
+        if self.is_drag:
+            return "conduit_drag"
         by_argument = _SETTINGS.get((self.slot, self.argument.name), _SETTINGS.get((self.slot, "")))
         return by_argument and by_argument.format(side=side(self.place))
 
@@ -193,7 +204,7 @@ class Law:
             return (*before, lambda sensing: self.added(sensing, x, y))
         if not y.any():
             return None
-        if self.opposes == CONTACTS:
+        if self.opposes == CONTACTS or self.is_drag:
             return Table(x, y)
         if self.is_factor:
             return Table(x, self.possible(1 + y))
@@ -202,8 +213,8 @@ class Law:
     def possible(self, y: NDArray) -> NDArray:
         """Values within what is physically possible: no negative friction or stretch."""
         low = {SLIDING_FRICTION: 0.0, CABLE_STRETCH: LEAST_COMPLIANCE, END_STRETCH: 0.0}.get(self.slot)
-        # After a reversal, friction acts in the former direction at first.
-        return y if low is None or self.opposes == CONTACTS else y.clip(low)
+        # After a reversal, friction acts in the former direction at first; a drag may take off from friction.
+        return y if low is None or self.opposes == CONTACTS or self.is_drag else y.clip(low)
 
     @property
     def basis(self) -> NDArray:
@@ -219,7 +230,8 @@ class Law:
 
     def range_of(self, visited: NDArray) -> tuple[float, float]:
         """First and last knot for the arguments that recordings visit."""
-        first, last = np.quantile(visited, RANGE)
+        # A drag grows with speed, and is largest in the few fastest samples.
+        first, last = np.quantile(visited, (0.0, 1.0) if self.is_drag else RANGE)
         if self.is_spaced_by_ratio:
             shortest = SHORTEST_OF_CONTACTS if self.opposes == CONTACTS else SHORTEST_YIELD
             first = last * shortest if self.opposes else max(first, last * LOWEST_TENSION)
@@ -323,7 +335,7 @@ class Law:
             return float(self.is_factor) + values[strength.name] * np.interp(arguments, x, self.shown(x) @ y)
 
         channels = (str(self.channel),) if self.slot == SENSOR_MAP else ()
-        return Curve(self.slot, self.argument.name, of, (strength,), channels)
+        return Curve(self.slot, self.argument.name, of, (strength,), channels, self.is_drag)
 
 
 _CURVE_IS = {
@@ -476,6 +488,12 @@ DWELL = Argument("dwell", "log10(s)", "the logarithm of the contacts' age", _age
 SLIDING = Argument(
     "distance-since-reversal", "m", "a contact's sliding since its last reversal", _since_reversal_of(THETA_IN)
 )
+SPEED = Argument(
+    "speed",
+    "m/s",
+    "the speed at which the cable slides",
+    lambda s: s.drive_radius_m * np.abs(_velocity_of(THETA_IN)(s)),
+)
 
 
 def _of_motion(angle: str, end: str) -> dict[str, Argument]:
@@ -497,6 +515,7 @@ def _laws() -> Iterator[Law]:
     for argument in (DIRECTION, LOG_SPEED, DWELL, TRAVEL, TIME, drive["angle"], TENSION, POSITION):
         yield Law(SLIDING_FRICTION, "conduit", argument)
     yield Law(SLIDING_FRICTION, "conduit", SLIDING, opposes=CONTACTS)
+    yield Law(SLIDING_FRICTION, "conduit", SPEED, is_drag=True)
     yield Law(CABLE_STRETCH, "cable", TENSION)
     for end in ("drive-end", "load-end"):
         yield Law(END_STRETCH, end, TENSION, resolution=SMOOTH)

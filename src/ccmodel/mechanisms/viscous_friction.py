@@ -15,6 +15,8 @@ from ccmodel.mechanisms.contract import SLIDING_FRICTION, Curve, Mechanism, Para
 # What the drag adds to Coulomb friction depends on the tension; over the speed it is one constant of its own: at
 # 10 mm/s from 0.3 % to as much as Coulomb friction.
 _RISE = Parameter("rise", "s/m", 0.3, 100.0, 10.0, "relative rise of friction per sliding speed")
+# From a negligible film to half of Coulomb friction: 15 mN to 3 N over a metre of conduit at 3 mm/s.
+_DRAG = Parameter("c", "N s/m^2", 5.0, 1000.0, 50.0, "drag per sliding speed and length")
 
 MECHANISM = Mechanism(
     name="viscous-friction",
@@ -22,10 +24,12 @@ MECHANISM = Mechanism(
     tex=r"\left|\frac{\partial T}{\partial x}\right| = \mu\,T\,\frac{d\varphi}{dx} + c\,|v|",
     sentence="the conduits have a viscous drag of {c}",
     places=("conduit",),
-    # From a negligible film to half of Coulomb friction: 15 mN to 3 N over a metre of conduit at 3 mm/s.
-    parameters=(Parameter("c", "N s/m^2", 5.0, 1000.0, 50.0, "drag per sliding speed and length"),),
+    parameters=(_DRAG,),
     mistaken_for=("stribeck", "time-skew"),
     depends_on_time=True,
     settings={"viscous": "c"},
-    curves=(Curve(SLIDING_FRICTION, "speed", lambda log_speed, c: 1 + c["rise"] * 10**log_speed, (_RISE,)),),
+    curves=(
+        Curve(SLIDING_FRICTION, "speed", lambda log_speed, values: 1 + values["rise"] * 10**log_speed, (_RISE,)),
+        Curve(SLIDING_FRICTION, "speed", lambda speed, values: values["c"] * speed, (_DRAG,), is_drag=True),
+    ),
 )

@@ -25,6 +25,9 @@ from ccmodel.mechanisms.tables import interpolated, pulled
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.layout import Physics
 
+# Tension below which a cable is nearly slack.
+SLACK_N = 0.02
+
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
 def _tensions(ph: Physics, piece: NDArray, slide: NDArray, mean: NDArray, follows: float) -> None:
@@ -151,6 +154,34 @@ def _elements(ph: Physics, node: NDArray, d: NDArray, c: int, length: float) -> 
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
+def _set_drag(ph: Physics, piece: NDArray, node: NDArray, grip: NDArray, d: NDArray, c: int, rate: float) -> None:
+    """Add a drag by speed to the friction of each node, of which `grip` is the part in proportion to its tensions.
+
+    Nothing would hold a slack cable whose drag falls with speed. Towards no tension, the drag changes over to the table
+    behind its own, which does not fall. Friction is never negative.
+
+    `DRAG_SLOPE` is the derivative of friction by the slide over the node's direction, N/m.
+    """
+    T, drag = piece[rows.TENSION, c], node[rows.DRAG, c]
+    in_proportion, constant, slope = node[rows.GRIP_NOW, c], node[rows.DRAG_NOW, c], node[rows.DRAG_SLOPE, c]
+    of_slack = ph.drag_table + 1 + 2 * int(node[ph.drag_table, 0, 0])
+    for i in range(node.shape[2]):
+        both = max(T[i], 0.0) + max(T[i + 1], 0.0)
+        share = min(both / (2.0 * SLACK_N), 1.0)
+        speed, rise = abs(d[i + 1]) * rate, rate if d[i + 1] >= 0.0 else -rate
+        taut, by_speed = interpolated(node, ph.drag_table, c, i, speed)
+        least = -grip[i] * max(both, 2.0 * SLACK_N)
+        if taut < least:
+            taut, by_speed = least, 0.0
+        in_proportion[i], constant[i], slope[i] = grip[i], drag[i] + taut, by_speed * rise
+        if share < 1.0:
+            slack, by_speed_slack = interpolated(node, of_slack, c, i, speed)
+            in_proportion[i] += (taut - slack) / (2.0 * SLACK_N)
+            constant[i] += slack - taut
+            slope[i] += (1.0 - share) * (by_speed_slack - by_speed) * rise
+
+
+@kernel(error_model="numpy", fastmath=rows.FAST)
 def _nodes(ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, dt: float, bristle: float) -> float:
     """Force out of balance at each node and its derivatives; returns the sum of its squares, N^2."""
     n = node.shape[2]
@@ -185,16 +216,24 @@ def _nodes(ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, dt: float
             elif ph.tension_exponent != 0.0:
                 _set_hold(ph, piece, node, c)
                 grip = node[rows.GRIP_NOW, c]
+            drags = node[rows.DRAG, c]
+            if ph.drag_table > 0:
+                _set_drag(ph, piece, node, grip, d, c, rate)
+                grip, drags = node[rows.GRIP_NOW, c], node[rows.DRAG_NOW, c]
             for i in range(n):
                 xi = node[rows.BRISTLE_NEXT, c, i]
                 x, g, slope = xi + ph.direction_bias * xi * xi, grip[i], node[rows.GRIP_SLOPE, c, i]
                 fd[i] *= 1.0 + 2.0 * ph.direction_bias * xi
-                hold = g * (max(T[i], 0.0) + max(T[i + 1], 0.0)) + node[rows.DRAG, c, i]
+                hold = g * (max(T[i], 0.0) + max(T[i + 1], 0.0)) + drags[i]
                 p[i] = K[i] * (1.0 - x * (g + slope))
                 q[i] = K[i + 1] * (1.0 + x * (g + slope))
                 drag = node[rows.VISCOUS, c, i] * rate
                 fd[i] = fd[i] * hold + drag
                 r[i] = T[i] - T[i + 1] - x * hold - drag * d[i + 1]
+            if ph.drag_table > 0:
+                for i in range(n):
+                    xi = node[rows.BRISTLE_NEXT, c, i]
+                    fd[i] += (xi + ph.direction_bias * xi * xi) * node[rows.DRAG_SLOPE, c, i]
         for i in range(n):
             total += r[i] * r[i]
     return total

@@ -40,9 +40,11 @@ BRANCH = 10
     GAMMA,
     GRIP_NOW,
     GRIP_SLOPE,
-) = range(18)
+    DRAG_NOW,
+    DRAG_SLOPE,
+) = range(20)
 # Then the elements of presliding friction and its creeping one, -1 to 1: state, and result of the step.
-ELEMENT, ELEMENT_NEXT = 18, 19 + MOST_ELEMENTS
+ELEMENT, ELEMENT_NEXT = 20, 21 + MOST_ELEMENTS
 # slide, shape (rows, 2, n + 2): drive end, nodes, load end, m. Of this step, of Newton's step, and of those before.
 NOW, STEP, SAVED, LAST, BEFORE = range(5)
 # mean, shape (rows, 2): mean tension of a cable, which a compliant conduit responds to, N.
@@ -67,8 +69,9 @@ LAST_ROTATION, ROTATION_BEFORE, LAST_PULL, PULL_BEFORE, LAST_DT = range(5)
 PAST_ROWS = 5
 # drive pulley, shape (3,): angle, middle of the range that its encoder leaves open (rad); bristle of its bearing.
 DRIVE_ANGLE, DRIVE_MIDDLE, DRIVE_BEARING = range(3)
-PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10 + BRANCHES, 20 + 2 * MOST_ELEMENTS, 5, 11, 9
-# Then, in a run that has them, tables (`ccmodel.mechanisms.tables`) of compliance and of friction, each by tension.
+PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10 + BRANCHES, 22 + 2 * MOST_ELEMENTS, 5, 11, 9
+# Then, in a run that has them, tables (`ccmodel.mechanisms.tables`) of compliance and of friction, each by tension; and
+# one of drag by speed, from the row `drag_table` of the run's constants.
 SPRING_TABLE, FRICTION_TABLE = PIECE_ROWS, NODE_ROWS
 
 # Constants of a run: its own, and every setting of the mechanisms.
@@ -93,6 +96,7 @@ if TYPE_CHECKING:
         general_friction: bool
         has_spring_table: bool
         has_friction_table: bool
+        drag_table: int
 
         def __getattr__(self, name: str) -> float: ...
 
@@ -100,7 +104,7 @@ else:
     Physics = namedtuple(
         "Physics",
         "has_settling has_relaxation relaxing_times_s bristle presliding creep element_m element_share elements radius "
-        "stiffness_load load_damping kind general_friction has_spring_table has_friction_table "
+        "stiffness_load load_damping kind general_friction has_spring_table has_friction_table drag_table "
         + " ".join(registry.march_settings()),
     )
 

@@ -54,6 +54,8 @@ def initial_state(
     if settings.friction_by_tension is not None:
         factor = factor * settings.friction_by_tension.at(both / 2)
     hold = np.tanh(node[rows.HALF_BEND] * factor) * both + node[rows.DRAG]
+    if physics.drag_table:
+        hold = (hold + node[physics.drag_table + 1 + settings.conduit_drag.knots.size]).clip(0.0)
     share = np.divide(T[:, :-1] - T[:, 1:], hold, out=np.zeros_like(both), where=hold > 0)
     # Where friction depends on the direction of sliding, the share is xi + b xi^2.
     xi = 2 * share / (1 + np.sqrt((1 + 4 * physics.direction_bias * share).clip(0.0)))

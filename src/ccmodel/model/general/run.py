@@ -16,6 +16,7 @@ from ccmodel.mechanisms.load_inertia import load_damping
 from ccmodel.mechanisms.presliding import Contacts
 from ccmodel.mechanisms.pulley_friction import bearing
 from ccmodel.mechanisms.relaxation import branch_times
+from ccmodel.mechanisms.tables import Table
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.active import Active, active_of
 from ccmodel.model.general.grid import Grid, make_grid
@@ -315,6 +316,7 @@ def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tu
     piece[rows.SHARE][:, segments] = segment / length
     node[rows.HALF_BEND][:, cells] = friction * ratio_mu * grid.cell_rad / 2
     node[rows.DRAG][:, cells] = settings.drag_N * cell / length
+    drag = settings.conduit_drag
     node[rows.VISCOUS][:, cells] = settings.viscous * cell
     if drive is not None:
         piece[rows.STIFFNESS][:, 0] = 1 / drive[0]
@@ -322,11 +324,22 @@ def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tu
         piece[rows.STIFFNESS][:, -1] = 1 / load[0]
     ends = [[end[1]] if end is not None else [] for end in (drive, load)]
     springs = [*ends[0], *[settings.cable_compliance] * segment.size, *ends[1]]
-    by_tension = [settings.friction_by_tension] * nodes
-    return (
-        _with_tables(piece, [None if law is None else law.rows_of_spring for law in springs]),
-        _with_tables(node, [None if law is None else law.rows for law in by_tension]),
-    )
+    node = _with_tables(node, [_rows(settings.friction_by_tension)] * nodes)
+    if drag is not None:
+        lengths = np.zeros(nodes)
+        lengths[cells] = cell
+        slack = Table(drag.knots, np.maximum.accumulate(drag.values.clip(0.0)))
+        for law in (drag, slack):
+            node = _with_tables(node, [Table(law.knots, law.values * m).rows for m in lengths])
+    return _with_tables(piece, [None if law is None else law.rows_of_spring for law in springs]), node
+
+
+def _rows(law: Table | None) -> NDArray | None:
+    return None if law is None else law.rows
+
+
+def _size(law: Table | None) -> int:
+    return 0 if law is None else law.rows.size
 
 
 def _with_tables(array: NDArray, tables: Sequence[NDArray | None]) -> NDArray:
@@ -343,7 +356,7 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
     K_e = load.stiffness_Nm_per_rad if isinstance(load, SpringLoad) else 0.0
     K_e = load.parallel_Nm_per_rad if isinstance(load, TorqueLoad) else K_e
     values = {name: float(getattr(settings, name)) for name in registry.march_settings()}
-    has_friction_table = settings.friction_by_tension is not None
+    has_friction_table, has_drag_table = settings.friction_by_tension is not None, settings.conduit_drag is not None
     contacts, has_presliding = _contacts(settings)
     springs = settings.cable_compliance, settings.drive_end_stretch, settings.load_end_stretch
     return rows.Physics(
@@ -360,9 +373,12 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
         stiffness_load=float(K_e),
         load_damping=float(load_damping(settings, K_e)),
         kind=rows.PRESCRIBED_ANGLE if isinstance(load, AngleLoad | FixedLoad) else rows.IMPEDANCE,
-        general_friction=bool(settings.tension_exponent or settings.drag_N or settings.viscous or has_friction_table),
+        general_friction=bool(
+            settings.tension_exponent or settings.drag_N or settings.viscous or has_friction_table or has_drag_table
+        ),
         has_spring_table=any(law is not None for law in springs),
         has_friction_table=has_friction_table,
+        drag_table=rows.NODE_ROWS + _size(settings.friction_by_tension) if has_drag_table else 0,
         **values,
     )
 
