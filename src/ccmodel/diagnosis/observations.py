@@ -25,8 +25,8 @@ def observations_of(
 ) -> tuple[list[Observations], NotJudged]:
     """Observations of every usable recording, and what could not be judged.
 
-    If the initial tension is observed at rest in some recordings, those without are left out: friction and initial
-    tension cannot be separated in them.
+    Of more than `MOST_RECORDINGS`, so many are taken, evenly from all conditions. If the initial tension is observed at
+    rest in some recordings, those without are left out: friction and initial tension cannot be separated in them.
 
     Raises
     ------
@@ -34,7 +34,12 @@ def observations_of(
         If the model cannot be run on any of the recordings.
     """
     usable, not_judged = [], []
-    for recording in recordings:
+    chosen = spread_over_conditions(recordings, settings.MOST_RECORDINGS)
+    if len(chosen) < len(recordings):
+        what = f"{len(recordings) - len(chosen):,} of {len(recordings):,} recordings"
+        why = f"a diagnosis compares at most {settings.MOST_RECORDINGS}, taken evenly from all conditions and over time"
+        not_judged.append(_entry(what, why))
+    for recording in chosen:
         step = max(step_s, float(np.ptp(recording.time_s)) / settings.MOST_SAMPLES)
         try:
             shown = first_cycles(recording, cycles)
@@ -42,13 +47,33 @@ def observations_of(
         except (ModelError, ValueError) as error:
             not_judged.append(_entry(recording.id, str(error)))
     if not usable:
-        raise ModelError("none of the recordings can be compared with the model: " + not_judged[0]["why"])
+        raise ModelError("none of the recordings can be compared with the model: " + not_judged[-1]["why"])
     observed = [o for o in usable if o.given.initial_tension_observed]
     if observed:
         why = "its tensions are not observed at rest by load cells and torques, as those of the others are"
         not_judged += [_entry(o.id, why) for o in usable if o not in observed]
     usable = _with_lone_batches(observed or usable)
     return usable, [*not_judged, *_missing(usable), *_tolerated(tolerance)]
+
+
+def spread_over_conditions(recordings: Sequence[Recording], most: int) -> list[Recording]:
+    """At most so many recordings, as equal a number of each stated condition as there are, evenly over its sequence."""
+    if len(recordings) <= most:
+        return list(recordings)
+    by_condition: dict[str, list[int]] = {}
+    for i, r in enumerate(recordings):
+        stated = r.batch, r.pretension_N, r.path.bend_rad, r.path.length_m, sorted(r.excitation.items())
+        by_condition.setdefault(repr(stated), []).append(i)
+    share = Counter[str]()
+    while share.total() < most:
+        left = [condition for condition, of in by_condition.items() if share[condition] < len(of)]
+        share.update(left[: most - share.total()])
+    chosen = [
+        of[int(k)]
+        for condition, of in by_condition.items()
+        for k in np.linspace(0, len(of) - 1, share[condition]).round()
+    ]
+    return [recordings[i] for i in sorted(chosen)]
 
 
 def _with_lone_batches(observations: Sequence[Observations]) -> list[Observations]:

@@ -14,6 +14,9 @@ import numpy as np
 # Least time between compared samples, s, and most samples of a recording. Chosen: an eighth of the shortest event of
 # such rigs, a reversal's presliding at 1 Hz; further samples cost time and are correlated.
 STEP_S, MOST_SAMPLES = 0.008, 2000
+# Most recordings that are compared. Chosen: a candidate's fit of 100 takes some 1,500 of the runs that a diagnosis has,
+# and their whitened errors some 2 GB.
+MOST_RECORDINGS = 100
 
 # --- Calibration: the paper's model fitted to the batch
 
