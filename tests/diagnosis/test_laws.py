@@ -15,6 +15,8 @@ from ccmodel.model.files import read_model_file
 from ccmodel.model.general import Active, simulate
 
 K_TORQUE = 0.0234
+# Enough for a single law, and less than a diagnosis has: sets of listed mechanisms take most runs.
+RUNS = "5000"
 COGGING_NM, PERIOD_RAD = 2e-3, 0.4
 
 
@@ -29,7 +31,16 @@ def cogging(table):
 def learned(tmp_path_factory):
     folder = tmp_path_factory.mktemp("raw")
     batch = spoil(write_batch(folder / "cogging", pretensions=(7.0, 6.0, 5.0)), cogging)
-    arguments = ["diagnose", str(batch), "--out", str(folder / "out"), "--keep-law", "cogging-motor"]
+    arguments = [
+        "diagnose",
+        str(batch),
+        "--run-limit",
+        RUNS,
+        "--out",
+        str(folder / "out"),
+        "--keep-law",
+        "cogging-motor",
+    ]
     done = CliRunner().invoke(cli.app, arguments)
     assert done.exit_code == 0, done.output
     return batch, folder / "out"
@@ -95,7 +106,16 @@ def test_a_mechanism_that_is_taken_off_the_list_is_recognised_in_the_curve(tmp_p
         return table
 
     batch = spoil(write_batch(tmp_path / "gain", pretensions=(7.0, 6.0, 5.0)), gain)
-    arguments = ["diagnose", str(batch), "--out", str(tmp_path / "out"), "--without", "torque-scale"]
+    arguments = [
+        "diagnose",
+        str(batch),
+        "--run-limit",
+        RUNS,
+        "--out",
+        str(tmp_path / "out"),
+        "--without",
+        "torque-scale",
+    ]
     done = CliRunner().invoke(cli.app, arguments)
     assert done.exit_code == 0, done.output
     said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
@@ -114,7 +134,7 @@ def test_friction_by_tension_is_learned_inside_the_solver(tmp_path, monkeypatch)
 
     monkeypatch.setattr(builders, "simulate_pair", pair)
     batch = spoil(write_batch(tmp_path / "power", pretensions=(9.0, 6.0, 3.5, 2.0)))
-    arguments = ["diagnose", str(batch), "--out", str(tmp_path / "out"), "--without", power.name]
+    arguments = ["diagnose", str(batch), "--run-limit", RUNS, "--out", str(tmp_path / "out"), "--without", power.name]
     done = CliRunner().invoke(cli.app, arguments)
     assert done.exit_code == 0, done.output
     (law,) = json.loads((tmp_path / "out" / "diagnosis.json").read_text())["laws"]

@@ -57,6 +57,8 @@ from ccmodel.mechanisms.tables import Table
 COARSE, FINE, SMOOTH = (9, 0.25), (25, 0.08), (9, 1.0)
 # Shares of a law's standard deviation below which a direction of its coefficients is left out.
 SLIGHTEST = 0.02
+# Standard deviation of a straight line at its end, over that of the curve about it.
+SLOPE = 3.0
 # A reversal is a motion back by more than this, which noise of the encoder does not reach.
 REVERSAL_RAD = 0.01
 # The contact is renewed when the drive has moved so far, m; and the shortest age that is told apart, s.
@@ -220,7 +222,7 @@ class Law:
     def basis(self) -> NDArray:
         """Derivatives of its values at the knots by its coefficients, shape (knots, coefficients)."""
         knots, length = (2, 1.0) if self.argument.has_two_values else self.resolution
-        return basis(knots, length, self.is_centred)
+        return basis(knots, length, self.is_centred, self.is_drag)
 
     def at_knots(self, values: Mapping[str, float]) -> tuple[NDArray, NDArray]:
         """Its arguments at the knots and its values there, both of shape (knots,)."""
@@ -370,13 +372,13 @@ Source: Rasmussen and Williams, Gaussian Processes for Machine Learning, MIT Pre
 
 
 @cache
-def basis(knots: int, length: float, is_centred: bool) -> NDArray:
+def basis(knots: int, length: float, is_centred: bool, has_slope: bool = False) -> NDArray:
     """Root of the a priori covariance of a law's values at its knots, shape (knots, coefficients).
 
-    Their mean variance is 1. Directions whose standard deviation is below `SLIGHTEST` are left out.
+    `has_slope` adds a straight line from zero, as a drag by speed has. Their mean variance is 1. Directions whose standard deviation is below `SLIGHTEST` are left out.
     """
     x = np.linspace(0.0, 1.0, knots)
-    covariance = np.exp(-0.5 * ((x[:, None] - x) / length) ** 2)
+    covariance = np.exp(-0.5 * ((x[:, None] - x) / length) ** 2) + has_slope * SLOPE**2 * np.outer(x, x)
     centred = np.eye(knots) - (1.0 / knots if is_centred else 0.0)
     value, vector = np.linalg.eigh(centred @ covariance @ centred)
     value, vector = value[::-1].clip(0.0), vector[:, ::-1]
