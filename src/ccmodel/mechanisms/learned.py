@@ -375,7 +375,8 @@ Source: Rasmussen and Williams, Gaussian Processes for Machine Learning, MIT Pre
 def basis(knots: int, length: float, is_centred: bool, has_slope: bool = False) -> NDArray:
     """Root of the a priori covariance of a law's values at its knots, shape (knots, coefficients).
 
-    `has_slope` adds a straight line from zero, as a drag by speed has. Their mean variance is 1. Directions whose standard deviation is below `SLIGHTEST` are left out.
+    `has_slope` adds a straight line from zero, as a drag by speed has. Their mean variance is 1. Directions whose
+    standard deviation is below `SLIGHTEST` are left out.
     """
     x = np.linspace(0.0, 1.0, knots)
     covariance = np.exp(-0.5 * ((x[:, None] - x) / length) ** 2) + has_slope * SLOPE**2 * np.outer(x, x)
