@@ -152,8 +152,13 @@ def test_a_bad_log_is_refused_in_one_line_and_the_good_one_comes_through(bench, 
 WARNED = {
     "one gap": (frame(lambda t: t.drop(index=range(200, 205))), 202, "time_s", "a gap of 0.024 s"),
     "one empty cell": (cell(50, 3, ""), 50, "drive_current_A", "no number: row dropped"),
-    "infinite": (cell(50, 3, "inf"), 50, "drive_current_A", "no number: row dropped"),
-    "infinite once it is calibrated": (cell(50, 5, "-1e308"), 50, "drive_load_cell_V", "no number: row dropped"),
+    "infinite": (cell(50, 3, "inf"), 50, "drive_current_A", "inf is no reading: row dropped"),
+    "infinite once it is calibrated": (
+        cell(50, 5, "-1e308"),
+        50,
+        "drive_load_cell_V",
+        "-1e+308 is no reading: row dropped",
+    ),
     "two empty cells": (
         changed("drive_current_A", lambda t: t.drive_current_A.where(~t.index.isin([50, 51]))),
         52,

@@ -110,13 +110,23 @@ def _drop_bad(table: pd.DataFrame, warnings: list[Defect]) -> pd.DataFrame:
         row = int(table.index[is_bad][0])
         if is_bad.all():
             raise LogError(None, column, "has no numbers: leave the column out if the rig has no such sensor")
-        run = length(longest_run(is_bad))
+        run, said = length(longest_run(is_bad)), _said(table.iloc[:, k].to_numpy()[is_bad])
         if run > limits.BAD_CELLS_IN_A_ROW or is_bad.mean() > limits.BAD_CELLS_FRACTION:
-            raise LogError(row, column, f"{is_bad.sum()} cells have no number, {run} of them in a row")
-        many = f"{is_bad.sum()} cells have no number: their rows are" if is_bad.sum() > 1 else "no number: row"
-        warnings.append(Defect(row, column, f"{many} dropped"))
+            raise LogError(row, column, f"{said}, {run} of them in a row")
+        rows = "row" if is_bad.sum() == 1 else "their rows are"
+        warnings.append(Defect(row, column, f"{said}: {rows} dropped"))
         any_bad |= is_bad
     return without(table, any_bad)
+
+
+def _said(bad: NDArray) -> str:
+    """What is wrong with the values of cells: they are empty, or larger than a sensor reads."""
+    first = f"{bad[0]:g}"
+    if bad.size == 1:
+        return "no number" if np.isnan(bad[0]) else f"{first} is no reading"
+    return (
+        f"{bad.size} cells have no number" if np.isnan(bad[0]) else f"{bad.size} cells have no reading (first {first})"
+    )
 
 
 def _drop_repeated(table: pd.DataFrame, warnings: list[Defect]) -> pd.DataFrame:
