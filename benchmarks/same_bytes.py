@@ -33,8 +33,8 @@ TUTORIAL = ROOT / "docs/tutorial"
 PIPELINE = "pipeline"
 # Verdicts, with the batches that have them.
 VERDICTS = ("agrees", "explained", "undecided")
-# A diagnosis that reaches its limit, of a batch of the repository.
-LIMITED, ITS_BATCH, RUN_LIMIT = "limited", "rich", "9000"
+# A batch of the repository whose diagnosis reaches this limit on model runs.
+LIMITED, RUN_LIMIT = "rich", "9000"
 JOBS = (PIPELINE, *VERDICTS, LIMITED)
 RUBBING_A = 0.17
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -102,7 +102,7 @@ def prepare(folder: Path) -> None:
     subprocess.run([sys.executable, *line], cwd=folder, check=True, capture_output=True)
     stated = (TUTORIAL / "batch.yaml").read_text(encoding="utf-8").replace("batch: first", "batch: explained")
     (folder / "explained/batch.yaml").write_text(stated, encoding="utf-8")
-    shutil.copytree(ROOT / "data/raw" / ITS_BATCH, folder / LIMITED)
+    shutil.copytree(ROOT / "data/raw" / LIMITED, folder / LIMITED)
 
 
 def line_of(job: str, cores: int) -> list[str]:
