@@ -101,7 +101,9 @@ pathlib.Path("out/received.json").write_text(json.dumps(received))
     options = ["--tolerance", "0.1"]
     conceal.diagnose(batch, tmp_path / "out", ["backlash"], diagnosis(body), options, tmp_path / "model.json")
     received = json.loads((tmp_path / "out" / "received.json").read_text())
-    arguments = ["diagnose", "case-1", "--out", "out", *options, "--without", "backlash"]
+    # The clock ends no diagnosis before its process.
+    limit = ["--time-limit", str(conceal.TIMEOUT_S)]
+    arguments = ["diagnose", "case-1", "--out", "out", *options, *limit, "--without", "backlash"]
     assert received == [*arguments, "--baseline", "baseline.json", "{}"]
 
 
