@@ -4,8 +4,8 @@ import time
 from dataclasses import dataclass
 from math import inf
 
+from ccmodel.effort import model_runs
 from ccmodel.failure import ModelError
-from ccmodel.model.effort import model_runs
 
 
 class OutOfTimeError(ModelError):
@@ -23,7 +23,7 @@ class Deadline:
     at_s : float
         A moment of the monotonic clock, s.
     at_runs : float
-        Runs of the model that this process has then made (`ccmodel.model.effort`).
+        Runs of the model that this process has then made (`ccmodel.effort`).
     """
 
     at_s: float = inf

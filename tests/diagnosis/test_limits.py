@@ -9,8 +9,8 @@ import pytest
 import ccmodel as cc
 from builders import recording, spoil, write_batch
 from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
+from ccmodel.effort import count_run, model_runs
 from ccmodel.inference import pool
-from ccmodel.model.effort import count_run, model_runs
 from ccmodel.model.run import simulate_recording
 from ccmodel.typed import InputError
 from made_observations import PARAMETERS

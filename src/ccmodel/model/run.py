@@ -21,9 +21,9 @@ from ccmodel.channels import (
     TORQUE_AT,
     ZERO_OF,
 )
+from ccmodel.effort import count_run
 from ccmodel.failure import ModelError
 from ccmodel.mechanisms.relaxation import branch_times, kept_at_rest
-from ccmodel.model import effort
 from ccmodel.model.exact import pair as exact
 from ccmodel.model.general import run as general
 from ccmodel.model.general.sensors import true_at
@@ -85,7 +85,7 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
         If the model cannot be run on this recording.
     """
     recording = given.recording
-    effort.count_run()
+    count_run()
     parameters = of_recording(parameters, recording)
     transmission = transmission_of(recording, parameters)
     load, measured = _load(given, parameters, load_from)
