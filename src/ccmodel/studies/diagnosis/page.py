@@ -4,6 +4,7 @@ import base64
 import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import fill
 
 import jinja2
 import matplotlib
@@ -39,6 +40,8 @@ from ccmodel.rig.overview import overview_of
 LOOPS = 3
 CANDIDATES = 8
 FAINT = "#9a9a9a"
+# Letters of an axis label that fit beside a panel of a law.
+LABEL_LETTERS = 34
 WITH_FOUND = "with the mechanisms found"
 
 
@@ -280,8 +283,10 @@ def _law(law: Mapping, found: Diagnosis) -> Figure:
         ax.fill_between(x, low, high, color=COLOURS[1], alpha=0.25, lw=0, label="90 % band")
         ax.plot(x, y, color=COLOURS[1], lw=1.4, label="learned law")
     ax.axhline(1.0 if learned.is_factor else 0.0, color=FAINT, lw=1.0, ls="--", label="calibrated model")
+    if learned.is_spaced_by_ratio:
+        ax.set_xscale("log")
     ax.set_xlabel(f"{law['argument_is']} ({law['argument_unit']})")
-    ax.set_ylabel(law["curve_is"])
+    ax.set_ylabel(fill(law["curve_is"], LABEL_LETTERS))
     legend_below(figure, axes)
     stamp_figure(figure, _stamp(found))
     return figure
