@@ -27,22 +27,17 @@ def cogging(table):
     return table
 
 
+def diagnosed(batch, out, *options):
+    done = CliRunner().invoke(cli.app, ["diagnose", str(batch), "--out", str(out), *options])
+    assert done.exit_code == 0, done.output
+    return json.loads((out / "diagnosis.json").read_text())
+
+
 @pytest.fixture(scope="module")
 def learned(tmp_path_factory):
     folder = tmp_path_factory.mktemp("raw")
     batch = spoil(write_batch(folder / "cogging", pretensions=(7.0, 6.0, 5.0)), cogging)
-    arguments = [
-        "diagnose",
-        str(batch),
-        "--run-limit",
-        RUNS,
-        "--out",
-        str(folder / "out"),
-        "--keep-law",
-        "cogging-motor",
-    ]
-    done = CliRunner().invoke(cli.app, arguments)
-    assert done.exit_code == 0, done.output
+    diagnosed(batch, folder / "out", "--run-limit", RUNS, "--keep-law", "cogging-motor")
     return batch, folder / "out"
 
 
@@ -106,19 +101,7 @@ def test_a_mechanism_that_is_taken_off_the_list_is_recognised_in_the_curve(tmp_p
         return table
 
     batch = spoil(write_batch(tmp_path / "gain", pretensions=(7.0, 6.0, 5.0)), gain)
-    arguments = [
-        "diagnose",
-        str(batch),
-        "--run-limit",
-        RUNS,
-        "--out",
-        str(tmp_path / "out"),
-        "--without",
-        "torque-scale",
-    ]
-    done = CliRunner().invoke(cli.app, arguments)
-    assert done.exit_code == 0, done.output
-    said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    said = diagnosed(batch, tmp_path / "out", "--run-limit", RUNS, "--without", "torque-scale")
     (law,) = said["laws"]
     assert (law["slot"], law["channel"], law["arguments"]) == ("sensor-map", "tau_in_Nm", ["reading"])
     assert law["nearest_listed"]["name"] == "torque-scale"
@@ -134,19 +117,10 @@ def test_friction_by_tension_is_learned_inside_the_solver(tmp_path, monkeypatch)
 
     monkeypatch.setattr(builders, "simulate_pair", pair)
     batch = spoil(write_batch(tmp_path / "power", pretensions=(9.0, 6.0, 3.5, 2.0)))
-    arguments = ["diagnose", str(batch), "--run-limit", RUNS, "--out", str(tmp_path / "out"), "--without", power.name]
-    done = CliRunner().invoke(cli.app, arguments)
-    assert done.exit_code == 0, done.output
-    (law,) = json.loads((tmp_path / "out" / "diagnosis.json").read_text())["laws"]
+    (law,) = diagnosed(batch, tmp_path / "out", "--run-limit", RUNS, "--without", power.name)["laws"]
     assert (law["slot"], law["place"], law["arguments"]) == ("sliding-friction", "conduit", ["tension"])
     assert (law["formula"], law["nearest_listed"]["name"]) == ("a x^n", power.name)
     assert law["parameters"][-1]["value"] == pytest.approx(-0.3, abs=0.02)
-
-
-def diagnosed(batch, out):
-    done = CliRunner().invoke(cli.app, ["diagnose", str(batch), "--out", str(out)])
-    assert done.exit_code == 0, done.output
-    return json.loads((out / "diagnosis.json").read_text())
 
 
 def test_a_listed_mechanism_is_named_beside_a_law(tmp_path):

@@ -2,11 +2,10 @@
 
 import time
 
-import numpy as np
-import pandas as pd
 import pytest
 
 import ccmodel as cc
+from benchmarks.same_bytes import rubbing
 from builders import recording, spoil, write_batch
 from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.effort import count_run, model_runs
@@ -14,13 +13,6 @@ from ccmodel.inference import pool
 from ccmodel.model.run import simulate_recording
 from ccmodel.typed import InputError
 from made_observations import PARAMETERS
-
-
-def rubbing(table):
-    """A torque against the motion, which the cables know nothing of."""
-    turn = pd.Series(np.sign(np.diff(table["drive_encoder_counts"], prepend=table["drive_encoder_counts"].iloc[0])))
-    table["drive_current_A"] += 0.17 * turn.replace(0, np.nan).ffill().fillna(0)
-    return table
 
 
 @pytest.fixture(scope="module")

@@ -238,14 +238,14 @@ class Selection:
         # Every rival of a complete candidate matters; of an incomplete one, only the leading ones lead on.
         most = len(found.candidates) if found.unlisted < 0.5 else settings.CONTENDERS
         highest = 1.0 + settings.HOPELESS * max(best.mean_square - 1.0, settings.NEAR_NOISE)
-        # What the best one's last mechanism adds is judged by its largest parts.
-        largest = best.hypothesis.size - 1
-        leading = [
-            c
-            for k, c in enumerate(found.by_evidence)
-            if (c.mean_square <= highest and (k < most or is_part_of(c, best)))
-            or (c.hypothesis.size == largest and is_part_of(c, best))
-        ]
+
+        def is_worth(k: int, c: CandidateFit) -> bool:
+            is_part = is_part_of(c, best)
+            # What the best one's last mechanism adds is judged by its largest parts.
+            is_largest_part = is_part and c.hypothesis.size == best.hypothesis.size - 1
+            return is_largest_part or (c.mean_square <= highest and (k < most or is_part))
+
+        leading = [c for k, c in enumerate(found.by_evidence) if is_worth(k, c)]
         again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in leading for s in starts(c)])
         if not any(c.hypothesis == best.hypothesis for c in again):
             return found
