@@ -8,17 +8,18 @@ REGRESSORS ?= $(RIVALS)
 
 .PHONY: help results real data test fuzz docs bench accuracy-gate input-checks diagnosis-settings decision-rules \
   form-errors joint-rigs outside-rigs past several-effects table-one coverage proof proof-full proof-real slurm-test \
-  kills same-bytes load mutants lint lock sbom clean
+  kills same-bytes load mutants lint lint-types lint-style lock sbom clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
 # `--require-hashes` refuses whatever is not pinned in requirements.lock; the package itself then needs no download.
+# Python compiles what it imports; to compile all that is installed takes as long as to install it.
 $(VENV)/.ready: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
 	  || { echo "ccmodel needs Python 3.11 or newer; choose one with: make PYTHON=python3.12 ..." >&2; exit 1; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --require-hashes -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $@
 
@@ -44,7 +45,7 @@ data: $(VENV)/.ready  ## record data/raw again with the virtual rig
 # One process more than cores: a test of the pipeline often waits for Snakemake.
 test: $(VENV)/.ready  ## run the tests and the linters
 	$(BIN)/python -m pytest -n $$(($(CORES) + 1)) --dist loadfile --no-loadscope-reorder
-	$(MAKE) --no-print-directory lint
+	$(MAKE) --no-print-directory -j $(CORES) lint
 
 fuzz: $(VENV)/.ready  ## damage batches and files, and run the exact solver, FUZZ times as often as the tests do: docs/trust.md
 	FUZZ=$(or $(FUZZ),60) $(BIN)/python -m pytest -n $(CORES) --dist loadfile tests/rig/test_damaged_batches.py \
@@ -123,14 +124,18 @@ load: $(VENV)/.ready  ## run the pipeline on 10, 100 and 1,000 recordings, and r
 mutants: $(VENV)/.ready  ## run the tests on N wrong operators, numbers and conditions; goes on where it was stopped: docs/trust.md
 	$(BIN)/python -m benchmarks.mutants --count $(or $(N),300) --seed $(or $(SEED),0) --out results/mutants-$(or $(SEED),0)
 
-lint: $(VENV)/.ready
+lint: lint-types lint-style
+
+lint-types: $(VENV)/.ready
+	$(BIN)/mypy --no-error-summary
+
+lint-style: $(VENV)/.ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile proof/Snakefile workflow
 	$(BIN)/snakemake --lint
 	$(BIN)/snakemake --snakefile proof/Snakefile --lint
 	$(BIN)/lint-imports --no-cache
-	$(BIN)/mypy --no-error-summary
 
 lock:  ## pin the newest versions that fit pyproject.toml (needs uv)
 	uv pip compile pyproject.toml --all-extras --universal --python-version 3.11 --upgrade --generate-hashes \
