@@ -213,6 +213,24 @@ def test_the_strength_of_a_mechanism_with_a_state_is_what_is_left_of_it():
     assert support(together) == pytest.approx(5 * np.log1p(100.0 / 9) - np.log(10) / 2)
 
 
+@pytest.mark.parametrize(("degrees", "left"), [(9.0, 7.0), (2.5, 2.5)])
+def test_a_strength_is_judged_for_the_shape_that_was_fitted(degrees, left):
+    """Share, time and spread of a relaxation scatter together: each alone is known to a half, for the others to 0.1."""
+    acting, names = ("relaxation", "cable"), ("r", "tau", "spread")
+    values = dict(zip(names, (0.2, 30.0, 10.0), strict=True))
+    given = values | {"relaxed": 0.0}
+    one = fitted(1.0, acting, **{f"relaxation/cable/{n}": v for n, v in given.items()})
+    every = list(one.values)
+    at = [every.index(f"relaxation/cable/{n}") for n in names]
+    spread = 0.5 * np.array(list(values.values()))
+    covariance = np.zeros((len(every), len(every)))
+    covariance[np.ix_(at, at)] = (0.96 + 0.04 * np.eye(3)) * np.outer(spread, spread)
+    found = replace(one, covariance=covariance, degrees_of_freedom=np.full(len(every), degrees)).log_support(*acting)
+    for_shape = 0.25 * (1 - 2 * 0.96**2 / 1.96)
+    t2 = 1 / (for_shape if left < degrees else 0.25)
+    assert found == pytest.approx((left + 1) / 2 * np.log1p(t2 / left) - np.log(left + 1) / 2)
+
+
 def test_a_search_goes_on_from_what_may_be_an_imitation():
     """The pair takes off half of what the kink leaves, as an imitation would, and as one of three effects would."""
     kink, pair = (fitted(60.0, KINK), evidence(NONE - 100, NONE - 90, size=59.0)), fitted(30.0, KINK, SCALE)

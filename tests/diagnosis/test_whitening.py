@@ -60,6 +60,21 @@ def test_one_per_cent_of_friction_is_a_nuisance_and_ten_are_not(whitened):
     assert errors[0.1] > 50
 
 
+def test_friction_that_builds_up_within_a_micrometre_is_a_nuisance_and_presliding_is_not(whitened):
+    def with_presliding(z0):
+        return replace(PARAMETERS, mechanisms=(Active("presliding", "conduit", {"z0": z0, "spread": 4.0}),))
+
+    def left(z0, by=whitened):
+        errors = whitened.observations.with_parameters(with_presliding(z0)).errors({}).ravel()
+        return np.sum(by.whiten(errors) ** 2)
+
+    rigid = whiten(whitened.observations, with_presliding(1e-8))
+    assert left(5e-7, rigid) > 20
+    assert left(5e-7) < 3
+    # Longer lengths have other shapes: what is left of the shortest that is presliding still shows.
+    assert left(5e-6) > 50
+
+
 def test_the_loads_position_in_its_gap_is_a_nuisance(whitened):
     gap = Active("backlash", "load-pulley", {"half_gap": 0.02})
     with_gap = replace(PARAMETERS, mechanisms=(gap,))

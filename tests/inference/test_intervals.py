@@ -189,7 +189,8 @@ def test_what_rounding_does_to_a_fit_stands_in_its_covariance(solved):
     """With residuals of nothing, against encoders of many phases; without a step, there is no rounding."""
     problem, solution = solved
     silent = replace(solution, blocks=[replace(b, errors=np.zeros_like(b.errors)) for b in solution.blocks])
-    read = [replace(e.given.recording, encoder_step_rad={}) for e in problem.observations]
+    drive = {"theta_in_rad": problem.observations[0].given.recording.encoder_step_rad["theta_in_rad"]}
+    read = [replace(e.given.recording, encoder_step_rad=drive) for e in problem.observations]
     uncounted = [
         replace(e, given=replace(e.given, recording=r)) for e, r in zip(problem.observations, read, strict=True)
     ]

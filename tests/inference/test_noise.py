@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS
-from ccmodel.inference.noise import PHASES, SensorNoise, repeated, rounding_errors, sensor_noise
+from ccmodel.inference.noise import PHASES, SensorNoise, pooled, repeated, rounding_errors, sensor_noise
 
 STEP = 0.003
 
@@ -60,3 +60,41 @@ def test_cycles_and_rest_are_weighed_by_their_degrees_of_freedom():
     found = repeated(SensorNoise(1.0, "rest"), 4.0, 0.2)
     assert IN_DIAGNOSIS == 20
     assert found.sd**2 == pytest.approx((4.0 * 1.0 + 4.0 * 4.0) / 8.0)
+
+
+def rests(true_sd, samples=37, seed=0):
+    """Scatter of a sensor at rest in several recordings."""
+    random, freedom = np.random.default_rng(seed), samples - 2
+    return [SensorNoise(sd * np.sqrt(random.chisquare(freedom) / freedom), "rest", freedom) for sd in true_sd]
+
+
+def test_rests_of_one_sensor_have_one_noise():
+    found = pooled(rests(np.ones(200)))
+    assert np.std([one.sd for one in found]) < 0.02
+    assert np.mean([one.sd**2 for one in found]) == pytest.approx(1.0, abs=0.05)
+
+
+def test_the_inverse_of_the_pooled_variance_has_no_bias():
+    """It is the weight of a recording's errors: of its own rest alone it would be 6 % too large."""
+    inverse = [[1 / one.sd**2 for one in own(rests(np.ones(10), seed=k))] for own in (list, pooled) for k in range(200)]
+    alone, together = np.mean(inverse[:200]), np.mean(inverse[200:])
+    assert alone == pytest.approx(35 / 33, abs=0.02)
+    assert together == pytest.approx(1.0, abs=0.02)
+
+
+def test_noises_that_differ_between_recordings_stay_apart():
+    true = np.exp(0.3 * np.random.default_rng(3).standard_normal(60))
+    given = rests(true)
+    found = pooled(given)
+
+    def error(noises):
+        return np.mean(np.log([one.sd for one in noises] / true) ** 2)
+
+    assert error(found) < error(given)
+    assert np.corrcoef(np.log([one.sd for one in found]), np.log(true))[0, 1] > 0.9
+
+
+def test_what_no_rest_shows_is_not_pooled():
+    given = [SensorNoise(0.1, "assumed"), *rests([1.0]), SensorNoise(0.5, "count")]
+    assert pooled(given) == given
+    assert pooled([*given, *rests([1.0], seed=1)])[0] == given[0]

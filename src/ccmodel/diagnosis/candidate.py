@@ -139,8 +139,14 @@ class CandidateFit:
         Statistical Association 90(430), 773-795, 1995, doi:10.1080/01621459.1995.10476572). It is that of the clearest
         strength; infinite for a law, which has none, and where nothing scatters. Of a mechanism with states, the
         strength is what is left of it when the recordings start.
+
+        A strength is judged for the fitted values of the mechanism's other parameters, which mean nothing without it:
+        each of them takes a degree of freedom. If too few are left, the variance is the one for all values.
         """
         mechanism, names = registry.get(name), list(self.values)
+        apart = {p.name for p in (*mechanism.strengths, *mechanism.states)}
+        keys = [mechanism_key(name, place, p.name) for p in mechanism.parameters if p.name not in apart]
+        shapes = [names.index(key) for key in keys if key in self.values]
         states = [names.index(mechanism_key(name, place, state.name)) for state in mechanism.states]
         left = 1.0 - np.array([self.values[names[k]] for k in states])
         most = -np.inf
@@ -149,7 +155,10 @@ class CandidateFit:
             whole, nu = self.values[names[k]] - strength.neutral, float(self.degrees_of_freedom[k])
             # The derivatives of what is left: by the strength, and by each state.
             slopes = [float(left.prod()), *(-whole * float(np.delete(left, i).prod()) for i in range(left.size))]
-            variance = np.array(slopes) @ self.covariance[np.ix_([k, *states], [k, *states])] @ np.array(slopes)
+            covariance = self.covariance[np.ix_([k, *states], [k, *states])]
+            if nu - len(shapes) >= 1:
+                covariance, nu = _given(self.covariance, [k, *states], shapes), nu - len(shapes)
+            variance = np.array(slopes) @ covariance @ np.array(slopes)
             if not variance > 0.0:
                 return np.inf
             t2 = (whole * float(left.prod())) ** 2 / variance
@@ -399,3 +408,9 @@ def discretisation_shift(candidate: CandidateFit) -> NDArray:
     information += candidate.prior[1].T @ candidate.prior[1]
     score = sum(c * J.T @ e for J, e, c in zip(candidate.jacobian, changes, weights, strict=True))
     return -inverse_of(information, sizes) @ score
+
+
+def _given(covariance: NDArray, wanted: list[int], known: list[int]) -> NDArray:
+    """Covariance of some unknowns of a normal distribution where others are known, shape (wanted, wanted)."""
+    across = covariance[np.ix_(wanted, known)]
+    return covariance[np.ix_(wanted, wanted)] - across @ np.linalg.pinv(covariance[np.ix_(known, known)]) @ across.T

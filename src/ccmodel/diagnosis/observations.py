@@ -9,7 +9,7 @@ import numpy as np
 from ccmodel.channels import MEASURED
 from ccmodel.diagnosis import settings
 from ccmodel.failure import ModelError
-from ccmodel.inference.observations import Observations, Tolerance
+from ccmodel.inference.observations import Observations, Tolerance, with_pooled_noise
 from ccmodel.model.parameters import Parameters
 from ccmodel.recording import Recording
 
@@ -52,7 +52,7 @@ def observations_of(
     if observed:
         why = "its tensions are not observed at rest by load cells and torques, as those of the others are"
         not_judged += [_entry(o.id, why) for o in usable if o not in observed]
-    usable = _with_lone_batches(observed or usable)
+    usable = _with_lone_batches(with_pooled_noise(observed or usable))
     return usable, [*not_judged, *_missing(usable), *_tolerated(tolerance)]
 
 

@@ -26,6 +26,7 @@ from ccmodel.diagnosis.repeatability import FRICTION, PRETENSION, STATED, Repeat
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS
 from ccmodel.inference.jacobian import STEP, jacobian, size_of
 from ccmodel.inference.observations import Observations
+from ccmodel.model.general.active import Active
 from ccmodel.model.general.run import settings_of
 from ccmodel.model.parameters import Parameters, mechanism_key, mechanism_parameter, of_batch
 from ccmodel.model.session import known_states
@@ -265,12 +266,29 @@ def nuisances(o: Observations, repeatability: Repeatability = STATED) -> NDArray
     Returns
     -------
     ndarray, shape (rows, k)
-        Scalar nuisances first, friction before all others; then draws of the drive motion's error.
+        Scalar nuisances first, friction before all others; then draws of the drive motion's error, and the length over
+        which friction builds up.
     """
     scalars = repeatability.applied(_scalar_nuisances(o))
     drawn = o.drive_errors({})
-    columns = [*_effects(o, scalars), *((d / np.sqrt(len(drawn))).ravel() for d in drawn)]
+    columns = [*_effects(o, scalars), *((d / np.sqrt(len(drawn))).ravel() for d in drawn), *_build_up(o)]
     return np.stack(columns, axis=1)
+
+
+def _build_up(o: Observations) -> list[NDArray]:
+    """Effect on the errors of friction that builds up over `BUILD_UP_M`; none where the model has presliding."""
+    acting = settings_of(o.parameters.mechanisms)
+    if acting.bristle_m or acting.contact_elements is not None:
+        return []
+    at_once, built_up = (_presliding(o, share * settings.BUILD_UP_M) for share in (0.01, 1.0))
+    return [((built_up - at_once) / o.sigma).ravel()]
+
+
+def _presliding(o: Observations, z0: float) -> NDArray:
+    mechanism = registry.get("presliding")
+    values = {p.name: p.start for p in mechanism.parameters} | {"z0": z0}
+    mechanisms = (*o.parameters.mechanisms, Active(mechanism.name, mechanism.places[0], values))
+    return o.with_parameters(replace(o.parameters, mechanisms=mechanisms)).modelled({})
 
 
 def _effects(o: Observations, scalars: Sequence[tuple[str, float, float]]) -> list[NDArray]:

@@ -47,6 +47,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import Akima1DInterpolator
 from scipy.ndimage import uniform_filter1d
 
 from ccmodel.encoder.rest_detection import Rest, find_rests
@@ -123,12 +124,12 @@ def reconstruct_motion(time_s: NDArray, theta_counts_rad: NDArray, step_rad: flo
     rests = find_rests(counts, resting)
     posterior = smooth(counts, observed, rests, WINDOW_S / step_s, from_rest)
     grid = time[0] + step_s * np.arange(counts.size)
-    angle = _without_overshoot(posterior.mean, counts, rests)
-    *draws, offset = (
-        np.interp(time, grid, _without_overshoot(posterior.mean + deviation, counts, rests) - angle) * step_rad
-        for deviation in (*posterior.draws, posterior.offset)
+    angle, *others = (
+        step_rad * _smoothly(time, grid, _without_overshoot(posterior.mean + deviation, counts, rests))
+        for deviation in (0.0, *posterior.draws, posterior.offset)
     )
-    angle, sigma = (np.interp(time, grid, curve) * step_rad for curve in (angle, posterior.sd))
+    *draws, offset = (other - angle for other in others)
+    sigma = step_rad * np.interp(time, grid, posterior.sd)
     if from_rest:
         return DriveMotion(angle - angle[0], sigma, np.array(draws), offset, angle[0] + zero)
     return DriveMotion(angle + zero, sigma, np.array(draws), offset, 0.0)
@@ -150,6 +151,11 @@ def _on_even_steps(time: NDArray, counts: NDArray) -> tuple[float, NDArray, NDAr
     observed[index] = True
     latest = np.searchsorted(index, np.arange(observed.size), "right") - 1
     return step_s, np.round(counts[latest]), observed
+
+
+def _smoothly(time: NDArray, grid: NDArray, curve: NDArray) -> NDArray:
+    """A curve between the points of a grid: it turns there as round as at them, and rests where they do."""
+    return Akima1DInterpolator(grid, curve)(np.clip(time, grid[0], grid[-1]))
 
 
 def _without_overshoot(angle: NDArray, counts: NDArray, rests: list[Rest]) -> NDArray:

@@ -1,12 +1,19 @@
-"""Noise of a recording under the correct model: sensor noise, encoder steps, and the uncertain drive motion."""
+"""Noise of a recording under the correct model: sensor noise, encoder steps, and the uncertain drive motion.
 
+Source
+------
+The scatter at rest of several recordings, each by what its own samples and all recordings say: Smyth, Linear models and
+empirical Bayes methods, Stat. Appl. Genet. Mol. Biol. 3 (2004), Section 6.2.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
+from scipy.special import polygamma
 
-from ccmodel.inference.cycles import NONE, CycleNoise
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
@@ -35,14 +42,17 @@ class SensorNoise:
         Standard deviation, in the channel's unit.
     source : {"cycles", "rest", "count", "assumed"}
         Consecutive cycles, scatter at rest, the step of a counted angle, or the stated accuracy.
+    freedom : float
+        Degrees of freedom of the scatter at rest; 0 of another source.
     """
 
     sd: float
     source: str
+    freedom: float = 0.0
 
 
-def sensor_noise(given: ModelInput, cycles: CycleNoise = NONE) -> dict[str, SensorNoise]:
-    """Noise of each channel.
+def sensor_noise(given: ModelInput) -> dict[str, SensorNoise]:
+    """Noise of each channel without regard to its motion.
 
     The scatter about a straight line through the first half of the rest at the recording's start (before the drive's
     first count, friction already gives way in the second half), or the stated accuracy if the rest is too short. A
@@ -57,11 +67,38 @@ def sensor_noise(given: ModelInput, cycles: CycleNoise = NONE) -> dict[str, Sens
             prior = SensorNoise(step / np.sqrt(12), "count")
         elif rest.size >= FEWEST_AT_REST:
             best = BEST_SHARE * stated if stated else 1e-6 * max(float(np.abs(values).max()), 1e-9)
-            prior = SensorNoise(max(_scatter(rest[: max(FEWEST_AT_REST, rest.size // 2)]), best), "rest")
+            first = rest[: max(FEWEST_AT_REST, rest.size // 2)]
+            prior = SensorNoise(max(_scatter(first), best), "rest", first.size - 2)
         else:
             prior = SensorNoise(stated or 0.01 * max(float(np.ptp(values)), 1e-9), "assumed")
-        found[channel] = repeated(prior, cycles.variance.get(channel), cycles.cycles)
+        found[channel] = prior
     return found
+
+
+def pooled(noises: Sequence[SensorNoise]) -> list[SensorNoise]:
+    """Noise of one channel in several recordings, the scatter at each rest drawn towards that of all rests.
+
+    A rest has few samples, and its variance scatters by a quarter; the sensor is the same one. The variances of all
+    recordings are drawn from a scaled inverse chi-squared distribution, whose mean and degrees of freedom follow from
+    mean and variance of their logarithms. Noise of another source is left as it is.
+    """
+    freedom = np.array([one.freedom for one in noises])
+    variance = np.array([one.sd**2 for one in noises])
+    at_rest = freedom > 0
+    if at_rest.sum() < 2:
+        return list(noises)
+    n, s2 = freedom[at_rest], variance[at_rest]
+    scatter = np.var(np.log(s2), ddof=1) - np.mean(polygamma(1, n / 2))
+    if scatter <= 0:
+        drawn = np.full(n.size, n @ s2 / n.sum())
+    else:
+        # The inverse of the trigamma function, from its first two terms at a large argument.
+        prior_freedom = (1 + np.sqrt(1 + 2 * scatter)) / scatter
+        of_logarithm = np.mean(np.log(s2) - polygamma(0, n / 2) + np.log(n / 2))
+        prior = np.exp(of_logarithm + polygamma(0, prior_freedom / 2) - np.log(prior_freedom / 2))
+        drawn = (prior_freedom * prior + n * s2) / (prior_freedom + n)
+    variance[at_rest] = drawn
+    return [replace(one, sd=float(np.sqrt(v))) for one, v in zip(noises, variance, strict=True)]
 
 
 def repeated(prior: SensorNoise, variance: float | None, cycles: float) -> SensorNoise:

@@ -8,8 +8,17 @@ from numpy.typing import NDArray
 
 from ccmodel.channels import MEASURED, TAU_OUT
 from ccmodel.failure import ModelError
-from ccmodel.inference.cycles import cycle_noise
-from ccmodel.inference.noise import PHASES, SensorNoise, drive_errors, rounding_errors, sensor_noise, size_over_time
+from ccmodel.inference.cycles import NONE, CycleNoise, cycle_noise
+from ccmodel.inference.noise import (
+    PHASES,
+    SensorNoise,
+    drive_errors,
+    pooled,
+    repeated,
+    rounding_errors,
+    sensor_noise,
+    size_over_time,
+)
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import PRESCRIBED, LoadFrom, ModelInput, simulate
 from ccmodel.recording import Recording
@@ -41,6 +50,10 @@ class Observations:
         Whether the load's law or the measured load torque acts at the cables' far end.
     noise : mapping of str to SensorNoise
         Noise of each channel's sensor.
+    before_motion : mapping of str to SensorNoise
+        The same without regard to the motion: from the rest, or as stated.
+    cycles : CycleNoise
+        What consecutive cycles say of it.
     friction_between : float
         Standard deviation of friction between batches, over its mean, that this recording has besides the one between
         runs: of the only recording of a batch among several. Otherwise 0.
@@ -56,6 +69,8 @@ class Observations:
     offset_is_free: bool = False
     load_from: LoadFrom = "law"
     noise: Mapping[str, SensorNoise] = field(default_factory=dict)
+    before_motion: Mapping[str, SensorNoise] = field(default_factory=dict)
+    cycles: CycleNoise = NONE
     friction_between: float = 0.0
 
     @classmethod
@@ -85,14 +100,33 @@ class Observations:
             raise ModelError(f"{recording.batch}/{recording.id}: none of {', '.join(channels)} was recorded")
         time_s = given.recording.time_s
         judged = time_s >= max(recording.rest_s, recording.settled_s)
-        sensors = sensor_noise(given, cycle_noise(whole or recording))
+        before_motion, cycles = sensor_noise(given), cycle_noise(whole or recording)
+        sensors = _with_cycles(before_motion, cycles)
         drive = drive_errors(given, parameters, offset_is_free)
         measured = np.stack([given.recording[c][judged] for c in used])
         sigma = np.stack([np.hypot(sensors[c].sd, size_over_time(drive[c], time_s)[judged]) for c in used])
         by_channel = tolerance if isinstance(tolerance, Mapping) else dict.fromkeys(used, tolerance)
         shares = np.array([by_channel.get(c, 0.0) for c in used])
         sigma = np.hypot(sigma, (shares * np.ptp(measured, axis=1))[:, None])
-        return cls(given, parameters, used, judged, measured, sigma, shares, offset_is_free, noise=sensors)
+        return cls(
+            given,
+            parameters,
+            used,
+            judged,
+            measured,
+            sigma,
+            shares,
+            offset_is_free,
+            noise=sensors,
+            before_motion=before_motion,
+            cycles=cycles,
+        )
+
+    def with_noise(self, before_motion: Mapping[str, SensorNoise]) -> "Observations":
+        """The same with other noise of the sensors."""
+        noise = _with_cycles(before_motion, self.cycles)
+        change = np.array([noise[c].sd ** 2 - self.noise[c].sd ** 2 for c in self.channels])
+        return replace(self, sigma=np.sqrt(self.sigma**2 + change[:, None]), noise=noise, before_motion=before_motion)
 
     def without(self, channel: str) -> "Observations":
         """The same without one of the channels."""
@@ -151,3 +185,18 @@ class Observations:
             if channel in steps:
                 found[:, k] = rounding_errors(simulated[k], steps[channel])
         return found / self.sigma
+
+
+def with_pooled_noise(observations: Sequence[Observations]) -> list[Observations]:
+    """Observations of one rig, the noise of each sensor drawn towards that of all recordings (`noise.pooled`)."""
+    priors: list[dict[str, SensorNoise]] = [{} for _ in observations]
+    for channel in sorted({c for o in observations for c in o.before_motion}):
+        having = [k for k, o in enumerate(observations) if channel in o.before_motion]
+        of_all = pooled([observations[k].before_motion[channel] for k in having])
+        for k, one in zip(having, of_all, strict=True):
+            priors[k][channel] = one
+    return [o.with_noise(prior) for o, prior in zip(observations, priors, strict=True)]
+
+
+def _with_cycles(noise: Mapping[str, SensorNoise], cycles: CycleNoise) -> dict[str, SensorNoise]:
+    return {c: repeated(one, cycles.variance.get(c), cycles.cycles) for c, one in noise.items()}

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ccmodel.channels import F_LOAD, TAU_OUT, THETA_IN, THETA_MOTOR, THETA_OUT
 from ccmodel.encoder.reconstruction import reconstruct_motion
 from ccmodel.encoder.smoothing import DRAWS, OFFSET_SCORES
+from ccmodel.model.turning_points import TurningPoints
 from ccmodel.recording import Recording, stride
 
 # A measured load torque is the torque and its sensor's noise. The noise would move the load back and forth; a hand, a
@@ -111,6 +112,30 @@ class ModelInput:
         theta_out, tau_out, F_load = (load.get(name) for name in ("theta_out", "tau_out", "F_load"))
         exact = np.zeros((0, theta_in.size)), np.zeros(theta_in.size)
         return cls(recording, theta_in, *exact, theta_out, tau_out, F_load, {})
+
+    @property
+    def with_turning_points(self) -> "tuple[ModelInput, NDArray | slice]":
+        """Times, drive, load and motor with the points at which the drive turns between samples; and the samples there.
+
+        Only a motion behind an encoder's counts has them: the noise of any other angle turns at most samples, and a
+        prescribed motion is linear between its samples.
+        """
+        recording = self.recording
+        if THETA_IN not in recording.encoder_step_rad:
+            return self, slice(None)
+        turns = TurningPoints.of(recording.time_s, self.theta_in)
+        if not turns.interval.size:
+            return self, slice(None)
+        given = replace(
+            self,
+            recording=replace(recording, time_s=turns.inserted(recording.time_s), channels={}),
+            theta_in=turns.inserted_in_motion(self.theta_in),
+            theta_out=turns.inserted(self.theta_out),
+            tau_out=turns.inserted(self.tau_out),
+            F_load=turns.inserted(self.F_load),
+            theta_motor=turns.inserted(self.theta_motor),
+        )
+        return given, turns.samples(recording.time_s.size)
 
     @cached_property
     def resting_mean(self) -> dict[str, float]:

@@ -88,11 +88,13 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
     count_run()
     parameters = of_recording(parameters, recording)
     transmission = transmission_of(recording, parameters)
-    load, measured = _load(given, parameters, load_from)
     initial = initial_tension(given, parameters)
     if parameters.drive_encoder_offset:
         given = replace(given, theta_in=given.theta_in + parameters.drive_encoder_offset * given.drive_encoder_offset)
-    channels = _channels(_readings(transmission, load, given, initial, parameters), recording, parameters)
+    given, samples = given.with_turning_points
+    load, measured = _load(given, parameters, load_from)
+    read = _readings(transmission, load, given, initial, parameters)
+    channels = _channels({c: values[samples] for c, values in read.items()}, recording, parameters)
     sources = dict.fromkeys(channels, "model") | dict.fromkeys((THETA_IN, *measured), PRESCRIBED)
     return recording.with_channels(channels, sources, origin="model")
 

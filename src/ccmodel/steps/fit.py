@@ -7,7 +7,7 @@ from pathlib import Path
 from ccmodel import provenance
 from ccmodel.failure import ModelError
 from ccmodel.inference.fit import FitResult, fit
-from ccmodel.inference.observations import Observations
+from ccmodel.inference.observations import Observations, with_pooled_noise
 from ccmodel.inference.problem import Free, Problem
 from ccmodel.model.parameters import Parameters
 from ccmodel.progress import Progress, silent
@@ -47,7 +47,7 @@ def _fit(stated: Fit, recordings_files: Sequence[Path], progress: Progress) -> F
     except (ModelError, ValueError) as error:
         return FitResult(False, str(error), recordings=[f"{r.batch}/{r.id}" for r, _ in pairs])
     own = {name: _start(name, one, pairs[0][1], one.spread) for name, one in stated.per_recording.items()}
-    return fit(Problem(observations, shared, own), stated.starts, stated.profile, progress)
+    return fit(Problem(with_pooled_noise(observations), shared, own), stated.starts, stated.profile, progress)
 
 
 def _start(name: str, free: FreeParameter | OwnParameter, estimates: Parameters, spread: float | None = None) -> Free:
