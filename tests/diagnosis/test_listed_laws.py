@@ -9,6 +9,7 @@ from ccmodel import mechanisms
 from ccmodel.diagnosis.listed_laws import Learned, distance, nearest_listed
 from ccmodel.diagnosis.settings import WITHIN_BAND
 from ccmodel.mechanisms import laws
+from ccmodel.mechanisms.law_forms import DRAG
 from ccmodel.mechanisms.learned import FINE
 from ccmodel.report.verdict import law_claim
 
@@ -37,7 +38,7 @@ def law_of(curve):
         law
         for law in laws().values()
         if law.is_first
-        and (law.slot, law.argument.name, law.is_drag) == (curve.slot, curve.argument, curve.is_drag)
+        and (law.slot, law.argument.name, law.form is DRAG) == (curve.slot, curve.argument, curve.is_drag)
         and (not curve.channels or law.channel in curve.channels)
     )
 
@@ -47,9 +48,9 @@ def learned(law, y, sd=0.03):
     first, last = RANGES[law.argument.name, law.argument.unit]
     values = {"first": first, "last": last, "scale": 1.0}
     x, _ = law.at_knots(values | dict.fromkeys(law.coefficients, 0.0))
-    y = law.behind(x, y(law.determined_at(x))) if law.opposes else y(x)
-    if law.is_centred:
-        y = y / y.mean() - 1 if law.is_factor else y - y.mean()
+    y = law.behind(x, y(law.determined_at(x))) if law.form.has_elements else y(x)
+    if law.form.is_centred:
+        y = y / y.mean() - 1 if law.form.is_factor else y - y.mean()
     scale = 3 * float(np.abs(y).max())
     z = np.linalg.lstsq(scale * law.basis, y, rcond=None)[0]
     z += sd * np.random.default_rng(7).standard_normal(z.size)

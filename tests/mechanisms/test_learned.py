@@ -8,7 +8,8 @@ from ccmodel.channels import TAU_IN, THETA_IN, THETA_OUT
 from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.mechanisms import Sensing, laws
-from ccmodel.mechanisms.learned import COARSE, FINE, basis
+from ccmodel.mechanisms.law_forms import DRAG, basis
+from ccmodel.mechanisms.learned import COARSE, FINE
 from ccmodel.mechanisms.presliding import Contacts
 from ccmodel.mechanisms.tables import Table, pulled, stretched
 from ccmodel.model.load import FixedLoad, SpringLoad
@@ -20,8 +21,8 @@ SCALES = {"end-stretch": 5e-5}
 
 
 def values_of(law, **coefficients):
-    first, last = (0.0, 0.05) if law.is_drag else RANGES.get(law.argument.name, (-1.0, 1.0))
-    fixed = {"first": first, "last": last, "scale": 1.0 if law.is_drag else SCALES.get(law.slot, 0.1)}
+    first, last = (0.0, 0.05) if law.form is DRAG else RANGES.get(law.argument.name, (-1.0, 1.0))
+    fixed = {"first": first, "last": last, "scale": 1.0 if law.form is DRAG else SCALES.get(law.slot, 0.1)}
     return fixed | dict.fromkeys(law.coefficients, 0.0) | coefficients
 
 
@@ -49,8 +50,8 @@ def test_the_coefficients_make_smooth_curves_of_variance_one(resolution, is_cent
 def test_a_law_with_more_knots_is_no_second_law(law):
     alike = [one for one in EVERY if one.has_the_quantity_of(law)]
     assert law in alike and (law.finer() is None or law.finer() in alike)
-    assert {(one.slot, one.place, one.channel, one.argument, one.opposes) for one in alike} == {
-        (law.slot, law.place, law.channel, law.argument, law.opposes)
+    assert {(one.slot, one.place, one.channel, one.argument, one.form) for one in alike} == {
+        (law.slot, law.place, law.channel, law.argument, law.form)
     }
 
 

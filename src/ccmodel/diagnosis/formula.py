@@ -47,7 +47,7 @@ class Form:
 def _forms(law: Law) -> Iterator[Form]:
     """Formulas from short to long."""
     if law.argument.has_two_values:
-        yield Form("1 + a sign(v)" if law.is_factor else "a sign(v)", lambda x, _: (x,), ("a",), ("y",))
+        yield Form("1 + a sign(v)" if law.form.is_factor else "a sign(v)", lambda x, _: (x,), ("a",), ("y",))
         return
     if law.is_spaced_by_ratio:
         yield Form("a x^n", lambda x, n: (x**n,), ("a", "n"), ("y/x^n", "1"), has_exponent=True)
@@ -82,7 +82,7 @@ def shortest(
     law : Law
     """
     quantile = normal_quantile(0.5 + COVERAGE / 2)
-    neutral = 1.0 if law.argument.has_two_values and law.is_factor else 0.0
+    neutral = 1.0 if law.argument.has_two_values and law.form.is_factor else 0.0
     sd = np.maximum((band[1] - band[0]) / (2 * quantile), 1e-3 * max(float(np.ptp(y)), 1e-12))
     for form in _forms(law):
         constants, errors, derivatives = _fitted(form, x, y - neutral, sd)
@@ -137,7 +137,7 @@ def _unit(unit: str, law: Law) -> str:
         "x": of_argument,
         "y": law.unit,
         "1": "1",
-        "y x": of_argument if law.is_factor else f"{law.unit}*{of_argument}",
+        "y x": of_argument if law.form.is_factor else f"{law.unit}*{of_argument}",
     }
     found = alone.get(unit, unit.replace("y/x", f"{law.unit}/({of_argument})"))
     return found.replace(" ", "*")

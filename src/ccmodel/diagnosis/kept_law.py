@@ -51,7 +51,7 @@ def mechanism_file(name: str, stated: Mapping, candidate: CandidateFit, batch: s
     x, y = law.at_knots(values_of(candidate, law))
     nearest = stated["nearest_listed"]
     argument = stated["argument_is"]
-    value = "1 + strength y(x)" if law.is_factor else "strength y(x)"
+    value = "1 + strength y(x)" if law.form.is_factor else "strength y(x)"
     text = [
         _title(stated),
         f"Equation: With y the values of `CURVE` over x, {argument} ({stated['argument_unit']}), the law is {value}: "

@@ -53,9 +53,9 @@ def curve_of(candidate: CandidateFit, law: Law) -> tuple[NDArray, NDArray, tuple
     covariance = by_coefficients @ candidate.covariance[np.ix_(some, some)] @ by_coefficients.T
     variance = np.diag(covariance).clip(0.0) + of_straight_pieces(x, y) ** 2
     reach = normal_quantile(0.5 + COVERAGE / 2) * np.sqrt(variance)
-    neutral = 1.0 if law.is_factor else 0.0
-    low, high = (law.possible(y + neutral + sign * reach) for sign in (-1, 1))
-    return x, law.possible(y + neutral), (low, high)
+    middle, possible = y + law.form.neutral, law.form.possible
+    low, high = (possible(middle + sign * reach) for sign in (-1, 1))
+    return x, possible(middle), (low, high)
 
 
 def of_straight_pieces(x: NDArray, y: NDArray) -> NDArray:

@@ -20,6 +20,7 @@ from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.failure import ModelError
 from ccmodel.inference.pool import each
 from ccmodel.mechanisms import Sensing, laws
+from ccmodel.mechanisms.law_forms import DRAG
 from ccmodel.mechanisms.learned import Law
 from ccmodel.model.parameters import mechanism_key
 from ccmodel.model.run import simulate
@@ -103,9 +104,9 @@ def _unit_of(law: Law, base: CandidateFit, motions: Sequence[Sensing]) -> float:
     """
     if law.channel is not None:
         return float(np.ptp(np.concatenate([m.channels[law.channel] for m in motions])))
-    if law.is_factor:
+    if law.form.is_factor:
         return 1.0
-    if law.is_drag:
+    if law.form is DRAG:
         o = base.whitened[0].observations
         model, path = base.model(o.parameters), o.given.recording.path
         tension_N = np.mean([m.channels[c].clip(0.0).mean() for m in motions for c in TENSIONS if c in m.channels])

@@ -18,6 +18,7 @@ from ccmodel.inference.cross_validation import inverse_of
 from ccmodel.inference.effective_samples import of_recording
 from ccmodel.inference.jacobian import size_of
 from ccmodel.mechanisms.contract import Curve, Parameter
+from ccmodel.mechanisms.law_forms import DRAG
 from ccmodel.mechanisms.learned import Law
 
 
@@ -54,7 +55,7 @@ def nearest_listed(learned: Learned) -> dict[str, str | float] | None:
 
 
 def _is_comparable(law: Law, curve: Curve) -> bool:
-    is_same = (curve.slot, curve.argument, curve.is_drag) == (law.slot, law.argument.name, law.is_drag)
+    is_same = (curve.slot, curve.argument, curve.is_drag) == (law.slot, law.argument.name, law.form is DRAG)
     return is_same and (not curve.channels or law.channel in curve.channels)
 
 
@@ -88,7 +89,7 @@ class _Distance:
         constants = zip(self.curve.constants, u, signs, strict=True)
         at = law.determined_at(self.x)
         y = self.curve.of(at, {p.name: _value(p, one, sign) for p, one, sign in constants})
-        wanted = _without_average(y, law) if law.is_centred else law.behind(self.x, y)
+        wanted = _without_average(y, law) if law.form.is_centred else law.behind(self.x, y)
         z = np.linalg.lstsq(scale * law.basis, wanted, rcond=None)[0]
         return solve_triangular(self.root, z - self.z, lower=True)
 
@@ -110,7 +111,7 @@ class _Distance:
 
 def _without_average(y: NDArray, law: Law) -> NDArray:
     """Values of a law at its knots without what belongs to the calibration: added to 1 for a factor, or to 0."""
-    return y / y.mean() - 1.0 if law.is_factor else y - y.mean()
+    return y / y.mean() - 1.0 if law.form.is_factor else y - y.mean()
 
 
 def _scaled(p: Parameter, value: float) -> float:

@@ -282,7 +282,7 @@ def _law(law: Mapping, found: Diagnosis) -> Figure:
     else:
         ax.fill_between(x, low, high, color=COLOURS[1], alpha=0.25, lw=0, label="90 % band")
         ax.plot(x, y, color=COLOURS[1], lw=1.4, label="learned law")
-    ax.axhline(1.0 if learned.is_factor else 0.0, color=FAINT, lw=1.0, ls="--", label="calibrated model")
+    ax.axhline(learned.form.neutral, color=FAINT, lw=1.0, ls="--", label="calibrated model")
     if learned.is_spaced_by_ratio:
         ax.set_xscale("log")
     ax.set_xlabel(f"{law['argument_is']} ({law['argument_unit']})")

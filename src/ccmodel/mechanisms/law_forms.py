@@ -1,0 +1,91 @@
+"""How the values of a law that no list holds stand in the equations of its slot, and what they are a priori."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+# A spring is never without stretch: its least compliance over its mean.
+LEAST_COMPLIANCE = 0.05
+# Shares of a law's standard deviation below which a direction of its coefficients is left out.
+SLIGHTEST = 0.02
+# Standard deviation of a straight line at its end, over that of the curve about it.
+SLOPE = 3.0
+
+
+@dataclass(frozen=True)
+class Form:
+    """How a law's values act.
+
+    Attributes
+    ----------
+    meaning : str
+        What the values are, with the symbol of the channel that they are added to and the side of their place.
+    unit : str or None
+        Of the values; None for that of the channel that they are added to.
+    neutral : float
+        What the values are added to: 1 of a factor, else 0.
+    least : float or None
+        The smallest value that is physically possible, if there is one.
+    is_centred : bool
+        Whether the average of the values belongs to the calibration.
+    has_slope : bool
+        Whether the values rise with the argument a priori, from nothing.
+    shortest_yield : float or None
+        The values are of Maxwell-slip elements, each of which yields after the travel that is its knot; the shortest
+        travel over the longest. None of a law without memory.
+    """
+
+    meaning: str
+    unit: str | None = None
+    neutral: float = 0.0
+    least: float | None = None
+    is_centred: bool = True
+    has_slope: bool = False
+    shortest_yield: float | None = None
+
+    @property
+    def is_factor(self) -> bool:
+        """Whether the values are added to a factor."""
+        return self.neutral != 0.0
+
+    @property
+    def has_elements(self) -> bool:
+        """Whether the values are of elements that yield."""
+        return self.shortest_yield is not None
+
+    def possible(self, y: NDArray) -> NDArray:
+        """Values within what is physically possible."""
+        return y if self.least is None else y.clip(self.least)
+
+
+FRICTION_FACTOR = Form("factor of the friction coefficient", "1", neutral=1.0, least=0.0)
+STRETCH_FACTOR = Form("factor of the cables' compliance", "1", neutral=1.0, least=LEAST_COMPLIANCE)
+END_COMPLIANCE = Form("compliance of the cables' fastening at the {side}, in m/N", "m/N", least=0.0, is_centred=False)
+DRAG = Form("drag of a cable per length of conduit, in N/m", "N/m", is_centred=False, has_slope=True)
+# Shares of friction that build up; after a reversal friction acts in the former direction at first.
+CONTACT_ELEMENTS = Form(
+    "friction over that of sliding, after a reversal", "1", neutral=1.0, is_centred=False, shortest_yield=0.002
+)
+ADDED = Form("added to {symbol}, in {unit}")
+# A torque whose elements yield one after the other.
+AGAINST_MOTION = Form("added to {symbol}, against the motion, in {unit}", is_centred=False, shortest_yield=0.01)
+
+
+@cache
+def basis(knots: int, length: float, is_centred: bool, has_slope: bool = False) -> NDArray:
+    """Root of the a priori covariance of a law's values at its knots, shape (knots, coefficients).
+
+    `has_slope` adds a straight line from zero, as a drag by speed has. Their mean variance is 1. Directions whose
+    standard deviation is below `SLIGHTEST` are left out.
+    """
+    x = np.linspace(0.0, 1.0, knots)
+    covariance = np.exp(-0.5 * ((x[:, None] - x) / length) ** 2) + has_slope * SLOPE**2 * np.outer(x, x)
+    centred = np.eye(knots) - (1.0 / knots if is_centred else 0.0)
+    value, vector = np.linalg.eigh(centred @ covariance @ centred)
+    value, vector = value[::-1].clip(0.0), vector[:, ::-1]
+    root = (vector * np.sqrt(value))[:, value > SLIGHTEST**2 * value.sum()]
+    # Eigenvectors have no sign of their own: that of their last entry is made positive.
+    root = root * np.where(root[-1] < 0, -1.0, 1.0)
+    return root / np.sqrt((root**2).sum() / knots)
