@@ -156,6 +156,20 @@ def test_a_single_bad_channel_makes_a_fit_bad():
 
 
 @pytest.mark.parametrize(
+    ("single", "larger", "said"),
+    [(19.0, 15.0, "explained"), (19.0, 7.0, "undecided"), (1.4, 1.1, "explained")],
+)
+def test_what_a_larger_set_leaves_far_less_of_is_not_explained(single, larger, said):
+    """The second mechanism most probably imitates what the kink's equations leave, and leaves a third or more of it."""
+    kink = fitted(single, KINK), evidence(NONE - 30.0, size=single - 1.0)
+    pair = fitted(larger, FRICTION, KINK), evidence(NONE, size=larger - 1.0)
+    found = verdict(evidence(), kink, pair, model=fitted(3000.0))
+    assert found.confidence_in("kink") > SURE
+    assert found.confidence_in("pulley-friction") < 0.5
+    assert found.verdict == said
+
+
+@pytest.mark.parametrize(
     ("rival", "left", "said"), [(FAR, 1.3, "explained"), (NONE - 1.0, 1.3, "undecided"), (FAR, 3.0, "undecided")]
 )
 def test_a_set_that_alone_leaves_a_good_fit_is_named_although_something_unlisted_may_be_imitated(rival, left, said):

@@ -278,6 +278,17 @@ class Comparison:
         )
         return bool(left <= settings.LEADING_ON * before)
 
+    def is_outdone(self, candidate: CandidateFit) -> bool:
+        """Whether a candidate's fit is not good, and that of a larger set leaves at most half of what it leaves.
+
+        Whether the further mechanisms are missing or imitate what the equations leave, the candidate alone is then no
+        complete account: what an imitation takes off is seldom half.
+        """
+        if candidate.is_good:
+            return False
+        larger = (c for c in self.candidates if c.is_plausible and is_part_of(candidate, c))
+        return any(self.left_by(c) <= settings.LEADING_ON * self.left_by(candidate) for c in larger)
+
     def log_weight(self, candidate: CandidateFit) -> float:
         """Log posterior of a candidate, complete or not."""
         return float(np.logaddexp.reduce(self.log_posterior[1 + self.candidates.index(candidate)]))

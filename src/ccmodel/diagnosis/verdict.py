@@ -86,8 +86,9 @@ def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
 
     - ``agrees``: nothing is missing in the calibrated model, with a probability above one half.
     - ``explained``: each mechanism of the candidate that is most probably complete has the probability `SURE` at least,
-      and that these and no others are missing has one above one half; or those that have it leave a good fit
-      (`Comparison.certain`); or a set leaves a good fit and no other does as well (`Comparison.best_of_list`).
+      and that these and no others are missing has one above one half, unless a larger set leaves far less
+      (`Comparison.is_outdone`); or those that have it leave a good fit (`Comparison.certain`); or a set leaves a good
+      fit and no other does as well (`Comparison.best_of_list`).
     - ``learned``: something that no list holds is missing, and is a law of one slot with a probability above one half.
     - ``unexplained``: something is missing that no candidate describes, with a probability above one half, and no
       mechanism is part of it with such a probability.
@@ -123,7 +124,8 @@ def _is_explained(judgement: Judgement, best: CandidateFit) -> bool:
     names = sorted(best.hypothesis.names)
     pairs = zip(judgement.candidates, judgement.probability, strict=True)
     alone = sum(p for c, p in pairs if sorted(c.hypothesis.names) == names)
-    return min(map(judgement.confidence_in, names)) >= settings.SURE and alone > 0.5
+    is_sure = min(map(judgement.confidence_in, names)) >= settings.SURE and alone > 0.5
+    return is_sure and not judgement.comparison.is_outdone(best)
 
 
 def single_fault_places(comparison: Comparison) -> list[str]:
