@@ -113,7 +113,7 @@ class ModelInput:
         exact = np.zeros((0, theta_in.size)), np.zeros(theta_in.size)
         return cls(recording, theta_in, *exact, theta_out, tau_out, F_load, {})
 
-    @property
+    @cached_property
     def with_turning_points(self) -> "tuple[ModelInput, NDArray | slice]":
         """Times, drive, load and motor with the points at which the drive turns between samples; and the samples there.
 
