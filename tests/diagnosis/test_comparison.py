@@ -160,7 +160,7 @@ def test_a_single_bad_channel_makes_a_fit_bad():
     [(19.0, 15.0, "explained"), (19.0, 9.0, "undecided"), (1.4, 1.1, "explained")],
 )
 def test_what_a_larger_set_leaves_far_less_of_is_not_explained(single, larger, said):
-    """The second mechanism most probably imitates what the kink's equations leave, and leaves most of it or less than half."""
+    """The second mechanism imitates what the kink's equations leave, most probably; it leaves most of it or little."""
     kink = fitted(single, KINK), evidence(NONE - 30.0, size=single - 1.0)
     pair = fitted(larger, FRICTION, KINK), evidence(NONE, size=larger - 1.0)
     found = verdict(evidence(), kink, pair, model=fitted(3000.0))

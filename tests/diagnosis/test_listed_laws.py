@@ -9,7 +9,6 @@ from ccmodel import mechanisms
 from ccmodel.diagnosis.listed_laws import Learned, distance, nearest_listed
 from ccmodel.diagnosis.settings import WITHIN_BAND
 from ccmodel.mechanisms import laws
-from ccmodel.mechanisms.law_forms import DRAG
 from ccmodel.mechanisms.learned import FINE
 from ccmodel.report.verdict import law_claim
 
@@ -38,7 +37,7 @@ def law_of(curve):
         law
         for law in laws().values()
         if law.is_first
-        and (law.slot, law.argument.name, law.form is DRAG) == (curve.slot, curve.argument, curve.is_drag)
+        and (law.slot, law.argument.name, law.form.name) == (curve.slot, curve.argument, curve.form)
         and (not curve.channels or law.channel in curve.channels)
     )
 

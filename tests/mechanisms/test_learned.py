@@ -117,6 +117,27 @@ def test_friction_by_position_is_where_the_bend_is():
     assert largest_difference(found, wanted) < 0.2 * largest_difference(run(sine()), wanted)
 
 
+BEND = "learned-sliding-friction-bend-by-position-along-conduit"
+
+
+@pytest.mark.parametrize(("added_rad", "bend_rad"), [(1.5, np.pi + 1.5), (-2.0, np.pi - 2.0), (-9.0, 0.0)])
+def test_bend_that_is_added_evenly_is_that_of_another_loop(added_rad, bend_rad):
+    """No conduit has less bend than none."""
+    law = with_values(laws()[BEND], lambda x: np.full(x.size, added_rad), scale=1.0)
+    found, wanted = run(sine(), law), run(sine(), path=ConduitPath([L], [bend_rad]))
+    assert largest_difference(found, wanted) < 0.02 * largest_difference(run(sine()), wanted)
+
+
+@pytest.mark.parametrize("loop_rad", [np.pi, 3 * np.pi])
+def test_bend_that_is_added_at_one_place_is_a_kink_in_any_loop(loop_rad):
+    """A kink of 0.8 rad, over a width of a twentieth; a factor of friction would grow with the loop's bend."""
+    path = ConduitPath([L], [loop_rad])
+    law = with_values(laws()[f"{BEND}-fine"], lambda x: 0.8 / 0.05 * (1 - abs(x - 0.5) / 0.05).clip(0), scale=4.0)
+    found = run(sine(), law, path=path, elements=64)
+    wanted = run(sine(), ("kink", "conduit", {"beta": 0.8, "s": 0.5}), path=path, elements=64)
+    assert largest_difference(found, wanted) < 0.2 * largest_difference(run(sine(), path=path, elements=64), wanted)
+
+
 def test_cables_of_a_learned_compliance_are_those_that_settle():
     """Over its own tension a settling cable has the compliance 1 / (1 - exp(-u / u_s))."""
     law = laws()["learned-cable-stretch-by-tension-fine"]

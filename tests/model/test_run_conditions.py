@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from builders import recording
+from ccmodel.channels import TENSIONS
 from ccmodel.geometry import ConduitPath
+from ccmodel.mechanisms import laws
 from ccmodel.model.general.run import Active
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, FixedLoad, SpringLoad, TorqueLoad
-from ccmodel.model.run import _by_torque_alone, _load, _true_at_rest, _zeroed
+from ccmodel.model.run import ModelInput, _by_torque_alone, _load, _true_at_rest, _zeroed, initial_tension
 from model_runs import CABLE
 
 THETA = np.linspace(1.0, 2.0, 301)
@@ -100,3 +102,26 @@ def test_a_torque_that_is_the_load_keeps_its_reading_and_others_are_freed_of_the
     rest = {"time_s": 0.1, "tau_in_Nm": 0.01, "tau_out_Nm": 0.011, "F_drive_N": 14.0, "F_load_N": 14.0}
     one = SimpleNamespace(recording=replace(recording(), far_end=far_end), resting_mean=rest)
     assert _true_at_rest(one, parameters)["tau_out_Nm"] == pytest.approx(tau_out)
+
+
+@pytest.mark.parametrize("added_rad", [0.0, 1.0])
+def test_a_law_that_adds_bend_holds_more_of_the_tension_that_a_rest_shows(added_rad):
+    """Cable A rests with a ratio of tensions that its loop alone does not hold."""
+    mu, radius = CABLE.friction_coefficient, CABLE.drive_radius_m
+    ratio = np.exp(mu * (np.pi + 0.8))
+    T1, T2, T3, T4 = 12.0, 12.0 / ratio, 7.0, 7.0
+    shown = {
+        "tau_in_Nm": (T1 - T3) * radius,
+        "tau_out_Nm": (T2 - T4) * radius,
+        "F_drive_N": T1 + T3,
+        "F_load_N": T2 + T4,
+    } | dict(zip(TENSIONS, (T1, T2, T3, T4), strict=True))
+    still = {"theta_in_rad": 0.0, "theta_out_rad": 0.0}
+    rest = moved(0.5, 0.0, **{c: lambda t, v=v: np.full(t.size, v) for c, v in (shown | still).items()})
+    law = laws()["learned-sliding-friction-bend-by-position-along-conduit"]
+    even = np.linalg.lstsq(law.basis, np.ones(len(law.basis)), rcond=None)[0]
+    values = {"first": 0.0, "last": 1.0, "scale": added_rad} | dict(zip(law.coefficients, even.tolist(), strict=True))
+    parameters = replace(CABLE, mechanisms=(Active(law.name, law.place, values),))
+    found = initial_tension(ModelInput.of(rest), parameters).tension_A_N
+    held = ratio if added_rad else np.exp(mu * np.pi)
+    assert found[0] / found[-1] == pytest.approx(held, rel=1e-3)

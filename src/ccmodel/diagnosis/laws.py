@@ -20,7 +20,7 @@ from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.failure import ModelError
 from ccmodel.inference.pool import each
 from ccmodel.mechanisms import Sensing, laws
-from ccmodel.mechanisms.law_forms import DRAG
+from ccmodel.mechanisms.law_forms import ADDED_BEND, DRAG
 from ccmodel.mechanisms.learned import Law
 from ccmodel.model.parameters import mechanism_key
 from ccmodel.model.run import simulate
@@ -99,13 +99,15 @@ def _proposed(
 
 
 def _unit_of(law: Law, base: CandidateFit, motions: Sequence[Sensing]) -> float:
-    """What sizes of a law's values are shares of: 1 of a factor, Coulomb friction per length of conduit of a drag,
-    `MOST_OF_END` cables', or a channel's peak to peak.
+    """What sizes of a law's values are shares of: 1 of a factor, Coulomb friction per length of conduit of a drag, the
+    conduits' bend, `MOST_OF_END` cables', or a channel's peak to peak.
     """
     if law.channel is not None:
         return float(np.ptp(np.concatenate([m.channels[law.channel] for m in motions])))
     if law.form.is_factor:
         return 1.0
+    if law.form is ADDED_BEND:
+        return float(base.whitened[0].observations.given.recording.path.bend_rad)
     if law.form is DRAG:
         o = base.whitened[0].observations
         model, path = base.model(o.parameters), o.given.recording.path

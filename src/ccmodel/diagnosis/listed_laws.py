@@ -18,7 +18,6 @@ from ccmodel.inference.cross_validation import inverse_of
 from ccmodel.inference.effective_samples import of_recording
 from ccmodel.inference.jacobian import size_of
 from ccmodel.mechanisms.contract import Curve, Parameter
-from ccmodel.mechanisms.law_forms import DRAG
 from ccmodel.mechanisms.learned import Law
 
 
@@ -55,7 +54,7 @@ def nearest_listed(learned: Learned) -> dict[str, str | float] | None:
 
 
 def _is_comparable(law: Law, curve: Curve) -> bool:
-    is_same = (curve.slot, curve.argument, curve.is_drag) == (law.slot, law.argument.name, law.form is DRAG)
+    is_same = (curve.slot, curve.argument, curve.form) == (law.slot, law.argument.name, law.form.name)
     return is_same and (not curve.channels or law.channel in curve.channels)
 
 

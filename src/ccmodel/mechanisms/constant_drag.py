@@ -42,7 +42,7 @@ MECHANISM = Mechanism(
             "speed",
             lambda speed, values: np.full(speed.shape, values["per_length"]),
             (_PER_LENGTH,),
-            is_drag=True,
+            form="drag",
         ),
     ),
 )

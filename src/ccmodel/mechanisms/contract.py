@@ -134,8 +134,9 @@ class Curve:
         Constants that are fitted to the learned law.
     channels : tuple of str
         Channels whose map it can be; empty for all.
-    is_drag : bool
-        Whether it is a drag per length of conduit, N/m, and no factor of friction.
+    form : str
+        What the law is where its slot has several forms, as a name of `ccmodel.mechanisms.law_forms`: "drag" for one
+        per length of conduit, N/m; "bend" for one that is added, rad; empty for a factor of friction.
     """
 
     slot: str
@@ -143,7 +144,7 @@ class Curve:
     of: Callable[[NDArray, Mapping[str, float]], NDArray]
     constants: tuple[Parameter, ...]
     channels: tuple[str, ...] = ()
-    is_drag: bool = False
+    form: str = ""
 
 
 class Settings:

@@ -45,6 +45,12 @@ def _of_position(share: NDArray, values: Mapping[str, float]) -> NDArray:
     return 1 + values["rise"] * (1 - np.abs(share - values["s"]) / HALF_WIDTH).clip(0.0)
 
 
+def _bend_by_position(share: NDArray, values: Mapping[str, float]) -> NDArray:
+    """Bend of the kink over the conduit's length, rad."""
+    return values["beta"] / HALF_WIDTH * (1 - np.abs(share - values["s"]) / HALF_WIDTH).clip(0.0)
+
+
+_BETA = Parameter("beta", "rad", 0.2, 1.5, 0.6, "angle of the bend")
 _S = Parameter("s", "1", 0.05, 0.95, 0.5, "place, as a share of the length", neutral=0.5, scale="linear")
 # A bend of 0.2 to 1.5 rad over what an even bend of 1 to 9 rad has within the width.
 _RISE = Parameter("rise", "1", 0.1, 15.0, 2.0, "rise of friction at the kink, over that of an even bend")
@@ -56,7 +62,7 @@ MECHANISM = Mechanism(
     sentence="the conduits have an extra bend of {beta} at one place",
     places=("conduit",),
     parameters=(
-        Parameter("beta", "rad", 0.2, 1.5, 0.6, "angle of the bend"),
+        _BETA,
         _S,
         Parameter(
             "hold",
@@ -75,5 +81,8 @@ MECHANISM = Mechanism(
     depends_on_time=False,
     structures={"kinks": ()},
     modifies_physics=_modifies_physics,
-    curves=(Curve(SLIDING_FRICTION, "position-along-conduit", _of_position, (_RISE, _S)),),
+    curves=(
+        Curve(SLIDING_FRICTION, "position-along-conduit", _of_position, (_RISE, _S)),
+        Curve(SLIDING_FRICTION, "position-along-conduit", _bend_by_position, (_BETA, _S), form="bend"),
+    ),
 )

@@ -32,6 +32,8 @@ class Form:
         Whether the average of the values belongs to the calibration.
     has_slope : bool
         Whether the values rise with the argument a priori, from nothing.
+    name : str
+        Tells it from the usual form of its slot; empty for that one.
     shortest_yield : float or None
         The values are of Maxwell-slip elements, each of which yields after the travel that is its knot; the shortest
         travel over the longest. None of a law without memory.
@@ -43,6 +45,7 @@ class Form:
     least: float | None = None
     is_centred: bool = True
     has_slope: bool = False
+    name: str = ""
     shortest_yield: float | None = None
 
     @property
@@ -63,7 +66,9 @@ class Form:
 FRICTION_FACTOR = Form("factor of the friction coefficient", "1", neutral=1.0, least=0.0)
 STRETCH_FACTOR = Form("factor of the cables' compliance", "1", neutral=1.0, least=LEAST_COMPLIANCE)
 END_COMPLIANCE = Form("compliance of the cables' fastening at the {side}, in m/N", "m/N", least=0.0, is_centred=False)
-DRAG = Form("drag of a cable per length of conduit, in N/m", "N/m", is_centred=False, has_slope=True)
+DRAG = Form("drag of a cable per length of conduit, in N/m", "N/m", is_centred=False, has_slope=True, name="drag")
+# Friction that does not grow with the bend of the loop, as at a kink.
+ADDED_BEND = Form("bend added to the conduits, over their length, in rad", "rad", is_centred=False, name="bend")
 # Shares of friction that build up; after a reversal friction acts in the former direction at first.
 CONTACT_ELEMENTS = Form(
     "friction over that of sliding, after a reversal", "1", neutral=1.0, is_centred=False, shortest_yield=0.002

@@ -64,6 +64,7 @@ from ccmodel.mechanisms.law_arguments import (
 )
 from ccmodel.mechanisms.law_forms import (
     ADDED,
+    ADDED_BEND,
     AGAINST_MOTION,
     CONTACT_ELEMENTS,
     DRAG,
@@ -124,8 +125,8 @@ class Law:
             of = f"-{short_name(str(self.channel))}".replace("_", "-")
         if self.slot == END_STRETCH:
             of = f"-{side(self.place)}"
-        if self.form is DRAG:
-            of = "-drag"
+        if self.form.name:
+            of = f"-{self.form.name}"
         fine = "" if self.is_first else "-fine"
         return f"learned-{self.slot}{of}-by-{self.argument.name}{fine}"
 
@@ -152,8 +153,8 @@ class Law:
         A law whose argument differs along the cables is a number or a table in the solver's equations. The others are
         functions of a motion, and a setting holds several.
         """
-        if self.form is DRAG:
-            return "conduit_drag"
+        if self.form in _SETTING_OF:
+            return _SETTING_OF[self.form]
         by_argument = _SETTINGS.get((self.slot, self.argument.name), _SETTINGS.get((self.slot, "")))
         return by_argument and by_argument.format(side=side(self.place))
 
@@ -290,9 +291,11 @@ class Law:
             return self.form.neutral + values[strength.name] * np.interp(arguments, x, self.shown(x) @ y)
 
         channels = (str(self.channel),) if self.slot == SENSOR_MAP else ()
-        return Curve(self.slot, self.argument.name, of, (strength,), channels, self.form is DRAG)
+        return Curve(self.slot, self.argument.name, of, (strength,), channels, self.form.name)
 
 
+# Settings of the solver by form, where that is not the usual one of its slot.
+_SETTING_OF = {DRAG: "conduit_drag", ADDED_BEND: "added_bend"}
 # Settings of the solver by slot and argument, or by slot for all other arguments; and those that are neutral at
 # something else than None.
 _SETTINGS = {
@@ -349,6 +352,7 @@ def _laws() -> Iterator[Law]:
         yield Law(SLIDING_FRICTION, "conduit", argument, FRICTION_FACTOR)
     yield Law(SLIDING_FRICTION, "conduit", SLIDING, CONTACT_ELEMENTS)
     yield Law(SLIDING_FRICTION, "conduit", SPEED, DRAG)
+    yield Law(SLIDING_FRICTION, "conduit", POSITION, ADDED_BEND)
     yield Law(CABLE_STRETCH, "cable", TENSION, STRETCH_FACTOR)
     for end in ("drive-end", "load-end"):
         yield Law(END_STRETCH, end, TENSION, END_COMPLIANCE, resolution=SMOOTH)

@@ -30,6 +30,6 @@ MECHANISM = Mechanism(
     settings={"viscous": "c"},
     curves=(
         Curve(SLIDING_FRICTION, "speed", lambda log_speed, values: 1 + values["rise"] * 10**log_speed, (_RISE,)),
-        Curve(SLIDING_FRICTION, "speed", lambda speed, values: values["c"] * speed, (_DRAG,), is_drag=True),
+        Curve(SLIDING_FRICTION, "speed", lambda speed, values: values["c"] * speed, (_DRAG,), form="drag"),
     ),
 )

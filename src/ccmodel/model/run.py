@@ -180,6 +180,8 @@ def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension
     B = A if given.recording.far_end else _both_ends("B", tensions, scale)
     curvatures = parameters.tension_curvature_A, parameters.tension_curvature_B
     kinks_rad = sum(kink.hold * kink.bend_rad for kink in settings.kinks)
+    if (added := settings.added_bend) is not None:
+        kinks_rad += float(np.trapezoid(added.values, added.knots))
     return InitialTension.between_ends(path, parameters.friction, A, B, curvatures, kinks_rad)
 
 

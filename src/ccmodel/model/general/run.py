@@ -194,7 +194,10 @@ def prepared(
     piece, node = _constants(transmission, settings, grid)
     friction_factor = _friction_factor(transmission, settings, time_s, theta_in)
     mean, state = np.zeros((rows.MEAN_ROWS, 2)), np.zeros(rows.LOAD_ROWS)
-    tension_A, tension_B = initial.at(grid.boundary_m, grid.held_rad)
+    held_rad = grid.held_rad
+    if (added := _added_bend(settings, grid, transmission.path.length_m)) is not None:
+        held_rad = held_rad + np.concatenate([[0.0], np.cumsum(added)])
+    tension_A, tension_B = initial.at(grid.boundary_m, held_rad)
     if transmission.is_single_cable:
         tension_B = np.zeros_like(tension_B)
     T = initial_state(physics, piece, node, settings, (tension_A, tension_B), friction_factor[0])
@@ -314,7 +317,10 @@ def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tu
     piece[rows.LOST][:, segments] = segment * settings.settling_N / EA
     piece[rows.RELAXING][:, segments] = settings.relaxing_share
     piece[rows.SHARE][:, segments] = segment / length
-    node[rows.HALF_BEND][:, cells] = friction * ratio_mu * grid.cell_rad / 2
+    added, bend = _added_bend(settings, grid, length), grid.cell_rad
+    if added is not None:
+        bend = bend + added
+    node[rows.HALF_BEND][:, cells] = friction * ratio_mu * bend / 2
     node[rows.DRAG][:, cells] = settings.drag_N * cell / length
     drag = settings.conduit_drag
     node[rows.VISCOUS][:, cells] = settings.viscous * cell
@@ -332,6 +338,15 @@ def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tu
         for law in (drag, slack):
             node = _with_tables(node, [Table(law.knots, law.values * m).rows for m in lengths])
     return _with_tables(piece, [None if law is None else law.rows_of_spring for law in springs]), node
+
+
+def _added_bend(settings: Settings, grid: Grid, length_m: float) -> NDArray | None:
+    """Bend that a law of the position adds to each cell, rad, shape (cells,); no cell has less than none."""
+    law = settings.added_bend
+    if law is None:
+        return None
+    middle = (grid.boundary_m[:-1] + grid.boundary_m[1:]) / (2 * length_m)
+    return np.maximum(law.at(middle) * grid.cell_m / length_m, -grid.cell_rad)
 
 
 def _rows(law: Table | None) -> NDArray | None:
