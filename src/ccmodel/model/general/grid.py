@@ -35,6 +35,11 @@ class Grid:
         return np.diff(self.boundary_m)
 
     @cached_property
+    def middle_m(self) -> NDArray:
+        """Arc length at the middle of each cell, m, shape (n,)."""
+        return (self.boundary_m[:-1] + self.boundary_m[1:]) / 2
+
+    @cached_property
     def cell_rad(self) -> NDArray:
         """Bend of each cell, rad, shape (n,)."""
         return np.diff(self.boundary_rad)

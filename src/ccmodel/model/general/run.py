@@ -311,8 +311,7 @@ def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tu
     piece, node = np.zeros((rows.PIECE_ROWS, 2, nodes + 1)), np.zeros((rows.NODE_ROWS, 2, nodes))
     friction = transmission.friction_coefficient
     if settings.friction_by_position is not None:
-        middle_m = (grid.boundary_m[:-1] + grid.boundary_m[1:]) / 2
-        friction = friction * settings.friction_by_position.at(middle_m / length)
+        friction = friction * settings.friction_by_position.at(grid.middle_m / length)
     piece[rows.STIFFNESS][:, segments] = EA / segment
     piece[rows.LOST][:, segments] = segment * settings.settling_N / EA
     piece[rows.RELAXING][:, segments] = settings.relaxing_share
@@ -345,8 +344,7 @@ def _added_bend(settings: Settings, grid: Grid, length_m: float) -> NDArray | No
     law = settings.added_bend
     if law is None:
         return None
-    middle = (grid.boundary_m[:-1] + grid.boundary_m[1:]) / (2 * length_m)
-    return np.maximum(law.at(middle) * grid.cell_m / length_m, -grid.cell_rad)
+    return np.maximum(law.at(grid.middle_m / length_m) * grid.cell_m / length_m, -grid.cell_rad)
 
 
 def _rows(law: Table | None) -> NDArray | None:
