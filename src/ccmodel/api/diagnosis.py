@@ -258,11 +258,11 @@ def diagnose(
     >>> import ccmodel as cc
     >>> found = cc.diagnose("data/raw/half-loop", step_s=0.04)
     >>> found.verdict
-    'unexplained'
+    'undecided'
     >>> found.report["location"]["place"]
-    'conduit'
-    >>> found.nearest
-    Model: ...; pulley-friction at drive-pulley + presliding at conduit + ..., fitted to half-loop, ...
+    'drive-pulley'
+    >>> sorted(one["name"] for one in found.report["alternatives"])
+    ['presliding', 'pulley-friction']
     """
     options = diagnosis_options(
         tolerance,
