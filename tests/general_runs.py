@@ -3,6 +3,7 @@
 import numpy as np
 
 from ccmodel.geometry import ConduitPath
+from ccmodel.mechanisms import laws
 from ccmodel.model.general import Active, simulate
 from ccmodel.model.general.run import NO_MOTOR
 from ccmodel.model.initial import InitialTension
@@ -21,6 +22,14 @@ def transmission(path=HALF_LOOP, mu=MU, k=K):
 
 def sine(amplitude=0.6, cycles=2, samples=500):
     return amplitude * np.sin(2 * np.pi * np.arange(cycles * samples + 1) / samples)
+
+
+def evenly_added_bend(added_rad):
+    """The law that adds bend, of the same bend everywhere: (name, place, values)."""
+    law = laws()["learned-sliding-friction-bend-by-position-along-conduit"]
+    even = np.linalg.lstsq(law.basis, np.ones(len(law.basis)), rcond=None)[0]
+    values = {"first": 0.0, "last": 1.0, "scale": added_rad}
+    return law.name, law.place, values | dict(zip(law.coefficients, even.tolist(), strict=True))
 
 
 def run(

@@ -71,7 +71,7 @@ def test_friction_that_builds_up_within_a_micrometre_is_a_nuisance_and_preslidin
     rigid = whiten(whitened.observations, with_presliding(1e-8))
     assert left(5e-7, rigid) > 20
     assert left(5e-7) < 3
-    # Longer lengths have other shapes: what is left of the shortest that is presliding still shows.
+    # A longer one has another effect: after whitening, the shortest presliding of the list is still significant.
     assert left(5e-6) > 50
 
 

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
-from ccmodel.mechanisms import laws
 from ccmodel.mechanisms.kink import Kink
 from ccmodel.model.general import Active, simulate
 from ccmodel.model.general.grid import make_grid
@@ -18,7 +17,22 @@ from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
 from ccmodel.model.paper import simulate_pair
 from ccmodel.model.response import Status
-from general_runs import HALF_LOOP, K_E, MU, OUTPUTS, T0, TENSIONS, K, L, R, rms, run, sine, transmission
+from general_runs import (
+    HALF_LOOP,
+    K_E,
+    MU,
+    OUTPUTS,
+    T0,
+    TENSIONS,
+    K,
+    L,
+    R,
+    evenly_added_bend,
+    rms,
+    run,
+    sine,
+    transmission,
+)
 
 LOOPS = ConduitPath([0.3, 0.5, 0.4], [0.0, 4.0, 1.0])
 
@@ -105,12 +119,9 @@ def test_what_friction_holds_at_rest_it_holds_at_a_kink_too():
 
 def test_what_friction_holds_at_rest_it_holds_where_a_law_adds_bend_too():
     """The drive's pull slips all cells of a cable that is at its limit everywhere at once, and none before."""
-    law = laws()["learned-sliding-friction-bend-by-position-along-conduit"]
-    even = np.linalg.lstsq(law.basis, np.ones(len(law.basis)), rcond=None)[0]
-    values = {"first": 0.0, "last": 1.0, "scale": 1.0} | dict(zip(law.coefficients, even.tolist(), strict=True))
     limit = np.exp(MU * (HALF_LOOP.bend_rad + 1.0))
     profile = InitialTension.between_ends(HALF_LOOP, MU, (2 * T0, 2 * T0 / limit), (T0, T0), kinks_rad=1.0)
-    r = run(np.linspace(0.0, 0.1, 20), (law.name, law.place, values), T=profile)
+    r = run(np.linspace(0.0, 0.1, 20), evenly_added_bend(1.0), T=profile)
     assert pytest.approx(limit, rel=2e-3) == r.T1_N / r.T2_N
 
 

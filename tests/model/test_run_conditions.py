@@ -9,11 +9,11 @@ import pytest
 from builders import recording
 from ccmodel.channels import TENSIONS
 from ccmodel.geometry import ConduitPath
-from ccmodel.mechanisms import laws
 from ccmodel.model.general.run import Active
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, FixedLoad, SpringLoad, TorqueLoad
 from ccmodel.model.run import ModelInput, _by_torque_alone, _load, _true_at_rest, _zeroed, initial_tension
+from general_runs import evenly_added_bend
 from model_runs import CABLE
 
 THETA = np.linspace(1.0, 2.0, 301)
@@ -118,10 +118,7 @@ def test_a_law_that_adds_bend_holds_more_of_the_tension_that_a_rest_shows(added_
     } | dict(zip(TENSIONS, (T1, T2, T3, T4), strict=True))
     still = {"theta_in_rad": 0.0, "theta_out_rad": 0.0}
     rest = moved(0.5, 0.0, **{c: lambda t, v=v: np.full(t.size, v) for c, v in (shown | still).items()})
-    law = laws()["learned-sliding-friction-bend-by-position-along-conduit"]
-    even = np.linalg.lstsq(law.basis, np.ones(len(law.basis)), rcond=None)[0]
-    values = {"first": 0.0, "last": 1.0, "scale": added_rad} | dict(zip(law.coefficients, even.tolist(), strict=True))
-    parameters = replace(CABLE, mechanisms=(Active(law.name, law.place, values),))
+    parameters = replace(CABLE, mechanisms=(Active(*evenly_added_bend(added_rad)),))
     found = initial_tension(ModelInput.of(rest), parameters).tension_A_N
     held = ratio if added_rad else np.exp(mu * np.pi)
     assert found[0] / found[-1] == pytest.approx(held, rel=1e-3)

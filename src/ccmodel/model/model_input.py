@@ -124,8 +124,6 @@ class ModelInput:
         if THETA_IN not in recording.encoder_step_rad:
             return self, slice(None)
         turns = TurningPoints.of(recording.time_s, self.theta_in)
-        if not turns.interval.size:
-            return self, slice(None)
         given = replace(
             self,
             recording=replace(recording, time_s=turns.inserted(recording.time_s), channels={}),

@@ -191,12 +191,11 @@ def prepared(
     """
     grid = make_grid(transmission.path, elements, settings.kinks)
     physics = _physics(transmission, load, settings, elements)
-    piece, node = _constants(transmission, settings, grid)
+    added_rad = _added_bend(settings, grid, transmission.path.length_m)
+    piece, node = _constants(transmission, settings, grid, added_rad)
     friction_factor = _friction_factor(transmission, settings, time_s, theta_in)
     mean, state = np.zeros((rows.MEAN_ROWS, 2)), np.zeros(rows.LOAD_ROWS)
-    held_rad = grid.held_rad
-    if (added := _added_bend(settings, grid, transmission.path.length_m)) is not None:
-        held_rad = held_rad + np.concatenate([[0.0], np.cumsum(added)])
+    held_rad = grid.held_rad + np.concatenate([[0.0], np.cumsum(added_rad)])
     tension_A, tension_B = initial.at(grid.boundary_m, held_rad)
     if transmission.is_single_cable:
         tension_B = np.zeros_like(tension_B)
@@ -298,7 +297,9 @@ def _check(time_s: NDArray, theta_in: NDArray, series: NDArray | None, elements:
         raise ModelError(f"time_s must increase; it does not at sample {late[0] + 1}")
 
 
-def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tuple[NDArray, NDArray]:
+def _constants(
+    transmission: Transmission, settings: Settings, grid: Grid, added_rad: NDArray
+) -> tuple[NDArray, NDArray]:
     """Constants of pieces and nodes; a compliant end is a piece of its own, next to a node without friction."""
     ratio_K, ratio_mu = (np.array([[1.0], [r]]) for r in (settings.stiffness_ratio_B, settings.friction_ratio_B))
     EA = transmission.axial_rigidity_N * ratio_K
@@ -316,10 +317,7 @@ def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tu
     piece[rows.LOST][:, segments] = segment * settings.settling_N / EA
     piece[rows.RELAXING][:, segments] = settings.relaxing_share
     piece[rows.SHARE][:, segments] = segment / length
-    added, bend = _added_bend(settings, grid, length), grid.cell_rad
-    if added is not None:
-        bend = bend + added
-    node[rows.HALF_BEND][:, cells] = friction * ratio_mu * bend / 2
+    node[rows.HALF_BEND][:, cells] = friction * ratio_mu * (grid.cell_rad + added_rad) / 2
     node[rows.DRAG][:, cells] = settings.drag_N * cell / length
     drag = settings.conduit_drag
     node[rows.VISCOUS][:, cells] = settings.viscous * cell
@@ -339,11 +337,11 @@ def _constants(transmission: Transmission, settings: Settings, grid: Grid) -> tu
     return _with_tables(piece, [None if law is None else law.rows_of_spring for law in springs]), node
 
 
-def _added_bend(settings: Settings, grid: Grid, length_m: float) -> NDArray | None:
+def _added_bend(settings: Settings, grid: Grid, length_m: float) -> NDArray:
     """Bend that a law of the position adds to each cell, rad, shape (cells,); no cell has less than none."""
     law = settings.added_bend
     if law is None:
-        return None
+        return np.zeros(grid.cell_rad.size)
     return np.maximum(law.at(grid.middle_m / length_m) * grid.cell_m / length_m, -grid.cell_rad)
 
 
