@@ -7,8 +7,9 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from ccmodel.diagnosis.candidate import CandidateFit
-from ccmodel.diagnosis.discrepancy import Discrepancy, Modes, Products, _log_evidence, _weight, evidence_of
+from ccmodel.diagnosis.discrepancy import Discrepancy, Modes, Products, _log_evidence, evidence_of
 from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.normal_equations import NormalEquations, sample_weight
 from made_observations import batch, calibrated
 
 EXCESS = 10.0
@@ -47,12 +48,27 @@ def test_the_evidence_is_that_of_a_normal_distribution():
     prior_sd, variance = np.array([0.5, 2.0]), np.array([1.0, 0.3, 0.0, 0.7])
     from_mean = np.array([0.0, 1.3])
     modes = Modes.of(F.T @ F, variance)
-    products = Products(J.T @ J, J.T @ e, float(e @ e), F.T @ J, F.T @ e, prior_sd, from_mean)
+    equations = NormalEquations(J.T @ J, J.T @ e, float(e @ e), prior_sd, from_mean)
+    products = Products(equations, F.T @ J, F.T @ e)
     for size in (0.0, 0.2, 30.0):
         covariance = np.eye(12) + J @ np.diag(prior_sd**2) @ J.T + size * F @ np.diag(variance) @ F.T
         expected = multivariate_normal(J @ (prior_sd * from_mean), covariance).logpdf(e) + 6 * np.log(2 * np.pi)
         found = _log_evidence(products, modes.strength, modes.vectors.T @ F.T @ J, modes.vectors.T @ F.T @ e, size)
         assert found == pytest.approx(expected, rel=1e-9)
+
+
+def test_scaled_derivatives_are_those_of_unknowns_in_another_unit():
+    """The most probable change predicts the same errors as that of the scaled derivatives computed anew."""
+    random = np.random.default_rng(5)
+    J, e, factors = random.standard_normal((12, 3)), random.standard_normal(12), np.array([1.0, 0.1, 7.0])
+    prior_sd, from_mean = np.array([0.5, 2.0, 1.0]), np.array([0.0, 1.3, 0.0])
+    scaled = NormalEquations(J.T @ J, J.T @ e, float(e @ e), prior_sd, from_mean).scaled(factors)
+    K = J * factors
+    anew = NormalEquations(K.T @ K, K.T @ e, float(e @ e), prior_sd, from_mean)
+    assert scaled.log_evidence == pytest.approx(anew.log_evidence, rel=1e-12)
+    covariance = np.linalg.inv(K.T @ K + np.diag(prior_sd**-2.0))
+    change = -covariance @ (K.T @ e + from_mean / prior_sd)
+    np.testing.assert_allclose(scaled.most_probable, change, rtol=1e-9)
 
 
 def test_noise_has_no_discrepancy(recordings, discrepancy):
@@ -121,7 +137,7 @@ def test_the_tolerance_counts_once_for_all_recordings(recordings, discrepancy):
 def test_what_a_tolerance_allows_weighs_as_one_recording_of_all(recordings, share, weight):
     one = replace(recordings[0], observations=_allowing(recordings[0].observations, share))
     n = one.measured.shape[1]
-    assert _weight(one, samples=n, recordings=4) == pytest.approx(weight)
+    assert sample_weight(one, samples=n, recordings=4) == pytest.approx(weight)
 
 
 def _allowing(o, share):

@@ -11,22 +11,19 @@ wrong candidate costs.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel import mechanisms as registry
 from ccmodel.channels import TAU_IN, THETA_OUT
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.drive import since_reversal, speed
-from ccmodel.diagnosis.hypothesis import coefficients_of
+from ccmodel.diagnosis.normal_equations import NormalEquations, sample_weight
 from ccmodel.diagnosis.whitening import Whitened
-from ccmodel.inference.effective_samples import IN_DIAGNOSIS, IN_EVIDENCE
+from ccmodel.inference.effective_samples import IN_EVIDENCE
 from ccmodel.inference.pool import each
-from ccmodel.mechanisms import Parameter
-from ccmodel.model.parameters import mechanism_key
 from ccmodel.model.run import simulate
 
 
@@ -63,28 +60,15 @@ class Products:
 
     Attributes
     ----------
-    information : ndarray, shape (unknowns, unknowns)
-        Weighted J'J.
-    score : ndarray, shape (unknowns,)
-        Weighted J'e.
-    square : float
-        Weighted e'e.
+    equations : NormalEquations
+        Of the candidate without a discrepancy.
     by_unknowns, by_residuals : ndarray, shapes (features, unknowns) and (features,)
         Weighted F'J and F'e.
-    prior_sd : ndarray, shape (unknowns,)
-        Standard deviation of the unknowns' prior.
-    from_mean : ndarray, shape (unknowns,)
-        Distance of the unknowns from their prior's mean over its standard deviation, where the prior has a mean of its
-        own, as that of a law's coefficients; 0 elsewhere.
     """
 
-    information: NDArray
-    score: NDArray
-    square: float
+    equations: NormalEquations
     by_unknowns: NDArray
     by_residuals: NDArray
-    prior_sd: NDArray
-    from_mean: NDArray
 
 
 @dataclass(frozen=True)
@@ -133,12 +117,6 @@ class Discrepancy:
         J, e = modes.vectors.T @ p.by_unknowns, modes.vectors.T @ p.by_residuals
         return np.array([_log_evidence(p, modes.strength, J, e, size) for size in sizes])
 
-    def most_probable(self, candidate: CandidateFit) -> NDArray:
-        """Change of each unknown to its most probable value, to first order and without a discrepancy."""
-        p = self._products_of(candidate)
-        information = np.eye(len(p.score)) + p.prior_sd[:, None] * p.information * p.prior_sd
-        return -p.prior_sd * np.linalg.solve(information, p.prior_sd * p.score + p.from_mean)
-
     def resolution(self, candidate: CandidateFit, sizes: Sequence[float]) -> float:
         """The least of these sizes, in all channels, that residuals of noise alone show to be too large."""
         strength = self._modes_of(candidate, dict.fromkeys(self.channels, 1.0)).strength
@@ -157,28 +135,18 @@ class Discrepancy:
 
     def _summed(self, candidate: CandidateFit) -> Products:
         unknowns, features = len(candidate.values), self.features[0].shape[1] * len(self.channels)
-        information, score, square = np.zeros((unknowns, unknowns)), np.zeros(unknowns), 0.0
         by_unknowns, by_residuals = np.zeros((features, unknowns)), np.zeros(features)
         count = len(candidate.whitened)
         for w, F, e, J in zip(candidate.whitened, self.features, candidate.residuals, candidate.jacobian, strict=True):
-            both, n = np.column_stack([J, e]), w.measured.size
-            weights = np.full(len(e), _weight(w, IN_DIAGNOSIS, count))
-            weights[:n] = _weight(w, IN_EVIDENCE, count)
-            products = both.T @ (weights[:, None] * both)
-            information += products[:-1, :-1]
-            score += products[:-1, -1]
-            square += float(products[-1, -1])
-            along = w.directions.T @ both[:n]
-            whitened = both[:n] - w.directions @ (w.shrinkage[:, None] * along)
+            n = w.measured.size
+            both = np.column_stack([J[:n], e[:n]])
+            whitened = both - w.directions @ (w.shrinkage[:, None] * (w.directions.T @ both))
             whitened = whitened.reshape(*w.measured.shape, unknowns + 1)
             for k, channel in enumerate(w.observations.channels):
-                part = weights[0] * F.T @ whitened[k]
+                part = sample_weight(w, IN_EVIDENCE, count) * F.T @ whitened[k]
                 by_unknowns[self._columns(channel)] += part[:, :-1]
                 by_residuals[self._columns(channel)] += part[:, -1]
-        prior_sd = np.array([_prior_sd(candidate, name) for name in candidate.values])
-        coefficients = coefficients_of(candidate.hypothesis)
-        from_mean = np.array([candidate.values[n] / coefficients.get(n, np.inf) for n in candidate.values])
-        return Products(information, score, square, by_unknowns, by_residuals, prior_sd, from_mean)
+        return Products(NormalEquations.of(candidate), by_unknowns, by_residuals)
 
     def _columns(self, channel: str) -> slice:
         """Features of a channel among those of all channels."""
@@ -205,7 +173,7 @@ class Discrepancy:
         gram, total = np.zeros((size * len(self.channels),) * 2), np.zeros(size * len(self.channels))
         count = np.zeros(len(total))
         for w, F in zip(whitened, self.features, strict=True):
-            own, weight = F.T @ F, _weight(w, IN_EVIDENCE, len(whitened))
+            own, weight = F.T @ F, sample_weight(w, IN_EVIDENCE, len(whitened))
             along = np.zeros((w.directions.shape[1], len(total)))
             directions = w.directions.reshape(*w.measured.shape, -1)
             for k, channel in enumerate(w.observations.channels):
@@ -298,40 +266,13 @@ def _mean(logarithms: Sequence[float] | NDArray) -> float:
 
 def _log_evidence(p: Products, strength: NDArray, J: NDArray, e: NDArray, size: float) -> float:
     share = size / (1 + size * strength)
-    information = p.information - J.T @ (share[:, None] * J)
-    score = p.score - J.T @ (share * e)
-    square = p.square - float(e @ (share * e))
-    root = np.linalg.cholesky(np.eye(len(score)) + p.prior_sd[:, None] * information * p.prior_sd)
-    along = np.linalg.solve(root, p.prior_sd * score + p.from_mean)
-    determinants = 2 * np.log(np.diag(root)).sum() + np.log1p(size * strength).sum()
-    return float(-(square + p.from_mean @ p.from_mean - along @ along + determinants) / 2)
-
-
-def _weight(w: Whitened, samples: int, recordings: int) -> float:
-    """Weight of each squared residual of a recording, so that a channel counts as so many independent samples.
-
-    The tolerance stands for errors that are the same in every recording, and counts once for all of them.
-    """
-    shared = w.observations.tolerance_share
-    return samples / w.measured.shape[1] * (1 - shared + shared / recordings)
-
-
-def _prior_sd(candidate: CandidateFit, unknown: str) -> float:
-    """Standard deviation of an unknown's prior: of a mechanism's parameter, from its plausible range."""
-    for name, place in candidate.hypothesis.acting:
-        for p in registry.get(name).parameters:
-            if mechanism_key(name, place, p.name) == unknown:
-                return p.spread or p.prior_sd or _sd_within_range(p, candidate.values[unknown])
-    free = candidate.free.get(unknown)
-    # A baseline's mechanisms are in every candidate, and so are their priors.
-    return (free.high - free.low) / np.sqrt(12) if free else 1.0
-
-
-def _sd_within_range(p: Parameter, value: float) -> float:
-    if (p.scale == "log" or p.ratio) and p.low > 0:
-        both_signs = np.log(2) if p.signed else 0.0
-        return float(np.clip(abs(value), p.low, p.high) * (np.log(p.high / p.low) + both_signs) / np.sqrt(12))
-    return abs(p.high - p.low) * (2 if p.signed else 1) / np.sqrt(12)
+    beside = replace(
+        p.equations,
+        information=p.equations.information - J.T @ (share[:, None] * J),
+        score=p.equations.score - J.T @ (share * e),
+        square=p.equations.square - float(e @ (share * e)),
+    )
+    return float(beside.log_evidence - np.log1p(size * strength).sum() / 2)
 
 
 def _features(inputs: Sequence[NDArray]) -> list[NDArray]:

@@ -15,8 +15,8 @@ from ccmodel.channels import CHANNELS, TENSIONS, THETA_IN
 from ccmodel.deadline import Deadline, OutOfTimeError
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
-from ccmodel.diagnosis.discrepancy import Discrepancy
 from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.normal_equations import NormalEquations
 from ccmodel.failure import ModelError
 from ccmodel.inference.pool import each
 from ccmodel.mechanisms import Sensing, laws
@@ -48,9 +48,9 @@ class Proposal:
     values: dict[str, float]
 
 
-def proposals(base: CandidateFit, discrepancy: Discrepancy, every: Sequence[Law], deadline: Deadline) -> list[Proposal]:
+def proposals(base: CandidateFit, every: Sequence[Law], deadline: Deadline) -> list[Proposal]:
     """Each law beside a fitted model with the a priori size that suits it best, the highest evidence first."""
-    nothing = _evidence(discrepancy, base)
+    nothing = NormalEquations.of(base).log_evidence
     motions = each(base.whitened, lambda i, w: _motion(base, i))
     channels = {c for w in base.whitened for c in w.observations.channels}
     found = []
@@ -60,7 +60,7 @@ def proposals(base: CandidateFit, discrepancy: Discrepancy, every: Sequence[Law]
         if law.channel is not None and law.channel not in channels:
             continue
         try:
-            found.append(max(_proposed(base, discrepancy, law, motions, nothing), key=lambda p: p.evidence))
+            found.append(max(_proposed(base, law, motions, nothing), key=lambda p: p.evidence))
         except (ModelError, ValueError, OutOfTimeError):
             continue
     return sorted(found, key=lambda p: -p.evidence)
@@ -74,9 +74,7 @@ def _motion(base: CandidateFit, i: int) -> Sensing:
     return Sensing(o.given.recording.time_s, channels, o.parameters.drive_radius_m, o.parameters.load_radius_m)
 
 
-def _proposed(
-    base: CandidateFit, discrepancy: Discrepancy, law: Law, motions: Sequence[Sensing], nothing: float
-) -> Iterator[Proposal]:
+def _proposed(base: CandidateFit, law: Law, motions: Sequence[Sensing], nothing: float) -> Iterator[Proposal]:
     pairs = zip(base.whitened, motions, strict=True)
     visited = np.concatenate([law.argument.of(m)[..., w.observations.judged].ravel() for w, m in pairs])
     first, last = law.range_of(visited)
@@ -90,12 +88,14 @@ def _proposed(
         return Hypothesis(((law.name, law.place),), fixed=of_law)
 
     tried = settings.LAW_STEP * unit
-    columns = _sensitivities(base, base.hypothesis.and_also(hypothesis(tried)), law)
+    extended = base.hypothesis.and_also(hypothesis(tried))
+    linear = _extended(base, extended, _sensitivities(base, extended, law))
+    equations, is_new = NormalEquations.of(linear), np.array([name not in base.values for name in linear.values])
     for share in settings.LAW_SCALES:
         one = hypothesis(share * unit)
-        linear = _extended(base, base.hypothesis.and_also(one), [J * share / settings.LAW_STEP for J in columns])
-        x = dict(zip(linear.values, discrepancy.most_probable(linear).tolist(), strict=True))
-        yield Proposal(one, _evidence(discrepancy, linear) - nothing, {name: x[name] for name in one.start})
+        scaled = equations.scaled(np.where(is_new, share / settings.LAW_STEP, 1.0))
+        x = dict(zip(linear.values, scaled.most_probable.tolist(), strict=True))
+        yield Proposal(one, scaled.log_evidence - nothing, {name: x[name] for name in one.start})
 
 
 def _unit_of(law: Law, base: CandidateFit, motions: Sequence[Sensing]) -> float:
@@ -135,11 +135,6 @@ def _extended(base: CandidateFit, hypothesis: Hypothesis, columns: Sequence[NDAr
     added = {name: 0.0 for name in hypothesis.start if name not in base.values}
     jacobian = [np.column_stack([J, D[: len(J)]]) for J, D in zip(base.jacobian, columns, strict=True)]
     return replace(base, hypothesis=hypothesis, values=base.values | added, jacobian=jacobian)
-
-
-def _evidence(discrepancy: Discrepancy, candidate: CandidateFit) -> float:
-    """Logarithm of the evidence without anything else missing."""
-    return float(discrepancy.log_evidence(candidate, [0.0], dict.fromkeys(discrepancy.channels, 1.0))[0])
 
 
 def unknowns_of(candidate: CandidateFit, law: Law) -> list[int]:

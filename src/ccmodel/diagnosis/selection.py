@@ -109,12 +109,11 @@ class Selection:
 
     def learn(self, found: Comparison) -> Comparison:
         """The same with laws that no list holds: the leading ones, and the best of them with more knots."""
-        assert found.discrepancy is not None
-        base, discrepancy = found.base, found.discrepancy
+        base = found.base
         self.progress("learning a law from the recordings", 0.0)
 
         def fitted(every: Sequence[Law], most: int, beside: CandidateFit = base) -> list[CandidateFit]:
-            leading = proposals(beside, discrepancy, every, self.deadline)[:most]
+            leading = proposals(beside, every, self.deadline)[:most]
             return self.fit_all(found.whitened, beside, [Score(p.hypothesis, 0.0, p.values) for p in leading])
 
         first = sorted(fitted(self.laws, settings.LAWS_FITTED), key=lambda c: c.mean_square)
@@ -135,12 +134,11 @@ class Selection:
         best = found.leading[0]
         if found.is_enough or self.deadline.has_passed or best.hypothesis.size > 1:
             return found
-        assert found.discrepancy is not None
         self.progress(f"looking for what acts beside {best.hypothesis}", 0.0)
         acting = laws_in(best.hypothesis)
         others = [law for law in self.laws if not any(law.has_the_quantity_of(one) for one in acting)]
         scores = [s for s in screen(best, self.mechanisms, self.deadline).singles() if s.gain > settings.WORTH_FITTING]
-        second = proposals(best, found.discrepancy, others, self.deadline)[: settings.PARTNERS]
+        second = proposals(best, others, self.deadline)[: settings.PARTNERS]
         chosen = scores[: settings.PARTNERS] + [Score(p.hypothesis, 0.0, p.values) for p in second]
         pairs = self.fit_all(found.whitened, best, chosen)
         return self.relinearise(found.with_candidates([*found.candidates, *pairs])) if pairs else found

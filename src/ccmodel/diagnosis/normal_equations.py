@@ -1,0 +1,113 @@
+"""The linear model of a candidate's residuals about its fit: its evidence without a discrepancy.
+
+A candidate leaves whitened residuals e = J dtheta + noise. J are its derivatives by its unknowns, which have a normal
+prior. What the evidence and the most probable change of the unknowns depend on is the weighted sums J'J, J'e and e'e.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ccmodel import mechanisms as registry
+from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.hypothesis import coefficients_of
+from ccmodel.diagnosis.whitening import Whitened
+from ccmodel.inference.effective_samples import IN_DIAGNOSIS, IN_EVIDENCE
+from ccmodel.mechanisms import Parameter
+from ccmodel.model.parameters import mechanism_key
+
+
+@dataclass(frozen=True)
+class NormalEquations:
+    """Normal equations of a candidate, with the prior of its unknowns.
+
+    Attributes
+    ----------
+    information : ndarray, shape (unknowns, unknowns)
+        Weighted J'J.
+    score : ndarray, shape (unknowns,)
+        Weighted J'e.
+    square : float
+        Weighted e'e.
+    prior_sd : ndarray, shape (unknowns,)
+        Standard deviation of the unknowns' prior.
+    from_mean : ndarray, shape (unknowns,)
+        Distance of the unknowns from their prior's mean over its standard deviation, where the prior has a mean of its
+        own, as that of a law's coefficients; 0 elsewhere.
+    """
+
+    information: NDArray
+    score: NDArray
+    square: float
+    prior_sd: NDArray
+    from_mean: NDArray
+
+    @classmethod
+    def of(cls, candidate: CandidateFit) -> "NormalEquations":
+        """Those of a candidate at its fitted values."""
+        unknowns = len(candidate.values)
+        information, score, square = np.zeros((unknowns, unknowns)), np.zeros(unknowns), 0.0
+        count = len(candidate.whitened)
+        for w, e, J in zip(candidate.whitened, candidate.residuals, candidate.jacobian, strict=True):
+            both, n = np.column_stack([J, e]), w.measured.size
+            weights = np.full(len(e), sample_weight(w, IN_DIAGNOSIS, count))
+            weights[:n] = sample_weight(w, IN_EVIDENCE, count)
+            products = both.T @ (weights[:, None] * both)
+            information += products[:-1, :-1]
+            score += products[:-1, -1]
+            square += float(products[-1, -1])
+        prior_sd = np.array([_prior_sd(candidate, name) for name in candidate.values])
+        coefficients = coefficients_of(candidate.hypothesis)
+        from_mean = np.array([candidate.values[n] / coefficients.get(n, np.inf) for n in candidate.values])
+        return cls(information, score, square, prior_sd, from_mean)
+
+    def scaled(self, factors: NDArray) -> Self:
+        """The same with derivatives multiplied by factors, shape (unknowns,)."""
+        return replace(self, information=factors[:, None] * self.information * factors, score=factors * self.score)
+
+    @property
+    def log_evidence(self) -> float:
+        """Logarithm of the evidence, up to a constant that all candidates share."""
+        root = np.linalg.cholesky(self._information_over_prior)
+        along = np.linalg.solve(root, self.prior_sd * self.score + self.from_mean)
+        determinant = 2 * np.log(np.diag(root)).sum()
+        return float(-(self.square + self.from_mean @ self.from_mean - along @ along + determinant) / 2)
+
+    @property
+    def most_probable(self) -> NDArray:
+        """Change of each unknown to its most probable value, shape (unknowns,)."""
+        along = self.prior_sd * self.score + self.from_mean
+        return -self.prior_sd * np.linalg.solve(self._information_over_prior, along)
+
+    @property
+    def _information_over_prior(self) -> NDArray:
+        return np.eye(len(self.score)) + self.prior_sd[:, None] * self.information * self.prior_sd
+
+
+def sample_weight(w: Whitened, samples: int, recordings: int) -> float:
+    """Weight of each squared residual of a recording, so that a channel counts as so many independent samples.
+
+    The tolerance stands for errors that are the same in every recording, and counts once for all of them.
+    """
+    shared = w.observations.tolerance_share
+    return samples / w.measured.shape[1] * (1 - shared + shared / recordings)
+
+
+def _prior_sd(candidate: CandidateFit, unknown: str) -> float:
+    """Standard deviation of an unknown's prior: of a mechanism's parameter, from its plausible range."""
+    for name, place in candidate.hypothesis.acting:
+        for p in registry.get(name).parameters:
+            if mechanism_key(name, place, p.name) == unknown:
+                return p.spread or p.prior_sd or _sd_within_range(p, candidate.values[unknown])
+    free = candidate.free.get(unknown)
+    # A baseline's mechanisms are in every candidate, and so are their priors.
+    return (free.high - free.low) / np.sqrt(12) if free else 1.0
+
+
+def _sd_within_range(p: Parameter, value: float) -> float:
+    if (p.scale == "log" or p.ratio) and p.low > 0:
+        both_signs = np.log(2) if p.signed else 0.0
+        return float(np.clip(abs(value), p.low, p.high) * (np.log(p.high / p.low) + both_signs) / np.sqrt(12))
+    return abs(p.high - p.low) * (2 if p.signed else 1) / np.sqrt(12)
