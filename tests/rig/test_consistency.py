@@ -11,7 +11,7 @@ from benchmarks.input_mistakes import MISTAKES, Copy, outcome, read_copy, said_o
 from ccmodel.rig.consistency.clocks import drift_of
 from ccmodel.rig.consistency.fitted import contradicted_by_fit
 from ccmodel.rig.consistency.parity import Parity, closed_part, crossings, speed, white_noise
-from ccmodel.rig.consistency.signs import EXCHANGED, FAULTS, explanation, negative_relations
+from ccmodel.rig.consistency.signs import EXCHANGED, FAULTS, explanation, negative_relations, wrong_signs
 from ccmodel.rig.ingest import ingest_batch
 from proof.build import record
 from proof.cases import draw
@@ -128,6 +128,17 @@ def test_a_relation_without_its_sensors_is_absent(tmp_path):
 def test_a_wrong_sign_explains_what_it_makes_negative(fault):
     signs = {name: -value if name in fault.negative else value for name, value in SIGNS.items()} | {"loss": -0.5}
     assert explanation(negative_relations(signs), signs) == (fault,)
+
+
+@pytest.mark.parametrize(("sum_N", "count", "is_refused"), [(-1.0, 1, False), (-4.0, 1, True), (-1.0, 2, True)])
+def test_an_offset_may_make_the_sum_of_one_recording_negative(tmp_path, sum_N, count, is_refused):
+    """Not by more than cells' offsets, and not in all recordings: cables cannot push."""
+    parity = parity_of(tmp_path)
+    read = parity.recording["F_load_N"]
+    channels = {**parity.recording.channels, "F_load_N": read + sum_N - np.median(read)}
+    low = replace(parity, recording=replace(parity.recording, channels=channels))
+    found = wrong_signs([low] * count + [parity] * (2 - count))
+    assert bool(found) == is_refused
 
 
 def test_energy_from_nowhere_means_exchanged_ends_if_all_signs_are_right():

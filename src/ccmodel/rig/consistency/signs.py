@@ -61,11 +61,13 @@ EVIDENCE = {
     "F_drive": "the sum of tensions at the drive is negative, and cables cannot push",
     "F_load": "the sum of tensions at the load is negative, and cables cannot push",
 }
+SUMS = {"F_drive": F_DRIVE, "F_load": F_LOAD}
 
 
 def wrong_signs(parities: Sequence[Parity]) -> list[Contradiction]:
     """Sensors with a wrong sign and exchanged ends, of the batch or of single recordings."""
-    by_recording = [negative_relations(p.signs) for p in parities]
+    positive = {name for name in SUMS if any(p.signs.get(name, 0.0) > 0 for p in parities)}
+    by_recording = [negative_relations(p.signs) - {n for n in positive if _may_be_offset(p, n)} for p in parities]
     most_common, count = Counter(by_recording).most_common(1)[0]
     found = []
     if most_common and count >= limits.MOST_RECORDINGS * len(parities):
@@ -75,6 +77,11 @@ def wrong_signs(parities: Sequence[Parity]) -> list[Contradiction]:
         if negative and not (found and negative == most_common):
             found += _contradictions(negative, [parity], parity.recording.id, "")
     return found
+
+
+def _may_be_offset(parity: Parity, name: str) -> bool:
+    """Whether an offset of the load cell may make a sum of tensions negative that is positive in other recordings."""
+    return float(np.median(parity.moving[SUMS[name]])) >= min(limits.CELL_OFFSETS_N)
 
 
 def negative_relations(signs: Mapping[str, float]) -> frozenset[str]:
