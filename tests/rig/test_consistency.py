@@ -137,7 +137,9 @@ def test_an_offset_may_make_the_sum_of_one_recording_negative(tmp_path, sum_N, c
     read = parity.recording["F_load_N"]
     channels = {**parity.recording.channels, "F_load_N": read + sum_N - np.median(read)}
     low = replace(parity, recording=replace(parity.recording, channels=channels))
-    found = wrong_signs([low] * count + [parity] * (2 - count))
+    without = {name: values for name, values in parity.recording.channels.items() if name != "F_load_N"}
+    bare = replace(parity, recording=replace(parity.recording, channels=without))
+    found = wrong_signs([low] * count + [parity] * (2 - count) + [bare])
     assert bool(found) == is_refused
 
 

@@ -32,6 +32,9 @@ from ccmodel.rig.angle import passes_of_zero
 from ccmodel.rig.batch import WAVES, Batch
 from ccmodel.rig.consistency import limits
 
+# Channel of each sum of tensions, by the name of its relation.
+SUMS = {"F_drive": F_DRIVE, "F_load": F_LOAD}
+
 
 @dataclass(frozen=True)
 class Parity:
@@ -88,7 +91,7 @@ class Parity:
             found["load"] = correlation(x[TAU_OUT], x[THETA_OUT]) if spring else load[0] / load[1]
         if drive and load:
             found["loss"] = (drive[0] - load[0]) / max(drive[1], load[1])
-        for name, channel in (("F_drive", F_DRIVE), ("F_load", F_LOAD)):
+        for name, channel in SUMS.items():
             if channel in x:
                 found[name] = float(np.sign(np.median(x[channel])))
         return {name: value for name, value in found.items() if np.isfinite(value)}

@@ -10,7 +10,7 @@ import numpy as np
 from ccmodel.channels import F_DRIVE, F_LOAD, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import Contradiction
-from ccmodel.rig.consistency.parity import Parity
+from ccmodel.rig.consistency.parity import SUMS, Parity
 
 
 class _Fault(NamedTuple):
@@ -61,13 +61,16 @@ EVIDENCE = {
     "F_drive": "the sum of tensions at the drive is negative, and cables cannot push",
     "F_load": "the sum of tensions at the load is negative, and cables cannot push",
 }
-SUMS = {"F_drive": F_DRIVE, "F_load": F_LOAD}
 
 
 def wrong_signs(parities: Sequence[Parity]) -> list[Contradiction]:
     """Sensors with a wrong sign and exchanged ends, of the batch or of single recordings."""
     positive = {name for name in SUMS if any(p.signs.get(name, 0.0) > 0 for p in parities)}
-    by_recording = [negative_relations(p.signs) - {n for n in positive if _may_be_offset(p, n)} for p in parities]
+    negatives = [negative_relations(p.signs) for p in parities]
+    by_recording = [
+        negative - {name for name in negative & positive if _may_be_offset(p, name)}
+        for p, negative in zip(parities, negatives, strict=True)
+    ]
     most_common, count = Counter(by_recording).most_common(1)[0]
     found = []
     if most_common and count >= limits.MOST_RECORDINGS * len(parities):
