@@ -138,12 +138,12 @@ class Discrepancy:
         by_unknowns, by_residuals = np.zeros((features, unknowns)), np.zeros(features)
         count = len(candidate.whitened)
         for w, F, e, J in zip(candidate.whitened, self.features, candidate.residuals, candidate.jacobian, strict=True):
-            n = w.measured.size
+            n, weight = w.measured.size, sample_weight(w, IN_EVIDENCE, count)
             both = np.column_stack([J[:n], e[:n]])
             whitened = both - w.directions @ (w.shrinkage[:, None] * (w.directions.T @ both))
             whitened = whitened.reshape(*w.measured.shape, unknowns + 1)
             for k, channel in enumerate(w.observations.channels):
-                part = sample_weight(w, IN_EVIDENCE, count) * F.T @ whitened[k]
+                part = weight * F.T @ whitened[k]
                 by_unknowns[self._columns(channel)] += part[:, :-1]
                 by_residuals[self._columns(channel)] += part[:, -1]
         return Products(NormalEquations.of(candidate), by_unknowns, by_residuals)
