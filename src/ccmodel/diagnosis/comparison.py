@@ -14,7 +14,7 @@ best imitation of something unlisted leaves any share, and a mechanism that only
 takes off little of it.
 
 A learned law of the quantity that a listed mechanism's law has holds that law as a special case. Where the mechanism
-leaves as little, the law's probability is the mechanism's.
+fits as well, the law's probability is the mechanism's.
 """
 
 from collections.abc import Mapping, Sequence
@@ -173,14 +173,14 @@ class Comparison:
         The law then is the mechanism's own, and its probability is the mechanism's.
         """
         acting = set(candidate.hypothesis.acting)
-        most = self.left_by(candidate) + settings.SCATTER
+        most = candidate.mean_square + settings.SCATTER
         forms = [
             acting - {(law.name, law.place)} | {(name, law.place)}
             for law in laws_in(candidate.hypothesis)
             for name in listed_forms(law)
         ]
         listed = (c for c in self.candidates if set(c.hypothesis.acting) in forms)
-        return next((c for c in listed if c.is_plausible and self.left_by(c) <= most), None)
+        return next((c for c in listed if c.is_plausible and c.mean_square <= most), None)
 
     def _imitation(self, candidate: CandidateFit, part: CandidateFit) -> NDArray:
         before, resolution = self.left_by(part), self.evidence[candidate.hypothesis].resolution
