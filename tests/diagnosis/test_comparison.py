@@ -16,23 +16,13 @@ from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.result import alternatives_of
 from ccmodel.diagnosis.screening import Score
 from ccmodel.diagnosis.selection import Selection
-from ccmodel.diagnosis.settings import (
-    MISSTATED_NOISE,
-    MOSTLY_LISTED,
-    PRIOR_AGREES,
-    PRIOR_FURTHER,
-    PRIOR_LISTED,
-    SCATTER,
-    SURE,
-)
+from ccmodel.diagnosis.settings import MISSTATED_NOISE, PRIOR_AGREES, PRIOR_FURTHER, PRIOR_LISTED, SCATTER, SURE
 from ccmodel.diagnosis.verdict import judge, nested_choice
 from ccmodel.inference.problem import Free
-from ccmodel.mechanisms import laws
 from made_observations import batch, calibrated
 
 FRICTION, SCALE = ("pulley-friction", "drive-pulley"), ("torque-scale", "drive-sensor")
 KINK, STRIBECK = ("kink", "conduit"), ("stribeck", "conduit")
-BY_SPEED = ("learned-sliding-friction-by-speed", "conduit")
 STARTS = [
     {"torque-scale/drive-sensor/gain": 0.05},
     {f"pulley-friction/drive-pulley/{name}": 2e-3 for name in ("friction_torque", "presliding")},
@@ -460,88 +450,6 @@ def test_laws_come_where_sets_do_not_lead_on_or_their_time_is_over(monkeypatch, 
     monkeypatch.setattr(Selection, "learn", lambda self, found: steps.append("laws") or found)
     Selection({}, [], laws=(None,), sets_until=until).further(of(1), None)
     assert steps == order
-
-
-@pytest.mark.parametrize(
-    ("leading", "order"),
-    [
-        ((BY_SPEED,), ["set of 2", "laws"]),
-        ((BY_SPEED, SCALE), ["set of 2", "laws", "set of 3"]),
-        ((BY_SPEED, SCALE, KINK), ["set of 2", "laws", "set of 3"]),
-    ],
-)
-def test_a_law_beside_listed_mechanisms_competes_with_one_more_of_these(monkeypatch, leading, order):
-    single, pair = (fitted(31.0, KINK), evidence(size=30.0)), (fitted(26.0, KINK, SCALE), evidence(size=25.0))
-    learned = fitted(2.0, *leading), evidence(NONE, size=1.0)
-    found = [compared(evidence(), *some, model=fitted(600.0)) for some in ([single], [single, pair], [single, learned])]
-    steps = []
-    monkeypatch.setattr(Selection, "relinearise", lambda self, found: found)
-    monkeypatch.setattr(
-        Selection,
-        "extended",
-        lambda self, f, s, size: steps.append(f"set of {size}") or (found[1] if size == 2 else f),
-    )
-    monkeypatch.setattr(Selection, "learn", lambda self, f: steps.append("laws") or found[2])
-    Selection({}, [], laws=(None,)).further(found[0], None)
-    assert steps == order
-
-
-def test_sets_grow_from_listed_mechanisms(monkeypatch):
-    grown = []
-    monkeypatch.setattr("ccmodel.diagnosis.selection.screen", lambda first, *also: grown.append(first) or screened())
-    law = fitted(2.0, BY_SPEED, SCALE), evidence(NONE, size=1.0)
-    pair = fitted(26.0, KINK, SCALE), evidence(size=25.0)
-    Selection({}, [])._sets(compared(evidence(), law, pair, model=fitted(600.0)), screened(), 3)
-    assert grown == [pair[0]]
-
-
-def screened():
-    """A screening in which nothing gains."""
-    return SimpleNamespace(singles=list, sets=lambda size: [])
-
-
-@pytest.mark.parametrize(
-    ("by_law", "by_listed", "is_the_listed"),
-    [(1.0, 1.0, True), (1.0, 1.0 + 2 * SCATTER, False), (1.0 - 3 * SCATTER, 1.0, False)],
-)
-def test_a_law_that_leaves_as_much_as_the_listed_one_of_its_quantity_is_that(by_law, by_listed, is_the_listed):
-    """Below 1 too: the noise or the tolerance is then stated too large, and a lower mean square is a better fit."""
-    law = fitted(by_law, SCALE, BY_SPEED), evidence(NONE)
-    listed = fitted(by_listed, SCALE, STRIBECK), evidence(NONE - 5.0, NONE - 5.0, size=max(by_listed - 1.0, 0.0))
-    other = fitted(1.0, SCALE, KINK), evidence(NONE - 1.0)
-    found = compared(evidence(), law, listed, other)
-    p_law, p_listed, _ = found.probability
-    assert (p_law == 0.0) == is_the_listed
-    assert (p_listed > p_law) == is_the_listed
-    if is_the_listed:
-        without = compared(evidence(), law, other).probability
-        assert p_listed > 0.9 * without[0]
-
-
-def test_a_law_beside_a_set_stands_without_the_member_that_imitated_it(monkeypatch):
-    """Beside a gain, the torque's zero drifts back and forth, which friction of the pulley takes off a little of."""
-    monkeypatch.undo()
-
-    def spoil(simulated):
-        return {"tau_in_Nm": 0.1 * simulated["tau_in_Nm"] + 1e-3 * np.sin(4 * simulated.time_s)}
-
-    recordings, law = batch(spoil), laws()["learned-sensor-map-tau-in-by-time-fine"]
-    base = calibrated(recordings)
-    selection = Selection(base.free, [], laws=[law])
-    (both,) = selection.fit_all(recordings, base, [Score(Hypothesis((SCALE, FRICTION)), 0.0, STARTS[0] | STARTS[1])])
-    assert selection.mostly_listed(Comparison.of(recordings, base, [both], SCREENED)) is both
-    found = selection.learn(Comparison.of(recordings, base, [both], SCREENED))
-    assert {SCALE, FRICTION, (law.name, law.place)} in [set(c.hypothesis.acting) for c in found.candidates]
-    assert set(found.leading[0].hypothesis.acting) == {SCALE, (law.name, law.place)}
-    assert found.leading[0].mean_square < 1.2 < both.mean_square
-
-
-def test_a_set_that_leaves_most_is_nothing_to_learn_a_law_beside():
-    half = MOSTLY_LISTED * 10.0
-    of = [
-        compared(evidence(), (fitted(1 + left, SCALE), evidence()), model=fitted(11.0)) for left in (half + 1, half - 1)
-    ]
-    assert [Selection({}, []).mostly_listed(found) is None for found in of] == [True, False]
 
 
 def test_the_covariance_is_linearised_about_the_best_candidate(monkeypatch):

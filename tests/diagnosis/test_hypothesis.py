@@ -6,7 +6,7 @@ import pytest
 from ccmodel import mechanisms
 from ccmodel.diagnosis.hypothesis import Hypothesis, plausible, single_mechanisms
 from ccmodel.diagnosis.screening import scaled
-from ccmodel.model.parameters import mechanism_key, mechanism_parameter
+from ccmodel.model.parameters import mechanism_parameter
 from made_observations import PARAMETERS
 
 
@@ -26,15 +26,6 @@ def test_probes_are_plausible_and_within_reach_of_a_fit(hypothesis):
         for key, free in hypothesis.free(probe).items():
             assert free.low <= probe[key] <= free.high
             assert free.start == probe[key]
-
-
-def test_what_lacks_a_member_keeps_the_stated_values_of_the_others():
-    drag, law = ("constant-drag", "conduit"), ("learned-sliding-friction-drag-by-speed", "conduit")
-    other = ("learned-sliding-friction-by-tension", "conduit")
-    ranges = tuple((mechanism_key(*one, "first"), value) for one, value in ((law, 1.0), (other, 2.0)))
-    three = Hypothesis((drag, law, other), fixed=ranges)
-    assert three.lacking(drag) == Hypothesis((law, other), fixed=ranges)
-    assert three.lacking(law) == Hypothesis((drag, other), fixed=ranges[1:])
 
 
 def test_a_probe_is_scaled_about_the_neutral_value():

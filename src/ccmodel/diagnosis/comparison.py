@@ -12,9 +12,6 @@ A mechanism may also only imitate what is missing, and better than a Gaussian pr
 explanations (`imitation`), which the share that it leaves tells apart: an effect's own mechanism leaves little, the
 best imitation of something unlisted leaves any share, and a mechanism that only fits what another one's equation leaves
 takes off little of it.
-
-A learned law of the quantity that a listed mechanism's law has holds that law as a special case. Where the mechanism
-fits as well, the law's probability is the mechanism's.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,7 +26,6 @@ from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.discrepancy import Discrepancy, Evidence, evidence_of
 from ccmodel.diagnosis.hypothesis import Hypothesis, laws_in
-from ccmodel.diagnosis.listed_laws import listed_forms
 from ccmodel.diagnosis.repeatability import FRICTION, friction_probabilities, log_bayes_factor
 from ccmodel.diagnosis.whitening import Whitened
 
@@ -145,11 +141,6 @@ class Comparison:
     def log_posterior(self) -> NDArray:
         """As `log_weights`, normalised, with the probability of an imitation given to what it imitates."""
         every, weights = [self.base, *self.candidates], self.log_weights.copy()
-        for k, candidate in enumerate(every):
-            listed = self.listed_form_of(candidate)
-            if listed is not None:
-                at = every.index(listed)
-                weights[at], weights[k] = np.logaddexp(weights[at], weights[k]), -np.inf
         for k in sorted(range(1, len(every)), key=lambda k: -every[k].hypothesis.size):
             part = self.part_of(every[k])
             assert part is not None
@@ -166,21 +157,6 @@ class Comparison:
             weights[0, 1] = np.logaddexp(weights[0, 1], untested)
             weights[1:] += log(self._tested)
         return weights
-
-    def listed_form_of(self, candidate: CandidateFit) -> CandidateFit | None:
-        """The fitted candidate with a listed mechanism where this one has its law in general, if it fits as well.
-
-        The law then is the mechanism's own, and its probability is the mechanism's.
-        """
-        acting = set(candidate.hypothesis.acting)
-        most = candidate.mean_square + settings.SCATTER
-        forms = [
-            acting - {(law.name, law.place)} | {(name, law.place)}
-            for law in laws_in(candidate.hypothesis)
-            for name in listed_forms(law)
-        ]
-        listed = (c for c in self.candidates if set(c.hypothesis.acting) in forms)
-        return next((c for c in listed if c.is_plausible and c.mean_square <= most), None)
 
     def _imitation(self, candidate: CandidateFit, part: CandidateFit) -> NDArray:
         before, resolution = self.left_by(part), self.evidence[candidate.hypothesis].resolution
@@ -301,12 +277,6 @@ class Comparison:
             for is_size in (lambda s: s == size, lambda s: s < size)
         )
         return bool(left <= settings.LEADING_ON * before)
-
-    @property
-    def has_law_beside_listed(self) -> bool:
-        """Whether a law that no list holds leads beside listed mechanisms."""
-        leading = self.leading[0].hypothesis
-        return 0 < len(laws_in(leading)) < leading.size
 
     def is_outdone(self, candidate: CandidateFit) -> bool:
         """Whether a candidate's fit is not good, and a larger set has at most half of its excess mean square.

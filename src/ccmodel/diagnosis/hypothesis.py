@@ -11,7 +11,7 @@ from ccmodel.inference.problem import Free
 from ccmodel.mechanisms import Parameter
 from ccmodel.mechanisms.learned import Law
 from ccmodel.model.general.run import Active
-from ccmodel.model.parameters import Parameters, mechanism_key, mechanism_parameter
+from ccmodel.model.parameters import Parameters, mechanism_key
 
 
 @dataclass(frozen=True)
@@ -42,12 +42,6 @@ class Hypothesis:
     def and_also(self, other: "Hypothesis") -> "Hypothesis":
         """The same with another's mechanisms added."""
         return replace(self, acting=self.acting + other.acting, fixed=self.fixed + other.fixed)
-
-    def lacking(self, member: tuple[str, str]) -> "Hypothesis":
-        """The mechanisms without one of them, beside the paper's model."""
-        acting = tuple(one for one in self.acting if one != member)
-        fixed = tuple((key, value) for key, value in self.fixed if (mechanism_parameter(key) or ())[:2] in acting)
-        return Hypothesis(acting, fixed=fixed)
 
     @property
     def size(self) -> int:

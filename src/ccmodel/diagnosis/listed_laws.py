@@ -45,17 +45,12 @@ def nearest_listed(learned: Learned) -> dict[str, str | float] | None:
     ``distance`` is the root mean square distance of the coefficients in their posterior standard deviations, with the
     listed law's own constants fitted to the curve: about 1 for a law that is the listed one.
     """
-    distances = {name: distance(learned, curve) for name, curve in listed_forms(learned.law).items()}
+    every = [(name, curve) for name in registry.names() for curve in registry.get(name).curves]
+    distances = {name: distance(learned, curve) for name, curve in every if _is_comparable(learned.law, curve)}
     if not distances:
         return None
     name = min(distances, key=lambda one: distances[one])
     return {"name": name, "distance": distances[name]}
-
-
-def listed_forms(law: Law) -> dict[str, Curve]:
-    """By listed mechanism, its law at the slot of a learned one and of the same argument."""
-    every = [(name, curve) for name in registry.names() for curve in registry.get(name).curves]
-    return {name: curve for name, curve in every if _is_comparable(law, curve)}
 
 
 def _is_comparable(law: Law, curve: Curve) -> bool:

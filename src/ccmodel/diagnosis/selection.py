@@ -1,7 +1,8 @@
 """Forward selection: single mechanisms by their screening score, and further ones as long as the evidence grows."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from typing import Self
 
 from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
@@ -24,8 +25,6 @@ from ccmodel.progress import Progress, silent, within
 # Measured on two batches, data/raw/loops and half-loop; they only serve the estimate of the time left.
 SCREENED, FITTED = 0.15, 0.35
 SIZES = settings.MOST_MECHANISMS - 1
-# Fits of the leading ones of some laws, at most so many, beside a fitted model.
-Fitted = Callable[[Sequence[Law], int, CandidateFit], list[CandidateFit]]
 RELINEARISED, PARTNERS_SCREENED = 0.3, 0.5
 
 
@@ -85,8 +84,7 @@ class Selection:
         """The same with sets of listed mechanisms, and with laws where sets do not lead on.
 
         Sets come first, within a share of the time, as long as each size leaves at most half of what the smaller one
-        does. Then laws compete with them, and a law beside listed mechanisms with one more of these. Larger sets
-        follow if nothing is decided yet.
+        does. Then laws compete with them. Larger sets follow if nothing is decided yet.
         """
         sets, size = replace(self, deadline=self.sets_until), 2
         while size <= settings.MOST_MECHANISMS:
@@ -99,9 +97,6 @@ class Selection:
             is_over = part.deadline.has_passed
             if sets.laws and (is_over or not found.leads_on(size)) and not found.is_decided:
                 found, sets = self.learn(found), replace(self, laws=())
-                if found.has_law_beside_listed and not is_over and size < settings.MOST_MECHANISMS:
-                    size += 1
-                    found = sets.extended(found, screening, size)
                 if law_of(found.leading[0].hypothesis) is not None:
                     break
                 if is_over:
@@ -117,49 +112,22 @@ class Selection:
         base = found.base
         self.progress("learning a law from the recordings", 0.0)
 
-        def fitted(every: Sequence[Law], most: int, beside: CandidateFit) -> list[CandidateFit]:
+        def fitted(every: Sequence[Law], most: int, beside: CandidateFit = base) -> list[CandidateFit]:
             leading = proposals(beside, every, self.deadline)[:most]
             return self.fit_all(found.whitened, beside, [Score(p.hypothesis, 0.0, p.values) for p in leading])
 
-        first = sorted(fitted(self.laws, settings.LAWS_FITTED, base), key=lambda c: c.mean_square)
+        first = sorted(fitted(self.laws, settings.LAWS_FITTED), key=lambda c: c.mean_square)
         found_first = [law_of(c.hypothesis) for c in first[: settings.LAWS_REFINED]]
         tried = {law.name for law in found_first if law is not None}
         finer = [law.finer() for law in found_first if law is not None]
-        learned = first + fitted(
-            [f for f in finer if f is not None and f.name not in tried], settings.LAWS_REFINED, base
-        )
-        # Listed effects that are far larger hide the law from the calibrated model; or their own law is another one.
-        listed = self.mostly_listed(found)
-        if listed is not None:
-            learned += self.learned_beside(listed, found, fitted)
-        found = found.with_candidates(lowest([*found.candidates, *learned]))
+        learned = first + fitted([f for f in finer if f is not None and f.name not in tried], settings.LAWS_REFINED)
+        # A listed effect that is far larger hides the law from the calibrated model.
+        listed = min((c for c in found.candidates if c.hypothesis.size == 1), key=lambda c: c.mean_square, default=None)
+        if listed is not None and listed.mean_square - 1 < settings.MOSTLY_LISTED * found.excess:
+            learned += fitted(self.laws, settings.PARTNERS, listed)
+        found = found.with_candidates([*found.candidates, *learned])
         found = self.relinearise(found) if found.candidates else found
         return self.beside_law(found) if law_of(found.leading[0].hypothesis) is not None else found
-
-    def mostly_listed(self, found: Comparison) -> CandidateFit | None:
-        """The set of listed mechanisms with the best fit, if it leaves less than a share of the excess mean square.
-
-        It has room for a law.
-        """
-        listed = (c for c in found.candidates if c.is_plausible and law_of(c.hypothesis) is None)
-        sets = (c for c in listed if c.hypothesis.size < settings.MOST_MECHANISMS)
-        best = min(sets, key=lambda c: c.mean_square, default=None)
-        if best is None or best.mean_square - 1 >= settings.MOSTLY_LISTED * found.excess:
-            return None
-        return best
-
-    def learned_beside(self, listed: CandidateFit, found: Comparison, fitted: Fitted) -> list[CandidateFit]:
-        """Laws beside a listed set, the best of them also with more knots, and beside the set without a member each."""
-        beside = fitted(self.laws, settings.PARTNERS, listed)
-        if not beside or listed.hypothesis.size == 1:
-            return beside
-        law = law_of(min(beside, key=lambda c: c.mean_square).hypothesis)
-        finer = law.finer() if law is not None else None
-        if finer is not None:
-            beside += fitted([finer], 1, listed)
-        # A mechanism of the set may have imitated the law.
-        best = min(beside, key=lambda c: c.mean_square)
-        return beside + self._subsets(found, best, listed.hypothesis.acting)
 
     def beside_law(self, found: Comparison) -> Comparison:
         """The same with what acts beside the leading law, a listed mechanism or a second law, if something is left."""
@@ -173,7 +141,7 @@ class Selection:
         second = proposals(best, others, self.deadline)[: settings.PARTNERS]
         chosen = scores[: settings.PARTNERS] + [Score(p.hypothesis, 0.0, p.values) for p in second]
         pairs = self.fit_all(found.whitened, best, chosen)
-        return self.relinearise(found.with_candidates(lowest([*found.candidates, *pairs]))) if pairs else found
+        return self.relinearise(found.with_candidates([*found.candidates, *pairs])) if pairs else found
 
     def _part(self, low: float, high: float) -> Self:
         """The same, whose work takes these shares of the whole."""
@@ -202,7 +170,7 @@ class Selection:
         sets = self._part(0.0, 0.8)._sets(found, screening, size)
         if not sets:
             return found
-        extended = found.with_candidates(lowest([*found.candidates, *sets]))
+        extended = found.with_candidates([*found.candidates, *sets])
         best = extended.by_evidence[0]
         if best.hypothesis.size == size:
             subsets = self._part(0.8, 1.0)._subsets(found, best)
@@ -211,8 +179,7 @@ class Selection:
 
     def _sets(self, found: Comparison, screening: Screening, size: int) -> list[CandidateFit]:
         """Fitted sets: the leading smaller ones with the best partner each, and those that lead the first screening."""
-        listed = (c for c in found.by_evidence if law_of(c.hypothesis) is None)
-        firsts = [c for c in listed if c.hypothesis.size == size - 1][: settings.FIRSTS[size]]
+        firsts = [c for c in found.by_evidence if c.hypothesis.size == size - 1][: settings.FIRSTS[size]]
         fitted, seen = [], {frozenset(c.hypothesis.acting) for c in found.candidates}
         for k, first in enumerate(firsts):
             part = self._part(k / (len(firsts) + 1), (k + 1) / (len(firsts) + 1))
@@ -226,15 +193,13 @@ class Selection:
         part = self._part(len(firsts) / (len(firsts) + 1), 1.0)
         return fitted + part.fit_all(found.whitened, found.base, linear)
 
-    def _subsets(
-        self, found: Comparison, best: CandidateFit, members: Sequence[tuple[str, str]] = ()
-    ) -> list[CandidateFit]:
-        """The subsets of a set that lack one of its members each, or one of those given, fitted from its values.
+    def _subsets(self, found: Comparison, best: CandidateFit) -> list[CandidateFit]:
+        """The subsets of a set that lack one of its members each, fitted from its values.
 
         Also those that were fitted before: from other values a search may have ended at a worse minimum, and the
         further member would be credited with the difference.
         """
-        subsets = [best.hypothesis.lacking(one) for one in members or best.hypothesis.acting]
+        subsets = map(Hypothesis, combinations(best.hypothesis.acting, best.hypothesis.size - 1))
         starts = [Score(h, 0.0, {key: best.values[key] for key in h.start}) for h in subsets]
         base = replace(found.base, values={name: best.values[name] for name in found.base.values})
         return self.fit_all(found.whitened, base, starts)

@@ -254,7 +254,7 @@ LAWS_FITTED, LAWS_REFINED = 8, 2
 LISTED_STARTS = 3
 # Distance, in posterior standard deviations, up to which a learned law is a listed one: half of its 90 % band.
 WITHIN_BAND = 1.645
-# Share of the excess mean square below which what the best set of listed mechanisms leaves is learned too. Chosen.
+# Share of the excess mean square below which what the best single listed mechanism leaves is learned too. Chosen.
 MOSTLY_LISTED = 0.5
 # Share of both limits after which no further set is fitted before laws are learned. Chosen: laws take some 40 s.
 SETS_SHARE = 0.6
