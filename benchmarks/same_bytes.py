@@ -94,7 +94,9 @@ def record_cogging(folder: Path) -> None:
     case = draw(COGGING, "unlisted", "unlisted-cogging-motor", 0.95)
     record(case, case.recordings[:ENOUGH], folder)
     file = folder / "batch.yaml"
-    file.write_text(yaml.safe_dump(yaml.safe_load(file.read_text()) | {"batch": folder.name}), encoding="utf-8")
+    file.write_text(
+        yaml.safe_dump(yaml.safe_load(file.read_text(encoding="utf-8")) | {"batch": folder.name}), encoding="utf-8"
+    )
 
 
 def prepare(folder: Path) -> None:
@@ -196,7 +198,7 @@ def main() -> int:
     asked = parser.parse_args()
     out = asked.out.resolve() / source_digest("ccmodel.cli.__init__")
     inputs = out / "inputs"
-    if not (inputs / "explained/batch.yaml").exists():
+    if not (inputs / "learned/batch.yaml").exists():
         shutil.rmtree(inputs, ignore_errors=True)
         prepare(inputs)
         record_cogging(inputs / "learned")
