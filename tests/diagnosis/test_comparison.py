@@ -45,6 +45,8 @@ WHITENED = [SimpleNamespace(observations=OBSERVATIONS, measured=np.zeros((5, 1))
 # Log evidence at which nothing is left, and of something that is far from it.
 NONE, FAR = -10.0, -500.0
 SCREENED = 34
+# Mean square, mechanism and log evidence.
+SINGLES = [(90.0, KINK, -100.0), (95.0, SCALE, -110.0), (80.0, FRICTION, -120.0), (30.0, STRIBECK, -130.0)]
 
 
 @pytest.fixture(autouse=True)
@@ -424,6 +426,30 @@ def test_a_further_mechanism_is_not_credited_with_a_worse_minimum_of_a_part(monk
     found = selection.extended(Comparison.of(recordings, base, [stuck], SCREENED), None, 2)
     assert found.leading[0].hypothesis.acting == (SCALE,)
     assert found.leading[0].mean_square == pytest.approx(single.mean_square, rel=1e-3)
+
+
+def test_partners_are_looked_for_again_beside_a_part_that_is_found_to_be_far_better(monkeypatch):
+    stuck, pair, asked = fitted(5.0, KINK), fitted(3.0, KINK, SCALE), []
+    monkeypatch.setattr(Selection, "_sets", lambda *given: [pair])
+    monkeypatch.setattr(Selection, "_beside", lambda self, w, first, seen: asked.append((first, seen)) or [])
+    monkeypatch.setattr(Comparison, "with_candidates", lambda self, every: found_with(every))
+
+    def found_with(candidates):
+        return compared(evidence(), *((c, evidence(NONE if c is pair else FAR)) for c in candidates))
+
+    for part in (fitted(3.9, KINK), fitted(4.1, KINK)):
+        monkeypatch.setattr(Selection, "_subsets", lambda *given, part=part: [part, fitted(1.5, SCALE)])
+        Selection({}, []).extended(found_with([stuck]), None, 2)
+        assert asked == ([(part, set())] if part.mean_square < 4.0 else [])
+        asked.clear()
+
+
+def test_the_set_that_leaves_least_is_extended_too(monkeypatch):
+    """Far from the truth, the evidence may prefer a set that leaves more, but what a smooth discrepancy explains."""
+    firsts = [(fitted(m, a), evidence(*2 * (e,), size=m)) for m, a, e in SINGLES]
+    monkeypatch.setattr(Selection, "_beside", lambda self, w, first, seen: [first])
+    extended = Selection({}, [])._sets(compared(evidence(), *firsts), SimpleNamespace(sets=lambda size: []), 2)
+    assert [c.hypothesis.acting for c in extended] == [(KINK,), (SCALE,), (STRIBECK,)]
 
 
 @pytest.mark.parametrize(

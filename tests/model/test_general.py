@@ -78,6 +78,17 @@ def test_full_slip_has_the_capstan_ratio_on_any_grid():
         assert np.log(r.T4_N[-1] / r.T3_N[-1]) == pytest.approx(MU * np.pi, rel=1e-9)
 
 
+def test_slack_cables_leave_a_smooth_function_of_friction():
+    """Where a slack cable lies in its conduit decides how far its contacts have built up when it is taut again."""
+    presliding = "presliding", "conduit", {"z0": 0.18e-3, "spread": 9.0}
+    ends = [("termination-compliance", f"{end}-end", {"compliance": 50e-6}) for end in ("drive", "load")]
+    path, frictions = ConduitPath([L], [3 * np.pi]), 0.15 + 4e-6 * np.arange(6)
+    found = [run(sine(0.45), [presliding, *ends], path=path, T=2.0, mu=mu, k=2 * K) for mu in frictions]
+    assert np.mean(found[0].T3_N == 0) > 0.2
+    torque = np.array([r.tau_in_Nm for r in found])
+    assert np.ptp(np.diff(torque, axis=0), axis=0).max() < 2e-7
+
+
 def test_steps_may_be_large():
     """Between reversals the path does not matter: one step a stroke ends where five hundred do."""
     ends = np.array([0, 0.6, -0.6, 0.3, -0.1, 0.5])

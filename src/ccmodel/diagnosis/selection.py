@@ -166,32 +166,49 @@ class Selection:
         return fitted
 
     def extended(self, found: Comparison, screening: Screening, size: int) -> Comparison:
-        """The same with sets of `size` mechanisms, and with the parts of the best of them that lack a member."""
-        sets = self._part(0.0, 0.8)._sets(found, screening, size)
+        """The same with sets of `size` mechanisms, and with the parts of the best of them that lack a member.
+
+        A part may be better than before: the search for it had ended at a worse minimum. Its partners are then looked
+        for again.
+        """
+        sets = self._part(0.0, 0.6)._sets(found, screening, size)
         if not sets:
             return found
         extended = found.with_candidates([*found.candidates, *sets])
         best = extended.by_evidence[0]
-        if best.hypothesis.size == size:
-            subsets = self._part(0.8, 1.0)._subsets(found, best)
-            extended = extended.with_candidates(lowest([*extended.candidates, *subsets]))
-        return extended
+        if best.hypothesis.size < size:
+            return extended
+        parts = self._part(0.6, 0.8)._subsets(found, best)
+        extended = extended.with_candidates(lowest([*extended.candidates, *parts]))
+        first = lower(parts, found.candidates)
+        if first is None:
+            return extended
+        again = self._part(0.8, 1.0)._beside(found.whitened, first, set())
+        return extended.with_candidates(lowest([*extended.candidates, *again]))
 
     def _sets(self, found: Comparison, screening: Screening, size: int) -> list[CandidateFit]:
         """Fitted sets: the leading smaller ones with the best partner each, and those that lead the first screening."""
-        firsts = [c for c in found.by_evidence if c.hypothesis.size == size - 1][: settings.FIRSTS[size]]
+        listed = (c for c in found.by_evidence if law_of(c.hypothesis) is None)
+        smaller = [c for c in listed if c.hypothesis.size == size - 1]
+        firsts = smaller[: settings.FIRSTS[size]]
+        # The evidence is that of complete models. Of incomplete ones, the one that leaves least may lead further.
+        firsts += [c for c in sorted(smaller, key=lambda c: c.mean_square)[:1] if c not in firsts]
         fitted, seen = [], {frozenset(c.hypothesis.acting) for c in found.candidates}
         for k, first in enumerate(firsts):
             part = self._part(k / (len(firsts) + 1), (k + 1) / (len(firsts) + 1))
-            part.progress(f"screening mechanisms beside {first.hypothesis}", 0.0)
-            partners = [h for h in self.mechanisms if h.acting[0] not in first.hypothesis.acting]
-            scores = screen(first, partners, self.deadline).singles()
-            worth = [s for s in scores if s.gain > settings.WORTH_FITTING]
-            chosen = unseen(worth, seen, settings.PARTNERS, first.hypothesis.acting)
-            fitted += part._part(PARTNERS_SCREENED, 1.0).fit_all(found.whitened, first, chosen)
+            fitted += part._beside(found.whitened, first, seen)
         linear = unseen(screening.sets(size), seen, settings.LINEAR_SETS)
         part = self._part(len(firsts) / (len(firsts) + 1), 1.0)
         return fitted + part.fit_all(found.whitened, found.base, linear)
+
+    def _beside(self, whitened: Sequence[Whitened], first: CandidateFit, seen: set[frozenset]) -> list[CandidateFit]:
+        """A set with each of its best partners; sets that were seen are left out, and these are added to them."""
+        self.progress(f"screening mechanisms beside {first.hypothesis}", 0.0)
+        partners = [h for h in self.mechanisms if h.acting[0] not in first.hypothesis.acting]
+        scores = screen(first, partners, self.deadline).singles()
+        worth = [s for s in scores if s.gain > settings.WORTH_FITTING]
+        chosen = unseen(worth, seen, settings.PARTNERS, first.hypothesis.acting)
+        return self._part(PARTNERS_SCREENED, 1.0).fit_all(whitened, first, chosen)
 
     def _subsets(self, found: Comparison, best: CandidateFit) -> list[CandidateFit]:
         """The subsets of a set that lack one of its members each, fitted from its values.
@@ -264,6 +281,13 @@ def lowest(every: Sequence[CandidateFit]) -> list[CandidateFit]:
         if members not in best or candidate.mean_square < best[members].mean_square:
             best[members] = candidate
     return list(best.values())
+
+
+def lower(again: Sequence[CandidateFit], before: Sequence[CandidateFit]) -> CandidateFit | None:
+    """Of sets that were fitted before, the best one that has now come to another minimum, which is far lower."""
+    was = {frozenset(c.hypothesis.acting): c.mean_square for c in before}
+    found = (c for c in again if c.mean_square < settings.FAR_LOWER * was.get(frozenset(c.hypothesis.acting), 0.0))
+    return min(found, key=lambda c: c.mean_square, default=None)
 
 
 def unseen(

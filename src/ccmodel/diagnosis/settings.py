@@ -176,6 +176,8 @@ MOST_MECHANISMS = 4
 # Candidates to which a further mechanism is added, by the size of the set; further ones that are fitted with each; and
 # sets of the first screening that are fitted. Chosen for time.
 FIRSTS, PARTNERS, LINEAR_SETS = {2: 2, 3: 1, 4: 1}, 3, 2
+# Share of its earlier mean square below which a set that is fitted again has come to another minimum. Chosen.
+FAR_LOWER = 0.8
 # Runs of the model, each on one recording, after which no further candidate is fitted. Chosen: they take two cores that
 # do nothing else about two minutes. (On one core, a run and all that a diagnosis does with it took 4.2 ms in
 # data/raw/rich, with recordings of 1,251 samples, and 2.9 ms in data/raw/da-vinci, with 215.)

@@ -13,8 +13,10 @@ from ccmodel.mechanisms.relaxation import BRANCHES
 
 IMPEDANCE, PRESCRIBED_ANGLE = 0, 1
 
-# A slack piece keeps this share of its stiffness, so that its nodes have a position; its tension counts as zero.
-SLACK_SHARE = 1e-9
+# A slack piece keeps this share of its stiffness, so that its nodes have a position; its tension counts as zero. The
+# positions decide how friction builds up once the cable is taut again. Newton's tolerance leaves them open by 0.1 um;
+# with a ten-thousandth of this share by 1 mm, and the solution jumps with the least change of a parameter.
+SLACK_SHARE = 1e-5
 
 # piece, shape (rows, 2, n + 1): the cable between nodes. Constants (N/m, m, -, -), state, results of the step.
 STIFFNESS, LOST, RELAXING, SHARE, STRETCH, ELASTIC, TENSION, TANGENT, PULL, MEMORY = range(10)
