@@ -258,11 +258,13 @@ def diagnose(
     >>> import ccmodel as cc
     >>> found = cc.diagnose("data/raw/half-loop", step_s=0.04)
     >>> found.verdict
-    'undecided'
-    >>> found.report["location"]["place"]
-    'drive-pulley'
-    >>> sorted(one["name"] for one in found.report["alternatives"])
-    ['presliding', 'pulley-friction']
+    'explained'
+    >>> for one in sorted(found.report["mechanisms"], key=lambda one: (one["name"], one["place"])):
+    ...     print(one["name"], "at", one["place"])
+    presliding at conduit
+    pulley-friction at drive-pulley
+    termination-compliance at drive-end
+    termination-compliance at load-end
     """
     options = diagnosis_options(
         tolerance,
