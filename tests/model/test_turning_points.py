@@ -7,9 +7,15 @@ import pytest
 
 from builders import recording
 from ccmodel.channels import TAU_IN, THETA_IN
+from ccmodel.failure import ModelError
+from ccmodel.model.general import Active
+from ccmodel.model.general import simulate as by_general
+from ccmodel.model.initial import InitialTension
+from ccmodel.model.load import SpringLoad
 from ccmodel.model.model_input import ModelInput
 from ccmodel.model.run import simulate
 from ccmodel.model.turning_points import TurningPoints
+from general_runs import HALF_LOOP, T0, transmission
 from made_observations import PARAMETERS
 
 STEP_S = 0.008
@@ -86,3 +92,18 @@ def test_samples_of_a_motion_show_the_torque_of_the_motion():
     fine = drive_torque(0.0005)
     error, without = (np.abs(drive_torque(0.016, with_encoder) - fine).max() for with_encoder in (True, False))
     assert error < 0.02 * without
+
+
+def test_a_failure_is_counted_in_the_samples_of_the_recording():
+    """The load's spring pushes on beyond what the cables hold, after two turns that lie between samples."""
+    t = np.arange(0.0, 4.0, STEP_S)
+    theta = sine(t, amplitude=0.3) + np.where(t > 2.0, 4 * (t - 2.0), 0.0)
+    turns = TurningPoints.of(t, theta)
+    pushing = [Active("load-stiffening", "load", {"K3": -10.0})]
+    load, initial = SpringLoad(1e-4), InitialTension.uniform(HALF_LOOP, T0)
+    response = by_general(transmission(), load, turns.inserted(t), turns.inserted_in_motion(theta), initial, pushing)
+    samples = turns.samples(t.size)
+    first = np.flatnonzero(samples >= response.reached)[0]
+    assert samples[first] > first, "turns lie before it"
+    with pytest.raises(ModelError, match=rf"at sample {first}: "):
+        response.complete(samples)

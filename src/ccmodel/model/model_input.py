@@ -114,7 +114,7 @@ class ModelInput:
         return cls(recording, theta_in, *exact, theta_out, tau_out, F_load, {})
 
     @cached_property
-    def with_turning_points(self) -> "tuple[ModelInput, NDArray | slice]":
+    def with_turning_points(self) -> "tuple[ModelInput, NDArray]":
         """Times, drive, load and motor with the points at which the drive turns between samples; and the samples there.
 
         Only a motion behind an encoder's counts has them: the noise of any other angle turns at most samples, and a
@@ -122,7 +122,7 @@ class ModelInput:
         """
         recording = self.recording
         if THETA_IN not in recording.encoder_step_rad:
-            return self, slice(None)
+            return self, np.arange(self.theta_in.size)
         turns = TurningPoints.of(recording.time_s, self.theta_in)
         given = replace(
             self,

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Self
 
+import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.channels import F_DRIVE, F_LOAD, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
@@ -62,15 +63,21 @@ class PairResponse:
             F_LOAD: self.T2_N + self.T4_N,
         }
 
-    def complete(self) -> Self:
+    def complete(self, samples: NDArray | None = None) -> Self:
         """The response itself, if every sample was solved in balance.
+
+        Parameters
+        ----------
+        samples : ndarray of int, optional
+            Indices of a recording's samples among those of the response, which may have turning points between them.
 
         Raises
         ------
         ModelError
-            With the advice of the status, if not.
+            With the advice of the status, and the first sample of the recording that was not solved, if not.
         """
         if self.status is not Status.OK:
             name = self.status.name.lower().replace("_", "-")
-            raise ModelError(f"{name} at sample {self.reached}: {self.status.value}")
+            at = self.reached if samples is None else np.searchsorted(samples, self.reached)
+            raise ModelError(f"{name} at sample {at}: {self.status.value}")
         return self

@@ -93,7 +93,7 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
         given = replace(given, theta_in=given.theta_in + parameters.drive_encoder_offset * given.drive_encoder_offset)
     given, samples = given.with_turning_points
     load, measured = _load(given, parameters, load_from)
-    read = _readings(transmission, load, given, initial, parameters)
+    read = _readings(transmission, load, given, samples, initial, parameters)
     channels = _channels({c: values[samples] for c, values in read.items()}, recording, parameters)
     sources = dict.fromkeys(channels, "model") | dict.fromkeys((THETA_IN, *measured), PRESCRIBED)
     return recording.with_channels(channels, sources, origin="model")
@@ -112,9 +112,14 @@ def transmission_of(recording: Recording, parameters: Parameters) -> Transmissio
 
 
 def _readings(
-    transmission: Transmission, load: Load, given: ModelInput, initial: InitialTension, parameters: Parameters
+    transmission: Transmission,
+    load: Load,
+    given: ModelInput,
+    samples: NDArray,
+    initial: InitialTension,
+    parameters: Parameters,
 ) -> Mapping[str, NDArray]:
-    """Readings of sensors without zeros: angles, torques and sums of tensions, by channel."""
+    """Readings of sensors without zeros, at samples and turning points: angles, torques and sums of tensions."""
     if parameters.mechanisms or not isinstance(load, SpringLoad | FixedLoad):
         time_s = given.recording.time_s
         finer = parameters.refinement
@@ -122,9 +127,9 @@ def _readings(
         by_general = general.simulate(
             transmission, load, time_s, given.theta_in, initial, parameters.mechanisms, *solver
         )
-        return by_general.complete().read
+        return by_general.complete(samples).read
     response = exact.simulate_pair(transmission, load, given.theta_in, initial)
-    return response.complete().channels(given.theta_in)
+    return response.complete(samples).channels(given.theta_in)
 
 
 def _motor(given: ModelInput) -> general.Motor:
