@@ -10,8 +10,10 @@ from ccmodel.cli.interruption import leaving
 from ccmodel.cli.options import (
     Batch,
     BatchOption,
+    ConduitsOf,
     Json,
     Model,
+    Pretension,
     Quiet,
     Tolerance,
     input_file,
@@ -89,15 +91,8 @@ def compensate(
         typer.Option(help="Largest acceleration of the drive, rad/s^2; needs --max-speed.", show_default=False),
     ] = None,
     batch: BatchOption = None,
-    recording: Annotated[
-        str | None,
-        typer.Option(
-            help="Recording whose conduits are used; else the first that the model was fitted to.", show_default=False
-        ),
-    ] = None,
-    pretension: Annotated[
-        float | None, typer.Option(min=0.0, help="Pretension, N; else that recording's.", show_default=False)
-    ] = None,
+    recording: ConduitsOf = None,
+    pretension: Pretension = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:

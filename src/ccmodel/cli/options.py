@@ -51,6 +51,15 @@ Model = Annotated[
         "--model", help="A model file, as a diagnosis or a fit writes it.", callback=input_file, show_default=False
     ),
 ]
+ConduitsOf = Annotated[
+    str | None,
+    typer.Option(
+        help="Recording whose conduits are used; else the first that the model was fitted to.", show_default=False
+    ),
+]
+Pretension = Annotated[
+    float | None, typer.Option(min=0.0, help="Pretension, N; else that recording's.", show_default=False)
+]
 Results = Annotated[
     Path, typer.Argument(metavar="RESULTS", help="Folder of a run's results, or of a diagnosis.", callback=input_folder)
 ]

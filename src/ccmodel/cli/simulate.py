@@ -7,7 +7,7 @@ import typer
 
 from ccmodel.cli.group import MODEL, command
 from ccmodel.cli.interruption import leaving
-from ccmodel.cli.options import BatchOption, Json, Model, Quiet, input_file, out_file
+from ccmodel.cli.options import BatchOption, ConduitsOf, Json, Model, Pretension, Quiet, input_file, out_file
 from ccmodel.cli.output import Output
 
 
@@ -30,15 +30,8 @@ def simulate(
     model: Model,
     out: Annotated[Path, out_file("File for the sensor readings, CSV.")],
     batch: BatchOption = None,
-    recording: Annotated[
-        str | None,
-        typer.Option(
-            help="Recording whose conduits are used; else the first that the model was fitted to.", show_default=False
-        ),
-    ] = None,
-    pretension: Annotated[
-        float | None, typer.Option(min=0.0, help="Pretension, N; else that recording's.", show_default=False)
-    ] = None,
+    recording: ConduitsOf = None,
+    pretension: Pretension = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
