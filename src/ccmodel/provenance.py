@@ -114,10 +114,17 @@ def _imports(file: Path) -> list[str]:
     return [name for name in names if name.partition(".")[0] == ccmodel.__name__]
 
 
-def _run(node: ast.AST) -> Iterator[ast.AST]:
-    """A node and all below it, without what only a type checker reads."""
-    yield node
-    if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
-        return
-    for child in ast.iter_child_nodes(node):
-        yield from _run(child)
+def _run(block: ast.AST) -> Iterator[ast.AST]:
+    """The statements of a block at any depth, without what only a type checker reads."""
+    # Walking through expressions too would take most of the time that the package takes to import.
+    for part in ("body", "orelse", "handlers", "finalbody", "cases"):
+        for statement in getattr(block, part, ()):
+            yield statement
+            if not _is_for_type_checkers(statement):
+                yield from _run(statement)
+
+
+def _is_for_type_checkers(statement: ast.AST) -> bool:
+    return (
+        isinstance(statement, ast.If) and isinstance(statement.test, ast.Name) and statement.test.id == "TYPE_CHECKING"
+    )

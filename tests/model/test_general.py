@@ -12,6 +12,7 @@ from ccmodel.geometry import ConduitPath
 from ccmodel.mechanisms.kink import Kink
 from ccmodel.model.general import Active, simulate
 from ccmodel.model.general.grid import make_grid
+from ccmodel.model.general.march import march
 from ccmodel.model.general.run import _physics, _steps, settings_of
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, SpringLoad, TorqueLoad
@@ -318,6 +319,16 @@ def test_bad_input_is_refused_by_name():
         attempt(mechanisms=[Active("kink", "conduit", {"beta": 0.5, "s": 1.5})])
     with pytest.raises(ModelError, match="relaxation has the parameters r, relaxed, spread, tau; got r"):
         attempt(mechanisms=[Active("relaxation", "cable", {"r": 0.1})])
+
+
+def test_the_solver_is_compiled_once_whatever_the_memory_of_its_motion():
+    """A column of a table, an array that cannot be written: numba would compile the solver anew for each."""
+    plain = sine(samples=50, cycles=1)
+    column, kept = np.column_stack([plain, plain])[:, 0], plain.copy()
+    kept.setflags(write=False)
+    runs = [run(theta, samples=50).theta_out_rad for theta in (plain, column, kept)]
+    assert np.array_equal(runs[0], runs[1]) and np.array_equal(runs[0], runs[2])
+    assert len(march.signatures) == 1
 
 
 # Grid

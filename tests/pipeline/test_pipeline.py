@@ -181,11 +181,15 @@ def test_what_a_diagnosis_found_is_one_more_set_of_parameters(diagnosed):
 
 
 def test_inputs_that_contradict_one_another_are_named_and_get_no_model(diagnosed, tmp_path):
+    """Unless the batch's settings say that they are trusted."""
     folder = tmp_path / "run"
     shutil.copytree(diagnosed, folder, copy_function=shutil.copy2)
     log = folder / "data/raw/tiny/t-7N.csv.gz"
     write_gz(log, pd.read_csv(log).assign(drive_current_A=0.0).to_csv(index=False))
-    keep_one_study(folder)
+    shutil.copytree(folder / "data/raw/tiny", folder / "data/raw/trusted")
+    batch = folder / "data/raw/trusted/batch.yaml"
+    batch.write_text(batch.read_text().replace("batch: tiny", "batch: trusted"))
+    keep_one_study(folder, diagnosing_by_batch={"trusted": {"trust_inputs": True, "time_limit_s": 5}})
     run = snakemake(folder)
     assert run.returncode == 0, run.stdout + run.stderr
     results = folder / "results"
@@ -197,15 +201,15 @@ def test_inputs_that_contradict_one_another_are_named_and_get_no_model(diagnosed
     assert page.index('id="contradictory"') < page.index(dead) < page.index('<article class="card inputs-inconsistent"')
     said = ccmodel("report", str(results))
     assert said.returncode == 1
-    assert [line for line in said.stderr.splitlines() if line.startswith("inconsistent: ") and dead in line]
-    # Whatever the verdict, and what was not fitted for it.
-    keep_one_study(folder, diagnosing={"trust_inputs": True, "time_limit_s": 5})
-    assert snakemake(folder).returncode == 0
-    trusted = json.loads((results / "diagnoses/tiny/diagnosis.json").read_text())
+    lines = [line for line in said.stderr.splitlines() if dead in line]
+    assert {line.partition("t-7N")[0] for line in lines} == {
+        "inconsistent: data/raw/tiny/",
+        "warning: data/raw/trusted/",
+    }
+    # Whatever the verdict.
+    trusted = json.loads((results / "diagnoses/trusted/diagnosis.json").read_text())
     assert "t-7N.csv.gz, drive_current_A" in [n["what"] for n in trusted["not_judged"]]
-    said = ccmodel("report", str(results))
-    assert said.returncode == 0
-    assert [line for line in said.stderr.splitlines() if line.startswith("warning: ") and dead in line]
+    assert trusted["verdict"] != "inputs-inconsistent"
 
 
 def planned(folder: Path) -> set[str]:
@@ -357,9 +361,12 @@ def test_a_second_run_does_nothing(copy):
 
 def test_a_new_batch_appears_with_three_lines_of_config(copy):
     write_batch(copy / "data/raw/added", pretensions=(5.0,))
-    write_config(copy, added={"batches": ["added"], "variable": "pretension"})
+    keep_one_study(copy)
+    config = yaml.safe_load((copy / "config.yaml").read_text())
+    config["studies"]["added"] = {"batches": ["added"], "variable": "pretension"}
+    (copy / "config.yaml").write_text(yaml.safe_dump(config))
     results = copy / "results"
-    old = ["simulated/fitted/tiny.nc", "fits/fitted/shared.json", "recordings/tiny.nc", "figures/pretension.png"]
+    old = ["simulated/fitted/tiny.nc", "fits/fitted/shared.json", "recordings/tiny.nc", "figures/one-run.png"]
     before = [(results / f).stat().st_mtime_ns for f in old]
     assert snakemake(copy).returncode == 0
     assert [(results / f).stat().st_mtime_ns for f in old] == before, "only what depends on the new batch is made"

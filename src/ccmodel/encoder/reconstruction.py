@@ -47,7 +47,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import Akima1DInterpolator
 from scipy.ndimage import uniform_filter1d
 
 from ccmodel.encoder.rest_detection import Rest, find_rests
@@ -155,6 +154,9 @@ def _on_even_steps(time: NDArray, counts: NDArray) -> tuple[float, NDArray, NDAr
 
 def _smoothly(time: NDArray, grid: NDArray, curve: NDArray) -> NDArray:
     """A curve between the points of a grid: it turns there as round as at them, and rests where they do."""
+    # It takes a fifth of a second to import, and many commands reconstruct nothing.
+    from scipy.interpolate import Akima1DInterpolator
+
     return Akima1DInterpolator(grid, curve)(np.clip(time, grid[0], grid[-1]))
 
 

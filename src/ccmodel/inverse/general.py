@@ -41,7 +41,7 @@ from ccmodel.model.general.march import (
 from ccmodel.model.general.newton import copy_means, copy_slides, solve, solve_with_conduits
 from ccmodel.model.general.run import ELEMENTS, prepared
 from ccmodel.model.initial import InitialTension
-from ccmodel.model.load import SpringLoad, TorqueLoad
+from ccmodel.model.load import SpringLoad, TorqueLoad, one_row
 from ccmodel.model.transmission import Transmission
 
 # A torque that changes by less than this share of the load's is hidden by friction: what the model's derivative says
@@ -236,26 +236,27 @@ def run(
     ModelError
         If a step has no solution.
     """
+    time_s, theta_in = one_row(time_s, "time_s"), one_row(drive.theta_rad, "theta_in")
+    noise, theta_variance = drive.torque_variance.copy(), one_row(drive.theta_variance, "theta_variance")
     n = time_s.size
     has_law = isinstance(load, SpringLoad)
     series = np.zeros(1) if isinstance(load, SpringLoad) else load.torque_Nm
     at_rest = prepared(
-        transmission, load, settings, time_s, drive.theta_rad, initial, refinement * ELEMENTS, refinement, series
+        transmission, load, settings, time_s, theta_in, initial, refinement * ELEMENTS, refinement, series
     )
     slide, mean = (np.concatenate([a, np.zeros_like(a[:1])]) for a in (at_rest.slide, at_rest.mean))
     trace, out = np.zeros((TRACE_ROWS, n)), np.empty((2, n))
     if misfit_Nm is not None:
         trace[MISFIT] = misfit_Nm
-    torque, noise = drive.torque_Nm, drive.torque_variance.copy()
     # The drive pulley's own bearing follows from its motion.
-    own = settings.drive_friction_Nm * bearing(drive.theta_rad, settings.drive_presliding_rad)
+    own = settings.drive_friction_Nm * bearing(theta_in, settings.drive_presliding_rad)
     solved = filtered(
         *at_rest._replace(slide=slide, mean=mean),
         time_s,
-        drive.theta_rad,
-        torque - own,
+        theta_in,
+        one_row(drive.torque_Nm - own, "tau_in"),
         noise,
-        drive.theta_variance,
+        theta_variance,
         prior.considered,
         prior.law_share,
         prior.wander_N2m2_per_rad,

@@ -21,7 +21,6 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import SLIDING_FRICTION, Curve, Mechanism, Parameter
@@ -51,6 +50,9 @@ def followed(r: float, times: tuple[float, ...], relaxed: float) -> NDArray:
 
     def excess(seconds: float) -> float:
         return float(np.mean(-np.expm1(-seconds / tau))) - wanted
+
+    # It takes a fifth of a second to import, and many commands run no model.
+    from scipy.optimize import brentq
 
     # The slowest branch alone would be the last.
     latest = -float(tau.max()) * np.log1p(-wanted)

@@ -87,8 +87,11 @@ Load = SpringLoad | TorqueLoad | AngleLoad | FixedLoad
 
 
 def one_row(values: ArrayLike, name: str) -> NDArray:
-    """`values` as a contiguous array of one finite number a sample; `ModelError` where they are not."""
-    values = np.ascontiguousarray(values, dtype=float)
+    """`values` as an array of one finite number a sample; `ModelError` where they are not.
+
+    Contiguous and writable: numba compiles a kernel anew for each other kind of array.
+    """
+    values = np.require(values, float, "CW")
     if values.ndim != 1 or values.size == 0:
         raise ModelError(f"{name} is one row of samples, at least one; got an array of shape {values.shape}")
     if not np.isfinite(values).all():

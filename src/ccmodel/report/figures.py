@@ -8,6 +8,9 @@ from typing import Any
 import matplotlib
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import FigureCanvasPdf
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
@@ -23,6 +26,12 @@ LINES = ("-", "--", "-.", ":")
 FORMATS = ("png", "svg", "pdf")
 # Without what would make the files of two equal runs differ: dates, and random names of an SVG's parts.
 _METADATA = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+# Of each format. `Figure.savefig` draws everything once more before, to lay it out.
+_PRINT = {
+    ".png": lambda figure, file, **options: FigureCanvasAgg(figure).print_png(file, **options),
+    ".svg": lambda figure, file, **options: FigureCanvasSVG(figure).print_svg(file, **options),
+    ".pdf": lambda figure, file, **options: FigureCanvasPdf(figure).print_pdf(file, **options),
+}
 _FILES: dict[Any, Any] = {"svg.fonttype": "none", "svg.hashsalt": "ccmodel", "pdf.fonttype": 42}
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 # Panels of the paper's Figs. 5, 8 and 9: channel on the x axis, channel on the y axis.
@@ -130,12 +139,14 @@ def save_figure(figure: Figure, *files: Path) -> None:
     """
     with matplotlib.rc_context(_FILES):
         _lay_out(figure)
+        figure.dpi = 150
         for file in map(Path, files):
             with new_file(file) as fresh:
-                figure.savefig(fresh, dpi=150, metadata=_METADATA.get(file.suffix))
+                _PRINT[file.suffix](figure, fresh, metadata=_METADATA.get(file.suffix))
 
 
 def _lay_out(figure: Figure) -> None:
-    """Lay out the panels once, and the same for every format."""
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
+    """Lay out the panels, unless they are: once, and the same for every format."""
+    if isinstance(figure.get_layout_engine(), ConstrainedLayoutEngine):
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
