@@ -154,6 +154,14 @@ def diagnosed(finished, tmp_path_factory):
     return folder
 
 
+@pytest.fixture
+def diagnosed_copy(diagnosed, tmp_path):
+    """The run with a diagnosis, free to be changed."""
+    folder = tmp_path / "run"
+    shutil.copytree(diagnosed, folder, copy_function=shutil.copy2)
+    return folder
+
+
 def test_the_page_holds_the_report_of_each_diagnosis(diagnosed):
     page = (diagnosed / "results/index.html").read_text()
     (section,) = re.findall(r'<details class="diagnosis" id="diagnosis-tiny">(.*?)</details>', page, re.DOTALL)
@@ -180,16 +188,15 @@ def test_what_a_diagnosis_found_is_one_more_set_of_parameters(diagnosed):
     assert json.loads((results / "simulated/nearest/tiny.json").read_text()) == {"failures": []}
 
 
-def test_inputs_that_contradict_one_another_are_named_and_get_no_model(diagnosed, tmp_path):
+def test_inputs_that_contradict_one_another_are_named_and_get_no_model(diagnosed_copy):
     """Unless the batch's settings say that they are trusted."""
-    folder = tmp_path / "run"
-    shutil.copytree(diagnosed, folder, copy_function=shutil.copy2)
+    folder = diagnosed_copy
     log = folder / "data/raw/tiny/t-7N.csv.gz"
     write_gz(log, pd.read_csv(log).assign(drive_current_A=0.0).to_csv(index=False))
     shutil.copytree(folder / "data/raw/tiny", folder / "data/raw/trusted")
     batch = folder / "data/raw/trusted/batch.yaml"
     batch.write_text(batch.read_text().replace("batch: tiny", "batch: trusted"))
-    keep_one_study(folder, diagnosing_by_batch={"trusted": {"trust_inputs": True, "time_limit_s": 5}})
+    keep_one_study(folder, diagnosing_by_batch={"trusted": {"trust_inputs": True, "time_limit_s": 5}}, fits={})
     run = snakemake(folder)
     assert run.returncode == 0, run.stdout + run.stderr
     results = folder / "results"
@@ -218,7 +225,8 @@ def planned(folder: Path) -> set[str]:
     return {line.split(": ", 1)[1] for line in lines if line.startswith("Job ") and " batch " in line}
 
 
-def test_a_rig_has_its_own_fits_and_a_batch_its_own_settings(copy):
+def test_a_rig_has_its_own_fits_and_a_batch_its_own_settings(diagnosed_copy):
+    copy = diagnosed_copy
     write_batch(copy / "data/raw/other", pretensions=(5.0,))
     keep_one_study(copy)
     config = yaml.safe_load((copy / "config.yaml").read_text())
@@ -264,9 +272,8 @@ def test_snakemakes_report_has_page_diagnoses_tables_and_figures_with_their_capt
     assert len(set(labels)) == len(labels), "every entry can be told from the others"
 
 
-def test_batches_of_a_rig_are_diagnosed_together(diagnosed, tmp_path):
-    folder = tmp_path / "run"
-    shutil.copytree(diagnosed, folder, copy_function=shutil.copy2)
+def test_batches_of_a_rig_are_diagnosed_together(diagnosed_copy):
+    folder = diagnosed_copy
     write_batch(folder / "data/raw/other", pretensions=(7.0, 5.0))
     keep_one_study(folder)
     config = yaml.safe_load((folder / "config.yaml").read_text())
@@ -376,17 +383,16 @@ def test_a_new_batch_appears_with_three_lines_of_config(copy):
 
 def test_bad_input_is_a_line_each_and_nothing_else_is_lost(copy):
     raw = copy / "data/raw"
-    for name in ("misspelt", "no-column", "empty", "cut"):
-        write_batch(raw / name)
+    write_batch(raw / "misspelt")
+    write_batch(raw / "damaged", pretensions=(7.0, 5.0, 3.5, 2.0))
     batch = raw / "misspelt/batch.yaml"
     batch.write_text(batch.read_text().replace("pretension_N", "pretensoin_N", 1))
-    log = raw / "no-column/t-7N.csv.gz"
-    rows = read_gz(log).splitlines()
-    write_gz(log, "\n".join(row.rsplit(",", 1)[0] for row in rows) + "\n")
-    write_gz(raw / "empty/t-7N.csv.gz", "")
-    log = raw / "cut/t-7N.csv.gz"
-    text = read_gz(log)
-    write_gz(log, text[: len(text) // 2])
+    no_column, empty, cut = (raw / f"damaged/t-{name}.csv.gz" for name in ("7N", "5N", "3.5N"))
+    rows = read_gz(no_column).splitlines()
+    write_gz(no_column, "\n".join(row.rsplit(",", 1)[0] for row in rows) + "\n")
+    write_gz(empty, "")
+    text = read_gz(cut)
+    write_gz(cut, text[: len(text) // 2])
     keep_one_study(copy)
 
     run = snakemake(copy)
@@ -397,15 +403,15 @@ def test_bad_input_is_a_line_each_and_nothing_else_is_lost(copy):
     assert len(lines) == 4, said.stderr
     for place, what in (
         ("misspelt/batch.yaml", "did you mean 'pretension_N'"),
-        ("no-column/t-7N.csv.gz", "load_load_cell_V"),
-        ("empty/t-7N.csv.gz", "empty"),
-        ("cut/t-7N.csv.gz", "cut"),
+        ("damaged/t-7N.csv.gz", "load_load_cell_V"),
+        ("damaged/t-5N.csv.gz", "empty"),
+        ("damaged/t-3.5N.csv.gz", "cut"),
     ):
         (line,) = [line for line in lines if place in line]
         assert what in line
     errors = pd.read_parquet(copy / "results/tables/errors.parquet")
-    assert set(errors["batch"]) == {"tiny", "no-column", "empty", "cut"}
-    assert set(errors.loc[errors["batch"] == "cut", "recording"]) == {"t-3.5N"}
+    assert set(errors["batch"]) == {"tiny", "damaged"}
+    assert set(errors.loc[errors["batch"] == "damaged", "recording"]) == {"t-2N"}
 
 
 def test_a_refused_batch_takes_only_its_own_with_it(copy):

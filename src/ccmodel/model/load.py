@@ -91,7 +91,7 @@ def one_row(values: ArrayLike, name: str) -> NDArray:
 
     Contiguous and writable: numba compiles a kernel anew for each other kind of array.
     """
-    values = np.require(values, float, "CW")
+    values = np.require(values, float, ["C", "W"])
     if values.ndim != 1 or values.size == 0:
         raise ModelError(f"{name} is one row of samples, at least one; got an array of shape {values.shape}")
     if not np.isfinite(values).all():

@@ -114,12 +114,9 @@ def angle_of(table: pd.DataFrame, end: End) -> Angle | None:
 def angle_at(table: pd.DataFrame, end: str, counts_per_rev: float | None, step_rad: float | None) -> Angle | None:
     """The same from the name of the end ("drive" or "load") and the two constants, where they are known."""
     (counts,), angle, key = RAW_COLUMNS[ANGLE_AT[end]], ANGLE_AT[end], f"rig.{end}"
-    if counts in table:
-        rad = 2 * np.pi / counts_per_rev if counts_per_rev else None
-        key = f"{key}.encoder_counts_per_rev"
-        return Angle(counts, table[counts].to_numpy(), rad, True, 1.0, key, counts_per_rev is not None)
-    if angle not in table:
-        return None
+    counted = _counted(table, counts, counts_per_rev, f"{key}.encoder_counts_per_rev")
+    if counted or angle not in table:
+        return counted
     values, key = table[angle].to_numpy(), f"{key}.angle_resolution_rad"
     if step_rad:
         return Angle(angle, np.round((values - values[0]) / step_rad), step_rad, True, 1.0, key, True)
@@ -129,14 +126,19 @@ def angle_at(table: pd.DataFrame, end: str, counts_per_rev: float | None, step_r
 
 def angle_of_motor(table: pd.DataFrame, rig: Rig) -> Angle | None:
     """The motor's angle at the drive pulley, as a log has it; None if it has none."""
-    (counts,), per_rev = RAW_COLUMNS[THETA_MOTOR], rig.drive.motor_counts_per_rev
-    key = "rig.drive.motor_counts_per_rev"
-    if counts in table:
-        rad = 2 * np.pi / per_rev if per_rev else None
-        return Angle(counts, table[counts].to_numpy(), rad, True, 1.0, key, per_rev is not None)
-    if THETA_MOTOR not in table:
-        return None
+    (counts,), key = RAW_COLUMNS[THETA_MOTOR], "rig.drive.motor_counts_per_rev"
+    counted = _counted(table, counts, rig.drive.motor_counts_per_rev, key)
+    if counted or THETA_MOTOR not in table:
+        return counted
     return Angle(THETA_MOTOR, table[THETA_MOTOR].to_numpy(), 1.0, False, limits.FINE_STEP_RAD, key, True)
+
+
+def _counted(table: pd.DataFrame, counts: str, counts_per_rev: float | None, key: str) -> Angle | None:
+    """An angle whose log has an encoder's counts; None if it has none."""
+    if counts not in table:
+        return None
+    rad = 2 * np.pi / counts_per_rev if counts_per_rev else None
+    return Angle(counts, table[counts].to_numpy(), rad, True, 1.0, key, counts_per_rev is not None)
 
 
 def noise_width(time_s: NDArray, angle_rad: NDArray) -> float:

@@ -89,8 +89,9 @@ def plain(rig: Rig, condition: Condition, stiffness: float, friction: float) -> 
     """
     initial = InitialTension.uniform(_path(rig), rig.pretension_N)
     load = SpringLoad(condition.load_stiffness_Nm_per_rad)
-    response = exact.simulate_pair(_transmission(rig, stiffness, friction), load, motion(rig, condition)[1], initial)
-    read = {channel: getattr(response.complete(), channel) for channel in TABLE_ONE}
+    pair = _transmission(rig, stiffness, friction)
+    response = exact.simulate_pair(pair, load, motion(rig, condition)[1], initial).complete()
+    read = {channel: getattr(response, channel) for channel in TABLE_ONE}
     sums = {SUM_AT[end]: read[first] + read[second] for end, (first, second) in TENSIONS_AT.items()}
     return _table_channels(read | sums, rig)
 
