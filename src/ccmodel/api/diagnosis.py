@@ -256,7 +256,7 @@ def diagnose(
     Examples
     --------
     >>> import ccmodel as cc
-    >>> found = cc.diagnose("data/raw/half-loop", step_s=0.04)
+    >>> found = cc.diagnose("data/raw/half-loop", step_s=0.06)
     >>> found.verdict
     'explained'
     >>> for one in sorted(found.report["mechanisms"], key=lambda one: (one["name"], one["place"])):
