@@ -299,6 +299,16 @@ def test_a_large_offset_of_a_load_cell_is_no_wrong_friction(tmp_path, end):
     assert not [text for text in said if "friction" in str(text)]
 
 
+def test_sensors_of_the_drive_that_come_late_are_no_wrong_stiffness(tmp_path):
+    """They hide how the tensions follow from the stretch, or turn it round."""
+    copy = read_copy(Path("data/raw/rich"))
+    for log in copy.logs.values():
+        for name in ("drive_encoder_counts", "drive_current_A", "drive_load_cell_V"):
+            log[name] = np.interp(log["time_s"] - 0.1, log["time_s"], log[name])
+        log["drive_encoder_counts"] = log["drive_encoder_counts"].round()
+    assert said_of(write_copy(copy, tmp_path / "late")) == []
+
+
 def test_no_offset_of_a_load_cell_acts_on_the_rise_of_tensions():
     recordings = ingest_batch(SIMULATED)
     for recording in recordings.recordings[:3]:

@@ -63,7 +63,8 @@ def processes(count: int) -> Iterator[ProcessPoolExecutor]:
     except BaseException:
         pool.shutdown(wait=False, cancel_futures=True)
         for worker in multiprocessing.active_children():
-            worker.terminate()
+            # Not SIGTERM: a worker that has only just been forked still has this process's handler of it.
+            worker.kill()
         raise
     finally:
         pool.shutdown()

@@ -226,7 +226,7 @@ class Parity:
         """Slope of the mean tension over the stretch of the taut cables, N/m; None if it is not determined.
 
         Friction scatters both. The regression of the tension on the stretch gives the lower bound, that of the stretch
-        on the tension the upper.
+        on the tension the upper. Sensors of one end that come late hide their relation, or turn its sign.
         """
         x, rig = self.moving, self.batch.rig
         if not all(name in x for name in (T1, T2, T3, T4, THETA_OUT)):
@@ -251,7 +251,7 @@ class Parity:
         variance, covariance, of_tension = (
             np.einsum("i,i", a, b) for a, b in ((length, length), (length, tension), (tension, tension))
         )
-        if covariance == 0:
+        if covariance**2 < limits.LEAST_OF_STRETCH * variance * of_tension:
             return None
         return float(covariance / variance), float(of_tension / covariance)
 
