@@ -56,10 +56,9 @@ fuzz: $(VENV)/.ready  ## damage batches and files, and run the exact solver, FUZ
 guides: $(VENV)/.ready  ## follow the how-to guides to the letter: docs/trust.md
 	$(BIN)/python -m pytest -n $(CORES) --dist load tests/guides/test_how_to.py
 
-# A fresh environment every time: a build that reuses the last one's is silent about pages it does not read again. With
-# EXECUTE=off the cells of the notebook are not run.
+# A fresh environment every time: a build that reuses the last one's is silent about pages it does not read again.
 docs: $(VENV)/.ready  ## build the documents: results/docs/html/index.html; a warning or a dead link is an error
-	$(BIN)/python -m sphinx -n -W --keep-going -E -q -D nb_execution_mode=$(or $(EXECUTE),force) -d results/docs/doctrees docs results/docs/html
+	$(BIN)/python -m sphinx -n -W --keep-going -E -q -d results/docs/doctrees docs results/docs/html
 	@echo "The documents are results/docs/html/index.html"
 
 bench: $(VENV)/.ready  ## measure speed and accuracy: results/bench.json, docs/figures/work-precision.png
