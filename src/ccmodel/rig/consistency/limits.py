@@ -11,8 +11,8 @@ TAUT_SHARE, TAUT_N = 0.25, 0.3
 # Share of both cables' samples that must be taut, so that they show the stiffness.
 MOSTLY_TAUT = 0.5
 # Share of the variance of the mean tension that the stretch must account for, so that the stiffness is determined.
-# Measured: 0.64 or more in the recordings of data/raw/rich, 0 to 0.4 in most of them if the drive's sensors come late by
-# 80 ms.
+# Measured: 0.64 or more in the recordings of data/raw/rich, below 0.4 in most of them if the drive's sensors come late
+# by 80 ms.
 LEAST_OF_STRETCH = 0.3
 # Stated mu phi from which the friction can be compared: below it noise decides.
 LEAST_CAPSTAN = 0.05
