@@ -12,7 +12,6 @@ import sample_files as sample
 from ccmodel.rig import readers
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers import attempt, read_signals, signatures
-from fuzzing import examples
 
 FORMATS = {
     "log.csv": "text file",
@@ -138,7 +137,7 @@ def damaged(raw: bytes, kind: int, rng) -> bytes:
 @pytest.mark.parametrize("name", FORMATS)
 def test_random_damage_ends_in_signals_or_one_line(sound, tmp_path, name, capfd):
     apart = readers.registry()[signatures.kind_of_bytes(sound[name]).module].apart
-    for seed in range(examples(4 if apart else 120)):
+    for seed in range(8 if apart else 120):
         (tmp_path / name).write_bytes(damaged(sound[name], seed, np.random.default_rng(seed)))
         refusal(tmp_path / name)
     assert capfd.readouterr() == ("", "")

@@ -254,7 +254,7 @@ def run(
         *at_rest._replace(slide=slide, mean=mean),
         time_s,
         theta_in,
-        one_row(drive.torque_Nm - own, "tau_in"),
+        drive.torque_Nm - own,
         noise,
         theta_variance,
         prior.considered,

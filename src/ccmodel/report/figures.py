@@ -8,9 +8,7 @@ from typing import Any
 import matplotlib
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_pdf import FigureCanvasPdf
-from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
@@ -25,13 +23,7 @@ LINES = ("-", "--", "-.", ":")
 # Endings of a figure's files.
 FORMATS = ("png", "svg", "pdf")
 # Without what would make the files of two equal runs differ: dates, and random names of an SVG's parts.
-_METADATA = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-# Of each format. `Figure.savefig` draws everything once more before, to lay it out.
-_PRINT = {
-    ".png": lambda figure, file, **options: FigureCanvasAgg(figure).print_png(file, **options),
-    ".svg": lambda figure, file, **options: FigureCanvasSVG(figure).print_svg(file, **options),
-    ".pdf": lambda figure, file, **options: FigureCanvasPdf(figure).print_pdf(file, **options),
-}
+_METADATA = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 _FILES: dict[Any, Any] = {"svg.fonttype": "none", "svg.hashsalt": "ccmodel", "pdf.fonttype": 42}
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 # Panels of the paper's Figs. 5, 8 and 9: channel on the x axis, channel on the y axis.
@@ -139,10 +131,19 @@ def save_figure(figure: Figure, *files: Path) -> None:
     """
     with matplotlib.rc_context(_FILES):
         _lay_out(figure)
-        figure.dpi = 150
         for file in map(Path, files):
             with new_file(file) as fresh:
-                _PRINT[file.suffix](figure, fresh, metadata=_METADATA.get(file.suffix))
+                print_figure(figure, fresh, file.suffix.removeprefix("."), 150)
+
+
+def print_figure(figure: Figure, file: Any, ending: str, dpi: float) -> None:
+    """Draw a figure that is laid out to a file or a buffer; `ending` is one of `FORMATS`.
+
+    `Figure.savefig` would draw everything once more before, to lay it out.
+    """
+    figure.dpi = dpi
+    canvas = get_registered_canvas_class(ending)(figure)
+    getattr(canvas, f"print_{ending}")(file, metadata=_METADATA.get(ending))
 
 
 def _lay_out(figure: Figure) -> None:

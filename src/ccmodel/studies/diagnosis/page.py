@@ -24,7 +24,7 @@ from ccmodel.model.parameters import batch_key
 from ccmodel.provenance import stamp
 from ccmodel.recording import ORIGIN, Recording
 from ccmodel.report.embedding import asset
-from ccmodel.report.figures import COLOURS, STYLE, legend_below, stamp_figure, subplots, title_figure
+from ccmodel.report.figures import COLOURS, STYLE, legend_below, print_figure, stamp_figure, subplots, title_figure
 from ccmodel.report.verdict import (
     NOT_ACCEPTED,
     SYMBOL,
@@ -305,5 +305,5 @@ def _stamp(found: Diagnosis) -> str:
 
 def _encoded(figure: Figure) -> str:
     buffer = io.BytesIO()
-    figure.savefig(buffer, dpi=130, format="png")
+    print_figure(figure, buffer, "png", 130)
     return base64.b64encode(buffer.getvalue()).decode()
