@@ -8,9 +8,10 @@ import pytest
 from made_up_batch import T0, Bench, table
 
 from benchmarks.input_mistakes import MISTAKES, Copy, outcome, read_copy, said_of, write_copy
-from ccmodel.rig.consistency.clocks import drift_of
+from ccmodel.rig.consistency.clocks import drift_of, trend
 from ccmodel.rig.consistency.fitted import contradicted_by_fit
 from ccmodel.rig.consistency.parity import Parity, closed_part, crossings, speed, white_noise
+from ccmodel.rig.consistency.scales import pooled
 from ccmodel.rig.consistency.signs import EXCHANGED, FAULTS, explanation, negative_relations, wrong_signs
 from ccmodel.rig.ingest import ingest_batch
 from proof.build import record
@@ -67,6 +68,22 @@ def test_an_exchange_of_names_throughout_is_no_mistake(tmp_path):
         for column in ("drive_encoder_counts", "load_encoder_counts", "drive_current_A", "load_current_A"):
             log[column] = -log[column]
     assert said_of(write_copy(copy, tmp_path / "mirrored")) == []
+
+
+def test_a_load_with_mass_contradicts_no_spring(tmp_path):
+    """Above its resonance the torque of a load with mass falls with its angle: most slopes here are negative."""
+    copy, inertia_over_spring_s2 = read_copy(Path("data/raw/rich")), 0.15
+    for log in copy.logs.values():
+        time, torque = log["time_s"].to_numpy(), log["load_current_A"].to_numpy()
+        acceleration = speed(speed(torque, time), time)
+        for column in ("load_current_A", "drive_current_A"):
+            log[column] += inertia_over_spring_s2 * acceleration
+    folder = write_copy(copy, tmp_path / "mass")
+    ingested = ingest_batch(folder)
+    slopes = [Parity(recording, ingested.batch).ratios["spring"] for recording in ingested.recordings]
+    assert np.median(slopes) < -0.1
+    assert pooled([Parity(r, ingested.batch) for r in ingested.recordings])["spring"] == pytest.approx(1.0, rel=0.05)
+    assert not any("spring" in one for one in said_of(folder))
 
 
 def test_the_same_samples_under_two_names_are_said_once_and_in_one_line(tmp_path):
@@ -168,6 +185,14 @@ def test_the_rate_of_a_drift_is_found(tmp_path, rate):
     found, change = drift_of(Parity(ingested.recordings[0], ingested.batch))
     assert found == pytest.approx(rate, rel=0.1)
     assert np.sign(change) == np.sign(rate)
+
+
+def test_lags_that_only_scatter_do_not_drift():
+    """Those of a load that rings after the start: a line through five of them has two degrees of freedom left."""
+    time_s, ringing_s = np.arange(5) * 1.25, np.array([-0.0428, -0.0343, -0.0203, -0.0189, -0.0139])
+    assert trend(ringing_s, time_s) == (0.0, 0.0)
+    by_direction_s = 0.004 * (-1.0) ** np.arange(5)
+    assert trend(0.006 * time_s + by_direction_s, time_s) == pytest.approx((0.006, 0.03))
 
 
 def test_clocks_that_agree_do_not_drift(tmp_path):

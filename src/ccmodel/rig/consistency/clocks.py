@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.channels import THETA_IN, THETA_OUT
+from ccmodel.distributions import student_quantile
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
 from ccmodel.rig.consistency.parity import Parity, crossings
@@ -26,15 +27,23 @@ def drift_of(parity: Parity) -> tuple[float, float] | None:
     )
     if not _equal(np.diff(drive)) or not _equal(_strokes(x[THETA_IN], marks[0])):
         return None
-    lag = load - drive
+    return trend(load - drive, drive)
+
+
+def trend(lag_s: NDArray, time_s: NDArray) -> tuple[float, float]:
+    """Rate, s/s, and change over the recording, s, of lags at successive crossings; zeros if they may only scatter.
+
+    Both arguments have shape (crossings,), four of them at least.
+    """
     # The load's lag differs between the two directions; both change alike.
-    direction = np.where(np.arange(count) % 2, 0.5, -0.5)
-    basis = np.column_stack([np.ones(count), direction, drive - drive.mean()])
-    values, *_ = np.linalg.lstsq(basis, lag, rcond=None)
-    rate, change = float(values[2]), float(values[2]) * float(np.ptp(drive))
-    residual = lag - basis @ values
-    scatter = float(np.sqrt(residual @ residual / max(count - 3, 1)))
-    return (rate, change) if abs(change) > 4 * scatter else (0.0, 0.0)
+    direction = np.where(np.arange(lag_s.size) % 2, 0.5, -0.5)
+    basis = np.column_stack([np.ones(lag_s.size), direction, time_s - time_s.mean()])
+    values, *_ = np.linalg.lstsq(basis, lag_s, rcond=None)
+    rate, residual, freedom = float(values[2]), lag_s - basis @ values, lag_s.size - basis.shape[1]
+    variance = float(residual @ residual) / freedom * float(np.linalg.inv(basis.T @ basis)[2, 2])
+    # The first lags of a load that rings after the start differ from the others.
+    is_chance = rate**2 <= float(student_quantile(1 - limits.DRIFT_BY_CHANCE / 2, freedom)) ** 2 * variance
+    return (0.0, 0.0) if is_chance else (rate, rate * float(np.ptp(time_s)))
 
 
 def _times(time_s: NDArray, values: NDArray, marks: NDArray) -> NDArray:

@@ -37,6 +37,9 @@ STATED_FACTOR = 3.0
 # The same of a fitted stiffness. A model that lacks some physics may be off; of six batches it was 0.5 to 1.1 of the
 # stated one. Units differ by more.
 FITTED_FACTOR = 10.0
+# Factor between the slowest and the fastest motion of the load, as mean square speed over mean square angle, from which
+# recordings tell a spring from an inertia.
+UNLIKE_MOTIONS = 2.0
 # Frequency of the motion over the noted one. A note is no measurement, but no rig runs a third as fast as it is asked.
 FREQUENCY_FACTOR = 3.0
 # Travel of the load over that of the drive, both at the cable, in the recording of the greatest stroke. Friction and
@@ -77,6 +80,8 @@ MOST_CELL_ERROR = 1.0
 
 # Rate at which the load's lag changes from cycle to cycle, s/s, and its change over the recording, s.
 DRIFT_RATE, DRIFT_S = 0.004, 0.02
+# Probability with which lags that only scatter may seem to drift.
+DRIFT_BY_CHANCE = 0.001
 # Relative deviation of amplitude and period up to which cycles count as equal, and fewest crossings of the middle.
 EQUAL_CYCLES, FEWEST_CROSSINGS = 0.05, 4
 

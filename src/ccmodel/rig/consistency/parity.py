@@ -149,6 +149,17 @@ class Parity:
             found["nearest stiffness"] = float(np.clip(1.0, low, high))
         return {name: float(value) for name, value in found.items() if np.isfinite(value)}
 
+    @cached_property
+    def load_speed(self) -> float | None:
+        """Variance of the load's speed over that of its angle, 1/s^2: the square of the frequency of a sine.
+
+        What an inertia J takes off the slope of torque over angle is J times this, whatever the motion.
+        """
+        x = self.moving
+        if THETA_OUT not in x or not (variance := float(x[THETA_OUT].var())):
+            return None
+        return float(speed(x[THETA_OUT], x["time_s"]).var()) / variance
+
     def _noise(self, channel: str) -> float:
         """Standard deviation of white noise in motion; at rest, if it is far less: cables may stick and slip."""
         moving = white_noise(self.moving[channel])

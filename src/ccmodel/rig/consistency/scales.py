@@ -48,7 +48,10 @@ def wrong_scales(parities: Sequence[Parity]) -> list[Contradiction]:
 
 
 def pooled(parities: Sequence[Parity]) -> dict[str, float]:
-    """Median of each relation over the recordings; the travel is that of the greatest stroke."""
+    """Median of each relation over the recordings; the travel is that of the greatest stroke.
+
+    The spring is the one without what an inertia of the load takes off it, and absent where that is not known.
+    """
     by_relation: dict[str, list[tuple[float, float]]] = {}
     for parity in parities:
         stroke = float(np.ptp(parity.moving[THETA_IN]))
@@ -57,7 +60,25 @@ def pooled(parities: Sequence[Parity]) -> dict[str, float]:
     found = {name: float(np.median([value for _, value in of])) for name, of in by_relation.items()}
     if "travel" in by_relation:
         found["travel"] = max(by_relation["travel"])[1]
+    if beyond(found.get("spring"), _SAME) and (spring := _without_inertia(parities, found.pop("spring"))) is not None:
+        found["spring"] = spring
     return found
+
+
+def _without_inertia(parities: Sequence[Parity], median: float) -> float | None:
+    """Torque over angle of a load that is slow, over the stated spring, from its `median` over the recordings.
+
+    An inertia lowers it in proportion to `Parity.load_speed`, below zero above the load's resonance. Motions that are
+    alike do not tell the two apart; a negative spring is then none.
+    """
+    pairs = [(w, p.ratios["spring"]) for p in parities if "spring" in p.ratios and (w := p.load_speed) is not None]
+    speeds, springs = np.array(pairs).reshape(-1, 2).T
+    if not speeds.size or speeds.max() < limits.UNLIKE_MOTIONS * speeds.min():
+        return median if median > 0 else None
+    from scipy.stats import theilslopes  # it takes 0.3 s to import
+
+    line = theilslopes(springs, speeds)
+    return float(line.intercept) if line.slope < 0 else median
 
 
 def beyond(ratio: float | None, factor: float) -> int:
