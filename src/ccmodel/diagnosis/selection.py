@@ -9,6 +9,7 @@ from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit, fit
 from ccmodel.diagnosis.comparison import Comparison, is_part_of
+from ccmodel.diagnosis.equation_error import other_start
 from ccmodel.diagnosis.hypothesis import Hypothesis, law_of, laws_in
 from ccmodel.diagnosis.laws import proposals
 from ccmodel.diagnosis.repeatability import estimated
@@ -43,6 +44,9 @@ class Selection:
     laws : sequence of Law
         Laws that may be learned where something is missing that is on no list.
     progress : Progress
+    known : mapping of str to float
+        Values that recordings show without a run of the model (`ccmodel.diagnosis.equation_error`). Fits of what they
+        belong to also start from them.
     deadline, sets_until : Deadline
         When the selection ends with what was fitted until then; and when sets are to be fitted before laws are learned.
     """
@@ -52,6 +56,7 @@ class Selection:
     forced: Sequence[Hypothesis] = ()
     laws: Sequence[Law] = ()
     progress: Progress = field(default=silent)
+    known: Mapping[str, float] = field(default_factory=dict)
     deadline: Deadline = UNLIMITED
     sets_until: Deadline = UNLIMITED
 
@@ -66,7 +71,10 @@ class Selection:
         worth = [s for k, s in enumerate(scores) if s.values and (s.gain > settings.WORTH_FITTING or k < fewest)]
         leading = worth[: settings.MOST_FITTED if self.is_tension_observed else settings.MOST_FITTED_IF_UNOBSERVED]
         chosen = [s.hypothesis for s in leading]
-        forced = [Score(h, 0.0, h.start) for h in self.forced if h not in chosen]
+        # The screening is linear, and a mass that is out of tune seems to explain nothing.
+        shown = [h for h in self.mechanisms if fewest and h.start and all(name in self.known for name in h.start)]
+        further = dict.fromkeys(h for h in [*self.forced, *shown] if h not in chosen)
+        forced = [Score(h, 0.0, h.start) for h in further]
         singles = self._part(SCREENED, FITTED).fit_all(whitened, base, [*leading, *forced])
         found = self._part(FITTED, 1.0).further(nothing.with_candidates(singles), screening)
         # Candidates are compared, and their parameters estimated, under the best one's own covariance: about a model
@@ -153,8 +161,11 @@ class Selection:
         for k, score in enumerate(chosen):
             hypothesis = base.hypothesis.and_also(score.hypothesis)
             self.progress(f"fitting {hypothesis}", k / len(chosen))
+            start = base.values | score.values
+            starts = [one for one in (other_start(start, self.known), start) if one is not None]
             try:
-                candidate = fit(whitened, hypothesis, self.free, base.values | score.values, self.deadline)
+                fits = [fit(whitened, hypothesis, self.free, one, self.deadline) for one in starts]
+                candidate = min(fits, key=lambda c: c.mean_square)
             except OutOfTimeError:
                 self.progress(f"{hypothesis}: not fitted, the time is over")
                 break

@@ -1,0 +1,75 @@
+"""Values of the load that a linear regression shows, without a run of the model: the equation-error method.
+
+Where the load's angle and torque are both measured, its own equation holds sample by sample,
+
+    tau_out = K_e theta + B dtheta/dt + J d2theta/dt2,
+
+whatever the cables do. A load with mass on nearly undamped cables rings, and a search for its inertia through the model
+has many minima; the regression has none. Both sides go through the same filter, which leaves the equation as it is and
+keeps the noise of the differences low (Young, Parameter estimation for continuous-time models: a survey, Automatica
+17(1), 23-39, 1981, doi:10.1016/0005-1098(81)90082-0).
+"""
+
+from collections.abc import Mapping, Sequence
+from math import isclose, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from ccmodel import mechanisms as registry
+from ccmodel.channels import TAU_OUT, THETA_OUT
+from ccmodel.diagnosis import settings
+from ccmodel.model.parameters import mechanism_key
+from ccmodel.recording import Recording
+
+# Window of the moving average, s, and how often it is applied. Chosen: it keeps a ringing below 10 Hz.
+WINDOW_S, PASSES = 0.05, 4
+# Relative difference of inertias from which both starts are tried. Chosen: half of the screening's step.
+ALIKE = 0.1
+LOAD_SPRING, INERTIA = "load_stiffness_Nm_per_rad", ("load-inertia", "load")
+
+
+def load_values(recordings: Sequence[Recording]) -> dict[str, float]:
+    """Spring, inertia and damping ratio of the load, by the names of a fit's unknowns.
+
+    Empty if a channel was not recorded, or if the regression shows no load with an inertia within its plausible range.
+    """
+    equations = [e for r in recordings if THETA_OUT in r and TAU_OUT in r and (e := _equations(r)) is not None]
+    if not equations:
+        return {}
+    terms, torque = (np.concatenate(rows) for rows in zip(*equations, strict=True))
+    K_e, B, J = np.linalg.lstsq(terms, torque, rcond=None)[0].tolist()
+    bounds = {p.name: (p.low, p.high) for p in registry.get(INERTIA[0]).parameters}
+    if K_e <= 0.0 or not bounds["J"][0] <= J <= settings.RANGE_SLACK * bounds["J"][1]:
+        return {}
+    zeta = float(np.clip(B / (2 * sqrt(J * K_e)), *bounds["zeta"]))
+    return {LOAD_SPRING: K_e, mechanism_key(*INERTIA, "J"): J, mechanism_key(*INERTIA, "zeta"): zeta}
+
+
+def other_start(start: Mapping[str, float], known: Mapping[str, float]) -> dict[str, float] | None:
+    """A start of a fit with the known values of its unknowns; None if it has no inertia, or much the same one."""
+    key = mechanism_key(*INERTIA, "J")
+    if key not in start or key not in known or isclose(start[key], known[key], rel_tol=ALIKE):
+        return None
+    return {name: known.get(name, value) for name, value in start.items()}
+
+
+def _equations(recording: Recording) -> tuple[NDArray, NDArray] | None:
+    """Terms of the load's equation, shape (samples, 3), and its torque, each about its mean; None of a short one."""
+    time_s = recording.time_s
+    window = max(3, round(WINDOW_S / float(np.median(np.diff(time_s)))) | 1)
+    # The filter reaches over the ends.
+    inside = slice(max(int(np.searchsorted(time_s, recording.rest_s)), PASSES * window), -PASSES * window)
+    angle, torque = (_filtered(recording[channel], window) for channel in (THETA_OUT, TAU_OUT))
+    rate = np.gradient(angle, time_s)
+    terms = np.column_stack([angle, rate, np.gradient(rate, time_s)])[inside]
+    if len(terms) <= PASSES * window:
+        return None
+    return terms - terms.mean(axis=0), torque[inside] - torque[inside].mean()
+
+
+def _filtered(values: NDArray, window: int) -> NDArray:
+    for _ in range(PASSES):
+        values = uniform_filter1d(values, window)
+    return values

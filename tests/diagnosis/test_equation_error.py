@@ -1,0 +1,59 @@
+"""Values of the load that a regression of its torque on its motion shows."""
+
+import numpy as np
+import pytest
+
+from builders import recording
+from ccmodel.diagnosis.equation_error import load_values, other_start
+
+J, ZETA, K_E = "load-inertia/load/J", "load-inertia/load/zeta", "load_stiffness_Nm_per_rad"
+SPRING, DAMPING = 0.056, 0.0005
+COUNT_RAD, NOISE_NM = 0.0008, 1e-4
+RATES, SIZES = np.array([[2.0], [7.0], [24.0]]), np.array([[0.3], [0.1], [0.02]])
+
+
+def ringing(mass, seed=0, spring=SPRING, **changes):
+    """A load that moves with three frequencies, read by an encoder with counts and a torque sensor with noise."""
+
+    def angle(t):
+        exact = (SIZES * np.sin(RATES * t)).sum(axis=0)
+        return COUNT_RAD * np.round(exact / COUNT_RAD)
+
+    def torque(t):
+        wave, slope = SIZES * np.sin(RATES * t), SIZES * RATES * np.cos(RATES * t)
+        exact = (spring * wave + DAMPING * slope - mass * RATES**2 * wave).sum(axis=0)
+        return exact + NOISE_NM * np.random.default_rng(seed).normal(size=t.size)
+
+    return recording(10.0, theta_out_rad=angle, tau_out_Nm=torque, **changes)
+
+
+@pytest.mark.parametrize("mass", [2e-4, 2e-3, 1e-2])
+def test_spring_inertia_and_damping_are_found(mass):
+    found = load_values([ringing(mass, 1), ringing(mass, 2)])
+    zeta = DAMPING / (2 * np.sqrt(mass * SPRING))
+    assert found == pytest.approx({K_E: SPRING, J: mass, ZETA: zeta}, rel=0.05)
+
+
+@pytest.mark.parametrize("mass", [0.0, 1e-6, 0.1])
+def test_an_inertia_outside_of_the_plausible_range_is_none(mass):
+    assert load_values([ringing(mass)]) == {}
+
+
+def test_a_torque_with_the_wrong_sign_shows_no_load():
+    assert load_values([ringing(2e-3, spring=-SPRING)]) == {}
+
+
+def test_without_the_torque_or_with_too_few_samples_there_is_nothing_to_see():
+    assert load_values([recording(10.0, theta_out_rad=np.sin)]) == {}
+    whole = ringing(2e-3)
+    assert load_values([whole[:60]]) == {}
+    assert load_values([whole[:60], whole]) == load_values([whole])
+
+
+def test_a_fit_with_the_inertia_also_starts_from_the_known_values():
+    known = {K_E: 0.05, J: 2e-3, ZETA: 0.01}
+    start = {"friction_coefficient": 0.1, K_E: 0.04, J: 1e-3, ZETA: 0.3}
+    assert other_start(start, known) == {"friction_coefficient": 0.1, **known}
+    assert other_start(start | {J: 1.95e-3}, known) is None
+    assert other_start({K_E: 0.04}, known) is None
+    assert other_start(start, {}) is None
