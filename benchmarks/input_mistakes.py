@@ -184,7 +184,7 @@ def _exchanged_ends(copy: Copy, random) -> str:
 
 
 def _constant(copy: Copy, random) -> str:
-    name, column = copy.any_log(random), random.choice(copy.columns("^(?!time_s|drive_encoder)"))
+    name, column = copy.any_log(random), random.choice(copy.columns("^(?!time_s|drive_encoder|motor)"))
     copy.logs[name][column] = copy.logs[name][column].iloc[0]
     return column
 
@@ -207,7 +207,7 @@ def _wrapped(copy: Copy, random) -> str:
 
 def _copied(copy: Copy, random) -> str:
     one, other = random.choice(list(copy.logs), 2, replace=False)
-    column = random.choice(copy.columns("^(?!time_s|drive_encoder)"))
+    column = random.choice(copy.columns("^(?!time_s|drive_encoder|motor)"))
     n = min(len(copy.logs[one]), len(copy.logs[other]))
     copy.logs[one] = copy.logs[one].iloc[:n].copy()
     copy.logs[one][column] = copy.logs[other][column].to_numpy()[:n]
