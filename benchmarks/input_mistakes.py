@@ -31,6 +31,8 @@ MEASURED, SIMULATED = Path("data/raw/da-vinci"), Path("data/raw/rich")
 PAGE = Path("docs/input-checks.md")
 BEGIN, END = "<!-- made by `make input-checks` -->", "<!-- end -->"
 COUNTS = ("drive_encoder_counts", "load_encoder_counts")
+# Sensors but those of the drive's motion: the same command gives the same counts.
+NOT_COMMANDED = "^(?!time_s|drive_encoder|motor)"
 NOISY = re.compile(r"_(current_A|torque_counts|load_cell_V)$")
 # Seeds of the draws: of the mistakes, and of the proof's cases, which no limit of the checks was chosen on.
 SEED, CASES_SEED = 20261123, 960000
@@ -87,10 +89,10 @@ def read_copy(folder: Path, donors: Sequence[Recording] = ()) -> Copy:
 
 
 def as_logged(recording: Recording, rig: Mapping, columns: Sequence[str]) -> pd.DataFrame | None:
-    """A recording of another rig as this rig would log it; None if it lacks a channel."""
+    """A recording of another rig as this rig would log it, without the motor; None if it lacks a channel."""
     found = {"time_s": recording.time_s.round(6)}
     for column in columns:
-        if column == "time_s":
+        if column in found or column.startswith("motor"):
             continue
         end, sensor = column.split("_", 1)
         side = rig[end]
@@ -184,7 +186,7 @@ def _exchanged_ends(copy: Copy, random) -> str:
 
 
 def _constant(copy: Copy, random) -> str:
-    name, column = copy.any_log(random), random.choice(copy.columns("^(?!time_s|drive_encoder|motor)"))
+    name, column = copy.any_log(random), random.choice(copy.columns(NOT_COMMANDED))
     copy.logs[name][column] = copy.logs[name][column].iloc[0]
     return column
 
@@ -207,7 +209,7 @@ def _wrapped(copy: Copy, random) -> str:
 
 def _copied(copy: Copy, random) -> str:
     one, other = random.choice(list(copy.logs), 2, replace=False)
-    column = random.choice(copy.columns("^(?!time_s|drive_encoder|motor)"))
+    column = random.choice(copy.columns(NOT_COMMANDED))
     n = min(len(copy.logs[one]), len(copy.logs[other]))
     copy.logs[one] = copy.logs[one].iloc[:n].copy()
     copy.logs[one][column] = copy.logs[other][column].to_numpy()[:n]

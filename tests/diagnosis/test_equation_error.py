@@ -1,10 +1,17 @@
 """Values of the load that a regression of its torque on its motion shows."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from builders import recording
+from ccmodel.deadline import OutOfTimeError
+from ccmodel.diagnosis import selection
 from ccmodel.diagnosis.equation_error import load_values, other_start
+from ccmodel.diagnosis.hypothesis import PAPER, Hypothesis
+from ccmodel.diagnosis.screening import Score
+from ccmodel.failure import ModelError
 
 J, ZETA, K_E = "load-inertia/load/J", "load-inertia/load/zeta", "load_stiffness_Nm_per_rad"
 SPRING, DAMPING = 0.056, 0.0005
@@ -12,7 +19,7 @@ COUNT_RAD, NOISE_NM = 0.0008, 1e-4
 RATES, SIZES = np.array([[2.0], [7.0], [24.0]]), np.array([[0.3], [0.1], [0.02]])
 
 
-def ringing(mass, seed=0, spring=SPRING, **changes):
+def ringing(mass, seed=0, spring=SPRING):
     """A load that moves with three frequencies, read by an encoder with counts and a torque sensor with noise."""
 
     def angle(t):
@@ -24,7 +31,7 @@ def ringing(mass, seed=0, spring=SPRING, **changes):
         exact = (spring * wave + DAMPING * slope - mass * RATES**2 * wave).sum(axis=0)
         return exact + NOISE_NM * np.random.default_rng(seed).normal(size=t.size)
 
-    return recording(10.0, theta_out_rad=angle, tau_out_Nm=torque, **changes)
+    return recording(10.0, theta_out_rad=angle, tau_out_Nm=torque)
 
 
 @pytest.mark.parametrize("mass", [2e-4, 2e-3, 1e-2])
@@ -57,3 +64,29 @@ def test_a_fit_with_the_inertia_also_starts_from_the_known_values():
     assert other_start(start | {J: 1.95e-3}, known) is None
     assert other_start({K_E: 0.04}, known) is None
     assert other_start(start, {}) is None
+
+
+@pytest.mark.parametrize(
+    ("ends", "kept"),
+    [
+        ((2.0, 3.0), 2.0),
+        ((3.0, 2.0), 2.0),
+        ((2.0, OutOfTimeError()), 2.0),
+        ((ModelError("no solution"), 3.0), 3.0),
+        ((2.0, ModelError("no solution")), 2.0),
+        ((OutOfTimeError(), 3.0), None),
+    ],
+)
+def test_of_both_starts_the_better_fit_that_can_be_made_is_kept(monkeypatch, ends, kept):
+    inertia, left = Hypothesis((("load-inertia", "load"),)), list(ends)
+
+    def fit(whitened, hypothesis, free, start, deadline):
+        end = left.pop(0)
+        if isinstance(end, Exception):
+            raise end
+        return SimpleNamespace(hypothesis=hypothesis, mean_square=end)
+
+    monkeypatch.setattr(selection, "fit", fit)
+    chosen = selection.Selection({}, [], known={K_E: 0.05, J: 2e-3, ZETA: 0.01})
+    fitted = chosen.fit_all([], SimpleNamespace(hypothesis=PAPER, values={}), [Score(inertia, 0.0, inertia.start)])
+    assert [c.mean_square for c in fitted] == ([] if kept is None else [kept])

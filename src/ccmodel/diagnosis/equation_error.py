@@ -23,10 +23,6 @@ from ccmodel.diagnosis import settings
 from ccmodel.model.parameters import mechanism_key
 from ccmodel.recording import Recording
 
-# Window of the moving average, s, and how often it is applied. Chosen: it keeps a ringing below 10 Hz.
-WINDOW_S, PASSES = 0.05, 4
-# Relative difference of inertias from which both starts are tried. Chosen: half of the screening's step.
-ALIKE = 0.1
 LOAD_SPRING, INERTIA = "load_stiffness_Nm_per_rad", ("load-inertia", "load")
 
 
@@ -50,7 +46,7 @@ def load_values(recordings: Sequence[Recording]) -> dict[str, float]:
 def other_start(start: Mapping[str, float], known: Mapping[str, float]) -> dict[str, float] | None:
     """A start of a fit with the known values of its unknowns; None if it has no inertia, or much the same one."""
     key = mechanism_key(*INERTIA, "J")
-    if key not in start or key not in known or isclose(start[key], known[key], rel_tol=ALIKE):
+    if key not in start or key not in known or isclose(start[key], known[key], rel_tol=settings.ALIKE_INERTIA):
         return None
     return {name: known.get(name, value) for name, value in start.items()}
 
@@ -58,18 +54,21 @@ def other_start(start: Mapping[str, float], known: Mapping[str, float]) -> dict[
 def _equations(recording: Recording) -> tuple[NDArray, NDArray] | None:
     """Terms of the load's equation, shape (samples, 3), and its torque, each about its mean; None of a short one."""
     time_s = recording.time_s
-    window = max(3, round(WINDOW_S / float(np.median(np.diff(time_s)))) | 1)
+    window = max(3, round(settings.FILTER_S / float(np.median(np.diff(time_s)))) | 1)
     # The filter reaches over the ends.
-    inside = slice(max(int(np.searchsorted(time_s, recording.rest_s)), PASSES * window), -PASSES * window)
+    inside = slice(
+        max(int(np.searchsorted(time_s, recording.rest_s)), settings.FILTER_PASSES * window),
+        -settings.FILTER_PASSES * window,
+    )
     angle, torque = (_filtered(recording[channel], window) for channel in (THETA_OUT, TAU_OUT))
     rate = np.gradient(angle, time_s)
     terms = np.column_stack([angle, rate, np.gradient(rate, time_s)])[inside]
-    if len(terms) <= PASSES * window:
+    if len(terms) <= settings.FILTER_PASSES * window:
         return None
     return terms - terms.mean(axis=0), torque[inside] - torque[inside].mean()
 
 
 def _filtered(values: NDArray, window: int) -> NDArray:
-    for _ in range(PASSES):
+    for _ in range(settings.FILTER_PASSES):
         values = uniform_filter1d(values, window)
     return values

@@ -156,16 +156,18 @@ class Selection:
         return replace(self, progress=within(self.progress, low, high))
 
     def fit_all(self, whitened: Sequence[Whitened], base: CandidateFit, chosen: Sequence[Score]) -> list[CandidateFit]:
-        """Fit extensions of a fitted model, from the values of their scores, until the deadline."""
+        """Fit extensions of a fitted model, from the values of their scores and from known ones, until the deadline.
+
+        Of several fits of a hypothesis, the one with the lowest mean square is returned.
+        """
+        starts = [(score.hypothesis, base.values | score.values) for score in chosen]
+        every = [(h, one) for h, s in starts for one in (other_start(s, self.known), s) if one is not None]
         fitted = []
-        for k, score in enumerate(chosen):
-            hypothesis = base.hypothesis.and_also(score.hypothesis)
-            self.progress(f"fitting {hypothesis}", k / len(chosen))
-            start = base.values | score.values
-            starts = [one for one in (other_start(start, self.known), start) if one is not None]
+        for k, (further, start) in enumerate(every):
+            hypothesis = base.hypothesis.and_also(further)
+            self.progress(f"fitting {hypothesis}", k / len(every))
             try:
-                fits = [fit(whitened, hypothesis, self.free, one, self.deadline) for one in starts]
-                candidate = min(fits, key=lambda c: c.mean_square)
+                candidate = fit(whitened, hypothesis, self.free, start, self.deadline)
             except OutOfTimeError:
                 self.progress(f"{hypothesis}: not fitted, the time is over")
                 break
@@ -174,7 +176,7 @@ class Selection:
                 continue
             self.progress(f"{hypothesis}: leave-one-out mean square {candidate.mean_square:.2f}")
             fitted.append(candidate)
-        return fitted
+        return lowest(fitted)
 
     def extended(self, found: Comparison, screening: Screening, size: int) -> Comparison:
         """The same with sets of `size` mechanisms, and with the parts of the best of them that lack a member.
@@ -275,13 +277,12 @@ class Selection:
         again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in leading for s in starts(c)])
         if not any(c.hypothesis == best.hypothesis for c in again):
             return found
-        every = lowest(again)
         # About the same mechanisms once more: only if that leads on.
         about = found.linearised_about
-        reached = next(c.mean_square for c in every if c.hypothesis == best.hypothesis)
+        reached = next(c.mean_square for c in again if c.hypothesis == best.hypothesis)
         if about and about.hypothesis == best.hypothesis and reached >= best.mean_square:
             return found
-        return Comparison.of(whitened, base, every, found.screened, best)
+        return Comparison.of(whitened, base, again, found.screened, best)
 
 
 def lowest(every: Sequence[CandidateFit]) -> list[CandidateFit]:

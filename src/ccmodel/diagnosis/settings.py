@@ -104,6 +104,12 @@ CONTINUATION_FACTOR, PROMISING = 4.0, 0.7
 # Shares of the pretension from which a fit starts where the initial tension is not observed, and the evaluations after
 # which the better start is taken: the cost has a minimum with both cables taut and one with a cable slack. Chosen.
 PRETENSION_STARTS, START_EVALUATIONS = (1.0, 0.2), 8
+# Moving average before the load's equation is regressed, s, and how often it is applied. Chosen: it keeps a ringing
+# below 10 Hz.
+FILTER_S, FILTER_PASSES = 0.05, 4
+# Relative difference of an inertia from the regressed one above which a fit also starts from that. Chosen: half of the
+# screening's step.
+ALIKE_INERTIA = 0.1
 # How far a fit may leave a parameter's plausible range, as a factor. Chosen: far enough to recognise that it would.
 BEYOND_RANGE = 3.0
 # Factor by which a strength may exceed its plausible range in an accepted model. Chosen: ranges are rough.
