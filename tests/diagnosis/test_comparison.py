@@ -398,6 +398,38 @@ def test_a_further_mechanism_is_searched_for_where_something_is_left(mean_square
     assert compared(evidence(), (fitted(mean_square, FRICTION), given)).is_enough == enough
 
 
+@pytest.mark.parametrize(
+    "mean_square, size, unlisted, is_settled",
+    [
+        (1.05, 0.0, NONE - 20, True),  # it leaves nothing
+        (1.4, 0.2, NONE - 20, True),  # what it leaves is a remainder of its own equation
+        (1.4, 0.2, NONE + 2, False),  # it is certain, but something may be missing beside it
+        (3.0, 2.0, NONE + 2, False),  # nothing leaves a good fit
+    ],
+)
+def test_laws_are_learned_where_what_is_certain_leaves_something(mean_square, size, unlisted, is_settled):
+    given = evidence(NONE, unlisted, size=size)
+    found = compared(evidence(size=60.0), (fitted(mean_square, FRICTION), given), model=fitted(61.0))
+    assert found.is_settled == is_settled
+    assert (found.certain is not None) == (mean_square < 1.5)
+
+
+@pytest.mark.parametrize("left, learned", [(0.0, []), (0.4, ["a law"])])
+def test_a_selection_ends_with_laws_where_what_is_certain_leaves_something(monkeypatch, left, learned):
+    single = fitted(1.0 + left, FRICTION), evidence(NONE, NONE + 2, size=left)
+    found, calls = compared(evidence(size=60.0), single, model=fitted(61.0)), []
+    monkeypatch.setattr(Selection, "relinearise", lambda self, found: found)
+    monkeypatch.setattr(Selection, "extended", lambda self, found, screening, size: found)
+    monkeypatch.setattr(Selection, "learn", lambda self, found: calls.extend(self.laws) or found)
+    assert Selection({}, [], laws=["a law"]).further(found, None) is found
+    assert calls == learned
+
+
+def test_no_law_is_learned_where_nothing_is_missing():
+    assert compared(evidence(complete=NONE)).is_settled
+    assert compared(evidence(complete=NONE), (fitted(1.1, FRICTION), evidence(NONE - 10))).is_settled
+
+
 def test_without_candidates_there_is_nothing_to_extend():
     assert compared(evidence(FAR, NONE)).is_enough
 

@@ -5,6 +5,7 @@ import struct
 from functools import cache
 from typing import NamedTuple
 
+import numpy as np
 import pytest
 import sample_files as sample
 from hypothesis import HealthCheck, given, settings
@@ -155,7 +156,7 @@ def test_a_damaged_file_is_read_or_refused(name, sound, reads, tmp_path):
     raw, path = sound[name], tmp_path / name
     others = [other for called, other in sound.items() if called != name]
 
-    @settings(max_examples=examples(8), suppress_health_check=[HealthCheck.function_scoped_fixture])
+    @settings(max_examples=examples(40), suppress_health_check=[HealthCheck.function_scoped_fixture])
     @given(inside=st.booleans(), several=st.lists(damages, min_size=1, max_size=4))
     def each(inside, several):
         path.write_bytes(damaged(raw, inside, several, others))
@@ -164,3 +165,12 @@ def test_a_damaged_file_is_read_or_refused(name, sound, reads, tmp_path):
     path.write_bytes(raw)
     check(reads.read(path))
     each()
+
+
+@pytest.mark.parametrize("name", sample.WRITERS)
+def test_random_bytes_behind_a_sound_beginning(name, sound, reads, tmp_path):
+    for seed in range(40):
+        (tmp_path / name).write_bytes(sound[name][: 16 + seed] + np.random.default_rng(seed).bytes(3000))
+        read = reads.read(tmp_path / name)
+        check(read)
+        assert read.refusal is not None

@@ -116,42 +116,6 @@ def test_without_an_ending_a_file_is_read_by_its_first_bytes(sound, tmp_path, na
     assert said is None if FORMATS[name] != "ROS bag" else "rename it to ." + name.rpartition(".")[2] in said
 
 
-def damaged(raw: bytes, kind: int, rng) -> bytes:
-    """Bytes flipped, replaced, taken out or cut, anywhere or near an end, where formats keep their tables."""
-    raw = bytearray(raw)
-    start, stop = [(0, len(raw)), (0, min(4096, len(raw))), (max(0, len(raw) - 4096), len(raw))][kind % 3]
-    at = int(rng.integers(start, stop))
-    match kind % 4:
-        case 0:
-            for i in rng.integers(start, stop, rng.integers(1, 20)):
-                raw[i] = rng.integers(256)
-        case 1:
-            raw[at : at + 200] = rng.bytes(200)
-        case 2:
-            del raw[at : at + int(rng.integers(1, 500))]
-        case _:
-            del raw[at:]
-    return bytes(raw)
-
-
-@pytest.mark.parametrize("name", FORMATS)
-def test_random_damage_ends_in_signals_or_one_line(sound, tmp_path, name, capfd):
-    apart = readers.registry()[signatures.kind_of_bytes(sound[name]).module].apart
-    for seed in range(8 if apart else 120):
-        (tmp_path / name).write_bytes(damaged(sound[name], seed, np.random.default_rng(seed)))
-        refusal(tmp_path / name)
-    assert capfd.readouterr() == ("", "")
-
-
-@pytest.mark.parametrize("name", FORMATS)
-def test_random_bytes_behind_a_sound_beginning(sound, tmp_path, name):
-    apart = readers.registry()[signatures.kind_of_bytes(sound[name]).module].apart
-    for seed in range(2 if apart else 40):
-        rng = np.random.default_rng(seed)
-        (tmp_path / name).write_bytes(sound[name][: 16 + seed] + rng.bytes(3000))
-        assert refusal(tmp_path / name) is not None
-
-
 def test_a_library_that_ends_the_process_is_one_line(tmp_path, monkeypatch):
     (tmp_path / "log.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
     monkeypatch.setattr(attempt, "_CHILD", "import os; os.abort()")

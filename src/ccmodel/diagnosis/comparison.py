@@ -207,6 +207,16 @@ class Comparison:
         """Whether the calibrated model or one candidate is complete with a probability of `SURE`, or one is enough."""
         return max(self.probability_of_base, *self.probability, 0.0) >= settings.SURE or self.certain is not None
 
+    @property
+    def is_settled(self) -> bool:
+        """Whether no law is learned: a model is complete with the probability `SURE`, or what is named leaves nothing.
+
+        A mechanism that is certain and leaves something may be the best imitation of a law that no list holds.
+        """
+        if max(self.probability_of_base, *self.probability, 0.0) >= settings.SURE:
+            return True
+        return self.is_enough if self.certain is None else self.left_by(self.certain) == 0.0
+
     def confidence_in(self, name: str) -> float:
         """Probability that a mechanism acts, at whatever place and beside whatever others."""
         weights = np.logaddexp.reduce(self.log_posterior[1:], axis=1).tolist()

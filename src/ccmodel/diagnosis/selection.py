@@ -92,7 +92,8 @@ class Selection:
         """The same with sets of listed mechanisms, and with laws where sets do not lead on.
 
         Sets come first, within a share of the time, as long as each size leaves at most half of what the smaller one
-        does. Then laws compete with them. Larger sets follow if nothing is decided yet.
+        does. Then laws compete with them, and larger sets follow, unless something is decided. A mechanism that is
+        certain but leaves something competes with laws at the end.
         """
         sets, size = replace(self, deadline=self.sets_until), 2
         while size <= settings.MOST_MECHANISMS:
@@ -113,7 +114,7 @@ class Selection:
             if is_over or listed.hypothesis.size < size:
                 break
             size += 1
-        return self.learn(found) if sets.laws and not (found.is_decided or found.is_enough) else found
+        return self.learn(found) if sets.laws and not found.is_settled else found
 
     def learn(self, found: Comparison) -> Comparison:
         """The same with laws that no list holds: the leading ones, and the best of them with more knots."""

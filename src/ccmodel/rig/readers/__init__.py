@@ -14,17 +14,19 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from ccmodel import inputs
 from ccmodel.rig.findings import LogError
-from ccmodel.rig.readers import csv, signatures
+from ccmodel.rig.readers import signatures
 from ccmodel.rig.readers.attempt import COPY, read_apart, read_here
 from ccmodel.rig.readers.contract import Format, Signal, SignalFile, TextLayout
-from ccmodel.rig.readers.log_table import log_of_signals
 from ccmodel.rig.readers.names import split_unit, unique
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 __all__ = ["Format", "Signal", "SignalFile", "TextLayout", "read", "read_signals", "registry"]
 
@@ -119,7 +121,7 @@ def _checked(file: SignalFile, format: Format) -> SignalFile:
     )
 
 
-def read(path: Path) -> pd.DataFrame:
+def read(path: Path) -> "pd.DataFrame":
     """Read a log of a batch: a table whose columns have the names of the format of a batch.
 
     Returns
@@ -133,11 +135,14 @@ def read(path: Path) -> pd.DataFrame:
     LogError
         If the file is missing, damaged or cut, or if its signals have no common time.
     """
+    # They load pandas, for which the process of a file of another format (`read_apart`) would wait a second.
+    from ccmodel.rig.readers import csv, log_table
+
     path = Path(path)
     try:
         _check_files(path)
         if (module := signatures.kind_of(path).module) not in (None, "text") and _ending(path) not in csv.SUFFIXES:
-            return log_of_signals(read_signals(path), registry()[module].name)
+            return log_table.log_of_signals(read_signals(path), registry()[module].name)
         return csv.read(path)
     except FileNotFoundError:
         raise LogError(None, None, "there is no such file: put it there or take it out of batch.yaml") from None

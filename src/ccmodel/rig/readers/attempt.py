@@ -15,6 +15,7 @@ import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -70,14 +71,16 @@ def read_apart(name: str, format: Format, path: Path) -> SignalFile | LogError:
 
 
 def _main() -> None:
-    """The process of `read_apart`: the result goes to standard output, and nothing else does."""
-    from ccmodel.rig.readers import registry
+    """The process of `read_apart`: the result goes to standard output, and nothing else does.
 
+    Of the formats it loads its own only.
+    """
     result = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     name, path, computing = sys.argv[1:]
     limit_computing(float(computing))
-    pickle.dump(read_here(registry()[name], Path(path)), result, protocol=5)
+    format = import_module(f"{__package__}.{name}").FORMAT
+    pickle.dump(read_here(format, Path(path)), result, protocol=5)
     result.close()
 
 
