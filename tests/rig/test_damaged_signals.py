@@ -156,7 +156,7 @@ def test_a_damaged_file_is_read_or_refused(name, sound, reads, tmp_path):
     raw, path = sound[name], tmp_path / name
     others = [other for called, other in sound.items() if called != name]
 
-    @settings(max_examples=examples(40), suppress_health_check=[HealthCheck.function_scoped_fixture])
+    @settings(max_examples=examples(50), suppress_health_check=[HealthCheck.function_scoped_fixture])
     @given(inside=st.booleans(), several=st.lists(damages, min_size=1, max_size=4))
     def each(inside, several):
         path.write_bytes(damaged(raw, inside, several, others))

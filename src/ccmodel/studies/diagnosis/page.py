@@ -254,14 +254,15 @@ def _loops(found: Diagnosis) -> Figure:
         observed = j.whitened[i].observations
         c = observed.channels.index(channel)
         theta = observed.given.theta_in[observed.judged]
-        ax.plot(theta, scale * observed.measured[c], color=FAINT, lw=2.2, label=_origin(found))
-        models = [(found.calibrated, COLOURS[0], "--", _baseline(found.report))]
+        ax.plot(theta, scale * observed.measured[c], color=FAINT, lw=3.0, label=_origin(found))
+        # Widths, for whoever does not see the colours: dashes of cycles that lie on one another look solid.
+        models = [(found.calibrated, COLOURS[0], 1.8, _baseline(found.report))]
         if chosen[i] is not j.calibrated:
-            models.append((chosen[i], COLOURS[1], "-", WITH_FOUND))
+            models.append((chosen[i], COLOURS[1], 0.8, WITH_FOUND))
         if found.report["nearest"] and j.nearest is not None:
-            models.append((j.nearest, COLOURS[3], "-.", f"nearest model, {NOT_ACCEPTED}"))
-        for fit, colour, line, label in models:
-            ax.plot(theta, scale * fit.held_out(i).modelled({})[c], color=colour, lw=1.0, ls=line, label=label)
+            models.append((j.nearest, COLOURS[3], 0.8, f"nearest model, {NOT_ACCEPTED}"))
+        for fit, colour, width, label in models:
+            ax.plot(theta, scale * fit.held_out(i).modelled({})[c], color=colour, lw=width, label=label)
         ax.set_title(observed.given.recording.id, fontsize=9)
         ax.set_xlabel(TABLE[THETA_IN].axis)
     axes[0][0].set_ylabel(TABLE[channel].axis)
