@@ -402,7 +402,7 @@ def test_a_further_mechanism_is_searched_for_where_something_is_left(mean_square
     "mean_square, size, unlisted, is_settled",
     [
         (1.05, 0.0, NONE - 20, True),  # it leaves nothing
-        (1.4, 0.2, NONE - 20, True),  # what it leaves is a remainder of its own equation
+        (1.4, 0.2, NONE - 20, True),  # its equation is not exact
         (1.4, 0.2, NONE + 2, False),  # it is certain, but something may be missing beside it
         (3.0, 2.0, NONE + 2, False),  # nothing leaves a good fit
     ],
