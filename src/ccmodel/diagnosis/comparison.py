@@ -205,7 +205,12 @@ class Comparison:
     @property
     def is_decided(self) -> bool:
         """Whether the calibrated model or one candidate is complete with a probability of `SURE`, or one is enough."""
-        return max(self.probability_of_base, *self.probability, 0.0) >= settings.SURE or self.certain is not None
+        return self._is_sure or self.certain is not None
+
+    @property
+    def _is_sure(self) -> bool:
+        """Whether the calibrated model or one candidate is complete with a probability of `SURE`."""
+        return max(self.probability_of_base, *self.probability, 0.0) >= settings.SURE
 
     @property
     def is_settled(self) -> bool:
@@ -213,7 +218,7 @@ class Comparison:
 
         A mechanism that is certain and leaves something may be the best imitation of a law that no list holds.
         """
-        if max(self.probability_of_base, *self.probability, 0.0) >= settings.SURE:
+        if self._is_sure:
             return True
         return self.is_enough if self.certain is None else self.left_by(self.certain) == 0.0
 
