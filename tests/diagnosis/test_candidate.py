@@ -1,19 +1,23 @@
 """Fits of candidate models."""
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from ccmodel.api.batch import load
 from ccmodel.diagnosis import settings
-from ccmodel.diagnosis.candidate import continued, discretisation_shift, fit
+from ccmodel.diagnosis.candidate import LAST_SEARCH, continued, discretisation_shift, fit
 from ccmodel.diagnosis.hypothesis import Hypothesis, single_mechanisms
 from ccmodel.diagnosis.result import least_strength, mechanism_of
+from ccmodel.diagnosis.run import Options, calibrate
 from ccmodel.diagnosis.screening import screen
 from ccmodel.diagnosis.whitening import relinearised, with_states_of
 from ccmodel.mechanisms.relaxation import relaxed_after
 from ccmodel.model.general import Active
+from ccmodel.model.parameters import Parameters
 from made_observations import PARAMETERS, batch, calibrated, whitened
 
 LOW = np.array([0.0, 1e-3])
@@ -40,6 +44,25 @@ def test_the_papers_model_has_no_solver_to_refine():
     for w in batch():
         refined = w.with_parameters(replace(w.observations.parameters, refinement=3))
         assert (w.observations.modelled({}) == refined.observations.modelled({})).all()
+
+
+def test_the_last_search_ends_in_one_place_wherever_it_starts():
+    """Also about a model that lacks something, whose cost has corners."""
+    ingested = load(Path(__file__).parents[2] / "data/raw/half-loop")._ingested
+    estimates = Parameters.estimated(ingested.stated.rig)
+    found = calibrate(ingested.recordings, estimates, Options(step_s=0.06))
+    hypothesis = Hypothesis((("pulley-friction", "drive-pulley"), ("presliding", "conduit")))
+    first = fit(found.whitened, hypothesis, found.tested.free, found.fit.values | hypothesis.start)
+    rng = np.random.default_rng(3)
+
+    def squares():
+        start = {name: value * np.exp(rng.normal(0, 0.1)) for name, value in first.values.items()}
+        last = fit(found.whitened, hypothesis, found.tested.free, start, search=LAST_SEARCH)
+        return float(np.mean([np.mean(r**2) for r in last.residuals]))
+
+    ends = [squares() for _ in range(6)]
+    assert min(ends) > 10.0, "something is missing"
+    assert max(ends) < min(ends) * (1 + 1e-5), ends
 
 
 @pytest.mark.parametrize(("least", "end"), [(0.005, 0.00625), (0.08, 0.1), (0.0, 0.0015625)])

@@ -9,7 +9,7 @@ import pytest
 
 from ccmodel.deadline import UNLIMITED, Deadline
 from ccmodel.diagnosis import comparison as comparisons
-from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.candidate import LAST_SEARCH, CandidateFit
 from ccmodel.diagnosis.comparison import Comparison, imitation, log_priors
 from ccmodel.diagnosis.discrepancy import Evidence
 from ccmodel.diagnosis.hypothesis import Hypothesis
@@ -508,6 +508,17 @@ def test_laws_come_where_sets_do_not_lead_on_or_their_time_is_over(monkeypatch, 
     monkeypatch.setattr(Selection, "learn", lambda self, found: steps.append("laws") or found)
     Selection({}, [], laws=(None,), sets_until=until).further(of(1), None)
     assert steps == order
+
+
+def test_contenders_are_fitted_to_the_end_and_others_stay(monkeypatch):
+    """A lower cost counts, also if the held-out mean square is a little higher."""
+    best, hopeless = fitted(1.4, SCALE), fitted(60.0, FRICTION)
+    found = compared(evidence(), (best, evidence(NONE)), (hopeless, evidence()))
+    end, asked = fitted(1.45, SCALE), []
+    monkeypatch.setattr(Selection, "fit_all", lambda *given: asked.append(given[3:]) or [end])
+    monkeypatch.setattr(Comparison, "with_candidates", lambda self, every: every)
+    assert Selection({}, []).completed(found) == [end, hopeless]
+    assert asked == [([Score(best.hypothesis, 0.0, best.values)], LAST_SEARCH)]
 
 
 def test_the_covariance_is_linearised_about_the_best_candidate(monkeypatch):

@@ -32,6 +32,18 @@ SEARCH = Search(
     most_evaluations=settings.FIT_EVALUATIONS,
     retreats=False,
     own_units=True,
+    secants=True,
+)
+# The last search for what is reported. Larger differences average over the cost's corners. A quick search may end at
+# any of these within a standard deviation of the minimum: rounding errors, and so the processor, would choose where.
+LAST_SEARCH = replace(
+    SEARCH,
+    tolerance=settings.LAST_TOLERANCE,
+    shortest=settings.LAST_TOLERANCE,
+    gradient=settings.LAST_TOLERANCE,
+    difference=settings.ROUGH_DIFFERENCE,
+    most_evaluations=settings.LAST_EVALUATIONS,
+    secants=False,
 )
 
 
@@ -199,6 +211,7 @@ def fit(
     free: Mapping[str, Free],
     start: Mapping[str, float],
     deadline: Deadline = UNLIMITED,
+    search: Search = SEARCH,
 ) -> CandidateFit:
     """Fit a candidate model from given values and cross-validate it.
 
@@ -212,6 +225,7 @@ def fit(
         Starting values of these and of the mechanisms' unknowns.
     deadline : Deadline
         When the fit is given up.
+    search : Search
 
     Raises
     ------
@@ -225,7 +239,8 @@ def fit(
     modelled = _with_states(whitened, hypothesis, {n: f.start for n, f in unknowns.items()})
     problem = Problem(modelled, unknowns, weight=mean_weight)
     # Runs of the paper's model are cheap, and its cost is rough where much is missing.
-    search = replace(SEARCH, deadline=deadline, secants=bool(hypothesis.baseline or hypothesis.acting))
+    secants = search.secants and bool(hypothesis.baseline or hypothesis.acting)
+    search = replace(search, deadline=deadline, secants=secants)
     solution = _search(problem, hypothesis, search)
     further = replace(search, most_evaluations=settings.START_EVALUATIONS)
     has_states = any(registry.get(name).states for name, _ in hypothesis.baseline + hypothesis.acting)

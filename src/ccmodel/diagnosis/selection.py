@@ -7,7 +7,7 @@ from typing import Self
 
 from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis import settings
-from ccmodel.diagnosis.candidate import CandidateFit, fit
+from ccmodel.diagnosis.candidate import LAST_SEARCH, SEARCH, CandidateFit, fit
 from ccmodel.diagnosis.comparison import Comparison, is_part_of
 from ccmodel.diagnosis.equation_error import other_start
 from ccmodel.diagnosis.hypothesis import Hypothesis, law_of, laws_in
@@ -16,6 +16,7 @@ from ccmodel.diagnosis.repeatability import estimated
 from ccmodel.diagnosis.screening import Score, Screening, screen
 from ccmodel.diagnosis.whitening import Whitened, relinearised
 from ccmodel.failure import ModelError
+from ccmodel.inference.least_squares import Search
 from ccmodel.inference.pool import each
 from ccmodel.inference.problem import Free
 from ccmodel.mechanisms.learned import Law
@@ -80,7 +81,7 @@ class Selection:
         # Candidates are compared, and their parameters estimated, under the best one's own covariance: about a model
         # that lacks something, friction seems to scatter.
         if found.candidates and found.probability_of_base < 0.5:
-            found = self.relinearise(found)
+            found = self.completed(self.relinearise(found))
         return found, scores
 
     @property
@@ -156,7 +157,9 @@ class Selection:
         """The same, whose work takes these shares of the whole."""
         return replace(self, progress=within(self.progress, low, high))
 
-    def fit_all(self, whitened: Sequence[Whitened], base: CandidateFit, chosen: Sequence[Score]) -> list[CandidateFit]:
+    def fit_all(
+        self, whitened: Sequence[Whitened], base: CandidateFit, chosen: Sequence[Score], search: Search = SEARCH
+    ) -> list[CandidateFit]:
         """Fit extensions of a fitted model, from the values of their scores and from known ones, until the deadline.
 
         Of several fits of a hypothesis, the one with the lowest mean square is returned.
@@ -168,7 +171,7 @@ class Selection:
             hypothesis = base.hypothesis.and_also(further)
             self.progress(f"fitting {hypothesis}", k / len(every))
             try:
-                candidate = fit(whitened, hypothesis, self.free, start, self.deadline)
+                candidate = fit(whitened, hypothesis, self.free, start, self.deadline, search)
             except OutOfTimeError:
                 self.progress(f"{hypothesis}: not fitted, the time is over")
                 break
@@ -264,17 +267,7 @@ class Selection:
         except ModelError as error:
             self.progress(f"the covariance stays as it is ({error})")
             return found
-        # Every rival of a complete candidate matters; of an incomplete one, only the leading ones lead on.
-        most = len(found.candidates) if found.unlisted < 0.5 else settings.CONTENDERS
-        highest = 1.0 + settings.HOPELESS * max(best.mean_square - 1.0, settings.NEAR_NOISE)
-
-        def is_worth(k: int, c: CandidateFit) -> bool:
-            is_part = is_part_of(c, best)
-            # What the best one's last mechanism adds is judged by its largest parts.
-            is_largest_part = is_part and c.hypothesis.size == best.hypothesis.size - 1
-            return is_largest_part or (c.mean_square <= highest and (k < most or is_part))
-
-        leading = [c for k, c in enumerate(found.by_evidence) if is_worth(k, c)]
+        leading = contenders(found)
         again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in leading for s in starts(c)])
         if not any(c.hypothesis == best.hypothesis for c in again):
             return found
@@ -284,6 +277,29 @@ class Selection:
         if about and about.hypothesis == best.hypothesis and reached >= best.mean_square:
             return found
         return Comparison.of(whitened, base, again, found.screened, best)
+
+    def completed(self, found: Comparison) -> Comparison:
+        """The same with the contenders fitted to the end, so that rounding errors do not choose their values."""
+        scores = [Score(c.hypothesis, 0.0, c.values) for c in contenders(found)]
+        again = self.fit_all(found.whitened, found.base, scores, LAST_SEARCH)
+        every = {c.hypothesis: c for c in [*found.candidates, *again]}
+        return found.with_candidates(list(every.values()))
+
+
+def contenders(found: Comparison) -> list[CandidateFit]:
+    """The candidates that are fitted again: the best one by evidence, its largest parts, and its rivals."""
+    best = found.by_evidence[0]
+    # Every rival of a complete candidate matters; of an incomplete one, only the leading ones lead on.
+    most = len(found.candidates) if found.unlisted < 0.5 else settings.CONTENDERS
+    highest = 1.0 + settings.HOPELESS * max(best.mean_square - 1.0, settings.NEAR_NOISE)
+
+    def is_worth(k: int, c: CandidateFit) -> bool:
+        is_part = is_part_of(c, best)
+        # What the best one's last mechanism adds is judged by its largest parts.
+        is_largest_part = is_part and c.hypothesis.size == best.hypothesis.size - 1
+        return is_largest_part or (c.mean_square <= highest and (k < most or is_part))
+
+    return [c for k, c in enumerate(found.by_evidence) if is_worth(k, c)]
 
 
 def lowest(every: Sequence[CandidateFit]) -> list[CandidateFit]:

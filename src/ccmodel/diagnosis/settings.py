@@ -97,6 +97,10 @@ STATE_PASSES, STATE_TOLERANCE = 6, 0.005
 # The same for a search that stalls: friction that falls with speed lets cables jump, and the cost is rough. Practice:
 # of 3e-4, 3e-3 and 1e-2 this one led to the least cost.
 ROUGH_DIFFERENCE = 3e-3
+# Tolerances and most evaluations of the last search, which has these differences too. On two batches (data/raw/radius
+# and loops), nine of ten searches from other starts then ended within 3e-4 of the cost of the minimum nearby, before
+# within 0.04.
+LAST_TOLERANCE, LAST_EVALUATIONS = 1e-6, 60
 # Factor by which an unknown is lowered at each step of a continuation (`Parameter.continuation`), and share of the cost
 # without the mechanism below which a short search must come for one. Chosen; practice: the loads of two rigs that ring
 # came to 4 and 6 %, where the mechanism was not there the search came to 88 %, and took half of the diagnosis's time.
