@@ -513,12 +513,14 @@ def test_laws_come_where_sets_do_not_lead_on_or_their_time_is_over(monkeypatch, 
 def test_contenders_are_fitted_to_the_end_and_others_stay(monkeypatch):
     """A lower cost counts, also if the held-out mean square is a little higher."""
     best, hopeless = fitted(1.4, SCALE), fitted(60.0, FRICTION)
-    found = compared(evidence(), (best, evidence(NONE)), (hopeless, evidence()))
+    found = compared(evidence(), (best, evidence(NONE, size=0.4)), (hopeless, evidence()))
     end, asked = fitted(1.45, SCALE), []
     monkeypatch.setattr(Selection, "fit_all", lambda *given: asked.append(given[3:]) or [end])
     monkeypatch.setattr(Comparison, "with_candidates", lambda self, every: every)
     assert Selection({}, []).completed(found) == [end, hopeless]
     assert asked == [([Score(best.hypothesis, 0.0, best.values)], LAST_SEARCH)]
+    enough = compared(evidence(), (fitted(1.0, SCALE), evidence(NONE)))
+    assert Selection({}, []).completed(enough) is enough
 
 
 def test_the_covariance_is_linearised_about_the_best_candidate(monkeypatch):

@@ -279,7 +279,12 @@ class Selection:
         return Comparison.of(whitened, base, again, found.screened, best)
 
     def completed(self, found: Comparison) -> Comparison:
-        """The same with the contenders fitted to the end, so that rounding errors do not choose their values."""
+        """The same with the contenders fitted to the end, so that rounding errors do not choose their values.
+
+        Of a model that leaves nothing, quick searches find the minimum.
+        """
+        if found.is_enough:
+            return found
         scores = [Score(c.hypothesis, 0.0, c.values) for c in contenders(found)]
         again = self.fit_all(found.whitened, found.base, scores, LAST_SEARCH)
         every = {c.hypothesis: c for c in [*found.candidates, *again]}
