@@ -6,7 +6,7 @@ CORES ?= 2
 # The former name of REGRESSORS.
 REGRESSORS ?= $(RIVALS)
 
-.PHONY: help results real data test guides fuzz docs bench accuracy-gate input-checks diagnosis-settings decision-rules \
+.PHONY: help results real data test long-tests fuzz docs bench accuracy-gate input-checks diagnosis-settings decision-rules \
   form-errors joint-rigs outside-rigs past several-effects table-one coverage proof proof-full proof-real slurm-test \
   kills same-bytes load mutants lint lint-types lint-style lock sbom clean
 
@@ -44,17 +44,18 @@ data: $(VENV)/.ready  ## record data/raw again with the virtual rig
 
 # One process more than cores: a test of the pipeline often waits for Snakemake. BLAS has one thread in each: with more
 # of them the tests take a fifth more of the cores.
-test: $(VENV)/.ready  ## run the linters and all tests but those of the how-to guides
+test: $(VENV)/.ready  ## run the linters and all tests but the long ones
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $$(($(CORES) + 1)) --dist loadfile --no-loadscope-reorder \
-	  --ignore tests/guides/test_how_to.py
+	  -m "not long"
 	$(MAKE) --no-print-directory -j $(CORES) lint
 
 fuzz: $(VENV)/.ready  ## damage batches and files, and run the exact solver, FUZZ times as often as the tests do: docs/trust.md
 	FUZZ=$(or $(FUZZ),60) $(BIN)/python -m pytest -n $(CORES) --dist loadfile tests/rig/test_damaged_batches.py \
 	  tests/rig/test_damaged_signals.py tests/report/test_damaged_files.py tests/model/test_stated_limits.py
 
-guides: $(VENV)/.ready  ## follow the how-to guides to the letter: docs/trust.md
-	$(BIN)/python -m pytest -n $(CORES) --dist load tests/guides/test_how_to.py
+long-tests: $(VENV)/.ready  ## follow tutorial and guides to the letter, run the pipeline in many ways: docs/trust.md
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $$(($(CORES) + 1)) --dist loadfile --no-loadscope-reorder \
+	  -m long
 
 # A fresh environment every time: a build that reuses the last one's is silent about pages it does not read again.
 docs: $(VENV)/.ready  ## build the documents: results/docs/html/index.html; a warning or a dead link is an error

@@ -35,6 +35,7 @@ def test_what_depends_on_hashes_time_zone_locale_threads_or_folder_is_found(othe
     assert other("(os.getcwd())") == {"two cores", "another folder"}
 
 
+@pytest.mark.long
 def test_an_undecided_diagnosis_has_the_same_bytes_under_other_circumstances(tmp_path, monkeypatch):
     every = [same_bytes.VARIANTS[name].environment for name in VARIED]
     other = Variant({key: value for one in every for key, value in one.items()}, folder="elsewhere")

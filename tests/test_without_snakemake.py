@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from builders import write_batch
 
 BLOCKED = """
@@ -48,6 +50,7 @@ def test_every_module_of_the_library_is_imported_without_snakemake():
     assert int(done.stdout) > 100
 
 
+@pytest.mark.long
 def test_a_batch_is_checked_and_diagnosed_without_snakemake(tmp_path: Path):
     write_batch(tmp_path / "tiny")
     checked = without_snakemake(COMMAND, "check", str(tmp_path / "tiny"))

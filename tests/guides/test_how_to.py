@@ -11,6 +11,8 @@ from following import ROOT, Guide, first_missing
 
 from ccmodel.rig.importing import import_files
 
+pytestmark = pytest.mark.long
+
 TUTORIAL = ROOT / "docs/tutorial"
 # Of one bend and motion, with two pretensions: enough for a diagnosis.
 RUNS = ("logs/run1", "logs/run3")

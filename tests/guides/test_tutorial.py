@@ -13,6 +13,8 @@ from ruamel.yaml import YAML
 
 from ccmodel.rig.importing import write_guess
 
+pytestmark = pytest.mark.long
+
 TUTORIAL = ROOT / "docs/tutorial"
 PAGE = ROOT / "docs/tutorial.md"
 RIG = YAML(typ="safe").load(TUTORIAL / "rig.yaml")["rig"]

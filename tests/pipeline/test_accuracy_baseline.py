@@ -30,6 +30,7 @@ def finished(tmp_path_factory):
     return folder
 
 
+@pytest.mark.long
 def test_from_no_baseline_to_a_loss(finished):
     """One run, in the order in which a project goes through it."""
     page, baseline = finished / "results/index.html", finished / "config/baseline.json"

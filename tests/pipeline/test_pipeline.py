@@ -190,6 +190,7 @@ def test_what_a_diagnosis_found_is_one_more_set_of_parameters(diagnosed):
     assert json.loads((results / "simulated/nearest/tiny.json").read_text()) == {"failures": []}
 
 
+@pytest.mark.long
 def test_inputs_that_contradict_one_another_are_named_and_get_no_model(diagnosed_copy):
     """Unless the batch's settings say that they are trusted."""
     folder = diagnosed_copy
@@ -227,6 +228,7 @@ def planned(folder: Path) -> set[str]:
     return {line.split(": ", 1)[1] for line in lines if line.startswith("Job ") and " batch " in line}
 
 
+@pytest.mark.long
 def test_a_rig_has_its_own_fits_and_a_batch_its_own_settings(diagnosed_copy):
     copy = diagnosed_copy
     write_batch(copy / "data/raw/other", pretensions=(5.0,))
@@ -274,6 +276,7 @@ def test_snakemakes_report_has_page_diagnoses_tables_and_figures_with_their_capt
     assert len(set(labels)) == len(labels), "every entry can be told from the others"
 
 
+@pytest.mark.long
 def test_batches_of_a_rig_are_diagnosed_together(diagnosed_copy):
     folder = diagnosed_copy
     write_batch(folder / "data/raw/other", pretensions=(7.0, 5.0))
@@ -368,6 +371,7 @@ def test_a_second_run_does_nothing(copy):
     assert (copy / "results/index.html").stat().st_mtime_ns == before
 
 
+@pytest.mark.long
 def test_a_new_batch_appears_with_three_lines_of_config(copy):
     write_batch(copy / "data/raw/added", pretensions=(5.0,))
     keep_one_study(copy)
@@ -416,6 +420,7 @@ def test_bad_input_is_a_line_each_and_nothing_else_is_lost(copy):
     assert set(errors.loc[errors["batch"] == "damaged", "recording"]) == {"t-2N"}
 
 
+@pytest.mark.long
 def test_a_refused_batch_takes_only_its_own_with_it(copy):
     """The batch that everything was fitted on is refused: the recordings of the others are still drawn and scored."""
     write_batch(copy / "data/raw/other", pretensions=(5.0,))
@@ -450,6 +455,7 @@ def test_a_misspelt_key_of_the_configuration_is_one_line(copy):
     assert "Traceback" not in run.stderr
 
 
+@pytest.mark.long
 def test_a_fit_with_a_name_of_a_diagnosis_and_a_missing_file_are_one_line(copy):
     config = copy / "config.yaml"
     text = config.read_text()

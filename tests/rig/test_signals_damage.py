@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import sample_files as sample
 
+from ccmodel import inputs
 from ccmodel.rig import readers
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers import attempt, read_signals, signatures
@@ -116,25 +117,95 @@ def test_without_an_ending_a_file_is_read_by_its_first_bytes(sound, tmp_path, na
     assert said is None if FORMATS[name] != "ROS bag" else "rename it to ." + name.rpartition(".")[2] in said
 
 
-def test_a_library_that_ends_the_process_is_one_line(tmp_path, monkeypatch):
+@pytest.fixture
+def child(monkeypatch):
+    """Let another process than the usual one read what is read apart."""
+
+    def replaced(code):
+        monkeypatch.setattr(attempt, "_CHILD", code)
+        monkeypatch.setattr(attempt, "_apart", attempt._Apart())
+
+    return replaced
+
+
+def reading(function: str) -> str:
+    """Code of a process that calls another function than `read_here`."""
+    return f"import os, time; from ccmodel.rig.readers import attempt; attempt.read_here = {function}; attempt._main()"
+
+
+@pytest.mark.parametrize("code", ["import os; os.abort()", reading("lambda *_: os.abort()")])
+def test_a_library_that_ends_the_process_is_one_line(tmp_path, child, code):
     (tmp_path / "log.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
-    monkeypatch.setattr(attempt, "_CHILD", "import os; os.abort()")
-    assert refusal(tmp_path / "log.h5") == (
-        "the HDF5 file is cut short or damaged (its library fails on it): copy it again from the recorder"
-    )
-    monkeypatch.setattr(attempt, "_CHILD", "import time; time.sleep(60)")
+    child(code)
+    for _ in range(2):
+        assert refusal(tmp_path / "log.h5") == (
+            "the HDF5 file is cut short or damaged (its library fails on it): copy it again from the recorder"
+        )
+
+
+@pytest.mark.parametrize("code", ["import time; time.sleep(60)", reading("lambda *_: time.sleep(60)")])
+def test_a_library_that_waits_is_one_line(tmp_path, child, monkeypatch, code):
+    (tmp_path / "log.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
+    child(code)
     monkeypatch.setattr(attempt, "_PATIENCE_S", 0.2)
     assert "not read after 0 s" in refusal(tmp_path / "log.h5")
 
 
-def test_a_library_that_goes_round_in_circles_is_one_line(sound, tmp_path, monkeypatch):
+def test_a_library_that_goes_round_in_circles_is_one_line(sound, tmp_path, child, monkeypatch):
     (tmp_path / "log.h5").write_bytes(sound["log.h5"])
-    circles = (
-        "from ccmodel.rig.readers import attempt; attempt.read_here = lambda *_: any(iter(int, 1)); attempt._main()"
-    )
-    monkeypatch.setattr(attempt, "_CHILD", circles)
+    child(reading("lambda *_: any(iter(int, 1))"))
     monkeypatch.setattr(attempt, "_COMPUTING_S", 3.0)
     assert "(not read after 3 s of computing)" in refusal(tmp_path / "log.h5")
+
+
+UNLESS_NAMED_END = "lambda format, path: os.abort() if path.name == 'end.h5' else usual(format, path)"
+
+
+def test_a_process_reads_file_after_file_and_starts_again_after_it_has_failed(sound, tmp_path, child):
+    (tmp_path / "log.h5").write_bytes(sound["log.h5"])
+    (tmp_path / "end.h5").write_bytes(sound["log.h5"])
+    child("from ccmodel.rig.readers import attempt; usual = attempt.read_here; " + reading(UNLESS_NAMED_END))
+    assert refusal(tmp_path / "log.h5") is None
+    first = attempt._apart._process
+    assert refusal(tmp_path / "log.h5") is None
+    assert attempt._apart._process is first
+    assert "its library fails" in refusal(tmp_path / "end.h5")
+    assert refusal(tmp_path / "log.h5") is None
+    assert attempt._apart._process is not first
+
+
+def test_where_no_process_can_be_forked_each_file_has_one(sound, tmp_path, child, monkeypatch):
+    (tmp_path / "log.h5").write_bytes(sound["log.h5"])
+    monkeypatch.setattr(attempt, "_FORKS", False)
+    child("from ccmodel.rig.readers import attempt; attempt._FORKS = False; attempt._main()")
+    for _ in range(2):
+        assert refusal(tmp_path / "log.h5") is None
+    child(
+        "import os; from ccmodel.rig.readers import attempt; attempt._FORKS = False; "
+        + reading("lambda *_: os.abort()")
+    )
+    assert "its library fails" in refusal(tmp_path / "log.h5")
+
+
+def test_a_file_is_read_with_the_limits_of_the_time(sound, tmp_path, monkeypatch):
+    (tmp_path / "log.h5").write_bytes(sound["log.h5"])
+    assert refusal(tmp_path / "log.h5") is None
+    monkeypatch.setenv(inputs.UNPACKED, "0.0001")
+    assert inputs.UNPACKED in refusal(tmp_path / "log.h5")
+
+
+def test_what_an_interrupted_reading_still_gives_answers_no_other(sound, tmp_path, monkeypatch):
+    (tmp_path / "log.h5").write_bytes(sound["log.h5"])
+    monkeypatch.setattr(attempt.pickle, "load", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        refusal(tmp_path / "log.h5")
+    monkeypatch.undo()
+    assert attempt._apart._process is None
+    assert refusal(tmp_path / "log.h5") is None
+
+
+def interrupted(stream):
+    raise KeyboardInterrupt
 
 
 def test_an_mdf_file_with_records_of_a_huge_length_is_refused_at_once(sound, tmp_path):

@@ -6,6 +6,8 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from builders import spoil, write_batch
 from ccmodel.model.files import Model
 from ccmodel.model.general.run import Active
@@ -34,6 +36,7 @@ def written(folder: Path, **environment: str) -> dict[str, bytes]:
     return {file.name: file.read_bytes() for file in folder.iterdir() if file.is_file()}
 
 
+@pytest.mark.long
 def test_the_same_bytes_with_any_seed_of_hashes_time_zone_and_locale(tmp_path):
     spoil(write_batch(tmp_path / "bench"))
     acting = (

@@ -205,6 +205,7 @@ def test_a_ranking_names_every_effect_once_nearest_first(tiny, tiny_file):
     assert len(tiny.pairs) > 0
 
 
+@pytest.mark.long
 def test_a_tiny_run_writes_tables_and_figure(tiny_file, tmp_path):
     figure = tmp_path / "figures/table-one.png"
     run = CliRunner().invoke(

@@ -135,6 +135,7 @@ def test_same_seed_same_bytes_and_another_seed_another_run(small_campaign):
     assert record(changed(small_campaign, seed=small_campaign.seed + 1), "half-loop", plan) != first
 
 
+@pytest.mark.long
 def test_one_command_records_and_replaces(small_campaign, tmp_path):
     config, out = tmp_path / "rig.yaml", tmp_path / "raw"
     config.write_text(yaml.safe_dump(small_campaign.model_dump(mode="json")))

@@ -12,12 +12,15 @@ import pickle
 import signal
 import subprocess
 import sys
+import tempfile
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from threading import Lock, Timer
+from typing import IO, NamedTuple
 
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers.contract import Format, SignalFile, TextLayout
@@ -27,6 +30,8 @@ COPY = "copy it again from the recorder"
 # a damaged file uses the processor all the time; one that waits for a slow disk does not.
 _PATIENCE_S, _COMPUTING_S, _S_PER_MB = 60.0, 8.0, 1.0
 _CHILD = "from ccmodel.rig.readers.attempt import _main; _main()"
+# Elsewhere some libraries of the system do not outlive a fork, or there is none.
+_FORKS = sys.platform == "linux"
 
 
 def read_here(format: Format, path: Path, text: TextLayout | None = None) -> SignalFile | LogError:
@@ -57,31 +62,123 @@ def read_apart(name: str, format: Format, path: Path) -> SignalFile | LogError:
     """As `read_here`, in a process of its own; `name` is the module of the format."""
     more = _S_PER_MB * path.stat().st_size / 1e6
     patience, computing = _PATIENCE_S + more, _COMPUTING_S + more
-    command = [sys.executable, "-c", _CHILD, name, str(path), str(computing)]
     # A library that fails on a damaged file leaves its temporary files behind.
     with TemporaryDirectory(prefix="ccmodel-read-") as scratch:
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p), "TMPDIR": scratch}
-        try:
-            child = subprocess.run(command, capture_output=True, env=environment, timeout=patience, check=False)
-        except subprocess.TimeoutExpired:
-            return _damaged(format, f"not read after {patience:.0f} s")
-    if child.returncode == -getattr(signal, "SIGXCPU", 0) != 0:
+        environment = {**os.environ, "TMPDIR": scratch}
+        result = _apart.read(_Request(name, path.absolute(), computing, environment), patience)
+    if isinstance(result, SignalFile | LogError):
+        return result
+    if result == -getattr(signal, "SIGXCPU", 0) != 0:
         return _damaged(format, f"not read after {computing:.0f} s of computing")
-    return pickle.loads(child.stdout) if child.returncode == 0 else _damaged(format, "its library fails on it")
+    if result == -getattr(signal, "SIGKILL", 9) != 0:
+        return _damaged(format, f"not read after {patience:.0f} s")
+    return _damaged(format, "its library fails on it")
+
+
+class _Request(NamedTuple):
+    """A file to be read by another process."""
+
+    name: str  # module of the format
+    path: Path
+    computing_s: float  # the process is ended after this time of computing
+    environment: dict[str, str]
+
+
+class _Apart:
+    """The process that reads files for this one. It starts with the first file, and again after it has failed."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        self._owner = 0  # a process that was forked from this one must not share it
+        self._lock = Lock()
+
+    def read(self, request: _Request, patience: float) -> SignalFile | LogError | int:
+        """Result of a request; if the process ends without one, its return code."""
+        with self._lock:
+            process = self._running()
+            assert process.stdin is not None and process.stdout is not None
+            impatience = Timer(patience, _end, [process])
+            impatience.start()
+            try:
+                pickle.dump(request, process.stdin)
+                process.stdin.flush()
+                result: SignalFile | LogError = pickle.load(process.stdout)
+            except (BrokenPipeError, EOFError, pickle.UnpicklingError):
+                self._process = None
+                return process.wait()
+            except BaseException:  # an interruption: what the process still writes answers no later request
+                self._process = None
+                _end(process)
+                raise
+            finally:
+                impatience.cancel()
+            if not _FORKS:
+                self._process = None
+            return result
+
+    def _running(self) -> subprocess.Popen[bytes]:
+        if self._process is None or self._owner != os.getpid() or self._process.poll() is not None:
+            # Threads of a library for linear algebra would not outlive a fork, and nothing here needs them.
+            environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "OMP_NUM_THREADS": "1"}
+            self._process = subprocess.Popen(
+                [sys.executable, "-c", _CHILD],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                env=environment,
+                start_new_session=True,
+            )
+            self._owner = os.getpid()
+        return self._process
+
+
+_apart = _Apart()
+
+
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    """Kill a process and, where a process can have one, its group."""
+    if hasattr(os, "killpg"):
+        os.killpg(process.pid, signal.SIGKILL)
+    else:
+        process.kill()
 
 
 def _main() -> None:
-    """The process of `read_apart`: the result goes to standard output, and nothing else does.
+    """Serve the requests that come by standard input.
 
-    Of the formats it loads its own only.
+    The results go to what was standard output, and nothing else does. Of the formats, those that are asked for are
+    loaded. A fork for each file has the libraries loaded already, and leaves nothing behind; where no process can be
+    forked safely, this one ends after a file.
     """
-    result = os.fdopen(os.dup(1), "wb")
+    results = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    name, path, computing = sys.argv[1:]
-    limit_computing(float(computing))
-    format = import_module(f"{__package__}.{name}").FORMAT
-    pickle.dump(read_here(format, Path(path)), result, protocol=5)
-    result.close()
+    for request in _requests():
+        format = import_module(f"{__package__}.{request.name}").FORMAT
+        for library in format.apart:
+            with suppress(ImportError):
+                import_module(library)
+        if _FORKS and (child := os.fork()):
+            status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+            if status:
+                os.kill(os.getpid(), -status if status < 0 else signal.SIGABRT)
+            continue
+        _answer(request, format, results)
+        os._exit(0)
+
+
+def _requests() -> Iterator[_Request]:
+    with suppress(EOFError):
+        while True:
+            yield pickle.load(sys.stdin.buffer)
+
+
+def _answer(request: _Request, format: Format, results: IO[bytes]) -> None:
+    os.environ.clear()
+    os.environ.update(request.environment)
+    tempfile.tempdir = None  # to be found again from the environment
+    limit_computing(request.computing_s)
+    pickle.dump(read_here(format, request.path), results, protocol=5)
+    results.flush()
 
 
 def limit_computing(seconds: float = _COMPUTING_S) -> None:

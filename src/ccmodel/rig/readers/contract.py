@@ -95,8 +95,8 @@ class Format:
         exception for a damaged file; `LogError` if it can say more than that the file is damaged.
     extra : str or None
         Optional dependencies of the package that it needs.
-    apart : bool
-        Whether its library ends the process on some damaged files, so that it needs a process of its own.
+    apart : tuple of str
+        Its libraries, if they end the process on some damaged files: such a format is read in a process of its own.
     repair : str
         How a damaged file may be repaired, after "or".
     """
@@ -105,5 +105,5 @@ class Format:
     suffixes: tuple[str, ...]
     read: Callable[..., SignalFile]
     extra: str | None = None
-    apart: bool = False
+    apart: tuple[str, ...] = ()
     repair: str = ""

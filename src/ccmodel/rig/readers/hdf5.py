@@ -37,7 +37,7 @@ def read(path: Path) -> SignalFile:
     return SignalFile(tuple(columns.signals), None, columns.remarks())
 
 
-FORMAT = Format("HDF5 file", (".h5", ".hdf5", ".hdf", ".he5", ".nc"), read, extra="hdf5", apart=True)
+FORMAT = Format("HDF5 file", (".h5", ".hdf5", ".hdf", ".he5", ".nc"), read, extra="hdf5", apart=("h5py",))
 
 
 def size_of(dataset: Any) -> int:

@@ -58,7 +58,7 @@ def read(path: Path) -> SignalFile:
     return SignalFile(tuple(columns.signals), None, remarks)
 
 
-FORMAT = Format("MATLAB file", (".mat",), read, extra="mat", apart=True)
+FORMAT = Format("MATLAB file", (".mat",), read, extra="mat", apart=("scipy.io", "h5py"))
 
 
 def _advice(objects: list[tuple[str, str]]) -> str:

@@ -38,7 +38,7 @@ def read(path: Path) -> SignalFile:
     return SignalFile(tuple(columns.signals), _utc(started), columns.remarks())
 
 
-FORMAT = Format("MDF file", (".mf4", ".mdf", ".dat", ".mf3"), read, extra="mdf", apart=True)
+FORMAT = Format("MDF file", (".mf4", ".mdf", ".dat", ".mf3"), read, extra="mdf", apart=("asammdf",))
 
 
 def _count_packed(path: Path) -> None:
