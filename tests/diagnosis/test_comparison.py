@@ -519,6 +519,7 @@ def test_contenders_are_fitted_to_the_end_and_others_stay(monkeypatch):
     monkeypatch.setattr(Comparison, "with_candidates", lambda self, every: every)
     assert Selection({}, []).completed(found) == [end, hopeless]
     assert asked == [([Score(best.hypothesis, 0.0, best.values)], LAST_SEARCH)]
+    assert Selection({}, [], deadline=Deadline(0.0)).completed(found) is found, "some may not be fitted to the end"
     enough = compared(evidence(), (fitted(1.0, SCALE), evidence(NONE)))
     assert Selection({}, []).completed(enough) is enough
 
