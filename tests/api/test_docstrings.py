@@ -12,6 +12,7 @@ from ccmodel import api
 ROOT = Path(__file__).parents[2]
 FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
 MODULES = sorted(f"ccmodel.api.{module.name}" for module in pkgutil.iter_modules(api.__path__))
+LONG = ("ccmodel.api.diagnosis",)
 
 
 def examples_of(module: str, **names) -> list[doctest.DocTest]:
@@ -20,7 +21,7 @@ def examples_of(module: str, **names) -> list[doctest.DocTest]:
     return [one for one in found if one.examples]
 
 
-@pytest.mark.parametrize("module", MODULES)
+@pytest.mark.parametrize("module", [pytest.param(m, marks=[pytest.mark.long] * (m in LONG)) for m in MODULES])
 def test_examples_in_docstrings_run(module, monkeypatch, tmp_path):
     monkeypatch.chdir(ROOT)
     runner, said = doctest.DocTestRunner(optionflags=FLAGS), []

@@ -24,6 +24,7 @@ LOW = np.array([0.0, 1e-3])
 KEY = "conduit-compliance/conduit/compliance"
 
 
+@pytest.mark.long
 def test_the_discretisation_shift_is_that_of_a_fit_on_the_finer_solver(monkeypatch):
     """Recordings of a compliant conduit on the finer solver."""
     compliant = Active("conduit-compliance", "conduit", {"compliance": 2e-5})

@@ -95,6 +95,7 @@ def test_the_page_shows_the_curve(learned):
     assert "The learned law: added to" in page
 
 
+@pytest.mark.long
 def test_a_mechanism_that_is_taken_off_the_list_is_recognised_in_the_curve(tmp_path):
     def gain(table):
         table["drive_current_A"] *= 1.1
@@ -109,6 +110,7 @@ def test_a_mechanism_that_is_taken_off_the_list_is_recognised_in_the_curve(tmp_p
     assert "this is the law of torque-scale" in said["headline"]
 
 
+@pytest.mark.long
 def test_friction_by_tension_is_learned_inside_the_solver(tmp_path, monkeypatch):
     power = Active("load-dependent-friction", "conduit", {"n": -0.3})
 
@@ -123,6 +125,7 @@ def test_friction_by_tension_is_learned_inside_the_solver(tmp_path, monkeypatch)
     assert law["parameters"][-1]["value"] == pytest.approx(-0.3, abs=0.02)
 
 
+@pytest.mark.long
 def test_a_listed_mechanism_is_named_beside_a_law(tmp_path):
     def both(table):
         table["load_current_A"] *= 1.08
@@ -137,6 +140,7 @@ def test_a_listed_mechanism_is_named_beside_a_law(tmp_path):
     assert "Beside it: the load's torque sensor reads" in said["headline"]
 
 
+@pytest.mark.long
 def test_a_second_law_is_learned_beside_the_first(tmp_path):
     def both(table):
         theta_out = (table["load_encoder_counts"] + 40) * 2 * np.pi / 2000

@@ -387,6 +387,7 @@ def test_a_new_batch_appears_with_three_lines_of_config(copy):
     assert "added" in set(pd.read_parquet(copy / "results/tables/errors.parquet")["batch"])
 
 
+@pytest.mark.long
 def test_bad_input_is_a_line_each_and_nothing_else_is_lost(copy):
     raw = copy / "data/raw"
     write_batch(raw / "misspelt")

@@ -34,6 +34,7 @@ def planned(folder: Path, snakefile: Path) -> dict[str, int]:
     return {name: int(count) for name, count in re.findall(r"^(\w[\w-]*) +(\d+)$", table, flags=re.MULTILINE)}
 
 
+@pytest.mark.long
 def test_the_workflow_plans_the_same_jobs_wherever_it_is_started_from(tmp_path):
     write_batch(tmp_path / "data/raw/tiny")
     (tmp_path / "config.yaml").write_text(yaml.safe_dump({"diagnose": "each"}))

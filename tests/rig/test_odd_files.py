@@ -4,8 +4,6 @@ import gzip
 import os
 import re
 import struct
-import subprocess
-import sys
 import zlib
 from pathlib import Path
 
@@ -15,6 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import sample_files as sample
+from measured_reads import MeasuredReads
 
 from ccmodel import inputs
 from ccmodel.paths import existing_file, try_file
@@ -251,35 +250,17 @@ def mcap_bomb(path):
     next((path.parent / "bag").glob("*.mcap")).rename(path)
 
 
-# Reads a file in a fresh process. The growth of its peak includes what libraries written in C take. `ru_maxrss` is no
-# measure of it, since a process inherits that from the one that starts it.
-MEASURE = r"""
-import re, sys
-from pathlib import Path
-import asammdf, h5py, nptdms, numpy, pandas, pyarrow.parquet, rosbags.highlevel, scipy.io
-from ccmodel.rig.readers import attempt, registry, signatures
-
-path = Path(sys.argv[1])
-format = registry()[signatures.kind_of(path).module]
-peak = lambda: int(re.search(r"VmHWM:\s+(\d+) kB", Path("/proc/self/status").read_text())[1])
-before = peak()
-result = attempt.read_here(format, path)
-print(peak() - before)
-print(*(result.args[2:] if isinstance(result, attempt.LogError) else [s.name for s in result.signals]))
-"""
-
-
 IN_LINUX = pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the peak of memory is read from /proc")
 
 
-def read_measured(path):
-    """Growth of the peak memory of a process that reads a file, MB, and what it says."""
-    command = [sys.executable, "-c", MEASURE, str(path)]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    kilobytes, said = subprocess.run(
-        command, env=environment, capture_output=True, text=True, check=True
-    ).stdout.splitlines()
-    return int(kilobytes) / 1024, said
+@pytest.fixture(scope="module")
+def limited():
+    """Reads of files that may unpack to 100 MB. The growth of the peak includes what libraries written in C take."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(inputs.UNPACKED, "100")
+        process = MeasuredReads()
+    yield process
+    process.close()
 
 
 @IN_LINUX
@@ -305,11 +286,11 @@ def read_measured(path):
         ("a.mcap", mcap_bomb, 101),
     ],
 )
-def test_what_unpacks_to_too_much_is_refused_before_it_is_read(name, make, found, tmp_path, monkeypatch):
-    monkeypatch.setenv(inputs.UNPACKED, "100")
+def test_what_unpacks_to_too_much_is_refused_before_it_is_read(name, make, found, tmp_path, limited):
     make(tmp_path / name)
     assert (tmp_path / name).stat().st_size < 2e6
-    most, said = read_measured(tmp_path / name)
+    said, fault, _, most = limited.read(tmp_path / name)
+    assert not fault
     limit = f"larger than 100 MB; if that is right, set {inputs.UNPACKED} to its MB"
     assert re.fullmatch(rf"unpacks to (\d+) MB or more, which is {limit}", said), said
     assert float(said.split()[2]) == pytest.approx(found, rel=0.02)
@@ -356,17 +337,18 @@ def test_channels_of_an_mdf_file_are_counted_as_numbers(tmp_path, monkeypatch):
 @IN_LINUX
 def test_the_measure_of_memory_sees_what_a_library_takes(tmp_path):
     bytes_bomb(tmp_path / "b.h5")
-    most, said = read_measured(tmp_path / "b.h5")
-    assert (said, most > 300) == ("a", True)
+    process = MeasuredReads()
+    read = process.read(tmp_path / "b.h5")
+    process.close()
+    assert (read.refusal, read.fault, read.megabytes > 300) == (None, "", True)
 
 
 @IN_LINUX
-def test_a_text_that_a_parquet_file_repeats_takes_its_memory_once(tmp_path, monkeypatch):
-    monkeypatch.setenv(inputs.UNPACKED, "100")
+def test_a_text_that_a_parquet_file_repeats_takes_its_memory_once(tmp_path, limited):
     repeated = pa.DictionaryArray.from_arrays(pa.array([0] * 10**4, pa.int8()), pa.array(["x" * 20_000]))
     pq.write_table(pa.table({"note": repeated, "a": [1.0] * 10**4}), tmp_path / "a.parquet", store_schema=False)
-    most, said = read_measured(tmp_path / "a.parquet")
-    assert (said, most < 60) == ("a", True)
+    read = limited.read(tmp_path / "a.parquet")
+    assert (read.refusal, read.fault, read.megabytes < 60) == (None, "", True)
 
 
 def stored_elsewhere(file, other):
