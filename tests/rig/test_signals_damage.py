@@ -133,7 +133,16 @@ def reading(function: str) -> str:
     return f"import os, time; from ccmodel.rig.readers import attempt; attempt.read_here = {function}; attempt._main()"
 
 
-@pytest.mark.parametrize("code", ["import os; os.abort()", reading("lambda *_: os.abort()")])
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import os; os.abort()",
+        reading("lambda *_: os.abort()"),
+        reading("lambda *_: os.kill(os.getpid(), 9)"),
+        reading("lambda *_: os._exit(0)"),
+        reading("lambda *_: exit(0)"),
+    ],
+)
 def test_a_library_that_ends_the_process_is_one_line(tmp_path, child, code):
     (tmp_path / "log.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
     child(code)
@@ -185,6 +194,41 @@ def test_where_no_process_can_be_forked_each_file_has_one(sound, tmp_path, child
         + reading("lambda *_: os.abort()")
     )
     assert "its library fails" in refusal(tmp_path / "log.h5")
+
+
+def test_modules_in_the_users_folder_are_not_imported(sound, tmp_path):
+    (tmp_path / "log.h5").write_bytes(sound["log.h5"])
+    for name in ("h5py", "pickle", "numpy"):
+        (tmp_path / f"{name}.py").write_text("from pathlib import Path; Path('run').touch(); raise ImportError")
+    code = "from ccmodel.rig.readers import read_signals; read_signals('log.h5')"
+    search = ":".join(filter(None, sys.path))
+    subprocess.run([sys.executable, "-P", "-c", code], cwd=tmp_path, env={"PYTHONPATH": search}, check=True)
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_library_that_cannot_be_loaded_says_why(sound, tmp_path):
+    (tmp_path / "log.h5").write_bytes(sound["log.h5"])
+    (tmp_path / "old").mkdir()
+    (tmp_path / "old/h5py.py").write_text("raise ValueError('numpy.dtype size changed, may indicate incompatibility')")
+    code = "from ccmodel.rig.readers import read_signals; read_signals('log.h5')"
+    search = ":".join([str(tmp_path / "old"), *filter(None, sys.path)])
+    command = [sys.executable, "-c", code]
+    child = subprocess.run(command, cwd=tmp_path, env={"PYTHONPATH": search}, capture_output=True, text=True)
+    assert "numpy.dtype size changed" in child.stderr
+
+
+@pytest.mark.parametrize("limit_s", [2, 100])
+def test_an_inherited_limit_of_computing_is_kept(limit_s):
+    code = f"""
+import resource
+from ccmodel.rig.readers.attempt import limit_computing
+resource.setrlimit(resource.RLIMIT_CPU, ({limit_s}, {limit_s}))
+limit_computing(8)
+print(*resource.getrlimit(resource.RLIMIT_CPU))
+"""
+    environment = {"PYTHONPATH": ":".join(filter(None, sys.path))}
+    said = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert said.stdout.split() == [str(min(8, limit_s)), str(min(9, limit_s))]
 
 
 def test_a_file_is_read_with_the_limits_of_the_time(sound, tmp_path, monkeypatch):

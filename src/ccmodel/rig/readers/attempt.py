@@ -19,7 +19,7 @@ from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppres
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from threading import Lock, Timer
+from threading import Event, Lock, Timer
 from typing import IO, NamedTuple
 
 from ccmodel.rig.findings import LogError
@@ -32,6 +32,10 @@ _PATIENCE_S, _COMPUTING_S, _S_PER_MB = 60.0, 8.0, 1.0
 _CHILD = "from ccmodel.rig.readers.attempt import _main; _main()"
 # Elsewhere some libraries of the system do not outlive a fork, or there is none.
 _FORKS = sys.platform == "linux"
+# Exit codes: of a process that has answered, which a library cannot give by ending it; and, as shells count, what is
+# added to a signal's number. The last are those of a process whose time of computing is over.
+_ANSWERED, _SIGNALLED = 99, 128
+_XCPU = tuple(sign * getattr(signal, "SIGXCPU", 24) + base for sign, base in ((-1, 0), (1, _SIGNALLED)))
 
 
 def read_here(format: Format, path: Path, text: TextLayout | None = None) -> SignalFile | LogError:
@@ -61,18 +65,11 @@ def read_here(format: Format, path: Path, text: TextLayout | None = None) -> Sig
 def read_apart(name: str, format: Format, path: Path) -> SignalFile | LogError:
     """As `read_here`, in a process of its own; `name` is the module of the format."""
     more = _S_PER_MB * path.stat().st_size / 1e6
-    patience, computing = _PATIENCE_S + more, _COMPUTING_S + more
     # A library that fails on a damaged file leaves its temporary files behind.
     with TemporaryDirectory(prefix="ccmodel-read-") as scratch:
         environment = {**os.environ, "TMPDIR": scratch}
-        result = _apart.read(_Request(name, path.absolute(), computing, environment), patience)
-    if isinstance(result, SignalFile | LogError):
-        return result
-    if result == -getattr(signal, "SIGXCPU", 0) != 0:
-        return _damaged(format, f"not read after {computing:.0f} s of computing")
-    if result == -getattr(signal, "SIGKILL", 9) != 0:
-        return _damaged(format, f"not read after {patience:.0f} s")
-    return _damaged(format, "its library fails on it")
+        result = _apart.read(_Request(name, path.absolute(), _COMPUTING_S + more, environment), _PATIENCE_S + more)
+    return _damaged(format, result) if isinstance(result, str) else result
 
 
 class _Request(NamedTuple):
@@ -92,36 +89,36 @@ class _Apart:
         self._owner = 0  # a process that was forked from this one must not share it
         self._lock = Lock()
 
-    def read(self, request: _Request, patience: float) -> SignalFile | LogError | int:
-        """Result of a request; if the process ends without one, its return code."""
+    def read(self, request: _Request, patience_s: float) -> SignalFile | LogError | str:
+        """Result of a request; if the process ends without one, the reason."""
         with self._lock:
-            process = self._running()
-            assert process.stdin is not None and process.stdout is not None
-            impatience = Timer(patience, _end, [process])
-            impatience.start()
+            process, is_late, result = self._running(), Event(), None
+            timer = Timer(patience_s, _give_up, [process, is_late])
+            timer.start()
             try:
-                pickle.dump(request, process.stdin)
-                process.stdin.flush()
-                result: SignalFile | LogError = pickle.load(process.stdout)
-            except (BrokenPipeError, EOFError, pickle.UnpicklingError):
-                self._process = None
-                return process.wait()
-            except BaseException:  # an interruption: what the process still writes answers no later request
-                self._process = None
-                _end(process)
+                result = _asked(process, request)
+            except BaseException:  # the user interrupts: what the process still writes must answer no later request
+                _kill(process)
                 raise
             finally:
-                impatience.cancel()
-            if not _FORKS:
-                self._process = None
+                timer.cancel()
+                timer.join()
+                if result is None or is_late.is_set() or not _FORKS:
+                    self._process, code = None, process.wait()
+        if result is not None:
             return result
+        if is_late.is_set():
+            return f"not read after {patience_s:.0f} s"
+        return (
+            f"not read after {request.computing_s:.0f} s of computing" if code in _XCPU else "its library fails on it"
+        )
 
-    def _running(self) -> subprocess.Popen[bytes]:
+    def _running(self) -> "subprocess.Popen[bytes]":
         if self._process is None or self._owner != os.getpid() or self._process.poll() is not None:
             # Threads of a library for linear algebra would not outlive a fork, and nothing here needs them.
             environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "OMP_NUM_THREADS": "1"}
             self._process = subprocess.Popen(
-                [sys.executable, "-c", _CHILD],
+                [sys.executable, "-P", "-c", _CHILD],  # -P: modules in the user's folder are not imported
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
@@ -135,12 +132,30 @@ class _Apart:
 _apart = _Apart()
 
 
-def _end(process: "subprocess.Popen[bytes]") -> None:
+def _asked(process: "subprocess.Popen[bytes]", request: _Request) -> SignalFile | LogError | None:
+    """Answer of a process to a request; None if it ends without one."""
+    assert process.stdin is not None and process.stdout is not None
+    try:
+        pickle.dump(request, process.stdin)
+        process.stdin.flush()
+        result: SignalFile | LogError = pickle.load(process.stdout)
+    except (BrokenPipeError, EOFError, pickle.UnpicklingError):
+        return None
+    return result
+
+
+def _give_up(process: "subprocess.Popen[bytes]", is_late: Event) -> None:
+    is_late.set()
+    _kill(process)
+
+
+def _kill(process: "subprocess.Popen[bytes]") -> None:
     """Kill a process and, where a process can have one, its group."""
-    if hasattr(os, "killpg"):
-        os.killpg(process.pid, signal.SIGKILL)
-    else:
-        process.kill()
+    with suppress(ProcessLookupError):
+        if hasattr(os, "killpg"):
+            os.killpg(process.pid, signal.SIGKILL)
+        else:
+            process.kill()
 
 
 def _main() -> None:
@@ -152,24 +167,26 @@ def _main() -> None:
     """
     results = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    for request in _requests():
+    while request := _next_request():
         format = import_module(f"{__package__}.{request.name}").FORMAT
         for library in format.apart:
-            with suppress(ImportError):
+            with suppress(Exception):  # `read_here` meets and words it again
                 import_module(library)
         if _FORKS and (child := os.fork()):
-            status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-            if status:
-                os.kill(os.getpid(), -status if status < 0 else signal.SIGABRT)
+            code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+            if code != _ANSWERED:
+                os._exit(_SIGNALLED - code if code < 0 else 1)
             continue
         _answer(request, format, results)
-        os._exit(0)
+        os._exit(_ANSWERED)
 
 
-def _requests() -> Iterator[_Request]:
-    with suppress(EOFError):
-        while True:
-            yield pickle.load(sys.stdin.buffer)
+def _next_request() -> _Request | None:
+    try:
+        request: _Request = pickle.load(sys.stdin.buffer)
+    except EOFError:
+        return None
+    return request
 
 
 def _answer(request: _Request, format: Format, results: IO[bytes]) -> None:
@@ -188,7 +205,10 @@ def limit_computing(seconds: float = _COMPUTING_S) -> None:
     except ImportError:
         return
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(seconds), math.ceil(seconds) + 1))
+    soft, hard = math.ceil(seconds), math.ceil(seconds) + 1
+    if (inherited := resource.getrlimit(resource.RLIMIT_CPU)[1]) != resource.RLIM_INFINITY:
+        soft, hard = min(soft, inherited), min(hard, inherited)
+    resource.setrlimit(resource.RLIMIT_CPU, (soft, hard))
 
 
 def _damaged(format: Format, detail: str) -> LogError:
