@@ -543,3 +543,11 @@ def test_the_covariance_is_linearised_about_the_best_candidate(monkeypatch):
     assert selection.relinearise(again) is again
     moved = replace(again.linearised_about, values=dict.fromkeys(again.linearised_about.values, 0.0))
     assert not replace(again, linearised_about=moved).is_linearised_about(again.candidates[0])
+
+    def in_time_for_one(self, *given):
+        monkeypatch.setattr(Deadline, "has_passed", True)
+        return candidates[:1]
+
+    monkeypatch.setattr(Selection, "fit_all", in_time_for_one)
+    found = Comparison.of(recordings, base, candidates, SCREENED)
+    assert selection.relinearise(found) is found, "the other one would be lost"

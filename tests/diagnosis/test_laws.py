@@ -1,6 +1,7 @@
 """A law that is on no list is found from recordings: its slot, its argument and its curve."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,11 @@ from typer.testing import CliRunner
 import builders
 from builders import spoil, write_batch
 from ccmodel import cli
+from ccmodel.channels import T1
+from ccmodel.diagnosis.laws import _unit_of
 from ccmodel.diagnosis.settings import WITHIN_BAND
+from ccmodel.geometry import ConduitPath
+from ccmodel.mechanisms.law_forms import ADDED_BEND, DRAG
 from ccmodel.model.files import read_model_file
 from ccmodel.model.general import Active, simulate
 
@@ -25,6 +30,23 @@ def cogging(table):
     theta = 0.6 * np.sin(2 * np.pi * np.maximum(table["time_s"].to_numpy() - 0.5, 0))
     table["drive_current_A"] += COGGING_NM * np.sin(2 * np.pi * theta / PERIOD_RAD) / K_TORQUE
     return table
+
+
+def test_the_size_of_a_bend_or_drag_is_that_of_all_recordings():
+    """The first recording may have a straight conduit."""
+    paths = [ConduitPath([1.0], [bend]) for bend in (0.0, 6.0)]
+    observations = [
+        SimpleNamespace(parameters=None, given=SimpleNamespace(recording=SimpleNamespace(path=p))) for p in paths
+    ]
+    whitened = [SimpleNamespace(observations=one) for one in observations]
+    base = SimpleNamespace(whitened=whitened, model=lambda _: SimpleNamespace(friction_coefficient=0.1))
+    motions = [SimpleNamespace(channels={T1: np.array([4.0, 6.0])})] * 2
+
+    def unit(form):
+        return _unit_of(SimpleNamespace(channel=None, form=form), base, motions)
+
+    assert unit(ADDED_BEND) == 3.0
+    assert unit(DRAG) == pytest.approx(0.1 * 5.0 * 3.0)
 
 
 def diagnosed(batch, out, *options):

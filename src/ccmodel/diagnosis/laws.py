@@ -18,6 +18,7 @@ from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.normal_equations import NormalEquations
 from ccmodel.failure import ModelError
+from ccmodel.geometry import ConduitPath
 from ccmodel.inference.pool import each
 from ccmodel.mechanisms import Sensing, laws
 from ccmodel.mechanisms.law_forms import ADDED_BEND, DRAG
@@ -100,20 +101,24 @@ def _proposed(base: CandidateFit, law: Law, motions: Sequence[Sensing], nothing:
 
 def _unit_of(law: Law, base: CandidateFit, motions: Sequence[Sensing]) -> float:
     """What sizes of a law's values are shares of: 1 of a factor, Coulomb friction per length of conduit of a drag, the
-    conduits' bend, `MOST_OF_END` cables', or a channel's peak to peak.
+    conduits' bend, both in the mean of the recordings, `MOST_OF_END` cables', or a channel's peak to peak.
     """
     if law.channel is not None:
         return float(np.ptp(np.concatenate([m.channels[law.channel] for m in motions])))
     if law.form.is_factor:
         return 1.0
     if law.form is ADDED_BEND:
-        return float(base.whitened[0].observations.given.recording.path.bend_rad)
+        return float(np.mean([path.bend_rad for path in _paths(base)]))
     if law.form is DRAG:
-        o = base.whitened[0].observations
-        model, path = base.model(o.parameters), o.given.recording.path
+        model = base.model(base.whitened[0].observations.parameters)
+        bend_per_m = np.mean([path.bend_rad / path.length_m for path in _paths(base)])
         tension_N = np.mean([m.channels[c].clip(0.0).mean() for m in motions for c in TENSIONS if c in m.channels])
-        return float(model.friction_coefficient * tension_N * path.bend_rad / path.length_m)
+        return float(model.friction_coefficient * tension_N * bend_per_m)
     return MOST_OF_END / base.model(base.whitened[0].observations.parameters).stiffness_N_per_m
+
+
+def _paths(base: CandidateFit) -> list[ConduitPath]:
+    return [w.observations.given.recording.path for w in base.whitened]
 
 
 def _sensitivities(base: CandidateFit, hypothesis: Hypothesis, law: Law) -> list[NDArray]:

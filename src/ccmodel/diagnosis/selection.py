@@ -269,7 +269,8 @@ class Selection:
             return found
         leading = contenders(found)
         again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in leading for s in starts(c)])
-        if not any(c.hypothesis == best.hypothesis for c in again):
+        # Of rivals that were not fitted again in time, none must be lost.
+        if self.deadline.has_passed or not any(c.hypothesis == best.hypothesis for c in again):
             return found
         # About the same mechanisms once more: only if that leads on.
         about = found.linearised_about
