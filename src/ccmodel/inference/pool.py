@@ -24,7 +24,8 @@ def set_threads(count: int | None) -> None:
 
 def threads() -> int:
     """Number of threads in use."""
-    return _threads or len(os.sched_getaffinity(0))
+    here = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)
+    return _threads or len(here)
 
 
 def each(items: Sequence, work: Callable) -> list:
