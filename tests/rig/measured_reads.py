@@ -152,7 +152,8 @@ def _outcome(path: Path) -> tuple[str | None, str]:
     from ccmodel.rig import readers
     from ccmodel.rig.findings import LogError
     from ccmodel.rig.importing.guess import guess_file
-    from ccmodel.rig.readers.attempt import limit_computing, read_here
+    from ccmodel.rig.readers.apart import limit_computing
+    from ccmodel.rig.readers.attempt import read_here
     from ccmodel.rig.readers.log_table import log_of_signals
 
     def read_apart(name, format, path):

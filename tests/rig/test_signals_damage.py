@@ -12,7 +12,7 @@ import sample_files as sample
 from ccmodel import inputs
 from ccmodel.rig import readers
 from ccmodel.rig.findings import LogError
-from ccmodel.rig.readers import attempt, read_signals, signatures
+from ccmodel.rig.readers import apart, read_signals, signatures
 
 FORMATS = {
     "log.csv": "text file",
@@ -122,15 +122,15 @@ def child(monkeypatch):
     """Let another process than the usual one read what is read apart."""
 
     def replaced(code):
-        monkeypatch.setattr(attempt, "_CHILD", code)
-        monkeypatch.setattr(attempt, "_apart", attempt._Apart())
+        monkeypatch.setattr(apart, "_CHILD", code)
+        monkeypatch.setattr(apart, "_apart", apart._Apart())
 
     return replaced
 
 
 def reading(function: str) -> str:
     """Code of a process that calls another function than `read_here`."""
-    return f"import os, time; from ccmodel.rig.readers import attempt; attempt.read_here = {function}; attempt._main()"
+    return f"import os, time; from ccmodel.rig.readers import apart; apart.read_here = {function}; apart._main()"
 
 
 @pytest.mark.parametrize(
@@ -156,14 +156,14 @@ def test_a_library_that_ends_the_process_is_one_line(tmp_path, child, code):
 def test_a_library_that_waits_is_one_line(tmp_path, child, monkeypatch, code):
     (tmp_path / "log.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
     child(code)
-    monkeypatch.setattr(attempt, "_PATIENCE_S", 0.2)
+    monkeypatch.setattr(apart, "_PATIENCE_S", 0.2)
     assert "not read after 0 s" in refusal(tmp_path / "log.h5")
 
 
 def test_a_library_that_goes_round_in_circles_is_one_line(sound, tmp_path, child, monkeypatch):
     (tmp_path / "log.h5").write_bytes(sound["log.h5"])
     child(reading("lambda *_: any(iter(int, 1))"))
-    monkeypatch.setattr(attempt, "_COMPUTING_S", 3.0)
+    monkeypatch.setattr(apart, "_COMPUTING_S", 3.0)
     assert "(not read after 3 s of computing)" in refusal(tmp_path / "log.h5")
 
 
@@ -173,26 +173,23 @@ UNLESS_NAMED_END = "lambda format, path: os.abort() if path.name == 'end.h5' els
 def test_a_process_reads_file_after_file_and_starts_again_after_it_has_failed(sound, tmp_path, child):
     (tmp_path / "log.h5").write_bytes(sound["log.h5"])
     (tmp_path / "end.h5").write_bytes(sound["log.h5"])
-    child("from ccmodel.rig.readers import attempt; usual = attempt.read_here; " + reading(UNLESS_NAMED_END))
+    child("from ccmodel.rig.readers import apart; usual = apart.read_here; " + reading(UNLESS_NAMED_END))
     assert refusal(tmp_path / "log.h5") is None
-    first = attempt._apart._process
+    first = apart._apart._process
     assert refusal(tmp_path / "log.h5") is None
-    assert attempt._apart._process is first
+    assert apart._apart._process is first
     assert "its library fails" in refusal(tmp_path / "end.h5")
     assert refusal(tmp_path / "log.h5") is None
-    assert attempt._apart._process is not first
+    assert apart._apart._process is not first
 
 
 def test_where_no_process_can_be_forked_each_file_has_one(sound, tmp_path, child, monkeypatch):
     (tmp_path / "log.h5").write_bytes(sound["log.h5"])
-    monkeypatch.setattr(attempt, "_FORKS", False)
-    child("from ccmodel.rig.readers import attempt; attempt._FORKS = False; attempt._main()")
+    monkeypatch.setattr(apart, "_FORKS", False)
+    child("from ccmodel.rig.readers import apart; apart._FORKS = False; apart._main()")
     for _ in range(2):
         assert refusal(tmp_path / "log.h5") is None
-    child(
-        "import os; from ccmodel.rig.readers import attempt; attempt._FORKS = False; "
-        + reading("lambda *_: os.abort()")
-    )
+    child("import os; from ccmodel.rig.readers import apart; apart._FORKS = False; " + reading("lambda *_: os.abort()"))
     assert "its library fails" in refusal(tmp_path / "log.h5")
 
 
@@ -221,7 +218,7 @@ def test_a_library_that_cannot_be_loaded_says_why(sound, tmp_path):
 def test_an_inherited_limit_of_computing_is_kept(limit_s):
     code = f"""
 import resource
-from ccmodel.rig.readers.attempt import limit_computing
+from ccmodel.rig.readers.apart import limit_computing
 resource.setrlimit(resource.RLIMIT_CPU, ({limit_s}, {limit_s}))
 limit_computing(8)
 print(*resource.getrlimit(resource.RLIMIT_CPU))
@@ -240,11 +237,11 @@ def test_a_file_is_read_with_the_limits_of_the_time(sound, tmp_path, monkeypatch
 
 def test_what_an_interrupted_reading_still_gives_answers_no_other(sound, tmp_path, monkeypatch):
     (tmp_path / "log.h5").write_bytes(sound["log.h5"])
-    monkeypatch.setattr(attempt.pickle, "load", interrupted)
+    monkeypatch.setattr(apart.pickle, "load", interrupted)
     with pytest.raises(KeyboardInterrupt):
         refusal(tmp_path / "log.h5")
     monkeypatch.undo()
-    assert attempt._apart._process is None
+    assert apart._apart._process is None
     assert refusal(tmp_path / "log.h5") is None
 
 

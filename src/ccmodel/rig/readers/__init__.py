@@ -21,7 +21,8 @@ import numpy as np
 from ccmodel import inputs
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers import signatures
-from ccmodel.rig.readers.attempt import COPY, read_apart, read_here
+from ccmodel.rig.readers.apart import read_apart
+from ccmodel.rig.readers.attempt import COPY, read_here
 from ccmodel.rig.readers.contract import Format, Signal, SignalFile, TextLayout
 from ccmodel.rig.readers.names import split_unit, unique
 
