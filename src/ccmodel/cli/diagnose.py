@@ -70,11 +70,15 @@ def diagnose(
     ] = None,
     run_limit: Annotated[
         int | None,
-        typer.Option("--run-limit", help="Model runs for fitting candidates; 50000 if not given.", show_default=False),
+        typer.Option(
+            "--run-limit", help="Model runs after which no candidate is fitted; 50000 if not given.", show_default=False
+        ),
     ] = None,
     time_limit: Annotated[
         float | None,
-        typer.Option("--time-limit", help="Time for fitting candidates, s; 160 if not given.", show_default=False),
+        typer.Option(
+            "--time-limit", help="Time after which no candidate is fitted, s; 160 if not given.", show_default=False
+        ),
     ] = None,
     trust_inputs: TrustInputs = False,
     strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 unless the model agrees.")] = False,
