@@ -39,7 +39,7 @@ def test_guess_import_check(tmp_path, run):
     assert "theta_in_rad" in out
     command = out.splitlines()[-1]
     assert f"--map {batch}/map.yaml --out {batch}" in command
-    assert "lines are not sure" in command
+    assert "because they are uncertain: " in command
     code, out, err = run("import", *files, "--map", batch / "map.yaml", "--out", batch)
     assert (code, err) == (0, "")
     assert "fast" in out and "500 Hz" in out and f"ccmodel check {batch}" in out

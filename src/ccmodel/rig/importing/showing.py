@@ -41,7 +41,7 @@ def guess_tables(guessed: GuessedMap) -> list[RenderableType]:
 def next_of_guess(guessed: GuessedMap, files: Sequence[Path], out: Path) -> str:
     """What to do after a guess."""
     unsure = sum(bool(g.column) and not g.sure for one in guessed.guessed.values() for g in one.guesses)
-    lines = f"; {unsure} of its lines are not sure and stand behind '# '" if unsure else ""
+    lines = f"; lines commented out because they are uncertain: {unsure}" if unsure else ""
     map_file = Path(out) / MAP
     return f"wrote {map_file}{lines}. Correct it, then: {_command(files, out, map_file)}"
 
