@@ -203,6 +203,26 @@ HOPELESS = 20.0
 # Excess mean square that counts as none in this comparison. Chosen.
 NEAR_NOISE = 0.2
 
+# --- Laws that no list holds
+
+# A priori sizes of a law's values that are tried, and the one that its sensitivities are taken at: shares of the
+# friction coefficient, or of a channel's peak to peak. Chosen: factors of three.
+LAW_SCALES = 0.003, 0.01, 0.03, 0.1, 0.3
+LAW_STEP = 0.01
+# Laws that are fitted, the leading ones to first order; and of these, how many are also fitted with more knots. Chosen
+# for time.
+LAWS_FITTED, LAWS_REFINED = 8, 2
+# Starts, of a listed law's constants, from which the best ones are searched. Chosen: a sine has a few minima.
+LISTED_STARTS = 3
+# Distance, in posterior standard deviations, up to which a learned law is a listed one: half of its 90 % band.
+WITHIN_BAND = 1.645
+# Share of the excess mean square below which what the best single listed mechanism leaves is learned too. Chosen.
+MOSTLY_LISTED = 0.5
+# Share of both limits after which no further set is fitted before laws are learned. Chosen: laws take some 40 s.
+SETS_SHARE = 0.6
+# Share of what smaller sets leave that a larger one leaves at most if still larger ones come before laws. Chosen.
+LEADING_ON = 0.5
+
 # --- Fault isolation and location
 
 # Share of the excess mean square below which leaving out a channel must bring it for the fault to be in that sensor.
@@ -255,20 +275,3 @@ SINES_HZ, HOLDS_S, NESTED_HZ, STEP_DURATION_S = (0.1, 0.4, 1.2), (1.0, 3.0, 8.0)
 WANTED_ODDS = 20.0
 # Experiments, of the most separating ones, for which a refit is taken into account. Chosen for time.
 REFITTED = 8
-
-# Laws that no list holds. A priori sizes of a law's values that are tried, and the one that its sensitivities are taken
-# at: shares of the friction coefficient, or of a channel's peak to peak.
-LAW_SCALES = 0.003, 0.01, 0.03, 0.1, 0.3
-LAW_STEP = 0.01
-# Laws that are fitted, the leading ones to first order; and of these, how many are also fitted with more knots.
-LAWS_FITTED, LAWS_REFINED = 8, 2
-# Starts, of a listed law's constants, from which the best ones are searched. Chosen: a sine has a few minima.
-LISTED_STARTS = 3
-# Distance, in posterior standard deviations, up to which a learned law is a listed one: half of its 90 % band.
-WITHIN_BAND = 1.645
-# Share of the excess mean square below which what the best single listed mechanism leaves is learned too. Chosen.
-MOSTLY_LISTED = 0.5
-# Share of both limits after which no further set is fitted before laws are learned. Chosen: laws take some 40 s.
-SETS_SHARE = 0.6
-# Share of what smaller sets leave that a larger one leaves at most if still larger ones come before laws. Chosen.
-LEADING_ON = 0.5
