@@ -11,6 +11,7 @@ from html.parser import HTMLParser
 import pandas as pd
 import pytest
 from made_pages import content, diagnosis, entries, run, summary
+from matplotlib.figure import Figure
 
 from ccmodel.errors import COLUMNS
 from ccmodel.inference.fit import FitResult
@@ -85,7 +86,9 @@ def errors(text: Texts) -> pd.DataFrame:
 
 def write_pages(folder, text: Texts):
     """The page of a run, and the pages of batches without a verdict and with inputs that contradict one another."""
-    folder.mkdir()
+    (folder / "figures").mkdir(parents=True)
+    for ending in ("png", "svg", "pdf"):
+        Figure((1, 1)).savefig(folder / f"figures/study.{ending}")
     explained, undiagnosed, wrong = (text(f"name of batch {k}") for k in (1, 2, 3))
     diagnoses = [
         diagnosis(explained, "explained"),
@@ -101,10 +104,13 @@ def write_pages(folder, text: Texts):
     reports |= {undiagnosed: (folder / "not-diagnosed.html").read_text()}
     reports |= {wrong: (folder / "inconsistent.html").read_text()}
     runs = [entries(1)[0] | {"id": text("recording of the viewer"), "batch": explained}]
+    settings = {"title": text("title of a study"), "batches": [text("batch of a study")]}
+    study = {"kind": "loops", "name": "study", "heading": "Figures", "settings": settings}
     page = content(
         *diagnoses, batches=[summary(d["batch"], note=text("note")) for d in diagnoses], reports=reports, runs=runs,
         errors=errors(text), fits=[hostile_fit(text)], left_out=[text("left out")],
         inconsistent=[text("inconsistent")], warnings=[text("warning")],
+        studies=[study | {"parameters": text("parameters of a study")}],
     )  # fmt: skip
     write_page(folder / "index.html", page)
     return [folder / name for name in ("index.html", "not-diagnosed.html", "inconsistent.html")]
