@@ -88,9 +88,9 @@ def proposed(judgement: Judgement, estimates: Parameters) -> dict | None:
     names = list(dict.fromkeys(name for c in candidates for name, _ in c.hypothesis.acting))
     differ = f"there the candidates differ by {refitted[best]:.2g} times the noise, fitted to it as well"
     wanted = recordings_wanted(refitted[best], len(template.channels))
-    tells = "one such recording tells" if wanted == 1 else f"it takes {wanted} such recordings to tell"
+    enough = "one such recording is" if wanted == 1 else f"{wanted} such recordings are"
     chosen = every[leading[best]]
-    text = f"{chosen.text}: {differ}, more than in any other tried; {tells}."
+    text = f"{chosen.text}: {differ}, more than in any other tried; {enough} enough."
     return {"text": text, "separates": names, "recording": chosen.recording(wanted)}
 
 

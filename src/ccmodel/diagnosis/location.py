@@ -14,6 +14,7 @@ from ccmodel.diagnosis.isolation import channels_of, isolate
 from ccmodel.diagnosis.verdict import Judgement
 from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.model.run import ModelInput
+from ccmodel.sentences import joined
 
 # Phases of the drive's motion.
 PHASES = ("at rest", "after a reversal", "under way")
@@ -21,7 +22,7 @@ PHASES = ("at rest", "after a reversal", "under way")
 BETWEEN = ("conduit",)
 
 TEXT = {
-    "drive-pulley": "at the drive pulley, between its torque and the cables",
+    "drive-pulley": "at the drive pulley (between its torque and the cables)",
     "drive-end": "where the cables are fastened at the drive",
     "cable": "in the cables themselves",
     "conduit": "between cable and conduit",
@@ -47,8 +48,8 @@ def location(judgement: Judgement, calibrated: CandidateFit) -> dict:
     by_phase = {p: float(np.nanmean(s)) for p, s in squares.items() if np.isfinite(s).any()}
     phases = sorted(prominent(by_phase, settings.NAMED_PHASE), key=PHASES.index)
     verb = "is" if len(channels) == 1 else "are"
-    where = (" and " if hypothesis.acting else " or ").join(TEXT[place] for place in places)
-    text = f"The mismatch sits {where}: {', '.join(channels)} {verb} off most, {' and '.join(phases)}."
+    where = joined([TEXT[place] for place in places], "and" if hypothesis.acting else "or")
+    text = f"The mismatch sits {where}: {joined(channels)} {verb} off most, {joined(phases)}."
     return {"place": places[0], "places": list(places), "channels": channels, "phases": phases, "text": text}
 
 

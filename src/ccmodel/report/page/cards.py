@@ -12,12 +12,12 @@ from ccmodel.report.verdict import (
     INPUTS_INCONSISTENT,
     NOT_ACCEPTED,
     SYMBOL,
-    joined,
     nearest_sentence,
     place_in_words,
     possible_places,
     sentence,
 )
+from ccmodel.sentences import joined
 
 IN_PART, CONTRADICTORY = "explained in part", "inputs inconsistent"
 # Verdicts as cards show them, in the order of the summary.
