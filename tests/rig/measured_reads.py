@@ -13,6 +13,7 @@ import subprocess
 import sys
 import traceback
 import warnings
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -38,12 +39,15 @@ class Read(NamedTuple):
         Of computing, so that other processes of the machine do not count.
     megabytes : float
         Growth of the peak of memory.
+    names : list of str
+        The signals that were read.
     """
 
     refusal: str | None
     fault: str
     seconds: float
     megabytes: float
+    names: Sequence[str] = ()
 
 
 class MeasuredReads:
@@ -113,8 +117,8 @@ def _in_a_fork(path: Path) -> Read:
         return Read(None, f"not read after {PATIENCE_S:g} s", seconds, 0.0)
     if not said:
         return _ended(path, status, seconds)
-    refusal, fault, megabytes = json.loads(said)
-    return Read(refusal, fault, seconds, megabytes)
+    refusal, fault, megabytes, names = json.loads(said)
+    return Read(refusal, fault, seconds, megabytes, names)
 
 
 def _ended(path: Path, status: int, seconds: float) -> Read:
@@ -129,26 +133,26 @@ def _ended(path: Path, status: int, seconds: float) -> Read:
     return Read(None, end, seconds, 0.0)
 
 
-def _measured(path: Path) -> tuple[str | None, str, float]:
-    """Refusal, fault and growth of the peak of memory, MB."""
+def _measured(path: Path) -> tuple[str | None, str, float, list[str]]:
+    """Refusal, fault, growth of the peak of memory, MB, and names of the signals."""
     resource.setrlimit(resource.RLIMIT_AS, (_ADDRESS_SPACE, _ADDRESS_SPACE))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     # What a library in C prints would be seen by the user of a format that is read in the process itself.
     printed = os.memfd_create("printed")
     os.dup2(printed, 1), os.dup2(printed, 2)
     before = _peak_kB()
-    refusal, fault = _outcome(path)
+    refusal, fault, names = _outcome(path)
     if not fault and (size := os.fstat(printed).st_size):
         fault = f"prints {os.pread(printed, min(size, 300), 0)!r}"
-    return refusal, fault, (_peak_kB() - before) / 1024
+    return refusal, fault, (_peak_kB() - before) / 1024, names
 
 
 def _peak_kB() -> int:
     return int(re.search(r"VmHWM:\s+(\d+) kB", Path("/proc/self/status").read_text())[1])
 
 
-def _outcome(path: Path) -> tuple[str | None, str]:
-    """Refusal and fault."""
+def _outcome(path: Path) -> tuple[str | None, str, list[str]]:
+    """Refusal, fault and names of the signals."""
     from ccmodel.rig import readers
     from ccmodel.rig.findings import LogError
     from ccmodel.rig.importing.guess import guess_file
@@ -172,10 +176,10 @@ def _outcome(path: Path) -> tuple[str | None, str]:
     except LogError as error:
         row, column, text = error.args
         fine = (row is None or row > 0) and (column is None or isinstance(column, str)) and isinstance(text, str)
-        return text, "" if fine else f"odd arguments {error.args}"
+        return text, "" if fine else f"odd arguments {error.args}", []
     except BaseException:
-        return None, traceback.format_exc()[-3000:]
-    return None, _odd(file)
+        return None, traceback.format_exc()[-3000:], []
+    return None, _odd(file), [s.name for s in file.signals]
 
 
 def _odd(file) -> str:

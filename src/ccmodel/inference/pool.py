@@ -24,8 +24,9 @@ def set_threads(count: int | None) -> None:
 
 def threads() -> int:
     """Number of threads in use."""
-    here = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)
-    return _threads or len(here)
+    if _threads:
+        return _threads
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def each(items: Sequence, work: Callable) -> list:

@@ -32,8 +32,8 @@ _FORKS = sys.platform == "linux"
 _ANSWERED = 99
 # What is added to the number of the signal that ends a fork, as shells do.
 _SIGNALLED = 128
-# Return codes of a process whose time of computing is over: without a fork, and with one.
-_OUT_OF_COMPUTING = tuple(sign * getattr(signal, "SIGXCPU", 24) + base for sign, base in ((-1, 0), (1, _SIGNALLED)))
+# The signal that ends a process whose time of computing is over.
+_OUT_OF_COMPUTING = getattr(signal, "SIGXCPU", 24)
 
 
 def read_apart(name: str, format: Format, path: Path) -> SignalFile | LogError:
@@ -83,11 +83,9 @@ class _Apart:
             return result
         if is_late.is_set():
             return f"not read after {patience_s:.0f} s"
-        return (
-            f"not read after {request.computing_s:.0f} s of computing"
-            if code in _OUT_OF_COMPUTING
-            else "its library fails on it"
-        )
+        if code in (-_OUT_OF_COMPUTING, _SIGNALLED + _OUT_OF_COMPUTING):  # of the process itself, or of its fork
+            return f"not read after {request.computing_s:.0f} s of computing"
+        return "its library fails on it"
 
     def _running(self) -> "subprocess.Popen[bytes]":
         if self._process is None or self._owner != os.getpid() or self._process.poll() is not None:
