@@ -47,7 +47,7 @@ def write_config(folder: Path, **studies: dict) -> None:
         "phases": load_config(ROOT / "config/config.yaml").phases.model_dump(),
         "studies": {
             "pretension": {"batches": ["tiny"], "variable": "pretension", "title": "pretension"},
-            "one-run": {"batches": ["tiny"], "figure": "transmission"},
+            "one-run": {"batches": ["tiny"], "figure": "transmission", "parameters": "extended"},
             # The claims' other two studies; a drawing of each comes with them.
             "bend": {"batches": ["tiny"], "variable": "bend"},
             "radius": {"batches": ["tiny"], "variable": "radius"},
@@ -70,14 +70,15 @@ def write_config(folder: Path, **studies: dict) -> None:
                 "sections_error_percent": 1,
             },
         },
-        "accuracy": {},
+        "accuracy": {"parameters": "calibrated"},
+        "diagnose": "each",
     }
     (folder / "config.yaml").write_text(yaml.safe_dump(config))
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
-    """A finished run of a tiny batch."""
+    """A finished run of a tiny batch, with a diagnosis."""
     folder = tmp_path_factory.mktemp("run")
     write_batch(folder / "data/raw/tiny")
     write_config(folder)
@@ -95,10 +96,9 @@ def copy(finished, tmp_path):
 
 
 def keep_one_study(folder: Path, **changes) -> None:
-    """Leave in a configuration, for a further run, the study of one run alone: what its test does not look at."""
+    """Leave in a configuration, for a further run, one study and the fit: a test looks at nothing else."""
     config = yaml.safe_load((folder / "config.yaml").read_text())
-    config = {key: value for key, value in config.items() if key not in ("claims", "phases", "accuracy")}
-    config["studies"] = {"one-run": config["studies"]["one-run"]}
+    config = {"fits": config["fits"], "studies": {"one-run": {"batches": ["tiny"], "figure": "transmission"}}}
     (folder / "config.yaml").write_text(yaml.safe_dump(config | changes))
 
 
@@ -122,7 +122,6 @@ def test_it_makes_figures_tables_and_the_page(finished):
         assert (results / f"figures/{name}.png").stat().st_size > 10_000
     csv, parquet = pd.read_csv(results / "tables/errors.csv"), pd.read_parquet(results / "tables/errors.parquet")
     assert csv["rmse"].to_numpy() == pytest.approx(parquet["rmse"].to_numpy(), rel=1e-4)
-    assert set(parquet["parameters"]) == {"estimated", "fitted"}
     said = ccmodel("report", str(results))
     assert said.returncode == 0
     assert said.stderr.startswith("warning: "), "a warning is no failure"
@@ -141,41 +140,18 @@ def test_every_link_of_the_page_leads_somewhere(finished):
     assert not re.search(r'<img [^>]*?src="(?!data:)', text)
 
 
-@pytest.fixture(scope="module")
-def diagnosed(finished, tmp_path_factory):
-    """A copy of the finished run, with a diagnosis."""
-    folder = tmp_path_factory.mktemp("diagnosed") / "run"
-    shutil.copytree(finished, folder, copy_function=shutil.copy2)
-    config = yaml.safe_load((folder / "config.yaml").read_text())
-    config["diagnose"] = "each"
-    config["studies"]["one-run"]["parameters"] = "extended"
-    config["accuracy"] = {"parameters": "calibrated"}
-    (folder / "config.yaml").write_text(yaml.safe_dump(config))
-    run = snakemake(folder)
-    assert run.returncode == 0, run.stdout + run.stderr
-    return folder
-
-
-@pytest.fixture
-def diagnosed_copy(diagnosed, tmp_path):
-    """The run with a diagnosis, free to be changed."""
-    folder = tmp_path / "run"
-    shutil.copytree(diagnosed, folder, copy_function=shutil.copy2)
-    return folder
-
-
-def test_the_page_holds_the_report_of_each_diagnosis(diagnosed):
-    page = (diagnosed / "results/index.html").read_text()
+def test_the_page_holds_the_report_of_each_diagnosis(finished):
+    page = (finished / "results/index.html").read_text()
     (section,) = re.findall(r'<details class="diagnosis" id="diagnosis-tiny">(.*?)</details>', page, re.DOTALL)
-    report = (diagnosed / "results/diagnoses/tiny/report.html").read_text()
+    report = (finished / "results/diagnoses/tiny/report.html").read_text()
     headings = re.findall(r"<h2[^>]*>(.*?)</h2>", report)
     assert len(headings) > 2
     assert all(heading in section for heading in headings)
     assert section.count("<img") == report.count("<img") > 0
 
 
-def test_what_a_diagnosis_found_is_one_more_set_of_parameters(diagnosed):
-    results = diagnosed / "results"
+def test_what_a_diagnosis_found_is_one_more_set_of_parameters(finished):
+    results = finished / "results"
     assert json.loads((results / "diagnoses/tiny/diagnosis.json").read_text())["verdict"] == "agrees"
     nearest = json.loads((results / "diagnoses/tiny/nearest.json").read_text())
     assert nearest == {"succeeded": False, "message": "verdict 'agrees': the diagnosis has no nearest model"}
@@ -191,18 +167,18 @@ def test_what_a_diagnosis_found_is_one_more_set_of_parameters(diagnosed):
 
 
 @pytest.mark.long
-def test_inputs_that_contradict_one_another_are_named_and_get_no_model(diagnosed_copy):
+def test_inputs_that_contradict_one_another_are_named_and_get_no_model(copy):
     """Unless the batch's settings say that they are trusted."""
-    folder = diagnosed_copy
-    log = folder / "data/raw/tiny/t-7N.csv.gz"
+    log = copy / "data/raw/tiny/t-7N.csv.gz"
     write_gz(log, pd.read_csv(log).assign(drive_current_A=0.0).to_csv(index=False))
-    shutil.copytree(folder / "data/raw/tiny", folder / "data/raw/trusted")
-    batch = folder / "data/raw/trusted/batch.yaml"
+    shutil.copytree(copy / "data/raw/tiny", copy / "data/raw/trusted")
+    batch = copy / "data/raw/trusted/batch.yaml"
     batch.write_text(batch.read_text().replace("batch: tiny", "batch: trusted"))
-    keep_one_study(folder, diagnosing_by_batch={"trusted": {"trust_inputs": True, "time_limit_s": 5}}, fits={})
-    run = snakemake(folder)
+    trusted = {"trust_inputs": True, "time_limit_s": 5}
+    keep_one_study(copy, diagnose="each", diagnosing_by_batch={"trusted": trusted}, fits={})
+    run = snakemake(copy)
     assert run.returncode == 0, run.stdout + run.stderr
-    results = folder / "results"
+    results = copy / "results"
     assert json.loads((results / "diagnoses/tiny/diagnosis.json").read_text())["verdict"] == "inputs-inconsistent"
     for name in ("calibrated", "extended", "nearest"):
         assert read_recordings(results / f"simulated/{name}/tiny.nc") == []
@@ -229,8 +205,7 @@ def planned(folder: Path) -> set[str]:
 
 
 @pytest.mark.long
-def test_a_rig_has_its_own_fits_and_a_batch_its_own_settings(diagnosed_copy):
-    copy = diagnosed_copy
+def test_a_rig_has_its_own_fits_and_a_batch_its_own_settings(copy):
     write_batch(copy / "data/raw/other", pretensions=(5.0,))
     keep_one_study(copy)
     config = yaml.safe_load((copy / "config.yaml").read_text())
@@ -254,19 +229,19 @@ def test_a_rig_has_its_own_fits_and_a_batch_its_own_settings(diagnosed_copy):
     }
 
 
-def test_snakemakes_report_has_page_diagnoses_tables_and_figures_with_their_captions(diagnosed):
-    run = snakemake(diagnosed, "--report", str(diagnosed / "report.zip"))
+def test_snakemakes_report_has_page_diagnoses_tables_and_figures_with_their_captions(finished):
+    run = snakemake(finished, "--report", str(finished / "report.zip"))
     assert run.returncode == 0, run.stdout + run.stderr
-    with zipfile.ZipFile(diagnosed / "report.zip") as archive:
+    with zipfile.ZipFile(finished / "report.zip") as archive:
         text = archive.read("report/report.html").decode()
         entries, _ = json.JSONDecoder().raw_decode(text, text.index('{"results/index.html"'))
         # They are the files of the run, not drawn again.
         for file, entry in entries.items():
-            assert archive.read(f"report/{entry['data_uri']}") == (diagnosed / file).read_bytes(), file
-    results = diagnosed / "results"
+            assert archive.read(f"report/{entry['data_uri']}") == (finished / file).read_bytes(), file
+    results = finished / "results"
     wanted = {results / "index.html", *results.glob("diagnoses/*/report.html"), *results.glob("tables/*.csv")}
     wanted |= set(results.glob("figures/**/*.png"))
-    assert set(entries) == {str(file.relative_to(diagnosed)) for file in wanted}
+    assert set(entries) == {str(file.relative_to(finished)) for file in wanted}
     caption = {file: entry["caption"] for file, entry in entries.items()}
     assert all(text.startswith("<p>") for text in caption.values())
     assert "pretension: tiny. Loops of the last whole cycle" in caption["results/figures/pretension.png"]
@@ -277,18 +252,17 @@ def test_snakemakes_report_has_page_diagnoses_tables_and_figures_with_their_capt
 
 
 @pytest.mark.long
-def test_batches_of_a_rig_are_diagnosed_together(diagnosed_copy):
-    folder = diagnosed_copy
-    write_batch(folder / "data/raw/other", pretensions=(7.0, 5.0))
-    keep_one_study(folder)
-    config = yaml.safe_load((folder / "config.yaml").read_text())
+def test_batches_of_a_rig_are_diagnosed_together(copy):
+    write_batch(copy / "data/raw/other", pretensions=(7.0, 5.0))
+    keep_one_study(copy)
+    config = yaml.safe_load((copy / "config.yaml").read_text())
     config |= {"rigs": {"bench": ["tiny", "other"]}, "diagnose": ["tiny"], "diagnose_rigs": "each"}
     config["diagnosing_by_batch"] = {"bench": {"step_s": 0.01}}
-    (folder / "config.yaml").write_text(yaml.safe_dump(config))
-    run = snakemake(folder)
+    (copy / "config.yaml").write_text(yaml.safe_dump(config))
+    run = snakemake(copy)
     assert run.returncode == 0, run.stdout + run.stderr
     assert "Diagnosing rig bench" in run.stdout + run.stderr
-    results = folder / "results"
+    results = copy / "results"
     said = json.loads((results / "diagnoses/bench/diagnosis.json").read_text())
     assert (said["batch"], said["batches"], said["verdict"]) == ("bench", ["tiny", "other"], "agrees")
     assert not (results / "diagnoses/other").exists()
