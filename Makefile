@@ -7,8 +7,8 @@ CORES ?= 2
 REGRESSORS ?= $(RIVALS)
 
 .PHONY: help results real data test long-tests fuzz docs bench accuracy-gate input-checks diagnosis-settings decision-rules \
-  form-errors joint-rigs outside-rigs past several-effects table-one coverage proof proof-full proof-real slurm-test \
-  kills same-bytes load mutants lint lint-types lint-style lock sbom clean
+  form-errors joint-rigs law-bands outside-rigs past several-effects table-one coverage proof proof-full proof-real \
+  slurm-test kills same-bytes load mutants lint lint-types lint-style lock sbom clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -89,6 +89,10 @@ joint-rigs: $(VENV)/.ready  ## diagnose together the studies of rigs that no sin
 several-effects: $(VENV)/.ready  ## diagnose rigs with several effects: make several-effects KIND=triple SEED=0 N=20
 	$(BIN)/python -m benchmarks.several_effects --kind $(or $(KIND),triple) --seed $(or $(SEED),0) --count $(or $(N),20) \
 	  --cores $(CORES) --out results/several-effects
+
+law-bands: $(VENV)/.ready  ## count how often the band of a learned law holds the true one: make law-bands SEED=320000 N=12
+	$(BIN)/python -m benchmarks.law_bands --first $(or $(SEED),320000) --count $(or $(N),12) --cores $(CORES) \
+	  --out results/law-bands.csv
 
 past: $(VENV)/.ready  ## diagnose cables with a past and fresh ones: make past SEED=0 N=10
 	$(BIN)/python -m benchmarks.past --seed $(or $(SEED),0) --count $(or $(N),10) --cores $(CORES) --out results/past

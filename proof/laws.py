@@ -74,15 +74,20 @@ def is_confidently_wrong_law(o: Outcome) -> bool:
 
 
 def inside(o: Outcome) -> float | None:
-    """Share of a curve's points at which the true law is inside its band; None for another argument than the true one.
+    """Share of a curve's points at which the true law is inside its band; None if its argument is not the true one."""
+    law, truth = law_in_slot(o), _truth(o)
+    if law is None or law["arguments"] != [truth["argument"]]:
+        return None
+    return share_inside(law["curve"], truth)
+
+
+def share_inside(curve: Sequence[Sequence[float]], truth: Mapping) -> float | None:
+    """Share of a curve's points, of those in the range of the true law, at which this is inside the curve's band.
 
     The true law has what a calibration absorbs as the curve has it: a factor of a factor, an average of what is added,
     and a slope of what is added by an angle.
     """
-    law, truth = law_in_slot(o), _truth(o)
-    if law is None or law["arguments"] != [truth["argument"]]:
-        return None
-    x, y, low, high = np.array(law["curve"]).T
+    x, y, low, high = np.array(curve).T
     true_x, true_y = np.array(truth["curve"]).T
     visited = (x >= true_x[0]) & (x <= true_x[-1])
     if not visited.any():

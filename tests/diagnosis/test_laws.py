@@ -75,11 +75,12 @@ def test_the_law_is_named_by_its_slot_and_argument(learned):
 
 def test_its_curve_is_the_true_one_up_to_what_a_calibration_absorbs(learned):
     (law,) = json.loads((learned[1] / "diagnosis.json").read_text())["laws"]
-    x, y = np.array(law["curve"]).T[:2]
+    x, y, low, high = np.array(law["curve"]).T
     true = COGGING_NM * np.sin(2 * np.pi * x / PERIOD_RAD)
     # What it adds on average, and in proportion to the angle, belongs to the calibration.
     absorbed = np.polyval(np.polyfit(x, y - true, 1), x)
     assert np.abs(y - true - absorbed).max() < 0.25 * COGGING_NM
+    assert np.mean((true + absorbed >= low) & (true + absorbed <= high)) >= 0.9
     assert law["formula"] == "a + b cos(2 pi x/p) + c sin(2 pi x/p)"
     assert law["parameters"][-1]["value"] == pytest.approx(PERIOD_RAD, rel=0.03)
 

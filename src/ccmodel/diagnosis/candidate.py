@@ -128,6 +128,24 @@ class CandidateFit:
         derivatives = np.array([[f.prior_precision * (name == other) for other in self.values] for name, f in stated])
         return distances, derivatives.reshape(len(stated), len(self.values))
 
+    @cached_property
+    def prior_precision(self) -> NDArray:
+        """Reciprocal standard deviation of each unknown's prior in the cost of the fit, 0 without one; (unknowns,)."""
+        unknowns = dict(self.free) | self.hypothesis.free(self.values)
+        unknowns |= _with_priors(self.whitened, self.hypothesis, unknowns)
+        return np.array([unknowns[name].prior_precision for name in self.values])
+
+    @property
+    def sizes(self) -> NDArray:
+        """The unit in which each unknown is measured, shape (unknowns,)."""
+        of_prior = zip(self.values.items(), self.prior_precision, strict=True)
+        return np.array([1 / precision if precision else size_of(*one) for one, precision in of_prior])
+
+    @property
+    def information(self) -> list[NDArray]:
+        """By recording, the information of its errors in the cost of the fit, shape (unknowns, unknowns)."""
+        return [mean_weight(w.observations) * J.T @ J for w, J in zip(self.whitened, self.jacobian, strict=True)]
+
     @property
     def is_plausible(self) -> bool:
         """Whether its mechanisms' strengths lie within their plausible ranges."""
@@ -418,11 +436,9 @@ def discretisation_shift(candidate: CandidateFit) -> NDArray:
     ]
     changes = each(finer, lambda i, w: w.errors(candidate.values) - candidate.residuals[i])
     weights = [mean_weight(w.observations) for w in candidate.whitened]
-    sizes = np.array([size_of(n, v) for n, v in candidate.values.items()])
-    information = sum(c * J.T @ J for J, c in zip(candidate.jacobian, weights, strict=True))
-    information += candidate.prior[1].T @ candidate.prior[1]
+    information = sum(candidate.information, np.diag(candidate.prior_precision**2))
     score = sum(c * J.T @ e for J, e, c in zip(candidate.jacobian, changes, weights, strict=True))
-    return -inverse_of(information, sizes) @ score
+    return -inverse_of(information, candidate.sizes) @ score
 
 
 def _given(covariance: NDArray, wanted: list[int], known: list[int]) -> NDArray:

@@ -8,6 +8,7 @@ from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.formula import shortest
 from ccmodel.diagnosis.hypothesis import laws_in
 from ccmodel.diagnosis.laws import unknowns_of, values_of
+from ccmodel.diagnosis.linear_functions import half_widths_of
 from ccmodel.diagnosis.listed_laws import learned_of, nearest_listed
 from ccmodel.diagnosis.verdict import Judgement
 from ccmodel.distributions import normal_quantile
@@ -46,13 +47,14 @@ def _stated(judgement: Judgement, law: Law) -> dict:
 
 def curve_of(candidate: CandidateFit, law: Law) -> tuple[NDArray, NDArray, tuple[NDArray, NDArray]]:
     """A fitted law's arguments at its knots, its values there, and the ends of their 90 % band; shapes (knots,)."""
-    values, some = values_of(candidate, law), unknowns_of(candidate, law)
+    values = values_of(candidate, law)
     x, y = law.at_knots(values)
     shown = law.shown(x)
-    y, by_coefficients = shown @ y, values["scale"] * (shown @ law.basis)
-    covariance = by_coefficients @ candidate.covariance[np.ix_(some, some)] @ by_coefficients.T
-    variance = np.diag(covariance).clip(0.0) + of_straight_pieces(x, y) ** 2
-    reach = normal_quantile(0.5 + COVERAGE / 2) * np.sqrt(variance)
+    by_unknowns = np.zeros((len(x), len(candidate.values)))
+    by_unknowns[:, unknowns_of(candidate, law)] = values["scale"] * (shown @ law.basis)
+    y = shown @ y
+    by_pieces = normal_quantile(0.5 + COVERAGE / 2) * of_straight_pieces(x, y)
+    reach = np.hypot(half_widths_of(candidate, by_unknowns), by_pieces)
     middle, possible = y + law.form.neutral, law.form.possible
     low, high = (possible(middle + sign * reach) for sign in (-1, 1))
     return x, possible(middle), (low, high)

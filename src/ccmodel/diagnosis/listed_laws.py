@@ -12,11 +12,8 @@ from scipy.optimize import least_squares
 from ccmodel import mechanisms as registry
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
-from ccmodel.diagnosis.hypothesis import coefficients_of
 from ccmodel.diagnosis.laws import unknowns_of, values_of
-from ccmodel.inference.cross_validation import inverse_of
-from ccmodel.inference.effective_samples import of_recording
-from ccmodel.inference.jacobian import size_of
+from ccmodel.diagnosis.linear_functions import covariance_by_information
 from ccmodel.mechanisms.contract import Curve, Parameter
 from ccmodel.mechanisms.learned import Law
 
@@ -135,18 +132,6 @@ def learned_of(candidate: CandidateFit, law: Law) -> Learned:
     all recordings: a jackknife over few recordings is singular.
     """
     some = unknowns_of(candidate, law)
-    by_information = _inverse_information(candidate)[np.ix_(some, some)]
+    by_information = covariance_by_information(candidate)[np.ix_(some, some)]
     ratio = np.sqrt(np.diag(candidate.covariance)[some] / np.diag(by_information))
     return Learned(law, values_of(candidate, law), by_information * np.outer(ratio, ratio))
-
-
-def _inverse_information(candidate: CandidateFit) -> NDArray:
-    """Covariance of all unknowns by the information of the recordings and of the priors."""
-    prior_sd = coefficients_of(candidate.hypothesis)
-    information = np.diag([prior_sd[name] ** -2 if name in prior_sd else 0.0 for name in candidate.values])
-    of_calibration = candidate.prior[1].T @ candidate.prior[1] / len(candidate.whitened)
-    for w, J in zip(candidate.whitened, candidate.jacobian, strict=True):
-        count = of_recording(w.observations)
-        information += count * (J.T @ J / w.measured.size + of_calibration)
-    sizes = [prior_sd.get(name) or size_of(name, value) for name, value in candidate.values.items()]
-    return inverse_of(information, np.array(sizes))

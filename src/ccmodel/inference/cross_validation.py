@@ -107,9 +107,14 @@ def shortened(problem: Problem, x: NDArray, aside: NDArray, joint: Sequence[NDAr
 
 
 def jackknife(
-    moved: NDArray, information: Sequence[NDArray], inverse: NDArray, without: Sequence[NDArray]
+    moved: NDArray,
+    information: Sequence[NDArray],
+    inverse: NDArray,
+    without: Sequence[NDArray],
+    functions: NDArray | None = None,
 ) -> tuple[NDArray, NDArray]:
-    """Covariance of a fit from how far it moves as each recording is left out.
+    """Covariance of a fit's unknowns, or of linear functions of them, from how far it moves as each recording is left
+    out.
 
     Recordings differ in how much information they give: left out, the informative ones move a fit further than their
     share of the variance, and few of them are few degrees of freedom. Variances are scaled to be right in the mean if
@@ -126,23 +131,28 @@ def jackknife(
         Inverse of the information of all recordings.
     without : sequence of ndarray, each of shape (unknowns, unknowns)
         By recording, inverse of the information of all others.
+    functions : ndarray, shape (functions, unknowns), optional
+        Coefficients of the linear functions; each unknown itself if not given.
 
     Returns
     -------
-    covariance : ndarray, shape (unknowns, unknowns)
-    degrees_of_freedom : ndarray, shape (unknowns,)
+    covariance : ndarray, shape (functions, functions)
+    degrees_of_freedom : ndarray, shape (functions,)
         Of each variance, 1 at least.
     """
-    n, aside = len(moved), np.stack(without)
+    of = np.eye(moved.shape[1]) if functions is None else functions
+    n, aside = len(moved), np.stack(without) @ of.T
     effect = np.einsum("iab,ibk->kia", np.stack(information), aside)
-    # By unknown, the expected products of the moves that two recordings cause.
+    # By function, the expected products of the moves that two recordings cause.
     expected = -effect @ inverse @ effect.transpose(0, 2, 1)
     expected[:, range(n), range(n)] += np.einsum("iak,kia->ki", aside, effect)
     mean, square = np.trace(expected, axis1=1, axis2=2), (expected**2).sum(axis=(1, 2))
-    known = (square > 0) & (np.diag(inverse) > 0)
+    variance = np.einsum("ka,ab,kb->k", of, inverse, of)
+    known = (square > 0) & (variance > 0)
     degrees = np.divide(mean**2, square, out=np.ones_like(mean), where=known).clip(1.0)
-    excess = np.sqrt(np.divide(mean, np.diag(inverse), out=np.ones_like(mean), where=known))
-    return moved.T @ moved / np.outer(excess, excess), degrees
+    excess = np.sqrt(np.divide(mean, variance, out=np.ones_like(mean), where=known))
+    functions_moved = moved @ of.T
+    return functions_moved.T @ functions_moved / np.outer(excess, excess), degrees
 
 
 def inverse_of(information: NDArray, sizes: NDArray) -> NDArray:
