@@ -9,7 +9,7 @@ import pytest
 
 from ccmodel.api.batch import load
 from ccmodel.diagnosis import settings
-from ccmodel.diagnosis.candidate import LAST_SEARCH, continued, discretisation_shift, fit
+from ccmodel.diagnosis.candidate import LAST_SEARCH, continued, discretisation_shift, evaluated, fit
 from ccmodel.diagnosis.hypothesis import Hypothesis, single_mechanisms
 from ccmodel.diagnosis.result import least_strength, mechanism_of
 from ccmodel.diagnosis.run import Options, calibrate
@@ -72,6 +72,17 @@ def test_continuation_goes_down_as_long_as_the_cost_falls(least, end):
         return SimpleNamespace(x=x, cost=1 + abs(np.log((x[1] + 1e-9) / (least + 1e-9))))
 
     assert continued(search, search(np.array([3.0, 0.1])), 1, LOW).x == pytest.approx([3.0, end])
+
+
+def test_a_fit_that_is_evaluated_again_is_the_same_fit():
+    ingested = load(Path(__file__).parents[2] / "data/raw/half-loop")._ingested
+    found = calibrate(ingested.recordings, Parameters.estimated(ingested.stated.rig), Options(step_s=0.06))
+    hypothesis = Hypothesis((("relaxation", "cable"),))
+    once = fit(found.whitened, hypothesis, found.tested.free, found.fit.values | hypothesis.start)
+    again = evaluated(once, found.whitened)
+    assert again.values == pytest.approx(once.values, rel=1e-6, abs=1e-6)
+    assert again.mean_square == pytest.approx(once.mean_square, rel=0.02)
+    assert np.diag(again.covariance) == pytest.approx(np.diag(once.covariance), rel=0.2)
 
 
 def test_a_model_without_unknowns_is_evaluated_as_it_is():

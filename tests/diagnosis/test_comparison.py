@@ -9,6 +9,7 @@ import pytest
 
 from ccmodel.deadline import UNLIMITED, Deadline
 from ccmodel.diagnosis import comparison as comparisons
+from ccmodel.diagnosis import selection as selections
 from ccmodel.diagnosis.candidate import LAST_SEARCH, CandidateFit
 from ccmodel.diagnosis.comparison import Comparison, imitation, log_priors
 from ccmodel.diagnosis.discrepancy import Evidence
@@ -544,10 +545,19 @@ def test_the_covariance_is_linearised_about_the_best_candidate(monkeypatch):
     moved = replace(again.linearised_about, values=dict.fromkeys(again.linearised_about.values, 0.0))
     assert not replace(again, linearised_about=moved).is_linearised_about(again.candidates[0])
 
+    deadline = SimpleNamespace(has_passed=False, check=lambda: None)
+
     def in_time_for_one(self, *given):
-        monkeypatch.setattr(Deadline, "has_passed", True)
+        deadline.has_passed = True
         return candidates[:1]
 
+    # Where the time is over, a rival has its former values under the new covariance.
     monkeypatch.setattr(Selection, "fit_all", in_time_for_one)
-    found = Comparison.of(recordings, base, candidates, SCREENED)
-    assert selection.relinearise(found) is found, "the other one would be lost"
+    monkeypatch.setattr(selections, "contenders", lambda found: found.by_evidence)
+    late_selection = Selection(base.free, [], deadline=deadline)
+    found = late_selection.relinearise(Comparison.of(recordings, base, candidates, SCREENED))
+    first, late = found.candidates
+    assert first is candidates[0]
+    assert late.hypothesis == candidates[1].hypothesis
+    assert late.values == pytest.approx(candidates[1].values, rel=1e-6, abs=1e-6)
+    assert late.whitened[0].shrinkage == pytest.approx(again.whitened[0].shrinkage)

@@ -131,8 +131,7 @@ class CandidateFit:
     @cached_property
     def prior_precision(self) -> NDArray:
         """Reciprocal standard deviation of each unknown's prior in the cost of the fit, 0 without one; (unknowns,)."""
-        unknowns = dict(self.free) | self.hypothesis.free(self.values)
-        unknowns |= _with_priors(self.whitened, self.hypothesis, unknowns)
+        unknowns = _unknowns(self.whitened, self.hypothesis, self.free, self.values)
         return np.array([unknowns[name].prior_precision for name in self.values])
 
     @property
@@ -252,8 +251,7 @@ def fit(
     ccmodel.deadline.OutOfTimeError
         If the deadline has passed.
     """
-    unknowns = {n: replace(f, start=start[n]) for n, f in free.items()} | hypothesis.free(start)
-    unknowns |= _with_priors(whitened, hypothesis, unknowns)
+    unknowns = _unknowns(whitened, hypothesis, free, start)
     modelled = _with_states(whitened, hypothesis, {n: f.start for n, f in unknowns.items()})
     problem = Problem(modelled, unknowns, weight=mean_weight)
     # Runs of the paper's model are cheap, and its cost is rough where much is missing.
@@ -273,11 +271,43 @@ def fit(
         solution = minimise(problem, inside_bounds(problem, solution.x), further)
         if abs(solution.cost - before) < settings.STATE_TOLERANCE * before:
             break
+    return _cross_validated(hypothesis, free, problem, solution)
+
+
+def evaluated(candidate: CandidateFit, whitened: Sequence[Whitened]) -> CandidateFit:
+    """A candidate with its values, under the covariance of other whitened observations: a fit that takes no step.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be run.
+    """
+    hypothesis, values = candidate.hypothesis, candidate.values
+    unknowns = _unknowns(whitened, hypothesis, candidate.free, values)
+    own = [w.states_within_range(values) for w in candidate.whitened]
+    problem = Problem(_with_states(whitened, hypothesis, values, own), unknowns, weight=mean_weight)
+    solution = minimise(problem, inside_bounds(problem, problem.start), replace(SEARCH, most_evaluations=1))
+    return _cross_validated(hypothesis, candidate.free, problem, solution)
+
+
+def _unknowns(
+    whitened: Sequence[Whitened], hypothesis: Hypothesis, free: Mapping[str, Free], start: Mapping[str, float]
+) -> dict[str, Free]:
+    """Unknowns of the calibration and of the mechanisms, with their priors and these starting values."""
+    unknowns = {n: replace(f, start=start[n]) for n, f in free.items()} | hypothesis.free(start)
+    return unknowns | _with_priors(whitened, hypothesis, unknowns)
+
+
+def _cross_validated(
+    hypothesis: Hypothesis, free: Mapping[str, Free], problem: Problem, solution: Solution
+) -> CandidateFit:
+    """The candidate of a solution, with what each recording's absence does to it."""
+    modelled = problem.observations
     left_out = leave_one_out(problem, solution)
     covariance, degrees = left_out.covariance, left_out.degrees_of_freedom
     if len(modelled) == 1:
         covariance = covariance / of_recording(modelled[0].observations)
-    if any(f.spread for f in unknowns.values()):
+    if problem.prior_precision.any():
         covariance, degrees = at_least_by_information(problem, solution, covariance, degrees)
     roots = [np.sqrt(w.measured.size) for w in modelled]
     return CandidateFit(

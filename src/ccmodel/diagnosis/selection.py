@@ -7,7 +7,7 @@ from typing import Self
 
 from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis import settings
-from ccmodel.diagnosis.candidate import LAST_SEARCH, SEARCH, CandidateFit, fit
+from ccmodel.diagnosis.candidate import LAST_SEARCH, SEARCH, CandidateFit, evaluated, fit
 from ccmodel.diagnosis.comparison import Comparison, is_part_of
 from ccmodel.diagnosis.equation_error import other_start
 from ccmodel.diagnosis.hypothesis import Hypothesis, law_of, laws_in
@@ -269,8 +269,11 @@ class Selection:
             return found
         leading = contenders(found)
         again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in leading for s in starts(c)])
-        # Of rivals that were not fitted again in time, none must be lost.
-        if self.deadline.has_passed or not any(c.hypothesis == best.hypothesis for c in again):
+        if self.deadline.has_passed:
+            # No rival must be lost: without it, the others would be more probable.
+            in_time = {c.hypothesis for c in again}
+            again += self._evaluated([c for c in leading if c.hypothesis not in in_time], whitened)
+        if not any(c.hypothesis == best.hypothesis for c in again):
             return found
         # About the same mechanisms once more: only if that leads on.
         about = found.linearised_about
@@ -278,6 +281,17 @@ class Selection:
         if about and about.hypothesis == best.hypothesis and reached >= best.mean_square:
             return found
         return Comparison.of(whitened, base, again, found.screened, best)
+
+    def _evaluated(self, late: Sequence[CandidateFit], whitened: Sequence[Whitened]) -> list[CandidateFit]:
+        """Candidates under another covariance with the values that they have, which takes few runs of the model."""
+        found = []
+        for candidate in late:
+            self.progress(f"{candidate.hypothesis}: its values stay, as the time is over")
+            try:
+                found.append(evaluated(candidate, whitened))
+            except (ModelError, ValueError) as error:
+                self.progress(f"{candidate.hypothesis}: cannot be run ({error})")
+        return found
 
     def completed(self, found: Comparison) -> Comparison:
         """The same with the contenders fitted to the end, so that rounding errors do not choose their values.
