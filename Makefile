@@ -112,7 +112,8 @@ proof: $(VENV)/.ready  ## diagnose four cases with concealed effects and score t
 	  --figures results/proof/figures --command "make proof" --selection "Four cases with fixed seeds." --strict
 
 proof-full: $(VENV)/.ready  ## the full validation, or N of its cases drawn at random: docs/proof.md; resumes an interrupted run
-	$(BIN)/snakemake --snakefile proof/Snakefile --cores $(CORES) --keep-going $(if $(N)$(REGRESSORS),--config $(if $(N),cases=$(N)) $(if $(REGRESSORS),regressors=true))
+	$(BIN)/python workflow/run.py results/proof \
+	  $(BIN)/snakemake --snakefile proof/Snakefile --cores $(CORES) --keep-going $(if $(N)$(REGRESSORS),--config $(if $(N),cases=$(N)) $(if $(REGRESSORS),regressors=true))
 
 proof-real: $(VENV)/.ready  ## seed faults in the public da Vinci recordings and diagnose them: make proof-real DATA=path
 	@test -n "$(DATA)" || { echo "make proof-real needs DATA=path of the mis-tool-characterization data" >&2; exit 2; }
