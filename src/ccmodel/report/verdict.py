@@ -232,7 +232,7 @@ def _scale(value: float, unit: str) -> tuple[float, str]:
     """Factor from SI to the printed unit, and that unit with a space before it."""
     if unit == "%":
         return 100.0, " %"
-    printed = re.sub(r"\^(\d)", lambda m: m[1].translate(_SUPERSCRIPT), unit).replace("*", " ")
+    printed = printed_unit(unit)
     if unit in _WITHOUT_PREFIX:
         printed = "" if unit == "1" else f" {printed}"
         power = _exponent(value)
@@ -241,6 +241,11 @@ def _scale(value: float, unit: str) -> tuple[float, str]:
         return 10.0**-power, f"·10{str(power).translate(_SUPERSCRIPT)}{printed}"
     size, prefix = next((p for p in _PREFIXES if abs(value) >= 0.1 * p[0]), _PREFIXES[0])
     return 1 / size, f" {prefix}{printed}"
+
+
+def printed_unit(unit: str) -> str:
+    """A unit of diagnosis.json as it is printed: ``N m`` for ``N*m``, ``m²`` for ``m^2``."""
+    return re.sub(r"\^(\d)", lambda m: m[1].translate(_SUPERSCRIPT), unit).replace("*", " ")
 
 
 def place_in_words(place: str) -> str:

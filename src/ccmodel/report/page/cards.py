@@ -15,6 +15,7 @@ from ccmodel.report.verdict import (
     nearest_sentence,
     place_in_words,
     possible_places,
+    printed_unit,
     sentence,
 )
 from ccmodel.sentences import joined
@@ -137,7 +138,7 @@ def _rows(error: Mapping[str, Mapping], nearest: Mapping[str, Mapping] | None) -
             "before": e["before"] / e["noise"],
             "after": after[channel]["after"] / e["noise"] if changed else None,
             "noise": e["noise"],
-            "unit": e["unit"].replace("*", " "),
+            "unit": printed_unit(e["unit"]),
         }
         for channel, e in error.items()
     ]

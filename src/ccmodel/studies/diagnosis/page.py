@@ -33,6 +33,8 @@ from ccmodel.report.verdict import (
     nearest_sentence,
     place_in_words,
     possible_places,
+    printed_unit,
+    quantity,
     worst_channel,
 )
 from ccmodel.rig.overview import overview_of
@@ -42,7 +44,7 @@ CANDIDATES = 8
 FAINT = "#9a9a9a"
 # Letters of an axis label that fit beside a panel of a law.
 LABEL_LETTERS = 34
-WITH_FOUND = "with the mechanisms found"
+WITH_FOUND = "with what was found"
 
 
 def _baseline(report: dict) -> str:
@@ -128,7 +130,8 @@ def _template(name: str) -> jinja2.Template:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("ccmodel", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
-    environment.globals["asset"] = asset
+    environment.globals |= {"asset": asset, "quantity": quantity}
+    environment.filters["printed_unit"] = printed_unit
     return environment.get_template(f"studies/diagnosis/{name}")
 
 
@@ -155,7 +158,9 @@ def repeatability_in_words(rows: Sequence[Mapping]) -> str:
     """The standard deviations that count as noise: what the recordings show, and what was assumed."""
     shown, assumed = [], []
     for row in rows:
-        size = f"{100 * row['value']:.2g} %" if row["unit"] == "1" else f"{row['value']:.2g} {row['unit']}"
+        size = (
+            f"{100 * row['value']:.2g} %" if row["unit"] == "1" else f"{row['value']:.2g} {printed_unit(row['unit'])}"
+        )
         if row["from"] == "assumed":
             assumed.append(f"{row['what']} {size}")
         else:
@@ -215,7 +220,7 @@ def _why(fit: CandidateFit, found: Diagnosis) -> str:
 
 
 def _map(found: Diagnosis) -> Figure:
-    """Errors over the noise by channel and part of the motion: baseline and, if any, with the mechanisms found."""
+    """Errors over the noise by channel and part of the motion: baseline and, if any, with what was found."""
     j = found.judgement
     before = mismatch(found.calibrated, j.whitened)
     highest = max(np.nanmax([list(v.values()) for v in before.values()]), 3.0)
@@ -240,7 +245,7 @@ def _map(found: Diagnosis) -> Figure:
 
 
 def _loops(found: Diagnosis) -> Figure:
-    """Worst channel of the recordings with the largest errors: measured, baseline, and with the mechanisms found."""
+    """Worst channel of the recordings with the largest errors: measured, baseline, and with what was found."""
     j = found.judgement
     chosen = nested_choice(j)
     worst = worst_channel(found.report["fit"]["error"])
