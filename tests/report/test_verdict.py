@@ -6,7 +6,7 @@ import pytest
 from made_pages import BACKLASH, SCALE, diagnosis
 
 from ccmodel import mechanisms
-from ccmodel.report.verdict import claim, headline, nearest_sentence, quantity, sentence
+from ccmodel.report.verdict import claim, headline, nearest_sentence, quantity, rounded, sentence, with_symbols
 
 
 def gain(value, low, high, place="load-sensor"):
@@ -62,6 +62,25 @@ def test_every_mechanism_has_a_sentence_on_its_own_strengths(name):
 )
 def test_a_quantity_has_the_digits_that_its_interval_leaves(given, shown):
     assert quantity(*given) == shown
+
+
+@pytest.mark.parametrize(
+    ("given", "shown"),
+    [
+        ((9.84e-5, "N*m"), "98 µN m"),
+        ((0.0123, "%"), "1.2 %"),
+        ((99.7, "N"), "100 N"),
+        ((9.07e-4, "rad"), "0.91 mrad"),
+        ((0.0, "N"), "0 N"),
+    ],
+)
+def test_a_rounded_value_has_two_digits(given, shown):
+    assert rounded(*given) == shown
+
+
+def test_channels_of_a_text_have_their_symbols():
+    said = "tau_in and theta_out are off most; sum_of_tau_inner stays"
+    assert with_symbols(said) == "τ_in and θ_out are off most; sum_of_tau_inner stays"
 
 
 def test_each_verdict_has_its_sentence():

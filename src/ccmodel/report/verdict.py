@@ -243,6 +243,17 @@ def _scale(value: float, unit: str) -> tuple[float, str]:
     return 1 / size, f" {prefix}{printed}"
 
 
+def rounded(value: float, unit: str) -> str:
+    """A value with two digits and its unit, as ``98 µN m``; parameters as of `quantity`."""
+    factor, printed = _scale(value, unit)
+    return f"{float(f'{factor * value:.2g}'):g}{printed}"  # 100, not 1e+02
+
+
+def with_symbols(text: str) -> str:
+    """A text of diagnosis.json with the symbols of channels in place of their names."""
+    return re.sub(rf"\b({'|'.join(SYMBOL)})\b", lambda m: SYMBOL[m[0]], text)
+
+
 def printed_unit(unit: str) -> str:
     """A unit of diagnosis.json as it is printed: ``N m`` for ``N*m``, ``m²`` for ``m^2``."""
     return re.sub(r"\^(\d)", lambda m: m[1].translate(_SUPERSCRIPT), unit).replace("*", " ")

@@ -35,6 +35,8 @@ from ccmodel.report.verdict import (
     possible_places,
     printed_unit,
     quantity,
+    rounded,
+    with_symbols,
     worst_channel,
 )
 from ccmodel.rig.overview import overview_of
@@ -131,7 +133,7 @@ def _template(name: str) -> jinja2.Template:
         loader=jinja2.PackageLoader("ccmodel", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
     environment.globals |= {"asset": asset, "quantity": quantity}
-    environment.filters["printed_unit"] = printed_unit
+    environment.filters |= {"printed_unit": printed_unit, "with_symbols": with_symbols}
     return environment.get_template(f"studies/diagnosis/{name}")
 
 
@@ -158,13 +160,12 @@ def repeatability_in_words(rows: Sequence[Mapping]) -> str:
     """The standard deviations that count as noise: what the recordings show, and what was assumed."""
     shown, assumed = [], []
     for row in rows:
-        size = (
-            f"{100 * row['value']:.2g} %" if row["unit"] == "1" else f"{row['value']:.2g} {printed_unit(row['unit'])}"
-        )
+        size = rounded(row["value"], "%" if row["unit"] == "1" else row["unit"])
+        stated = f"{with_symbols(row['what'])} {size}"
         if row["from"] == "assumed":
-            assumed.append(f"{row['what']} {size}")
+            assumed.append(stated)
         else:
-            shown.append(f"{row['what']} {size} ({row['recordings']} recordings {SOURCES[row['from']]})")
+            shown.append(f"{stated} ({row['recordings']} recordings {SOURCES[row['from']]})")
     parts = [f"estimated: {', '.join(shown)}"] * bool(shown) + [f"assumed: {', '.join(assumed)}"] * bool(assumed)
     return f"Standard deviations that count as noise, {'; '.join(parts)}."
 
