@@ -25,7 +25,7 @@ rule diagnose:
     threads: 2
     resources:
         mem_mb=2000,
-        runtime=60,
+        runtime=150,
     params:
         settings=lambda wildcards: CONFIG.diagnosing_of(
             wildcards.batch
