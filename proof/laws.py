@@ -82,7 +82,7 @@ def inside(o: Outcome) -> float | None:
 
 
 def share_inside(curve: Sequence[Sequence[float]], truth: Mapping) -> float | None:
-    """Share of a curve's points, of those in the range of the true law, at which this is inside the curve's band.
+    """Share of a curve's points within the range of the true law at which the true law is inside its band.
 
     The true law has what a calibration absorbs as the curve has it: a factor of a factor, an average of what is added,
     and a slope of what is added by an angle.

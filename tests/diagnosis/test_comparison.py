@@ -561,3 +561,7 @@ def test_the_covariance_is_linearised_about_the_best_candidate(monkeypatch):
     assert late.hypothesis == candidates[1].hypothesis
     assert late.values == pytest.approx(candidates[1].values, rel=1e-6, abs=1e-6)
     assert late.whitened[0].shrinkage == pytest.approx(again.whitened[0].shrinkage)
+    # Where laws follow, all are fitted again with them.
+    deadline.has_passed = False
+    before = Comparison.of(recordings, base, candidates, SCREENED)
+    assert replace(late_selection, goes_on=True).relinearise(before) is before

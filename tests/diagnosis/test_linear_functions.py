@@ -55,9 +55,11 @@ def test_intervals_hold_the_truth_where_recordings_differ_by_more_than_noise():
     assert (share_inside([1.0] * 6, scatter=1.0) > 0.88).all()
 
 
-def test_one_recording_has_the_interval_of_its_information():
+@pytest.mark.parametrize("precision", [0.0, 0.7])
+def test_one_recording_has_the_interval_of_its_information_and_of_the_prior(precision):
     one = line(np.random.default_rng(1), [1.0])
-    inverse = np.linalg.inv(IN_DIAGNOSIS * one.information[0])
+    one.prior_precision = np.array([0.0, precision])
+    inverse = np.linalg.inv(IN_DIAGNOSIS * (one.information[0] + np.diag([0.0, precision**2])))
     assert half_widths_of(one, FUNCTIONS) == pytest.approx(
         1.6449 * np.sqrt(np.einsum("ka,ab,kb->k", FUNCTIONS, inverse, FUNCTIONS)), rel=1e-3
     )

@@ -156,6 +156,6 @@ def said(**nearest):
 
 
 def test_the_report_says_whether_it_is_a_listed_law():
-    assert "Within its band this is the law of stribeck" in said(name="stribeck", distance=0.9)
+    assert "Within its uncertainty this is the law of stribeck" in said(name="stribeck", distance=0.9)
     assert "No listed mechanism does this (the nearest is stribeck, 7.4 standard" in said(name="stribeck", distance=7.4)
     assert "No listed mechanism does this; the law" in said()

@@ -47,7 +47,7 @@ def write_config(folder: Path, **studies: dict) -> None:
         "phases": load_config(ROOT / "config/config.yaml").phases.model_dump(),
         "studies": {
             "pretension": {"batches": ["tiny"], "variable": "pretension", "title": "pretension"},
-            "one-run": {"batches": ["tiny"], "figure": "transmission", "parameters": "extended"},
+            **EXTENDED,
             # The claims' other two studies; a drawing of each comes with them.
             "bend": {"batches": ["tiny"], "variable": "bend"},
             "radius": {"batches": ["tiny"], "variable": "radius"},
@@ -95,10 +95,14 @@ def copy(finished, tmp_path):
     return folder
 
 
+# A study whose parameters are those of a diagnosis.
+EXTENDED = {"one-run": {"batches": ["tiny"], "figure": "transmission", "parameters": "extended"}}
+
+
 def keep_one_study(folder: Path, **changes) -> None:
     """Leave in a configuration, for a further run, one study and the fit: a test looks at nothing else."""
     config = yaml.safe_load((folder / "config.yaml").read_text())
-    config = {"fits": config["fits"], "studies": {"one-run": {"batches": ["tiny"], "figure": "transmission"}}}
+    config = {"fits": config["fits"], "studies": {"pretension": config["studies"]["pretension"]}}
     (folder / "config.yaml").write_text(yaml.safe_dump(config | changes))
 
 
@@ -175,7 +179,7 @@ def test_inputs_that_contradict_one_another_are_named_and_get_no_model(copy):
     batch = copy / "data/raw/trusted/batch.yaml"
     batch.write_text(batch.read_text().replace("batch: tiny", "batch: trusted"))
     trusted = {"trust_inputs": True, "time_limit_s": 5}
-    keep_one_study(copy, diagnose="each", diagnosing_by_batch={"trusted": trusted}, fits={})
+    keep_one_study(copy, diagnose="each", diagnosing_by_batch={"trusted": trusted}, fits={}, studies=EXTENDED)
     run = snakemake(copy)
     assert run.returncode == 0, run.stdout + run.stderr
     results = copy / "results"
@@ -254,7 +258,7 @@ def test_snakemakes_report_has_page_diagnoses_tables_and_figures_with_their_capt
 @pytest.mark.long
 def test_batches_of_a_rig_are_diagnosed_together(copy):
     write_batch(copy / "data/raw/other", pretensions=(7.0, 5.0))
-    keep_one_study(copy)
+    keep_one_study(copy, studies=EXTENDED)
     config = yaml.safe_load((copy / "config.yaml").read_text())
     config |= {"rigs": {"bench": ["tiny", "other"]}, "diagnose": ["tiny"], "diagnose_rigs": "each"}
     config["diagnosing_by_batch"] = {"bench": {"step_s": 0.01}}
@@ -353,7 +357,7 @@ def test_a_new_batch_appears_with_three_lines_of_config(copy):
     config["studies"]["added"] = {"batches": ["added"], "variable": "pretension"}
     (copy / "config.yaml").write_text(yaml.safe_dump(config))
     results = copy / "results"
-    old = ["simulated/fitted/tiny.nc", "fits/fitted/shared.json", "recordings/tiny.nc", "figures/one-run.png"]
+    old = ["simulated/fitted/tiny.nc", "fits/fitted/shared.json", "recordings/tiny.nc", "figures/pretension.png"]
     before = [(results / f).stat().st_mtime_ns for f in old]
     assert snakemake(copy).returncode == 0
     assert [(results / f).stat().st_mtime_ns for f in old] == before, "only what depends on the new batch is made"

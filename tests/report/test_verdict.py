@@ -58,6 +58,10 @@ def test_every_mechanism_has_a_sentence_on_its_own_strengths(name):
         ((1.0, 1.0, 1.0, "1"), ("1.00", "1.00 to 1.00")),
         ((0.0, 0.0, 0.0, "N"), ("0.00 N", "0.00 to 0.00 N")),
         ((30.0, 29.9999, 30.0001, "s"), ("30.00 s", "30.00 to 30.00 s")),
+        ((2e-6, -3e-3, 3e-3, "N*m"), ("0 mN m", "-3 to 3 mN m")),
+        ((3.0, 2.0, 4.0, "1/(rad)"), ("3 1/(rad)", "2 to 4 1/(rad)")),
+        ((-0.04, -0.05, -0.03, "log10(m/s)"), ("-0.04 log10(m/s)", "-0.05 to -0.03 log10(m/s)")),
+        ((1e-9, -0.5, 0.5, "1"), ("0.0", "-0.5 to 0.5")),
     ],
 )
 def test_a_quantity_has_the_digits_that_its_interval_leaves(given, shown):

@@ -259,8 +259,7 @@ def fit(
     search = replace(search, deadline=deadline, secants=secants)
     solution = _search(problem, hypothesis, search)
     further = replace(search, most_evaluations=settings.START_EVALUATIONS)
-    has_states = any(registry.get(name).states for name, _ in hypothesis.baseline + hypothesis.acting)
-    for _ in range(settings.STATE_PASSES if has_states else 0):
+    for _ in range(settings.STATE_PASSES if _has_states(hypothesis) else 0):
         # The states' effects were those of the values at the start, which the fit has left.
         before, values = solution.cost, problem.values_of(solution.x, 0)
         own = [w.states_within_range(values) for w in modelled]
@@ -284,10 +283,16 @@ def evaluated(candidate: CandidateFit, whitened: Sequence[Whitened]) -> Candidat
     """
     hypothesis, values = candidate.hypothesis, candidate.values
     unknowns = _unknowns(whitened, hypothesis, candidate.free, values)
-    own = [w.states_within_range(values) for w in candidate.whitened]
+    own = [w.states_within_range(values) for w in candidate.whitened] if _has_states(hypothesis) else None
     problem = Problem(_with_states(whitened, hypothesis, values, own), unknowns, weight=mean_weight)
     solution = minimise(problem, inside_bounds(problem, problem.start), replace(SEARCH, most_evaluations=1))
-    return _cross_validated(hypothesis, candidate.free, problem, solution)
+    again = _cross_validated(hypothesis, candidate.free, problem, solution)
+    return replace(again, message=candidate.message, converged=candidate.converged)
+
+
+def _has_states(hypothesis: Hypothesis) -> bool:
+    """Whether one of its mechanisms has a state when a recording starts."""
+    return any(registry.get(name).states for name, _ in hypothesis.baseline + hypothesis.acting)
 
 
 def _unknowns(

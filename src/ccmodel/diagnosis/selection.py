@@ -50,6 +50,8 @@ class Selection:
         belong to also start from them.
     deadline, sets_until : Deadline
         When the selection ends with what was fitted until then; and when sets are to be fitted before laws are learned.
+    goes_on : bool
+        Whether the deadline is that of the sets, and laws follow.
     """
 
     free: Mapping[str, Free]
@@ -60,6 +62,7 @@ class Selection:
     known: Mapping[str, float] = field(default_factory=dict)
     deadline: Deadline = UNLIMITED
     sets_until: Deadline = UNLIMITED
+    goes_on: bool = False
 
     def run(self, whitened: Sequence[Whitened], base: CandidateFit) -> tuple[Comparison, list[Score]]:
         """Select from all mechanisms; the comparison of what was fitted, and the screening scores."""
@@ -96,7 +99,7 @@ class Selection:
         does. Then laws compete with them, and larger sets follow, unless something is decided. A mechanism that is
         certain but leaves something competes with laws at the end.
         """
-        sets, size = replace(self, deadline=self.sets_until), 2
+        sets, size = replace(self, deadline=self.sets_until, goes_on=True), 2
         while size <= settings.MOST_MECHANISMS:
             part = sets._part((size - 2) / SIZES, (size - 1) / SIZES)
             if not found.is_enough:
@@ -270,6 +273,9 @@ class Selection:
         leading = contenders(found)
         again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in leading for s in starts(c)])
         if self.deadline.has_passed:
+            # All are fitted again when laws compete.
+            if self.goes_on:
+                return found
             # No rival must be lost: without it, the others would be more probable.
             in_time = {c.hypothesis for c in again}
             again += self._evaluated([c for c in leading if c.hypothesis not in in_time], whitened)
@@ -283,10 +289,10 @@ class Selection:
         return Comparison.of(whitened, base, again, found.screened, best)
 
     def _evaluated(self, late: Sequence[CandidateFit], whitened: Sequence[Whitened]) -> list[CandidateFit]:
-        """Candidates under another covariance with the values that they have, which takes few runs of the model."""
+        """Candidates under another covariance with the values that they have."""
         found = []
         for candidate in late:
-            self.progress(f"{candidate.hypothesis}: its values stay, as the time is over")
+            self.progress(f"{candidate.hypothesis}: its values stay")
             try:
                 found.append(evaluated(candidate, whitened))
             except (ModelError, ValueError) as error:

@@ -214,7 +214,8 @@ LAW_STEP = 0.01
 LAWS_FITTED, LAWS_REFINED = 8, 2
 # Starts, of a listed law's constants, from which the best ones are searched. Chosen: a sine has a few minima.
 LISTED_STARTS = 3
-# Distance, in posterior standard deviations, up to which a learned law is a listed one: half of its 90 % band.
+# Distance, in posterior standard deviations, up to which a learned law is a listed one: half of a normal
+# distribution's 90 % interval.
 WITHIN_BAND = 1.645
 # Share of the excess mean square below which what the best single listed mechanism leaves is learned too. Chosen.
 MOSTLY_LISTED = 0.5

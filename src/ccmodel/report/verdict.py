@@ -25,7 +25,7 @@ NOT_ACCEPTED = "not accepted"
 INPUTS_INCONSISTENT = "inputs-inconsistent"
 # A unit is printed with a prefix if the value is below a tenth of it; these units take none.
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
-_WITHOUT_PREFIX = ("1", "1/m", "kg*m^2")
+_WITHOUT_PREFIX = ("1", "kg*m^2")
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -139,12 +139,12 @@ def law_claim(law: Mapping) -> str:
 
 
 def _resemblance(law: Mapping) -> str:
-    """Whether a learned law is that of a listed mechanism within its band, or how far the nearest one is."""
+    """Whether a learned law is that of a listed mechanism within its uncertainty, or how far the nearest one is."""
     nearest = law["nearest_listed"]
     if nearest is None:
         return "No listed mechanism does this"
     if nearest["distance"] <= WITHIN_BAND:
-        return f"Within its band this is the law of {nearest['name']}"
+        return f"Within its uncertainty this is the law of {nearest['name']}"
     away = f"{nearest['distance']:.1f} standard deviations away"
     return f"No listed mechanism does this (the nearest is {nearest['name']}, {away})"
 
@@ -216,7 +216,7 @@ def quantity(value: float, low: float, high: float, unit: str) -> tuple[str, str
     unit : str
         SI unit as in diagnosis.json, "1" for a number, or "%" for a number that is shown in per cent.
     """
-    factor, printed = _scale(value, unit)
+    factor, printed = _scale(max(abs(value), abs(low), abs(high)), unit)
     value, low, high = factor * value, factor * low, factor * high
     reach = float(f"{(high - low) / 2:.3g}")  # without the rounding of binary numbers
     digits = min(-_exponent(reach), 3 - _exponent(value)) if reach > 0 else 2 - _exponent(value)
@@ -233,7 +233,7 @@ def _scale(value: float, unit: str) -> tuple[float, str]:
     if unit == "%":
         return 100.0, " %"
     printed = printed_unit(unit)
-    if unit in _WITHOUT_PREFIX:
+    if unit in _WITHOUT_PREFIX or unit.startswith(("1/", "log10")):
         printed = "" if unit == "1" else f" {printed}"
         power = _exponent(value)
         if -3 <= power <= 3:
