@@ -9,6 +9,7 @@ from proof.calibration import calibration_error, compared_values, doubtful, reli
 from proof.detection import confusion, detection, detection_by_error
 from proof.follow_up import PROPOSED, RANDOM
 from proof.intervals import bootstrap, count
+from proof.laws import is_slot_right
 from proof.outcome import INCONSISTENT, Outcome, after, is_located
 
 INPUTS_ACCEPTED = "right inputs are not called inconsistent"
@@ -60,9 +61,12 @@ def _rates_of_listed(outcomes: Sequence[Outcome]) -> list[dict]:
 def _rates_of_outsiders(outsiders: Sequence[Outcome]) -> list[dict]:
     """Rates of effects that are not among the candidates."""
     visible, detected = [o for o in outsiders if o.is_visible], [o for o in outsiders if o.is_detected]
-    is_open = ("unexplained", "undecided")
+
+    def is_right(o: Outcome) -> bool:
+        return o.verdict in ("unexplained", "undecided") or (o.verdict == "learned" and is_slot_right(o))
+
     return [
-        count("no candidate: unexplained or undecided", outsiders, lambda o: o.verdict in is_open, 0.85),
+        count("no candidate: unexplained, undecided, or a law learned in the true slot", outsiders, is_right, 0.85),
         count("no candidate: unexplained", outsiders, lambda o: o.verdict == "unexplained"),
         count("no candidate, visible: detected", visible, lambda o: o.is_detected),
         count("no candidate, detected: located", detected, is_located),

@@ -59,6 +59,10 @@ OUTSIDER = Outcome(answer("unlisted", RUNOUT), reported("unexplained", place="lo
 OUTSIDER_MISIDENTIFIED = Outcome(
     answer("removed", ("unlisted-kink", "conduit", 0.5, {})), WRONG, errors=errors(9.0, 5.0)
 )
+LEARNED, LEARNED_ELSEWHERE = (
+    Outcome(answer("unlisted", RUNOUT), reported("learned", place=place), errors=errors(9.0, 1.0))
+    for place in ("load-sensor", "conduit")
+)
 UNDECIDED = Outcome(
     answer("poor", GAIN, protocol="single"),
     reported("undecided", alternatives=[("torque-scale", "drive-sensor", 0.5, []), ("kink", "conduit", 0.5, [])]),
@@ -118,7 +122,7 @@ def rate_of(what, *outcomes):
             (CLEAN, FALSE_POSITIVE, IDENTIFIED, MISIDENTIFIED, OUTSIDER_MISIDENTIFIED),
             (2, 5),
         ),
-        ("no candidate: unexplained or", (OUTSIDER, OUTSIDER_MISIDENTIFIED), (1, 2)),
+        ("no candidate: unexplained, ", (OUTSIDER, OUTSIDER_MISIDENTIFIED, LEARNED, LEARNED_ELSEWHERE), (2, 4)),
         ("poor protocol", (UNDECIDED,), (1, 1)),
         ("undecided: a true effect", (UNDECIDED, IDENTIFIED), (1, 1)),
         ("coverage of the 90 %", (IDENTIFIED, MISIDENTIFIED), (1, 1)),
