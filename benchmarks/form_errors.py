@@ -50,15 +50,20 @@ def rigs(effect: str, number: int) -> list[Case]:
     return [case for cases in found.values() for case in cases]
 
 
-def row(case: Case) -> dict:
-    """Mean squares of the calibrated model and of the true mechanism, and the share of the excess that is left."""
+def calibration_of(case: Case) -> Calibration:
+    """The calibrated model of a case's recordings; on one thread, as each process has a case of its own."""
     set_threads(1)
     with tempfile.TemporaryDirectory() as folder:
         batch = Path(folder) / case.name
         record(case, case.recordings, batch)
         ingested = ingest_batch(batch)
+    return calibrate(ingested.recordings, Parameters.estimated(ingested.stated.rig))
+
+
+def row(case: Case) -> dict:
+    """Mean squares of the calibrated model and of the true mechanism, and the share of the excess that is left."""
     (truth,) = case.truth
-    calibrated = calibrate(ingested.recordings, Parameters.estimated(ingested.batch.rig))
+    calibrated = calibration_of(case)
     found = fitted(calibrated, Hypothesis(((truth.name, truth.place),)))
     before, after = calibrated.fit.mean_square, found.mean_square
     share = (after - 1.0) / (before - 1.0)

@@ -8,7 +8,6 @@ of its knots at which the band holds the true law is then that of the band alone
 """
 
 import argparse
-import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from math import inf
@@ -16,16 +15,13 @@ from pathlib import Path
 
 import pandas as pd
 
+from benchmarks.form_errors import calibration_of
 from ccmodel.deadline import Deadline
 from ccmodel.diagnosis.candidate import CandidateFit, fit
 from ccmodel.diagnosis.law_report import curve_of
 from ccmodel.diagnosis.laws import Proposal, first_laws, proposals
-from ccmodel.diagnosis.run import Calibration, calibrate
-from ccmodel.inference.pool import set_threads
+from ccmodel.diagnosis.run import Calibration
 from ccmodel.mechanisms.learned import Law
-from ccmodel.model.parameters import Parameters
-from ccmodel.rig.ingest import ingest_batch
-from proof.build import record
 from proof.cases import Case, Truth
 from proof.families import family
 from proof.laws import share_inside
@@ -36,13 +32,8 @@ FIRST_SEED, COUNT = 320_000, 12  # far from the seeds of tests, proofs and other
 
 def row(case: Case) -> dict:
     """Mean squares before and after the true law was fitted, and how its band holds the true curve."""
-    set_threads(1)
-    with tempfile.TemporaryDirectory() as folder:
-        batch = Path(folder) / case.name
-        record(case, case.recordings, batch)
-        ingested = ingest_batch(batch)
     (truth,) = case.truth
-    calibrated = calibrate(ingested.recordings, Parameters.estimated(ingested.batch.rig))
+    calibrated = calibration_of(case)
     law, proposal = most_probable(calibrated.fit, truth)
     found = fitted(calibrated, proposal)
     x, y, (low, high) = curve_of(found, law)

@@ -40,6 +40,7 @@ from ccmodel.report.verdict import (
     worst_channel,
 )
 from ccmodel.rig.overview import overview_of
+from ccmodel.sentences import joined
 
 LOOPS = 3
 CANDIDATES = 8
@@ -132,7 +133,7 @@ def _template(name: str) -> jinja2.Template:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("ccmodel", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
-    environment.globals |= {"asset": asset, "quantity": quantity}
+    environment.globals |= {"asset": asset, "quantity": quantity, "joined": joined}
     environment.filters |= {"printed_unit": printed_unit, "with_symbols": with_symbols}
     return environment.get_template(f"studies/diagnosis/{name}")
 
@@ -165,7 +166,8 @@ def repeatability_in_words(rows: Sequence[Mapping]) -> str:
         if row["from"] == "assumed":
             assumed.append(stated)
         else:
-            shown.append(f"{stated} ({row['recordings']} recordings {SOURCES[row['from']]})")
+            count = row["recordings"]
+            shown.append(f"{stated} ({count} recording{'' if count == 1 else 's'} {SOURCES[row['from']]})")
     parts = [f"estimated: {', '.join(shown)}"] * bool(shown) + [f"assumed: {', '.join(assumed)}"] * bool(assumed)
     return f"Standard deviations that count as noise, {'; '.join(parts)}."
 
