@@ -352,7 +352,7 @@ def test_a_second_run_does_nothing(copy):
 @pytest.mark.long
 def test_a_new_batch_appears_with_three_lines_of_config(copy):
     write_batch(copy / "data/raw/added", pretensions=(5.0,))
-    keep_one_study(copy)
+    keep_one_study(copy, accuracy={})
     config = yaml.safe_load((copy / "config.yaml").read_text())
     config["studies"]["added"] = {"batches": ["added"], "variable": "pretension"}
     (copy / "config.yaml").write_text(yaml.safe_dump(config))
@@ -363,6 +363,8 @@ def test_a_new_batch_appears_with_three_lines_of_config(copy):
     assert [(results / f).stat().st_mtime_ns for f in old] == before, "only what depends on the new batch is made"
     assert (copy / "results/figures/added.png").exists()
     assert "added" in set(pd.read_parquet(copy / "results/tables/errors.parquet")["batch"])
+    # By default the accuracy is that of the fit.
+    assert pd.read_csv(results / "tables/accuracy-by-recording.csv")["inputs_left_out"].isna().all()
 
 
 @pytest.mark.long
