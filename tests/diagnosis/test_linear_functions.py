@@ -28,10 +28,12 @@ def line(random, lengths, scatter=0.0):
     every = range(len(lengths))
     left_out = every if len(lengths) > 1 else ()
     named = [dict(zip("ab", fitted([i for i in every if i != out]), strict=True)) for out in left_out]
+    information = [j.T @ j / IN_DIAGNOSIS for j in J]
     return SimpleNamespace(
         values=dict(zip("ab", fitted(every), strict=True)),
         loo_values=named,
-        information=[j.T @ j / IN_DIAGNOSIS for j in J],
+        information=information,
+        total_information=sum(information),
         prior_precision=np.zeros(2),
         sizes=np.ones(2),
         whitened=[SimpleNamespace(observations=SimpleNamespace(channels=["one"]))] * len(lengths),

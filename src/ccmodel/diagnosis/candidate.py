@@ -146,6 +146,11 @@ class CandidateFit:
         return [mean_weight(w.observations) * J.T @ J for w, J in zip(self.whitened, self.jacobian, strict=True)]
 
     @property
+    def total_information(self) -> NDArray:
+        """Information of all recordings and of the priors in the cost of the fit, shape (unknowns, unknowns)."""
+        return sum(self.information, np.diag(self.prior_precision**2))
+
+    @property
     def is_plausible(self) -> bool:
         """Whether its mechanisms' strengths lie within their plausible ranges."""
         return plausible(self.hypothesis, self.values)
@@ -471,9 +476,8 @@ def discretisation_shift(candidate: CandidateFit) -> NDArray:
     ]
     changes = each(finer, lambda i, w: w.errors(candidate.values) - candidate.residuals[i])
     weights = [mean_weight(w.observations) for w in candidate.whitened]
-    information = sum(candidate.information, np.diag(candidate.prior_precision**2))
     score = sum(c * J.T @ e for J, e, c in zip(candidate.jacobian, changes, weights, strict=True))
-    return -inverse_of(information, candidate.sizes) @ score
+    return -inverse_of(candidate.total_information, candidate.sizes) @ score
 
 
 def _given(covariance: NDArray, wanted: list[int], known: list[int]) -> NDArray:

@@ -31,8 +31,7 @@ def half_widths_of(candidate: CandidateFit, functions: NDArray) -> NDArray:
     reach = normal_quantile(0.5 + COVERAGE / 2) * np.sqrt(np.diag(by_information).clip(0.0))
     if len(candidate.whitened) == 1:
         return reach
-    information, sizes = candidate.information, candidate.sizes
-    total = sum(information, np.diag(candidate.prior_precision**2))
+    information, sizes, total = candidate.information, candidate.sizes, candidate.total_information
     without = [inverse_of(total - one, sizes) for one in information]
     joint = np.array(list(candidate.values.values()))
     moved = np.array([[values[name] for name in candidate.values] for values in candidate.loo_values]) - joint
@@ -43,5 +42,5 @@ def half_widths_of(candidate: CandidateFit, functions: NDArray) -> NDArray:
 def covariance_by_information(candidate: CandidateFit) -> NDArray:
     """Covariance of all unknowns by the information of all recordings at the effective sample size, and the priors'."""
     count = [of_recording(w.observations) for w in candidate.whitened]
-    information = sum((n * one for n, one in zip(count, candidate.information, strict=True)))
+    information = sum(n * one for n, one in zip(count, candidate.information, strict=True))
     return inverse_of(information + np.mean(count) * np.diag(candidate.prior_precision**2), candidate.sizes)

@@ -51,7 +51,7 @@ class Selection:
     deadline, sets_until : Deadline
         When the selection ends with what was fitted until then; and when sets are to be fitted before laws are learned.
     goes_on : bool
-        Whether the deadline is that of the sets, and laws follow.
+        Whether the deadline is that of the sets, after which the selection goes on.
     """
 
     free: Mapping[str, Free]
@@ -273,7 +273,7 @@ class Selection:
         leading = contenders(found)
         again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in leading for s in starts(c)])
         if self.deadline.has_passed:
-            # All are fitted again when laws compete.
+            # Until the selection ends, all are fitted again.
             if self.goes_on:
                 return found
             # No rival must be lost: without it, the others would be more probable.

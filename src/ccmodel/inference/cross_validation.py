@@ -147,7 +147,7 @@ def jackknife(
     expected = -effect @ inverse @ effect.transpose(0, 2, 1)
     expected[:, range(n), range(n)] += np.einsum("iak,kia->ki", aside, effect)
     mean, square = np.trace(expected, axis1=1, axis2=2), (expected**2).sum(axis=(1, 2))
-    variance = np.einsum("ka,ab,kb->k", of, inverse, of)
+    variance = np.diag(of @ inverse @ of.T)
     known = (square > 0) & (variance > 0)
     degrees = np.divide(mean**2, square, out=np.ones_like(mean), where=known).clip(1.0)
     excess = np.sqrt(np.divide(mean, variance, out=np.ones_like(mean), where=known))
