@@ -57,7 +57,7 @@ def without_discrepancy(comparison: Comparison) -> dict:
     if best is comparison.base:
         return said("agrees", best, 1.0)
     confidence = float(probability.max())
-    return said("explained" if confidence >= settings.SURE else "undecided", best, confidence)
+    return said("explained" if confidence >= settings.DECIDED else "undecided", best, confidence)
 
 
 def _log_weight(comparison: Comparison, candidate: CandidateFit, screened: int) -> float:

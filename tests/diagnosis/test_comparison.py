@@ -17,7 +17,7 @@ from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.result import alternatives_of
 from ccmodel.diagnosis.screening import Score
 from ccmodel.diagnosis.selection import Selection
-from ccmodel.diagnosis.settings import MISSTATED_NOISE, PRIOR_AGREES, PRIOR_FURTHER, PRIOR_LISTED, SCATTER, SURE
+from ccmodel.diagnosis.settings import DECIDED, MISSTATED_NOISE, PRIOR_AGREES, PRIOR_FURTHER, PRIOR_LISTED, SCATTER
 from ccmodel.diagnosis.verdict import judge, nested_choice
 from ccmodel.inference.problem import Free
 from made_observations import batch, calibrated
@@ -120,7 +120,7 @@ def test_a_mechanism_at_either_of_two_places_is_named():
     at_load = ("torque-scale", "load-sensor")
     found = verdict(evidence(), (fitted(1.0, SCALE), evidence(NONE)), (fitted(1.0, at_load), evidence(NONE)))
     assert found.verdict == "explained"
-    assert max(found.probability) < SURE
+    assert max(found.probability) < DECIDED
 
 
 def test_a_mechanism_has_the_probability_of_all_sets_that_contain_it():
@@ -130,7 +130,7 @@ def test_a_mechanism_has_the_probability_of_all_sets_that_contain_it():
     assert found.verdict == "undecided"
     shares = {a["name"]: a["confidence"] for a in alternatives_of(found, {})}
     assert shares["pulley-friction"] == pytest.approx(2 * shares["kink"], rel=0.05)
-    assert shares["pulley-friction"] > SURE
+    assert shares["pulley-friction"] > DECIDED
 
 
 @pytest.mark.parametrize(("error", "said"), [(1.2, "explained"), (1.3, "undecided")])
@@ -140,7 +140,7 @@ def test_what_may_be_missing_beside_a_good_fit_is_of_no_consequence(error, said)
     sets = [(fitted(1.0, FRICTION, KINK, other), evidence(NONE + 12.0)) for other in (SCALE, STRIBECK)]
     found = verdict(evidence(), (fitted(300.0, KINK), evidence()), pair, *sets, model=fitted(3000.0))
     assert found.verdict == said
-    assert {n for n in ("kink", "pulley-friction", "torque-scale") if found.confidence_in(n) > SURE} == {
+    assert {n for n in ("kink", "pulley-friction", "torque-scale") if found.confidence_in(n) > DECIDED} == {
         "kink",
         "pulley-friction",
     }
@@ -167,7 +167,7 @@ def test_what_a_larger_set_leaves_far_less_of_is_not_explained(single, larger, s
     kink = fitted(single, KINK), evidence(NONE - 30.0, size=single - 1.0)
     pair = fitted(larger, FRICTION, KINK), evidence(NONE, size=larger - 1.0)
     found = verdict(evidence(), kink, pair, model=fitted(3000.0))
-    assert found.confidence_in("kink") > SURE
+    assert found.confidence_in("kink") > DECIDED
     assert found.confidence_in("pulley-friction") < 0.5
     assert found.verdict == said
 
@@ -183,7 +183,7 @@ def test_a_set_that_alone_leaves_a_good_fit_is_named_although_something_unlisted
     assert found.verdict == said
     if said == "explained":
         assert found.best is pair[0]
-        assert 0.5 < found.confidence_in("pulley-friction") < SURE
+        assert 0.5 < found.confidence_in("pulley-friction") < DECIDED
 
 
 @pytest.mark.parametrize(("calibrated", "said"), [(1.6, "explained"), (1.45, "undecided")])
@@ -207,8 +207,8 @@ def test_a_strength_that_scatters_between_recordings_is_not_named(deviation, deg
     assert both.log_support(*KINK) == np.inf
     kink = fitted(1.3, KINK), evidence(NONE - 40.0, NONE - 45.0, size=0.3)
     found = verdict(evidence(), kink, (both, evidence(NONE)), model=fitted(600.0))
-    assert (found.confidence_in("pulley-friction") > SURE) == named
-    assert found.confidence_in("kink") > SURE
+    assert (found.confidence_in("pulley-friction") > DECIDED) == named
+    assert found.confidence_in("kink") > DECIDED
 
 
 def test_the_strength_of_a_mechanism_with_a_state_is_what_is_left_of_it():
@@ -362,7 +362,7 @@ def test_a_weak_mechanism_is_not_named():
     found = verdict(evidence(NONE - 20), (fitted(1.0, FRICTION), evidence(NONE)), model=fitted(1.01))
     assert found.verdict == "undecided"
     assert found.probability[0] == pytest.approx(imitation(0.0, 1.0, False)[0], rel=1e-3)
-    assert 0.5 < found.probability[0] < SURE
+    assert 0.5 < found.probability[0] < DECIDED
 
 
 def test_slips_that_no_feature_follows_are_left_all_the_same():

@@ -16,7 +16,7 @@ EFFECTS = [
 ]
 
 SIZE = "30.1 mrad (29.2 to 30.9 mrad)"
-NAMED = f"named: {SIZE}"
+IDENTIFIED = f"identified: {SIZE}"
 # As diagnosis.json states an alternative: without its parameters.
 ALTERNATIVE = {"name": "torque-scale", "place": "load-sensor", "confidence": 0.2}
 
@@ -35,10 +35,10 @@ def concealed(tmp_path):
 @pytest.mark.parametrize(
     ("said", "of_backlash", "of_scale"),
     [
-        ({"verdict": "explained"}, NAMED, "not named"),
-        ({"verdict": "explained", "alternatives": [ALTERNATIVE]}, NAMED, "alternative, but at the load sensor"),
-        ({"verdict": "unexplained"}, f"in the nearest model, not accepted: {SIZE}", "not named"),
-        ({"verdict": "agrees"}, "not named", "not named"),
+        ({"verdict": "explained"}, IDENTIFIED, "not identified"),
+        ({"verdict": "explained", "alternatives": [ALTERNATIVE]}, IDENTIFIED, "alternative, but at the load sensor"),
+        ({"verdict": "unexplained"}, f"in the nearest model, not accepted: {SIZE}", "not identified"),
+        ({"verdict": "agrees"}, "not identified", "not identified"),
         ({"verdict": "inputs-inconsistent"}, "–", "–"),
         ({"verdict": None}, "–", "–"),
     ],
@@ -51,7 +51,7 @@ def test_each_effect_has_what_was_said_of_it(concealed, said, of_backlash, of_sc
 def test_the_same_effect_at_two_places_is_named_at_each_by_itself(concealed):
     effects = [EFFECTS[1] | {"place": place} for place in ("drive-sensor", "load-sensor")]
     (table,) = beside(concealed(effects), [diagnosis("b", "explained", mechanisms=[SCALE])])
-    assert [e["said"] for e in table["effects"]] == [["not named"], ["named: 0.148 (0.147 to 0.149)"]]
+    assert [e["said"] for e in table["effects"]] == [["not identified"], ["identified: 0.148 (0.147 to 0.149)"]]
 
 
 def test_what_was_named_and_is_not_there_is_said(concealed):
@@ -91,4 +91,4 @@ def test_what_was_said_of_all_batches_together_is_a_column_of_its_own(concealed)
     said = [diagnosis("b", "undecided"), diagnosis("bench", "explained", batches=["b", "c"])]
     (table,) = beside(concealed(batches=("b", "c")), said)
     assert table["columns"] == ["b", "c", "bench (2 batches together)"]
-    assert table["effects"][0]["said"][2] == NAMED
+    assert table["effects"][0]["said"][2] == IDENTIFIED

@@ -204,21 +204,21 @@ class Comparison:
 
     @property
     def is_decided(self) -> bool:
-        """Whether the calibrated model or one candidate is complete with a probability of `SURE`, or one is enough."""
-        return self._is_sure or self.certain is not None
+        """Whether a model is complete with the probability `DECIDED`, or one leaves a good fit and is `certain`."""
+        return self._has_complete or self.certain is not None
 
     @property
-    def _is_sure(self) -> bool:
-        """Whether the calibrated model or one candidate is complete with a probability of `SURE`."""
-        return max(self.probability_of_base, *self.probability, 0.0) >= settings.SURE
+    def _has_complete(self) -> bool:
+        """Whether the calibrated model or one candidate is complete with a probability of `DECIDED`."""
+        return max(self.probability_of_base, *self.probability, 0.0) >= settings.DECIDED
 
     @property
     def is_settled(self) -> bool:
-        """Whether no law is learned: a model is complete with the probability `SURE`, or what is named leaves nothing.
+        """Whether no law is learned: a model is complete with the probability `DECIDED`, or has no lack of fit.
 
         A mechanism that is certain and leaves something may be the best imitation of a law that no list holds.
         """
-        if self._is_sure:
+        if self._has_complete:
             return True
         return self.is_enough if self.certain is None else self.left_by(self.certain) == 0.0
 
@@ -230,7 +230,7 @@ class Comparison:
 
     @property
     def certain(self) -> CandidateFit | None:
-        """The most probable candidate of all mechanisms with the probability `SURE`, if it leaves a good fit.
+        """The most probable candidate of all mechanisms with the probability `DECIDED`, if it leaves a good fit.
 
         What may be missing beside it is then of no consequence. Where the calibrated model leaves a good fit itself, a
         good fit shows nothing.
@@ -238,16 +238,17 @@ class Comparison:
         if self.base.is_good:
             return None
         every = {name for c in self.candidates for name in c.hypothesis.names}
-        sure = sorted(name for name in every if self.confidence_in(name) >= settings.SURE)
-        alone = (c for c in self.leading if sure and list(c.hypothesis.names) == sure)
+        identified = sorted(name for name in every if self.confidence_in(name) >= settings.DECIDED)
+        alone = (c for c in self.leading if identified and list(c.hypothesis.names) == identified)
         return next((c for c in alone if c.is_plausible and c.is_good), None)
 
     @property
     def best_of_list(self) -> CandidateFit | None:
         """The set that is most probably complete, if it leaves a good fit and no other set of the list does as well.
 
-        Its probability among the complete ones is then `SURE`. Each of its members is more probable than not; how much
-        more, the priors of effects that nobody listed decide. None where the calibrated model leaves a good fit itself.
+        Its probability among the complete ones is then `DECIDED`. Each of its members is more probable than not; how
+        much more, the priors of effects that nobody listed decide. None where the calibrated model leaves a good fit
+        itself.
         """
         best = self.most_probable
         if self.base.is_good or best is self.base or best.hypothesis.size < 2:
@@ -256,7 +257,7 @@ class Comparison:
             return None
         names, complete = best.hypothesis.names, np.array(self.probability)
         same = np.array([c.hypothesis.names == names for c in self.candidates])
-        if min(map(self.confidence_in, names)) <= 0.5 or complete[same].sum() < settings.SURE * complete.sum():
+        if min(map(self.confidence_in, names)) <= 0.5 or complete[same].sum() < settings.DECIDED * complete.sum():
             return None
         return best
 
@@ -324,7 +325,7 @@ class Comparison:
         """
         is_weak = len(self.whitened) == 1 or "pretension_share" in self.base.free
         share = 1.0 if is_weak else np.mean([w.observations.tolerance_share for w in self.whitened])
-        return float(settings.UNTESTED**share)
+        return float(settings.DISCOUNT**share)
 
 
 def log_priors(size: int, screened: int) -> NDArray:

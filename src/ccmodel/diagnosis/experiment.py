@@ -70,7 +70,7 @@ class Experiment:
 def proposed(judgement: Judgement, estimates: Parameters) -> dict | None:
     """The experiment that best separates the leading candidates; None without two that can be run."""
     pairs = zip(judgement.candidates, judgement.probability, strict=True)
-    candidates = [c for c, p in pairs if p > settings.RIVAL]
+    candidates = [c for c, p in pairs if p > settings.ALTERNATIVE]
     if len(candidates) < 2:
         candidates = [judgement.calibrated, *judgement.candidates]
     candidates = candidates[: settings.SEPARATED]

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from ccmodel.diagnosis import settings
 from ccmodel.distributions import normal_quantile
 from ccmodel.inference.intervals import COVERAGE
 from ccmodel.mechanisms.learned import Law
@@ -15,8 +16,6 @@ from ccmodel.mechanisms.learned import Law
 TRIED = 40
 # Exponents that are tried first.
 EXPONENTS = tuple(0.1 * k for k in (*range(-25, 0), *range(1, 26)))
-# Share of the knots at which a formula must lie in the band.
-IN_BAND = 0.9
 
 
 @dataclass(frozen=True)
@@ -86,7 +85,7 @@ def shortest(
     sd = np.maximum((band[1] - band[0]) / (2 * quantile), 1e-3 * max(float(np.ptp(y)), 1e-12))
     for form in _forms(law):
         constants, errors, derivatives = _fitted(form, x, y - neutral, sd)
-        if np.mean(np.abs(errors) <= quantile) < IN_BAND:
+        if np.mean(np.abs(errors) <= quantile) < settings.IN_BAND:
             continue
         size = np.linalg.norm(derivatives, axis=0)
         scaled = derivatives / size

@@ -81,4 +81,4 @@ def indistinguishable(judgement: Judgement, law: Law) -> list[str]:
         for other in laws_in(hypothesis):
             if other.is_of_slot(law) and other.argument.name not in acting:
                 by_argument[other.argument.name] = by_argument.get(other.argument.name, 0.0) + p
-    return sorted((a for a, p in by_argument.items() if p > settings.RIVAL), key=lambda a: -by_argument[a])
+    return sorted((a for a, p in by_argument.items() if p > settings.ALTERNATIVE), key=lambda a: -by_argument[a])

@@ -26,9 +26,6 @@ from ccmodel.mechanisms.learned import Law
 from ccmodel.model.parameters import mechanism_key
 from ccmodel.model.run import simulate
 
-# An end of a cable may yield as much as the whole cable: its compliances are shares of so many times the cable's.
-MOST_OF_END = 3.0
-
 
 @dataclass(frozen=True)
 class Proposal:
@@ -101,7 +98,7 @@ def _proposed(base: CandidateFit, law: Law, motions: Sequence[Sensing], nothing:
 
 def _unit_of(law: Law, base: CandidateFit, motions: Sequence[Sensing]) -> float:
     """What sizes of a law's values are shares of: 1 of a factor, Coulomb friction per length of conduit of a drag, the
-    conduits' bend, both in the mean of the recordings, `MOST_OF_END` cables', or a channel's peak to peak.
+    conduits' bend, both in the mean of the recordings, `LAW_CABLES` cables', or a channel's peak to peak.
     """
     if law.channel is not None:
         return float(np.ptp(np.concatenate([m.channels[law.channel] for m in motions])))
@@ -114,7 +111,7 @@ def _unit_of(law: Law, base: CandidateFit, motions: Sequence[Sensing]) -> float:
         bend_per_m = np.mean([path.bend_rad / path.length_m for path in _paths(base)])
         tension_N = np.mean([m.channels[c].clip(0.0).mean() for m in motions for c in TENSIONS if c in m.channels])
         return float(model.friction_coefficient * tension_N * bend_per_m)
-    return MOST_OF_END / base.model(base.whitened[0].observations.parameters).stiffness_N_per_m
+    return settings.LAW_CABLES / base.model(base.whitened[0].observations.parameters).stiffness_N_per_m
 
 
 def _paths(base: CandidateFit) -> list[ConduitPath]:

@@ -88,7 +88,7 @@ def alternatives_of(judgement: Judgement, named: Mapping[str, str]) -> list[dict
         places.setdefault(name, place)
     others = [(n, p, _stated(judgement, n)) for n, p in places.items() if n not in named]
     ranked = sorted(others, key=lambda one: -one[2])[: settings.MOST_ALTERNATIVES]
-    return [{"name": n, "place": p, "confidence": round(c, 4)} for n, p, c in ranked if c > settings.RIVAL]
+    return [{"name": n, "place": p, "confidence": round(c, 4)} for n, p, c in ranked if c > settings.ALTERNATIVE]
 
 
 def _stated(judgement: Judgement, name: str) -> float:

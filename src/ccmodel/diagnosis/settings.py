@@ -165,7 +165,7 @@ CLEARLY_WORSE = 3.0
 
 # Prior probability that nothing is missing; that something further is missing beside what is; and that an effect that
 # is missing is among the mechanisms here. Chosen: even odds, one rig in four, and two effects in three. The last is
-# below `SURE`: recordings that show nothing name nothing.
+# below `DECIDED`: recordings that show nothing name nothing.
 PRIOR_AGREES, PRIOR_FURTHER, PRIOR_LISTED = 0.5, 0.25, 2 / 3
 # Prior probability that an effect's law is that of the mechanism, and shares of its effect that the mechanism's
 # equation leaves otherwise, log-uniform between these. Practice (`make form-errors`): 17 published laws of 9 effects
@@ -209,9 +209,14 @@ NEAR_NOISE = 0.2
 # friction coefficient, or of a channel's peak to peak. Chosen: factors of three.
 LAW_SCALES = 0.003, 0.01, 0.03, 0.1, 0.3
 LAW_STEP = 0.01
+# Compliance of an end of a cable that the sizes of a law are shares of, over the cable's own. Chosen: an end may yield
+# as much as its cable.
+LAW_CABLES = 3.0
 # Laws that are fitted, the leading ones to first order; and of these, how many are also fitted with more knots. Chosen
 # for time.
 LAWS_FITTED, LAWS_REFINED = 8, 2
+# Share of the knots of a learned law at which a formula must lie in its band. Chosen.
+IN_BAND = 0.9
 # Starts, of a listed law's constants, from which the best ones are searched. Chosen: a sine has a few minima.
 LISTED_STARTS = 3
 # Distance, in posterior standard deviations, up to which a learned law is a listed one: half of a normal
@@ -237,15 +242,16 @@ NAMED_CHANNEL, NAMED_PHASE = 0.35, 0.7  # Chosen.
 
 # --- Verdict
 
-# Posterior probability from which a mechanism is named, and from which it is listed as an alternative. Chosen.
-SURE, RIVAL = 0.8, 0.02
+# Posterior probability from which a mechanism is identified (the decision threshold), and from which it is listed as an
+# alternative. Chosen.
+DECIDED, ALTERNATIVE = 0.8, 0.02
 # Error of a channel over its noise up to which what may be missing beside a set of mechanisms is of no consequence.
 # Chosen: it shows when one looks for it, and not by itself. Beyond it, pages say that a channel is explained in part.
 CONSPICUOUS = 1.5
 # Factor on the probability of every set of mechanisms where no recording can be held out, where the initial tension is
 # not observed, and, in proportion, where a tolerance takes the place of noise. Practice: without it two of 21
-# mechanisms concealed in measured recordings were named wrongly.
-UNTESTED = 0.75
+# mechanisms concealed in measured recordings were identified wrongly.
+DISCOUNT = 0.75
 # Mean square (1: noise) up to which a fit is called good, and a recording is said to contradict the others. Chosen.
 GOOD_FIT = 1.5
 # No probability is reported above this: no number of samples shows that the list of mechanisms is complete. Chosen.

@@ -85,8 +85,8 @@ def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
     """Decide the verdict.
 
     - ``agrees``: nothing is missing in the calibrated model, with a probability above one half.
-    - ``explained``: each mechanism of the candidate that is most probably complete has the probability `SURE` at least,
-      and that these and no others are missing has one above one half, unless a larger set leaves far less
+    - ``explained``: each mechanism of the candidate that is most probably complete has the probability `DECIDED` at
+      least, and that these and no others are missing has one above one half, unless a larger set leaves far less
       (`Comparison.is_outdone`); or those that have it leave a good fit (`Comparison.certain`); or a set leaves a good
       fit and no other does as well (`Comparison.best_of_list`).
     - ``learned``: something that no list holds is missing, and is a law of one slot with a probability above one half.
@@ -124,14 +124,14 @@ def _is_explained(judgement: Judgement, best: CandidateFit) -> bool:
     names = sorted(best.hypothesis.names)
     pairs = zip(judgement.candidates, judgement.probability, strict=True)
     alone = sum(p for c, p in pairs if sorted(c.hypothesis.names) == names)
-    is_sure = min(map(judgement.confidence_in, names)) >= settings.SURE and alone > 0.5
-    return is_sure and not judgement.comparison.is_outdone(best)
+    is_decided = min(map(judgement.confidence_in, names)) >= settings.DECIDED and alone > 0.5
+    return is_decided and not judgement.comparison.is_outdone(best)
 
 
 def single_fault_places(comparison: Comparison) -> list[str]:
     """Places of the channels in which a single unknown fault is probable, the most probable first."""
     by_channel = comparison.faulty_channels
-    probable = sorted((c for c, p in by_channel.items() if p > settings.RIVAL), key=lambda c: -by_channel[c])
+    probable = sorted((c for c, p in by_channel.items() if p > settings.ALTERNATIVE), key=lambda c: -by_channel[c])
     return list(dict.fromkeys(place for channel in probable for place in PLACES_OF[channel]))
 
 

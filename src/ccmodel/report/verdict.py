@@ -6,7 +6,7 @@ from math import floor, log10
 
 from ccmodel import mechanisms as registry
 from ccmodel.channels import TABLE, symbol_of
-from ccmodel.diagnosis.settings import SURE, WITHIN_BAND
+from ccmodel.diagnosis.settings import DECIDED, WITHIN_BAND
 from ccmodel.mechanisms.contract import (
     BEARING_TORQUE,
     CABLE_STRETCH,
@@ -83,7 +83,7 @@ def _with_confidence(mechanisms: Sequence[Mapping]) -> str:
 def _undecided(diagnosis: Mapping, missing: str) -> str:
     together = [_placed(one) for one in diagnosis["likeliest"]]
     names = [f"{_placed(one)} ({one['confidence']:.2f})" for one in diagnosis["alternatives"]]
-    sure = sum(one["confidence"] >= SURE for one in diagnosis["alternatives"])
+    sure = sum(one["confidence"] >= DECIDED for one in diagnosis["alternatives"])
     if sure:
         rest = f": perhaps {' or '.join(names[sure:])}" if names[sure:] else ""
         part = f"Part of what {missing} is {' and '.join(names[:sure])}"

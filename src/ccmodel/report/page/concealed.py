@@ -9,11 +9,11 @@ from ccmodel.report.page.cards import after_is
 from ccmodel.report.verdict import INPUTS_INCONSISTENT, SYMBOL, place_in_words, strength, worst_channel
 from ccmodel.typed import TypedModel, load_yaml_model
 
-NAMED, ALTERNATIVE, NEAREST, NOT_NAMED = (
-    "named",
+IDENTIFIED, ALTERNATIVE, NEAREST, NOT_IDENTIFIED = (
+    "identified",
     "alternative",
     "in the nearest model, not accepted",
-    "not named",
+    "not identified",
 )
 
 
@@ -90,7 +90,7 @@ def _said_of(effect: Effect, rig: Rig, diagnosis: Mapping) -> str:
     if effect.name is None:
         return "no mechanism describes it"
     kinds = (
-        (diagnosis["mechanisms"], NAMED),
+        (diagnosis["mechanisms"], IDENTIFIED),
         (diagnosis["alternatives"], ALTERNATIVE),
         ((diagnosis.get("nearest") or {}).get("mechanisms", []), NEAREST),
     )
@@ -103,7 +103,7 @@ def _said_of(effect: Effect, rig: Rig, diagnosis: Mapping) -> str:
         if of_name:
             one = (here or of_name)[0]
             return f"{said}: {strength(one)}" if "parameters" in one else said
-    return NOT_NAMED
+    return NOT_IDENTIFIED
 
 
 def _besides(rig: Rig, diagnosis: Mapping) -> str:
