@@ -152,7 +152,7 @@ def test_options_of_a_fit_that_cannot_be_used_are_named(batch, options, line):
         ),
         ({"candidates": "kink"}, "candidates: 'kink' is at none of its places; state 'kink at conduit'"),
         ({"candidates": "rust at conduit"}, "candidates: there is no mechanism 'rust at conduit'"),
-        ({"freeze": True}, "freeze: there is no model to hold"),
+        ({"freeze": True}, "freeze: there is no baseline to freeze"),
     ],
 )
 def test_options_of_a_diagnosis_that_cannot_be_used_are_named(batch, options, line):

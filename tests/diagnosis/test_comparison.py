@@ -20,6 +20,7 @@ from ccmodel.diagnosis.selection import Selection
 from ccmodel.diagnosis.settings import DECIDED, MISSTATED_NOISE, PRIOR_AGREES, PRIOR_FURTHER, PRIOR_LISTED, SCATTER
 from ccmodel.diagnosis.verdict import judge, nested_choice
 from ccmodel.inference.problem import Free
+from ccmodel.mechanisms import laws
 from made_observations import batch, calibrated
 
 FRICTION, SCALE = ("pulley-friction", "drive-pulley"), ("torque-scale", "drive-sensor")
@@ -565,3 +566,33 @@ def test_the_covariance_is_linearised_about_the_best_candidate(monkeypatch):
     deadline.has_passed = False
     before = Comparison.of(recordings, base, candidates, SCREENED)
     assert replace(late_selection, goes_on=True).relinearise(before) is before
+
+
+def test_a_law_beside_which_something_is_missing_counts_once_as_unexplained():
+    """A law is complete with 0.12 and incomplete with 0.2; two listed mechanisms are as probable as one another."""
+    law = next(iter(laws().values()))
+    shares = {
+        (law.name, law.place): (0.12, 0.2),
+        ("kink", "conduit"): (0.31, 0.0),
+        ("stribeck", "conduit"): (0.31, 0.0),
+    }
+    candidates = [SimpleNamespace(hypothesis=Hypothesis((acting,))) for acting in shares]
+    whole = {c.hypothesis.names[0]: sum(p) for c, p in zip(candidates, shares.values(), strict=True)}
+    found = SimpleNamespace(
+        base=None,
+        candidates=candidates,
+        probability=[complete for complete, _ in shares.values()],
+        probability_of_base=0.0,
+        unlisted=0.2 + 0.06,
+        leading=candidates,
+        by_evidence=candidates[1:],
+        most_probable=candidates[1],
+        certain=None,
+        best_of_list=None,
+        faulty_channels={},
+        confidence_in=whole.__getitem__,
+        log_weight=lambda c: np.log(whole[c.hypothesis.names[0]]),
+    )
+    assert judge(found, []).verdict == "undecided"
+    found.unlisted = 0.4
+    assert judge(found, []).verdict == "unexplained"

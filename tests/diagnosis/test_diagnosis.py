@@ -221,6 +221,7 @@ def test_alternatives_are_others_than_what_is_named_each_once():
 @pytest.mark.parametrize(
     ("alternatives", "likeliest", "sentence"),
     [
+        ([], ["kink"], "these recordings do not tell what."),
         (["kink"], ["kink"], "it may be kink at the conduit (0.50), but"),
         (
             ["kink", "stribeck"],

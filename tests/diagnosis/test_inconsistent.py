@@ -20,8 +20,8 @@ from ccmodel.typed import InputError
 from model_runs import CABLE
 
 KEYS = {
-    "format", "batch", "verdict", "is_held", "location", "mechanisms", "alternatives", "likeliest", "nearest", "fit",
-    "repeatability", "next_experiment", "not_judged", "headline", "provenance",
+    "format", "batch", "verdict", "is_held", "location", "mechanisms", "laws", "alternatives", "likeliest", "nearest",
+    "fit", "repeatability", "next_experiment", "not_judged", "headline", "provenance",
 }  # fmt: skip
 DEAD = "is 0 throughout: a sensor that is dead or was never connected: column not used"
 

@@ -114,7 +114,7 @@ def test_the_law_is_kept_as_a_mechanism(learned):
 
 def test_the_page_shows_the_curve(learned):
     page = (learned[1] / "report.html").read_text()
-    assert "a law on no list" in page
+    assert "a law learned from the recordings" in page
     assert "The learned law: added to" in page
 
 

@@ -54,7 +54,20 @@ def test_the_same_effect_at_two_places_is_named_at_each_by_itself(concealed):
     assert [e["said"] for e in table["effects"]] == [["not identified"], ["identified: 0.148 (0.147 to 0.149)"]]
 
 
-def test_what_was_named_and_is_not_there_is_said(concealed):
+def test_a_law_is_said_of_the_unlisted_effect_at_its_place_only(concealed):
+    law = {"slot": "bearing-torque", "place": "drive-pulley", "arguments": ["drive-angle"]}
+    effects = [{"name": None, "place": place, "text": "cogging"} for place in ("drive-pulley", "load")]
+    (table,) = beside(concealed(effects), [diagnosis("b", "learned", mechanisms=[], laws=[law])])
+    assert [e["said"] for e in table["effects"]] == [
+        ["learned: bearing-torque by drive-angle"],
+        ["no mechanism describes it"],
+    ]
+    assert table["besides"] == ["–"]
+    (table,) = beside(concealed(effects[1:]), [diagnosis("b", "learned", mechanisms=[], laws=[law])])
+    assert table["besides"] == ["bearing-torque by drive-angle"]
+
+
+def test_what_was_identified_and_is_not_there_is_said(concealed):
     (table,) = beside(concealed(EFFECTS[1:]), [diagnosis("b", "explained", mechanisms=[BACKLASH, SCALE])])
     assert table["besides"] == ["backlash"]
 

@@ -165,17 +165,18 @@ class CandidateFit:
         return student_quantile(0.5 + COVERAGE / 2, self.degrees_of_freedom) * self.standard_deviations(shift)
 
     def log_support(self, name: str, place: str) -> float:
-        """Logarithm of the Bayes factor of a mechanism over none by the scatter of its strength between recordings.
+        """Log Bayes factor of a mechanism against its absence, from the scatter of its strength between recordings.
 
-        The evidence takes all samples for independent; here each recording is one observation of the strength. With the
-        statistic t = strength over its jackknife standard deviation, on nu degrees of freedom, Schwarz's approximation
-        is (1 + t^2 / nu)^((nu + 1) / 2) / (nu + 1)^(1 / 2) (Kass and Raftery, Bayes factors, Journal of the American
-        Statistical Association 90(430), 773-795, 1995, doi:10.1080/01621459.1995.10476572). It is that of the clearest
-        strength; infinite for a law, which has none, and where nothing scatters. Of a mechanism with states, the
-        strength is what is left of it when the recordings start.
+        The evidence counts `IN_EVIDENCE` samples per channel of every recording as independent; here each recording is
+        one observation of the strength. With the statistic t = strength over its jackknife standard deviation, on nu
+        degrees of freedom, Schwarz's approximation is (1 + t^2 / nu)^((nu + 1) / 2) / (nu + 1)^(1 / 2) (Kass and
+        Raftery, Bayes factors, Journal of the American Statistical Association 90(430), 773-795, 1995,
+        doi:10.1080/01621459.1995.10476572). Of several strengths, the clearest one counts. The result is infinite for a
+        law, which has no strength, and if nothing scatters. The strength of a mechanism with states is the part that
+        remains when the recordings start.
 
-        A strength is judged for the fitted values of the mechanism's other parameters, which mean nothing without it:
-        each of them takes a degree of freedom. If too few are left, the variance is the one for all values.
+        The variance is conditional on the mechanism's other parameters, which have no meaning without the mechanism;
+        each of them takes a degree of freedom. If fewer than one would be left, the variance is the marginal one.
         """
         mechanism, names = registry.get(name), list(self.values)
         apart = {p.name for p in (*mechanism.strengths, *mechanism.states)}

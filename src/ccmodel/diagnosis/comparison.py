@@ -1,9 +1,9 @@
 """Comparison of candidate models: the posterior probability that each is complete, and that something is missing.
 
-Every candidate is two hypotheses. It is *complete*: nothing else is missing, and it is exact or its equations leave a
-share of their own effect. Or it is *incomplete*: something that is on no list is missing beside it, a discrepancy of
-any size up to that of the calibrated model. The calibrated model without any mechanism is such a candidate too. What
-nobody listed therefore competes with what is listed.
+Every candidate is two hypotheses. It is *complete*: nothing else is missing, and it is exact or has a model-form error,
+a share of its own effect. Or it is *incomplete*: an unlisted effect is missing too, a discrepancy with a mean square
+from `SMALLEST_MISSING` to the excess of the calibrated model times `LARGEST_MISSING`. The calibrated model is a
+candidate like any other, so unlisted effects compete with listed mechanisms.
 
 The log posterior of each is its log evidence (`ccmodel.diagnosis.discrepancy`) plus a log prior, which follows from the
 number of mechanisms; all that were screened are equally probable.
@@ -139,7 +139,11 @@ class Comparison:
 
     @cached_property
     def log_posterior(self) -> NDArray:
-        """As `log_weights`, normalised, with the probability of an imitation given to what it imitates."""
+        """Log posterior probabilities, arranged as `log_weights`.
+
+        The probability that a mechanism is an imitation goes to the set without it. What `settings.DISCOUNT` takes from
+        all sets goes to the incomplete calibrated model.
+        """
         every, weights = [self.base, *self.candidates], self.log_weights.copy()
         for k in sorted(range(1, len(every)), key=lambda k: -every[k].hypothesis.size):
             part = self.part_of(every[k])
@@ -168,10 +172,10 @@ class Comparison:
         return limited(imitation(share, smallest, has_part), prior_of_further(has_part), support)
 
     def left_by(self, candidate: CandidateFit) -> float:
-        """Mean square that a candidate leaves above the noise.
+        """Mean square above the noise that a candidate does not explain (1: noise).
 
-        It is that of its discrepancy. What is no function of the rig's state, such as slips at other instants, only the
-        mean square itself shows, as far as it is beyond its scatter.
+        It is the size of its discrepancy, limited to within `SCATTER` of its excess mean square: errors that are no
+        function of the rig's state, such as slips at other instants, show in the mean square only.
         """
         lowest = min(c.mean_square for c in [self.base, *self.candidates])
         noise = 1.0 + float(np.clip(lowest - 1.0, 0.0, settings.MISSTATED_NOISE))
@@ -230,10 +234,10 @@ class Comparison:
 
     @property
     def certain(self) -> CandidateFit | None:
-        """The most probable candidate of all mechanisms with the probability `DECIDED`, if it leaves a good fit.
+        """The candidate of exactly the mechanisms whose probability is at least `DECIDED`, if its fit is good.
 
-        What may be missing beside it is then of no consequence. Where the calibrated model leaves a good fit itself, a
-        good fit shows nothing.
+        Anything else that is missing is then of no consequence. Of several such candidates, it is the most probable one
+        that is plausible. None if the calibrated model's own fit is good, since a good fit then shows nothing.
         """
         if self.base.is_good:
             return None
@@ -244,11 +248,10 @@ class Comparison:
 
     @property
     def best_of_list(self) -> CandidateFit | None:
-        """The set that is most probably complete, if it leaves a good fit and no other set of the list does as well.
+        """The most probable complete candidate, if it is a set of two or more listed mechanisms that has no equal.
 
-        Its probability among the complete ones is then `DECIDED`. Each of its members is more probable than not; how
-        much more, the priors of effects that nobody listed decide. None where the calibrated model leaves a good fit
-        itself.
+        Its fit is good, it has at least `DECIDED` of the probability of all complete candidates, and each member has a
+        probability above one half. None if the calibrated model's own fit is good.
         """
         best = self.most_probable
         if self.base.is_good or best is self.base or best.hypothesis.size < 2:
@@ -343,12 +346,12 @@ def log_priors(size: int, screened: int) -> NDArray:
 
 
 def imitation(share: float, smallest: float, has_part: bool) -> NDArray:
-    """Probabilities of what a mechanism explains by the share that it leaves of what was left without it.
+    """Probabilities of the three explanations of a mechanism's effect.
 
     Parameters
     ----------
     share : float
-        From 0 to 1.
+        Unexplained mean square with the mechanism over that without it, from 0 to 1.
     smallest : float
         The least share that would be noticed, above 0.
     has_part : bool

@@ -194,7 +194,7 @@ class Evidence:
     Attributes
     ----------
     exact : float
-        Nothing is left beside the noise.
+        No discrepancy, or one of at most `settings.NOT_WHITE`.
     other_law : float
         The candidate's equations leave a share of its own effect.
     incomplete : float
@@ -223,9 +223,9 @@ def evidence_of(discrepancy: Discrepancy, candidate: CandidateFit, effect: float
     discrepancy : Discrepancy
     candidate : CandidateFit
     effect : float
-        Mean square that its last mechanism takes off, of which the equations may leave a share; 0 without mechanisms.
+        Excess mean square without its last mechanism, of which its equations may leave a share; 0 without mechanisms.
     excess : float
-        Mean square of the calibrated model above that of noise: nothing that is missing has a larger effect.
+        Excess mean square of the calibrated model. A missing effect has `LARGEST_MISSING` times this at most.
     """
     sizes, channels = np.array(settings.DISCREPANCIES), discrepancy.channels
     none, *others = discrepancy.log_evidence(candidate, [0.0, *sizes], dict.fromkeys(channels, 1.0))

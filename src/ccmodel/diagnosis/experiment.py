@@ -86,11 +86,12 @@ def proposed(judgement: Judgement, estimates: Parameters) -> dict | None:
         return None
     best = int(np.argmax(refitted))
     names = list(dict.fromkeys(name for c in candidates for name, _ in c.hypothesis.acting))
-    differ = f"there the candidates differ by {refitted[best]:.2g} times the noise, fitted to it as well"
+    differ = f"there any two candidates differ by at least {refitted[best]:.2g} times the noise after a refit"
     wanted = recordings_wanted(refitted[best], len(template.channels))
-    enough = "one such recording is" if wanted == 1 else f"{wanted} such recordings are"
+    give = "one such recording gives" if wanted == 1 else f"{wanted} such recordings give"
     chosen = every[leading[best]]
-    text = f"{chosen.text}: {differ}, more than in any other tried; {enough} enough."
+    odds = f"odds of {settings.WANTED_ODDS:g} for the better of two"
+    text = f"{chosen.text}: {differ}, more than in any other motion tried; {give} {odds}."
     return {"text": text, "separates": names, "recording": chosen.recording(wanted)}
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.channels import CHANNELS, TENSIONS, THETA_IN
-from ccmodel.deadline import Deadline, OutOfTimeError
+from ccmodel.deadline import Deadline
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.hypothesis import Hypothesis
@@ -59,7 +59,7 @@ def proposals(base: CandidateFit, every: Sequence[Law], deadline: Deadline) -> l
             continue
         try:
             found.append(max(_proposed(base, law, motions, nothing), key=lambda p: p.evidence))
-        except (ModelError, ValueError, OutOfTimeError):
+        except (ModelError, ValueError):
             continue
     return sorted(found, key=lambda p: -p.evidence)
 
@@ -97,8 +97,11 @@ def _proposed(base: CandidateFit, law: Law, motions: Sequence[Sensing], nothing:
 
 
 def _unit_of(law: Law, base: CandidateFit, motions: Sequence[Sensing]) -> float:
-    """What sizes of a law's values are shares of: 1 of a factor, Coulomb friction per length of conduit of a drag, the
-    conduits' bend, both in the mean of the recordings, `LAW_CABLES` cables', or a channel's peak to peak.
+    """Unit of the a priori sizes of a law's values.
+
+    It is 1 for a factor, the peak to peak of a channel for what is added to it, the mean bend of the conduits for an
+    added bend, mean Coulomb friction per length of conduit for a drag, and `LAW_CABLES` times the compliance of a cable
+    for the compliance of an end.
     """
     if law.channel is not None:
         return float(np.ptp(np.concatenate([m.channels[law.channel] for m in motions])))

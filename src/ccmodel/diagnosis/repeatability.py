@@ -9,10 +9,10 @@ SS, the sum of squares about the means of the conditions, updates to
 Where no condition repeats, the spread of friction comes from its scatter over all recordings by the same formula, up to
 `settings.MOST_SCATTER` times the stated one: that scatter may be physics too.
 
-Whitening marginalises friction's deviation, so that no mean square shows a deviation that no repeat would have.
-`friction_repeats` tests it: by the scatter of repeats over the stated spread, and between conditions over the estimated
-one (F tests), and for a trend over the sequence of the recordings (t test). A trend is no scatter: spreads are those
-about it.
+Whitening marginalises the deviation of friction in each recording, so that mean squares do not show whether it exceeds
+the repeatability. `friction_probabilities` tests this: by the scatter of repeats over the stated spread, and between
+conditions over the estimated one (F tests), and for a trend over the sequence of the recordings (t test). A trend is no
+scatter: spreads are those about it.
 
 Deviations are in standard deviations as stated, and not shrunk: a posterior mean m with the posterior variance v under
 a standard normal prior is an observation m / (1 - v) with the variance v / (1 - v).
@@ -219,12 +219,6 @@ def friction_probabilities(
     groups = whitened[0].repeatability.conditions or [[i] for i in range(len(whitened))]
     scatter = min(within_probability(found, groups), between_probability(found, groups, is_fitted))
     return scatter, trend_probability(found, sequences(whitened))
-
-
-def friction_repeats(whitened: Sequence["Whitened"], residuals: Sequence[NDArray], is_fitted: bool) -> bool:
-    """Whether friction differs between recordings by no more than from run to run; as of `friction_probabilities`."""
-    scatter, trend = friction_probabilities(whitened, residuals, is_fitted)
-    return scatter > settings.SCATTER_LEVEL and trend > settings.TREND_LEVEL
 
 
 def log_bayes_factor(probability: float) -> float:

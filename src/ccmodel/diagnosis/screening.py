@@ -21,7 +21,8 @@ from ccmodel.failure import ModelError
 from ccmodel.inference.pool import each
 from ccmodel.model.parameters import mechanism_key
 
-# Least squared length of a direction, relative to the residuals': below it, a recalibration absorbs the mechanism.
+# Least squared length of a direction: a sum over recordings of mean squares (1: noise). Below it, the mechanism has no
+# effect, or a recalibration absorbs it.
 ABSORBED = 1e-12
 
 

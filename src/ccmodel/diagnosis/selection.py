@@ -93,11 +93,12 @@ class Selection:
         return "pretension_share" not in self.free
 
     def further(self, found: Comparison, screening: Screening) -> Comparison:
-        """The same with sets of listed mechanisms, and with laws where sets do not lead on.
+        """The same with sets of listed mechanisms, and with laws if sets do not lead on.
 
-        Sets come first, within a share of the time, as long as each size leaves at most half of what the smaller one
-        does. Then laws compete with them, and larger sets follow, unless something is decided. A mechanism that is
-        certain but leaves something competes with laws at the end.
+        Sets of increasing size are fitted first, within `SETS_SHARE` of both limits. Laws are learned when a size does
+        not halve what smaller sets leave, or when that share has passed, unless the comparison is decided; larger sets
+        follow unless a law leads. Otherwise laws are learned at the end, unless the comparison is settled: a mechanism
+        that is certain but has a lack of fit competes with laws.
         """
         sets, size = replace(self, deadline=self.sets_until, goes_on=True), 2
         while size <= settings.MOST_MECHANISMS:

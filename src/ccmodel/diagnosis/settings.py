@@ -53,12 +53,11 @@ SAME_LOAD = 0.05
 # Fewest recordings whose scatter or trend is looked at, and the largest spread that their scatter, without repeats, may
 # give, over the stated one. Chosen: what differs from run to run by more is to be found, not to be allowed for.
 FEWEST_FOR_SCATTER, MOST_SCATTER = 4, 2.0
-# Probability below which friction scatters more than from run to run, and below which it has a trend. Chosen: no clean
-# batch with the stated spread (1 %) scatters too much, one in two hundred with 2 %, and with 3 % one in thirty (nothing
-# repeats) to one in seven (one pair of repeats); a drift by 15 % over seven or more recordings always has a trend.
-SCATTER_LEVEL, TREND_LEVEL = 0.005, 0.002
-# The same from batch to batch of a rig, besides that from run to run, of the batch's friction over the rig's. Chosen:
-# twice that of runs; between two days the cable settles anew in its conduit, and its temperature differs.
+# Significance level of a trend of friction, about which scatter then counts. Chosen: a drift by 15 % over seven or more
+# recordings always has one.
+TREND_LEVEL = 0.002
+# Standard deviation of a batch's friction over the rig's; it adds to `FRICTION_SPREAD`, that from run to run. Chosen:
+# twice the latter; between two days the cable settles anew in its conduit, and its temperature differs.
 FRICTION_BETWEEN = 0.02
 # Standard deviation of a batch's initial tension over its stated one, relative to that of the rig, where it is not
 # observed at rest. Chosen: what a scale or a mark on a tensioner repeats to.
@@ -94,8 +93,8 @@ FIT_EVALUATIONS = 25
 # Times that the effects of mechanisms' states, which are proportional to their strength, are linearised again about the
 # values of a fit, at most, and the relative change of the cost below which they are not. Chosen.
 STATE_PASSES, STATE_TOLERANCE = 6, 0.005
-# The same for a search that stalls: friction that falls with speed lets cables jump, and the cost is rough. Practice:
-# of 3e-4, 3e-3 and 1e-2 this one led to the least cost.
+# Step of derivatives, as `FIT_DIFFERENCE`, for a search that stalls: friction that falls with speed lets cables jump,
+# and the cost is rough. Practice: of 3e-4, 3e-3 and 1e-2 this one led to the least cost.
 ROUGH_DIFFERENCE = 3e-3
 # Tolerances and most evaluations of the last search, which has these differences too. On two batches (data/raw/radius
 # and loops), nine of ten searches from other starts then ended within 3e-4 of the cost of the minimum nearby, before
@@ -163,20 +162,19 @@ CLEARLY_WORSE = 3.0
 
 # --- Comparison: posterior probabilities
 
-# Prior probability that nothing is missing; that something further is missing beside what is; and that an effect that
-# is missing is among the mechanisms here. Chosen: even odds, one rig in four, and two effects in three. The last is
-# below `DECIDED`: recordings that show nothing name nothing.
+# Prior probabilities: that nothing is missing; that a further effect is missing if one is; and that a missing effect is
+# a listed mechanism. Chosen: even odds, one rig in four, and two effects in three. The last is below `DECIDED`, so that
+# recordings without information identify no mechanism.
 PRIOR_AGREES, PRIOR_FURTHER, PRIOR_LISTED = 0.5, 0.25, 2 / 3
 # Prior probability that an effect's law is that of the mechanism, and shares of its effect that the mechanism's
 # equation leaves otherwise, log-uniform between these. Practice (`make form-errors`): 17 published laws of 9 effects
 # leave 0 to 49 %, half of them below 1.3 %.
 SAME_LAW, LEFT_BY_LAW = 0.5, (1e-4, 0.5)
-# What the best of all mechanisms leaves of something that is not one of them, but a law's remainder: a share with a
-# density that rises with this power, but for a part of the probability that is uniform. Chosen: half leave more than
-# 86 %.
+# Share that the best imitation leaves of another mechanism's model-form error: the exponent of its density, and the
+# part of the probability that is uniform. Chosen: half of the imitations leave more than 86 %.
 IMITATION_POWER, UNIFORM_PART = 4, 0.05
-# What mean squares of a batch scatter by without any discrepancy, and the most by which that of every candidate may be
-# above 1 for a noise that is larger than stated. Practice: of 71 clean batches one in twenty has more than 1.1.
+# Scatter of a batch's mean square without any discrepancy; and the largest excess of the best candidate that counts as
+# noise larger than stated. Practice: of 71 clean batches one in twenty has more than 1.1.
 SCATTER, MISSTATED_NOISE = 0.1, 0.1
 
 # --- Forward selection
@@ -205,12 +203,12 @@ NEAR_NOISE = 0.2
 
 # --- Laws that no list holds
 
-# A priori sizes of a law's values that are tried, and the one that its sensitivities are taken at: shares of the
-# friction coefficient, or of a channel's peak to peak. Chosen: factors of three.
+# A priori standard deviations of a law's values that are tried, and the one at which its sensitivities are computed:
+# shares of the unit of each form of law (`ccmodel.diagnosis.laws._unit_of`). Chosen: factors of three.
 LAW_SCALES = 0.003, 0.01, 0.03, 0.1, 0.3
 LAW_STEP = 0.01
-# Compliance of an end of a cable that the sizes of a law are shares of, over the cable's own. Chosen: an end may yield
-# as much as its cable.
+# That unit for the compliance of a cable's end, over the compliance of the cable. Chosen: with the largest of
+# `LAW_SCALES`, an end yields about as much as its cable.
 LAW_CABLES = 3.0
 # Laws that are fitted, the leading ones to first order; and of these, how many are also fitted with more knots. Chosen
 # for time.
@@ -222,17 +220,20 @@ LISTED_STARTS = 3
 # Distance, in posterior standard deviations, up to which a learned law is a listed one: half of a normal
 # distribution's 90 % interval.
 WITHIN_BAND = 1.645
-# Share of the excess mean square below which what the best single listed mechanism leaves is learned too. Chosen.
+# Laws are also learned beside the best single listed mechanism if its excess mean square is below this share of the
+# calibrated model's. Chosen.
 MOSTLY_LISTED = 0.5
 # Share of both limits after which no further set is fitted before laws are learned. Chosen: laws take some 40 s.
 SETS_SHARE = 0.6
-# Share of what smaller sets leave that a larger one leaves at most if still larger ones come before laws. Chosen.
+# Ratio of a larger set's unexplained mean square (`left_by`) to that of smaller ones up to which still larger sets come
+# before laws, and up to which a larger set outdoes a candidate without a good fit (`is_outdone`). Chosen.
 LEADING_ON = 0.5
 
 # --- Fault isolation and location
 
-# Share of the excess mean square below which leaving out a channel must bring it for the fault to be in that sensor.
-ISOLATED_SHARE = 0.05  # Chosen.
+# Largest excess mean square without a channel, or with the measured load torque, over that of the calibrated model, at
+# which the fault is located there. Chosen.
+ISOLATED_SHARE = 0.05
 # Speed below which the drive is at rest, over its highest speed. Chosen.
 REST_SPEED = 0.02
 # Travel after a reversal that counts as its neighbourhood, over the drive's stroke. Chosen.
@@ -245,14 +246,15 @@ NAMED_CHANNEL, NAMED_PHASE = 0.35, 0.7  # Chosen.
 # Posterior probability from which a mechanism is identified (the decision threshold), and from which it is listed as an
 # alternative. Chosen.
 DECIDED, ALTERNATIVE = 0.8, 0.02
-# Error of a channel over its noise up to which what may be missing beside a set of mechanisms is of no consequence.
-# Chosen: it shows when one looks for it, and not by itself. Beyond it, pages say that a channel is explained in part.
+# Largest rms error of a channel, over its noise, in a good fit (`CandidateFit.is_good`). Chosen: an error of this size
+# shows only if one looks for it. Above it, pages call a batch "explained in part" and add a caution.
 CONSPICUOUS = 1.5
 # Factor on the probability of every set of mechanisms where no recording can be held out, where the initial tension is
 # not observed, and, in proportion, where a tolerance takes the place of noise. Practice: without it two of 21
 # mechanisms concealed in measured recordings were identified wrongly.
 DISCOUNT = 0.75
-# Mean square (1: noise) up to which a fit is called good, and a recording is said to contradict the others. Chosen.
+# Mean square (1: noise) up to which a fit is called good. A recording contradicts the others if only the fit without it
+# is good. Chosen.
 GOOD_FIT = 1.5
 # No probability is reported above this: no number of samples shows that the list of mechanisms is complete. Chosen.
 MOST_CONFIDENT = 0.99

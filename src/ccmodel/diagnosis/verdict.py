@@ -24,8 +24,8 @@ class Judgement:
     ----------
     verdict : {"agrees", "explained", "learned", "undecided", "unexplained"}
     best : CandidateFit
-        The most probable candidate if the verdict is explained, the most probable one with a law if it is learned, the
-        listed one with the highest evidence if it is undecided, otherwise the calibrated model.
+        If the verdict is explained, the candidate of the reason that holds (`judge`); if learned, the most probable
+        candidate with a law; if undecided, the listed one of highest evidence and prior; else the calibrated model.
     comparison : Comparison
     candidates : list of CandidateFit
         Those of the comparison, by descending probability.
@@ -84,14 +84,16 @@ class Judgement:
 def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
     """Decide the verdict.
 
-    - ``agrees``: nothing is missing in the calibrated model, with a probability above one half.
-    - ``explained``: each mechanism of the candidate that is most probably complete has the probability `DECIDED` at
-      least, and that these and no others are missing has one above one half, unless a larger set leaves far less
-      (`Comparison.is_outdone`); or those that have it leave a good fit (`Comparison.certain`); or a set leaves a good
-      fit and no other does as well (`Comparison.best_of_list`).
-    - ``learned``: something that no list holds is missing, and is a law of one slot with a probability above one half.
-    - ``unexplained``: something is missing that no candidate describes, with a probability above one half, and no
-      mechanism is part of it with such a probability.
+    The first of these whose condition holds:
+
+    - ``agrees``: the calibrated model is complete with a probability above one half.
+    - ``learned``: the laws of the leading law's slot have a probability above one half together.
+    - ``explained``, for one of three reasons. Each mechanism of the most probable complete candidate has at least the
+      probability `DECIDED`, exactly these are missing with a probability above one half, and no larger set outdoes
+      them (`Comparison.is_outdone`). Or the mechanisms with at least the probability `DECIDED` give a good fit
+      (`Comparison.certain`). Or one set alone gives a good fit (`Comparison.best_of_list`).
+    - ``unexplained``: unlisted effects and laws have a probability above one half together, and none of the
+      listed mechanisms has one.
     - ``undecided``: otherwise.
     """
     probability = np.array(comparison.probability)
@@ -111,7 +113,8 @@ def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
     if sufficient is not None and law_of(sufficient.hypothesis) is None:
         return replace(found, verdict="explained", best=sufficient)
     names = {name for c in listed for name in c.hypothesis.names}
-    learned = sum(p for hypothesis, p in found.confidence.items() if law_of(hypothesis) is not None)
+    # Candidates with a law beside which something is missing too are part of `unlisted`.
+    learned = sum(p for c, p in zip(candidates, found.probability, strict=True) if law_of(c.hypothesis) is not None)
     if comparison.unlisted + learned > 0.5 and max(map(found.confidence_in, names), default=0.0) <= 0.5:
         return replace(found, verdict="unexplained", single_fault_places=single_fault_places(comparison))
     # Whether its last member is missing or imitates something, the set with the highest evidence predicts best.

@@ -54,7 +54,8 @@ class Whitened:
     determined : ndarray, shape (nuisances,)
         One minus the posterior variance of each scalar nuisance over its prior variance.
     noise_floor : dict of str to float
-        Root mean square error of a correct model by channel, in its unit: sensor noise and repeatability.
+        Root mean square error of a correct model by channel, in its unit: sensor noise, uncertain drive motion,
+        friction from run to run, and the tolerance.
     scalar_nuisances : sequence of (str, float, float)
         Parameter, value and prior standard deviation of each scalar nuisance.
     effects : ndarray, shape (rows, nuisances and draws)

@@ -48,9 +48,9 @@ MOST_CONTINUATIONS = 5
 # An unknown within this distance of a bound, in sizes, is put on the bound: scipy's iterates stay strictly inside.
 ON_BOUND = 1e-6
 NO_STEP_HELPS = 3  # scipy's status where no step longer than the shortest reduces the cost
-CONVERGED = "converged: the error no longer falls"
-ON_CORNER = "converged: the least error lies on a corner of it, within a third of a standard deviation"
-DIRECT = "converged: by direct search, the error being too rough for its slopes"
+CONVERGED = "converged: the cost no longer falls"
+ON_CORNER = "converged at a corner of the cost, within a third of a standard deviation of the minimum"
+DIRECT = "converged by a search without derivatives: the cost is too rough for them"
 STOPPED = "stopped at the largest number of evaluations without converging"
 STALLED = "stalled: no step lessens the error although its slope says that one should"
 

@@ -45,7 +45,7 @@ def sentence(diagnosis: Mapping) -> str:
     held = diagnosis["is_held"]
     missing = "has changed" if held else "is missing"
     if verdict == "agrees":
-        model, nothing = ("model given", "no change") if held else ("calibrated model", "no missing physics")
+        model, nothing = ("frozen baseline", "no change") if held else ("calibrated model", "no missing physics")
         return f"The {model} agrees with the recordings within their noise; they show {nothing}."
     if verdict == "explained":
         return _capital(f"{'this has changed: ' if held else ''}{_with_confidence(diagnosis['mechanisms'])}.")
@@ -94,6 +94,8 @@ def _undecided(diagnosis: Mapping, missing: str) -> str:
             name for name, one in zip(names, diagnosis["alternatives"], strict=True) if _placed(one) not in together
         ]
         names = [f"{all_of_them} together", *others]
+    if not names:
+        return f"Something {missing}, and these recordings do not tell what."
     if len(names) == 1:
         return f"Something {missing}; it may be {names[0]}, but these recordings do not confirm it."
     return f"Something {missing}, and these recordings cannot tell {' or '.join(names)} apart."

@@ -6,7 +6,6 @@ from statistics import median
 from typing import Any
 
 from ccmodel.diagnosis.settings import CONSPICUOUS
-from ccmodel.recording import ORIGIN
 from ccmodel.report.verdict import (
     IN_WORDS,
     INPUTS_INCONSISTENT,
@@ -15,7 +14,6 @@ from ccmodel.report.verdict import (
     nearest_sentence,
     place_in_words,
     possible_places,
-    printed_unit,
     sentence,
 )
 from ccmodel.sentences import joined
@@ -59,7 +57,6 @@ def _card(summary: Mapping, diagnoses: Mapping[str, Mapping]) -> dict:
         "together": summary.get("together", []),
         "origin": {"rig": "measured", "virtual-rig": "simulated"}.get(origin, "no usable recording"),
         "measured": origin == "rig",
-        "origin_in_full": ORIGIN.get(origin, ""),
         "recordings": len(summary["recordings"]),
         "single_cable": bool(summary["batch"]) and summary["batch"]["rig"].get("transmission") == "single-cable",
         "mismatch": 0.0,
@@ -88,7 +85,6 @@ def _card(summary: Mapping, diagnoses: Mapping[str, Mapping]) -> dict:
         "shown_verdict": IN_PART if in_part else diagnosis["verdict"],
         "nearest": nearest_sentence(diagnosis),
         "mechanisms": _mechanisms(diagnosis),
-        "next": (diagnosis.get("next_experiment") or {}).get("text"),
         "places": possible_places(diagnosis),
         "place_text": joined([place_in_words(p) for p in possible_places(diagnosis)]),
         "rows": rows,
@@ -125,7 +121,7 @@ def after_is(diagnosis: Mapping) -> str:
     verdict, nearest = diagnosis["verdict"], diagnosis.get("nearest")
     if verdict == "unexplained":
         return f"nearest ({NOT_ACCEPTED})" if nearest and nearest.get("error") else ""
-    return {"explained": "extended", "undecided": "most probable"}.get(verdict, "")
+    return {"explained": "extended", "learned": "extended", "undecided": "best listed"}.get(verdict, "")
 
 
 def _rows(error: Mapping[str, Mapping], nearest: Mapping[str, Mapping] | None) -> list[dict]:
@@ -137,8 +133,6 @@ def _rows(error: Mapping[str, Mapping], nearest: Mapping[str, Mapping] | None) -
             "channel": IN_WORDS[channel],
             "before": e["before"] / e["noise"],
             "after": after[channel]["after"] / e["noise"] if changed else None,
-            "noise": e["noise"],
-            "unit": printed_unit(e["unit"]),
         }
         for channel, e in error.items()
     ]
@@ -182,8 +176,11 @@ def _summary(origin: str, of: Sequence[Mapping]) -> str:
     counts = [f"{n} {shown}" if len(of) > 1 else shown for shown, n in counted.items() if n]
     falls = [
         _fall(those, model, len(of) > 1)
-        for verdict, model in (("explained", "extended model"), ("unexplained", f"nearest model, {NOT_ACCEPTED}"))
-        if (those := [c for c in of if c["verdict"] == verdict and c["worst"]["after"] is not None])
+        for verdicts, model in (
+            (("explained", "learned"), "extended model"),
+            (("unexplained",), f"nearest model, {NOT_ACCEPTED}"),
+        )
+        if (those := [c for c in of if c["verdict"] in verdicts and c["worst"]["after"] is not None])
     ]
     named = f"batch {of[0]['batch']}" if len(of) == 1 else f"{len(of)} batches"
     error = f" Largest held-out error over noise: {'; '.join(falls)}." if falls else ""

@@ -88,7 +88,8 @@ def _said_of(effect: Effect, rig: Rig, diagnosis: Mapping) -> str:
     if not diagnosis["verdict"] or diagnosis["verdict"] == INPUTS_INCONSISTENT:
         return "–"
     if effect.name is None:
-        return "no mechanism describes it"
+        laws = [law for law in diagnosis["laws"] if law["place"] == effect.place]
+        return f"learned: {_laws(laws)}" if laws else "no mechanism describes it"
     kinds = (
         (diagnosis["mechanisms"], IDENTIFIED),
         (diagnosis["alternatives"], ALTERNATIVE),
@@ -107,10 +108,19 @@ def _said_of(effect: Effect, rig: Rig, diagnosis: Mapping) -> str:
 
 
 def _besides(rig: Rig, diagnosis: Mapping) -> str:
-    """Mechanisms that a diagnosis names and the rig does not have."""
+    """Mechanisms that a diagnosis identifies and the rig does not have, and laws that it learns at other places."""
+    if not diagnosis["verdict"]:
+        return "–"
     there = {e.name for e in rig.effects}
-    named = [m["name"] for m in (diagnosis["mechanisms"] if diagnosis["verdict"] else []) if m["name"] not in there]
-    return ", ".join(named) or "–"
+    unlisted = {e.place for e in rig.effects if e.name is None}
+    laws = [law for law in diagnosis["laws"] if law["place"] not in unlisted]
+    identified = [m["name"] for m in diagnosis["mechanisms"] if m["name"] not in there]
+    return ", ".join([*identified, *([_laws(laws)] if laws else [])]) or "–"
+
+
+def _laws(laws: Sequence[Mapping]) -> str:
+    """Learned laws by slot and argument."""
+    return ", ".join(f"{law['slot']} by {' and '.join(law['arguments'])}" for law in laws)
 
 
 def _fall(diagnosis: Mapping) -> str:

@@ -36,6 +36,7 @@ def report(batch: str, findings: Sequence[Finding], is_held: bool = False, sever
         "location": _location(contradictions),
         "mechanisms": [],
         "alternatives": [],
+        "laws": [],
         "likeliest": [],
         "nearest": None,
         "fit": {

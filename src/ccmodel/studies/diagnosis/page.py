@@ -47,12 +47,12 @@ CANDIDATES = 8
 FAINT = "#9a9a9a"
 # Letters of an axis label that fit beside a panel of a law.
 LABEL_LETTERS = 34
-WITH_FOUND = "with what was found"
+WITH_FOUND = "extended model"
 
 
 def _baseline(report: dict) -> str:
     """The baseline model in words."""
-    return "model given" if report["is_held"] else "calibrated model"
+    return "frozen baseline" if report["is_held"] else "calibrated model"
 
 
 def write_diagnosis(file: Path, found: Diagnosis, page: str | None = None) -> None:
@@ -187,7 +187,7 @@ def _caution(report: Mapping, errors: Mapping[str, Mapping[str, float]]) -> str 
         f"The verdict is 'agrees' although {', '.join(high)} exceed{'s' if len(high) == 1 else ''} the noise floor. The"
         " floor is a mean over the whole motion, while differences between runs (friction, the drive's position between"
         " two counts) concentrate in parts of it. The verdict counts what these differences do not account for: the"
-        f" mean square of the whitened residuals is {square:.2g} (1 is noise), and no candidate lowers it by enough."
+        f" mean square of the whitened residuals is {square:.2g} (1 is noise), and candidates are less probable."
     )
 
 
@@ -213,7 +213,7 @@ def _why(fit: CandidateFit, found: Diagnosis) -> str:
     if fit is j.calibrated:
         return "agrees" if found.report["verdict"] == "agrees" else "the baseline"
     if fit is j.best:
-        return "most probable"
+        return "the extended model"
     if not fit.is_plausible:
         return "needs implausible values"
     evidence = j.comparison.evidence[fit.hypothesis]

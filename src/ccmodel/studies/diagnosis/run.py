@@ -168,7 +168,7 @@ def check_options(options: Options, has_baseline: bool, prefix: str = "") -> Non
     except registry.UnknownMechanismError as error:
         raise InputError(f"{prefix}without: {error}") from None
     if options.freeze and not has_baseline:
-        raise InputError(f"{prefix}freeze: there is no model to hold; name one with {prefix}baseline")
+        raise InputError(f"{prefix}freeze: there is no baseline to freeze; name one with {prefix}baseline")
 
 
 def diagnose_recordings(
