@@ -28,7 +28,7 @@ import ccmodel
 from benchmarks.clock import NEVER_S
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
-from ccmodel.diagnosis.comparison import Comparison, log_odds_of_repeats, log_priors
+from ccmodel.diagnosis.comparison import Comparison, log_bayes_factor_of_repeats, log_priors
 from ccmodel.inference.pool import set_threads
 from proof.build import record
 from proof.calibration import calibration_error, doubtful, spiegelhalter
@@ -62,7 +62,7 @@ def without_discrepancy(comparison: Comparison) -> dict:
 
 def _log_weight(comparison: Comparison, candidate: CandidateFit, screened: int) -> float:
     prior = log_priors(candidate.hypothesis.size, screened)[0]
-    return comparison.evidence[candidate.hypothesis].exact + prior + log_odds_of_repeats(candidate)
+    return comparison.evidence[candidate.hypothesis].exact + prior + log_bayes_factor_of_repeats(candidate)
 
 
 def said(verdict: str, best: CandidateFit, confidence: float) -> dict:

@@ -397,7 +397,7 @@ def test_shares_have_proper_densities(has_part):
     ],
 )
 def test_a_further_mechanism_is_searched_for_where_something_is_left(mean_square, given, enough):
-    assert compared(evidence(), (fitted(mean_square, FRICTION), given)).is_enough == enough
+    assert compared(evidence(), (fitted(mean_square, FRICTION), given)).is_adequate == enough
 
 
 @pytest.mark.parametrize(
@@ -433,7 +433,7 @@ def test_no_law_is_learned_where_nothing_is_missing():
 
 
 def test_without_candidates_there_is_nothing_to_extend():
-    assert compared(evidence(FAR, NONE)).is_enough
+    assert compared(evidence(FAR, NONE)).is_adequate
 
 
 def test_a_recording_is_predicted_by_the_choice_of_the_others():

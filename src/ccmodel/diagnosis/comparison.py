@@ -123,7 +123,7 @@ class Comparison:
         """
         found = []
         for candidate in [self.base, *self.candidates]:
-            evidence, repeats = self.evidence[candidate.hypothesis], log_odds_of_repeats(candidate)
+            evidence, repeats = self.evidence[candidate.hypothesis], log_bayes_factor_of_repeats(candidate)
             priors = log_priors(candidate.hypothesis.size, max(self.screened, len(self.candidates)))
             # What no list holds is any law of any slot.
             unlisted = log((1 - settings.PRIOR_LISTED) / settings.PRIOR_LISTED)
@@ -156,10 +156,10 @@ class Comparison:
             weights[p] = np.logaddexp(weights[p], imitates)
             weights[k] += true
         weights -= np.logaddexp.reduce(weights, axis=None)
-        if self._tested < 1:
-            untested = float(np.logaddexp.reduce(weights[1:], axis=None, initial=-np.inf)) + np.log1p(-self._tested)
-            weights[0, 1] = np.logaddexp(weights[0, 1], untested)
-            weights[1:] += log(self._tested)
+        if self._discount < 1:
+            discounted = float(np.logaddexp.reduce(weights[1:], axis=None, initial=-np.inf)) + np.log1p(-self._discount)
+            weights[0, 1] = np.logaddexp(weights[0, 1], discounted)
+            weights[1:] += log(self._discount)
         return weights
 
     def _imitation(self, candidate: CandidateFit, part: CandidateFit) -> NDArray:
@@ -199,7 +199,7 @@ class Comparison:
         return float(np.exp(self.log_posterior[:, 1]).sum())
 
     @property
-    def is_enough(self) -> bool:
+    def is_adequate(self) -> bool:
         """Whether no further mechanism is searched for: the best candidate leaves nothing of a further effect."""
         if not self.candidates:
             return True
@@ -224,7 +224,7 @@ class Comparison:
         """
         if self._has_complete:
             return True
-        return self.is_enough if self.certain is None else self.left_by(self.certain) == 0.0
+        return self.is_adequate if self.certain is None else self.left_by(self.certain) == 0.0
 
     def confidence_in(self, name: str) -> float:
         """Probability that a mechanism acts, at whatever place and beside whatever others."""
@@ -320,7 +320,7 @@ class Comparison:
         return {channel: exp(value + shift) for channel, value in evidence.in_channel.items()}
 
     @property
-    def _tested(self) -> float:
+    def _discount(self) -> float:
         """Factor on the probability of every set of mechanisms, below 1 where nothing shows how well models predict.
 
         That is so for a single recording, which leaves none to hold out; for an initial tension that is not observed
@@ -400,7 +400,7 @@ def prior_of_further(has_part: bool) -> float:
     return (settings.PRIOR_FURTHER if has_part else 1.0) * settings.PRIOR_LISTED
 
 
-def log_odds_of_repeats(candidate: CandidateFit) -> float:
+def log_bayes_factor_of_repeats(candidate: CandidateFit) -> float:
     """Logarithm of the least Bayes factor that friction differs between recordings as from run to run.
 
     Whitening keeps friction that differs from run to run out of the residuals, and so may keep out too much.

@@ -103,9 +103,9 @@ class Selection:
         sets, size = replace(self, deadline=self.sets_until, goes_on=True), 2
         while size <= settings.MOST_MECHANISMS:
             part = sets._part((size - 2) / SIZES, (size - 1) / SIZES)
-            if not found.is_enough:
+            if not found.is_adequate:
                 found = part._part(0.0, RELINEARISED).relinearise(found)
-            if found.is_enough or (size > 2 and found.by_evidence[0].is_good):
+            if found.is_adequate or (size > 2 and found.by_evidence[0].is_good):
                 break
             found = part._part(RELINEARISED, 1.0).extended(found, screening, size)
             is_over = part.deadline.has_passed
@@ -146,7 +146,7 @@ class Selection:
     def beside_law(self, found: Comparison) -> Comparison:
         """The same with what acts beside the leading law, a listed mechanism or a second law, if something is left."""
         best = found.leading[0]
-        if found.is_enough or self.deadline.has_passed or best.hypothesis.size > 1:
+        if found.is_adequate or self.deadline.has_passed or best.hypothesis.size > 1:
             return found
         self.progress(f"looking for what acts beside {best.hypothesis}", 0.0)
         acting = laws_in(best.hypothesis)
@@ -306,7 +306,7 @@ class Selection:
         Of a model that leaves nothing, quick searches find the minimum. If the deadline passes before all are fitted,
         all stay as they are: a longer search for some of them would tip the comparison.
         """
-        if found.is_enough:
+        if found.is_adequate:
             return found
         scores = [Score(c.hypothesis, 0.0, c.values) for c in contenders(found)]
         again = self.fit_all(found.whitened, found.base, scores, LAST_SEARCH)
