@@ -257,6 +257,25 @@ def test_a_drag_by_speed_is_that_of_each_contact(mechanism, drag_N_per_m):
         assert np.abs(found.read[channel] - expected.read[channel]).max() <= 0.05 * change
 
 
+DRAG_ALONG = "learned-sliding-friction-drag-by-position-along-conduit"
+
+
+def test_a_drag_that_is_the_same_everywhere_is_the_constant_drag():
+    law = with_values(laws()[DRAG_ALONG], lambda x: np.full(x.size, 0.5 / L), scale=1.0)
+    found, wanted = run(sine(), law), run(sine(), ("constant-drag", "conduit", {"f0": 0.5}))
+    assert largest_difference(found, wanted) < 0.02 * largest_difference(run(sine()), wanted)
+
+
+@pytest.mark.parametrize("place", [0.2, 0.8])
+def test_a_drag_at_one_place_of_a_straight_conduit_is_the_loss_wherever_it_is(place):
+    """0.4 N over a fifth to both sides, without Coulomb friction; while both cables slide, they lose it."""
+    shape = lambda x: 0.4 / 0.2 / L * (1 - abs(x - place) / 0.2).clip(0)  # noqa: E731
+    law = with_values(laws()[f"{DRAG_ALONG}-fine"], shape, scale=1.0)
+    slid = run(sine(), law, path=ConduitPath([L], [0.0]), elements=64)
+    for samples, direction in ((slice(560, 600), 1), (slice(810, 850), -1)):
+        np.testing.assert_allclose(slid.T1_N[samples] - slid.T2_N[samples], direction * 0.4, rtol=0.02)
+
+
 def test_more_than_all_friction_does_not_build_up():
     shares = np.full(4, 0.5)
     found = Contacts.of_law(np.geomspace(1e-5, 1e-3, 4), shares)

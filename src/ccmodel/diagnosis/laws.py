@@ -21,7 +21,7 @@ from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.inference.pool import each
 from ccmodel.mechanisms import Sensing, laws
-from ccmodel.mechanisms.law_forms import ADDED_BEND, DRAG
+from ccmodel.mechanisms.law_forms import ADDED_BEND, CONSTANT_DRAG, DRAG
 from ccmodel.mechanisms.learned import Law
 from ccmodel.model.parameters import mechanism_key
 from ccmodel.model.run import simulate
@@ -109,7 +109,7 @@ def _unit_of(law: Law, base: CandidateFit, motions: Sequence[Sensing]) -> float:
         return 1.0
     if law.form is ADDED_BEND:
         return float(np.mean([path.bend_rad for path in _paths(base)]))
-    if law.form is DRAG:
+    if law.form in (DRAG, CONSTANT_DRAG):
         model = base.model(base.whitened[0].observations.parameters)
         bend_per_m = np.mean([path.bend_rad / path.length_m for path in _paths(base)])
         tension_N = np.mean([m.channels[c].clip(0.0).mean() for m in motions for c in TENSIONS if c in m.channels])

@@ -44,5 +44,12 @@ MECHANISM = Mechanism(
             (_PER_LENGTH,),
             form="drag",
         ),
+        Curve(
+            SLIDING_FRICTION,
+            "position-along-conduit",
+            lambda position, values: np.full(position.shape, values["per_length"]),
+            (_PER_LENGTH,),
+            form="drag",
+        ),
     ),
 )

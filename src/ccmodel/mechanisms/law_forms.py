@@ -67,6 +67,8 @@ FRICTION_FACTOR = Form("factor of the friction coefficient", "1", neutral=1.0, l
 STRETCH_FACTOR = Form("factor of the cables' compliance", "1", neutral=1.0, least=LEAST_COMPLIANCE)
 END_COMPLIANCE = Form("compliance of the cables' fastening at the {side}, in m/N", "m/N", least=0.0, is_centred=False)
 DRAG = Form("drag of a cable per length of conduit, in N/m", "N/m", is_centred=False, has_slope=True, name="drag")
+# Drag that no speed changes, as that of a seal at one place.
+CONSTANT_DRAG = Form("drag of a cable per length of conduit, in N/m", "N/m", least=0.0, is_centred=False, name="drag")
 # Friction that does not grow with the bend of the loop, as at a kink.
 ADDED_BEND = Form("bend added to the conduits, over their length, in rad", "rad", is_centred=False, name="bend")
 # Shares of friction that build up; after a reversal friction acts in the former direction at first.

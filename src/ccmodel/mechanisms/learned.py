@@ -66,6 +66,7 @@ from ccmodel.mechanisms.law_forms import (
     ADDED,
     ADDED_BEND,
     AGAINST_MOTION,
+    CONSTANT_DRAG,
     CONTACT_ELEMENTS,
     DRAG,
     END_COMPLIANCE,
@@ -295,7 +296,7 @@ class Law:
 
 
 # Settings of the solver by form, where that is not the usual one of its slot.
-_SETTING_OF = {DRAG: "conduit_drag", ADDED_BEND: "added_bend"}
+_SETTING_OF = {DRAG: "conduit_drag", CONSTANT_DRAG: "added_drag", ADDED_BEND: "added_bend"}
 # Settings of the solver by slot and argument, or by slot for all other arguments; and those that are neutral at
 # something else than None.
 _SETTINGS = {
@@ -352,7 +353,8 @@ def _laws() -> Iterator[Law]:
         yield Law(SLIDING_FRICTION, "conduit", argument, FRICTION_FACTOR)
     yield Law(SLIDING_FRICTION, "conduit", SLIDING, CONTACT_ELEMENTS)
     yield Law(SLIDING_FRICTION, "conduit", SPEED, DRAG)
-    yield Law(SLIDING_FRICTION, "conduit", POSITION, ADDED_BEND)
+    for form in (CONSTANT_DRAG, ADDED_BEND):
+        yield Law(SLIDING_FRICTION, "conduit", POSITION, form)
     yield Law(CABLE_STRETCH, "cable", TENSION, STRETCH_FACTOR)
     for end in ("drive-end", "load-end"):
         yield Law(END_STRETCH, end, TENSION, END_COMPLIANCE, resolution=SMOOTH)

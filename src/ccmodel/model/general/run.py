@@ -319,6 +319,8 @@ def _constants(
     piece[rows.SHARE][:, segments] = segment / length
     node[rows.HALF_BEND][:, cells] = friction * ratio_mu * (grid.cell_rad + added_rad) / 2
     node[rows.DRAG][:, cells] = settings.drag_N * cell / length
+    if settings.added_drag is not None:
+        node[rows.DRAG][:, cells] += settings.added_drag.at(grid.middle_m / length) * cell
     drag = settings.conduit_drag
     node[rows.VISCOUS][:, cells] = settings.viscous * cell
     if drive is not None:
@@ -368,6 +370,7 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
     K_e = load.parallel_Nm_per_rad if isinstance(load, TorqueLoad) else K_e
     values = {name: float(getattr(settings, name)) for name in registry.march_settings()}
     has_friction_table, has_drag_table = settings.friction_by_tension is not None, settings.conduit_drag is not None
+    has_drag = settings.drag_N != 0 or settings.added_drag is not None
     contacts, has_presliding = _contacts(settings)
     springs = settings.cable_compliance, settings.drive_end_stretch, settings.load_end_stretch
     return rows.Physics(
@@ -385,7 +388,7 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
         load_damping=float(load_damping(settings, K_e)),
         kind=rows.PRESCRIBED_ANGLE if isinstance(load, AngleLoad | FixedLoad) else rows.IMPEDANCE,
         general_friction=bool(
-            settings.tension_exponent or settings.drag_N or settings.viscous or has_friction_table or has_drag_table
+            settings.tension_exponent or has_drag or settings.viscous or has_friction_table or has_drag_table
         ),
         has_spring_table=any(law is not None for law in springs),
         has_friction_table=has_friction_table,
