@@ -17,6 +17,7 @@ EFFECTS = [
 
 SIZE = "30.1 mrad (29.2 to 30.9 mrad)"
 IDENTIFIED = f"identified: {SIZE}"
+NOTHING = "no mechanism describes it"
 # As diagnosis.json states an alternative: without its parameters.
 ALTERNATIVE = {"name": "torque-scale", "place": "load-sensor", "confidence": 0.2}
 
@@ -54,17 +55,24 @@ def test_the_same_effect_at_two_places_is_named_at_each_by_itself(concealed):
     assert [e["said"] for e in table["effects"]] == [["not identified"], ["identified: 0.148 (0.147 to 0.149)"]]
 
 
-def test_a_law_is_said_of_the_unlisted_effect_at_its_place_only(concealed):
+@pytest.mark.parametrize(
+    ("effects", "distance", "said", "besides"),
+    [
+        ([(None, "drive-pulley"), (None, "load")], 9.0, ["learned: bearing-torque by drive-angle", NOTHING], "–"),
+        ([(None, None)], 9.0, ["learned: bearing-torque by drive-angle"], "–"),
+        ([(None, "load")], 9.0, [NOTHING], "bearing-torque by drive-angle"),
+        # Within its uncertainty it is the law of a listed mechanism.
+        ([("torque-scale", "drive-pulley")], 0.5, ["learned: bearing-torque by drive-angle"], "–"),
+        ([(None, "drive-pulley")], 0.5, [NOTHING], "bearing-torque by drive-angle"),
+    ],
+)
+def test_a_law_is_said_of_the_effect_that_it_is(concealed, effects, distance, said, besides):
     law = {"slot": "bearing-torque", "place": "drive-pulley", "arguments": ["drive-angle"]}
-    effects = [{"name": None, "place": place, "text": "cogging"} for place in ("drive-pulley", "load")]
-    (table,) = beside(concealed(effects), [diagnosis("b", "learned", mechanisms=[], laws=[law])])
-    assert [e["said"] for e in table["effects"]] == [
-        ["learned: bearing-torque by drive-angle"],
-        ["no mechanism describes it"],
-    ]
-    assert table["besides"] == ["–"]
-    (table,) = beside(concealed(effects[1:]), [diagnosis("b", "learned", mechanisms=[], laws=[law])])
-    assert table["besides"] == ["bearing-torque by drive-angle"]
+    law |= {"nearest_listed": {"name": "torque-scale", "distance": distance}}
+    rig = [{"name": name, "place": place, "text": "cogging"} for name, place in effects]
+    (table,) = beside(concealed(rig), [diagnosis("b", "learned", mechanisms=[], laws=[law])])
+    assert [e["said"][0] for e in table["effects"]] == said
+    assert table["besides"] == [besides]
 
 
 def test_what_was_identified_and_is_not_there_is_said(concealed):

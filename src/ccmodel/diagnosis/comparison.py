@@ -298,7 +298,7 @@ class Comparison:
         return bool(left <= settings.LEADING_ON * before)
 
     def is_outdone(self, candidate: CandidateFit) -> bool:
-        """Whether a candidate's fit is not good, and a larger set has at most half of its excess mean square.
+        """Whether a candidate's fit is not good, and a larger set has at most half of its lack of fit (`left_by`).
 
         Whether the further mechanisms are missing or imitate what the equations leave, the candidate alone is then no
         complete account: what an imitation takes off is seldom half.

@@ -125,12 +125,15 @@ def _sensitivities(base: CandidateFit, hypothesis: Hypothesis, law: Law) -> list
     """By recording, derivatives of the whitened errors by the law's coefficients about no effect."""
     none = base.values | {name: 0.0 for name in hypothesis.start if name not in base.values}
     names = [mechanism_key(law.name, law.place, name) for name in law.coefficients]
+    # Values below the least one are clipped: there only the difference of a curve and its opposite is the whole curve.
+    is_least = law.form.least is not None and law.form.least >= law.form.neutral
 
     def of(i: int) -> NDArray:
         w = base.whitened[i]
         w = w.with_parameters(hypothesis.of(w.observations.parameters))
         without = w.errors(none)
-        return np.column_stack([w.errors(none | {name: 1.0}) - without for name in names])
+        opposite = {name: w.errors(none | {name: -1.0}) if is_least else without for name in names}
+        return np.column_stack([w.errors(none | {name: 1.0}) - opposite[name] for name in names])
 
     return each(base.whitened, lambda i, w: of(i))
 

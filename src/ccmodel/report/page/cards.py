@@ -121,7 +121,7 @@ def after_is(diagnosis: Mapping) -> str:
     verdict, nearest = diagnosis["verdict"], diagnosis.get("nearest")
     if verdict == "unexplained":
         return f"nearest ({NOT_ACCEPTED})" if nearest and nearest.get("error") else ""
-    return {"explained": "extended", "learned": "extended", "undecided": "best listed"}.get(verdict, "")
+    return "extended" if verdict in ("explained", "learned", "undecided") else ""
 
 
 def _rows(error: Mapping[str, Mapping], nearest: Mapping[str, Mapping] | None) -> list[dict]:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from pydantic import Field
 
+from ccmodel.diagnosis.settings import WITHIN_BAND
 from ccmodel.report.page.cards import after_is
 from ccmodel.report.verdict import INPUTS_INCONSISTENT, SYMBOL, place_in_words, strength, worst_channel
 from ccmodel.typed import TypedModel, load_yaml_model
@@ -87,9 +88,10 @@ def _said_of(effect: Effect, rig: Rig, diagnosis: Mapping) -> str:
     """What a diagnosis said of an effect, and not of the same effect at another place of the rig."""
     if not diagnosis["verdict"] or diagnosis["verdict"] == INPUTS_INCONSISTENT:
         return "–"
+    laws = [law for law in diagnosis["laws"] if _is_law_of(law, effect)]
+    learned = f"learned: {_laws(laws)}" if laws else ""
     if effect.name is None:
-        laws = [law for law in diagnosis["laws"] if law["place"] == effect.place]
-        return f"learned: {_laws(laws)}" if laws else "no mechanism describes it"
+        return learned or "no mechanism describes it"
     kinds = (
         (diagnosis["mechanisms"], IDENTIFIED),
         (diagnosis["alternatives"], ALTERNATIVE),
@@ -104,18 +106,24 @@ def _said_of(effect: Effect, rig: Rig, diagnosis: Mapping) -> str:
         if of_name:
             one = (here or of_name)[0]
             return f"{said}: {strength(one)}" if "parameters" in one else said
-    return NOT_IDENTIFIED
+    return learned or NOT_IDENTIFIED
 
 
 def _besides(rig: Rig, diagnosis: Mapping) -> str:
-    """Mechanisms that a diagnosis identifies and the rig does not have, and laws that it learns at other places."""
+    """Mechanisms that a diagnosis identifies and laws that it learns, of effects that the rig does not have."""
     if not diagnosis["verdict"]:
         return "–"
     there = {e.name for e in rig.effects}
-    unlisted = {e.place for e in rig.effects if e.name is None}
-    laws = [law for law in diagnosis["laws"] if law["place"] not in unlisted]
+    laws = [law for law in diagnosis["laws"] if not any(_is_law_of(law, e) for e in rig.effects)]
     identified = [m["name"] for m in diagnosis["mechanisms"] if m["name"] not in there]
     return ", ".join([*identified, *([_laws(laws)] if laws else [])]) or "–"
+
+
+def _is_law_of(law: Mapping, effect: Effect) -> bool:
+    """Whether a law stands at the place of an effect, and is the one of its mechanism, or of none if it has none."""
+    nearest = law["nearest_listed"]
+    recognised = nearest["name"] if nearest and nearest["distance"] <= WITHIN_BAND else None
+    return recognised == effect.name and effect.place in (law["place"], None)
 
 
 def _laws(laws: Sequence[Mapping]) -> str:

@@ -187,7 +187,7 @@ def _caution(report: Mapping, errors: Mapping[str, Mapping[str, float]]) -> str 
         f"The verdict is 'agrees' although {', '.join(high)} exceed{'s' if len(high) == 1 else ''} the noise floor. The"
         " floor is a mean over the whole motion, while differences between runs (friction, the drive's position between"
         " two counts) concentrate in parts of it. The verdict counts what these differences do not account for: the"
-        f" mean square of the whitened residuals is {square:.2g} (1 is noise), and candidates are less probable."
+        f" mean square of the whitened residuals is {square:.2g} (1 is noise), and every candidate is less probable."
     )
 
 
@@ -223,7 +223,7 @@ def _why(fit: CandidateFit, found: Diagnosis) -> str:
 
 
 def _map(found: Diagnosis) -> Figure:
-    """Errors over the noise by channel and part of the motion: baseline and, if any, with what was found."""
+    """Errors over the noise by channel and part of the motion: baseline and, if any, extended model."""
     j = found.judgement
     before = mismatch(found.calibrated, j.whitened)
     highest = max(np.nanmax([list(v.values()) for v in before.values()]), 3.0)
@@ -248,7 +248,7 @@ def _map(found: Diagnosis) -> Figure:
 
 
 def _loops(found: Diagnosis) -> Figure:
-    """Worst channel of the recordings with the largest errors: measured, baseline, and with what was found."""
+    """Worst channel of the recordings with the largest errors: measured, baseline, and extended model."""
     j = found.judgement
     chosen = nested_choice(j)
     worst = worst_channel(found.report["fit"]["error"])
