@@ -1,6 +1,7 @@
 """A law that is on no list is found from recordings: its slot, its argument and its curve."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,12 +13,16 @@ import builders
 from builders import spoil, write_batch
 from ccmodel import cli
 from ccmodel.channels import T1
-from ccmodel.diagnosis.laws import _unit_of
+from ccmodel.deadline import UNLIMITED
+from ccmodel.diagnosis.laws import _unit_of, proposals
 from ccmodel.diagnosis.settings import WITHIN_BAND
 from ccmodel.geometry import ConduitPath
+from ccmodel.mechanisms import laws
 from ccmodel.mechanisms.law_forms import ADDED_BEND, DRAG
 from ccmodel.model.files import read_model_file
 from ccmodel.model.general import Active, simulate
+from ccmodel.model.parameters import mechanism_key
+from made_observations import PARAMETERS, batch, calibrated
 
 K_TORQUE = 0.0234
 # Enough for a single law, and less than a diagnosis has: sets of listed mechanisms take most runs.
@@ -177,3 +182,17 @@ def test_a_second_law_is_learned_beside_the_first(tmp_path):
     }
     assert "The torque at the drive pulley depends" in said["headline"]
     assert "The error of F_load depends" in said["headline"]
+
+
+@pytest.mark.parametrize("place", [0.15, 0.85])
+def test_a_drag_is_proposed_where_it_acts(place):
+    """A drag cannot be negative, so that about none only half of each direction of its law acts."""
+    law = laws()["learned-sliding-friction-drag-by-position-along-conduit"]
+    x = np.linspace(0.0, 1.0, len(law.basis))
+    wanted = np.exp(-(((x - place) / 0.2) ** 2))
+    z = np.linalg.lstsq(law.basis, wanted, rcond=None)[0]
+    values = {"first": 0.0, "last": 1.0, "scale": 1.0} | dict(zip(law.coefficients, z.tolist(), strict=True))
+    truth = replace(PARAMETERS, mechanisms=(Active(law.name, law.place, values),))
+    (proposal,) = proposals(calibrated(batch(truth=truth)), [law], UNLIMITED)
+    scale = dict(proposal.hypothesis.fixed)[mechanism_key(law.name, law.place, "scale")]
+    assert scale * law.basis @ list(proposal.values.values()) == pytest.approx(wanted, abs=0.35)
