@@ -37,19 +37,15 @@ MECHANISM = Mechanism(
             lambda tension, values: 1 + values["as_large_at"] / np.maximum(tension, FLOOR_N),
             (_AS_LARGE_AT,),
         ),
-        Curve(
-            SLIDING_FRICTION,
-            "speed",
-            lambda speed, values: np.full(speed.shape, values["per_length"]),
-            (_PER_LENGTH,),
-            form="drag",
-        ),
-        Curve(
-            SLIDING_FRICTION,
-            "position-along-conduit",
-            lambda position, values: np.full(position.shape, values["per_length"]),
-            (_PER_LENGTH,),
-            form="drag",
+        *(
+            Curve(
+                SLIDING_FRICTION,
+                argument,
+                lambda x, values: np.full(x.shape, values["per_length"]),
+                (_PER_LENGTH,),
+                form="drag",
+            )
+            for argument in ("speed", "position-along-conduit")
         ),
     ),
 )
