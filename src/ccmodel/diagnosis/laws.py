@@ -126,14 +126,15 @@ def _sensitivities(base: CandidateFit, hypothesis: Hypothesis, law: Law) -> list
     none = base.values | {name: 0.0 for name in hypothesis.start if name not in base.values}
     names = [mechanism_key(law.name, law.place, name) for name in law.coefficients]
     # Values below the least one are clipped: there only the difference of a curve and its opposite is the whole curve.
-    is_least = law.form.least is not None and law.form.least >= law.form.neutral
+    is_clipped = law.form.least is not None and law.form.least >= law.form.neutral
 
     def of(i: int) -> NDArray:
         w = base.whitened[i]
         w = w.with_parameters(hypothesis.of(w.observations.parameters))
+        if is_clipped:
+            return np.column_stack([w.errors(none | {n: 1.0}) - w.errors(none | {n: -1.0}) for n in names])
         without = w.errors(none)
-        opposite = {name: w.errors(none | {name: -1.0}) if is_least else without for name in names}
-        return np.column_stack([w.errors(none | {name: 1.0}) - opposite[name] for name in names])
+        return np.column_stack([w.errors(none | {n: 1.0}) - without for n in names])
 
     return each(base.whitened, lambda i, w: of(i))
 

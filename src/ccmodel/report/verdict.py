@@ -140,13 +140,19 @@ def law_claim(law: Mapping) -> str:
     )
 
 
+def recognised_as(law: Mapping) -> str | None:
+    """The listed mechanism whose law a learned one is within its uncertainty, if there is one."""
+    nearest = law["nearest_listed"]
+    return nearest["name"] if nearest and nearest["distance"] <= WITHIN_BAND else None
+
+
 def _resemblance(law: Mapping) -> str:
     """Whether a learned law is that of a listed mechanism within its uncertainty, or how far the nearest one is."""
     nearest = law["nearest_listed"]
     if nearest is None:
         return "No listed mechanism does this"
-    if nearest["distance"] <= WITHIN_BAND:
-        return f"Within its uncertainty this is the law of {nearest['name']}"
+    if (name := recognised_as(law)) is not None:
+        return f"Within its uncertainty this is the law of {name}"
     away = f"{nearest['distance']:.1f} standard deviations away"
     return f"No listed mechanism does this (the nearest is {nearest['name']}, {away})"
 

@@ -5,9 +5,15 @@ from pathlib import Path
 
 from pydantic import Field
 
-from ccmodel.diagnosis.settings import WITHIN_BAND
 from ccmodel.report.page.cards import after_is
-from ccmodel.report.verdict import INPUTS_INCONSISTENT, SYMBOL, place_in_words, strength, worst_channel
+from ccmodel.report.verdict import (
+    INPUTS_INCONSISTENT,
+    SYMBOL,
+    place_in_words,
+    recognised_as,
+    strength,
+    worst_channel,
+)
 from ccmodel.typed import TypedModel, load_yaml_model
 
 IDENTIFIED, ALTERNATIVE, NEAREST, NOT_IDENTIFIED = (
@@ -88,8 +94,8 @@ def _said_of(effect: Effect, rig: Rig, diagnosis: Mapping) -> str:
     """What a diagnosis said of an effect, and not of the same effect at another place of the rig."""
     if not diagnosis["verdict"] or diagnosis["verdict"] == INPUTS_INCONSISTENT:
         return "–"
-    laws = [law for law in diagnosis["laws"] if _is_law_of(law, effect)]
-    learned = f"learned: {_laws(laws)}" if laws else ""
+    laws = [_in_words(law) for law in diagnosis["laws"] if _is_law_of(law, effect)]
+    learned = f"learned: {', '.join(laws)}" if laws else ""
     if effect.name is None:
         return learned or "no mechanism describes it"
     kinds = (
@@ -114,21 +120,19 @@ def _besides(rig: Rig, diagnosis: Mapping) -> str:
     if not diagnosis["verdict"]:
         return "–"
     there = {e.name for e in rig.effects}
-    laws = [law for law in diagnosis["laws"] if not any(_is_law_of(law, e) for e in rig.effects)]
+    laws = [_in_words(law) for law in diagnosis["laws"] if not any(_is_law_of(law, e) for e in rig.effects)]
     identified = [m["name"] for m in diagnosis["mechanisms"] if m["name"] not in there]
-    return ", ".join([*identified, *([_laws(laws)] if laws else [])]) or "–"
+    return ", ".join([*identified, *laws]) or "–"
 
 
 def _is_law_of(law: Mapping, effect: Effect) -> bool:
     """Whether a law stands at the place of an effect, and is the one of its mechanism, or of none if it has none."""
-    nearest = law["nearest_listed"]
-    recognised = nearest["name"] if nearest and nearest["distance"] <= WITHIN_BAND else None
-    return recognised == effect.name and effect.place in (law["place"], None)
+    return recognised_as(law) == effect.name and effect.place in (law["place"], None)
 
 
-def _laws(laws: Sequence[Mapping]) -> str:
-    """Learned laws by slot and argument."""
-    return ", ".join(f"{law['slot']} by {' and '.join(law['arguments'])}" for law in laws)
+def _in_words(law: Mapping) -> str:
+    """A learned law by its slot and arguments."""
+    return f"{law['slot']} by {' and '.join(law['arguments'])}"
 
 
 def _fall(diagnosis: Mapping) -> str:
