@@ -7,12 +7,21 @@ import numpy as np
 import pytest
 
 from builders import recording
-from ccmodel.channels import TENSIONS
+from ccmodel import mechanisms as registry
+from ccmodel.channels import MEASURED, TENSIONS
 from ccmodel.geometry import ConduitPath
 from ccmodel.model.general.run import Active
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, FixedLoad, SpringLoad, TorqueLoad
-from ccmodel.model.run import ModelInput, _by_torque_alone, _load, _true_at_rest, _zeroed, initial_tension
+from ccmodel.model.run import (
+    ModelInput,
+    _by_torque_alone,
+    _load,
+    _true_at_rest,
+    _zeroed,
+    initial_tension,
+    simulate_recording,
+)
 from general_runs import evenly_added_bend
 from model_runs import CABLE
 
@@ -122,3 +131,24 @@ def test_a_law_that_adds_bend_holds_more_of_the_tension_that_a_rest_shows(added_
     found = initial_tension(ModelInput.of(rest), parameters).tension_A_N
     held = ratio if added_rad else np.exp(mu * np.pi)
     assert found[0] / found[-1] == pytest.approx(held, rel=1e-3)
+
+
+OF_SENSORS = [registry.get(name) for name in registry.names() if registry.get(name).modifies_observation]
+FAULTS = [(mechanism.name, place) for mechanism in OF_SENSORS for place in mechanism.places]
+
+
+@pytest.mark.parametrize("name, place", FAULTS)
+def test_a_fault_of_a_sensor_leaves_the_exact_solver(name, place):
+    one, mechanism = recording(), registry.get(name)
+    sound, neutral, faulty = (
+        simulate_recording(one, replace(CABLE, mechanisms=mechanisms))
+        for mechanisms in ([], [Active(name, place, mechanism.neutral)], [Active(name, place, mechanism.start)])
+    )
+    # This drag is none, but takes the general solver.
+    on_general = [Active("constant-drag", "conduit", {"f0": 0.0}), Active(name, place, mechanism.start)]
+    by_grid = simulate_recording(one, replace(CABLE, mechanisms=on_general))
+    for channel in MEASURED:
+        np.testing.assert_array_equal(neutral[channel], sound[channel])
+        # The grid has an error.
+        assert 0 < np.abs(faulty[channel] - by_grid[channel]).max() < 5e-3 * np.ptp(faulty[channel])
+    assert any((faulty[channel] != sound[channel]).any() for channel in MEASURED)

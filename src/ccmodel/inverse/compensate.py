@@ -12,6 +12,7 @@ from ccmodel.channels import THETA_IN, THETA_OUT
 from ccmodel.failure import ModelError
 from ccmodel.inverse import follow
 from ccmodel.kernel import kernel
+from ccmodel.model.general.active import modify_physics
 from ccmodel.model.general.run import settings_of
 from ccmodel.model.model_input import ModelInput
 from ccmodel.model.parameters import Parameters
@@ -99,7 +100,7 @@ def _drive(given: ModelInput, parameters: Parameters, wanted: NDArray) -> NDArra
     transmission = transmission_of(given.recording, parameters)
     initial, time_s = initial_tension(given, parameters), given.recording.time_s
     stiffness = parameters.load_stiffness_Nm_per_rad or 0.0
-    if kept:
+    if modify_physics(kept):
         theta_in, solved = follow.general(transmission, stiffness, settings_of(kept), initial, time_s, wanted)
     else:
         theta_in, solved = follow.exact(transmission, stiffness, initial, wanted)

@@ -13,6 +13,7 @@ from ccmodel.failure import ModelError
 from ccmodel.inverse import exact, general
 from ccmodel.inverse.proximal import FALL, LOOKS_AHEAD, UNIFORM, Proximal
 from ccmodel.inverse.update import BY_MISFIT, EXPECTED, MISFIT, Considered, Drive, Prior, Run, joint_estimate, variances
+from ccmodel.model.general.active import modify_physics
 from ccmodel.model.general.run import settings_of
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad, TorqueLoad
@@ -204,7 +205,7 @@ class _Problem:
             theta[0] -= shift_rad
             drive = drive._replace(theta_rad=theta)
         K_e = parameters.load_stiffness_Nm_per_rad
-        if not parameters.mechanisms and not (K_e is None and parameters.spring_beside_load_Nm_per_rad):
+        if not modify_physics(parameters.mechanisms) and not (K_e is None and parameters.spring_beside_load_Nm_per_rad):
             return exact.run(transmission, K_e or 0.0, initial, drive, self.prior, misfit_Nm)
         if K_e is None:
             rest = (initial.tension_A_N[-1] - initial.tension_B_N[-1]) * transmission.load_radius_m

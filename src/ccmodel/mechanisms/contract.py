@@ -258,7 +258,7 @@ class Mechanism:
         unknown = set(self.places) - set(PLACES)
         if unknown or not self.places:
             raise ValueError(f"{self.name}: places are {', '.join(PLACES)}; got {', '.join(self.places) or 'none'}")
-        kinds = bool(self.neutral_settings), self.modifies_observation is not None, self.drift is not None
+        kinds = self.modifies_settings, self.modifies_observation is not None, self.drift is not None
         if sum(kinds) != 1:
             raise ValueError(f"{self.name}: a mechanism modifies the physics or the observation, or is a drift")
         if missing := set(PARAGRAPHS) - self.paragraphs.keys():
@@ -299,6 +299,11 @@ class Mechanism:
     def states(self) -> tuple[Parameter, ...]:
         """Parameters that are states at a recording's start, which differ from recording to recording."""
         return tuple(p for p in self.parameters if p.spread)
+
+    @property
+    def modifies_settings(self) -> bool:
+        """Whether it modifies the physics: it writes settings of the solver."""
+        return bool(self.settings or self.structures)
 
     @property
     def neutral(self) -> dict[str, float]:

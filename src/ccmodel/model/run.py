@@ -26,7 +26,8 @@ from ccmodel.failure import ModelError
 from ccmodel.mechanisms.relaxation import branch_times, kept_at_rest
 from ccmodel.model.exact import pair as exact
 from ccmodel.model.general import run as general
-from ccmodel.model.general.sensors import true_at
+from ccmodel.model.general.active import active_of, modify_physics
+from ccmodel.model.general.sensors import read_by_sensors, true_at
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad
 from ccmodel.model.model_input import PRESCRIBED, ModelInput
@@ -59,7 +60,8 @@ def simulate_recording(recording: Recording, parameters: Parameters) -> Recordin
 def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "law") -> Recording:
     """Run the model on its input from a recording.
 
-    The paper's physics against a spring or a fixed end runs on the exact solver, anything else on the general one.
+    The paper's physics against a spring or a fixed end runs on the exact solver, with or without faults of the sensors;
+    anything else runs on the general one.
 
     Parameters
     ----------
@@ -120,16 +122,15 @@ def _readings(
     parameters: Parameters,
 ) -> Mapping[str, NDArray]:
     """Readings of sensors without zeros, at samples and turning points: angles, torques and sums of tensions."""
-    if parameters.mechanisms or not isinstance(load, SpringLoad | FixedLoad):
-        time_s = given.recording.time_s
+    active, time_s = active_of(parameters.mechanisms), given.recording.time_s
+    if modify_physics(active) or not isinstance(load, SpringLoad | FixedLoad):
         finer = parameters.refinement
         solver = finer * general.ELEMENTS, finer, _motor(given)
-        by_general = general.simulate(
-            transmission, load, time_s, given.theta_in, initial, parameters.mechanisms, *solver
-        )
+        by_general = general.simulate(transmission, load, time_s, given.theta_in, initial, active, *solver)
         return by_general.complete(samples).read
-    response = exact.simulate_pair(transmission, load, given.theta_in, initial)
-    return response.complete(samples).channels(given.theta_in)
+    response = exact.simulate_pair(transmission, load, given.theta_in, initial).complete(samples)
+    radii = transmission.drive_radius_m, transmission.load_radius_m
+    return read_by_sensors(active, time_s, response.channels(given.theta_in), radii)
 
 
 def _motor(given: ModelInput) -> general.Motor:

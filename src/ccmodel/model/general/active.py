@@ -47,6 +47,11 @@ def active_of(mechanisms: Sequence[Active]) -> list[Active]:
     return found
 
 
+def modify_physics(mechanisms: Sequence[Active]) -> bool:
+    """Whether any of the mechanisms modifies the physics; the others are faults of sensors."""
+    return any(registry.get(a.name).modifies_settings for a in mechanisms)
+
+
 def _check(a: Active, known: Mechanism) -> None:
     if a.place not in known.places:
         raise ModelError(f"{a.name} acts at {' or '.join(known.places)}; got {a.place!r}")
