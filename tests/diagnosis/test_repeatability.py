@@ -17,6 +17,7 @@ from ccmodel.diagnosis.repeatability import (
     deviations,
     estimated,
     friction_probabilities,
+    least_of,
     log_bayes_factor,
     relative_spread,
     report,
@@ -219,6 +220,15 @@ def test_the_report_says_what_was_assumed():
     rows = report([relinearised(w, found.model(made.PARAMETERS), repeatability) for w in recordings])
     assert (rows[0]["from"], rows[0]["recordings"]) == ("repeats", 2)
     assert rows[0]["value"] < 0.01
+
+
+def test_the_least_of_independent_p_values_is_as_probable_as_it_says():
+    draws = np.random.default_rng(0).uniform(size=(20_000, 2))
+    least = [least_of(pair) for pair in draws.tolist()]
+    assert np.mean(np.array(least) < 0.05) == pytest.approx(0.05, abs=0.005)
+    assert least_of([0.05, 1.0]) == pytest.approx(0.05), "a test that could not be made"
+    assert least_of([1.0, 1.0]) == 1.0
+    assert least_of([1e-300, 0.5]) == pytest.approx(2e-300)
 
 
 def test_an_unlikely_scatter_speaks_against_a_model_and_a_likely_one_for_nothing():

@@ -11,6 +11,7 @@ import select
 import signal
 import subprocess
 import sys
+import tempfile
 import traceback
 import warnings
 from collections.abc import Sequence
@@ -137,6 +138,8 @@ def _measured(path: Path) -> tuple[str | None, str, float, list[str]]:
     """Refusal, fault, growth of the peak of memory, MB, and names of the signals."""
     resource.setrlimit(resource.RLIMIT_AS, (_ADDRESS_SPACE, _ADDRESS_SPACE))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    # A library that fails on a damaged file leaves its temporary files behind; the file's folder goes with its test.
+    tempfile.tempdir = str(path.parent)
     # What a library in C prints would be seen by the user of a format that is read in the process itself.
     printed = os.memfd_create("printed")
     os.dup2(printed, 1), os.dup2(printed, 2)

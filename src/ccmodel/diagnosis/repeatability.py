@@ -11,8 +11,8 @@ Where no condition repeats, the spread of friction comes from its scatter over a
 
 Whitening marginalises the deviation of friction in each recording, so that mean squares do not show whether it exceeds
 the repeatability. `friction_probabilities` tests this: by the scatter of repeats over the stated spread, and between
-conditions over the estimated one (F tests), and for a trend over the sequence of the recordings (t test). A trend is no
-scatter: spreads are those about it.
+conditions over the estimated one (F tests, the least of whose p-values counts), and for a trend over the sequence of
+the recordings (t test). A trend is no scatter: spreads are those about it.
 
 Deviations are in standard deviations as stated, and not shrunk: a posterior mean m with the posterior variance v under
 a standard normal prior is an observation m / (1 - v) with the variance v / (1 - v).
@@ -217,8 +217,18 @@ def friction_probabilities(
         return 1.0, 1.0
     found = deviations(whitened, residuals, FRICTION)
     groups = whitened[0].repeatability.conditions or [[i] for i in range(len(whitened))]
-    scatter = min(within_probability(found, groups), between_probability(found, groups, is_fitted))
+    scatter = least_of([within_probability(found, groups), between_probability(found, groups, is_fitted)])
     return scatter, trend_probability(found, sequences(whitened))
+
+
+def least_of(probabilities: Sequence[float]) -> float:
+    """Probability of a p-value as small as the least one of independent tests; a test of p = 1 could not be made.
+
+    1 - (1 - p)^n: Sidak 1967, Journal of the American Statistical Association 62(318), 626-633,
+    doi:10.1080/01621459.1967.10482935.
+    """
+    made = [p for p in probabilities if p < 1.0]
+    return float(-np.expm1(len(made) * np.log1p(-min(made)))) if made else 1.0
 
 
 def log_bayes_factor(probability: float) -> float:
