@@ -66,6 +66,7 @@ def test_every_command_has_an_example():
     assert [name for name, lines in EXAMPLES.items() if not lines] == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("line", ORDERED)
 def test_an_example_runs(line, shell, folder):
     ended = shell(line)
@@ -76,6 +77,7 @@ def test_an_example_runs(line, shell, folder):
         shutil.copytree(folder / "out", folder / "results/diagnoses/loops")
 
 
+@pytest.mark.long
 def test_the_results_of_examples_are_one_json_document_each(shell, folder):
     # What these examples write is made once, and then kept.
     (folder / "data/raw/my-batch/map.yaml").unlink()

@@ -68,7 +68,7 @@ def _heed_interruptions():
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-@pytest.mark.parametrize("how, code", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize("how, code", [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.long)])
 def test_a_diagnosis_says_that_nothing_was_written(how, code, batch, tmp_path):
     out = tmp_path / "out"
     found = interrupted(THREADS.format(before=""), how, "diagnose", batch, "--out", out)
@@ -87,6 +87,7 @@ def test_what_was_written_is_named(batch, tmp_path):
     assert f"written so far: {out / 'diagnosis.json'};" in err
 
 
+@pytest.mark.long
 def test_interruption_as_json(batch, tmp_path):
     found = interrupted(
         THREADS.format(before=""), signal.SIGINT, "diagnose", batch, "--out", tmp_path / "out", "--json"

@@ -17,6 +17,8 @@ from virtualrig.motion import GrowingSine, Sine, WanderingSine, smooth_step
 from virtualrig.sensors import log
 from virtualrig.trajectory import Preparation
 
+pytestmark = pytest.mark.long
+
 RIG = Path(__file__).parents[1] / "data/ideal-rig/rig.yaml"
 MOTIONS = (
     Sine(wave="sine", amplitude_rad=0.6, frequency_Hz=0.5, rest_s=0.5, start_up_cycles=1, cycles=2),

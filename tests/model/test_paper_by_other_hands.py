@@ -8,6 +8,8 @@ import pytest
 
 from ccmodel.model import paper
 
+pytestmark = pytest.mark.long
+
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 

@@ -44,7 +44,7 @@ def test_a_fit_finds_stiffness_friction_and_spring(tmp_path, far_end):
         assert values[name] == pytest.approx(truth, rel=0.01), name
 
 
-@pytest.mark.parametrize("far_end", ["spring", "fixed"])
+@pytest.mark.parametrize("far_end", [pytest.param("spring", marks=pytest.mark.long), "fixed"])
 def test_a_diagnosis_agrees_or_names_what_was_left_out(tmp_path, far_end):
     found = diagnose(*ingested(tmp_path / "plain", far_end))
     write_diagnosis(tmp_path / "page.html", found)

@@ -233,6 +233,7 @@ def test_a_rig_has_its_own_fits_and_a_batch_its_own_settings(copy):
     }
 
 
+@pytest.mark.long
 def test_snakemakes_report_has_page_diagnoses_tables_and_figures_with_their_captions(finished):
     run = snakemake(finished, "--report", str(finished / "report.zip"))
     assert run.returncode == 0, run.stdout + run.stderr
