@@ -55,10 +55,10 @@ def row(case: Case) -> dict:
 def figures(name: str, candidate: CandidateFit, found: Judgement) -> dict[str, float]:
     """Mean square, and the lack of fit over that of the calibrated model."""
     comparison = found.comparison
-    before = comparison.left_by(found.calibrated)
+    before = comparison.unexplained_mean_square(found.calibrated)
     return {
         f"{name}_mean_square": candidate.mean_square,
-        f"{name}_share_left": comparison.left_by(candidate) / before if before else np.nan,
+        f"{name}_share_left": comparison.unexplained_mean_square(candidate) / before if before else np.nan,
     }
 
 

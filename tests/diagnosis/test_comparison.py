@@ -54,7 +54,7 @@ SINGLES = [(90.0, KINK, -100.0), (95.0, SCALE, -110.0), (80.0, FRICTION, -120.0)
 @pytest.fixture(autouse=True)
 def repeats(monkeypatch):
     """Friction that differs between recordings as from run to run."""
-    monkeypatch.setattr(comparisons, "friction_probabilities", lambda whitened, residuals, is_fitted: (0.5, 0.5))
+    monkeypatch.setattr(comparisons, "friction_p_values", lambda whitened, residuals, is_fitted: (0.5, 0.5))
 
 
 def fitted(mean_square, *acting, **values):
@@ -285,7 +285,7 @@ def test_the_priors_of_all_sets_and_of_what_is_unlisted_add_up_to_one():
 def test_friction_that_does_not_repeat_speaks_against_a_candidate(monkeypatch):
     monkeypatch.setattr(
         comparisons,
-        "friction_probabilities",
+        "friction_p_values",
         lambda w, residuals, is_fitted: (0.5, 1e-6 if residuals == "trend" else 0.5),
     )
     drifts = replace(fitted(1.0, FRICTION), residuals="trend")
@@ -368,9 +368,9 @@ def test_a_weak_mechanism_is_not_named():
 
 def test_slips_that_no_feature_follows_are_left_all_the_same():
     found = compared(evidence(), (fitted(4.0, FRICTION), evidence(NONE, size=0.0)))
-    assert found.left_by(found.candidates[0]) == pytest.approx(3.0 - MISSTATED_NOISE - SCATTER)
+    assert found.unexplained_mean_square(found.candidates[0]) == pytest.approx(3.0 - MISSTATED_NOISE - SCATTER)
     noisy = compared(evidence(), (fitted(1.15, FRICTION), evidence(NONE, size=0.0)))
-    assert noisy.left_by(noisy.candidates[0]) == 0.0
+    assert noisy.unexplained_mean_square(noisy.candidates[0]) == 0.0
 
 
 @pytest.mark.parametrize("has_part", [False, True])

@@ -196,3 +196,12 @@ def test_a_drag_is_proposed_where_it_acts(place):
     (proposal,) = proposals(calibrated(batch(truth=truth)), [law], UNLIMITED)
     scale = dict(proposal.hypothesis.fixed)[mechanism_key(law.name, law.place, "scale")]
     assert scale * law.basis @ list(proposal.values.values()) == pytest.approx(wanted, abs=0.35)
+
+
+def test_a_law_of_a_quantity_that_does_not_vary_is_left_out_with_a_message():
+    law = laws()["learned-sliding-friction-by-time"]
+    constant = replace(law, argument=replace(law.argument, of=lambda motion: np.ones_like(motion.time_s)))
+    said = []
+    found = proposals(calibrated(batch()), [constant, law], UNLIMITED, lambda text, done=None: said.append(text))
+    assert len(found) == 1
+    assert said == [f"{law.name} at conduit: not proposed (its argument does not vary)"]

@@ -12,18 +12,18 @@ from ccmodel.diagnosis.repeatability import (
     FRICTION,
     PRETENSION,
     Deviations,
-    between_probability,
+    between_p_value,
     conditions,
     deviations,
     estimated,
-    friction_probabilities,
+    friction_p_values,
     least_of,
     log_bayes_factor,
     relative_spread,
     report,
     sequences,
-    trend_probability,
-    within_probability,
+    trend_p_value,
+    within_p_value,
     without_trend,
     zero_spread,
 )
@@ -41,7 +41,7 @@ def observed(values, variance=0.0):
 
 
 def trend(found):
-    return trend_probability(found, [range(found.values.size)])
+    return trend_p_value(found, [range(found.values.size)])
 
 
 def with_frictions(*ratios, pretensions=(7.0, 7.0, 5.0, 6.0, 7.0, 5.0, 6.0)):
@@ -140,7 +140,7 @@ def test_repeats_never_make_a_zero_better_than_its_stated_accuracy():
 def test_the_stated_scatter_passes_and_many_times_as_much_does_not():
     draws = np.random.default_rng(1).standard_normal((200, 9))
     passed = {
-        size: np.mean([between_probability(observed(size * d), ALONE) > SCATTER_LEVEL for d in draws])
+        size: np.mean([between_p_value(observed(size * d), ALONE) > SCATTER_LEVEL for d in draws])
         for size in (1.0, 2.0, 8.0)
     }
     assert passed[1.0] == 1.0
@@ -151,14 +151,14 @@ def test_the_stated_scatter_passes_and_many_times_as_much_does_not():
 def test_scatter_is_judged_by_that_of_repeats():
     groups = [[0, 1, 2, 3], [4], [5], [6], [7]]
     frictions = [0.0, 0.0, 0.0, 0.0, 6.0, -6.0, 5.0, -5.0]
-    assert between_probability(observed(frictions), groups) < SCATTER_LEVEL
+    assert between_p_value(observed(frictions), groups) < SCATTER_LEVEL
     frictions[:4] = [4.0, -4.0, 4.0, -4.0]
-    assert between_probability(observed(frictions), groups) > SCATTER_LEVEL
+    assert between_p_value(observed(frictions), groups) > SCATTER_LEVEL
     # Repeats that differ by far more than stated are no repeats.
     assert (
-        within_probability(observed([8.0, -8.0]), [[0, 1]])
+        within_p_value(observed([8.0, -8.0]), [[0, 1]])
         < SCATTER_LEVEL
-        < within_probability(observed([2.0, -2.0]), [[0, 1]])
+        < within_p_value(observed([2.0, -2.0]), [[0, 1]])
     )
 
 
@@ -175,10 +175,10 @@ def test_a_trend_is_that_of_each_batch():
     """Batches one after another, each of which drifts alike and begins anew."""
     drift = np.tile(np.linspace(-4, 4, 5), 3) + np.random.default_rng(0).standard_normal(15)
     batches = [range(0, 5), range(5, 10), range(10, 15)]
-    assert trend_probability(observed(drift), batches) < TREND_LEVEL < trend(observed(drift))
+    assert trend_p_value(observed(drift), batches) < TREND_LEVEL < trend(observed(drift))
     apart = np.repeat([-9.0, 0.0, 9.0], 5) + np.random.default_rng(1).standard_normal(15)
-    assert trend(observed(apart)) < TREND_LEVEL < trend_probability(observed(apart), batches)
-    assert trend_probability(observed([5.0, -5.0, 0.0, 1.0]), [[0], [1], [2], [3]]) == 1.0
+    assert trend(observed(apart)) < TREND_LEVEL < trend_p_value(observed(apart), batches)
+    assert trend_p_value(observed([5.0, -5.0, 0.0, 1.0]), [[0], [1], [2], [3]]) == 1.0
 
 
 def test_a_recording_that_does_not_determine_friction_does_not_count():
@@ -203,7 +203,7 @@ def test_friction_that_drifts_does_not_repeat(drift, repeats):
     assert found.mean_square < 1.5
     again = [relinearised(w, found.model(made.PARAMETERS), repeatability) for w in recordings]
     refitted = fit(again, PAPER, found.free, found.values)
-    scatter, trend = friction_probabilities(again, refitted.residuals, True)
+    scatter, trend = friction_p_values(again, refitted.residuals, True)
     assert (scatter > SCATTER_LEVEL and trend > TREND_LEVEL) == repeats
 
 

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS
-from ccmodel.inference.noise import PHASES, SensorNoise, pooled, repeated, rounding_errors, sensor_noise
+from ccmodel.inference.noise import ROUNDING_PHASES, SensorNoise, pooled, repeated, rounding_errors, sensor_noise
 
 STEP = 0.003
 
 
 def test_a_count_is_wrong_by_half_a_step_at_most_and_by_its_deviation_on_average():
     errors = rounding_errors(np.linspace(0.0, 0.05, 300), STEP)
-    assert errors.shape == (PHASES.size, 300)
+    assert errors.shape == (ROUNDING_PHASES.size, 300)
     assert np.abs(errors).max() <= STEP / 2
     assert errors.std() == pytest.approx(STEP / np.sqrt(12), rel=0.01)
     # No phase is preferred: at every angle they cancel.
-    np.testing.assert_allclose(errors.mean(axis=0), 0.0, atol=STEP / PHASES.size)
+    np.testing.assert_allclose(errors.mean(axis=0), 0.0, atol=STEP / ROUNDING_PHASES.size)
 
 
 def test_counts_of_an_angle_are_wrong_alike_while_it_rests():

@@ -26,7 +26,7 @@ from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.discrepancy import Discrepancy, Evidence, evidence_of
 from ccmodel.diagnosis.hypothesis import Hypothesis, laws_in
-from ccmodel.diagnosis.repeatability import FRICTION, friction_probabilities, log_bayes_factor
+from ccmodel.diagnosis.repeatability import FRICTION, friction_p_values, log_bayes_factor
 from ccmodel.diagnosis.whitening import Whitened
 
 # Beyond it, an exponential function is infinite.
@@ -163,15 +163,15 @@ class Comparison:
         return weights
 
     def _imitation(self, candidate: CandidateFit, part: CandidateFit) -> NDArray:
-        before, resolution = self.left_by(part), self.evidence[candidate.hypothesis].resolution
+        before, resolution = self.unexplained_mean_square(part), self.evidence[candidate.hypothesis].resolution
         before = max(before, self.evidence[part.hypothesis].resolution, 1e-12)
-        share, smallest = (min(x / before, 1.0) for x in (self.left_by(candidate), resolution))
+        share, smallest = (min(x / before, 1.0) for x in (self.unexplained_mean_square(candidate), resolution))
         has_part = part is not self.base
         further = set(candidate.hypothesis.acting) - set(part.hypothesis.acting)
         support = min(candidate.log_support(*one) for one in further)
         return limited(imitation(share, smallest, has_part), prior_of_further(has_part), support)
 
-    def left_by(self, candidate: CandidateFit) -> float:
+    def unexplained_mean_square(self, candidate: CandidateFit) -> float:
         """Mean square above the noise that a candidate does not explain (1: noise).
 
         It is the size of its discrepancy, limited to within `SCATTER` of its excess mean square: errors that are no
@@ -204,7 +204,7 @@ class Comparison:
         if not self.candidates:
             return True
         best = self.most_probable if self.probability_of_base < 0.5 else self.base
-        return self.left_by(best) == 0.0
+        return self.unexplained_mean_square(best) == 0.0
 
     @property
     def is_decided(self) -> bool:
@@ -224,7 +224,7 @@ class Comparison:
         """
         if self._has_complete:
             return True
-        return self.is_adequate if self.certain is None else self.left_by(self.certain) == 0.0
+        return self.is_adequate if self.certain is None else self.unexplained_mean_square(self.certain) == 0.0
 
     def confidence_in(self, name: str) -> float:
         """Probability that a mechanism acts, at whatever place and beside whatever others."""
@@ -292,13 +292,13 @@ class Comparison:
         """
         ranked = [self.base, *self.candidates]
         left, before = (
-            min((self.left_by(c) for c in ranked if is_size(c.hypothesis.size)), default=np.inf)
+            min((self.unexplained_mean_square(c) for c in ranked if is_size(c.hypothesis.size)), default=np.inf)
             for is_size in (lambda s: s == size, lambda s: s < size)
         )
         return bool(left <= settings.LEADING_ON * before)
 
     def is_outdone(self, candidate: CandidateFit) -> bool:
-        """Whether a candidate's fit is not good, and a larger set has at most half of its lack of fit (`left_by`).
+        """Whether a candidate's fit is not good, and a larger set has at most half of its `unexplained_mean_square`.
 
         Whether the further mechanisms are missing or imitate what the equations leave, the candidate alone is then no
         complete account: what an imitation takes off is seldom half.
@@ -306,7 +306,10 @@ class Comparison:
         if candidate.is_good:
             return False
         larger = (c for c in self.candidates if c.is_plausible and is_part_of(candidate, c))
-        return any(self.left_by(c) <= settings.LEADING_ON * self.left_by(candidate) for c in larger)
+        return any(
+            self.unexplained_mean_square(c) <= settings.LEADING_ON * self.unexplained_mean_square(candidate)
+            for c in larger
+        )
 
     def log_weight(self, candidate: CandidateFit) -> float:
         """Log posterior of a candidate, complete or not."""
@@ -405,7 +408,7 @@ def log_bayes_factor_of_repeats(candidate: CandidateFit) -> float:
 
     Whitening keeps friction that differs from run to run out of the residuals, and so may keep out too much.
     """
-    tests = friction_probabilities(candidate.whitened, candidate.residuals, FRICTION in candidate.values)
+    tests = friction_p_values(candidate.whitened, candidate.residuals, FRICTION in candidate.values)
     return sum(map(log_bayes_factor, tests))
 
 

@@ -25,6 +25,7 @@ from ccmodel.mechanisms.law_forms import ADDED_BEND, CONSTANT_DRAG, DRAG
 from ccmodel.mechanisms.learned import Law
 from ccmodel.model.parameters import mechanism_key
 from ccmodel.model.run import simulate
+from ccmodel.progress import Progress, silent
 
 
 @dataclass(frozen=True)
@@ -46,8 +47,13 @@ class Proposal:
     values: dict[str, float]
 
 
-def proposals(base: CandidateFit, every: Sequence[Law], deadline: Deadline) -> list[Proposal]:
-    """Each law beside a fitted model with the a priori size that suits it best, the highest evidence first."""
+def proposals(
+    base: CandidateFit, every: Sequence[Law], deadline: Deadline, progress: Progress = silent
+) -> list[Proposal]:
+    """Each law beside a fitted model with the a priori size that suits it best, the highest evidence first.
+
+    A law that the model cannot be run with, or whose argument does not vary, is left out, and a message says so.
+    """
     nothing = NormalEquations.of(base).log_evidence
     motions = each(base.whitened, lambda i, w: _motion(base, i))
     channels = {c for w in base.whitened for c in w.observations.channels}
@@ -59,8 +65,8 @@ def proposals(base: CandidateFit, every: Sequence[Law], deadline: Deadline) -> l
             continue
         try:
             found.append(max(_proposed(base, law, motions, nothing), key=lambda p: p.evidence))
-        except (ModelError, ValueError):
-            continue
+        except (ModelError, ValueError) as error:
+            progress(f"{law.name} at {law.place}: not proposed ({error})")
     return sorted(found, key=lambda p: -p.evidence)
 
 
@@ -77,7 +83,7 @@ def _proposed(base: CandidateFit, law: Law, motions: Sequence[Sensing], nothing:
     visited = np.concatenate([law.argument.of(m)[..., w.observations.judged].ravel() for w, m in pairs])
     first, last = law.range_of(visited)
     if not last > first:
-        raise ValueError(f"{law.name}: its argument does not vary")
+        raise ValueError("its argument does not vary")
     unit = _unit_of(law, base, motions)
 
     def hypothesis(scale: float) -> Hypothesis:

@@ -10,7 +10,7 @@ Where no condition repeats, the spread of friction comes from its scatter over a
 `settings.MOST_SCATTER` times the stated one: that scatter may be physics too.
 
 Whitening marginalises the deviation of friction in each recording, so that mean squares do not show whether it exceeds
-the repeatability. `friction_probabilities` tests this: by the scatter of repeats over the stated spread, and between
+the repeatability. `friction_p_values` tests this: by the scatter of repeats over the stated spread, and between
 conditions over the estimated one (F tests, the least of whose p-values counts), and for a trend over the sequence of
 the recordings (t test). A trend is no scatter: spreads are those about it.
 
@@ -199,10 +199,10 @@ def _posterior(square: float, freedom: int) -> float:
     return float(np.sqrt((settings.SPREAD_FREEDOM + square) / (settings.SPREAD_FREEDOM + freedom)))
 
 
-def friction_probabilities(
+def friction_p_values(
     whitened: Sequence["Whitened"], residuals: Sequence[NDArray], is_fitted: bool
 ) -> tuple[float, float]:
-    """Probabilities of at least this scatter and of at least this trend of friction, if it differs as from run to run.
+    """P-values of the scatter and of the trend of friction, if it differs as from run to run.
 
     Parameters
     ----------
@@ -217,8 +217,8 @@ def friction_probabilities(
         return 1.0, 1.0
     found = deviations(whitened, residuals, FRICTION)
     groups = whitened[0].repeatability.conditions or [[i] for i in range(len(whitened))]
-    scatter = least_of([within_probability(found, groups), between_probability(found, groups, is_fitted)])
-    return scatter, trend_probability(found, sequences(whitened))
+    scatter = least_of([within_p_value(found, groups), between_p_value(found, groups, is_fitted)])
+    return scatter, trend_p_value(found, sequences(whitened))
 
 
 def least_of(probabilities: Sequence[float]) -> float:
@@ -240,14 +240,14 @@ def log_bayes_factor(probability: float) -> float:
     return float(1.0 + np.log(p) + np.log(-np.log(p))) if p < np.exp(-1) else 0.0
 
 
-def within_probability(found: Deviations, groups: Sequence[Sequence[int]]) -> float:
-    """Probability of at least this scatter of friction within conditions, if its spread is the stated one."""
+def within_p_value(found: Deviations, groups: Sequence[Sequence[int]]) -> float:
+    """P-value of the scatter of friction within conditions, if its spread is the stated one."""
     within, freedom, _ = found.sum_of_squares(groups)
     return fisher_tail(within / freedom, freedom, settings.SPREAD_FREEDOM) if freedom else 1.0
 
 
-def between_probability(found: Deviations, groups: Sequence[Sequence[int]], is_fitted: bool = True) -> float:
-    """Probability of at least this scatter of friction between conditions, if recordings differ as repeats do."""
+def between_p_value(found: Deviations, groups: Sequence[Sequence[int]], is_fitted: bool = True) -> float:
+    """P-value of the scatter of friction between conditions, if recordings differ as repeats do."""
     within, freedom, _ = found.sum_of_squares(groups)
     known = np.flatnonzero(np.isfinite(found.values))
     between = found.sum_of_squares([known.tolist()])[0] - within
@@ -273,8 +273,8 @@ def sequences(whitened: Sequence["Whitened"]) -> list[list[int]]:
     ]
 
 
-def trend_probability(found: Deviations, runs: Sequence[Sequence[int]]) -> float:
-    """Two-sided probability of at least this trend over the recordings of each batch, if there is none."""
+def trend_p_value(found: Deviations, runs: Sequence[Sequence[int]]) -> float:
+    """Two-sided p-value of the trend over the recordings of each batch, if there is none."""
     at, values = _over_sequence(found, runs)
     freedom = settings.SPREAD_FREEDOM + values.size - len(runs) - 1
     if values.size < settings.FEWEST_FOR_SCATTER or not at.any():
@@ -286,7 +286,7 @@ def trend_probability(found: Deviations, runs: Sequence[Sequence[int]]) -> float
 
 def without_trend(found: Deviations, runs: Sequence[Sequence[int]]) -> Deviations:
     """Deviations about their trend over the recordings of each batch, if they have one."""
-    if trend_probability(found, runs) > settings.TREND_LEVEL:
+    if trend_p_value(found, runs) > settings.TREND_LEVEL:
         return found
     slope, values = _slope(*_over_sequence(found, runs)), found.values.copy()
     for run in runs:

@@ -225,8 +225,8 @@ WITHIN_BAND = 1.645
 MOSTLY_LISTED = 0.5
 # Share of both limits after which no further set is fitted before laws are learned. Chosen: laws take some 40 s.
 SETS_SHARE = 0.6
-# Ratio of a larger set's unexplained mean square (`left_by`) to that of smaller ones up to which still larger sets come
-# before laws, and up to which a larger set outdoes a candidate without a good fit (`is_outdone`). Chosen.
+# Ratio of a larger set's `unexplained_mean_square` to that of smaller ones up to which still larger sets come before
+# laws, and up to which a larger set outdoes a candidate without a good fit (`is_outdone`). Chosen.
 LEADING_ON = 0.5
 
 # --- Fault isolation and location

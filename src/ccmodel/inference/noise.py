@@ -29,7 +29,7 @@ RESTLESS = 2.0
 # Time over which the variance of a few draws of the drive motion is averaged.
 ALIKE_S = 0.05
 # Sub-count offsets of the load encoder, uniform over a count.
-PHASES = (np.arange(16) + 0.5) / 16 - 0.5
+ROUNDING_PHASES = (np.arange(16) + 0.5) / 16 - 0.5
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ def rounding_errors(angle_rad: NDArray, step_rad: float) -> NDArray:
 
     The error lasts as long as the motion reverses or rests: it is not white noise.
     """
-    counts = angle_rad / step_rad + PHASES[:, None]
+    counts = angle_rad / step_rad + ROUNDING_PHASES[:, None]
     return (np.round(counts) - counts) * step_rad
 
 

@@ -10,7 +10,7 @@ from ccmodel.channels import MEASURED, TAU_OUT
 from ccmodel.failure import ModelError
 from ccmodel.inference.cycles import NONE, CycleNoise, cycle_noise
 from ccmodel.inference.noise import (
-    PHASES,
+    ROUNDING_PHASES,
     SensorNoise,
     drive_errors,
     pooled,
@@ -180,7 +180,7 @@ class Observations:
     def rounding_errors(self, values: Mapping[str, float]) -> NDArray:
         """Draws of the rounding error over the noise of counted angles; (phases, channels, samples)."""
         simulated, steps = self.modelled(values), self.given.recording.encoder_step_rad
-        found = np.zeros((PHASES.size, *simulated.shape))
+        found = np.zeros((ROUNDING_PHASES.size, *simulated.shape))
         for k, channel in enumerate(self.channels):
             if channel in steps:
                 found[:, k] = rounding_errors(simulated[k], steps[channel])
