@@ -166,7 +166,7 @@ def _first_fit(observations: Sequence[Observations], free: Mapping[str, Free]) -
     spread = settings.FRICTION_SPREAD
     if len(sessions_of(observations)) > 1:
         spread = float(np.hypot(spread, settings.FRICTION_BETWEEN))
-    problem = Problem(observations, shared, {"friction_scale": Free(1.0, 0.2, 5.0, spread)})
+    problem = Problem(observations, shared, {"friction_scale": Free(1.0, *settings.BETWEEN_BOUNDS, spread)})
     how = Search(most_evaluations=settings.FIRST_FIT_EVALUATIONS, tolerance=settings.FIRST_FIT_TOLERANCE)
     found = dict(zip(shared, solve(problem, problem.start, how).x.tolist(), strict=False))
     return {name: found.get(name, one.start) for name, one in free.items()}

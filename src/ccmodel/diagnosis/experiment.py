@@ -148,7 +148,8 @@ def load_as_recorded(given: Sequence[ModelInput]) -> Callable[[NDArray], dict[st
 
 def motions(a: float, fastest: float) -> Iterator[tuple[str, dict, NDArray]]:
     """Text, numbers and drive angles (rad) of motions with an amplitude (rad), no faster than a speed (rad/s)."""
-    start = np.clip(np.arange(0, settings.EXPERIMENT_S, 1 / settings.EXPERIMENT_RATE_HZ) - 0.4, 0, None)
+    time_s = np.arange(0, settings.EXPERIMENT_S, 1 / settings.EXPERIMENT_RATE_HZ)
+    start = np.clip(time_s - settings.EXPERIMENT_REST_S, 0, None)
     highest_Hz = fastest / (2 * np.pi * a)
     for rate in dict.fromkeys(min(rate, highest_Hz) for rate in settings.SINES_HZ):
         sine = {"wave": "sine", "amplitude_rad": float(a), "frequency_Hz": float(rate)}

@@ -272,7 +272,7 @@ def _stacked(whitened: Sequence[Whitened], by_recording: Sequence[NDArray]) -> N
 
 def changed(own: Mapping[str, float], values: Mapping[str, float], strength: float) -> dict[str, float]:
     """A change of a baseline's values extrapolated to another strength, without a change of sign."""
-    share = float(np.clip(settings.SCREENED_CHANGE * strength, -0.9, 10.0)) / settings.SCREENED_CHANGE
+    share = float(np.clip(settings.SCREENED_CHANGE * strength, *settings.CHANGES)) / settings.SCREENED_CHANGE
     return {key: own[key] + share * (value - own[key]) for key, value in values.items()}
 
 

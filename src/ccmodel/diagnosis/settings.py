@@ -125,6 +125,8 @@ RANGE_SLACK = 1.5
 SCREENED_STRENGTHS, SCREENED_SHAPES, SCREENED_RATIO = (0.25, 0.6), (0.2, 0.5, 0.8), 1.15
 # Relative change at which a parameter of a frozen baseline is tried. Chosen.
 SCREENED_CHANGE = 0.05
+# Limits of the linear extrapolation of this change to the start of a fit. Chosen: no value changes its sign.
+CHANGES = (-0.9, 10.0)
 # Trials of one mechanism above which they are first tried on a few recordings, how many these are, and how many trials
 # are kept. Chosen for time: the inertias of a load took half of a screening.
 MOST_TRIALS, FEW_RECORDINGS, LEADING_TRIALS = 16, 3, 5
@@ -148,6 +150,9 @@ MOST_FITTED_IF_UNOBSERVED = 10
 # Random Fourier features of the Gaussian process (Rahimi and Recht 2007), the mean number of inputs to each, and its
 # length scales in standard deviations of the inputs. Chosen.
 FEATURES, INPUTS_PER_FEATURE, LENGTH_SCALES = 64, 3.0, (0.5, 1.2, 3.0)
+# Of inputs that matter near zero: share of the highest speed and of the longest travel since a reversal beyond which
+# they saturate, and longest time since a reversal, s. Chosen.
+SATURATING_SPEED, SATURATING_TRAVEL, SINCE_REVERSAL_S = 0.1, 0.2, 3.0
 FEATURES_SEED = 0
 # Modes of the features below this share of the strongest one are rounding errors. Chosen.
 WEAKEST_MODE = 1e-9
@@ -274,6 +279,8 @@ REFINEMENT = 3
 
 # Sampling rate (Hz) and duration (s) of a proposed recording. Chosen.
 EXPERIMENT_RATE_HZ, EXPERIMENT_S = 125.0, 10.0
+# Rest before its motion, s. Chosen.
+EXPERIMENT_REST_S = 0.4
 # Candidate models that an experiment is to separate, at most. Chosen for time.
 SEPARATED = 4
 # Shares of the largest amplitude and the highest pretension in the batch. Chosen.
