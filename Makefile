@@ -16,7 +16,7 @@ unexport PYTHONDONTWRITEBYTECODE
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
-# `--require-hashes` refuses whatever is not pinned in requirements.lock; the package itself then needs no download.
+# `--require-hashes` refuses whatever is not pinned in the lock files; the package itself then needs no download.
 # Bytecode is compiled when a module is first imported: all of it would take half a minute.
 $(VENV)/.ready: requirements.lock pip.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
@@ -57,7 +57,7 @@ fuzz: $(VENV)/.ready  ## damage batches and files, and run the exact solver, FUZ
 	FUZZ=$(or $(FUZZ),60) $(BIN)/python -m pytest -n $(CORES) --dist loadfile tests/rig/test_damaged_batches.py \
 	  tests/rig/test_damaged_signals.py tests/report/test_damaged_files.py tests/model/test_stated_limits.py
 
-long-tests: $(VENV)/.ready  ## follow tutorial and guides to the letter, run the pipeline in many ways: docs/trust.md
+long-tests: $(VENV)/.ready  ## follow tutorial, guides and examples to the letter, run pipeline and rig in many ways: docs/trust.md
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $$(($(CORES) + 1)) --dist loadfile --no-loadscope-reorder \
 	  -m long
 

@@ -20,7 +20,7 @@ def test_it_runs_tests_and_the_gate_from_targets_of_the_makefile():
 def test_its_cache_is_keyed_by_the_pinned_environment():
     (job,) = yaml.safe_load(WORKFLOW.read_text())["jobs"].values()
     (cache,) = [step["with"] for step in job["steps"] if step.get("uses", "").startswith("actions/cache@")]
-    assert "requirements.lock" in cache["key"]
+    assert "requirements.lock" in cache["key"] and "pip.lock" in cache["key"]
     assert cache["path"] == ".venv"
 
 

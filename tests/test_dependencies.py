@@ -70,6 +70,11 @@ def test_the_conda_environment_has_the_same_dependencies():
     assert listed.keys() >= INSTALLS
 
 
+def test_the_installer_is_pinned_with_its_hash():
+    lines = [line for line in (ROOT / "pip.lock").read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    assert re.fullmatch(r"pip==[\d.]+ \\( +--hash=sha256:[0-9a-f]{64})+", "".join(lines))
+
+
 def test_container_and_proof_install_the_locked_packages_by_hash():
     for file in ("Containerfile", "proof/environment.post-deploy.sh", "Makefile"):
         installs = re.findall(r"pip install (?:[^\n]*\\\n)*[^\n]*", (ROOT / file).read_text(encoding="utf-8"))

@@ -427,6 +427,34 @@ def test_a_selection_ends_with_laws_where_what_is_certain_leaves_something(monke
     assert calls == learned
 
 
+@pytest.mark.parametrize(
+    "left, law, is_proposed",
+    [
+        (0.0, NONE + 5, False),  # it leads, and leaves nothing
+        (0.4, NONE + 5, True),  # it leaves something, with a good fit
+        (0.0, NONE - 20, True),  # it leaves nothing, but the listed mechanism leads
+    ],
+)
+def test_laws_are_proposed_beside_what_is_listed_unless_one_leads_that_leaves_nothing(
+    monkeypatch, left, law, is_proposed
+):
+    direction = ("learned-sliding-friction-by-direction", "conduit")
+    listed = fitted(1.4, FRICTION), evidence(NONE, NONE, size=0.4)
+    learned = fitted(1.0 + left, direction), evidence(law, law, size=left)
+    found, proposed = compared(evidence(size=60.0), listed, model=fitted(61.0)), []
+    fits = iter([[learned[0]]])
+    monkeypatch.setattr(
+        selections, "proposals", lambda beside, *others: proposed.append(beside.hypothesis.acting) or []
+    )
+    monkeypatch.setattr(Selection, "fit_all", lambda *given: next(fits, []))
+    both = compared(evidence(size=60.0), listed, learned, model=fitted(61.0))
+    monkeypatch.setattr(Comparison, "with_candidates", lambda self, every: both)
+    for step in ("relinearise", "beside_law"):
+        monkeypatch.setattr(Selection, step, lambda self, found: found)
+    assert Selection({}, [], laws=[laws()[direction[0]]]).learn(found) is both
+    assert ((FRICTION,) in proposed) == is_proposed
+
+
 def test_no_law_is_learned_where_nothing_is_missing():
     assert compared(evidence(complete=NONE)).is_settled
     assert compared(evidence(complete=NONE), (fitted(1.1, FRICTION), evidence(NONE - 10))).is_settled

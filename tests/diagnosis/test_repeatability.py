@@ -14,10 +14,10 @@ from ccmodel.diagnosis.repeatability import (
     Deviations,
     between_p_value,
     conditions,
+    corrected,
     deviations,
     estimated,
     friction_p_values,
-    least_of,
     log_bayes_factor,
     relative_spread,
     report,
@@ -222,13 +222,20 @@ def test_the_report_says_what_was_assumed():
     assert rows[0]["value"] < 0.01
 
 
-def test_the_least_of_independent_p_values_is_as_probable_as_it_says():
+def test_the_smaller_p_value_of_two_is_corrected_for_their_number():
     draws = np.random.default_rng(0).uniform(size=(20_000, 2))
-    least = [least_of(pair) for pair in draws.tolist()]
-    assert np.mean(np.array(least) < 0.05) == pytest.approx(0.05, abs=0.005)
-    assert least_of([0.05, 1.0]) == pytest.approx(0.05), "a test that could not be made"
-    assert least_of([1.0, 1.0]) == 1.0
-    assert least_of([1e-300, 0.5]) == pytest.approx(2e-300)
+    found = np.array([corrected(pair) for pair in draws.tolist()])
+    assert np.mean(found < 0.05) == pytest.approx(0.05, abs=0.005)
+    assert corrected([0.05, 1.0]) == pytest.approx(1 - 0.95**2)
+    assert corrected([0.05]) == pytest.approx(0.05)
+    assert corrected([]) == corrected([1.0, 1.0]) == 1.0
+    assert corrected([1e-300, 0.5]) == pytest.approx(2e-300)
+
+
+def test_a_test_without_repeats_or_conditions_is_none():
+    frictions = observed([3.0, -3.0, 3.0])
+    assert within_p_value(frictions, [[0], [1], [2]]) is None
+    assert between_p_value(frictions, [[0, 1, 2]]) is None
 
 
 def test_an_unlikely_scatter_speaks_against_a_model_and_a_likely_one_for_nothing():

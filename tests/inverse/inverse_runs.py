@@ -6,7 +6,7 @@ from ccmodel.geometry import ConduitPath
 from ccmodel.inverse import exact, general
 from ccmodel.inverse.estimate import WANDERS_RAD
 from ccmodel.inverse.update import BY_MISFIT, Considered, Drive, Prior
-from ccmodel.model.general.active import active_of
+from ccmodel.model.active import active_of
 from ccmodel.model.general.run import settings_of
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad, TorqueLoad

@@ -56,6 +56,14 @@ def test_the_load_follows_with_mechanisms(mechanism):
     assert np.sqrt(np.mean(lost**2)) < straight / 50
 
 
+def test_a_fault_of_a_sensor_changes_no_motion_of_the_drive():
+    fault = acting("torque-scale", "drive-sensor")
+    sound, faulty = (
+        compensated(WANTED, replace(PARAMETERS, mechanisms=mechanisms), RIG, FREE) for mechanisms in ((), (fault,))
+    )
+    assert faulty.table["theta_in_rad"].equals(sound.table["theta_in_rad"])
+
+
 def test_without_limits_the_drive_crosses_the_lost_motion_in_a_sample():
     found = compensated(WANTED, PARAMETERS, RIG, FREE)
     steps = np.abs(np.diff(found.table["theta_in_rad"]))

@@ -41,6 +41,13 @@ def test_without_noise_the_load_is_near_exact(sprung):
     assert np.abs(table["tau_out_Nm"] - sprung.tau_out_Nm).max() < 1e-6 * np.ptp(sprung.tau_out_Nm)
 
 
+def test_with_a_known_fault_of_the_torque_sensor_the_load_is_as_near(sprung):
+    fault = Active("torque-scale", "drive-sensor", {"gain": 0.05})
+    scaled = recording(sprung, GROWING, 1.05 * sprung.tau_in_Nm)
+    table = estimated(scaled, replace(PARAMETERS, mechanisms=(fault,))).table
+    assert np.abs(table["tau_out_Nm"] - sprung.tau_out_Nm).max() < 1e-6 * np.ptp(sprung.tau_out_Nm)
+
+
 @pytest.mark.parametrize("parameters", [PARAMETERS, WITH_MECHANISM], ids=["exact", "general"])
 @pytest.mark.parametrize("uses_law", [True, False])
 def test_no_value_depends_on_later_samples(seen, parameters, uses_law):

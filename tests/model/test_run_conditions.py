@@ -138,17 +138,17 @@ FAULTS = [(mechanism.name, place) for mechanism in OF_SENSORS for place in mecha
 
 
 @pytest.mark.parametrize("name, place", FAULTS)
-def test_a_fault_of_a_sensor_leaves_the_exact_solver(name, place):
+def test_the_exact_solver_runs_what_only_modifies_the_observation(name, place):
     one, mechanism = recording(), registry.get(name)
     sound, neutral, faulty = (
         simulate_recording(one, replace(CABLE, mechanisms=mechanisms))
         for mechanisms in ([], [Active(name, place, mechanism.neutral)], [Active(name, place, mechanism.start)])
     )
-    # This drag is none, but takes the general solver.
+    # A drag of zero does nothing, but a model that has one runs on the general solver.
     on_general = [Active("constant-drag", "conduit", {"f0": 0.0}), Active(name, place, mechanism.start)]
     by_grid = simulate_recording(one, replace(CABLE, mechanisms=on_general))
     for channel in MEASURED:
         np.testing.assert_array_equal(neutral[channel], sound[channel])
-        # The grid has an error.
+        # The two differ, by the error of the general solver's grid.
         assert 0 < np.abs(faulty[channel] - by_grid[channel]).max() < 5e-3 * np.ptp(faulty[channel])
     assert any((faulty[channel] != sound[channel]).any() for channel in MEASURED)

@@ -207,6 +207,12 @@ class Comparison:
         return self.unexplained_mean_square(best) == 0.0
 
     @property
+    def leading_law_leaves_nothing(self) -> bool:
+        """Whether a law is the most probable candidate, and leaves nothing of a further effect."""
+        leading = self.leading[0] if self.candidates else self.base
+        return bool(laws_in(leading.hypothesis)) and self.unexplained_mean_square(leading) == 0.0
+
+    @property
     def is_decided(self) -> bool:
         """Whether a model is complete with the probability `DECIDED`, or one leaves a good fit and is `certain`."""
         return self._has_complete or self.certain is not None

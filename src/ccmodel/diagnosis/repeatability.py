@@ -11,8 +11,8 @@ Where no condition repeats, the spread of friction comes from its scatter over a
 
 Whitening marginalises the deviation of friction in each recording, so that mean squares do not show whether it exceeds
 the repeatability. `friction_p_values` tests this: by the scatter of repeats over the stated spread, and between
-conditions over the estimated one (F tests, the least of whose p-values counts), and for a trend over the sequence of
-the recordings (t test). A trend is no scatter: spreads are those about it.
+conditions over the estimated one (F tests, whose smaller p-value is corrected for two tests), and for a trend over the
+sequence of the recordings (t test). A trend is no scatter: spreads are those about it.
 
 Deviations are in standard deviations as stated, and not shrunk: a posterior mean m with the posterior variance v under
 a standard normal prior is an observation m / (1 - v) with the variance v / (1 - v).
@@ -202,7 +202,7 @@ def _posterior(square: float, freedom: int) -> float:
 def friction_p_values(
     whitened: Sequence["Whitened"], residuals: Sequence[NDArray], is_fitted: bool
 ) -> tuple[float, float]:
-    """P-values of the scatter and of the trend of friction, if it differs as from run to run.
+    """P-values of the scatter and of the trend of friction, under the hypothesis that it differs as from run to run.
 
     Parameters
     ----------
@@ -217,18 +217,19 @@ def friction_p_values(
         return 1.0, 1.0
     found = deviations(whitened, residuals, FRICTION)
     groups = whitened[0].repeatability.conditions or [[i] for i in range(len(whitened))]
-    scatter = least_of([within_p_value(found, groups), between_p_value(found, groups, is_fitted)])
-    return scatter, trend_p_value(found, sequences(whitened))
+    tests = within_p_value(found, groups), between_p_value(found, groups, is_fitted)
+    return corrected([p for p in tests if p is not None]), trend_p_value(found, sequences(whitened))
 
 
-def least_of(probabilities: Sequence[float]) -> float:
-    """Probability of a p-value as small as the least one of independent tests; a test of p = 1 could not be made.
+def corrected(p_values: Sequence[float]) -> float:
+    """The smallest of the p-values of n tests, corrected for their number: 1 - (1 - p)^n; 1 without a test.
 
-    1 - (1 - p)^n: Sidak 1967, Journal of the American Statistical Association 62(318), 626-633,
-    doi:10.1080/01621459.1967.10482935.
+    Sidak 1967, Journal of the American Statistical Association 62(318), 626-633, doi:10.1080/01621459.1967.10482935. It
+    holds for independent tests. The two of friction share an estimate of the spread: the correction is then a little
+    too large.
     """
-    made = [p for p in probabilities if p < 1.0]
-    return float(-np.expm1(len(made) * np.log1p(-min(made)))) if made else 1.0
+    p = min(p_values, default=1.0)
+    return float(-np.expm1(len(p_values) * np.log1p(-p))) if p < 1.0 else 1.0
 
 
 def log_bayes_factor(probability: float) -> float:
@@ -240,14 +241,14 @@ def log_bayes_factor(probability: float) -> float:
     return float(1.0 + np.log(p) + np.log(-np.log(p))) if p < np.exp(-1) else 0.0
 
 
-def within_p_value(found: Deviations, groups: Sequence[Sequence[int]]) -> float:
-    """P-value of the scatter of friction within conditions, if its spread is the stated one."""
+def within_p_value(found: Deviations, groups: Sequence[Sequence[int]]) -> float | None:
+    """P-value of the scatter of friction within conditions, under the stated spread; None without repeats."""
     within, freedom, _ = found.sum_of_squares(groups)
-    return fisher_tail(within / freedom, freedom, settings.SPREAD_FREEDOM) if freedom else 1.0
+    return fisher_tail(within / freedom, freedom, settings.SPREAD_FREEDOM) if freedom else None
 
 
-def between_p_value(found: Deviations, groups: Sequence[Sequence[int]], is_fitted: bool = True) -> float:
-    """P-value of the scatter of friction between conditions, if recordings differ as repeats do."""
+def between_p_value(found: Deviations, groups: Sequence[Sequence[int]], is_fitted: bool = True) -> float | None:
+    """P-value of the scatter of friction between conditions, if they differ as repeats do; None without two of them."""
     within, freedom, _ = found.sum_of_squares(groups)
     known = np.flatnonzero(np.isfinite(found.values))
     between = found.sum_of_squares([known.tolist()])[0] - within
@@ -256,7 +257,7 @@ def between_p_value(found: Deviations, groups: Sequence[Sequence[int]], is_fitte
         between += len(known) * float(found.values[known].mean()) ** 2
         between_freedom += 1
     if between_freedom < 1:
-        return 1.0
+        return None
     ratio = max(between, 0.0) / between_freedom / _posterior(within, freedom) ** 2
     return fisher_tail(ratio, between_freedom, settings.SPREAD_FREEDOM + freedom)
 
@@ -274,7 +275,7 @@ def sequences(whitened: Sequence["Whitened"]) -> list[list[int]]:
 
 
 def trend_p_value(found: Deviations, runs: Sequence[Sequence[int]]) -> float:
-    """Two-sided p-value of the trend over the recordings of each batch, if there is none."""
+    """Two-sided p-value of the trend over the recordings of each batch, under the hypothesis that there is none."""
     at, values = _over_sequence(found, runs)
     freedom = settings.SPREAD_FREEDOM + values.size - len(runs) - 1
     if values.size < settings.FEWEST_FOR_SCATTER or not at.any():

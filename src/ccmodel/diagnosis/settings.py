@@ -62,7 +62,7 @@ FRICTION_BETWEEN = 0.02
 # Standard deviation of a batch's initial tension over its stated one, relative to that of the rig, where it is not
 # observed at rest. Chosen: what a scale or a mark on a tensioner repeats to.
 PRETENSION_BETWEEN = 0.05
-# Bounds of both ratios. Chosen: far outside.
+# Bounds of both ratios, and of a recording's friction over the mean in the first fit. Chosen: far outside.
 BETWEEN_BOUNDS = (0.2, 5.0)
 # Standard deviation of the curvature of a cable's initial tension between its ends, over the largest that friction can
 # hold. Chosen: earlier motions leave a profile that the rest shows at the ends only.
@@ -125,8 +125,9 @@ RANGE_SLACK = 1.5
 SCREENED_STRENGTHS, SCREENED_SHAPES, SCREENED_RATIO = (0.25, 0.6), (0.2, 0.5, 0.8), 1.15
 # Relative change at which a parameter of a frozen baseline is tried. Chosen.
 SCREENED_CHANGE = 0.05
-# Limits of the linear extrapolation of this change to the start of a fit. Chosen: no value changes its sign.
-CHANGES = (-0.9, 10.0)
+# Limits of the relative change at which a fit then starts. Chosen: no value changes its sign, and none becomes more
+# than eleven times as large.
+CHANGE_LIMITS = (-0.9, 10.0)
 # Trials of one mechanism above which they are first tried on a few recordings, how many these are, and how many trials
 # are kept. Chosen for time: the inertias of a load took half of a screening.
 MOST_TRIALS, FEW_RECORDINGS, LEADING_TRIALS = 16, 3, 5
@@ -150,10 +151,10 @@ MOST_FITTED_IF_UNOBSERVED = 10
 # Random Fourier features of the Gaussian process (Rahimi and Recht 2007), the mean number of inputs to each, and its
 # length scales in standard deviations of the inputs. Chosen.
 FEATURES, INPUTS_PER_FEATURE, LENGTH_SCALES = 64, 3.0, (0.5, 1.2, 3.0)
+FEATURES_SEED = 0
 # Of inputs that matter near zero: share of the highest speed and of the longest travel since a reversal beyond which
 # they saturate, and longest time since a reversal, s. Chosen.
 SATURATING_SPEED, SATURATING_TRAVEL, SINCE_REVERSAL_S = 0.1, 0.2, 3.0
-FEATURES_SEED = 0
 # Modes of the features below this share of the strongest one are rounding errors. Chosen.
 WEAKEST_MODE = 1e-9
 # Mean squares of a discrepancy (1: noise) that are tried, all equally probable. Chosen: factors of three.
@@ -226,7 +227,7 @@ LISTED_STARTS = 3
 # distribution's 90 % interval.
 WITHIN_BAND = 1.645
 # Laws are also learned beside the best single listed mechanism if its excess mean square is below this share of the
-# calibrated model's. Chosen.
+# calibrated model's, and no law leads that leaves nothing. Chosen.
 MOSTLY_LISTED = 0.5
 # Share of both limits after which no further set is fitted before laws are learned. Chosen: laws take some 40 s.
 SETS_SHARE = 0.6

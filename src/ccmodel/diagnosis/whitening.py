@@ -26,7 +26,7 @@ from ccmodel.diagnosis.repeatability import FRICTION, PRETENSION, STATED, Repeat
 from ccmodel.inference.effective_samples import IN_DIAGNOSIS
 from ccmodel.inference.jacobian import STEP, jacobian, size_of
 from ccmodel.inference.observations import Observations
-from ccmodel.model.general.active import Active
+from ccmodel.model.active import Active
 from ccmodel.model.general.run import settings_of
 from ccmodel.model.parameters import Parameters, mechanism_key, mechanism_parameter, of_batch
 from ccmodel.model.session import known_states

@@ -12,7 +12,7 @@ from ccmodel.channels import THETA_IN, THETA_OUT
 from ccmodel.failure import ModelError
 from ccmodel.inverse import follow
 from ccmodel.kernel import kernel
-from ccmodel.model.general.active import modify_physics
+from ccmodel.model.active import modify_physics
 from ccmodel.model.general.run import settings_of
 from ccmodel.model.model_input import ModelInput
 from ccmodel.model.parameters import Parameters

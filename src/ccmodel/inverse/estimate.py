@@ -13,7 +13,7 @@ from ccmodel.failure import ModelError
 from ccmodel.inverse import exact, general
 from ccmodel.inverse.proximal import FALL, LOOKS_AHEAD, UNIFORM, Proximal
 from ccmodel.inverse.update import BY_MISFIT, EXPECTED, MISFIT, Considered, Drive, Prior, Run, joint_estimate, variances
-from ccmodel.model.general.active import modify_physics
+from ccmodel.model.active import modify_physics
 from ccmodel.model.general.run import settings_of
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad, TorqueLoad

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from ccmodel.channels import F_DRIVE, F_LOAD, T1, T2, T3, T4, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
 from ccmodel.encoder.filtering import causal_motion
 from ccmodel.failure import ModelError
-from ccmodel.model.general.active import Active
-from ccmodel.model.general.sensors import FAULT_ITERATIONS, read_by_sensors
+from ccmodel.model.active import Active
 from ccmodel.model.model_input import ModelInput
 from ccmodel.model.parameters import Parameters
+from ccmodel.model.sensors import FAULT_ITERATIONS, read_by_sensors
 from ccmodel.recording import Recording
 
 # Sensors with these faults read what comes later, so that no causal estimate can undo them.

@@ -24,14 +24,14 @@ from ccmodel.channels import (
 from ccmodel.effort import count_run
 from ccmodel.failure import ModelError
 from ccmodel.mechanisms.relaxation import branch_times, kept_at_rest
+from ccmodel.model.active import active_of, modify_physics
 from ccmodel.model.exact import pair as exact
 from ccmodel.model.general import run as general
-from ccmodel.model.general.active import active_of, modify_physics
-from ccmodel.model.general.sensors import read_by_sensors, true_at
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad
 from ccmodel.model.model_input import PRESCRIBED, ModelInput
 from ccmodel.model.parameters import Parameters
+from ccmodel.model.sensors import read_by_sensors, true_at
 from ccmodel.model.session import of_recording
 from ccmodel.model.transmission import Transmission
 from ccmodel.recording import Recording
@@ -60,8 +60,8 @@ def simulate_recording(recording: Recording, parameters: Parameters) -> Recordin
 def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "law") -> Recording:
     """Run the model on its input from a recording.
 
-    The paper's physics against a spring or a fixed end runs on the exact solver, with or without faults of the sensors;
-    anything else runs on the general one.
+    The paper's physics against a spring or a fixed end runs on the exact solver, with or without mechanisms that modify
+    the observation. Anything else runs on the general one.
 
     Parameters
     ----------

@@ -17,15 +17,15 @@ from ccmodel.mechanisms.presliding import Contacts
 from ccmodel.mechanisms.pulley_friction import bearing
 from ccmodel.mechanisms.relaxation import branch_times
 from ccmodel.mechanisms.tables import Table
+from ccmodel.model.active import Active, active_of
 from ccmodel.model.general import layout as rows
-from ccmodel.model.general.active import Active, active_of
 from ccmodel.model.general.grid import Grid, make_grid
 from ccmodel.model.general.march import COULOMB_BRISTLE_M, SOFT_CONDUIT_BRISTLE_M, march
 from ccmodel.model.general.rest import initial_state, load_angle, remove_cable_B
-from ccmodel.model.general.sensors import read_by_sensors
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad, one_row
 from ccmodel.model.response import PairResponse, Status
+from ccmodel.model.sensors import read_by_sensors
 from ccmodel.model.transmission import Transmission
 
 ELEMENTS = 32

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
 from ccmodel.mechanisms.contract import Sensing
-from ccmodel.model.general.active import Active
+from ccmodel.model.active import Active
 
 # Each iteration reduces the error to the share that the fault is of the reading.
 FAULT_ITERATIONS = 8

@@ -48,7 +48,7 @@ def active_of(mechanisms: Sequence[Active]) -> list[Active]:
 
 
 def modify_physics(mechanisms: Sequence[Active]) -> bool:
-    """Whether any of the mechanisms modifies the physics; the others are faults of sensors."""
+    """Whether any of the mechanisms modifies the physics. The others modify the observation, or are drifts."""
     return any(registry.get(a.name).modifies_settings for a in mechanisms)
 
 
