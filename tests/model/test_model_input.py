@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from builders import recording
-from ccmodel.model.general import Active, sensors
+from ccmodel.model import sensors
+from ccmodel.model.general import Active
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 
