@@ -122,15 +122,15 @@ def _readings(
     parameters: Parameters,
 ) -> Mapping[str, NDArray]:
     """Readings of sensors without zeros, at samples and turning points: angles, torques and sums of tensions."""
-    active, time_s = active_of(parameters.mechanisms), given.recording.time_s
-    if modify_physics(active) or not isinstance(load, SpringLoad | FixedLoad):
+    mechanisms, time_s = parameters.mechanisms, given.recording.time_s
+    if modify_physics(mechanisms) or not isinstance(load, SpringLoad | FixedLoad):
         finer = parameters.refinement
         solver = finer * general.ELEMENTS, finer, _motor(given)
-        by_general = general.simulate(transmission, load, time_s, given.theta_in, initial, active, *solver)
+        by_general = general.simulate(transmission, load, time_s, given.theta_in, initial, mechanisms, *solver)
         return by_general.complete(samples).read
     response = exact.simulate_pair(transmission, load, given.theta_in, initial).complete(samples)
     radii = transmission.drive_radius_m, transmission.load_radius_m
-    return read_by_sensors(active, time_s, response.channels(given.theta_in), radii)
+    return read_by_sensors(active_of(mechanisms), time_s, response.channels(given.theta_in), radii)
 
 
 def _motor(given: ModelInput) -> general.Motor:
