@@ -135,12 +135,13 @@ class Selection:
         tried = {law.name for law in found_first if law is not None}
         finer = [law.finer() for law in found_first if law is not None]
         learned = first + fitted([f for f in finer if f is not None and f.name not in tried], settings.LAWS_REFINED)
-        listed = min((c for c in found.candidates if c.hypothesis.size == 1), key=lambda c: c.mean_square, default=None)
+        excess = settings.MOSTLY_LISTED * found.excess
+        listed = [c for c in found.candidates if c.hypothesis.size == 1 and c.mean_square - 1 < excess]
         found = found.with_candidates([*found.candidates, *learned])
         # A listed effect that is far larger hides the law from the calibrated model, unless a law leaves nothing.
-        mostly = listed is not None and listed.mean_square - 1 < settings.MOSTLY_LISTED * found.excess
-        if listed is not None and mostly and not found.leading_law_leaves_nothing:
-            found = found.with_candidates([*found.candidates, *fitted(self.laws, settings.PARTNERS, listed)])
+        if listed and not found.leading_law_leaves_nothing:
+            beside = min(listed, key=lambda c: c.mean_square)
+            found = found.with_candidates([*found.candidates, *fitted(self.laws, settings.PARTNERS, beside)])
         found = self.relinearise(found) if found.candidates else found
         return self.beside_law(found) if law_of(found.leading[0].hypothesis) is not None else found
 
