@@ -8,7 +8,7 @@ import pytest
 from builders import recording
 from ccmodel.deadline import OutOfTimeError
 from ccmodel.diagnosis import selection
-from ccmodel.diagnosis.equation_error import load_values, other_start
+from ccmodel.diagnosis.equation_error import largest_inertia, load_values, other_start
 from ccmodel.diagnosis.hypothesis import PAPER, Hypothesis
 from ccmodel.diagnosis.screening import Score
 from ccmodel.failure import ModelError
@@ -19,7 +19,7 @@ COUNT_RAD, NOISE_NM = 0.0008, 1e-4
 RATES, SIZES = np.array([[2.0], [7.0], [24.0]]), np.array([[0.3], [0.1], [0.02]])
 
 
-def ringing(mass, seed=0, spring=SPRING):
+def ringing(mass, seed=0, spring=SPRING, cubic=0.0, friction=0.0):
     """A load that moves with three frequencies, read by an encoder with counts and a torque sensor with noise."""
 
     def angle(t):
@@ -29,6 +29,7 @@ def ringing(mass, seed=0, spring=SPRING):
     def torque(t):
         wave, slope = SIZES * np.sin(RATES * t), SIZES * RATES * np.cos(RATES * t)
         exact = (spring * wave + DAMPING * slope - mass * RATES**2 * wave).sum(axis=0)
+        exact += cubic * wave.sum(axis=0) ** 3 + friction * np.sign(slope.sum(axis=0))
         return exact + NOISE_NM * np.random.default_rng(seed).normal(size=t.size)
 
     return recording(10.0, theta_out_rad=angle, tau_out_Nm=torque)
@@ -44,6 +45,19 @@ def test_spring_inertia_and_damping_are_found(mass):
 @pytest.mark.parametrize("mass", [0.0, 1e-6, 0.1])
 def test_an_inertia_outside_of_the_plausible_range_is_none(mass):
     assert load_values([ringing(mass)]) == {}
+
+
+@pytest.mark.parametrize("mass", [0.0, 2e-5, 2e-4, 2e-3])
+@pytest.mark.parametrize("beyond", [{}, {"cubic": 0.05}, {"cubic": -0.05}, {"friction": 2e-3}])
+def test_the_upper_limit_of_the_inertia_holds_the_true_one(mass, beyond):
+    """Also beside a spring that stiffens or softens, and beside dry friction."""
+    limit = largest_inertia([ringing(mass, seed, **beyond) for seed in range(6)])[J]
+    assert mass < limit < 1.05 * mass + 3e-5, "from 1e-5 on an inertia is plausible"
+
+
+def test_too_few_recordings_limit_no_inertia():
+    assert largest_inertia([ringing(0.0, seed) for seed in range(4)]) == {}
+    assert largest_inertia([]) == {}
 
 
 def test_a_torque_with_the_wrong_sign_shows_no_load():

@@ -55,6 +55,21 @@ def test_a_curve_that_no_formula_meets_has_none():
     assert formula_of(y, sd=1e-3) == (None, [])
 
 
+def test_a_law_whose_average_is_its_own_may_be_a_constant():
+    y = np.full(X.size, 0.8)
+    found, (a,) = formula_of(y, law=laws()["learned-sensor-map-F-load-by-time"])
+    assert (found, a["unit"]) == ("a", "N")
+    assert a["low"] < 0.8 < a["high"]
+    assert formula_of(y)[0] == "a + b x", "the average of friction belongs to its coefficient"
+
+
+def test_friction_by_cable_has_one_constant():
+    x, y = np.array([-1.0, 1.0]), np.array([0.9, 1.1])
+    found, (a,) = formula_of(y, law=laws()["learned-sliding-friction-by-cable"], x=x)
+    assert found == "1 + a x"
+    assert a["value"] == pytest.approx(0.1)
+
+
 def test_friction_by_direction_has_one_constant():
     x, y = np.array([-1.0, 1.0]), np.array([0.88, 1.12])
     found, (a,) = formula_of(y, law=DIRECTION, x=x)

@@ -27,6 +27,9 @@ RANGES = {
     ("position-along-conduit", "1"): (0.0, 1.0),
     ("reading", "N m"): (-0.1, 0.1),
     ("reading", "rad"): (-1.0, 1.0),
+    ("cable", "1"): (-1.0, 1.0),
+    ("torque", "N"): (-12.0, 12.0),
+    ("rate", "N/s"): (-20.0, 20.0),
 }
 CURVES = [(name, curve) for name in mechanisms.names() for curve in mechanisms.get(name).curves]
 
@@ -84,7 +87,11 @@ def test_the_law_of_a_listed_mechanism_is_within_the_band_of_that_mechanism(name
         ("kink", "sliding-friction", "position-along-conduit", lambda x: 1 + 2 * (1 - abs(x - 0.3) / 0.12).clip(0)),
         ("termination-compliance", "end-stretch", "tension", lambda T: np.full(T.shape, 3e-5)),
         ("load-cell-scale", "sensor-map", "reading", lambda f: -0.04 * f),
+        ("load-cell-offset", "sensor-map", "reading", lambda f: np.full(f.shape, -0.8)),
         ("load-cell-drift", "sensor-map", "time", lambda t: 0.07 * t),
+        ("load-cell-crosstalk", "sensor-map", "torque", lambda pull: -0.06 * pull),
+        ("cable-asymmetry", "sliding-friction", "cable", lambda cable: 1 + 0.1 * cable),
+        ("cable-asymmetry", "cable-stretch", "cable", lambda cable: 1 - 0.1 * cable),
     ],
 )
 def test_the_mechanism_of_a_law_is_the_nearest(name, slot, argument, y):

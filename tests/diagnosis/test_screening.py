@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ccmodel.diagnosis.hypothesis import Hypothesis
-from ccmodel.diagnosis.screening import Screening, Trial, leading, trials_of
+from ccmodel.diagnosis.screening import Screening, Trial, leading, screen, trials_of
 from ccmodel.diagnosis.settings import LEADING_TRIALS
 from ccmodel.model.general.run import Active
 from made_observations import PARAMETERS, calibrated, whitened
@@ -106,3 +106,27 @@ def test_of_many_trials_those_that_explain_most_in_a_few_recordings_are_kept():
     assert min(abs(np.log(trial.values["load-inertia/load/J"] / 3e-4)) for trial in kept) < np.log(tried[1] / tried[0])
     few = every[:2]
     assert leading(base, few) is few
+
+
+def test_a_larger_strength_is_not_tried_where_a_smaller_one_changes_more_than_there_is():
+    """Not of what fits but for noise; where much is left, both strengths are tried."""
+    truth = replace(PARAMETERS, mechanisms=(Active(*GAIN, {"gain": 0.3}),))
+    conditions = ((0.6, 1.0, 7.0), (0.4, 0.7, 7.0))
+    tried = {}
+    for name, true in (("noise", PARAMETERS), ("much", truth)):
+        base = calibrated([whitened(*c, seed=k, truth=true) for k, c in enumerate(conditions)])
+        tried[name] = [
+            trial.values[f"{GAIN[0]}/{GAIN[1]}/gain"] for trial in screen(base, [Hypothesis((GAIN,))]).trials
+        ]
+    assert len(tried["much"]) == 2
+    assert tried["noise"] == [min(tried["much"])]
+
+
+def test_nothing_is_screened_beyond_what_recordings_show():
+    inertia = Hypothesis((("load-inertia", "load"),))
+    base = calibrated([whitened(0.6, 1.0, 7.0, seed=1)])
+    limits = {"load-inertia/load/J": 2e-5}
+    tried = [trial.values["load-inertia/load/J"] for trial in screen(base, [inertia], limits=limits).trials]
+    assert tried and max(tried) <= 2e-5
+    none = screen(base, [inertia], limits={"load-inertia/load/J": 1e-6})
+    assert none.trials == [] and [score.gain for score in none.singles()] == [0.0]

@@ -18,6 +18,7 @@ from tests.general_runs import HALF_LOOP, K_E, MU, K, L, loop_area, run, sine
 EVERY = list(laws().values())
 RANGES = {"tension": (1.0, 12.0), "position-along-conduit": (0.0, 1.0), "distance-since-reversal": (1e-5, 1.0)}
 SCALES = {"end-stretch": 5e-5}
+LOAD_CELL = "load-cell-crosstalk"
 
 
 def values_of(law, **coefficients):
@@ -74,6 +75,76 @@ def test_friction_by_direction_is_larger_where_the_cable_slides_towards_the_driv
     for samples, direction in ((slice(560, 600), 1), (slice(810, 850), -1)):
         ratio = response.T1_N[samples] / response.T2_N[samples]
         np.testing.assert_allclose(np.log(ratio), direction * mu_phi * (1 + direction * b), rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("law", "ratio", "of"),
+    [
+        ("learned-sliding-friction-by-cable", "ratio", lambda b: {"mu": MU * (1 - b)}),
+        ("learned-cable-stretch-by-cable", "K_ratio", lambda b: {"k": K / (1 - b)}),
+    ],
+)
+def test_a_law_of_the_cable_is_two_cables_that_differ(law, ratio, of):
+    """Cable A has 1 - b times the friction or the compliance, and cable B 1 + b times."""
+    law = laws()[law]
+    values = values_of(law, z1=2.0)
+    b = float(law.at_knots(values)[1][-1])
+    b_over_a = (1 + b) / (1 - b)
+    asymmetry = {"ratio": 1.0, "K_ratio": 1.0} | {ratio: b_over_a if ratio == "ratio" else 1 / b_over_a}
+    found, wanted = (
+        run(sine(), (law.name, law.place, values)),
+        run(sine(), ("cable-asymmetry", "cable", asymmetry), **of(b)),
+    )
+    assert b > 0.1
+    assert largest_difference(found, wanted) < 1e-6
+
+
+@pytest.mark.parametrize(("place", "angle"), [("drive-pulley", THETA_IN), ("load-pulley", THETA_OUT)])
+def test_elements_of_a_bearing_that_yield_soon_are_its_friction(place, angle):
+    law = next(law for law in EVERY if (law.slot, law.place, law.opposes) == ("bearing-torque", place, angle))
+    values = values_of(law) | {"first": 1e-5, "last": 1e-3, "scale": 4e-3}
+    x, _ = law.at_knots(values)
+    # An element that yields after 0.1 mm has all of the friction.
+    z = np.linalg.lstsq(values["scale"] * law.basis, 4e-3 * (np.arange(x.size) == 4), rcond=None)[0]
+    values |= dict(zip(law.coefficients, z.tolist(), strict=True))
+    friction = float(np.sum(law.at_knots(values)[1]))
+    found = run(sine(), (law.name, place, values))
+    wanted = run(sine(), ("pulley-friction", place, {"friction_torque": friction, "presliding": 0.01}))
+    assert friction > 2e-3
+    for channel in found.read:
+        effect = np.std(run(sine()).read[channel] - wanted.read[channel])
+        assert np.std(found.read[channel] - wanted.read[channel]) < 0.3 * effect + 1e-9, channel
+
+
+@pytest.mark.parametrize("place", ["drive-sensor", "load-sensor"])
+def test_a_constant_delay_is_a_late_side_and_none_is_early(place):
+    law = laws()[f"learned-sensor-map-{place.split('-')[0]}-delay-by-time"]
+    wanted = run(sine(), ("time-skew", place, {"delay": 0.02}))
+    found = run(sine(), with_values(law, lambda t: np.full(t.size, 0.02), scale=0.02))
+    assert largest_difference(found, wanted) < 0.05 * largest_difference(run(sine()), wanted)
+    early = run(sine(), with_values(law, lambda t: np.full(t.size, -0.02), scale=0.02))
+    assert largest_difference(early, run(sine())) == 0.0
+
+
+@pytest.mark.parametrize("place", ["drive-sensor", "load-sensor"])
+def test_a_load_cell_by_the_torque_has_the_crosstalk_of_its_own_end(place):
+    law = laws()[f"learned-sensor-map-F-{place.split('-')[0]}-by-torque"]
+    name, _, values = with_values(law, lambda pull: 0.05 * pull, scale=0.05)
+    wide = {"first": -30.0, "last": 30.0, "scale": 0.05 * 30.0}
+    found, wanted = run(sine(), (name, place, values | wide)), run(sine(), (LOAD_CELL, place, {"crosstalk": 0.05}))
+    assert largest_difference(found, wanted) < 0.03 * largest_difference(run(sine()), wanted)
+
+
+def test_a_reading_by_its_rate_is_one_that_follows_slowly():
+    """To first order a filter's reading is behind by its time constant times the rate."""
+    law = laws()["learned-sensor-map-theta-out-by-rate"]
+    name, place, values = with_values(law, lambda rate: -0.01 * rate, scale=0.01)
+    theta_in = sine()
+    found = run(theta_in, (name, place, values | {"first": -10.0, "last": 10.0, "scale": 0.1})).read[THETA_OUT]
+    late = run(theta_in, ("time-skew", "load-sensor", {"delay": 0.01})).read[THETA_OUT]
+    without = run(theta_in).read[THETA_OUT]
+    # The load stops and starts at once, where a rate is that of a sample.
+    assert np.std(found - late) < 0.2 * np.std(without - late)
 
 
 def with_values(law, y, scale=None):

@@ -137,6 +137,12 @@ class Comparison:
             found.append(weights if is_possible else np.full(2, -np.inf))
         return np.array(found)
 
+    def is_far_behind(self, candidate: CandidateFit) -> bool:
+        """Whether a candidate's weight is so low that no other covariance makes it a rival."""
+        by_candidate = np.logaddexp.reduce(self.log_weights, axis=1)
+        own = by_candidate[[self.base, *self.candidates].index(candidate)]
+        return bool(own < by_candidate.max() - settings.FAR_BEHIND)
+
     @cached_property
     def log_posterior(self) -> NDArray:
         """Log posterior probabilities, arranged as `log_weights`.

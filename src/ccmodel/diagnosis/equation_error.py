@@ -8,6 +8,9 @@ whatever the cables do. A load with mass on nearly undamped cables rings, and a 
 has many minima; the regression has none. Both sides go through the same filter, which leaves the equation as it is and
 keeps the noise of the differences low (Young, Parameter estimation for continuous-time models: a survey, Automatica
 17(1), 23-39, 1981, doi:10.1016/0005-1098(81)90082-0).
+
+For an upper limit of the inertia the equation also has a cubic spring and dry friction, so that neither passes for the
+lack of a mass.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,6 +27,8 @@ from ccmodel.model.parameters import mechanism_key
 from ccmodel.recording import Recording
 
 LOAD_SPRING, INERTIA = "load_stiffness_Nm_per_rad", ("load-inertia", "load")
+# Terms of the equation without a cubic spring and dry friction; and which of them has the inertia.
+LINEAR, INERTIA_TERM = 3, 2
 
 
 def load_values(recordings: Sequence[Recording]) -> dict[str, float]:
@@ -31,16 +36,32 @@ def load_values(recordings: Sequence[Recording]) -> dict[str, float]:
 
     Empty if a channel was not recorded, or if the regression shows no load with an inertia within its plausible range.
     """
-    equations = [e for r in recordings if THETA_OUT in r and TAU_OUT in r and (e := _equations(r)) is not None]
+    equations = _equations_of(recordings)
     if not equations:
         return {}
-    terms, torque = (np.concatenate(rows) for rows in zip(*equations, strict=True))
-    K_e, B, J = np.linalg.lstsq(terms, torque, rcond=None)[0].tolist()
+    K_e, B, J = _fitted([(terms[:, :LINEAR], torque) for terms, torque in equations]).tolist()
     bounds = {p.name: (p.low, p.high) for p in registry.get(INERTIA[0]).parameters}
     if K_e <= 0.0 or not bounds["J"][0] <= J <= settings.RANGE_SLACK * bounds["J"][1]:
         return {}
     zeta = float(np.clip(B / (2 * sqrt(J * K_e)), *bounds["zeta"]))
     return {LOAD_SPRING: K_e, mechanism_key(*INERTIA, "J"): J, mechanism_key(*INERTIA, "zeta"): zeta}
+
+
+def largest_inertia(recordings: Sequence[Recording]) -> dict[str, float]:
+    """Upper limit of the load's inertia, kg m^2, by its name as an unknown of a fit.
+
+    It is the sum of the regression's value, `INERTIA_REACH` standard deviations, by the jackknife over recordings, and
+    the smallest plausible inertia: an encoder's steps are an error that recordings of the same motion have in common.
+    Empty if fewer than `INERTIA_RECORDINGS` recordings have both channels.
+    """
+    equations = _equations_of(recordings)
+    n = len(equations)
+    if n < settings.INERTIA_RECORDINGS:
+        return {}
+    without = np.array([_fitted(equations[:i] + equations[i + 1 :])[INERTIA_TERM] for i in range(n)])
+    sd = sqrt((n - 1) * float(np.var(without)))
+    limit = float(_fitted(equations)[INERTIA_TERM]) + settings.INERTIA_REACH * sd
+    return {mechanism_key(*INERTIA, "J"): limit + registry.get(INERTIA[0]).parameter("J").low}
 
 
 def other_start(start: Mapping[str, float], known: Mapping[str, float]) -> dict[str, float] | None:
@@ -51,8 +72,21 @@ def other_start(start: Mapping[str, float], known: Mapping[str, float]) -> dict[
     return {name: known.get(name, value) for name, value in start.items()}
 
 
+def _equations_of(recordings: Sequence[Recording]) -> list[tuple[NDArray, NDArray]]:
+    return [e for r in recordings if THETA_OUT in r and TAU_OUT in r and (e := _equations(r)) is not None]
+
+
+def _fitted(equations: Sequence[tuple[NDArray, NDArray]]) -> NDArray:
+    """Coefficient of each term, shape (terms,)."""
+    terms, torque = (np.concatenate(rows) for rows in zip(*equations, strict=True))
+    return np.linalg.lstsq(terms, torque, rcond=None)[0]
+
+
 def _equations(recording: Recording) -> tuple[NDArray, NDArray] | None:
-    """Terms of the load's equation, shape (samples, 3), and its torque, each about its mean; None of a short one."""
+    """Terms of the load's equation, shape (samples, 5), and its torque, each about its mean; None of a short one.
+
+    The terms are angle, rate, acceleration, cubed angle and direction.
+    """
     time_s = recording.time_s
     window = max(3, round(settings.FILTER_S / float(np.median(np.diff(time_s)))) | 1)
     # The filter reaches over the ends.
@@ -62,7 +96,8 @@ def _equations(recording: Recording) -> tuple[NDArray, NDArray] | None:
     )
     angle, torque = (_filtered(recording[channel], window) for channel in (THETA_OUT, TAU_OUT))
     rate = np.gradient(angle, time_s)
-    terms = np.column_stack([angle, rate, np.gradient(rate, time_s)])[inside]
+    beyond = [_filtered(values, window) for values in (recording[THETA_OUT] ** 3, np.sign(rate))]
+    terms = np.column_stack([angle, rate, np.gradient(rate, time_s), *beyond])[inside]
     if len(terms) <= settings.FILTER_PASSES * window:
         return None
     return terms - terms.mean(axis=0), torque[inside] - torque[inside].mean()

@@ -46,8 +46,11 @@ class Form:
 def _forms(law: Law) -> Iterator[Form]:
     """Formulas from short to long."""
     if law.argument.has_two_values:
-        yield Form("1 + a sign(v)" if law.form.is_factor else "a sign(v)", lambda x, _: (x,), ("a",), ("y",))
+        of = f"a {law.argument.symbol}"
+        yield Form(f"1 + {of}" if law.form.is_factor else of, lambda x, _: (x,), ("a",), ("y",))
         return
+    if not law.form.is_centred:
+        yield Form("a", lambda x, _: (x**0,), ("a",), ("y",))
     if law.is_spaced_by_ratio:
         yield Form("a x^n", lambda x, n: (x**n,), ("a", "n"), ("y/x^n", "1"), has_exponent=True)
         yield Form("a + b/x", lambda x, _: (x**0, 1 / x), ("a", "b"), ("y", "y x"))

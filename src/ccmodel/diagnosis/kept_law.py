@@ -75,7 +75,8 @@ def mechanism_file(name: str, stated: Mapping, candidate: CandidateFit, batch: s
 
 def _title(stated: Mapping) -> str:
     slot, argument = stated["slot"].replace("-", " "), stated["arguments"][0].replace("-", " ")
-    of = f" of {stated['channel'].rsplit('_', 1)[0]}" if stated["slot"] == SENSOR_MAP else ""
+    is_of_one = stated["slot"] == SENSOR_MAP and stated["channel"] is not None
+    of = f" of {stated['channel'].rsplit('_', 1)[0]}" if is_of_one else ""
     return f"A law of the {slot}{of} by the {argument}."
 
 

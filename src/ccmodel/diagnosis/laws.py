@@ -21,7 +21,7 @@ from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.inference.pool import each
 from ccmodel.mechanisms import Sensing, laws
-from ccmodel.mechanisms.law_forms import ADDED_BEND, CONSTANT_DRAG, DRAG
+from ccmodel.mechanisms.law_forms import ADDED_BEND, CONSTANT_DRAG, DELAY, DRAG
 from ccmodel.mechanisms.learned import Law
 from ccmodel.model.parameters import mechanism_key
 from ccmodel.model.run import simulate
@@ -106,13 +106,15 @@ def _unit_of(law: Law, base: CandidateFit, motions: Sequence[Sensing]) -> float:
     """Unit of the a priori sizes of a law's values.
 
     It is 1 for a factor, the peak to peak of a channel for what is added to it, the mean bend of the conduits for an
-    added bend, mean Coulomb friction per length of conduit for a drag, and `LAW_CABLES` times the compliance of a cable
-    for the compliance of an end.
+    added bend, mean Coulomb friction per length of conduit for a drag, `LAW_CABLES` times the compliance of a cable for
+    the compliance of an end, and `LAW_DELAY_S` for a delay.
     """
     if law.channel is not None:
         return float(np.ptp(np.concatenate([m.channels[law.channel] for m in motions])))
     if law.form.is_factor:
         return 1.0
+    if law.form is DELAY:
+        return settings.LAW_DELAY_S
     if law.form is ADDED_BEND:
         return float(np.mean([path.bend_rad for path in _paths(base)]))
     if law.form in (DRAG, CONSTANT_DRAG):

@@ -12,7 +12,7 @@ from ccmodel.deadline import Deadline
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.calibration import TestedModel, tested_model
 from ccmodel.diagnosis.candidate import CandidateFit, fit
-from ccmodel.diagnosis.equation_error import LOAD_SPRING, load_values
+from ccmodel.diagnosis.equation_error import LOAD_SPRING, largest_inertia, load_values
 from ccmodel.diagnosis.hypothesis import single_mechanisms, stated_hypothesis
 from ccmodel.diagnosis.laws import first_laws
 from ccmodel.diagnosis.observations import NotJudged, observations_of
@@ -216,8 +216,10 @@ def diagnose(
     mechanisms = single_mechanisms(options.without, tested.hypothesis, _recorded_by_all(recordings))
     forced = [stated_hypothesis(stated) for stated in options.forced_candidates]
     of_selection = within(progress, CALIBRATED, SELECTED)
-    known = load_values(recordings) if LOAD_SPRING in tested.free else {}
-    selection = Selection(tested.free, mechanisms, forced, first_laws(), of_selection, known, deadline, sets_until)
+    known, limits = (f(recordings) if LOAD_SPRING in tested.free else {} for f in (load_values, largest_inertia))
+    selection = Selection(
+        tested.free, mechanisms, forced, first_laws(), of_selection, known, limits, deadline, sets_until
+    )
     comparison, scores = selection.run(whitened, found.fit)
     if deadline.has_passed:
         limit = f"the limit of {options.run_limit:,} model runs"

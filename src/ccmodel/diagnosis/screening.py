@@ -7,6 +7,8 @@ products of all directions (their Gram matrix) give the same test for any set of
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import inf
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +68,21 @@ class Trial:
         if self.own is None:
             return scaled(self.hypothesis, self.values, strength)
         return changed(self.own, self.values, strength)
+
+    def is_within(self, limits: Mapping[str, float]) -> bool:
+        """Whether no value is above its limit."""
+        return all(value <= limits.get(key, inf) for key, value in self.values.items())
+
+    @property
+    def shape(self) -> tuple:
+        """What it has in common with trials of other strengths; unlike all others if it is not linear in them."""
+        ((name, place),) = self.hypothesis.acting
+        mechanism = registry.get(name)
+        is_linear = self.own is None and not any(p.screening_grid for p in mechanism.strengths)
+        strengths = mechanism.strengths if is_linear else ()
+        moved = tuple(p.name for p in strengths if self.values[mechanism_key(name, place, p.name)] != p.neutral)
+        others = [p for p in mechanism.parameters if p not in strengths]
+        return name, place, moved, *(self.values.get(mechanism_key(name, place, p.name)) for p in others)
 
     @property
     def has_one_sign(self) -> bool:
@@ -171,7 +188,12 @@ class Screening:
         return Score(hypothesis, float(self.product[list(members)] @ strengths) / self.square, values)
 
 
-def screen(base: CandidateFit, hypotheses: Sequence[Hypothesis], deadline: Deadline = UNLIMITED) -> Screening:
+def screen(
+    base: CandidateFit,
+    hypotheses: Sequence[Hypothesis],
+    deadline: Deadline = UNLIMITED,
+    limits: Mapping[str, float] = MappingProxyType({}),
+) -> Screening:
     """Screen mechanisms against a fitted model that they extend.
 
     Parameters
@@ -181,8 +203,11 @@ def screen(base: CandidateFit, hypotheses: Sequence[Hypothesis], deadline: Deadl
         Single mechanisms.
     deadline : Deadline
         When the screening ends with the trials that were run until then.
+    limits : mapping of str to float
+        Upper limits of unknowns; trials beyond them are left out.
     """
-    trials = [t for h in hypotheses for t in leading(base, list(trials_of(base, h)), deadline)]
+    possible = ([t for t in trials_of(base, h) if t.is_within(limits)] for h in hypotheses)
+    trials = [t for some in possible for t in leading(base, some, deadline)]
     return _screening(base, trials, hypotheses, deadline)
 
 
@@ -196,9 +221,13 @@ def _screening(
     residuals = residuals - absorbed @ (absorbed.T @ residuals)
     square = float(residuals @ residuals)
     usable, directions = [], []
+    # Shapes of which a strength changes more than there is; by the Cauchy-Schwarz inequality the best one is smaller.
+    strong = set()
     for trial in trials:
         if deadline.has_passed:
             break
+        if trial.shape in strong:
+            continue
         direction = _direction(base, trial)
         # The model cannot be run with the mechanism, or a recalibration absorbs it.
         if direction is None or direction @ direction < ABSORBED:
@@ -207,6 +236,8 @@ def _screening(
         if direction @ direction >= ABSORBED:
             usable.append(trial)
             directions.append(direction.astype(np.float32))
+        if direction @ direction > square:
+            strong.add(trial.shape)
     if not usable:
         return Screening([], np.empty((0, 0)), np.empty(0), square, hypotheses)
     D = np.stack(directions)

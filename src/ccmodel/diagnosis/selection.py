@@ -45,9 +45,9 @@ class Selection:
     laws : sequence of Law
         Laws that may be learned where something is missing that is on no list.
     progress : Progress
-    known : mapping of str to float
-        Values that recordings show without a run of the model (`ccmodel.diagnosis.equation_error`). Fits of what they
-        belong to also start from them.
+    known, limits : mapping of str to float
+        Values, and upper limits, that recordings show without a run of the model (`ccmodel.diagnosis.equation_error`).
+        Fits of what they belong to also start from these values, and nothing is screened beyond these limits.
     deadline, sets_until : Deadline
         When the selection ends with what was fitted until then; and when sets are to be fitted before laws are learned.
     goes_on : bool
@@ -60,6 +60,7 @@ class Selection:
     laws: Sequence[Law] = ()
     progress: Progress = field(default=silent)
     known: Mapping[str, float] = field(default_factory=dict)
+    limits: Mapping[str, float] = field(default_factory=dict)
     deadline: Deadline = UNLIMITED
     sets_until: Deadline = UNLIMITED
     goes_on: bool = False
@@ -68,7 +69,7 @@ class Selection:
         """Select from all mechanisms; the comparison of what was fitted, and the screening scores."""
         text = f"calibrated model: leave-one-out mean square {base.mean_square:.2f} (1: noise); screening"
         self.progress(f"{text} {len(self.mechanisms)} mechanisms", 0.0)
-        screening = screen(base, self.mechanisms, self.deadline)
+        screening = self.screened(base, self.mechanisms)
         scores = screening.singles()
         nothing = Comparison.of(whitened, base, [], len(self.mechanisms))
         fewest = settings.FEWEST_FITTED if nothing.unlisted > 0.5 else 0
@@ -153,11 +154,15 @@ class Selection:
         self.progress(f"looking for what acts beside {best.hypothesis}", 0.0)
         acting = laws_in(best.hypothesis)
         others = [law for law in self.laws if not any(law.has_the_quantity_of(one) for one in acting)]
-        scores = [s for s in screen(best, self.mechanisms, self.deadline).singles() if s.gain > settings.WORTH_FITTING]
+        scores = [s for s in self.screened(best, self.mechanisms).singles() if s.gain > settings.WORTH_FITTING]
         second = proposals(best, others, self.deadline, self.progress)[: settings.PARTNERS]
         chosen = scores[: settings.PARTNERS] + [Score(p.hypothesis, 0.0, p.values) for p in second]
         pairs = self.fit_all(found.whitened, best, chosen)
         return self.relinearise(found.with_candidates([*found.candidates, *pairs])) if pairs else found
+
+    def screened(self, base: CandidateFit, mechanisms: Sequence[Hypothesis]) -> Screening:
+        """Screening of mechanisms against a fitted model, until the deadline and within what recordings show."""
+        return screen(base, mechanisms, self.deadline, self.limits)
 
     def _part(self, low: float, high: float) -> Self:
         """The same, whose work takes these shares of the whole."""
@@ -228,7 +233,7 @@ class Selection:
         """A set with each of its best partners; sets that were seen are left out, and these are added to them."""
         self.progress(f"screening mechanisms beside {first.hypothesis}", 0.0)
         partners = [h for h in self.mechanisms if h.acting[0] not in first.hypothesis.acting]
-        scores = screen(first, partners, self.deadline).singles()
+        scores = self.screened(first, partners).singles()
         worth = [s for s in scores if s.gain > settings.WORTH_FITTING]
         chosen = unseen(worth, seen, settings.PARTNERS, first.hypothesis.acting)
         return self._part(PARTNERS_SCREENED, 1.0).fit_all(whitened, first, chosen)
@@ -274,14 +279,14 @@ class Selection:
             self.progress(f"the covariance stays as it is ({error})")
             return found
         leading = contenders(found)
-        again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in leading for s in starts(c)])
-        if self.deadline.has_passed:
-            # Until the selection ends, all are fitted again.
-            if self.goes_on:
-                return found
-            # No rival must be lost: without it, the others would be more probable.
-            in_time = {c.hypothesis for c in again}
-            again += self._evaluated([c for c in leading if c.hypothesis not in in_time], whitened)
+        near = [c for c in leading if not found.is_far_behind(c)]
+        again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in near for s in starts(c)])
+        # Until the selection ends, all are fitted again.
+        if self.deadline.has_passed and self.goes_on:
+            return found
+        # No rival must be lost: without it, the others would be more probable.
+        in_time = {c.hypothesis for c in again}
+        again += self._evaluated([c for c in leading if c.hypothesis not in in_time], whitened)
         if not any(c.hypothesis == best.hypothesis for c in again):
             return found
         # About the same mechanisms once more: only if that leads on.
@@ -310,7 +315,8 @@ class Selection:
         """
         if found.is_adequate:
             return found
-        scores = [Score(c.hypothesis, 0.0, c.values) for c in contenders(found)]
+        near = [c for c in contenders(found) if not found.is_far_behind(c)]
+        scores = [Score(c.hypothesis, 0.0, c.values) for c in near]
         again = self.fit_all(found.whitened, found.base, scores, LAST_SEARCH)
         if self.deadline.has_passed:
             return found

@@ -113,6 +113,10 @@ FILTER_S, FILTER_PASSES = 0.05, 4
 # Relative difference of an inertia from the regressed one above which a fit also starts from that. Chosen: half of the
 # screening's step.
 ALIKE_INERTIA = 0.1
+# Standard deviations above the regressed inertia beyond which none is screened, and the least number of recordings for
+# that. Chosen; on 20 batches without a load with mass, which is plausible from 1e-5 kg m^2, these reach to 8e-6 at most
+# on 18, to 1e-5 on one with backlash at the load, and to 2e-4 on one more.
+INERTIA_REACH, INERTIA_RECORDINGS = 5.0, 5
 # How far a fit may leave a parameter's plausible range, as a factor. Chosen: far enough to recognise that it would.
 BEYOND_RANGE = 3.0
 # Factor by which a strength may exceed its plausible range in an accepted model. Chosen: ranges are rough.
@@ -206,6 +210,9 @@ CONTENDERS = 4
 HOPELESS = 20.0
 # Excess mean square that counts as none in this comparison. Chosen.
 NEAR_NOISE = 0.2
+# Natural logarithm of the weight of the leading candidate over that of another one, above which the latter keeps its
+# values about the former. Chosen for time: three times less, as another covariance may make it, still excludes it.
+FAR_BEHIND = 100.0
 
 # --- Laws that no list holds
 
@@ -216,6 +223,8 @@ LAW_STEP = 0.01
 # That unit for the compliance of a cable's end, over the compliance of the cable. Chosen: with the largest of
 # `LAW_SCALES`, an end yields about as much as its cable.
 LAW_CABLES = 3.0
+# The same for the delay of a side, s. Chosen: ten times the longest step of usual recordings, 0.01 s.
+LAW_DELAY_S = 0.1
 # Laws that are fitted, the leading ones to first order; and of these, how many are also fitted with more knots. Chosen
 # for time.
 LAWS_FITTED, LAWS_REFINED = 8, 2

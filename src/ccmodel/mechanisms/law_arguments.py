@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.channels import TENSIONS, THETA_IN
+from ccmodel.channels import CABLES, TENSIONS, THETA_IN, TORQUE_AT, symbol_of, unit_of
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Sensing
 
@@ -33,6 +33,8 @@ class Argument:
         (places, n).
     has_two_values : bool
         Whether it is -1 or 1.
+    symbol : str
+        As it stands in a formula.
     """
 
     name: str
@@ -40,11 +42,12 @@ class Argument:
     meaning: str
     of: Callable[[Sensing], NDArray]
     has_two_values: bool = False
+    symbol: str = "x"
 
     @property
     def depends_on_time(self) -> bool:
         """Whether it depends on the rate of the motion, not only on its path."""
-        return self.name in ("speed", "dwell", "time")
+        return self.name in ("speed", "dwell", "time", "rate")
 
 
 @kernel
@@ -101,12 +104,32 @@ def reading_of(channel: str) -> Callable[[Sensing], NDArray]:
     return lambda s: s.channels[channel]
 
 
+def rate_of(channel: str) -> Argument:
+    """The rate of a channel's reading, on which a sensor that follows slowly depends."""
+    return Argument("rate", f"{unit_of(channel)}/s", f"the rate of {symbol_of(channel)}", _velocity_of(channel))
+
+
+def torque_at(end: str) -> Argument:
+    """The torque at one end over its pulley's radius: another sensor's reading, in the unit of the load cell's."""
+    return Argument(
+        "torque",
+        "N",
+        f"{symbol_of(TORQUE_AT[end])} over the {end} pulley's radius",
+        lambda s: s.channels[TORQUE_AT[end]] / getattr(s, f"{end}_radius_m"),
+    )
+
+
 def _log_speed(s: Sensing) -> NDArray:
     return np.log10(np.maximum(s.drive_radius_m * np.abs(_velocity_of(THETA_IN)(s)), SLOWEST_M_PER_S))
 
 
 def _tensions(s: Sensing) -> NDArray:
     return np.stack([s.channels[c] for c in TENSIONS if c in s.channels]).clip(0.0)
+
+
+def _cables(s: Sensing) -> NDArray:
+    signs = [sign for sign, ends in ((-1.0, CABLES["A"]), (1.0, CABLES["B"])) if set(ends) <= s.channels.keys()]
+    return np.repeat(np.array(signs)[:, None], s.time_s.size, axis=1)
 
 
 TENSION = Argument("tension", "N", "the cable's tension", _tensions)
@@ -116,7 +139,8 @@ POSITION = Argument(
     "the position along the conduit, from the drive, over its length",
     lambda s: np.repeat([[0.0], [1.0]], s.time_s.size, axis=1),
 )
-DIRECTION = Argument("direction", "1", "the direction in which the cable slides", _direction, True)
+DIRECTION = Argument("direction", "1", "the direction in which the cable slides", _direction, True, "sign(v)")
+CABLE = Argument("cable", "1", "the cable (-1: A, 1: B)", _cables, True)
 TIME = Argument("time", "s", "the time since the recording's start", lambda s: s.time_s - s.time_s[0])
 TRAVEL = Argument("travel", "m", "the drive's travel since the recording's start", lambda s: s.drive_travel_m)
 LOG_SPEED = Argument("speed", "log10(m/s)", "the logarithm of the cables' speed at the drive", _log_speed)

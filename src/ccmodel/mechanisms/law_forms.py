@@ -1,6 +1,6 @@
 """How the values of a law that no list holds stand in the equations of its slot, and what they are a priori."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -71,13 +71,22 @@ DRAG = Form("drag of a cable per length of conduit, in N/m", "N/m", is_centred=F
 CONSTANT_DRAG = Form("drag of a cable per length of conduit, in N/m", "N/m", least=0.0, is_centred=False, name="drag")
 # Friction that does not grow with the bend of the loop, as at a kink.
 ADDED_BEND = Form("bend added to the conduits, over their length, in rad", "rad", is_centred=False, name="bend")
+# A side's readings are never early.
+DELAY = Form("delay of the {side}'s channels, in s", "s", least=0.0, is_centred=False, name="delay")
 # Shares of friction that build up; after a reversal friction acts in the former direction at first.
 CONTACT_ELEMENTS = Form(
     "friction over that of sliding, after a reversal", "1", neutral=1.0, is_centred=False, shortest_yield=0.002
 )
 ADDED = Form("added to {symbol}, in {unit}")
-# A torque whose elements yield one after the other.
-AGAINST_MOTION = Form("added to {symbol}, against the motion, in {unit}", is_centred=False, shortest_yield=0.01)
+# The zero of a load cell belongs to no calibration.
+ADDED_TO_SUM = Form("added to {symbol}, in {unit}", is_centred=False)
+# A torque whose elements yield one after the other. A ball bearing's yield within a few hundredths of a millimetre.
+AGAINST_MOTION = Form("added to {symbol}, against the motion, in {unit}", is_centred=False, shortest_yield=0.002)
+
+
+# The same in the bearing of the load's pulley, whose torque no sensor reads.
+IN_BEARING = Form("torque in the bearing of the {side} pulley, in {unit}")
+AGAINST_ROTATION = replace(AGAINST_MOTION, meaning="torque in the bearing of the {side} pulley, against it, in {unit}")
 
 
 @cache

@@ -49,6 +49,7 @@ from ccmodel.mechanisms.contract import (
     side,
 )
 from ccmodel.mechanisms.law_arguments import (
+    CABLE,
     DIRECTION,
     DWELL,
     LOG_SPEED,
@@ -60,23 +61,30 @@ from ccmodel.mechanisms.law_arguments import (
     TRAVEL,
     Argument,
     of_motion,
+    rate_of,
     reading_of,
+    torque_at,
 )
 from ccmodel.mechanisms.law_forms import (
     ADDED,
     ADDED_BEND,
+    ADDED_TO_SUM,
     AGAINST_MOTION,
+    AGAINST_ROTATION,
     CONSTANT_DRAG,
     CONTACT_ELEMENTS,
+    DELAY,
     DRAG,
     END_COMPLIANCE,
     FRICTION_FACTOR,
+    IN_BEARING,
     LEAST_COMPLIANCE,
     STRETCH_FACTOR,
     Form,
     basis,
 )
 from ccmodel.mechanisms.tables import Table
+from ccmodel.mechanisms.time_skew import late
 
 # Knots of a law, and the length over which its values are correlated a priori, as a share of its range: at first, and
 # where the recordings show more. The fastening of a cable is smooth at first: with more coefficients its law would be
@@ -86,7 +94,7 @@ COARSE, FINE, SMOOTH = (9, 0.25), (25, 0.08), (9, 1.0)
 RANGE = (0.005, 0.995)
 # The lowest knot of a law of the tension over the highest one, at least: slack cables have no tension.
 LOWEST_TENSION = 0.02
-# Friction is never negative in either direction.
+# Friction is never negative in either direction or cable, and neither is a compliance.
 LARGEST_BIAS = 0.95
 
 
@@ -100,7 +108,7 @@ class Law:
     argument : Argument
     form : Form
     channel : str or None
-        The channel that a torque or a reading is added to; None of a factor, a drag or a compliance.
+        The channel that a torque or a reading is added to; None of a factor, a drag, a compliance or a delay.
     opposes : str or None
         The angle whose motion a torque of elements opposes: each of its knots is the travel at which an element yields,
         and its value there is the torque of that element. Elements without it stand at every contact and oppose its
@@ -122,12 +130,12 @@ class Law:
     def name(self) -> str:
         """Its name as a mechanism."""
         of = ""
-        if self.slot == SENSOR_MAP:
-            of = f"-{short_name(str(self.channel))}".replace("_", "-")
-        if self.slot == END_STRETCH:
+        if self.slot == SENSOR_MAP and self.channel is not None:
+            of = f"-{short_name(self.channel)}".replace("_", "-")
+        if self.slot == END_STRETCH or self.form is DELAY or self.place == "load-pulley":
             of = f"-{side(self.place)}"
         if self.form.name:
-            of = f"-{self.form.name}"
+            of += f"-{self.form.name}"
         fine = "" if self.is_first else "-fine"
         return f"learned-{self.slot}{of}-by-{self.argument.name}{fine}"
 
@@ -156,12 +164,13 @@ class Law:
         """
         if self.form in _SETTING_OF:
             return _SETTING_OF[self.form]
-        by_argument = _SETTINGS.get((self.slot, self.argument.name), _SETTINGS.get((self.slot, "")))
-        return by_argument and by_argument.format(side=side(self.place))
+        of = (self.argument.name, self.place, "")
+        found = next((_SETTINGS[self.slot, one] for one in of if (self.slot, one) in _SETTINGS), None)
+        return found and found.format(side=side(self.place))
 
     def written(self, x: NDArray, y: NDArray, before: Any) -> Any:
         """The value of its setting that had the value `before`, for values at knots; both of shape (knots,)."""
-        if self.setting == "direction_bias":
+        if self.argument.has_two_values:
             return float(np.clip(y[-1], -LARGEST_BIAS, LARGEST_BIAS))
         if isinstance(before, tuple):
             return (*before, lambda sensing: self.added(sensing, x, y))
@@ -278,8 +287,10 @@ class Law:
             setattr(settings, str(setting), self.written(*at_knots(values), getattr(settings, str(setting))))
 
         def observation(sensing: Sensing, place: str, values: Mapping[str, float]) -> dict[str, NDArray]:
-            channel = str(self.channel)
-            return {channel: sensing.channels[channel] + self.added(sensing, *at_knots(values))}
+            added = self.added(sensing, *at_knots(values))
+            if self.channel is None:
+                return late(sensing, place, self.form.possible(added))
+            return {self.channel: sensing.channels[self.channel] + added}
 
         if setting is None:
             return {"modifies_observation": observation}
@@ -297,19 +308,29 @@ class Law:
 
 # Settings of the solver by form, where that is not the usual one of its slot.
 _SETTING_OF = {DRAG: "conduit_drag", CONSTANT_DRAG: "added_drag", ADDED_BEND: "added_bend"}
-# Settings of the solver by slot and argument, or by slot for all other arguments; and those that are neutral at
-# something else than None.
+# Settings of the solver by slot and argument or place, or by slot for all others; and those whose neutral value is not
+# None.
 _SETTINGS = {
     (SLIDING_FRICTION, "direction"): "direction_bias",
+    (SLIDING_FRICTION, "cable"): "friction_by_cable",
     (SLIDING_FRICTION, "tension"): "friction_by_tension",
     (SLIDING_FRICTION, "position-along-conduit"): "friction_by_position",
     (SLIDING_FRICTION, "distance-since-reversal"): "contact_elements",
     (SLIDING_FRICTION, ""): "friction_laws",
     (CABLE_STRETCH, "tension"): "cable_compliance",
+    (CABLE_STRETCH, "cable"): "compliance_by_cable",
     (END_STRETCH, "tension"): "{side}_end_stretch",
+    (BEARING_TORQUE, "load-pulley"): "load_bearing_laws",
     (LOAD, ""): "load_laws",
 }
-_NEUTRAL: dict[str, Any] = {"direction_bias": 0.0, "friction_laws": (), "load_laws": ()}
+_NEUTRAL: dict[str, Any] = {
+    "direction_bias": 0.0,
+    "friction_by_cable": 0.0,
+    "compliance_by_cable": 0.0,
+    "friction_laws": (),
+    "load_laws": (),
+    "load_bearing_laws": (),
+}
 
 _TEXT = """A law that was learnt from recordings: {what}, by {argument}.
 
@@ -349,13 +370,14 @@ def _slip(travel: NDArray, yields: NDArray) -> NDArray:
 
 def _laws() -> Iterator[Law]:
     drive, load = of_motion(THETA_IN, "drive"), of_motion(THETA_OUT, "load")
-    for argument in (DIRECTION, LOG_SPEED, DWELL, TRAVEL, TIME, drive["angle"], TENSION, POSITION):
+    for argument in (DIRECTION, CABLE, LOG_SPEED, DWELL, TRAVEL, TIME, drive["angle"], TENSION, POSITION):
         yield Law(SLIDING_FRICTION, "conduit", argument, FRICTION_FACTOR)
     yield Law(SLIDING_FRICTION, "conduit", SLIDING, CONTACT_ELEMENTS)
     yield Law(SLIDING_FRICTION, "conduit", SPEED, DRAG)
     for form in (CONSTANT_DRAG, ADDED_BEND):
         yield Law(SLIDING_FRICTION, "conduit", POSITION, form)
-    yield Law(CABLE_STRETCH, "cable", TENSION, STRETCH_FACTOR)
+    for argument in (TENSION, CABLE):
+        yield Law(CABLE_STRETCH, "cable", argument, STRETCH_FACTOR)
     for end in ("drive-end", "load-end"):
         yield Law(END_STRETCH, end, TENSION, END_COMPLIANCE, resolution=SMOOTH)
     for slot, place, channel, motion, angle in (
@@ -365,13 +387,18 @@ def _laws() -> Iterator[Law]:
         yield Law(slot, place, motion["angle"], ADDED, channel)
         yield Law(slot, place, motion["speed"], ADDED, channel)
         yield Law(slot, place, motion["since"], AGAINST_MOTION, channel, opposes=angle)
+    yield Law(BEARING_TORQUE, "load-pulley", load["speed"], IN_BEARING, TAU_OUT)
+    yield Law(BEARING_TORQUE, "load-pulley", load["since"], AGAINST_ROTATION, TAU_OUT, opposes=THETA_OUT)
     for channel in (TAU_IN, TAU_OUT, F_DRIVE, F_LOAD, THETA_OUT):
         reading = Argument("reading", unit_of(channel), f"the reading of {symbol_of(channel)}", reading_of(channel))
         place = next(p for p in PLACES_OF[channel] if p.endswith("-sensor"))
         # A map of tau_in by its angle is a torque of the drive pulley, and theta_out is an angle itself.
         of_pulley = {F_DRIVE: [drive["angle"]], F_LOAD: [load["angle"]], TAU_OUT: [load["angle"]]}.get(channel, [])
-        for argument in (reading, TIME, *of_pulley):
-            yield Law(SENSOR_MAP, place, argument, ADDED, channel)
+        of_torque = {F_DRIVE: [torque_at("drive")], F_LOAD: [torque_at("load")]}.get(channel, [])
+        for argument in (reading, TIME, rate_of(channel), *of_pulley, *of_torque):
+            yield Law(SENSOR_MAP, place, argument, ADDED_TO_SUM if channel in (F_DRIVE, F_LOAD) else ADDED, channel)
+    for place in ("drive-sensor", "load-sensor"):
+        yield Law(SENSOR_MAP, place, TIME, DELAY)
 
 
 @cache

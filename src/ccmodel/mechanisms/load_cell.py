@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 
+import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.channels import SUM_AT, TORQUE_AT
@@ -83,12 +84,16 @@ def _fault(
     mistaken_for: tuple[str, ...],
     sentence: str,
     depends_on_time: bool = False,
-    map_by: str | None = None,
+    map_by: tuple[str, ...] = ("reading",),
+    added: Callable[[NDArray, float], NDArray] = lambda x, value: value * x,
 ) -> Mechanism:
     """Mechanism of one fault: `reading` gives the cell's values from the sum of tensions and the fault's parameter.
 
-    `map_by` is the argument in proportion to which it adds to the reading, if it does.
+    `map_by` are the arguments by which it can be learned as a law, and ``added(x, value)`` what it adds to the reading.
     """
+
+    def law(x: NDArray, values: Mapping[str, float]) -> NDArray:
+        return added(x, values[parameter.name])
 
     def modifies_observation(sensing: Sensing, place: str, values: Mapping[str, float]) -> dict[str, NDArray]:
         end = side(place)
@@ -104,9 +109,7 @@ def _fault(
         mistaken_for=mistaken_for,
         depends_on_time=depends_on_time,
         modifies_observation=modifies_observation,
-        curves=(Curve(SENSOR_MAP, map_by, lambda x, values: values[parameter.name] * x, (parameter,), CELLS),)
-        if map_by
-        else (),
+        curves=tuple(Curve(SENSOR_MAP, argument, law, (parameter,), CELLS) for argument in map_by),
     )
 
 
@@ -123,7 +126,6 @@ MECHANISMS = (
         _GAIN,
         ("load-cell-offset", "cable-asymmetry"),
         "the {side}'s load cell reads {gain:%} [high|low]",
-        map_by="reading",
     ),
     _fault(
         "load-cell-offset",
@@ -132,6 +134,8 @@ MECHANISMS = (
         _OFFSET,
         ("load-cell-scale",),
         "the {side}'s load cell reads {offset} [high|low]",
+        map_by=("reading", "time", "rate", "torque", "drive-angle", "load-angle"),
+        added=lambda x, offset: np.full(x.shape, offset),
     ),
     _fault(
         "load-cell-drift",
@@ -141,7 +145,7 @@ MECHANISMS = (
         ("relaxation", "load-cell-offset"),
         "the zero of the {side}'s load cell drifts [up|down] by {rate}",
         depends_on_time=True,
-        map_by="time",
+        map_by=("time",),
     ),
     _fault(
         "load-cell-crosstalk",
@@ -150,5 +154,6 @@ MECHANISMS = (
         _CROSSTALK,
         ("load-cell-scale",),
         "the {side}'s load cell responds to {crosstalk:%} of the torque",
+        map_by=("torque",),
     ),
 )

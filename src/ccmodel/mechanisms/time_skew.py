@@ -19,16 +19,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.channels import F_LOAD, TAU_OUT, THETA_OUT
-from ccmodel.mechanisms.contract import Mechanism, Parameter, Sensing, side
+from ccmodel.mechanisms.contract import SENSOR_MAP, Curve, Mechanism, Parameter, Sensing, side
 
 _LOAD_CHANNELS = (THETA_OUT, TAU_OUT, F_LOAD)
 
 
-def _modifies_observation(sensing: Sensing, place: str, values: Mapping[str, float]) -> dict[str, NDArray]:
-    late = values["delay"] if side(place) == "load" else -values["delay"]
+def late(sensing: Sensing, place: str, delay_s: float | NDArray) -> dict[str, NDArray]:
+    """The channels that change where a side's readings are late by `delay_s`, the same for all samples or for each."""
     t = sensing.time_s
-    return {name: np.interp(t - late, t, sensing.channels[name]) for name in _LOAD_CHANNELS}
+    read_at = t - delay_s if side(place) == "load" else t + delay_s
+    return {name: np.interp(read_at, t, sensing.channels[name]) for name in _LOAD_CHANNELS}
 
+
+def _modifies_observation(sensing: Sensing, place: str, values: Mapping[str, float]) -> dict[str, NDArray]:
+    return late(sensing, place, values["delay"])
+
+
+_DELAY = Parameter("delay", "s", 2e-3, 50e-3, 10e-3, "delay of one side's channels")
 
 MECHANISM = Mechanism(
     name="time-skew",
@@ -36,8 +43,9 @@ MECHANISM = Mechanism(
     tex=r"y_\mathrm{read}(t) = y(t - \mathrm{delay})",
     sentence="the {side}'s channels are late by {delay}",
     places=("drive-sensor", "load-sensor"),
-    parameters=(Parameter("delay", "s", 2e-3, 50e-3, 10e-3, "delay of one side's channels"),),
+    parameters=(_DELAY,),
     mistaken_for=("viscous-friction", "load-inertia"),
     depends_on_time=True,
     modifies_observation=_modifies_observation,
+    curves=(Curve(SENSOR_MAP, "time", lambda t, values: np.full(t.shape, values["delay"]), (_DELAY,), form="delay"),),
 )

@@ -113,13 +113,14 @@ def headline(diagnosis: Mapping) -> str:
     return f"{text} With this in the model, the held-out error of {SYMBOL[worst]} {fall}."
 
 
-# What has a law of each slot; that of a sensor is named by its channel.
+# What has a law of each slot; that of a sensor is named by its channel, and that of all channels of a side is a delay.
 IN_SLOT = {
     SLIDING_FRICTION: "Friction along the conduits",
     CABLE_STRETCH: "The cables' compliance",
     END_STRETCH: "The compliance of the cables' fastening at the {side}",
-    BEARING_TORQUE: "The torque at the drive pulley",
+    BEARING_TORQUE: "The torque at the {side} pulley",
     LOAD: "The load's torque",
+    SENSOR_MAP: "The delay of the {side}'s channels",
 }
 
 
@@ -131,7 +132,8 @@ def law_sentence(diagnosis: Mapping) -> str:
 
 def law_claim(law: Mapping) -> str:
     """What a learned law says, with its confidence."""
-    what = f"The error of {symbol_of(law['channel'])}" if law["slot"] == SENSOR_MAP else IN_SLOT[law["slot"]]
+    is_of_one = law["slot"] == SENSOR_MAP and law["channel"] is not None
+    what = f"The error of {symbol_of(law['channel'])}" if is_of_one else IN_SLOT[law["slot"]]
     what = what.format(side=side(law["place"]))
     others = f" (or on {' or '.join(law['indistinguishable'])})" if law["indistinguishable"] else ""
     return (

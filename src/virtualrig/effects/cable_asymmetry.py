@@ -1,10 +1,12 @@
 """Cables that differ: friction and stiffness of cable B over those of cable A."""
 
 from collections.abc import Mapping
+from typing import Any
 
+import numpy as np
 from pydantic import PositiveFloat
 
-from virtualrig.effects.contract import Seeded, Twin
+from virtualrig.effects.contract import Seeded, TrueLaw, Twin
 from virtualrig.strict import Strict
 
 
@@ -19,6 +21,11 @@ def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> 
     return {"cable_asymmetry": {"friction_ratio": 1 + size}}, {"ratio": 1 + size, "K_ratio": 1.0}
 
 
+def _law(rig: Any, place: str) -> TrueLaw:
+    of_B = rig.effects.cable_asymmetry.friction_ratio
+    return TrueLaw("sliding-friction", "cable", np.array([-1.0, 1.0]), np.array([1.0, of_B]))
+
+
 TWIN = Twin(
     name="cable-asymmetry",
     fields={"rig": {"cable_asymmetry": (CableAsymmetry, CableAsymmetry())}},
@@ -27,4 +34,5 @@ TWIN = Twin(
     unit="1",
     signed=True,
     seed=_seed,
+    law=_law,
 )

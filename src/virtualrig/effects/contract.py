@@ -65,6 +65,8 @@ LOG_SPEEDS, SPEEDS_RAD_PER_S, FORCES_N, TORQUES_NM, LOG_AGES = (
     (-0.07, 0.07),
     (-2, 0.5),
 )
+# Torques over the radius of a pulley, N.
+PULLS_N = (-12.0, 12.0)
 POINTS = 129
 # Fields of a side that a sensor reads, by the argument of its map.
 SIDE = {"angle": "angle_rad", "torque": "torque_Nm", "force": "force_N"}

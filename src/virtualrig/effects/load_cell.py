@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from virtualrig.effects.contract import (
     FORCES_N,
+    PULLS_N,
     TIMES_S,
     Range,
     Read,
@@ -45,7 +46,9 @@ def _crosstalk(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_
 
 
 def _map(read: Read, argument: str) -> Callable[[Any, str], TrueLaw]:
-    over, between = {"reading": ("force", FORCES_N), "time": ("time", TIMES_S)}[argument]
+    # With a radius of 1 a torque is also its pull.
+    table = {"reading": ("force", FORCES_N), "time": ("time", TIMES_S), "torque": ("torque", PULLS_N)}
+    over, between = table[argument]
 
     def law(rig: Any, place: str) -> TrueLaw:
         x, faults = along(between), getattr(rig.effects, group_of(place))
@@ -73,7 +76,10 @@ def _warming(size: float, also: Mapping[str, float], place: str, spring: float) 
 
 TWINS = (
     replace(_twin("load-cell-scale", "load_cell_gain", "gain", (0.005, 0.1), "1", _scale), law=_map(_scale, "reading")),
-    _twin("load-cell-offset", "load_cell_offset_N", "offset", (0.1, 3.0), "N", _offset),
+    replace(
+        _twin("load-cell-offset", "load_cell_offset_N", "offset", (0.1, 3.0), "N", _offset),
+        law=lambda rig, place: TrueLaw("sensor-map", "reading"),
+    ),
     replace(
         _twin("load-cell-drift", "load_cell_drift_N_per_s", "rate", (0.005, 0.2), "N/s", _drift),
         fields={"sensors": {"load_cell_drift_N_per_s": (float, 0.0), "load_cell_warm_up_s": (NonNegative, 0.0)}},
@@ -81,5 +87,8 @@ TWINS = (
         other_laws={"warm-up": _warming},
         law=_map(_drift, "time"),
     ),
-    _twin("load-cell-crosstalk", "load_cell_crosstalk", "crosstalk", (0.005, 0.1), "1", _crosstalk),
+    replace(
+        _twin("load-cell-crosstalk", "load_cell_crosstalk", "crosstalk", (0.005, 0.1), "1", _crosstalk),
+        law=_map(_crosstalk, "torque"),
+    ),
 )

@@ -1,10 +1,12 @@
 """Tension profiles of the exact solver: from an initial profile into a state, and from a state out as plain arrays."""
 
 from dataclasses import dataclass
+from math import exp
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.kernel import kernel
 from ccmodel.model.exact import state as rows
 from ccmodel.model.exact.front import position
 from ccmodel.model.exact.path import LUMP, NODE, PER_M, X_PER_M, X_START, PathTables
@@ -69,28 +71,39 @@ def _store(state: State, tables: PathTables, c: int, m: NDArray, tension: NDArra
     state.corner[rows.C_SLOPE, c, low : low + m.size - 1] = slope
     state.kind[c, [rows.LO, rows.FIRST]], state.kind[c, [rows.HI, rows.LAST]] = low, low + m.size - 1
     state.value[c, rows.T_DRIVE], state.value[c, rows.T_LOAD] = tension[0], tension[-1]
-    state.value[c, rows.E0] = _elongation(tables, m, tension, slope)
+    state.value[c, rows.E0] = _elongation(tables.table[0], m, tension, slope)
     state.value[c, rows.STIFFNESS : rows.STIFFNESS + 2] = 1.0 / np.array(tables.line_compliance)
     if tables.total == 0.0 or tension[0] == 0.0:
         state.kind[c, rows.MODE] = rows.WHOLE
         state.kind[c, rows.LINE] = -1
 
 
-def _elongation(tables: PathTables, m: NDArray, tension: NDArray, slope: NDArray) -> float:
-    """Elongation under a profile: the integral of T dx / EA, m."""
-    at = np.union1d(m, tables.table[0, NODE])
-    segment = np.clip(np.searchsorted(m, at[:-1], side="right") - 1, 0, max(m.size - 2, 0))
-    start = tension[segment] * np.exp(slope[segment] * (at[:-1] - m[segment]))
-    run = np.diff(at)
-    rise = slope[segment] * run
-    mean = np.divide(np.expm1(rise), rise, out=np.ones_like(rise), where=rise != 0)
-    total = 0.0
-    if run.size:
-        piece = np.clip(np.searchsorted(tables.table[0, NODE], at[:-1], side="right") - 1, 0, tables.table.shape[2] - 2)
-        total = float((tables.table[0, PER_M][piece] * start * mean * run).sum())
-    at_node = np.clip(np.searchsorted(m, tables.table[0, NODE], side="right") - 1, 0, m.size - 2)
-    values = tension[at_node] * np.exp(slope[at_node] * (tables.table[0, NODE] - m[at_node]))
-    return total + float((tables.table[0, LUMP] * values).sum())
+@kernel
+def _elongation(table: NDArray, m: NDArray, tension: NDArray, slope: NDArray) -> float:
+    """Elongation under a profile, the integral of T dx / EA along the bends and at the nodes, m.
+
+    `table` is the one that is seen from the drive end. Between the corners `m` of the profile and the nodes, ln T is
+    linear.
+    """
+    node, last = table[NODE], table.shape[1] - 1
+    total, segment, piece, at = 0.0, 0, 0, 0.0
+    while piece < last:
+        while segment < m.size - 2 and m[segment + 1] <= at:
+            segment += 1
+        end = node[piece + 1] if segment == m.size - 2 else min(node[piece + 1], m[segment + 1])
+        run = end - at
+        rise = slope[segment] * run
+        mean = np.expm1(rise) / rise if rise != 0.0 else 1.0
+        total += table[PER_M, piece] * tension[segment] * exp(slope[segment] * (at - m[segment])) * mean * run
+        at = end
+        if end == node[piece + 1]:
+            piece += 1
+    segment = 0
+    for i in range(node.size):
+        while segment < m.size - 2 and m[segment + 1] <= node[i]:
+            segment += 1
+        total += table[LUMP, i] * tension[segment] * exp(slope[segment] * (node[i] - m[segment]))
+    return total
 
 
 def cable_profile(state: State, tables: PathTables, transmission: Transmission, c: int) -> CableProfile:

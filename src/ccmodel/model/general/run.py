@@ -137,11 +137,15 @@ def simulate(
     else:
         motor = NO_MOTOR
     solved, out = _marched(*pair, elements, steps, series, motor)
-    # A law of the load takes the load's motion from the pass before. A load that is held or driven has no law.
-    has_law = bool(settings.load_laws) and not isinstance(load, AngleLoad | FixedLoad)
+    # A law of the load or its bearing takes the load's motion from the pass before. A held or driven load has no law.
+    has_law = bool(settings.load_laws or settings.load_bearing_laws) and not isinstance(load, AngleLoad | FixedLoad)
     for _ in range(LOAD_LAW_PASSES if has_law and solved == time_s.size else 0):
         motion = Sensing(time_s, {THETA_OUT: out[4]}, transmission.drive_radius_m, transmission.load_radius_m)
-        solved, out = _marched(*pair, elements, steps, series + sum(law(motion) for law in settings.load_laws), motor)
+        of_load, in_bearing = (
+            np.sum([law(motion) for law in laws], axis=0) for laws in (settings.load_laws, settings.load_bearing_laws)
+        )
+        solved, out = _marched(*pair, elements, steps, series + of_load + in_bearing, motor)
+        out[5] -= in_bearing  # the torque is measured on the load's side of the bearing
         if solved < time_s.size:
             break
     return _response(transmission, active, time_s[:solved], theta_in[:solved], out)
@@ -301,7 +305,9 @@ def _constants(
     transmission: Transmission, settings: Settings, grid: Grid, added_rad: NDArray
 ) -> tuple[NDArray, NDArray]:
     """Constants of pieces and nodes; a compliant end is a piece of its own, next to a node without friction."""
-    ratio_K, ratio_mu = (np.array([[1.0], [r]]) for r in (settings.stiffness_ratio_B, settings.friction_ratio_B))
+    of_cable = np.array([[-1.0], [1.0]])
+    ratio_mu = np.array([[1.0], [settings.friction_ratio_B]]) * (1.0 + settings.friction_by_cable * of_cable)
+    ratio_K = np.array([[1.0], [settings.stiffness_ratio_B]]) / (1.0 + settings.compliance_by_cable * of_cable)
     EA = transmission.axial_rigidity_N * ratio_K
     segment, cell, length = grid.segment_m, grid.cell_m, transmission.path.length_m
     drive, load = end_spring(settings, "drive"), end_spring(settings, "load")
