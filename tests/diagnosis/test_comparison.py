@@ -575,7 +575,7 @@ def test_the_covariance_is_linearised_about_the_best_candidate(monkeypatch):
     assert not replace(again, linearised_about=moved).is_linearised_about(again.candidates[0])
 
     # A rival that is far behind has its former values under the new covariance.
-    monkeypatch.setattr(selections, "contenders", lambda found: found.by_evidence)
+    monkeypatch.setattr(selections, "contenders", lambda found: (found.by_evidence[:1], found.by_evidence[1:]))
     compared_before = Comparison.of(recordings, base, candidates, SCREENED)
     assert [compared_before.is_far_behind(c) for c in candidates] == [False, True]
     rival = next(c for c in selection.relinearise(compared_before).candidates if c.hypothesis.acting == (FRICTION,))
@@ -590,6 +590,7 @@ def test_the_covariance_is_linearised_about_the_best_candidate(monkeypatch):
 
     # Where the time is over, a rival has its former values under the new covariance.
     monkeypatch.setattr(Selection, "fit_all", in_time_for_one)
+    monkeypatch.setattr(selections, "contenders", lambda found: (found.by_evidence, []))
     late_selection = Selection(base.free, [], deadline=deadline)
     found = late_selection.relinearise(Comparison.of(recordings, base, candidates, SCREENED))
     first, late = found.candidates

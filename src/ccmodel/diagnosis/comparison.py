@@ -138,10 +138,10 @@ class Comparison:
         return np.array(found)
 
     def is_far_behind(self, candidate: CandidateFit) -> bool:
-        """Whether a candidate's weight is so low that no other covariance makes it a rival."""
+        """Whether a candidate has a far lower weight than the leading one; False of one that is not plausible."""
         by_candidate = np.logaddexp.reduce(self.log_weights, axis=1)
         own = by_candidate[[self.base, *self.candidates].index(candidate)]
-        return bool(own < by_candidate.max() - settings.FAR_BEHIND)
+        return bool(np.isfinite(own) and own < by_candidate.max() - settings.FAR_BEHIND)
 
     @cached_property
     def log_posterior(self) -> NDArray:

@@ -39,7 +39,8 @@ def load_values(recordings: Sequence[Recording]) -> dict[str, float]:
     equations = _equations_of(recordings)
     if not equations:
         return {}
-    K_e, B, J = _fitted([(terms[:, :LINEAR], torque) for terms, torque in equations]).tolist()
+    terms, torque = (np.concatenate(rows) for rows in zip(*equations, strict=True))
+    K_e, B, J = np.linalg.lstsq(terms[:, :LINEAR], torque, rcond=None)[0].tolist()
     bounds = {p.name: (p.low, p.high) for p in registry.get(INERTIA[0]).parameters}
     if K_e <= 0.0 or not bounds["J"][0] <= J <= settings.RANGE_SLACK * bounds["J"][1]:
         return {}
@@ -50,17 +51,27 @@ def load_values(recordings: Sequence[Recording]) -> dict[str, float]:
 def largest_inertia(recordings: Sequence[Recording]) -> dict[str, float]:
     """Upper limit of the load's inertia, kg m^2, by its name as an unknown of a fit.
 
-    It is the sum of the regression's value, `INERTIA_REACH` standard deviations, by the jackknife over recordings, and
-    the smallest plausible inertia: an encoder's steps are an error that recordings of the same motion have in common.
+    It is the sum of the regression's value, if that is positive, `INERTIA_REACH` standard deviations, by the jackknife
+    over recordings, and the smallest plausible inertia: an encoder's steps are an error that recordings of the same
+    motion have in common.
     Empty if fewer than `INERTIA_RECORDINGS` recordings have both channels.
     """
     equations = _equations_of(recordings)
     n = len(equations)
     if n < settings.INERTIA_RECORDINGS:
         return {}
-    without = np.array([_fitted(equations[:i] + equations[i + 1 :])[INERTIA_TERM] for i in range(n)])
-    sd = sqrt((n - 1) * float(np.var(without)))
-    limit = float(_fitted(equations)[INERTIA_TERM]) + settings.INERTIA_REACH * sd
+    unit = np.sqrt(sum((terms**2).sum(axis=0) for terms, _ in equations))
+    unit[unit == 0.0] = 1.0
+    each_normal = np.array(
+        [terms.T @ np.column_stack([terms / unit, torque]) / unit[:, None] for terms, torque in equations]
+    )
+
+    def inertia(normal: NDArray) -> float:
+        return float(np.linalg.lstsq(normal[:, :-1], normal[:, -1], rcond=None)[0][INERTIA_TERM] / unit[INERTIA_TERM])
+
+    together = each_normal.sum(axis=0)
+    sd = sqrt((n - 1) * float(np.var([inertia(together - one) for one in each_normal])))
+    limit = max(inertia(together), 0.0) + settings.INERTIA_REACH * sd
     return {mechanism_key(*INERTIA, "J"): limit + registry.get(INERTIA[0]).parameter("J").low}
 
 
@@ -74,12 +85,6 @@ def other_start(start: Mapping[str, float], known: Mapping[str, float]) -> dict[
 
 def _equations_of(recordings: Sequence[Recording]) -> list[tuple[NDArray, NDArray]]:
     return [e for r in recordings if THETA_OUT in r and TAU_OUT in r and (e := _equations(r)) is not None]
-
-
-def _fitted(equations: Sequence[tuple[NDArray, NDArray]]) -> NDArray:
-    """Coefficient of each term, shape (terms,)."""
-    terms, torque = (np.concatenate(rows) for rows in zip(*equations, strict=True))
-    return np.linalg.lstsq(terms, torque, rcond=None)[0]
 
 
 def _equations(recording: Recording) -> tuple[NDArray, NDArray] | None:
@@ -96,7 +101,8 @@ def _equations(recording: Recording) -> tuple[NDArray, NDArray] | None:
     )
     angle, torque = (_filtered(recording[channel], window) for channel in (THETA_OUT, TAU_OUT))
     rate = np.gradient(angle, time_s)
-    beyond = [_filtered(values, window) for values in (recording[THETA_OUT] ** 3, np.sign(rate))]
+    direction = np.tanh(rate / settings.SLIDING_RAD_PER_S)  # at rest the sign is that of noise
+    beyond = [_filtered(values, window) for values in (recording[THETA_OUT] ** 3, direction)]
     terms = np.column_stack([angle, rate, np.gradient(rate, time_s), *beyond])[inside]
     if len(terms) <= settings.FILTER_PASSES * window:
         return None

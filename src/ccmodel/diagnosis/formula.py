@@ -12,6 +12,8 @@ from ccmodel.distributions import normal_quantile
 from ccmodel.inference.intervals import COVERAGE
 from ccmodel.mechanisms.learned import Law
 
+# A law that does not depend on its argument.
+CONSTANT = "a"
 # Lengths and periods that are tried first: so many, from twice the distance of the knots to twice the range.
 TRIED = 40
 # Exponents that are tried first.
@@ -50,7 +52,7 @@ def _forms(law: Law) -> Iterator[Form]:
         yield Form(f"1 + {of}" if law.form.is_factor else of, lambda x, _: (x,), ("a",), ("y",))
         return
     if not law.form.is_centred:
-        yield Form("a", lambda x, _: (x**0,), ("a",), ("y",))
+        yield Form(CONSTANT, lambda x, _: (x**0,), ("a",), ("y",))
     if law.is_spaced_by_ratio:
         yield Form("a x^n", lambda x, n: (x**n,), ("a", "n"), ("y/x^n", "1"), has_exponent=True)
         yield Form("a + b/x", lambda x, _: (x**0, 1 / x), ("a", "b"), ("y", "y x"))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.channels import CHANNELS, TENSIONS, THETA_IN
+from ccmodel.channels import CHANNELS, TAU_OUT, TENSIONS, THETA_IN
 from ccmodel.deadline import Deadline
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
@@ -21,6 +21,7 @@ from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.inference.pool import each
 from ccmodel.mechanisms import Sensing, laws
+from ccmodel.mechanisms.contract import BEARING_TORQUE
 from ccmodel.mechanisms.law_forms import ADDED_BEND, CONSTANT_DRAG, DELAY, DRAG
 from ccmodel.mechanisms.learned import Law
 from ccmodel.model.parameters import mechanism_key
@@ -105,12 +106,13 @@ def _proposed(base: CandidateFit, law: Law, motions: Sequence[Sensing], nothing:
 def _unit_of(law: Law, base: CandidateFit, motions: Sequence[Sensing]) -> float:
     """Unit of the a priori sizes of a law's values.
 
-    It is 1 for a factor, the peak to peak of a channel for what is added to it, the mean bend of the conduits for an
-    added bend, mean Coulomb friction per length of conduit for a drag, `LAW_CABLES` times the compliance of a cable for
-    the compliance of an end, and `LAW_DELAY_S` for a delay.
+    It is 1 for a factor, the peak to peak of a channel for what is added to it, that of tau_out for the torque of the
+    load pulley's bearing, the mean bend of the conduits for an added bend, mean Coulomb friction per length of conduit
+    for a drag, `LAW_CABLES` times the compliance of a cable for that of an end, and `LAW_DELAY_S` for a delay.
     """
-    if law.channel is not None:
-        return float(np.ptp(np.concatenate([m.channels[law.channel] for m in motions])))
+    channel = law.channel or (TAU_OUT if law.slot == BEARING_TORQUE else None)
+    if channel is not None:
+        return float(np.ptp(np.concatenate([m.channels[channel] for m in motions])))
     if law.form.is_factor:
         return 1.0
     if law.form is DELAY:

@@ -216,7 +216,8 @@ def diagnose(
     mechanisms = single_mechanisms(options.without, tested.hypothesis, _recorded_by_all(recordings))
     forced = [stated_hypothesis(stated) for stated in options.forced_candidates]
     of_selection = within(progress, CALIBRATED, SELECTED)
-    known, limits = (f(recordings) if LOAD_SPRING in tested.free else {} for f in (load_values, largest_inertia))
+    has_spring = LOAD_SPRING in tested.free
+    known, limits = (load_values(recordings), largest_inertia(recordings)) if has_spring else ({}, {})
     selection = Selection(
         tested.free, mechanisms, forced, first_laws(), of_selection, known, limits, deadline, sets_until
     )

@@ -74,15 +74,15 @@ class Trial:
         return all(value <= limits.get(key, inf) for key, value in self.values.items())
 
     @property
-    def shape(self) -> tuple:
-        """What it has in common with trials of other strengths; unlike all others if it is not linear in them."""
+    def but_for_strength(self) -> tuple | None:
+        """What it has in common with trials of other strengths; None of a mechanism that is tried at many of them."""
         ((name, place),) = self.hypothesis.acting
         mechanism = registry.get(name)
-        is_linear = self.own is None and not any(p.screening_grid for p in mechanism.strengths)
-        strengths = mechanism.strengths if is_linear else ()
-        moved = tuple(p.name for p in strengths if self.values[mechanism_key(name, place, p.name)] != p.neutral)
-        others = [p for p in mechanism.parameters if p not in strengths]
-        return name, place, moved, *(self.values.get(mechanism_key(name, place, p.name)) for p in others)
+        if self.own is not None or any(p.screening_grid for p in mechanism.strengths):
+            return None
+        values = {p.name: self.values[mechanism_key(name, place, p.name)] for p in mechanism.parameters}
+        which = tuple(p.name for p in mechanism.strengths if values[p.name] != p.neutral)
+        return name, place, which, *(values[p.name] for p in mechanism.shapes)
 
     @property
     def has_one_sign(self) -> bool:
@@ -221,12 +221,13 @@ def _screening(
     residuals = residuals - absorbed @ (absorbed.T @ residuals)
     square = float(residuals @ residuals)
     usable, directions = [], []
-    # Shapes of which a strength changes more than there is; by the Cauchy-Schwarz inequality the best one is smaller.
-    strong = set()
+    # Where a strength changes more than there is, the best one of the mechanism by itself is smaller: Cauchy-Schwarz.
+    strong: set[tuple] = set()
     for trial in trials:
         if deadline.has_passed:
             break
-        if trial.shape in strong:
+        kind = trial.but_for_strength
+        if kind in strong:
             continue
         direction = _direction(base, trial)
         # The model cannot be run with the mechanism, or a recalibration absorbs it.
@@ -236,8 +237,8 @@ def _screening(
         if direction @ direction >= ABSORBED:
             usable.append(trial)
             directions.append(direction.astype(np.float32))
-        if direction @ direction > square:
-            strong.add(trial.shape)
+        if kind is not None and direction @ direction > square:
+            strong.add(kind)
     if not usable:
         return Screening([], np.empty((0, 0)), np.empty(0), square, hypotheses)
     D = np.stack(directions)

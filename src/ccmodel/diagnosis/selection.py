@@ -69,7 +69,7 @@ class Selection:
         """Select from all mechanisms; the comparison of what was fitted, and the screening scores."""
         text = f"calibrated model: leave-one-out mean square {base.mean_square:.2f} (1: noise); screening"
         self.progress(f"{text} {len(self.mechanisms)} mechanisms", 0.0)
-        screening = self.screened(base, self.mechanisms)
+        screening = self._screened(base, self.mechanisms)
         scores = screening.singles()
         nothing = Comparison.of(whitened, base, [], len(self.mechanisms))
         fewest = settings.FEWEST_FITTED if nothing.unlisted > 0.5 else 0
@@ -154,13 +154,13 @@ class Selection:
         self.progress(f"looking for what acts beside {best.hypothesis}", 0.0)
         acting = laws_in(best.hypothesis)
         others = [law for law in self.laws if not any(law.has_the_quantity_of(one) for one in acting)]
-        scores = [s for s in self.screened(best, self.mechanisms).singles() if s.gain > settings.WORTH_FITTING]
+        scores = [s for s in self._screened(best, self.mechanisms).singles() if s.gain > settings.WORTH_FITTING]
         second = proposals(best, others, self.deadline, self.progress)[: settings.PARTNERS]
         chosen = scores[: settings.PARTNERS] + [Score(p.hypothesis, 0.0, p.values) for p in second]
         pairs = self.fit_all(found.whitened, best, chosen)
         return self.relinearise(found.with_candidates([*found.candidates, *pairs])) if pairs else found
 
-    def screened(self, base: CandidateFit, mechanisms: Sequence[Hypothesis]) -> Screening:
+    def _screened(self, base: CandidateFit, mechanisms: Sequence[Hypothesis]) -> Screening:
         """Screening of mechanisms against a fitted model, until the deadline and within what recordings show."""
         return screen(base, mechanisms, self.deadline, self.limits)
 
@@ -233,7 +233,7 @@ class Selection:
         """A set with each of its best partners; sets that were seen are left out, and these are added to them."""
         self.progress(f"screening mechanisms beside {first.hypothesis}", 0.0)
         partners = [h for h in self.mechanisms if h.acting[0] not in first.hypothesis.acting]
-        scores = self.screened(first, partners).singles()
+        scores = self._screened(first, partners).singles()
         worth = [s for s in scores if s.gain > settings.WORTH_FITTING]
         chosen = unseen(worth, seen, settings.PARTNERS, first.hypothesis.acting)
         return self._part(PARTNERS_SCREENED, 1.0).fit_all(whitened, first, chosen)
@@ -278,15 +278,16 @@ class Selection:
         except ModelError as error:
             self.progress(f"the covariance stays as it is ({error})")
             return found
-        leading = contenders(found)
-        near = [c for c in leading if not found.is_far_behind(c)]
+        near, far = contenders(found)
         again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in near for s in starts(c)])
-        # Until the selection ends, all are fitted again.
-        if self.deadline.has_passed and self.goes_on:
-            return found
+        if self.deadline.has_passed:
+            # Until the selection ends, all are fitted again.
+            if self.goes_on:
+                return found
+            in_time = {c.hypothesis for c in again}
+            far = [*far, *(c for c in near if c.hypothesis not in in_time)]
         # No rival must be lost: without it, the others would be more probable.
-        in_time = {c.hypothesis for c in again}
-        again += self._evaluated([c for c in leading if c.hypothesis not in in_time], whitened)
+        again += self._evaluated(far, whitened)
         if not any(c.hypothesis == best.hypothesis for c in again):
             return found
         # About the same mechanisms once more: only if that leads on.
@@ -308,15 +309,14 @@ class Selection:
         return found
 
     def completed(self, found: Comparison) -> Comparison:
-        """The same with the contenders fitted to the end, so that rounding errors do not choose their values.
+        """The same with near contenders fitted to the end, so that rounding errors do not choose their values.
 
         Of a model that leaves nothing, quick searches find the minimum. If the deadline passes before all are fitted,
         all stay as they are: a longer search for some of them would tip the comparison.
         """
         if found.is_adequate:
             return found
-        near = [c for c in contenders(found) if not found.is_far_behind(c)]
-        scores = [Score(c.hypothesis, 0.0, c.values) for c in near]
+        scores = [Score(c.hypothesis, 0.0, c.values) for c in contenders(found)[0]]
         again = self.fit_all(found.whitened, found.base, scores, LAST_SEARCH)
         if self.deadline.has_passed:
             return found
@@ -324,20 +324,25 @@ class Selection:
         return found.with_candidates(list(every.values()))
 
 
-def contenders(found: Comparison) -> list[CandidateFit]:
-    """The candidates that are fitted again: the best one by evidence, its largest parts, and its rivals."""
+def contenders(found: Comparison) -> tuple[list[CandidateFit], list[CandidateFit]]:
+    """The candidates that stay: the best one by evidence, its largest parts, and its rivals.
+
+    The first ones are worth another fit; the other rivals are far behind.
+    """
     best = found.by_evidence[0]
     # Every rival of a complete candidate matters; of an incomplete one, only the leading ones lead on.
     most = len(found.candidates) if found.unlisted < 0.5 else settings.CONTENDERS
     highest = 1.0 + settings.HOPELESS * max(best.mean_square - 1.0, settings.NEAR_NOISE)
 
-    def is_worth(k: int, c: CandidateFit) -> bool:
+    near: list[CandidateFit] = []
+    far: list[CandidateFit] = []
+    for k, c in enumerate(found.by_evidence):
         is_part = is_part_of(c, best)
         # What the best one's last mechanism adds is judged by its largest parts.
         is_largest_part = is_part and c.hypothesis.size == best.hypothesis.size - 1
-        return is_largest_part or (c.mean_square <= highest and (k < most or is_part))
-
-    return [c for k, c in enumerate(found.by_evidence) if is_worth(k, c)]
+        if is_largest_part or (c.mean_square <= highest and (k < most or is_part)):
+            (near if c is best or is_part or not found.is_far_behind(c) else far).append(c)
+    return near, far
 
 
 def lowest(every: Sequence[CandidateFit]) -> list[CandidateFit]:

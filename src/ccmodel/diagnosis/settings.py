@@ -117,6 +117,8 @@ ALIKE_INERTIA = 0.1
 # that. Chosen; on 20 batches without a load with mass, which is plausible from 1e-5 kg m^2, these reach to 8e-6 at most
 # on 18, to 1e-5 on one with backlash at the load, and to 2e-4 on one more.
 INERTIA_REACH, INERTIA_RECORDINGS = 5.0, 5
+# Speed above which dry friction has its full torque in that regression, rad/s. Chosen: slower than any stroke.
+SLIDING_RAD_PER_S = 0.01
 # How far a fit may leave a parameter's plausible range, as a factor. Chosen: far enough to recognise that it would.
 BEYOND_RANGE = 3.0
 # Factor by which a strength may exceed its plausible range in an accepted model. Chosen: ranges are rough.
@@ -211,7 +213,8 @@ HOPELESS = 20.0
 # Excess mean square that counts as none in this comparison. Chosen.
 NEAR_NOISE = 0.2
 # Natural logarithm of the weight of the leading candidate over that of another one, above which the latter keeps its
-# values about the former. Chosen for time: three times less, as another covariance may make it, still excludes it.
+# values about the former. Chosen for time: it stays excluded if another covariance makes its mean square three times
+# lower.
 FAR_BEHIND = 100.0
 
 # --- Laws that no list holds

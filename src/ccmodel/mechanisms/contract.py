@@ -128,15 +128,17 @@ class Curve:
     argument : str
         As in the diagnosis format; in the unit that `ccmodel.mechanisms.learned` has.
     of : callable
-        ``of(x, values)``: the law at arguments of shape (n,): a factor of the friction coefficient, or what is added to
-        a torque or a reading. Up to what a calibration absorbs: a factor of the former, a constant of the latter.
+        ``of(x, values)``: the law at arguments of shape (n,), as the form of its slot states it
+        (`ccmodel.mechanisms.law_forms`). Of a centred form, up to what a calibration absorbs: a factor of a factor, a
+        constant of what is added.
     constants : tuple of Parameter
         Constants that are fitted to the learned law.
     channels : tuple of str
         Channels whose map it can be; empty for all.
     form : str
         What the law is where its slot has several forms, as a name of `ccmodel.mechanisms.law_forms`: "drag" for one
-        per length of conduit, N/m; "bend" for one that is added, rad; empty for a factor of friction.
+        per length of conduit, N/m; "bend" for one that is added, rad; "delay" for that of an end's channels, s; empty
+        for the usual form.
     """
 
     slot: str

@@ -1,6 +1,6 @@
 """How the values of a law that no list holds stand in the equations of its slot, and what they are a priori."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -78,15 +78,17 @@ CONTACT_ELEMENTS = Form(
     "friction over that of sliding, after a reversal", "1", neutral=1.0, is_centred=False, shortest_yield=0.002
 )
 ADDED = Form("added to {symbol}, in {unit}")
-# The zero of a load cell belongs to no calibration.
+# The zero of a load cell scatters between recordings by its accuracy; beyond that it belongs to no calibration.
 ADDED_TO_SUM = Form("added to {symbol}, in {unit}", is_centred=False)
 # A torque whose elements yield one after the other. A ball bearing's yield within a few hundredths of a millimetre.
 AGAINST_MOTION = Form("added to {symbol}, against the motion, in {unit}", is_centred=False, shortest_yield=0.002)
 
 
-# The same in the bearing of the load's pulley, whose torque no sensor reads.
-IN_BEARING = Form("torque in the bearing of the {side} pulley, in {unit}")
-AGAINST_ROTATION = replace(AGAINST_MOTION, meaning="torque in the bearing of the {side} pulley, against it, in {unit}")
+# The bearing of the load's pulley is between the cables and the torque sensor.
+IN_BEARING = Form("torque of the {side} pulley's bearing on the cables, in N m", "N m")
+ELEMENTS_IN_BEARING = Form(
+    "torque of the {side} pulley's bearing, against its motion, in N m", "N m", is_centred=False, shortest_yield=0.002
+)
 
 
 @cache

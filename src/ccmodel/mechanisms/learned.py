@@ -6,8 +6,8 @@ what the recordings visit, and constant beyond them:
 
     y(x) = scale sum_k B_jk z_k at knot j,    z_k ~ N(0, 1)
 
-B is the root of a squared exponential covariance without its mean, so that z = 0 is no effect, and a smooth law is more
-probable than a rugged one. What a law adds on average belongs to the parameters of the calibration.
+B is the root of a squared exponential covariance, so that z = 0 is no effect, and a smooth law is more probable than a
+rugged one. It has no mean where what a law adds on average belongs to the parameters of the calibration.
 
 Laws are mechanisms that `ccmodel.mechanisms.names` does not list. `ccmodel.diagnosis.laws` learns them.
 """
@@ -70,11 +70,11 @@ from ccmodel.mechanisms.law_forms import (
     ADDED_BEND,
     ADDED_TO_SUM,
     AGAINST_MOTION,
-    AGAINST_ROTATION,
     CONSTANT_DRAG,
     CONTACT_ELEMENTS,
     DELAY,
     DRAG,
+    ELEMENTS_IN_BEARING,
     END_COMPLIANCE,
     FRICTION_FACTOR,
     IN_BEARING,
@@ -108,7 +108,8 @@ class Law:
     argument : Argument
     form : Form
     channel : str or None
-        The channel that a torque or a reading is added to; None of a factor, a drag, a compliance or a delay.
+        The channel that a torque or a reading is added to; None of a factor, a drag, a compliance, a delay, or a torque
+        that no sensor reads.
     opposes : str or None
         The angle whose motion a torque of elements opposes: each of its knots is the travel at which an element yields,
         and its value there is the torque of that element. Elements without it stand at every contact and oppose its
@@ -302,7 +303,7 @@ class Law:
         def of(arguments: NDArray, values: Mapping[str, float]) -> NDArray:
             return self.form.neutral + values[strength.name] * np.interp(arguments, x, self.shown(x) @ y)
 
-        channels = (str(self.channel),) if self.slot == SENSOR_MAP else ()
+        channels = (self.channel,) if self.slot == SENSOR_MAP and self.channel else ()
         return Curve(self.slot, self.argument.name, of, (strength,), channels, self.form.name)
 
 
@@ -387,16 +388,20 @@ def _laws() -> Iterator[Law]:
         yield Law(slot, place, motion["angle"], ADDED, channel)
         yield Law(slot, place, motion["speed"], ADDED, channel)
         yield Law(slot, place, motion["since"], AGAINST_MOTION, channel, opposes=angle)
-    yield Law(BEARING_TORQUE, "load-pulley", load["speed"], IN_BEARING, TAU_OUT)
-    yield Law(BEARING_TORQUE, "load-pulley", load["since"], AGAINST_ROTATION, TAU_OUT, opposes=THETA_OUT)
+    yield Law(BEARING_TORQUE, "load-pulley", load["speed"], IN_BEARING)
+    yield Law(BEARING_TORQUE, "load-pulley", load["since"], ELEMENTS_IN_BEARING, opposes=THETA_OUT)
     for channel in (TAU_IN, TAU_OUT, F_DRIVE, F_LOAD, THETA_OUT):
         reading = Argument("reading", unit_of(channel), f"the reading of {symbol_of(channel)}", reading_of(channel))
         place = next(p for p in PLACES_OF[channel] if p.endswith("-sensor"))
         # A map of tau_in by its angle is a torque of the drive pulley, and theta_out is an angle itself.
-        of_pulley = {F_DRIVE: [drive["angle"]], F_LOAD: [load["angle"]], TAU_OUT: [load["angle"]]}.get(channel, [])
-        of_torque = {F_DRIVE: [torque_at("drive")], F_LOAD: [torque_at("load")]}.get(channel, [])
-        for argument in (reading, TIME, rate_of(channel), *of_pulley, *of_torque):
-            yield Law(SENSOR_MAP, place, argument, ADDED_TO_SUM if channel in (F_DRIVE, F_LOAD) else ADDED, channel)
+        others = {
+            F_DRIVE: [drive["angle"], torque_at("drive")],
+            F_LOAD: [load["angle"], torque_at("load")],
+            TAU_OUT: [load["angle"]],
+        }
+        form = ADDED_TO_SUM if channel in (F_DRIVE, F_LOAD) else ADDED
+        for argument in (reading, TIME, rate_of(channel), *others.get(channel, [])):
+            yield Law(SENSOR_MAP, place, argument, form, channel)
     for place in ("drive-sensor", "load-sensor"):
         yield Law(SENSOR_MAP, place, TIME, DELAY)
 

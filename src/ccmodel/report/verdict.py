@@ -6,6 +6,7 @@ from math import floor, log10
 
 from ccmodel import mechanisms as registry
 from ccmodel.channels import TABLE, symbol_of
+from ccmodel.diagnosis.formula import CONSTANT
 from ccmodel.diagnosis.settings import DECIDED, WITHIN_BAND
 from ccmodel.mechanisms.contract import (
     BEARING_TORQUE,
@@ -136,9 +137,10 @@ def law_claim(law: Mapping) -> str:
     what = f"The error of {symbol_of(law['channel'])}" if is_of_one else IN_SLOT[law["slot"]]
     what = what.format(side=side(law["place"]))
     others = f" (or on {' or '.join(law['indistinguishable'])})" if law["indistinguishable"] else ""
+    says = "is constant" if law.get("formula") == CONSTANT else f"depends on {law['argument_is']}{others}"
     return (
-        f"{what} depends on {law['argument_is']}{others}, confidence {law['confidence']:.2f}. {_resemblance(law)}; the"
-        " law was learned from the recordings."
+        f"{what} {says}, confidence {law['confidence']:.2f}. {_resemblance(law)}; the law was learned from the"
+        " recordings."
     )
 
 

@@ -76,10 +76,7 @@ def _warming(size: float, also: Mapping[str, float], place: str, spring: float) 
 
 TWINS = (
     replace(_twin("load-cell-scale", "load_cell_gain", "gain", (0.005, 0.1), "1", _scale), law=_map(_scale, "reading")),
-    replace(
-        _twin("load-cell-offset", "load_cell_offset_N", "offset", (0.1, 3.0), "N", _offset),
-        law=lambda rig, place: TrueLaw("sensor-map", "reading"),
-    ),
+    _twin("load-cell-offset", "load_cell_offset_N", "offset", (0.1, 3.0), "N", _offset),
     replace(
         _twin("load-cell-drift", "load_cell_drift_N_per_s", "rate", (0.005, 0.2), "N/s", _drift),
         fields={"sensors": {"load_cell_drift_N_per_s": (float, 0.0), "load_cell_warm_up_s": (NonNegative, 0.0)}},

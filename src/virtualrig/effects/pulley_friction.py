@@ -45,8 +45,7 @@ def _law(rig: Any, place: str) -> TrueLaw:
     """The torque that builds up from rest, by the travel of the pulley's rim; at the cables' tensions at rest."""
     given, angle = getattr(rig.effects, group_of(place)).friction, along((0.0, ANGLES_RAD[1]))
     torque = given.torque_Nm * -np.expm1(-angle / given.presliding_rad)
-    slot = "bearing-torque" if place == "drive-pulley" else "load"
-    return TrueLaw(slot, "distance-since-reversal", rig.pulley_radius_m * angle, torque)
+    return TrueLaw("bearing-torque", "distance-since-reversal", rig.pulley_radius_m * angle, torque)
 
 
 TWIN = Twin(

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from virtualrig.effects.contract import Seeded, Side, TrueLaw, Twin, group_of
+from virtualrig.effects.contract import Seeded, Side, Twin, group_of
 from virtualrig.strict import NonNegative
 
 
@@ -33,5 +33,4 @@ TWIN = Twin(
     seed=lambda size, also, place, spring: ({group_of(place): {"delay_s": size}}, {"delay": size}),
     other_laws={"filter": _filtered},
     read=_read,
-    law=lambda rig, place: TrueLaw("sensor-map", "time"),
 )

@@ -1,6 +1,6 @@
 """Set up the march over the samples, run it, and pass its outputs through the sensors."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -29,8 +29,8 @@ from ccmodel.model.sensors import read_by_sensors
 from ccmodel.model.transmission import Transmission
 
 ELEMENTS = 32
-# Further passes of the march for laws of the load: each leaves the share of the error that the law's stiffness is of
-# that of the cables.
+# Further passes of the march for laws of the load and its bearing: each leaves the share of the error that the law's
+# stiffness is of that of the cables.
 LOAD_LAW_PASSES = 3
 # The run that only gives the mean torsion of a drive train has cells of so many times the length.
 COARSER = 4
@@ -140,15 +140,24 @@ def simulate(
     # A law of the load or its bearing takes the load's motion from the pass before. A held or driven load has no law.
     has_law = bool(settings.load_laws or settings.load_bearing_laws) and not isinstance(load, AngleLoad | FixedLoad)
     for _ in range(LOAD_LAW_PASSES if has_law and solved == time_s.size else 0):
-        motion = Sensing(time_s, {THETA_OUT: out[4]}, transmission.drive_radius_m, transmission.load_radius_m)
         of_load, in_bearing = (
-            np.sum([law(motion) for law in laws], axis=0) for laws in (settings.load_laws, settings.load_bearing_laws)
+            _added(laws, transmission, time_s, out[4]) for laws in (settings.load_laws, settings.load_bearing_laws)
         )
         solved, out = _marched(*pair, elements, steps, series + of_load + in_bearing, motor)
         out[5] -= in_bearing  # the torque is measured on the load's side of the bearing
         if solved < time_s.size:
             break
+    if isinstance(load, AngleLoad):
+        out[5] -= _added(settings.load_bearing_laws, transmission, time_s, out[4])
     return _response(transmission, active, time_s[:solved], theta_in[:solved], out)
+
+
+def _added(
+    laws: Sequence[Callable], transmission: Transmission, time_s: NDArray, theta_out: NDArray
+) -> NDArray | float:
+    """Torque of laws that take the load's motion, shape (n,); 0 without a law."""
+    motion = Sensing(time_s, {THETA_OUT: theta_out}, transmission.drive_radius_m, transmission.load_radius_m)
+    return sum(law(motion) for law in laws)
 
 
 def _zeroed(motor: Motor, settings: Settings, solved: int, out: NDArray) -> Motor:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from pydantic import Field
 
+from ccmodel import mechanisms as registry
 from ccmodel.report.page.cards import after_is
 from ccmodel.report.verdict import (
     INPUTS_INCONSISTENT,
@@ -126,8 +127,14 @@ def _besides(rig: Rig, diagnosis: Mapping) -> str:
 
 
 def _is_law_of(law: Mapping, effect: Effect) -> bool:
-    """Whether a law stands at the place of an effect, and is the one of its mechanism, or of none if it has none."""
-    return recognised_as(law) == effect.name and effect.place in (law["place"], None)
+    """Whether a law stands at the place of an effect, and is the one of its mechanism, or of none if it has none.
+
+    A mechanism that acts at one place only, as cables that differ, has its law wherever that stands.
+    """
+    if recognised_as(law) != effect.name:
+        return False
+    is_at_one_place = effect.name is not None and len(registry.get(effect.name).places) == 1
+    return is_at_one_place or effect.place in (law["place"], None)
 
 
 def _in_words(law: Mapping) -> str:
