@@ -1,6 +1,6 @@
 """How the values of a law that no list holds stand in the equations of its slot, and what they are a priori."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -82,12 +82,14 @@ ADDED = Form("added to {symbol}, in {unit}")
 ADDED_TO_SUM = Form("added to {symbol}, in {unit}", is_centred=False)
 # A torque whose elements yield one after the other. A ball bearing's yield within a few hundredths of a millimetre.
 AGAINST_MOTION = Form("added to {symbol}, against the motion, in {unit}", is_centred=False, shortest_yield=0.002)
+# At the load they stand in the equations of motion: passes of the march would not converge with stiffer ones.
+AGAINST_LOAD = replace(AGAINST_MOTION, shortest_yield=0.01)
 
 
 # The bearing of the load's pulley is between the cables and the torque sensor.
 IN_BEARING = Form("torque of the {side} pulley's bearing on the cables, in N m", "N m")
-ELEMENTS_IN_BEARING = Form(
-    "torque of the {side} pulley's bearing, against its motion, in N m", "N m", is_centred=False, shortest_yield=0.002
+ELEMENTS_IN_BEARING = replace(
+    AGAINST_LOAD, meaning="torque of the {side} pulley's bearing, against its motion, in N m", unit="N m"
 )
 
 

@@ -69,6 +69,7 @@ from ccmodel.mechanisms.law_forms import (
     ADDED,
     ADDED_BEND,
     ADDED_TO_SUM,
+    AGAINST_LOAD,
     AGAINST_MOTION,
     CONSTANT_DRAG,
     CONTACT_ELEMENTS,
@@ -381,13 +382,13 @@ def _laws() -> Iterator[Law]:
         yield Law(CABLE_STRETCH, "cable", argument, STRETCH_FACTOR)
     for end in ("drive-end", "load-end"):
         yield Law(END_STRETCH, end, TENSION, END_COMPLIANCE, resolution=SMOOTH)
-    for slot, place, channel, motion, angle in (
-        (BEARING_TORQUE, "drive-pulley", TAU_IN, drive, THETA_IN),
-        (LOAD, "load", TAU_OUT, load, THETA_OUT),
+    for slot, place, channel, motion, angle, elements in (
+        (BEARING_TORQUE, "drive-pulley", TAU_IN, drive, THETA_IN, AGAINST_MOTION),
+        (LOAD, "load", TAU_OUT, load, THETA_OUT, AGAINST_LOAD),
     ):
         yield Law(slot, place, motion["angle"], ADDED, channel)
         yield Law(slot, place, motion["speed"], ADDED, channel)
-        yield Law(slot, place, motion["since"], AGAINST_MOTION, channel, opposes=angle)
+        yield Law(slot, place, motion["since"], elements, channel, opposes=angle)
     yield Law(BEARING_TORQUE, "load-pulley", load["speed"], IN_BEARING)
     yield Law(BEARING_TORQUE, "load-pulley", load["since"], ELEMENTS_IN_BEARING, opposes=THETA_OUT)
     for channel in (TAU_IN, TAU_OUT, F_DRIVE, F_LOAD, THETA_OUT):
