@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from ccmodel import mechanisms
-from ccmodel.diagnosis.listed_laws import Learned, distance, nearest_listed
+from ccmodel.diagnosis.listed_laws import Learned, _is_comparable, distance, nearest_listed
 from ccmodel.diagnosis.settings import WITHIN_BAND
 from ccmodel.mechanisms import laws
+from ccmodel.mechanisms.contract import Parameter
 from ccmodel.mechanisms.learned import FINE
 from ccmodel.report.verdict import law_claim
 
@@ -149,8 +150,9 @@ def test_a_map_is_compared_with_faults_of_its_own_sensor():
     assert nearest_listed(learned(laws()["learned-sensor-map-theta-out-by-reading"], lambda x: 0.05 * x)) is None
 
 
-def said(**nearest):
+def said(formula="a + b x", **nearest):
     law = {
+        "formula": formula,
         "slot": "sliding-friction",
         "place": "conduit",
         "argument_is": "the speed",
@@ -166,3 +168,19 @@ def test_the_report_says_whether_it_is_a_listed_law():
     assert "Within its uncertainty this is the law of stribeck" in said(name="stribeck", distance=0.9)
     assert "No listed mechanism does this (the nearest is stribeck, 7.4 standard" in said(name="stribeck", distance=7.4)
     assert "No listed mechanism does this; the law" in said()
+
+
+def test_the_report_says_where_a_law_is_a_constant():
+    assert "Friction along the conduits is constant, confidence 0.90" in said("a", name="stribeck", distance=0.9)
+
+
+def test_a_delay_is_said_of_its_end_and_compared_with_a_late_clock():
+    law = laws()["learned-sensor-map-load-delay-by-time"]
+    found = learned(law, lambda t: np.full(t.shape, 0.012), sd=0.01)
+    assert nearest_listed(found)["name"] == "time-skew"
+    x, _ = law.at_knots(found.values)
+    kept = law.curve(x, np.full(x.size, 0.012), Parameter("strength", "1", 0.1, 3.0, 1.0, "size"))
+    assert distance(found, kept) < WITHIN_BAND and _is_comparable(law, kept)
+    stated = {"slot": law.slot, "place": law.place, "channel": None, "argument_is": "the time", "confidence": 0.9}
+    text = law_claim(stated | {"indistinguishable": [], "nearest_listed": None})
+    assert text.startswith("The delay of the load's channels depends on the time")

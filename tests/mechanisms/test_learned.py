@@ -12,7 +12,7 @@ from ccmodel.mechanisms.law_forms import DRAG, basis
 from ccmodel.mechanisms.learned import COARSE, FINE
 from ccmodel.mechanisms.presliding import Contacts
 from ccmodel.mechanisms.tables import Table, pulled, stretched
-from ccmodel.model.load import FixedLoad, SpringLoad
+from ccmodel.model.load import AngleLoad, FixedLoad, SpringLoad, TorqueLoad
 from tests.general_runs import HALF_LOOP, K_E, MU, K, L, loop_area, run, sine
 
 EVERY = list(laws().values())
@@ -114,6 +114,39 @@ def test_elements_of_a_bearing_that_yield_soon_are_its_friction(place, angle):
     for channel in found.read:
         effect = np.std(run(sine()).read[channel] - wanted.read[channel])
         assert np.std(found.read[channel] - wanted.read[channel]) < 0.3 * effect + 1e-9, channel
+
+
+def in_bearing(torque, argument="speed"):
+    """A torque of so many N m by rad/s in the bearing of the load's pulley."""
+    law = laws()[f"learned-bearing-torque-load-by-{argument}"]
+    return with_values(law, lambda x: torque * x, scale=torque)
+
+
+def test_the_bearing_of_a_load_without_a_spring_has_its_torque_between_cables_and_sensor():
+    """On the motion of a sprung load a driven pulley has the same tensions with and without it; the sensor has less."""
+    sprung = run(sine())
+    driven, with_law = (run(sine(), some, load=AngleLoad(sprung.theta_out_rad)) for some in ((), in_bearing(2e-3)))
+    np.testing.assert_array_equal(with_law.T2_N, driven.T2_N)
+    speed = np.gradient(sprung.theta_out_rad, 1 / 500)
+    np.testing.assert_allclose(driven.tau_out_Nm - with_law.tau_out_Nm, 2e-3 * speed.clip(-1, 1), atol=2e-4)
+    torque = TorqueLoad(sprung.tau_out_Nm)
+    np.testing.assert_allclose(run(sine(), in_bearing(2e-3), load=torque).tau_out_Nm, sprung.tau_out_Nm, atol=1e-9)
+
+
+@pytest.mark.parametrize("channel", ["theta-out", "tau-in", "tau-out", "F-drive", "F-load"])
+def test_where_no_time_passes_no_reading_has_a_rate(channel):
+    law = laws()[f"learned-sensor-map-{channel}-by-rate"]
+    for time_s in (np.zeros(1), np.zeros(2)):
+        sensing = Sensing(time_s, {str(law.channel): np.full(time_s.size, 3.0)}, 0.006, 0.006)
+        np.testing.assert_array_equal(law.argument.of(sensing), 0.0)
+
+
+def test_a_single_cable_has_no_law_by_cable():
+    law = laws()["learned-sliding-friction-by-cable"]
+    of_both = {name: np.ones(4) for name in ("T1_N", "T2_N", "T3_N", "T4_N")}
+    of_A = {name: of_both[name] for name in ("T1_N", "T2_N")}
+    visited = [np.unique(law.argument.of(Sensing(np.arange(4.0), c, 0.006, 0.006))) for c in (of_both, of_A)]
+    assert [v.tolist() for v in visited] == [[-1.0, 1.0], [-1.0]]
 
 
 @pytest.mark.parametrize("place", ["drive-sensor", "load-sensor"])

@@ -75,6 +75,16 @@ def test_a_law_is_said_of_the_effect_that_it_is(concealed, effects, distance, sa
     assert table["besides"] == [besides]
 
 
+def test_the_law_of_a_mechanism_with_one_place_is_its_own_wherever_it_stands(concealed):
+    """Friction by cable stands at the conduits; the mechanism of cables that differ at the cable."""
+    law = {"slot": "sliding-friction", "place": "conduit", "arguments": ["cable"]}
+    law |= {"nearest_listed": {"name": "cable-asymmetry", "distance": 0.1}}
+    rig = [{"name": "cable-asymmetry", "place": "cable", "text": "a rough cable"}]
+    (table,) = beside(concealed(rig), [diagnosis("b", "learned", mechanisms=[], laws=[law])])
+    assert table["effects"][0]["said"] == ["learned: sliding-friction by cable"]
+    assert table["besides"] == ["–"]
+
+
 def test_what_was_identified_and_is_not_there_is_said(concealed):
     (table,) = beside(concealed(EFFECTS[1:]), [diagnosis("b", "explained", mechanisms=[BACKLASH, SCALE])])
     assert table["besides"] == ["backlash"]
