@@ -53,8 +53,7 @@ def largest_inertia(recordings: Sequence[Recording]) -> dict[str, float]:
 
     It is the sum of the regression's value, if that is positive, `INERTIA_REACH` standard deviations, by the jackknife
     over recordings, and the smallest plausible inertia: an encoder's steps are an error that recordings of the same
-    motion have in common.
-    Empty if fewer than `INERTIA_RECORDINGS` recordings have both channels.
+    motion have in common. Empty if fewer than `INERTIA_RECORDINGS` recordings have both channels.
     """
     equations = _equations_of(recordings)
     n = len(equations)

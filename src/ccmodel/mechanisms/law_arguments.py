@@ -81,7 +81,7 @@ def _contact_age(time_s: NDArray, theta: NDArray, renewal: float) -> NDArray:
     return age
 
 
-def _rate_of(channel: str) -> Callable[[Sensing], NDArray]:
+def _derivative_of(channel: str) -> Callable[[Sensing], NDArray]:
     """Rate of a channel; where no time passes nothing changes."""
 
     def of(s: Sensing) -> NDArray:
@@ -113,7 +113,7 @@ def reading_of(channel: str) -> Callable[[Sensing], NDArray]:
 
 def rate_of(channel: str) -> Argument:
     """The rate of a channel's reading, on which a sensor that follows slowly depends."""
-    return Argument("rate", f"{unit_of(channel)}/s", f"the rate of {symbol_of(channel)}", _rate_of(channel))
+    return Argument("rate", f"{unit_of(channel)}/s", f"the rate of {symbol_of(channel)}", _derivative_of(channel))
 
 
 def torque_at(end: str) -> Argument:
@@ -127,7 +127,7 @@ def torque_at(end: str) -> Argument:
 
 
 def _log_speed(s: Sensing) -> NDArray:
-    return np.log10(np.maximum(s.drive_radius_m * np.abs(_rate_of(THETA_IN)(s)), SLOWEST_M_PER_S))
+    return np.log10(np.maximum(s.drive_radius_m * np.abs(_derivative_of(THETA_IN)(s)), SLOWEST_M_PER_S))
 
 
 def _tensions(s: Sensing) -> NDArray:
@@ -161,7 +161,7 @@ SPEED = Argument(
     "speed",
     "m/s",
     "the speed at which the cable slides",
-    lambda s: s.drive_radius_m * np.abs(_rate_of(THETA_IN)(s)),
+    lambda s: s.drive_radius_m * np.abs(_derivative_of(THETA_IN)(s)),
 )
 
 
@@ -169,7 +169,7 @@ def of_motion(angle: str, end: str) -> dict[str, Argument]:
     """Arguments of the motion of one pulley."""
     return {
         "angle": Argument(f"{end}-angle", "rad", f"the {end} pulley's angle", reading_of(angle)),
-        "speed": Argument("speed", "rad/s", f"the {end} pulley's velocity", _rate_of(angle)),
+        "speed": Argument("speed", "rad/s", f"the {end} pulley's velocity", _derivative_of(angle)),
         "since": Argument(
             "distance-since-reversal",
             "m",

@@ -84,8 +84,6 @@ ADDED_TO_SUM = Form("added to {symbol}, in {unit}", is_centred=False)
 AGAINST_MOTION = Form("added to {symbol}, against the motion, in {unit}", is_centred=False, shortest_yield=0.002)
 # At the load they stand in the equations of motion: passes of the march would not converge with stiffer ones.
 AGAINST_LOAD = replace(AGAINST_MOTION, shortest_yield=0.01)
-
-
 # The bearing of the load's pulley is between the cables and the torque sensor.
 IN_BEARING = Form("torque of the {side} pulley's bearing on the cables, in N m", "N m")
 ELEMENTS_IN_BEARING = replace(
