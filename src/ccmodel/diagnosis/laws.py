@@ -21,8 +21,7 @@ from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.inference.pool import each
 from ccmodel.mechanisms import Sensing, laws
-from ccmodel.mechanisms.contract import BEARING_TORQUE
-from ccmodel.mechanisms.law_forms import ADDED_BEND, CONSTANT_DRAG, DELAY, DRAG
+from ccmodel.mechanisms.law_forms import ADDED_BEND, CONSTANT_DRAG, DELAY, DRAG, ELEMENTS_IN_BEARING, IN_BEARING
 from ccmodel.mechanisms.learned import Law
 from ccmodel.model.parameters import mechanism_key
 from ccmodel.model.run import simulate
@@ -110,7 +109,7 @@ def _unit_of(law: Law, base: CandidateFit, motions: Sequence[Sensing]) -> float:
     load pulley's bearing, the mean bend of the conduits for an added bend, mean Coulomb friction per length of conduit
     for a drag, `LAW_CABLES` times the compliance of a cable for that of an end, and `LAW_DELAY_S` for a delay.
     """
-    channel = law.channel or (TAU_OUT if law.slot == BEARING_TORQUE else None)
+    channel = law.channel or (TAU_OUT if law.form in (IN_BEARING, ELEMENTS_IN_BEARING) else None)
     if channel is not None:
         return float(np.ptp(np.concatenate([m.channels[channel] for m in motions])))
     if law.form.is_factor:

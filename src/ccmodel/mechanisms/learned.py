@@ -48,6 +48,7 @@ from ccmodel.mechanisms.contract import (
     Settings,
     side,
 )
+from ccmodel.mechanisms.delayed import late
 from ccmodel.mechanisms.law_arguments import (
     CABLE,
     DIRECTION,
@@ -85,7 +86,6 @@ from ccmodel.mechanisms.law_forms import (
     basis,
 )
 from ccmodel.mechanisms.tables import Table
-from ccmodel.mechanisms.time_skew import late
 
 # Knots of a law, and the length over which its values are correlated a priori, as a share of its range: at first, and
 # where the recordings show more. The fastening of a cable is smooth at first: with more coefficients its law would be

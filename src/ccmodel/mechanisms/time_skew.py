@@ -18,17 +18,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.channels import F_LOAD, TAU_OUT, THETA_OUT
-from ccmodel.mechanisms.contract import SENSOR_MAP, Curve, Mechanism, Parameter, Sensing, side
-
-_LOAD_CHANNELS = (THETA_OUT, TAU_OUT, F_LOAD)
-
-
-def late(sensing: Sensing, place: str, delay_s: float | NDArray) -> dict[str, NDArray]:
-    """The channels that change where a side's readings are late by `delay_s`, the same for all samples or for each."""
-    t = sensing.time_s
-    read_at = t - delay_s if side(place) == "load" else t + delay_s
-    return {name: np.interp(read_at, t, sensing.channels[name]) for name in _LOAD_CHANNELS}
+from ccmodel.mechanisms.contract import SENSOR_MAP, Curve, Mechanism, Parameter, Sensing
+from ccmodel.mechanisms.delayed import late
 
 
 def _modifies_observation(sensing: Sensing, place: str, values: Mapping[str, float]) -> dict[str, NDArray]:
