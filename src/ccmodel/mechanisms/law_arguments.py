@@ -31,8 +31,8 @@ class Argument:
     of : callable
         ``of(sensing)``: its values, shape (n,); of one that differs along the cables, those at several places, shape
         (places, n).
-    has_two_values : bool
-        Whether it is -1 or 1.
+    two_values : tuple of str
+        What -1 and 1 stand for, of one that has no other values; else empty.
     symbol : str
         As it stands in a formula.
     """
@@ -41,8 +41,13 @@ class Argument:
     unit: str
     meaning: str
     of: Callable[[Sensing], NDArray]
-    has_two_values: bool = False
+    two_values: tuple[str, ...] = ()
     symbol: str = "x"
+
+    @property
+    def has_two_values(self) -> bool:
+        """Whether it is -1 or 1."""
+        return bool(self.two_values)
 
     @property
     def depends_on_time(self) -> bool:
@@ -146,8 +151,15 @@ POSITION = Argument(
     "the position along the conduit, from the drive, over its length",
     lambda s: np.repeat([[0.0], [1.0]], s.time_s.size, axis=1),
 )
-DIRECTION = Argument("direction", "1", "the direction in which the cable slides", _direction, True, "sign(v)")
-CABLE = Argument("cable", "1", "the cable (-1: A, 1: B)", _cables, True)
+DIRECTION = Argument(
+    "direction",
+    "1",
+    "the direction in which the cable slides",
+    _direction,
+    ("away from the drive", "towards the drive"),
+    "sign(v)",
+)
+CABLE = Argument("cable", "1", "the cable", _cables, ("A", "B"))
 TIME = Argument("time", "s", "the time since the recording's start", lambda s: s.time_s - s.time_s[0])
 TRAVEL = Argument("travel", "m", "the drive's travel since the recording's start", lambda s: s.drive_travel_m)
 LOG_SPEED = Argument("speed", "log10(m/s)", "the logarithm of the cables' speed at the drive", _log_speed)

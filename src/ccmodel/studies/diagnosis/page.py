@@ -288,13 +288,15 @@ def _law(law: Mapping, found: Diagnosis) -> Figure:
     if learned.argument.has_two_values:
         ax.errorbar(x, y, [y - low, high - y], fmt="o", color=COLOURS[1], capsize=4, label="learned law, 90 % interval")
         ax.set_xlim(x[0] - 0.5, x[1] + 0.5)
+        ax.set_xticks(x, learned.argument.two_values)
     else:
         ax.fill_between(x, low, high, color=COLOURS[1], alpha=0.25, lw=0, label="90 % band")
         ax.plot(x, y, color=COLOURS[1], lw=1.4, label="learned law")
     ax.axhline(learned.form.neutral, color=FAINT, lw=1.0, ls="--", label="calibrated model")
     if learned.is_spaced_by_ratio:
         ax.set_xscale("log")
-    ax.set_xlabel(f"{law['argument_is']} ({law['argument_unit']})")
+    unit = "" if learned.argument.has_two_values else f" ({law['argument_unit']})"
+    ax.set_xlabel(f"{law['argument_is']}{unit}")
     ax.set_ylabel(fill(law["curve_is"], LABEL_LETTERS))
     legend_below(figure, axes)
     stamp_figure(figure, _stamp(found))
