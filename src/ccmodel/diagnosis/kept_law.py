@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from textwrap import fill
 
 from ccmodel import mechanisms as registry
+from ccmodel.channels import short_name
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.laws import values_of
 from ccmodel.mechanisms.contract import BEARING_TORQUE, CABLE_STRETCH, END_STRETCH, LOAD, SENSOR_MAP, SLIDING_FRICTION
@@ -76,7 +77,7 @@ def mechanism_file(name: str, stated: Mapping, candidate: CandidateFit, batch: s
 def _title(stated: Mapping) -> str:
     slot, argument = stated["slot"].replace("-", " "), stated["arguments"][0].replace("-", " ")
     is_of_one = stated["slot"] == SENSOR_MAP and stated["channel"] is not None
-    of = f" of {stated['channel'].rsplit('_', 1)[0]}" if is_of_one else ""
+    of = f" of {short_name(stated['channel'])}" if is_of_one else ""
     return f"A law of the {slot}{of} by the {argument}."
 
 
