@@ -70,6 +70,12 @@ def test_friction_by_cable_has_one_constant():
     assert a["value"] == pytest.approx(0.1)
 
 
+def test_a_mass_has_one_constant():
+    found, (a,) = formula_of(2e-4 * X, sd=1e-6, law=laws()["learned-load-by-acceleration"])
+    assert (found, a["unit"]) == ("a x", "N*m/(rad/s^2)")
+    assert a["low"] < 2e-4 < a["high"]
+
+
 def test_friction_by_direction_has_one_constant():
     x, y = np.array([-1.0, 1.0]), np.array([0.88, 1.12])
     found, (a,) = formula_of(y, law=DIRECTION, x=x)

@@ -198,6 +198,19 @@ def test_a_drag_is_proposed_where_it_acts(place):
     assert scale * law.basis @ list(proposal.values.values()) == pytest.approx(wanted, abs=0.35)
 
 
+def test_a_mass_is_proposed_about_the_one_that_a_regression_shows():
+    """About no mass, the first order says nothing of a load that rings."""
+    law, J = laws()["learned-load-by-acceleration"], 2e-4
+    truth = replace(PARAMETERS, mechanisms=(Active("load-inertia", "load", {"J": J, "zeta": 0.05}),))
+    base = calibrated(batch(truth=truth))
+    key = mechanism_key("load-inertia", "load", "J")
+    (about_none,), (proposal,) = (proposals(base, [law], UNLIMITED, known=k) for k in ({}, {key: 0.97 * J}))
+    assert proposal.evidence > about_none.evidence + 100
+    fixed = {name.rsplit("/", 1)[1]: value for name, value in proposal.hypothesis.fixed}
+    x, torque = law.at_knots(fixed | {"z1": next(iter(proposal.values.values()))})
+    assert torque[-1] / x[-1] == pytest.approx(J, rel=0.03)
+
+
 def test_a_law_of_a_quantity_that_does_not_vary_is_left_out_with_a_message():
     law = laws()["learned-sliding-friction-by-time"]
     constant = replace(law, argument=replace(law.argument, of=lambda motion: np.ones_like(motion.time_s)))

@@ -254,6 +254,40 @@ def test_cables_of_a_learned_compliance_are_those_that_settle():
     assert largest_difference(found, wanted) < 0.1 * largest_difference(run(sine()), wanted)
 
 
+@pytest.mark.parametrize(
+    ("end", "name"),
+    [("drive", "learned-pulley-radius-by-drive-angle-fine"), ("load", "learned-pulley-radius-load-by-load-angle-fine")],
+)
+def test_a_radius_by_angle_is_that_of_an_eccentric_pulley(end, name):
+    law = laws()[name]
+    eccentric = ("pulley-eccentricity", f"{end}-pulley", {"e": 0.06, "psi": 0.7})
+    found = run(sine(), with_values(law, lambda theta: 0.06 * np.sin(theta + 0.7)))
+    wanted = run(sine(), eccentric)
+    assert largest_difference(found, wanted) < 0.01 * largest_difference(run(sine()), wanted)
+
+
+def test_a_radius_by_angle_keeps_the_work_of_its_torque():
+    """Without friction, the drive's work over a cycle is none."""
+    law = laws()["learned-pulley-radius-by-drive-angle"]
+    theta_in = sine(cycles=3)
+    response = run(theta_in, with_values(law, lambda theta: 0.2 * np.cos(3 * theta)), mu=0.0)
+    cycle = slice(500, 1501)
+    work = np.trapezoid(response.tau_in_Nm[cycle], theta_in[cycle])
+    taken = np.abs(np.diff(theta_in[cycle]) * response.tau_in_Nm[cycle][1:]).sum()
+    assert abs(work) < 2e-3 * taken
+
+
+def test_a_torque_by_acceleration_is_a_mass():
+    law = laws()["learned-load-by-acceleration"]
+    J, values = 2e-4, values_of(law) | {"first": -300.0, "last": 300.0, "scale": 1.0}
+    found = run(sine(), (law.name, law.place, values | {"z1": 300.0 * J / law.basis[-1, 0]}))
+    wanted = run(sine(), ("load-inertia", "load", {"J": J, "zeta": 0.0}))
+    assert largest_difference(found, wanted) < 1e-9
+    assert largest_difference(run(sine()), wanted) > 0.01
+    negative = run(sine(), (law.name, law.place, values | {"z1": -1.0}))
+    assert largest_difference(negative, run(sine())) == 0.0, "no mass is negative"
+
+
 @pytest.mark.parametrize("end", ["drive", "load"])
 def test_a_fastening_of_constant_compliance_is_the_listed_one(end):
     law = laws()[f"learned-end-stretch-{end}-by-tension"]

@@ -51,6 +51,9 @@ def _forms(law: Law) -> Iterator[Form]:
         of = f"a {law.argument.symbol}"
         yield Form(f"1 + {of}" if law.form.is_factor else of, lambda x, _: (x,), ("a",), ("y",))
         return
+    if law.form.in_proportion:
+        yield Form("a x", lambda x, _: (x,), ("a",), ("y/x",))
+        return
     if not law.form.is_centred:
         yield Form(CONSTANT, lambda x, _: (x**0,), ("a",), ("y",))
     if law.is_spaced_by_ratio:

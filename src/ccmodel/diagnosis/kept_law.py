@@ -8,7 +8,15 @@ from ccmodel import mechanisms as registry
 from ccmodel.channels import short_name
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.laws import values_of
-from ccmodel.mechanisms.contract import BEARING_TORQUE, CABLE_STRETCH, END_STRETCH, LOAD, SENSOR_MAP, SLIDING_FRICTION
+from ccmodel.mechanisms.contract import (
+    BEARING_TORQUE,
+    CABLE_STRETCH,
+    END_STRETCH,
+    LOAD,
+    PULLEY_RADIUS,
+    SENSOR_MAP,
+    SLIDING_FRICTION,
+)
 from ccmodel.typed import InputError
 
 NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
@@ -19,6 +27,7 @@ LOOK_ALIKES = {
     END_STRETCH: "termination-compliance",
     BEARING_TORQUE: "pulley-friction",
     LOAD: "load-stiffening",
+    PULLEY_RADIUS: "pulley-eccentricity",
     SENSOR_MAP: "load-cell-scale",
 }
 

@@ -1,12 +1,14 @@
 """Learning a law that no list holds: which slot, which argument, and the curve.
 
 Every law (`ccmodel.mechanisms.learned`) extends a fitted model by a few coefficients with a normal prior. Their
-sensitivities, from one run each, give its evidence to first order, under each of a few a priori sizes of its values.
-The leading laws are then fitted as any other candidate, and compete with these.
+sensitivities about no effect, from one run each, give its evidence to first order, under each of a few a priori sizes
+of its values. A mass is linearised about the one that the load's own equation shows: about none, the load does not
+ring. The leading laws are then fitted as any other candidate, and compete with these.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,7 @@ from ccmodel.channels import CHANNELS, TAU_OUT, TENSIONS, THETA_IN
 from ccmodel.deadline import Deadline
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.equation_error import INERTIA
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.normal_equations import NormalEquations
 from ccmodel.failure import ModelError
@@ -27,10 +30,13 @@ from ccmodel.model.parameters import mechanism_key
 from ccmodel.model.run import simulate
 from ccmodel.progress import Progress, silent
 
+# Share of a mass over which its derivative is taken: a load that rings gets out of step within a few per cent.
+STEP_OF_MASS = 0.01
+
 
 @dataclass(frozen=True)
 class Proposal:
-    """A law beside a fitted model, linearised about no effect.
+    """A law beside a fitted model, to first order.
 
     Attributes
     ----------
@@ -48,13 +54,20 @@ class Proposal:
 
 
 def proposals(
-    base: CandidateFit, every: Sequence[Law], deadline: Deadline, progress: Progress = silent
+    base: CandidateFit,
+    every: Sequence[Law],
+    deadline: Deadline,
+    progress: Progress = silent,
+    known: Mapping[str, float] = MappingProxyType({}),
 ) -> list[Proposal]:
     """Each law beside a fitted model with the a priori size that suits it best, the highest evidence first.
+
+    `known` are values of unknowns that a regression shows (`ccmodel.diagnosis.equation_error`).
 
     A law that the model cannot be run with, or whose argument does not vary, is left out, and a message says so.
     """
     nothing = NormalEquations.of(base).log_evidence
+    mass = 0.0 if INERTIA in base.hypothesis.acting else known.get(mechanism_key(*INERTIA, "J"), 0.0)
     motions = each(base.whitened, lambda i, w: _motion(base, i))
     channels = {c for w in base.whitened for c in w.observations.channels}
     found = []
@@ -64,7 +77,8 @@ def proposals(
         if law.channel is not None and law.channel not in channels:
             continue
         try:
-            found.append(max(_proposed(base, law, motions, nothing), key=lambda p: p.evidence))
+            about = mass if law.form.in_proportion else 0.0
+            found.append(max(_proposed(base, law, motions, nothing, about), key=lambda p: p.evidence))
         except (ModelError, ValueError) as error:
             progress(f"{law.name} at {law.place}: not proposed ({error})")
     return sorted(found, key=lambda p: -p.evidence)
@@ -78,7 +92,10 @@ def _motion(base: CandidateFit, i: int) -> Sensing:
     return Sensing(o.given.recording.time_s, channels, o.parameters.drive_radius_m, o.parameters.load_radius_m)
 
 
-def _proposed(base: CandidateFit, law: Law, motions: Sequence[Sensing], nothing: float) -> Iterator[Proposal]:
+def _proposed(
+    base: CandidateFit, law: Law, motions: Sequence[Sensing], nothing: float, about: float
+) -> Iterator[Proposal]:
+    """A law with each a priori size; it is linearised where its values are `about` times its argument."""
     pairs = zip(base.whitened, motions, strict=True)
     visited = np.concatenate([law.argument.of(m)[..., w.observations.judged].ravel() for w, m in pairs])
     first, last = law.range_of(visited)
@@ -91,15 +108,24 @@ def _proposed(base: CandidateFit, law: Law, motions: Sequence[Sensing], nothing:
         of_law = tuple((mechanism_key(law.name, law.place, name), value) for name, value in fixed.items())
         return Hypothesis(((law.name, law.place),), fixed=of_law)
 
-    tried = settings.LAW_STEP * unit
-    extended = base.hypothesis.and_also(hypothesis(tried))
-    linear = _extended(base, extended, _sensitivities(base, extended, law))
+    tried = hypothesis(settings.LAW_STEP * unit)
+    start = _in_proportion(law, tried, about) if about else dict.fromkeys(tried.start, 0.0)
+    linear = _linearised(base, tried, law, start)
     equations, is_new = NormalEquations.of(linear), np.array([name not in base.values for name in linear.values])
     for share in settings.LAW_SCALES:
-        one = hypothesis(share * unit)
-        scaled = equations.scaled(np.where(is_new, share / settings.LAW_STEP, 1.0))
+        one, larger = hypothesis(share * unit), share / settings.LAW_STEP
+        scaled = equations.scaled(np.where(is_new, larger, 1.0))
         x = dict(zip(linear.values, scaled.most_probable.tolist(), strict=True))
-        yield Proposal(one, scaled.log_evidence - nothing, {name: x[name] for name in one.start})
+        values = {name: start[name] / larger + x[name] for name in one.start}
+        yield Proposal(one, scaled.log_evidence - nothing, values)
+
+
+def _in_proportion(law: Law, hypothesis: Hypothesis, factor: float) -> dict[str, float]:
+    """Coefficients, by key, of a law that is a factor times its argument."""
+    of_law = {p.name: mechanism_key(law.name, law.place, p.name) for p in law.mechanism.parameters}
+    fixed = dict(hypothesis.fixed)
+    x, unit = law.at_knots({name: fixed.get(key, 1.0) for name, key in of_law.items()})
+    return dict.fromkeys(hypothesis.start, float(factor * x[-1] / unit[-1]))
 
 
 def _unit_of(law: Law, base: CandidateFit, motions: Sequence[Sensing]) -> float:
@@ -130,29 +156,31 @@ def _paths(base: CandidateFit) -> list[ConduitPath]:
     return [w.observations.given.recording.path for w in base.whitened]
 
 
-def _sensitivities(base: CandidateFit, hypothesis: Hypothesis, law: Law) -> list[NDArray]:
-    """By recording, derivatives of the whitened errors by the law's coefficients about no effect."""
-    none = base.values | {name: 0.0 for name in hypothesis.start if name not in base.values}
+def _linearised(base: CandidateFit, tried: Hypothesis, law: Law, start: Mapping[str, float]) -> CandidateFit:
+    """A fitted model with a law whose coefficients have a start, and its residuals and derivatives there."""
+    hypothesis, about = base.hypothesis.and_also(tried), base.values | dict(start)
     names = [mechanism_key(law.name, law.place, name) for name in law.coefficients]
+    has_effect = any(start.values())
     # Values below the least one are clipped: there only the difference of a curve and its opposite is the whole curve.
-    is_clipped = law.form.least is not None and law.form.least >= law.form.neutral
+    is_clipped = law.form.in_proportion or (law.form.least is not None and law.form.least >= law.form.neutral)
 
-    def of(i: int) -> NDArray:
+    def of(i: int) -> tuple[NDArray, NDArray]:
         w = base.whitened[i]
         w = w.with_parameters(hypothesis.of(w.observations.parameters))
-        if is_clipped:
-            return np.column_stack([w.errors(none | {n: 1.0}) - w.errors(none | {n: -1.0}) for n in names])
-        without = w.errors(none)
-        return np.column_stack([w.errors(none | {n: 1.0}) - without for n in names])
+        here = w.errors(about)
+        step = {n: STEP_OF_MASS * start[n] if has_effect else 1.0 for n in names}
+        if is_clipped and not has_effect:
+            columns = [w.errors(about | {n: 1.0}) - w.errors(about | {n: -1.0}) for n in names]
+        else:
+            columns = [(w.errors(about | {n: start[n] + step[n]}) - here) / step[n] for n in names]
+        return here, np.column_stack(columns)
 
-    return each(base.whitened, lambda i, w: of(i))
-
-
-def _extended(base: CandidateFit, hypothesis: Hypothesis, columns: Sequence[NDArray]) -> CandidateFit:
-    """A fitted model with a law that has no effect yet, and its derivatives."""
-    added = {name: 0.0 for name in hypothesis.start if name not in base.values}
-    jacobian = [np.column_stack([J, D[: len(J)]]) for J, D in zip(base.jacobian, columns, strict=True)]
-    return replace(base, hypothesis=hypothesis, values=base.values | added, jacobian=jacobian)
+    found = each(base.whitened, lambda i, w: of(i))
+    jacobian = [np.column_stack([J, D[: len(J)]]) for J, (_, D) in zip(base.jacobian, found, strict=True)]
+    residuals = base.residuals
+    if has_effect:
+        residuals = [here[: len(e)] for e, (here, _) in zip(base.residuals, found, strict=True)]
+    return replace(base, hypothesis=hypothesis, values=about, residuals=residuals, jacobian=jacobian)
 
 
 def unknowns_of(candidate: CandidateFit, law: Law) -> list[int]:

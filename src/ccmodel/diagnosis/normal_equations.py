@@ -64,8 +64,13 @@ class NormalEquations:
         return cls(information, score, square, prior_sd, from_mean)
 
     def scaled(self, factors: NDArray) -> Self:
-        """The same with derivatives multiplied by factors, shape (unknowns,)."""
-        return replace(self, information=factors[:, None] * self.information * factors, score=factors * self.score)
+        """The same with unknowns in units that are larger by factors, shape (unknowns,)."""
+        return replace(
+            self,
+            information=factors[:, None] * self.information * factors,
+            score=factors * self.score,
+            from_mean=self.from_mean / factors,
+        )
 
     @property
     def log_evidence(self) -> float:

@@ -128,7 +128,7 @@ class Selection:
         self.progress("learning a law from the recordings", 0.0)
 
         def fitted(every: Sequence[Law], most: int, beside: CandidateFit = base) -> list[CandidateFit]:
-            leading = proposals(beside, every, self.deadline, self.progress)[:most]
+            leading = proposals(beside, every, self.deadline, self.progress, self.known)[:most]
             return self.fit_all(found.whitened, beside, [Score(p.hypothesis, 0.0, p.values) for p in leading])
 
         first = sorted(fitted(self.laws, settings.LAWS_FITTED), key=lambda c: c.mean_square)
@@ -155,7 +155,7 @@ class Selection:
         acting = laws_in(best.hypothesis)
         others = [law for law in self.laws if not any(law.has_the_quantity_of(one) for one in acting)]
         scores = [s for s in self._screened(best, self.mechanisms).singles() if s.gain > settings.WORTH_FITTING]
-        second = proposals(best, others, self.deadline, self.progress)[: settings.PARTNERS]
+        second = proposals(best, others, self.deadline, self.progress, self.known)[: settings.PARTNERS]
         chosen = scores[: settings.PARTNERS] + [Score(p.hypothesis, 0.0, p.values) for p in second]
         pairs = self.fit_all(found.whitened, best, chosen)
         return self.relinearise(found.with_candidates([*found.candidates, *pairs])) if pairs else found

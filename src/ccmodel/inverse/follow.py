@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ccmodel.inverse.exact import start_of
 from ccmodel.kernel import borrowed, kernel
 from ccmodel.mechanisms.contract import Settings
-from ccmodel.mechanisms.pulley_eccentricity import winding
+from ccmodel.mechanisms.winding import Pulley, winding
 from ccmodel.model.exact import state as exact_rows
 from ccmodel.model.exact.cable import reverse
 from ccmodel.model.exact.path import PathTables
@@ -108,11 +108,12 @@ def exact(
 
 
 @kernel
-def _angle_that_winds(wound: float, angle: float, eccentricity: float, eccentricity_rad: float) -> float:
-    """Angle of an eccentric pulley that winds as much as an even one at the angle `wound`, from a guess; rad."""
-    wanted = wound + winding(0.0, eccentricity, eccentricity_rad)[0]
-    for _ in range(50 if eccentricity != 0.0 else 1):
-        now, factor, _ = winding(angle, eccentricity, eccentricity_rad)
+def _angle_that_winds(wound: float, angle: float, pulley: Pulley) -> float:
+    """Angle of a pulley that winds as much as a round one at the angle `wound`, from a guess; rad."""
+    wanted = wound + winding(0.0, pulley)[0]
+    is_round = pulley.eccentricity == 0.0 and pulley.knots_rad.size == 0
+    for _ in range(1 if is_round else 50):
+        now, factor, _ = winding(angle, pulley)
         angle += (wanted - now) / factor
     return angle
 
@@ -125,7 +126,7 @@ def _followed_general(
     slide: NDArray,
     mean: NDArray,
     load: NDArray,
-    drive: tuple[float, float, float],
+    drive: Pulley,
     friction_factor: NDArray,
     steps: int,
     time_s: NDArray,
@@ -197,7 +198,7 @@ def _followed_general(
             travelled += move
             if travelled > FURTHEST * span * ph.radius:
                 return j
-        theta_in[j] = _angle_that_winds(here / drive[0], theta_in[max(j - 1, 0)], drive[1], drive[2])
+        theta_in[j] = _angle_that_winds(here / drive.radius_m, theta_in[max(j - 1, 0)], drive)
     return wanted.size
 
 

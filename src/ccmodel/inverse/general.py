@@ -23,8 +23,8 @@ from ccmodel.inverse.update import (
 )
 from ccmodel.kernel import borrowed, kernel
 from ccmodel.mechanisms.contract import Settings
-from ccmodel.mechanisms.pulley_eccentricity import winding
 from ccmodel.mechanisms.pulley_friction import bearing
+from ccmodel.mechanisms.winding import Pulley, winding
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.equations import imbalance, set_grip, set_memory
 from ccmodel.model.general.layout import Physics
@@ -91,7 +91,7 @@ def filtered(
     slide: NDArray,
     mean: NDArray,
     load: NDArray,
-    drive: tuple[float, float, float],
+    drive: Pulley,
     friction_factor: NDArray,
     steps: int,
     time_s: NDArray,
@@ -127,12 +127,12 @@ def filtered(
     node[rows.RESTED] = 1.0
     set_grip(ph, node, slide, friction_factor[0], 0.0)
     fixed_grip = ph.stribeck_rise == 0.0 and len(friction_factor) == 1
-    wound_before = winding(theta_in[0], drive[1], drive[2])[0]
+    wound_before = winding(theta_in[0], drive)[0]
     expected = 0.0
     for j in range(m):
-        wound, radius_factor, _ = winding(theta_in[j], drive[1], drive[2])
-        pull, wound_before = drive[0] * (wound - wound_before), wound
-        lever = drive[0] * radius_factor
+        wound, radius_factor, _ = winding(theta_in[j], drive)
+        pull, wound_before = drive.radius_m * (wound - wound_before), wound
+        lever = drive.radius_m * radius_factor
         dt = time_s[j] - time_s[j - 1] if j > 0 else 0.0
         factor = friction_factor[min(j, len(friction_factor) - 1)]
         whole = 1.0 / steps if j > 0 else 1.0

@@ -38,7 +38,7 @@ PLACES = (
 )
 # Slots: places in the equations at which a constitutive law can stand.
 SLIDING_FRICTION, BEARING_TORQUE, LOAD, SENSOR_MAP = "sliding-friction", "bearing-torque", "load", "sensor-map"
-CABLE_STRETCH, END_STRETCH = "cable-stretch", "end-stretch"
+CABLE_STRETCH, END_STRETCH, PULLEY_RADIUS = "cable-stretch", "end-stretch", "pulley-radius"
 PARAGRAPHS = ("Equation", "Signature", "Separated by", "Source")
 # A source that begins with this short form is written out.
 PAPER_SHORT = "Agrawal, Peine and Yao 2010"

@@ -52,7 +52,7 @@ class Argument:
     @property
     def depends_on_time(self) -> bool:
         """Whether it depends on the rate of the motion, not only on its path."""
-        return self.name in ("speed", "dwell", "time", "rate")
+        return self.name in ("speed", "acceleration", "dwell", "time", "rate")
 
 
 @kernel
@@ -86,13 +86,16 @@ def _contact_age(time_s: NDArray, theta: NDArray, renewal: float) -> NDArray:
     return age
 
 
-def _derivative_of(channel: str) -> Callable[[Sensing], NDArray]:
-    """Rate of a channel; where no time passes nothing changes."""
+def _derivative_of(channel: str, order: int = 1) -> Callable[[Sensing], NDArray]:
+    """Rate of a channel, or its second derivative; where no time passes nothing changes."""
 
     def of(s: Sensing) -> NDArray:
         if s.time_s[-1] == s.time_s[0]:
             return np.zeros(s.time_s.size)
-        return np.gradient(s.channels[channel], s.time_s)
+        values = s.channels[channel]
+        for _ in range(order):
+            values = np.gradient(values, s.time_s)
+        return values
 
     return of
 
@@ -182,6 +185,9 @@ def of_motion(angle: str, end: str) -> dict[str, Argument]:
     return {
         "angle": Argument(f"{end}-angle", "rad", f"the {end} pulley's angle", reading_of(angle)),
         "speed": Argument("speed", "rad/s", f"the {end} pulley's velocity", _derivative_of(angle)),
+        "acceleration": Argument(
+            "acceleration", "rad/s^2", f"the {end} pulley's acceleration", _derivative_of(angle, order=2)
+        ),
         "since": Argument(
             "distance-since-reversal",
             "m",

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 # A spring is never without stretch: its least compliance over its mean.
 LEAST_COMPLIANCE = 0.05
+# A pulley winds cable at every angle: its least radius over the mean one.
+LEAST_RADIUS = 0.05
 # Shares of a law's standard deviation below which a direction of its coefficients is left out.
 SLIGHTEST = 0.02
 # Standard deviation of a straight line at its end, over that of the curve about it.
@@ -37,6 +39,8 @@ class Form:
     shortest_yield : float or None
         The values are of Maxwell-slip elements, each of which yields after the travel that is its knot; the shortest
         travel over the longest. None of a law without memory.
+    in_proportion : bool
+        Whether the values are the argument times one number, which is never negative.
     """
 
     meaning: str
@@ -47,6 +51,7 @@ class Form:
     has_slope: bool = False
     name: str = ""
     shortest_yield: float | None = None
+    in_proportion: bool = False
 
     @property
     def is_factor(self) -> bool:
@@ -65,6 +70,8 @@ class Form:
 
 FRICTION_FACTOR = Form("factor of the friction coefficient", "1", neutral=1.0, least=0.0)
 STRETCH_FACTOR = Form("factor of the cables' compliance", "1", neutral=1.0, least=LEAST_COMPLIANCE)
+# The calibration takes the mean radius as stated.
+RADIUS_FACTOR = Form("factor of the {side} pulley's radius", "1", neutral=1.0, least=LEAST_RADIUS, is_centred=False)
 END_COMPLIANCE = Form("compliance of the cables' fastening at the {side}, in m/N", "m/N", least=0.0, is_centred=False)
 DRAG = Form("drag of a cable per length of conduit, in N/m", "N/m", is_centred=False, has_slope=True, name="drag")
 # Drag that no speed changes, as that of a seal at one place.
@@ -78,6 +85,8 @@ CONTACT_ELEMENTS = Form(
     "friction over that of sliding, after a reversal", "1", neutral=1.0, is_centred=False, shortest_yield=0.002
 )
 ADDED = Form("added to {symbol}, in {unit}")
+# A mass: passes of the march with a torque by acceleration diverge above the frequency at which the load rings.
+IN_PROPORTION = replace(ADDED, in_proportion=True)
 # The zero of a load cell scatters between recordings by its accuracy; beyond that it belongs to no calibration.
 ADDED_TO_SUM = Form("added to {symbol}, in {unit}", is_centred=False)
 # A torque whose elements yield one after the other. A ball bearing's yield within a few hundredths of a millimetre.

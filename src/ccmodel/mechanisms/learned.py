@@ -39,6 +39,7 @@ from ccmodel.mechanisms.contract import (
     CABLE_STRETCH,
     END_STRETCH,
     LOAD,
+    PULLEY_RADIUS,
     SENSOR_MAP,
     SLIDING_FRICTION,
     Curve,
@@ -80,7 +81,9 @@ from ccmodel.mechanisms.law_forms import (
     END_COMPLIANCE,
     FRICTION_FACTOR,
     IN_BEARING,
+    IN_PROPORTION,
     LEAST_COMPLIANCE,
+    RADIUS_FACTOR,
     STRETCH_FACTOR,
     Form,
     basis,
@@ -174,6 +177,8 @@ class Law:
         """The value of its setting that had the value `before`, for values at knots; both of shape (knots,)."""
         if self.argument.has_two_values:
             return float(np.clip(y[-1], -LARGEST_BIAS, LARGEST_BIAS))
+        if self.form.in_proportion:
+            return (*before, float(max(y[-1] / x[-1], 0.0)))
         if isinstance(before, tuple):
             return (*before, lambda sensing: self.added(sensing, x, y))
         if not y.any():
@@ -184,9 +189,14 @@ class Law:
         return Table(x, values) if values.any() else None
 
     @property
+    def has_one_coefficient(self) -> bool:
+        """Whether one number is all that it has: the difference of two values, or a factor of its argument."""
+        return self.argument.has_two_values or self.form.in_proportion
+
+    @property
     def basis(self) -> NDArray:
         """Derivatives of its values at the knots by its coefficients, shape (knots, coefficients)."""
-        knots, length = (2, 1.0) if self.argument.has_two_values else self.resolution
+        knots, length = (2, 1.0) if self.has_one_coefficient else self.resolution
         return basis(knots, length, self.form.is_centred, self.form.has_slope)
 
     def at_knots(self, values: Mapping[str, float]) -> tuple[NDArray, NDArray]:
@@ -203,6 +213,9 @@ class Law:
             first = last * self.form.shortest_yield
         elif self.is_spaced_by_ratio:
             first = max(first, last * LOWEST_TENSION)
+        elif self.form.in_proportion:
+            last = max(abs(first), abs(last))
+            first = -last
         return float(first), float(last)
 
     def shown(self, x: NDArray, at: NDArray | None = None) -> NDArray:
@@ -248,7 +261,7 @@ class Law:
 
     def finer(self) -> "Law | None":
         """The same law with more coefficients, if there is one."""
-        is_finest = self.argument.has_two_values or self.form.has_elements or not self.is_first
+        is_finest = self.has_one_coefficient or self.form.has_elements or not self.is_first
         return None if is_finest else replace(self, resolution=COARSE if self.slot == END_STRETCH else FINE)
 
     @property
@@ -323,12 +336,15 @@ _SETTINGS = {
     (CABLE_STRETCH, "cable"): "compliance_by_cable",
     (END_STRETCH, "tension"): "{side}_end_stretch",
     (BEARING_TORQUE, "load-pulley"): "load_bearing_laws",
+    (PULLEY_RADIUS, ""): "{side}_radius_factor",
+    (LOAD, "acceleration"): "load_masses",
     (LOAD, ""): "load_laws",
 }
 _NEUTRAL: dict[str, Any] = {
     "direction_bias": 0.0,
     "friction_by_cable": 0.0,
     "compliance_by_cable": 0.0,
+    "load_masses": (),
     "friction_laws": (),
     "load_laws": (),
     "load_bearing_laws": (),
@@ -382,6 +398,8 @@ def _laws() -> Iterator[Law]:
         yield Law(CABLE_STRETCH, "cable", argument, STRETCH_FACTOR)
     for end in ("drive-end", "load-end"):
         yield Law(END_STRETCH, end, TENSION, END_COMPLIANCE, resolution=SMOOTH)
+    yield Law(PULLEY_RADIUS, "drive-pulley", drive["angle"], RADIUS_FACTOR)
+    yield Law(PULLEY_RADIUS, "load-pulley", load["angle"], RADIUS_FACTOR)
     for slot, place, channel, motion, angle, elements in (
         (BEARING_TORQUE, "drive-pulley", TAU_IN, drive, THETA_IN, AGAINST_MOTION),
         (LOAD, "load", TAU_OUT, load, THETA_OUT, AGAINST_LOAD),
@@ -389,6 +407,7 @@ def _laws() -> Iterator[Law]:
         yield Law(slot, place, motion["angle"], ADDED, channel)
         yield Law(slot, place, motion["speed"], ADDED, channel)
         yield Law(slot, place, motion["since"], elements, channel, opposes=angle)
+    yield Law(LOAD, "load", load["acceleration"], IN_PROPORTION, TAU_OUT)
     yield Law(BEARING_TORQUE, "load-pulley", load["speed"], IN_BEARING)
     yield Law(BEARING_TORQUE, "load-pulley", load["since"], ELEMENTS_IN_BEARING, opposes=THETA_OUT)
     for channel in (TAU_IN, TAU_OUT, F_DRIVE, F_LOAD, THETA_OUT):

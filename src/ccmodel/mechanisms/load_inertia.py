@@ -12,7 +12,7 @@ Source: Agrawal, Peine and Yao 2010, Section VI: load dynamics.
 
 from math import sqrt
 
-from ccmodel.mechanisms.contract import Mechanism, Parameter, Settings
+from ccmodel.mechanisms.contract import LOAD, Curve, Mechanism, Parameter, Settings
 
 # A mass that is a few per cent off rings out of phase with the recording. Screening therefore tries this many masses,
 # with high damping, under which a resonance is seen from further off; the fit then lowers the damping by continuation.
@@ -24,6 +24,8 @@ def load_damping(settings: Settings, stiffness: float) -> float:
     return 2 * settings.damping_ratio * sqrt(settings.inertia * stiffness)
 
 
+J = Parameter("J", "kg m^2", 1e-5, 1e-2, 1e-4, "moment of inertia", screening_grid=MASSES)
+
 MECHANISM = Mechanism(
     name="load-inertia",
     text=__doc__,
@@ -31,10 +33,11 @@ MECHANISM = Mechanism(
     sentence="the load has a moment of inertia of {J}",
     places=("load",),
     parameters=(
-        Parameter("J", "kg m^2", 1e-5, 1e-2, 1e-4, "moment of inertia", screening_grid=MASSES),
+        J,
         Parameter("zeta", "1", 1e-3, 0.3, 0.1, "damping ratio", screening_grid=(0.85,), continuation=True, default=0.0),
     ),
     mistaken_for=("time-skew",),
     depends_on_time=True,
     settings={"inertia": "J", "damping_ratio": "zeta"},
+    curves=(Curve(LOAD, "acceleration", lambda x, values: values["J"] * x, (J,)),),
 )

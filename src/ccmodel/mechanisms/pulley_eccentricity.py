@@ -15,26 +15,18 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.kernel import kernel
-from ccmodel.mechanisms.contract import BEARING_TORQUE, LOAD, Curve, Mechanism, Parameter
-
-
-@kernel
-def winding(theta: float, e: float, psi: float) -> tuple[float, float, float]:
-    """Cable travel over R (rad), the radius over R, and the derivative of the latter by the angle."""
-    return theta - e * np.cos(theta + psi), 1.0 + e * np.sin(theta + psi), e * np.cos(theta + psi)
-
-
-@kernel
-def winding_change(theta: float, rotation: float, e: float, psi: float) -> float:
-    """Cable travel over R (rad) of a rotation from theta, without cancellation for a small one."""
-    return rotation + 2.0 * e * np.sin(theta + psi + 0.5 * rotation) * np.sin(0.5 * rotation)
+from ccmodel.mechanisms.contract import BEARING_TORQUE, LOAD, PULLEY_RADIUS, Curve, Mechanism, Parameter
 
 
 def _torque(theta: NDArray, values: Mapping[str, float]) -> NDArray:
     return values["torque"] * np.sin(theta + values["psi"])
 
 
+def _radius(theta: NDArray, values: Mapping[str, float]) -> NDArray:
+    return 1.0 + values["e"] * np.sin(theta + values["psi"])
+
+
+_E = Parameter("e", "1", 0.01, 0.08, 0.03, "eccentricity over the radius", below=1.0)
 # Two values of psi half a turn apart would not do: one that is off by a right angle has no gradient in e.
 _PSI = Parameter(
     "psi",
@@ -58,14 +50,12 @@ MECHANISM = Mechanism(
     ),
     sentence="the {side} pulley's radius changes by ±{e:%} over a turn",
     places=("drive-pulley", "load-pulley"),
-    parameters=(
-        Parameter("e", "1", 0.01, 0.08, 0.03, "eccentricity over the radius", below=1.0),
-        _PSI,
-    ),
+    parameters=(_E, _PSI),
     mistaken_for=("load-stiffening",),
     depends_on_time=False,
     settings={"{side}_eccentricity": "e", "{side}_eccentricity_rad": "psi"},
     curves=(
+        *(Curve(PULLEY_RADIUS, f"{end}-angle", _radius, (_E, _PSI)) for end in ("drive", "load")),
         Curve(BEARING_TORQUE, "drive-angle", _torque, (_TORQUE, _PSI)),
         Curve(LOAD, "load-angle", _torque, (_TORQUE, _PSI)),
     ),

@@ -13,6 +13,7 @@ from ccmodel.mechanisms.contract import (
     CABLE_STRETCH,
     END_STRETCH,
     LOAD,
+    PULLEY_RADIUS,
     SENSOR_MAP,
     SLIDING_FRICTION,
     side,
@@ -121,6 +122,7 @@ IN_SLOT = {
     END_STRETCH: "The compliance of the cables' fastening at the {side}",
     BEARING_TORQUE: "The torque at the {side} pulley",
     LOAD: "The load's torque",
+    PULLEY_RADIUS: "The radius of the {side} pulley",
     SENSOR_MAP: "The delay of the {side}'s channels",
 }
 

@@ -56,7 +56,8 @@ class TrueLaw(NamedTuple):
 
 
 # What the proof's recordings visit: tensions (N), times (s), the drive's travel (m), angles (rad), speeds of the cable
-# (log10(m/s)) and of a pulley (rad/s), sums of tensions (N), torques (N m), ages of contacts (log10(s)).
+# (log10(m/s)) and of a pulley (rad/s), accelerations of a load that rings (rad/s^2), sums of tensions (N), torques
+# (N m), ages of contacts (log10(s)).
 TENSIONS_N, TIMES_S, TRAVELS_M, ANGLES_RAD = (0.5, 20.0), (0.0, 10.0), (0.0, 0.05), (-0.6, 0.6)
 LOG_SPEEDS, SPEEDS_RAD_PER_S, FORCES_N, TORQUES_NM, LOG_AGES = (
     (-4.0, -1.2),
@@ -65,6 +66,7 @@ LOG_SPEEDS, SPEEDS_RAD_PER_S, FORCES_N, TORQUES_NM, LOG_AGES = (
     (-0.07, 0.07),
     (-2, 0.5),
 )
+ACCELERATIONS = (-500.0, 500.0)
 # Torques over the radius of a pulley, N.
 PULLS_N = (-12.0, 12.0)
 POINTS = 129

@@ -3,9 +3,10 @@
 from collections.abc import Mapping
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import Field
 
-from virtualrig.effects.contract import Seeded, Twin, group_of
+from virtualrig.effects.contract import ANGLES_RAD, Seeded, TrueLaw, Twin, along, group_of
 from virtualrig.strict import Strict
 
 
@@ -33,6 +34,13 @@ def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> 
     return {group_of(place): {"eccentricity": eccentricity}}, {"e": size, "psi": also["phase"]}
 
 
+def _law(rig: Any, place: str) -> TrueLaw:
+    given, theta = getattr(rig.effects, group_of(place)).eccentricity, along(ANGLES_RAD)
+    factor = 1 + given.share * np.sin(theta + given.phase_rad)
+    factor += given.second_share * np.sin(2 * theta + given.second_phase_rad)
+    return TrueLaw("pulley-radius", f"{place.split('-')[0]}-angle", theta, factor)
+
+
 def _two_lobes(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
     settings, values = _seed(size, also, place, spring)
     second = {"second_share": also["second"] * size, "second_phase_rad": 2.4 - also["phase"]}
@@ -47,6 +55,7 @@ TWIN = Twin(
     size=(0.005, 0.08),
     unit="1",
     seed=_seed,
+    law=_law,
     other_laws={"two-lobes": _two_lobes},
     also={"second": (0.2, 0.6)},
     numbers=_numbers,

@@ -17,11 +17,11 @@ from ccmodel.kernel import kernel
 from ccmodel.mechanisms.backlash import dead_zone
 from ccmodel.mechanisms.load_dependent_friction import power_of_tension
 from ccmodel.mechanisms.presliding import MOST_ELEMENTS, dahl
-from ccmodel.mechanisms.pulley_eccentricity import winding, winding_change
 from ccmodel.mechanisms.relaxation import BRANCHES, lag_weights
 from ccmodel.mechanisms.strand_settling import settling_tension
 from ccmodel.mechanisms.stribeck import renewed
 from ccmodel.mechanisms.tables import interpolated, pulled
+from ccmodel.mechanisms.winding import winding, winding_change
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.layout import Physics
 
@@ -246,7 +246,7 @@ def _load(
     """Torque out of balance at the load pulley (N m), its derivative by angle without the cables, and the radius."""
     n = piece.shape[2] - 1
     theta = load[rows.ANGLE] + rotation
-    _, radius_factor, radius_slope = winding(theta, ph.load_eccentricity, ph.load_eccentricity_rad)
+    _, radius_factor, radius_slope = winding(theta, ph.load_pulley)
     R = ph.radius * radius_factor
     z, inside = dead_zone(theta, ph.half_gap)
     tau = torque + ph.stiffness_load * z + ph.cubic_stiffness * z**3
@@ -284,7 +284,7 @@ def imbalance(
 ) -> tuple[float, float, float, float, float]:
     """Imbalance of the whole chain: sum of squares (N^2), highest tension (N), and the terms of `_load`."""
     n = node.shape[2]
-    pulled = ph.radius * winding_change(load[rows.ANGLE], rotation, ph.load_eccentricity, ph.load_eccentricity_rad)
+    pulled = ph.radius * winding_change(load[rows.ANGLE], rotation, ph.load_pulley)
     slide[rows.NOW, 0, n + 1], slide[rows.NOW, 1, n + 1] = pulled, -pulled
     _tensions(ph, piece, slide, mean, follows)
     error = _nodes(ph, piece, node, slide, dt, bristle)

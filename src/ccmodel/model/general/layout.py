@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ccmodel import mechanisms as registry
 from ccmodel.mechanisms.presliding import MOST_ELEMENTS
 from ccmodel.mechanisms.relaxation import BRANCHES
+from ccmodel.mechanisms.winding import Pulley
 
 IMPEDANCE, PRESCRIBED_ANGLE = 0, 1
 
@@ -92,6 +93,7 @@ if TYPE_CHECKING:
         element_share: tuple[float, ...]
         elements: int
         radius: float
+        load_pulley: Pulley
         stiffness_load: float
         load_damping: float
         kind: int
@@ -106,7 +108,7 @@ else:
     Physics = namedtuple(
         "Physics",
         "has_settling has_relaxation relaxing_times_s bristle presliding creep element_m element_share elements radius "
-        "stiffness_load load_damping kind general_friction has_spring_table has_friction_table drag_table "
+        "load_pulley stiffness_load load_damping kind general_friction has_spring_table has_friction_table drag_table "
         + " ".join(registry.march_settings()),
     )
 

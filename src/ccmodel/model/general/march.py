@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ccmodel.kernel import borrowed, kernel
 from ccmodel.mechanisms.drive_train import train_torque
 from ccmodel.mechanisms.presliding import MOST_ELEMENTS, dahl
-from ccmodel.mechanisms.pulley_eccentricity import winding, winding_change
+from ccmodel.mechanisms.winding import Pulley, winding, winding_change
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.equations import relax, renew_contacts, set_grip
 from ccmodel.model.general.layout import Physics
@@ -153,7 +153,7 @@ def _at_drive_angle(
     bristle: float,
     friction_factor: NDArray,
     fixed_grip: bool,
-    drive: tuple[float, float, float],
+    drive: Pulley,
     pulley: NDArray,
     rotation: float,
     angle: float,
@@ -164,12 +164,12 @@ def _at_drive_angle(
     Returns whether it was solved, the load's rotation, and the torque on the drive pulley over that of the train (N m),
     which rises with the angle.
     """
-    pull = drive[0] * winding_change(pulley[rows.DRIVE_ANGLE], angle - pulley[rows.DRIVE_ANGLE], drive[1], drive[2])
+    pull = drive.radius_m * winding_change(pulley[rows.DRIVE_ANGLE], angle - pulley[rows.DRIVE_ANGLE], drive)
     slide[rows.NOW, 0, 0], slide[rows.NOW, 1, 0] = pull, -pull
     solved, rotation = solve_with_contacts(
         ph, piece, node, slide, mean, load, rotation, torque, dt, bristle, friction_factor, fixed_grip
     )
-    R = drive[0] * winding(angle, drive[1], drive[2])[1]
+    R = drive.radius_m * winding(angle, drive)[1]
     cables = R * (max(piece[rows.TENSION, 0, 0], 0.0) - max(piece[rows.TENSION, 1, 0], 0.0))
     turned = angle - pulley[rows.DRIVE_ANGLE]
     bearing = ph.drive_friction_Nm * dahl(pulley[rows.DRIVE_BEARING], turned, ph.drive_presliding_rad)[0]
@@ -190,7 +190,7 @@ def _solve_with_train(
     bristle: float,
     friction_factor: NDArray,
     fixed_grip: bool,
-    drive: tuple[float, float, float],
+    drive: Pulley,
     pulley: NDArray,
     lowest: float,
     highest: float,
@@ -237,7 +237,7 @@ def march(
     theta_in: NDArray,
     motor: NDArray,
     within_rad: float,
-    drive: tuple[float, float, float],
+    drive: Pulley,
     friction_factor: NDArray,
     series: NDArray,
     steps: int,
@@ -258,8 +258,8 @@ def march(
     within_rad : float
         With a drive train, the drive pulley is where the train balances the transmission, but no further than this
         from `theta_in`: what its encoder leaves open.
-    drive : tuple of float
-        The drive pulley's radius (m), eccentricity, and the latter's angle (rad).
+    drive : Pulley
+        The drive pulley.
     friction_factor : ndarray, shape (m, 2) or (1, 2)
         Factor of mu by cable. A single row holds throughout.
     series : ndarray, shape (m,) or (1,)
@@ -284,13 +284,13 @@ def march(
     set_grip(ph, node, slide, friction_factor[0], 0.0)
     fixed_grip = ph.stribeck_rise == 0.0 and len(friction_factor) == 1
     prescribed = ph.kind == rows.PRESCRIBED_ANGLE
-    wound_before = winding(theta_in[0], drive[1], drive[2])[0]
+    wound_before = winding(theta_in[0], drive)[0]
     has_train = ph.train_compliance > 0.0 and motor.size > 1
     pulley = np.array([theta_in[0], theta_in[0], 0.0])
     angle, middle = theta_in[0], theta_in[0]
     for j in range(m):
-        wound, radius_factor, _ = winding(theta_in[j], drive[1], drive[2])
-        pull, wound_before = drive[0] * (wound - wound_before), wound
+        wound, radius_factor, _ = winding(theta_in[j], drive)
+        pull, wound_before = drive.radius_m * (wound - wound_before), wound
         prescribed_value = series[min(j, series.size - 1)]
         rise = prescribed_value - series[min(j - 1, series.size - 1)] if j > 0 else 0.0
         dt = time_s[j] - time_s[j - 1] if j > 0 else 0.0
@@ -343,13 +343,13 @@ def march(
         out[4, j] = load[rows.ANGLE]
         bearing = ph.load_friction_Nm * load[rows.BEARING]
         if prescribed:
-            R = ph.radius * winding(load[rows.ANGLE], ph.load_eccentricity, ph.load_eccentricity_rad)[1]
+            R = ph.radius * winding(load[rows.ANGLE], ph.load_pulley)[1]
             out[5, j] = R * (out[1, j] - out[3, j]) - bearing
         else:
             out[5, j] = load[rows.TORQUE]
         out[7, j] = theta_in[j]
         if has_train:
             out[7, j] = angle
-            radius_factor = winding(angle, drive[1], drive[2])[1]
-        out[6, j] = drive[0] * radius_factor * (out[0, j] - out[2, j])
+            radius_factor = winding(angle, drive)[1]
+        out[6, j] = drive.radius_m * radius_factor * (out[0, j] - out[2, j])
     return m

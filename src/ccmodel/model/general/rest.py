@@ -9,10 +9,10 @@ from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Settings
 from ccmodel.mechanisms.learned import end_spring
 from ccmodel.mechanisms.load_dependent_friction import FLOOR_N, REFERENCE_N
-from ccmodel.mechanisms.pulley_eccentricity import winding
 from ccmodel.mechanisms.relaxation import followed
 from ccmodel.mechanisms.strand_settling import stretch_at
 from ccmodel.mechanisms.tables import stretched
+from ccmodel.mechanisms.winding import winding
 from ccmodel.model.general import layout as rows
 from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad
 
@@ -88,9 +88,9 @@ def load_angle(physics: rows.Physics, T: NDArray, load: Load, series: NDArray) -
         return 0.0
     theta, force = 0.0, T[0, -1] - T[1, -1]
     for _ in range(50):
-        torque = physics.radius * winding(theta, physics.load_eccentricity, physics.load_eccentricity_rad)[1] * force
+        torque = physics.radius * winding(theta, physics.load_pulley)[1] * force
         before, theta = theta, _angle_at_rest(K, K3, physics.half_gap, torque, load)
-        if physics.load_eccentricity == 0 or theta == before:
+        if theta == before:
             break
     return float(theta)
 

@@ -17,6 +17,7 @@ from ccmodel.mechanisms.presliding import Contacts
 from ccmodel.mechanisms.pulley_friction import bearing
 from ccmodel.mechanisms.relaxation import branch_times
 from ccmodel.mechanisms.tables import Table
+from ccmodel.mechanisms.winding import Pulley, pulley_of
 from ccmodel.model.active import Active, active_of
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.grid import Grid, make_grid
@@ -182,7 +183,7 @@ class Prepared(NamedTuple):
     slide: NDArray
     mean: NDArray
     load: NDArray
-    drive: tuple[float, float, float]
+    drive: Pulley
     friction_factor: NDArray
     steps: int
 
@@ -218,8 +219,7 @@ def prepared(
     mean[rows.MEAN] = (piece[rows.SHARE] * T).sum(axis=1)
     state[rows.ANGLE] = load_angle(physics, T, load, series)
     slide = np.zeros((rows.SLIDE_ROWS, 2, node.shape[2] + 2))
-    eccentricity = settings.drive_eccentricity, settings.drive_eccentricity_rad
-    drive = (float(transmission.drive_radius_m), float(eccentricity[0]), float(eccentricity[1]))
+    drive = _pulley(settings, "drive", transmission.drive_radius_m)
     steps *= _steps(physics, transmission, time_s)
     return Prepared(physics, piece, node, slide, mean, state, drive, friction_factor, steps)
 
@@ -384,6 +384,7 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
     K_e = load.stiffness_Nm_per_rad if isinstance(load, SpringLoad) else 0.0
     K_e = load.parallel_Nm_per_rad if isinstance(load, TorqueLoad) else K_e
     values = {name: float(getattr(settings, name)) for name in registry.march_settings()}
+    values["inertia"] += sum(settings.load_masses)
     has_friction_table, has_drag_table = settings.friction_by_tension is not None, settings.conduit_drag is not None
     has_drag = settings.drag_N != 0 or settings.added_drag is not None
     contacts, has_presliding = _contacts(settings)
@@ -399,6 +400,7 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
         element_share=contacts.element_share,
         elements=contacts.elements,
         radius=float(transmission.load_radius_m),
+        load_pulley=_pulley(settings, "load", transmission.load_radius_m),
         stiffness_load=float(K_e),
         load_damping=float(load_damping(settings, K_e)),
         kind=rows.PRESCRIBED_ANGLE if isinstance(load, AngleLoad | FixedLoad) else rows.IMPEDANCE,
@@ -410,6 +412,11 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
         drag_table=rows.NODE_ROWS + _size(settings.friction_by_tension) if has_drag_table else 0,
         **values,
     )
+
+
+def _pulley(settings: Settings, end: str, radius_m: float) -> Pulley:
+    by_bore = getattr(settings, f"{end}_eccentricity"), getattr(settings, f"{end}_eccentricity_rad")
+    return pulley_of(radius_m, *by_bore, getattr(settings, f"{end}_radius_factor"))
 
 
 def _contacts(settings: Settings) -> tuple[Contacts, bool]:

@@ -1,0 +1,79 @@
+"""How much cable a pulley winds, for a radius that changes with its angle.
+
+The radius is R (1 + e sin(theta + psi) + f(theta)), with the eccentricity e of a bore and a table f of any shape. The
+cables' travel is the integral of this radius over the angle.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ccmodel.kernel import kernel
+from ccmodel.mechanisms.tables import Table
+
+
+class Pulley(NamedTuple):
+    """A pulley's radius by its angle.
+
+    Attributes
+    ----------
+    radius_m : float
+        R.
+    eccentricity, phase_rad : float
+        e and psi.
+    knots_rad, added, added_rad : ndarray, shape (knots,)
+        Angles at the knots of f, its values there, and its integral from the first knot; empty without f, which is
+        piecewise linear between knots and constant beyond them.
+    """
+
+    radius_m: float
+    eccentricity: float
+    phase_rad: float
+    knots_rad: NDArray
+    added: NDArray
+    added_rad: NDArray
+
+
+def pulley_of(radius_m: float, eccentricity: float, phase_rad: float, factor: Table | None) -> Pulley:
+    """A pulley whose radius is eccentric, and `factor` times the mean one if that is given."""
+    if factor is None:
+        return Pulley(float(radius_m), float(eccentricity), float(phase_rad), np.zeros(0), np.zeros(0), np.zeros(0))
+    x, f = factor.knots, factor.values - 1.0
+    integral = np.concatenate([[0.0], np.cumsum(np.diff(x) * (f[1:] + f[:-1]) / 2)])
+    return Pulley(float(radius_m), float(eccentricity), float(phase_rad), x, f, integral)
+
+
+@kernel
+def _added(theta: float, pulley: Pulley) -> tuple[float, float, float]:
+    """Integral of f from its first knot to an angle (rad), f there, and its derivative."""
+    x, f, integral = pulley.knots_rad, pulley.added, pulley.added_rad
+    if theta <= x[0]:
+        return f[0] * (theta - x[0]), f[0], 0.0
+    last = x.size - 1
+    if theta >= x[last]:
+        return integral[last] + f[last] * (theta - x[last]), f[last], 0.0
+    k = min(int((theta - x[0]) / (x[last] - x[0]) * last), last - 1)
+    slope, beyond = (f[k + 1] - f[k]) / (x[k + 1] - x[k]), theta - x[k]
+    return integral[k] + (f[k] + 0.5 * slope * beyond) * beyond, f[k] + slope * beyond, slope
+
+
+@kernel
+def winding(theta: float, pulley: Pulley) -> tuple[float, float, float]:
+    """Cable travel over R (rad), from any zero; the radius over R, and the derivative of the latter by the angle."""
+    e, psi = pulley.eccentricity, pulley.phase_rad
+    travel, factor, slope = theta - e * np.cos(theta + psi), 1.0 + e * np.sin(theta + psi), e * np.cos(theta + psi)
+    if pulley.knots_rad.size:
+        added_rad, added, by_angle = _added(theta, pulley)
+        return travel + added_rad, factor + added, slope + by_angle
+    return travel, factor, slope
+
+
+@kernel
+def winding_change(theta: float, rotation: float, pulley: Pulley) -> float:
+    """Cable travel over R (rad) of a rotation from theta; by the bore without cancellation for a small one."""
+    e, psi = pulley.eccentricity, pulley.phase_rad
+    change = rotation + 2.0 * e * np.sin(theta + psi + 0.5 * rotation) * np.sin(0.5 * rotation)
+    if pulley.knots_rad.size:
+        change += _added(theta + rotation, pulley)[0] - _added(theta, pulley)[0]
+    return change
