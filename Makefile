@@ -9,9 +9,10 @@ REGRESSORS ?= $(RIVALS)
 # them would compile all libraries from their sources again, which takes three times as long as the imports themselves.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help results real data test long-tests fuzz docs bench accuracy-gate input-checks diagnosis-settings decision-rules \
-  form-errors joint-rigs law-bands outside-rigs past several-effects table-one coverage proof proof-full proof-real \
-  slurm-test kills same-bytes load mutants lint lint-types lint-style lock sbom clean
+.PHONY: help results real data test short-tests long-tests fuzz docs bench accuracy-gate input-checks \
+  diagnosis-settings decision-rules form-errors joint-rigs law-bands outside-rigs past several-effects table-one \
+  coverage proof proof-full proof-real slurm-test kills same-bytes load mutants lint lint-types lint-style lock sbom \
+  clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -46,12 +47,15 @@ real: $(VENV)/.ready  ## run the pipeline on the public da Vinci recordings: mak
 data: $(VENV)/.ready  ## record data/raw again with the virtual rig
 	$(BIN)/virtualrig record config/virtual-rig.yaml --out data/raw --concealed data/concealed.json
 
+# The linters run while the first tests wait for one of them to compile the solvers.
+test: $(VENV)/.ready  ## run the linters and all tests but the long ones
+	$(MAKE) --no-print-directory -j 3 short-tests lint
+
 # One process more than cores: a test of the pipeline often waits for Snakemake. BLAS has one thread in each: with more
 # of them the tests take a fifth more of the cores.
-test: $(VENV)/.ready  ## run the linters and all tests but the long ones
+short-tests: $(VENV)/.ready
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $$(($(CORES) + 1)) --dist loadfile --no-loadscope-reorder \
 	  -m "not long"
-	$(MAKE) --no-print-directory -j $(CORES) lint
 
 fuzz: $(VENV)/.ready  ## damage batches and files, and run the exact solver, FUZZ times as often as the tests do: docs/trust.md
 	FUZZ=$(or $(FUZZ),60) $(BIN)/python -m pytest -n $(CORES) --dist loadfile tests/rig/test_damaged_batches.py \

@@ -39,7 +39,8 @@ def pulley_of(radius_m: float, eccentricity: float, phase_rad: float, factor: Ta
     """A pulley whose radius is eccentric, and `factor` times the mean one if that is given."""
     if factor is None:
         return Pulley(float(radius_m), float(eccentricity), float(phase_rad), np.zeros(0), np.zeros(0), np.zeros(0))
-    x, f = factor.knots, factor.values - 1.0
+    # The march is compiled for contiguous arrays.
+    x, f = np.ascontiguousarray(factor.knots), np.ascontiguousarray(factor.values - 1.0)
     integral = np.concatenate([[0.0], np.cumsum(np.diff(x) * (f[1:] + f[:-1]) / 2)])
     return Pulley(float(radius_m), float(eccentricity), float(phase_rad), x, f, integral)
 
