@@ -167,19 +167,18 @@ def _linearised(base: CandidateFit, tried: Hypothesis, law: Law, start: Mapping[
     def of(i: int) -> tuple[NDArray, NDArray]:
         w = base.whitened[i]
         w = w.with_parameters(hypothesis.of(w.observations.parameters))
-        here = w.errors(about)
-        step = {n: STEP_OF_MASS * start[n] if has_effect else 1.0 for n in names}
         if is_clipped and not has_effect:
             columns = [w.errors(about | {n: 1.0}) - w.errors(about | {n: -1.0}) for n in names]
-        else:
-            columns = [(w.errors(about | {n: start[n] + step[n]}) - here) / step[n] for n in names]
-        return here, np.column_stack(columns)
+            return base.residuals[i], np.column_stack(columns)
+        here = w.errors(about)
+        step = {n: STEP_OF_MASS * start[n] if has_effect else 1.0 for n in names}
+        columns = [(w.errors(about | {n: start[n] + step[n]}) - here) / step[n] for n in names]
+        return here if has_effect else base.residuals[i], np.column_stack(columns)
 
     found = each(base.whitened, lambda i, w: of(i))
-    jacobian = [np.column_stack([J, D[: len(J)]]) for J, (_, D) in zip(base.jacobian, found, strict=True)]
-    residuals = base.residuals
-    if has_effect:
-        residuals = [here[: len(e)] for e, (here, _) in zip(base.residuals, found, strict=True)]
+    rows = [len(e) for e in base.residuals]
+    residuals = [e[:n] for n, (e, _) in zip(rows, found, strict=True)]
+    jacobian = [np.column_stack([J, D[:n]]) for n, J, (_, D) in zip(rows, base.jacobian, found, strict=True)]
     return replace(base, hypothesis=hypothesis, values=about, residuals=residuals, jacobian=jacobian)
 
 
