@@ -110,7 +110,8 @@ def noise_floor(
     """Root mean square error of a model with the true physics, by channel: repeatability plus sensors.
 
     The recording is simulated again with friction higher by its standard deviation from run to run, the drive offset by
-    one standard deviation of its sub-count position, and a past in the middle of its range. The difference is added in
+    one standard deviation of its sub-count position, and a past in the middle of its range. A model takes the tension
+    from the rest: the pretension is such that the load cells read the same there. The difference is added in
     quadrature to the sensors' noise and to the uncertainty of their zeros. The load's sub-count position counts twice,
     because its zero is read at the same rest. Both load cells give the pretension at rest, so that each is off by half
     the difference of their zeros.
@@ -130,6 +131,8 @@ def noise_floor(
     repeat = replace(preparation, friction_coefficient=friction, **_usual_past(campaign.repeatability))
     offset = plan.model_copy(update={"excitation": OffsetMotion(plan.excitation, np.sqrt(count_variance))})
     first = noise_free_channels(campaign, trajectory)
+    at_rest = _at_rest(noise_free_channels(campaign, simulate(campaign, offset, repeat)))
+    repeat = replace(repeat, pretension_N=repeat.pretension_N * _at_rest(first) / at_rest)
     second = noise_free_channels(campaign, simulate(campaign, offset, repeat))
     torque = _noise_variance(sensors.torque) + sensors.torque.accuracy_Nm**2 / 3
     force = _noise_variance(sensors.load_cell) + sensors.load_cell.accuracy_N**2 / 6
@@ -141,6 +144,11 @@ def noise_floor(
         "F_load_N": force,
     }
     return {name: float(np.sqrt(np.mean((first[name] - second[name]) ** 2) + sensor_variance[name])) for name in first}
+
+
+def _at_rest(channels: Mapping[str, NDArray]) -> float:
+    """Sum of all tensions at the first sample, N."""
+    return float(channels["F_drive_N"][0] + channels["F_load_N"][0])
 
 
 def _usual_past(spread: Repeatability) -> dict[str, Any]:

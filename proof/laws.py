@@ -12,7 +12,7 @@ from proof.outcome import DECISION_THRESHOLD, Outcome, is_located, same_place
 # A confident law of a wrong slot counts as wrong if its model's error is above so many noise floors.
 STILL_WRONG = 2.0
 # Slots whose values are factors, and those in which an average belongs to nothing but the law.
-FACTORS, NOT_CENTRED = ("sliding-friction", "cable-stretch"), ("end-stretch",)
+FACTORS, NOT_CENTRED = ("sliding-friction", "cable-stretch"), ("end-stretch", "pulley-radius")
 PREFIX = "unlisted-"
 
 

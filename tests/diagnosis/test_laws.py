@@ -14,7 +14,9 @@ from builders import spoil, write_batch
 from ccmodel import cli
 from ccmodel.channels import T1
 from ccmodel.deadline import UNLIMITED
-from ccmodel.diagnosis.laws import _unit_of, proposals
+from ccmodel.diagnosis.equation_error import INERTIA
+from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.laws import _missing_mass, _unit_of, proposals
 from ccmodel.diagnosis.settings import WITHIN_BAND
 from ccmodel.geometry import ConduitPath
 from ccmodel.mechanisms import laws
@@ -24,6 +26,7 @@ from ccmodel.model.general import Active, simulate
 from ccmodel.model.parameters import mechanism_key
 from made_observations import PARAMETERS, batch, calibrated
 
+MASS, ZETA = mechanism_key(*INERTIA, "J"), mechanism_key(*INERTIA, "zeta")
 K_TORQUE = 0.0234
 # Enough for a single law, and less than a diagnosis has: sets of listed mechanisms take most runs.
 RUNS = "5000"
@@ -203,12 +206,25 @@ def test_a_mass_is_proposed_about_the_one_that_a_regression_shows():
     law, J = laws()["learned-load-by-acceleration"], 2e-4
     truth = replace(PARAMETERS, mechanisms=(Active("load-inertia", "load", {"J": J, "zeta": 0.05}),))
     base = calibrated(batch(truth=truth))
-    key = mechanism_key("load-inertia", "load", "J")
-    (about_none,), (proposal,) = (proposals(base, [law], UNLIMITED, known=k) for k in ({}, {key: 0.97 * J}))
-    assert proposal.evidence > about_none.evidence + 100
-    fixed = {name.rsplit("/", 1)[1]: value for name, value in proposal.hypothesis.fixed}
-    x, torque = law.at_knots(fixed | {"z1": next(iter(proposal.values.values()))})
-    assert torque[-1] / x[-1] == pytest.approx(J, rel=0.03)
+    (about_none,), *found = (
+        proposals(base, [law], UNLIMITED, known=k) for k in ({}, {MASS: 0.9 * J}, {MASS: 1.08 * J})
+    )
+    for (proposal,) in found:
+        assert proposal.evidence > about_none.evidence + 100
+        fixed = {name.rsplit("/", 1)[1]: value for name, value in proposal.hypothesis.fixed}
+        x, torque = law.at_knots(fixed | {"z1": next(iter(proposal.values.values()))})
+        assert torque[-1] / x[-1] == pytest.approx(J, rel=0.1)
+
+
+def test_a_mass_that_the_model_has_already_is_not_proposed_again():
+    law, J = laws()["learned-load-by-acceleration"], 2e-4
+    with_mass = replace(PARAMETERS, mechanisms=(Active("load-inertia", "load", {"J": J, "zeta": 0.05}),))
+    base = calibrated(batch(truth=with_mass))
+    has_it = replace(base, hypothesis=Hypothesis((INERTIA,)), values=base.values | {ZETA: 0.05, MASS: J})
+    assert _missing_mass(base, {MASS: J}) == J
+    assert _missing_mass(has_it, {MASS: 1.02 * J}) == 0.0
+    assert _missing_mass(has_it, {MASS: 2 * J}) == pytest.approx(J)
+    assert law.mechanism.parameter("z1").low == 0.0, "no mass is negative"
 
 
 def test_a_law_of_a_quantity_that_does_not_vary_is_left_out_with_a_message():

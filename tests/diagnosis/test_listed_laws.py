@@ -174,6 +174,21 @@ def test_the_report_says_where_a_law_is_a_constant():
     assert "Friction along the conduits is constant, confidence 0.90" in said("a", name="stribeck", distance=0.9)
 
 
+def test_the_report_says_by_how_much_a_radius_is_wrong():
+    law = {
+        "formula": "a",
+        "slot": "pulley-radius",
+        "place": "drive-pulley",
+        "argument_is": "the drive pulley's angle",
+        "parameters": [{"name": "a", "value": 1.0312, "low": 1.03, "high": 1.033, "unit": "1"}],
+        "indistinguishable": [],
+        "confidence": 0.95,
+        "channel": None,
+        "nearest_listed": None,
+    }
+    assert "The radius of the drive pulley is 1.03 times the stated one, confidence 0.95" in law_claim(law)
+
+
 def test_a_delay_is_said_of_its_end_and_compared_with_a_late_clock():
     law = laws()["learned-sensor-map-load-delay-by-time"]
     found = learned(law, lambda t: np.full(t.shape, 0.012), sd=0.01)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_trapezoid
 
 from ccmodel import mechanisms as registry
 from ccmodel.channels import TAU_IN, THETA_IN, THETA_OUT
@@ -12,8 +13,9 @@ from ccmodel.mechanisms.law_forms import DRAG, basis
 from ccmodel.mechanisms.learned import COARSE, FINE
 from ccmodel.mechanisms.presliding import Contacts
 from ccmodel.mechanisms.tables import Table, pulled, stretched
+from ccmodel.mechanisms.winding import pulley_of, winding, winding_change
 from ccmodel.model.load import AngleLoad, FixedLoad, SpringLoad, TorqueLoad
-from tests.general_runs import HALF_LOOP, K_E, MU, K, L, loop_area, run, sine
+from tests.general_runs import HALF_LOOP, K_E, MU, K, L, R, loop_area, run, sine
 
 EVERY = list(laws().values())
 RANGES = {"tension": (1.0, 12.0), "position-along-conduit": (0.0, 1.0), "distance-since-reversal": (1e-5, 1.0)}
@@ -256,7 +258,10 @@ def test_cables_of_a_learned_compliance_are_those_that_settle():
 
 @pytest.mark.parametrize(
     ("end", "name"),
-    [("drive", "learned-pulley-radius-by-drive-angle-fine"), ("load", "learned-pulley-radius-load-by-load-angle-fine")],
+    [
+        ("drive", "learned-pulley-radius-drive-by-drive-angle-fine"),
+        ("load", "learned-pulley-radius-load-by-load-angle-fine"),
+    ],
 )
 def test_a_radius_by_angle_is_that_of_an_eccentric_pulley(end, name):
     law = laws()[name]
@@ -266,9 +271,29 @@ def test_a_radius_by_angle_is_that_of_an_eccentric_pulley(end, name):
     assert largest_difference(found, wanted) < 0.01 * largest_difference(run(sine()), wanted)
 
 
+@pytest.mark.parametrize("load", [FixedLoad(), AngleLoad(0.5 * sine())], ids=["fixed", "driven"])
+def test_a_radius_by_angle_acts_with_a_load_that_is_held_or_driven(load):
+    law = laws()["learned-pulley-radius-drive-by-drive-angle-fine"]
+    found = run(sine(), with_values(law, lambda theta: 0.06 * np.sin(theta + 0.7)), load=load)
+    wanted = run(sine(), ("pulley-eccentricity", "drive-pulley", {"e": 0.06, "psi": 0.7}), load=load)
+    np.testing.assert_allclose(found.T1_N, wanted.T1_N, rtol=0, atol=1e-3 * np.ptp(wanted.T1_N))
+
+
+def test_the_travel_is_the_integral_of_the_radius():
+    """Between knots, at them and beyond them; a table and the bore's eccentricity add up."""
+    x = np.array([-0.5, 0.1, 0.7, 1.3])
+    pulley = pulley_of(R, 0.05, 0.3, Table(x, np.array([1.1, 0.8, 1.3, 0.9])))
+    theta = np.linspace(-1.0, 2.0, 3001)
+    travel, factor, slope = np.array([winding(angle, pulley) for angle in theta]).T
+    assert travel - travel[0] == pytest.approx(cumulative_trapezoid(factor, theta, initial=0.0), abs=1e-6)
+    inside = np.abs(theta[:, None] - x).min(axis=1) > 2e-3
+    assert np.gradient(factor, theta)[inside][1:-1] == pytest.approx(slope[inside][1:-1], abs=1e-6)
+    assert winding_change(-0.8, 2.4, pulley) == pytest.approx(winding(1.6, pulley)[0] - winding(-0.8, pulley)[0])
+
+
 def test_a_radius_by_angle_keeps_the_work_of_its_torque():
     """Without friction, the drive's work over a cycle is none."""
-    law = laws()["learned-pulley-radius-by-drive-angle"]
+    law = laws()["learned-pulley-radius-drive-by-drive-angle"]
     theta_in = sine(cycles=3)
     response = run(theta_in, with_values(law, lambda theta: 0.2 * np.cos(3 * theta)), mu=0.0)
     cycle = slice(500, 1501)

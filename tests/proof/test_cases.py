@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import yaml
@@ -174,7 +176,7 @@ def test_the_noise_floor_adds_sensors_and_repeatability(poor, monkeypatch):
     def simulated(campaign, plan, preparation):
         torque = preparation.friction_coefficient * np.ones_like(time_s)
         angle, _ = plan.excitation.angle_and_rate(time_s)
-        return Trajectory(time_s, angle, angle, *(np.zeros_like(time_s) for _ in range(4)), torque, torque)
+        return Trajectory(time_s, angle, angle, *(np.ones_like(time_s) for _ in range(4)), torque, torque)
 
     monkeypatch.setattr(build, "simulate", simulated)
     campaign = poor.campaign.model_copy(update={"rig": poor.campaign.rig.model_copy(update={"effects": Effects()})})
@@ -188,6 +190,20 @@ def test_the_noise_floor_adds_sensors_and_repeatability(poor, monkeypatch):
     count = 2 * np.pi / 2000 / np.sqrt(12)
     # Two counts of the load and, once the drive moves, one of the drive.
     assert floor["theta_out_rad"] == pytest.approx(np.sqrt(3) * count, rel=0.05)
+
+
+def test_the_noise_floor_has_what_the_rest_does_not_show_of_the_initial_tension():
+    """A model takes the tension from the rest; a curved profile has another mean, which shows once the cables slide."""
+    case = draw(3, "clean")
+    plan, campaign = case.kept_back[0], case.campaign
+    curved = replace(build.prepare(campaign, plan, np.random.default_rng(1)), profile_curvature=(0.3, 0.3))
+    even = replace(curved, profile_curvature=(0.0, 0.0))
+    floors, at_rest = [], []
+    for preparation in (even, curved):
+        trajectory = build.simulate(campaign, plan, preparation)
+        floors.append(build.noise_floor(campaign, plan, preparation, trajectory)["F_drive_N"])
+        at_rest.append(trajectory.T1_N[0] + trajectory.T3_N[0])
+    assert np.sqrt(floors[1] ** 2 - floors[0] ** 2) == pytest.approx(abs(at_rest[1] - at_rest[0]), rel=0.5)
 
 
 def test_a_rig_that_has_some_of_its_effects_is_otherwise_the_same():

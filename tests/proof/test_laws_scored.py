@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from proof.laws import inside, is_confidently_wrong_law, is_slot_right, score_of_laws
+from proof.laws import absorbed, inside, is_confidently_wrong_law, is_slot_right, score_of_laws
 from proof.outcome import Outcome
 
 X = np.linspace(0.5, 12.0, 9)
@@ -57,6 +57,13 @@ def test_only_a_law_of_an_angle_has_its_slope_from_the_calibration(argument, exp
     key = answer(slot="bearing-torque", argument=argument, y=lambda x: 2e-3 * np.sin(x))
     learned = law(lambda x: 2e-3 * np.sin(x) + 0.01 * x - 0.3, sd=1e-5, slot="bearing-torque", arguments=[argument])
     assert inside(outcome(key, learned)) == pytest.approx(expected, abs=0.2)
+
+
+def test_a_radius_has_no_slope_from_the_calibration():
+    """The calibration takes a pulley's radius as stated."""
+    angle = np.linspace(-0.6, 0.6, 9)
+    truth = answer(slot="pulley-radius", argument="drive-angle")["truth"][0]
+    assert absorbed(1 + 0.05 * angle, angle, np.ones(9), truth) == pytest.approx(1 + 0.05 * angle)
 
 
 def test_slots_and_arguments_are_counted():

@@ -13,6 +13,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel import mechanisms as registry
 from ccmodel.channels import CHANNELS, TAU_OUT, TENSIONS, THETA_IN
 from ccmodel.deadline import Deadline
 from ccmodel.diagnosis import settings
@@ -26,12 +27,14 @@ from ccmodel.inference.pool import each
 from ccmodel.mechanisms import Sensing, laws
 from ccmodel.mechanisms.law_forms import ADDED_BEND, CONSTANT_DRAG, DELAY, DRAG, ELEMENTS_IN_BEARING, IN_BEARING
 from ccmodel.mechanisms.learned import Law
+from ccmodel.model.general.run import settings_of
 from ccmodel.model.parameters import mechanism_key
 from ccmodel.model.run import simulate
 from ccmodel.progress import Progress, silent
 
-# Share of a mass over which its derivative is taken: a load that rings gets out of step within a few per cent.
-STEP_OF_MASS = 0.01
+# Share of a mass over which its derivative is taken, and masses about which it is linearised, over the one that a
+# regression shows: a load that rings gets out of step within a few per cent.
+STEP_OF_MASS, MASSES_TRIED = 0.01, (0.9, 1.0, 1.1)
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,7 @@ def proposals(
     A law that the model cannot be run with, or whose argument does not vary, is left out, and a message says so.
     """
     nothing = NormalEquations.of(base).log_evidence
-    mass = 0.0 if INERTIA in base.hypothesis.acting else known.get(mechanism_key(*INERTIA, "J"), 0.0)
+    mass = _missing_mass(base, known)
     motions = each(base.whitened, lambda i, w: _motion(base, i))
     channels = {c for w in base.whitened for c in w.observations.channels}
     found = []
@@ -77,11 +80,19 @@ def proposals(
         if law.channel is not None and law.channel not in channels:
             continue
         try:
-            about = mass if law.form.in_proportion else 0.0
-            found.append(max(_proposed(base, law, motions, nothing, about), key=lambda p: p.evidence))
+            masses = [share * mass for share in MASSES_TRIED] if law.form.in_proportion and mass > 0.0 else []
+            tried = (p for about in (0.0, *masses) for p in _proposed(base, law, motions, nothing, about))
+            found.append(max(tried, key=lambda p: p.evidence))
         except (ModelError, ValueError) as error:
             progress(f"{law.name} at {law.place}: not proposed ({error})")
     return sorted(found, key=lambda p: -p.evidence)
+
+
+def _missing_mass(base: CandidateFit, known: Mapping[str, float]) -> float:
+    """What a model lacks of the inertia that a regression shows, kg m^2; 0 if that is no plausible inertia."""
+    acting = settings_of(base.model(base.whitened[0].observations.parameters).mechanisms)
+    missing = known.get(mechanism_key(*INERTIA, "J"), 0.0) - acting.inertia - sum(acting.load_masses)
+    return missing if missing >= registry.get(INERTIA[0]).parameter("J").low else 0.0
 
 
 def _motion(base: CandidateFit, i: int) -> Sensing:
@@ -117,6 +128,8 @@ def _proposed(
         scaled = equations.scaled(np.where(is_new, larger, 1.0))
         x = dict(zip(linear.values, scaled.most_probable.tolist(), strict=True))
         values = {name: start[name] / larger + x[name] for name in one.start}
+        if law.form.in_proportion:
+            values = {name: max(value, 0.0) for name, value in values.items()}
         yield Proposal(one, scaled.log_evidence - nothing, values)
 
 
@@ -157,7 +170,10 @@ def _paths(base: CandidateFit) -> list[ConduitPath]:
 
 
 def _linearised(base: CandidateFit, tried: Hypothesis, law: Law, start: Mapping[str, float]) -> CandidateFit:
-    """A fitted model with a law whose coefficients have a start, and its residuals and derivatives there."""
+    """A fitted model with a law whose coefficients have a start: its residuals there, and derivatives by the law.
+
+    The derivatives by the model's own unknowns stay those of the model without the law.
+    """
     hypothesis, about = base.hypothesis.and_also(tried), base.values | dict(start)
     names = [mechanism_key(law.name, law.place, name) for name in law.coefficients]
     has_effect = any(start.values())

@@ -6,8 +6,9 @@ what the recordings visit, and constant beyond them:
 
     y(x) = scale sum_k B_jk z_k at knot j,    z_k ~ N(0, 1)
 
-B is the root of a squared exponential covariance, so that z = 0 is no effect, and a smooth law is more probable than a
-rugged one. It has no mean where what a law adds on average belongs to the parameters of the calibration.
+A mass is a proportion instead, with one coefficient and without an end. B is the root of a squared exponential
+covariance, so that z = 0 is no effect, and a smooth law is more probable than a rugged one. It has no mean where what a
+law adds on average belongs to the parameters of the calibration.
 
 Laws are mechanisms that `ccmodel.mechanisms.names` does not list. `ccmodel.diagnosis.laws` learns them.
 """
@@ -137,7 +138,7 @@ class Law:
         of = ""
         if self.slot == SENSOR_MAP and self.channel is not None:
             of = f"-{short_name(self.channel)}".replace("_", "-")
-        if self.slot == END_STRETCH or self.form is DELAY or self.place == "load-pulley":
+        if self.slot in (END_STRETCH, PULLEY_RADIUS) or self.form is DELAY or self.place == "load-pulley":
             of = f"-{side(self.place)}"
         if self.form.name:
             of += f"-{self.form.name}"
@@ -272,14 +273,14 @@ class Law:
     @cached_property
     def mechanism(self) -> Mechanism:
         """The law as a mechanism."""
-        unit = self.argument.unit
+        unit, lowest = self.argument.unit, 0.0 if self.form.in_proportion else -4.0
         fixed = (
             Parameter("first", unit, -inf, inf, 0.0, "argument at the first knot", fixed=True),
             Parameter("last", unit, -inf, inf, 1.0, "argument at the last knot", fixed=True),
             Parameter("scale", self.unit, 0.0, inf, 1.0, "standard deviation of its values a priori", fixed=True),
         )
         coefficients = tuple(
-            Parameter(name, "1", -4.0, 4.0, 0.0, "coefficient of the law", scale="linear", prior_sd=1.0)
+            Parameter(name, "1", lowest, 4.0, 0.0, "coefficient of the law", scale="linear", prior_sd=1.0)
             for name in self.coefficients
         )
         return Mechanism(

@@ -36,7 +36,7 @@ class Pulley(NamedTuple):
 
 
 def pulley_of(radius_m: float, eccentricity: float, phase_rad: float, factor: Table | None) -> Pulley:
-    """A pulley whose radius is eccentric, and `factor` times the mean one if that is given."""
+    """An eccentric pulley; `factor` is 1 + f, none if not given."""
     if factor is None:
         return Pulley(float(radius_m), float(eccentricity), float(phase_rad), np.zeros(0), np.zeros(0), np.zeros(0))
     # The march is compiled for contiguous arrays.

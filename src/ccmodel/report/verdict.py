@@ -139,7 +139,10 @@ def law_claim(law: Mapping) -> str:
     what = f"The error of {symbol_of(law['channel'])}" if is_of_one else IN_SLOT[law["slot"]]
     what = what.format(side=side(law["place"]))
     others = f" (or on {' or '.join(law['indistinguishable'])})" if law["indistinguishable"] else ""
-    says = "is constant" if law.get("formula") == CONSTANT else f"depends on {law['argument_is']}{others}"
+    says = f"depends on {law['argument_is']}{others}"
+    if law.get("formula") == CONSTANT:
+        is_radius = law["slot"] == PULLEY_RADIUS
+        says = f"is {law['parameters'][0]['value']:.3g} times the stated one" if is_radius else "is constant"
     return (
         f"{what} {says}, confidence {law['confidence']:.2f}. {_resemblance(law)}; the law was learned from the"
         " recordings."

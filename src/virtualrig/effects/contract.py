@@ -45,8 +45,8 @@ class TrueLaw(NamedTuple):
     ----------
     slot, argument : str
     x, y : ndarray, shape (n,)
-        Arguments, and there a factor of friction or of a compliance, or what is added to a torque or a reading. Up to
-        what a calibration absorbs. Empty for a law that is none of a single quantity.
+        Arguments, and there a factor of friction, of a compliance or of a pulley's radius, or what is added to a
+        torque or a reading. Up to what a calibration absorbs. Empty for a law that is none of a single quantity.
     """
 
     slot: str

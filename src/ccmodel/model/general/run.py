@@ -31,7 +31,8 @@ from ccmodel.model.transmission import Transmission
 
 ELEMENTS = 32
 # Further passes of the march for laws of the load and its bearing: each leaves the share of the error that the law's
-# stiffness is of that of the cables.
+# stiffness is of that of the cables. About the frequency at which a load with mass rings it leaves more: with a damping
+# ratio of 0.16 three passes are off by 1e-2 N m, where the torque is 0.04 N m.
 LOAD_LAW_PASSES = 3
 # The run that only gives the mean torsion of a drive train has cells of so many times the length.
 COARSER = 4
