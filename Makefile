@@ -47,7 +47,7 @@ real: $(VENV)/.ready  ## run the pipeline on the public da Vinci recordings: mak
 data: $(VENV)/.ready  ## record data/raw again with the virtual rig
 	$(BIN)/virtualrig record config/virtual-rig.yaml --out data/raw --concealed data/concealed.json
 
-# The linters run while the first tests wait for one of them to compile the solvers.
+# The linters, two processes, run while the first tests wait for one of them to compile the solvers.
 test: $(VENV)/.ready  ## run the linters and all tests but the long ones
 	$(MAKE) --no-print-directory -j 3 short-tests lint
 
