@@ -57,13 +57,13 @@ def test_the_evidence_is_that_of_a_normal_distribution():
         assert found == pytest.approx(expected, rel=1e-9)
 
 
-def test_scaled_derivatives_are_those_of_unknowns_in_another_unit():
-    """The most probable change predicts the same errors as that of the scaled derivatives computed anew."""
+def test_scaled_equations_are_those_of_unknowns_in_another_unit():
+    """The same as computed anew; in a larger unit a value is nearer to its prior's mean, whose deviation is 1 unit."""
     random = np.random.default_rng(5)
     J, e, factors = random.standard_normal((12, 3)), random.standard_normal(12), np.array([1.0, 0.1, 7.0])
     prior_sd, from_mean = np.array([0.5, 2.0, 1.0]), np.array([0.0, 1.3, 0.0])
     scaled = NormalEquations(J.T @ J, J.T @ e, float(e @ e), prior_sd, from_mean).scaled(factors)
-    K = J * factors
+    K, from_mean = J * factors, from_mean / factors
     anew = NormalEquations(K.T @ K, K.T @ e, float(e @ e), prior_sd, from_mean)
     assert scaled.log_evidence == pytest.approx(anew.log_evidence, rel=1e-12)
     covariance = np.linalg.inv(K.T @ K + np.diag(prior_sd**-2.0))
