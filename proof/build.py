@@ -104,6 +104,18 @@ class OffsetMotion:
         return angle + self.offset_rad * step, rate + self.offset_rad * slope / OFFSET_RISE_S
 
 
+@dataclass(frozen=True)
+class Start:
+    """The first samples of a motion."""
+
+    motion: Excitation
+    duration_s: float
+
+    def angle_and_rate(self, time_s: NDArray) -> tuple[NDArray, NDArray]:
+        """Drive angle (rad) and its rate (rad/s) at `time_s` (s); same shape as `time_s`."""
+        return self.motion.angle_and_rate(time_s)
+
+
 def noise_floor(
     campaign: Campaign, plan: RecordingPlan, preparation: Preparation, trajectory: Trajectory
 ) -> dict[str, float]:
@@ -131,7 +143,8 @@ def noise_floor(
     repeat = replace(preparation, friction_coefficient=friction, **_usual_past(campaign.repeatability))
     offset = plan.model_copy(update={"excitation": OffsetMotion(plan.excitation, np.sqrt(count_variance))})
     first = noise_free_channels(campaign, trajectory)
-    at_rest = _at_rest(noise_free_channels(campaign, simulate(campaign, offset, repeat)))
+    start = plan.model_copy(update={"excitation": Start(plan.excitation, 1 / campaign.sensors.sample_rate_Hz)})
+    at_rest = _at_rest(noise_free_channels(campaign, simulate(campaign, start, repeat)))
     repeat = replace(repeat, pretension_N=repeat.pretension_N * _at_rest(first) / at_rest)
     second = noise_free_channels(campaign, simulate(campaign, offset, repeat))
     torque = _noise_variance(sensors.torque) + sensors.torque.accuracy_Nm**2 / 3

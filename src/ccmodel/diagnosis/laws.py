@@ -120,7 +120,8 @@ def _proposed(
         return Hypothesis(((law.name, law.place),), fixed=of_law)
 
     tried = hypothesis(settings.LAW_STEP * unit)
-    start = _in_proportion(law, tried, about) if about else dict.fromkeys(tried.start, 0.0)
+    coefficient = about * last / (settings.LAW_STEP * unit * law.basis[-1, 0]) if about else 0.0
+    start = dict.fromkeys(tried.start, float(coefficient))
     linear = _linearised(base, tried, law, start)
     equations, is_new = NormalEquations.of(linear), np.array([name not in base.values for name in linear.values])
     for share in settings.LAW_SCALES:
@@ -131,14 +132,6 @@ def _proposed(
         if law.form.in_proportion:
             values = {name: max(value, 0.0) for name, value in values.items()}
         yield Proposal(one, scaled.log_evidence - nothing, values)
-
-
-def _in_proportion(law: Law, hypothesis: Hypothesis, factor: float) -> dict[str, float]:
-    """Coefficients, by key, of a law that is a factor times its argument."""
-    of_law = {p.name: mechanism_key(law.name, law.place, p.name) for p in law.mechanism.parameters}
-    fixed = dict(hypothesis.fixed)
-    x, unit = law.at_knots({name: fixed.get(key, 1.0) for name, key in of_law.items()})
-    return dict.fromkeys(hypothesis.start, float(factor * x[-1] / unit[-1]))
 
 
 def _unit_of(law: Law, base: CandidateFit, motions: Sequence[Sensing]) -> float:

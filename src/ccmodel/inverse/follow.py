@@ -139,9 +139,9 @@ def _followed_general(
     set_grip(ph, node, slide, friction_factor[0], 0.0)
     fixed_grip = ph.stribeck_rise == 0.0 and len(friction_factor) == 1
     span = wanted.max() - wanted.min()
-    part = LARGEST_PART * span * ph.radius
+    part = LARGEST_PART * span * ph.load_pulley.radius_m
     first, here = load[rows.ANGLE], 0.0
-    guess = span * ph.radius / wanted.size
+    guess = span * ph.load_pulley.radius_m / wanted.size
     for j in range(wanted.size):
         dt = time_s[j] - time_s[j - 1] if j > 0 else 0.0
         factor = friction_factor[min(j, len(friction_factor) - 1)]
@@ -163,7 +163,7 @@ def _followed_general(
             # Where the drive has to move far, it does so in parts, each at the pace of a sample.
             low, high = 0.0, np.inf
             short, over = direction * (load[rows.ANGLE] - first - wanted[j]), 0.0
-            move = min(max(guess, ARRIVED * span * ph.radius), part)
+            move = min(max(guess, ARRIVED * span * ph.load_pulley.radius_m), part)
             solved, rotation, error = False, 0.0, 0.0
             for iteration in range(ITERATIONS):
                 slide[rows.NOW] = 0.0
@@ -175,11 +175,11 @@ def _followed_general(
                 if not solved:
                     high = np.inf
                     part, move = 0.5 * part, 0.5 * move
-                    if move < ARRIVED * span * ph.radius:
+                    if move < ARRIVED * span * ph.load_pulley.radius_m:
                         return j
                     continue
                 error = direction * (load[rows.ANGLE] + rotation - first - wanted[j])
-                if abs(error) <= ARRIVED * span or high - low <= 1e-12 * span * ph.radius:
+                if abs(error) <= ARRIVED * span or high - low <= 1e-12 * span * ph.load_pulley.radius_m:
                     arrived = True
                     break
                 if error < 0.0:
@@ -196,7 +196,7 @@ def _followed_general(
             accept(ph, piece, node, slide, mean, load, rotation, dt)
             here += direction * move
             travelled += move
-            if travelled > FURTHEST * span * ph.radius:
+            if travelled > FURTHEST * span * ph.load_pulley.radius_m:
                 return j
         theta_in[j] = _angle_that_winds(here / drive.radius_m, theta_in[max(j - 1, 0)], drive)
     return wanted.size

@@ -163,7 +163,7 @@ def filtered(
                 continue
             if not given and j > 0 and done + part >= 1.0 - ROUNDING:
                 response = lever * _response(ph, piece, node, slide, mean, load, rotation, misfit, step_dt, bristle)
-                if response < HIDDEN * lever / ph.radius:
+                if response < HIDDEN * lever / ph.load_pulley.radius_m:
                     response = 0.0
                 n = piece.shape[2] - 1
                 near = max(piece[rows.TENSION, 0, 0], 0.0) - max(piece[rows.TENSION, 1, 0], 0.0)

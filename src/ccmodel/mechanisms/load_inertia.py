@@ -24,7 +24,7 @@ def load_damping(settings: Settings, stiffness: float) -> float:
     return 2 * settings.damping_ratio * sqrt(settings.inertia * stiffness)
 
 
-J = Parameter("J", "kg m^2", 1e-5, 1e-2, 1e-4, "moment of inertia", screening_grid=MASSES)
+_J = Parameter("J", "kg m^2", 1e-5, 1e-2, 1e-4, "moment of inertia", screening_grid=MASSES)
 
 MECHANISM = Mechanism(
     name="load-inertia",
@@ -33,11 +33,11 @@ MECHANISM = Mechanism(
     sentence="the load has a moment of inertia of {J}",
     places=("load",),
     parameters=(
-        J,
+        _J,
         Parameter("zeta", "1", 1e-3, 0.3, 0.1, "damping ratio", screening_grid=(0.85,), continuation=True, default=0.0),
     ),
     mistaken_for=("time-skew",),
     depends_on_time=True,
     settings={"inertia": "J", "damping_ratio": "zeta"},
-    curves=(Curve(LOAD, "acceleration", lambda x, values: values["J"] * x, (J,)),),
+    curves=(Curve(LOAD, "acceleration", lambda x, values: values["J"] * x, (_J,)),),
 )

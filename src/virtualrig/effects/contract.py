@@ -66,7 +66,7 @@ LOG_SPEEDS, SPEEDS_RAD_PER_S, FORCES_N, TORQUES_NM, LOG_AGES = (
     (-0.07, 0.07),
     (-2, 0.5),
 )
-ACCELERATIONS = (-500.0, 500.0)
+ACCELERATIONS_RAD_PER_S2 = (-500.0, 500.0)
 # Torques over the radius of a pulley, N.
 PULLS_N = (-12.0, 12.0)
 POINTS = 129

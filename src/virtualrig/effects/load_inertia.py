@@ -2,12 +2,12 @@
 
 from typing import Any
 
-from virtualrig.effects.contract import ACCELERATIONS, TrueLaw, Twin, along
+from virtualrig.effects.contract import ACCELERATIONS_RAD_PER_S2, TrueLaw, Twin, along
 from virtualrig.strict import NonNegative
 
 
 def _law(rig: Any, place: str) -> TrueLaw:
-    acceleration = along(ACCELERATIONS)
+    acceleration = along(ACCELERATIONS_RAD_PER_S2)
     return TrueLaw("load", "acceleration", acceleration, rig.effects.load.inertia_kg_m2 * acceleration)
 
 

@@ -247,7 +247,7 @@ def _load(
     n = piece.shape[2] - 1
     theta = load[rows.ANGLE] + rotation
     _, radius_factor, radius_slope = winding(theta, ph.load_pulley)
-    R = ph.radius * radius_factor
+    R = ph.load_pulley.radius_m * radius_factor
     z, inside = dead_zone(theta, ph.half_gap)
     tau = torque + ph.stiffness_load * z + ph.cubic_stiffness * z**3
     slope = (ph.stiffness_load + 3 * ph.cubic_stiffness * z * z) * inside
@@ -265,7 +265,11 @@ def _load(
         slope += ph.load_friction_Nm * (by_rotation if rotation != 0.0 else 1.0 / ph.load_presliding_rad)
     difference = max(piece[rows.TENSION, 0, n], 0.0) - max(piece[rows.TENSION, 1, n], 0.0)
     load[rows.OMEGA_NEXT], load[rows.BEARING_NEXT], load[rows.TORQUE] = omega, bearing, tau
-    return R * difference - tau - ph.load_friction_Nm * bearing, slope - ph.radius * radius_slope * difference, R
+    return (
+        R * difference - tau - ph.load_friction_Nm * bearing,
+        slope - ph.load_pulley.radius_m * radius_slope * difference,
+        R,
+    )
 
 
 @kernel(error_model="numpy")
@@ -284,13 +288,13 @@ def imbalance(
 ) -> tuple[float, float, float, float, float]:
     """Imbalance of the whole chain: sum of squares (N^2), highest tension (N), and the terms of `_load`."""
     n = node.shape[2]
-    pulled = ph.radius * winding_change(load[rows.ANGLE], rotation, ph.load_pulley)
+    pulled = ph.load_pulley.radius_m * winding_change(load[rows.ANGLE], rotation, ph.load_pulley)
     slide[rows.NOW, 0, n + 1], slide[rows.NOW, 1, n + 1] = pulled, -pulled
     _tensions(ph, piece, slide, mean, follows)
     error = _nodes(ph, piece, node, slide, dt, bristle)
     G, slope, R = _load(ph, piece, load, rotation, torque, dt)
     if ph.kind == rows.IMPEDANCE:
-        error += (G / ph.radius) ** 2
+        error += (G / ph.load_pulley.radius_m) ** 2
     if ph.conduit_compliance > 0.0:
         for c in range(2):
             mean[rows.MEAN_EXCESS, c] = _mean_tension(piece, c) - mean[rows.MEAN_NEXT, c]

@@ -92,7 +92,6 @@ if TYPE_CHECKING:
         element_m: tuple[float, ...]
         element_share: tuple[float, ...]
         elements: int
-        radius: float
         load_pulley: Pulley
         stiffness_load: float
         load_damping: float
@@ -107,7 +106,7 @@ if TYPE_CHECKING:
 else:
     Physics = namedtuple(
         "Physics",
-        "has_settling has_relaxation relaxing_times_s bristle presliding creep element_m element_share elements radius "
+        "has_settling has_relaxation relaxing_times_s bristle presliding creep element_m element_share elements "
         "load_pulley stiffness_load load_damping kind general_friction has_spring_table has_friction_table drag_table "
         + " ".join(registry.march_settings()),
     )

@@ -343,7 +343,7 @@ def march(
         out[4, j] = load[rows.ANGLE]
         bearing = ph.load_friction_Nm * load[rows.BEARING]
         if prescribed:
-            R = ph.radius * winding(load[rows.ANGLE], ph.load_pulley)[1]
+            R = ph.load_pulley.radius_m * winding(load[rows.ANGLE], ph.load_pulley)[1]
             out[5, j] = R * (out[1, j] - out[3, j]) - bearing
         else:
             out[5, j] = load[rows.TORQUE]

@@ -88,7 +88,7 @@ def load_angle(physics: rows.Physics, T: NDArray, load: Load, series: NDArray) -
         return 0.0
     theta, force = 0.0, T[0, -1] - T[1, -1]
     for _ in range(50):
-        torque = physics.radius * winding(theta, physics.load_pulley)[1] * force
+        torque = physics.load_pulley.radius_m * winding(theta, physics.load_pulley)[1] * force
         before, theta = theta, _angle_at_rest(K, K3, physics.half_gap, torque, load)
         if theta == before:
             break

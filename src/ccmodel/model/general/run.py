@@ -400,7 +400,6 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
         element_m=contacts.element_m,
         element_share=contacts.element_share,
         elements=contacts.elements,
-        radius=float(transmission.load_radius_m),
         load_pulley=_pulley(settings, "load", transmission.load_radius_m),
         stiffness_load=float(K_e),
         load_damping=float(load_damping(settings, K_e)),
@@ -438,7 +437,7 @@ def _steps(physics: rows.Physics, transmission: Transmission, time_s: NDArray) -
     """
     if physics.inertia == 0 or physics.kind == rows.PRESCRIBED_ANGLE or time_s.size < 2:
         return 1
-    cables = 2 * transmission.axial_rigidity_N / transmission.path.length_m * physics.radius**2
+    cables = 2 * transmission.axial_rigidity_N / transmission.path.length_m * physics.load_pulley.radius_m**2
     rings_rad_per_s = np.sqrt((cables + physics.stiffness_load) / physics.inertia)
     wanted = rings_rad_per_s * float(np.median(np.diff(time_s))) / RINGING_STEP_RAD
     steps = int(max(2 ** np.ceil(np.log2(wanted)), 1))
