@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 
 from ccmodel import mechanisms as registry
-from ccmodel.channels import TAU_IN, THETA_IN, THETA_OUT
+from ccmodel.channels import TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
 from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.mechanisms import Sensing, laws
@@ -101,9 +101,9 @@ def test_a_law_of_the_cable_is_two_cables_that_differ(law, ratio, of):
     assert largest_difference(found, wanted) < 1e-6
 
 
-@pytest.mark.parametrize(("place", "angle"), [("drive-pulley", THETA_IN), ("load-pulley", THETA_OUT)])
-def test_elements_of_a_bearing_that_yield_soon_are_its_friction(place, angle):
-    law = next(law for law in EVERY if (law.slot, law.place, law.opposes) == ("bearing-torque", place, angle))
+@pytest.mark.parametrize("place", ["drive-pulley", "load-pulley"])
+def test_elements_of_a_bearing_that_yield_soon_are_its_friction(place):
+    law = next(law for law in EVERY if law.slot == "bearing-torque" and law.place == place and law.form.has_elements)
     values = values_of(law) | {"first": 1e-5, "last": 1e-3, "scale": 4e-3}
     x, _ = law.at_knots(values)
     # An element that yields after 0.1 mm has all of the friction.
@@ -130,7 +130,8 @@ def test_the_bearing_of_a_load_without_a_spring_has_its_torque_between_cables_an
     driven, with_law = (run(sine(), some, load=AngleLoad(sprung.theta_out_rad)) for some in ((), in_bearing(2e-3)))
     np.testing.assert_array_equal(with_law.T2_N, driven.T2_N)
     speed = np.gradient(sprung.theta_out_rad, 1 / 500)
-    np.testing.assert_allclose(driven.tau_out_Nm - with_law.tau_out_Nm, 2e-3 * speed.clip(-1, 1), atol=2e-4)
+    wrong_by = np.abs(driven.tau_out_Nm - with_law.tau_out_Nm - 2e-3 * speed.clip(-1, 1))
+    assert np.mean(wrong_by < 2e-4) > 0.99, "the speed of a step ends at its sample; at a start the mean one does not"
     torque = TorqueLoad(sprung.tau_out_Nm)
     np.testing.assert_allclose(run(sine(), in_bearing(2e-3), load=torque).tau_out_Nm, sprung.tau_out_Nm, atol=1e-9)
 
@@ -470,4 +471,41 @@ def test_a_law_of_the_load_is_the_loads_own_torque():
     soft, stiff = run(theta_in), run(theta_in, load=SpringLoad(K_E + slope))
     found = run(theta_in, (law.name, "load", values))
     change = np.abs(stiff.read[THETA_OUT] - soft.read[THETA_OUT]).max()
-    assert np.abs(found.read[THETA_OUT] - stiff.read[THETA_OUT]).max() < 0.05 * change
+    assert np.abs(found.read[THETA_OUT] - stiff.read[THETA_OUT]).max() < 0.02 * change
+
+
+def test_a_torque_by_speed_beside_a_mass_that_rings_is_its_damping():
+    J, zeta = 2e-4, 0.16
+    damping = 2 * zeta * np.sqrt(J * K_E)
+    law = with_values(laws()["learned-load-by-speed"], lambda x: 40 * damping * x, scale=40 * damping)
+    law[2].update(first=-40.0, last=40.0)
+    theta_in = np.where(sine() > 0.3, 0.3, sine())  # the drive stops, and the load rings
+    mass = [("load-inertia", "load", {"J": J, "zeta": z}) for z in (0.0, zeta)]
+    found, undamped, damped = run(theta_in, [mass[0], law]), run(theta_in, mass[:1]), run(theta_in, mass[1:])
+    for channel in (THETA_OUT, TAU_OUT):
+        effect = np.std(undamped.read[channel] - damped.read[channel])
+        assert np.std(found.read[channel] - damped.read[channel]) < 0.04 * effect, channel
+
+
+def test_elements_of_the_load_are_a_spring_until_they_yield():
+    law = laws()["learned-load-by-distance-since-reversal"]
+    values = values_of(law) | {"first": 1e-2, "last": 1.0, "scale": 1e-3}
+    x, _ = law.at_knots(values)
+    z = np.linalg.lstsq(1e-3 * law.basis, x, rcond=None)[0]
+    y = law.at_knots(values | dict(zip(law.coefficients, z.tolist(), strict=True)))[1]
+    found = run(sine(), (law.name, law.place, values | dict(zip(law.coefficients, z.tolist(), strict=True))))
+    travel = R * np.abs(found.theta_out_rad).max()
+    assert travel < x[0], "no element yields"
+    wanted = run(sine(), load=SpringLoad(K_E + float(R * np.sum(y / x))))
+    assert largest_difference(found, wanted) < 1e-6
+    assert largest_difference(run(sine()), wanted) > 0.01
+
+
+def test_two_laws_of_the_load_are_their_sum():
+    """So are a law that was kept and one that is learned beside it."""
+    one = with_values(laws()["learned-load-by-load-angle"], lambda x: 0.01 * x**3, scale=0.01)
+    other = with_values(laws()["learned-load-by-load-angle-fine"], lambda x: 0.02 * np.sin(5 * x), scale=0.02)
+    both = run(sine(), [one, other])
+    added = [np.interp(both.theta_out_rad, *laws()[name].at_knots(values)) for name, _, values in (one, other)]
+    np.testing.assert_allclose(both.tau_out_Nm - K_E * both.theta_out_rad, sum(added), atol=1e-9)
+    assert min(np.ptp(torque) for torque in added) > 1e-3

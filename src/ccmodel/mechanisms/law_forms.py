@@ -85,18 +85,16 @@ CONTACT_ELEMENTS = Form(
     "friction over that of sliding, after a reversal", "1", neutral=1.0, is_centred=False, shortest_yield=0.002
 )
 ADDED = Form("added to {symbol}, in {unit}")
-# A mass: passes of the march with a torque by acceleration diverge above the frequency at which the load rings.
+# A mass.
 IN_PROPORTION = replace(ADDED, in_proportion=True)
 # The zero of a load cell scatters between recordings by its accuracy; beyond that it belongs to no calibration.
 ADDED_TO_SUM = Form("added to {symbol}, in {unit}", is_centred=False)
 # A torque whose elements yield one after the other. A ball bearing's yield within a few hundredths of a millimetre.
 AGAINST_MOTION = Form("added to {symbol}, against the motion, in {unit}", is_centred=False, shortest_yield=0.002)
-# At the load they stand in the equations of motion: passes of the march would not converge with stiffer ones.
-AGAINST_LOAD = replace(AGAINST_MOTION, shortest_yield=0.01)
 # The bearing of the load's pulley is between the cables and the torque sensor.
 IN_BEARING = Form("torque of the {side} pulley's bearing on the cables, in N m", "N m")
 ELEMENTS_IN_BEARING = replace(
-    AGAINST_LOAD, meaning="torque of the {side} pulley's bearing, against its motion, in N m", unit="N m"
+    AGAINST_MOTION, meaning="torque of the {side} pulley's bearing, against its motion, in N m", unit="N m"
 )
 
 

@@ -72,7 +72,6 @@ from ccmodel.mechanisms.law_forms import (
     ADDED,
     ADDED_BEND,
     ADDED_TO_SUM,
-    AGAINST_LOAD,
     AGAINST_MOTION,
     CONSTANT_DRAG,
     CONTACT_ELEMENTS,
@@ -115,11 +114,6 @@ class Law:
     channel : str or None
         The channel that a torque or a reading is added to; None of a factor, a drag, a compliance, a delay, or a torque
         that no sensor reads.
-    opposes : str or None
-        The angle whose motion a torque of elements opposes: each of its knots is the travel at which an element yields,
-        and its value there is the torque of that element. Elements without it stand at every contact and oppose its
-        sliding: a knot is the travel since a reversal at which an element yields, and the value is its share of
-        friction.
     resolution : (int, float)
         Number of knots, and correlation length.
     """
@@ -129,7 +123,6 @@ class Law:
     argument: Argument
     form: Form
     channel: str | None = None
-    opposes: str | None = None
     resolution: tuple[int, float] = COARSE
 
     @property
@@ -165,29 +158,31 @@ class Law:
     def setting(self) -> str | None:
         """The solver's setting that takes the law, if it is one of the solver.
 
-        A law whose argument differs along the cables is a number or a table in the solver's equations. The others are
-        functions of a motion, and a setting holds several.
+        A number or a table stands in the solver's equations. A factor of friction by the drive's motion, which is known
+        beforehand, is a function of this motion; its setting holds several.
         """
         if self.form in _SETTING_OF:
             return _SETTING_OF[self.form]
-        of = (self.argument.name, self.place, "")
+        of = (self.argument.name, "")
         found = next((_SETTINGS[self.slot, one] for one in of if (self.slot, one) in _SETTINGS), None)
         return found and found.format(side=side(self.place))
 
     def written(self, x: NDArray, y: NDArray, before: Any) -> Any:
         """The value of its setting that had the value `before`, for values at knots; both of shape (knots,)."""
         if self.argument.has_two_values:
-            return float(np.clip(y[-1], -LARGEST_BIAS, LARGEST_BIAS))
+            return float(np.clip(before + y[-1], -LARGEST_BIAS, LARGEST_BIAS))
         if self.form.in_proportion:
             return (*before, float(max(y[-1] / x[-1], 0.0)))
-        if isinstance(before, tuple):
+        if self.setting == "friction_laws":
             return (*before, lambda sensing: self.added(sensing, x, y))
         if not y.any():
-            return None
+            return before
         if self.form.has_elements:
-            return Table(x, y)
-        values = self.form.possible(self.form.neutral + y)
-        return Table(x, values) if values.any() else None
+            return Table(x, y) if before is None else before.with_elements(x, y)
+        knots = x if before is None else np.union1d(x, before.knots)
+        neutral = self.form.neutral if before is None else before.at(knots)
+        values = self.form.possible(neutral + np.interp(knots, x, y))
+        return Table(knots, values) if values.any() else None
 
     @property
     def has_one_coefficient(self) -> bool:
@@ -246,10 +241,9 @@ class Law:
 
     def added(self, sensing: Sensing, x: NDArray, y: NDArray) -> NDArray:
         """What it adds along a run, to 1 if it is a factor, for values at knots; shape (n,)."""
-        if self.opposes is None:
-            return np.interp(self.argument.of(sensing), x, y)
-        radius = sensing.drive_radius_m if self.opposes == THETA_IN else sensing.load_radius_m
-        return y @ _slip(radius * sensing.channels[self.opposes], x)
+        if self.form.has_elements:  # of the drive pulley's bearing; the march has those of the contacts and the load
+            return y @ _slip(sensing.drive_radius_m * sensing.channels[THETA_IN], x)
+        return np.interp(self.argument.of(sensing), x, y)
 
     def is_of_slot(self, other: "Law") -> bool:
         """Whether another law stands in the same slot."""
@@ -323,7 +317,13 @@ class Law:
 
 
 # Settings of the solver by form, where that is not the usual one of its slot.
-_SETTING_OF = {DRAG: "conduit_drag", CONSTANT_DRAG: "added_drag", ADDED_BEND: "added_bend"}
+_SETTING_OF = {
+    DRAG: "conduit_drag",
+    CONSTANT_DRAG: "added_drag",
+    ADDED_BEND: "added_bend",
+    IN_BEARING: "bearing_by_speed",
+    ELEMENTS_IN_BEARING: "bearing_elements",
+}
 # Settings of the solver by slot and argument or place, or by slot for all others; and those whose neutral value is not
 # None.
 _SETTINGS = {
@@ -336,10 +336,12 @@ _SETTINGS = {
     (CABLE_STRETCH, "tension"): "cable_compliance",
     (CABLE_STRETCH, "cable"): "compliance_by_cable",
     (END_STRETCH, "tension"): "{side}_end_stretch",
-    (BEARING_TORQUE, "load-pulley"): "load_bearing_laws",
-    (PULLEY_RADIUS, ""): "{side}_radius_factor",
+    (PULLEY_RADIUS, "drive-angle"): "drive_radius_factor",
+    (PULLEY_RADIUS, "load-angle"): "load_radius_factor",
     (LOAD, "acceleration"): "load_masses",
-    (LOAD, ""): "load_laws",
+    (LOAD, "load-angle"): "load_by_angle",
+    (LOAD, "speed"): "load_by_speed",
+    (LOAD, "distance-since-reversal"): "load_elements",
 }
 _NEUTRAL: dict[str, Any] = {
     "direction_bias": 0.0,
@@ -347,8 +349,6 @@ _NEUTRAL: dict[str, Any] = {
     "compliance_by_cable": 0.0,
     "load_masses": (),
     "friction_laws": (),
-    "load_laws": (),
-    "load_bearing_laws": (),
 }
 
 _TEXT = """A law that was learnt from recordings: {what}, by {argument}.
@@ -401,16 +401,16 @@ def _laws() -> Iterator[Law]:
         yield Law(END_STRETCH, end, TENSION, END_COMPLIANCE, resolution=SMOOTH)
     yield Law(PULLEY_RADIUS, "drive-pulley", drive["angle"], RADIUS_FACTOR)
     yield Law(PULLEY_RADIUS, "load-pulley", load["angle"], RADIUS_FACTOR)
-    for slot, place, channel, motion, angle, elements in (
-        (BEARING_TORQUE, "drive-pulley", TAU_IN, drive, THETA_IN, AGAINST_MOTION),
-        (LOAD, "load", TAU_OUT, load, THETA_OUT, AGAINST_LOAD),
+    for slot, place, channel, motion in (
+        (BEARING_TORQUE, "drive-pulley", TAU_IN, drive),
+        (LOAD, "load", TAU_OUT, load),
     ):
         yield Law(slot, place, motion["angle"], ADDED, channel)
         yield Law(slot, place, motion["speed"], ADDED, channel)
-        yield Law(slot, place, motion["since"], elements, channel, opposes=angle)
+        yield Law(slot, place, motion["since"], AGAINST_MOTION, channel)
     yield Law(LOAD, "load", load["acceleration"], IN_PROPORTION, TAU_OUT)
     yield Law(BEARING_TORQUE, "load-pulley", load["speed"], IN_BEARING)
-    yield Law(BEARING_TORQUE, "load-pulley", load["since"], ELEMENTS_IN_BEARING, opposes=THETA_OUT)
+    yield Law(BEARING_TORQUE, "load-pulley", load["since"], ELEMENTS_IN_BEARING)
     for channel in (TAU_IN, TAU_OUT, F_DRIVE, F_LOAD, THETA_OUT):
         reading = Argument("reading", unit_of(channel), f"the reading of {symbol_of(channel)}", reading_of(channel))
         place = next(p for p in PLACES_OF[channel] if p.endswith("-sensor"))

@@ -2,6 +2,9 @@
 
 A table stands in consecutive rows of an array of shape (rows, 2, n), so that each node or piece of each cable has its
 own: the number of knots, the arguments there, and the values there. A spring's is followed by its stretches there.
+
+A table of Maxwell-slip elements has the travels at which they yield and their torques in the place of arguments and
+values, and is followed by their states, -1 to 1, before and after a step.
 """
 
 from math import sqrt
@@ -34,6 +37,15 @@ class Table(NamedTuple):
         x, c = self.knots, self.values
         stretches = x[0] * c[0] + np.cumsum(np.diff(x, prepend=x[0]) * (c + np.roll(c, 1)) / 2)
         return np.concatenate([self.rows, stretches])
+
+    def with_elements(self, yields: NDArray, values: NDArray) -> "Table":
+        """Its Maxwell-slip elements and these."""
+        return Table(np.concatenate([self.knots, yields]), np.concatenate([self.values, values]))
+
+    @property
+    def rows_of_elements(self) -> NDArray:
+        """The same of Maxwell-slip elements, with their states at rest."""
+        return np.concatenate([self.rows, np.zeros(2 * self.knots.size)])
 
 
 @kernel(inline="always")
@@ -91,3 +103,29 @@ def pulled(rows: NDArray, at: int, c: int, i: int, stretch: float) -> tuple[floa
     # The compliance at the tension that is sought; between knots the stretch is a parabola of the tension.
     there = sqrt(low * low + 2.0 * rise * beyond)
     return rows[argument + k, c, i] + 2.0 * beyond / (low + there), 1.0 / there
+
+
+@kernel
+def slipped(rows: NDArray, at: int, travel: float) -> tuple[float, float]:
+    """Torque of the elements in the rows from `at` after a further travel, and its derivative.
+
+    `rows` has shape (rows,). The states after the step are written; `keep_slip` makes them those before the next.
+    """
+    elements = int(rows[at])
+    torque, slope = 0.0, 0.0
+    for k in range(at + 1, at + 1 + elements):
+        yields, largest, before = rows[k], rows[k + elements], rows[k + 2 * elements]
+        trial = before + travel / yields
+        after = min(max(trial, -1.0), 1.0)
+        rows[k + 3 * elements] = after
+        torque += largest * after
+        slope += largest / yields if abs(trial) < 1.0 else 0.0
+    return torque, slope
+
+
+@kernel
+def keep_slip(rows: NDArray, at: int) -> None:
+    """Make the states of elements after a step those before the next."""
+    elements = int(rows[at])
+    for k in range(at + 1 + 2 * elements, at + 1 + 3 * elements):
+        rows[k] = rows[k + elements]

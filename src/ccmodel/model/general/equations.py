@@ -20,7 +20,7 @@ from ccmodel.mechanisms.presliding import MOST_ELEMENTS, dahl
 from ccmodel.mechanisms.relaxation import BRANCHES, lag_weights
 from ccmodel.mechanisms.strand_settling import settling_tension
 from ccmodel.mechanisms.stribeck import renewed
-from ccmodel.mechanisms.tables import interpolated, pulled
+from ccmodel.mechanisms.tables import interpolated, pulled, slipped
 from ccmodel.mechanisms.winding import winding, winding_change
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.layout import Physics
@@ -240,6 +240,33 @@ def _nodes(ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, dt: float
 
 
 @kernel(error_model="numpy")
+def _laws_of_load(
+    ph: Physics, load: NDArray, theta: float, rotation: float, omega: float, by_rotation: float
+) -> tuple[float, float, float]:
+    """Torque of the load's laws, and of those of its pulley's bearing (N m), and the slope of their sum by rotation.
+
+    `by_rotation` is the derivative of the speed omega by the rotation.
+    """
+    of_load, in_bearing, slope = 0.0, 0.0, 0.0
+    table, travel = load.reshape((load.size, 1, 1)), ph.load_pulley.radius_m * rotation
+    if ph.load_by_angle > 0:
+        of_load, slope = interpolated(table, ph.load_by_angle, 0, 0, theta)
+    if ph.load_by_speed > 0:
+        torque, by_speed = interpolated(table, ph.load_by_speed, 0, 0, omega)
+        of_load, slope = of_load + torque, slope + by_speed * by_rotation
+    if ph.load_elements > 0:
+        torque, by_travel = slipped(load, ph.load_elements, travel)
+        of_load, slope = of_load + torque, slope + by_travel * ph.load_pulley.radius_m
+    if ph.bearing_by_speed > 0:
+        torque, by_speed = interpolated(table, ph.bearing_by_speed, 0, 0, omega)
+        in_bearing, slope = in_bearing + torque, slope + by_speed * by_rotation
+    if ph.bearing_elements > 0:
+        torque, by_travel = slipped(load, ph.bearing_elements, travel)
+        in_bearing, slope = in_bearing + torque, slope + by_travel * ph.load_pulley.radius_m
+    return of_load, in_bearing, slope
+
+
+@kernel(error_model="numpy")
 def _load(
     ph: Physics, piece: NDArray, load: NDArray, rotation: float, torque: float, dt: float
 ) -> tuple[float, float, float]:
@@ -251,22 +278,27 @@ def _load(
     z, inside = dead_zone(theta, ph.half_gap)
     tau = torque + ph.stiffness_load * z + ph.cubic_stiffness * z**3
     slope = (ph.stiffness_load + 3 * ph.cubic_stiffness * z * z) * inside
-    omega = 0.0
+    omega, by_rotation = 0.0, 0.0
     if dt > 0.0:
         ratio = dt / load[rows.DT] if load[rows.DT] > 0.0 else 1.0
         a1, a2 = (1 + 2 * ratio) / (1 + ratio), ratio * ratio / (1 + ratio)
-        omega = (a1 * rotation - a2 * load[rows.ROTATION]) / dt
+        omega, by_rotation = (a1 * rotation - a2 * load[rows.ROTATION]) / dt, a1 / dt
         alpha = (a1 * (omega - load[rows.OMEGA]) - a2 * (load[rows.OMEGA] - load[rows.OMEGA_BEFORE])) / dt
         tau += ph.load_damping * omega + ph.inertia * alpha
         slope += (ph.load_damping + ph.inertia * a1 / dt) * a1 / dt
     bearing = load[rows.BEARING]
     if ph.load_friction_Nm > 0.0:
-        bearing, by_rotation = dahl(load[rows.BEARING], rotation, ph.load_presliding_rad)
-        slope += ph.load_friction_Nm * (by_rotation if rotation != 0.0 else 1.0 / ph.load_presliding_rad)
+        bearing, by_sliding = dahl(load[rows.BEARING], rotation, ph.load_presliding_rad)
+        slope += ph.load_friction_Nm * (by_sliding if rotation != 0.0 else 1.0 / ph.load_presliding_rad)
+    in_bearing = ph.load_friction_Nm * bearing
+    if ph.has_load_laws:
+        torque_of_load, torque_in_bearing, by_laws = _laws_of_load(ph, load, theta, rotation, omega, by_rotation)
+        tau, in_bearing, slope = tau + torque_of_load, in_bearing + torque_in_bearing, slope + by_laws
     difference = max(piece[rows.TENSION, 0, n], 0.0) - max(piece[rows.TENSION, 1, n], 0.0)
-    load[rows.OMEGA_NEXT], load[rows.BEARING_NEXT], load[rows.TORQUE] = omega, bearing, tau
+    load[rows.OMEGA_NEXT], load[rows.BEARING_NEXT] = omega, bearing
+    load[rows.TORQUE], load[rows.IN_BEARING] = tau, in_bearing
     return (
-        R * difference - tau - ph.load_friction_Nm * bearing,
+        R * difference - tau - in_bearing,
         slope - ph.load_pulley.radius_m * radius_slope * difference,
         R,
     )

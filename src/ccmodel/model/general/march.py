@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ccmodel.kernel import borrowed, kernel
 from ccmodel.mechanisms.drive_train import train_torque
 from ccmodel.mechanisms.presliding import MOST_ELEMENTS, dahl
+from ccmodel.mechanisms.tables import keep_slip
 from ccmodel.mechanisms.winding import Pulley, winding, winding_change
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.equations import relax, renew_contacts, set_grip
@@ -138,6 +139,10 @@ def accept(
         load[rows.OMEGA_BEFORE], load[rows.OMEGA] = load[rows.OMEGA], load[rows.OMEGA_NEXT]
     load[rows.ANGLE] += rotation
     load[rows.BEARING] = load[rows.BEARING_NEXT]
+    if ph.load_elements > 0:
+        keep_slip(load, ph.load_elements)
+    if ph.bearing_elements > 0:
+        keep_slip(load, ph.bearing_elements)
 
 
 @kernel(error_model="numpy")
@@ -341,10 +346,9 @@ def march(
         out[0, j], out[1, j] = max(piece[rows.TENSION, 0, 0], 0.0), max(piece[rows.TENSION, 0, n], 0.0)
         out[2, j], out[3, j] = max(piece[rows.TENSION, 1, 0], 0.0), max(piece[rows.TENSION, 1, n], 0.0)
         out[4, j] = load[rows.ANGLE]
-        bearing = ph.load_friction_Nm * load[rows.BEARING]
         if prescribed:
             R = ph.load_pulley.radius_m * winding(load[rows.ANGLE], ph.load_pulley)[1]
-            out[5, j] = R * (out[1, j] - out[3, j]) - bearing
+            out[5, j] = R * (out[1, j] - out[3, j]) - load[rows.IN_BEARING]
         else:
             out[5, j] = load[rows.TORQUE]
         out[7, j] = theta_in[j]

@@ -1,8 +1,8 @@
 """Set up the march over the samples, run it, and pass its outputs through the sensors."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,10 +30,6 @@ from ccmodel.model.sensors import read_by_sensors
 from ccmodel.model.transmission import Transmission
 
 ELEMENTS = 32
-# Further passes of the march for laws of the load and its bearing: each leaves the share of the error that the law's
-# stiffness is of that of the cables. About the frequency at which a load with mass rings it leaves more: with a damping
-# ratio of 0.16 three passes are off by 1e-2 N m, where the torque is 0.04 N m.
-LOAD_LAW_PASSES = 3
 # The run that only gives the mean torsion of a drive train has cells of so many times the length.
 COARSER = 4
 # Outputs of the march, row by row.
@@ -139,27 +135,7 @@ def simulate(
     else:
         motor = NO_MOTOR
     solved, out = _marched(*pair, elements, steps, series, motor)
-    # A law of the load or its bearing takes the load's motion from the pass before. A held or driven load has no law.
-    has_law = bool(settings.load_laws or settings.load_bearing_laws) and not isinstance(load, AngleLoad | FixedLoad)
-    for _ in range(LOAD_LAW_PASSES if has_law and solved == time_s.size else 0):
-        of_load, in_bearing = (
-            _added(laws, transmission, time_s, out[4]) for laws in (settings.load_laws, settings.load_bearing_laws)
-        )
-        solved, out = _marched(*pair, elements, steps, series + of_load + in_bearing, motor)
-        out[5] -= in_bearing  # the torque is measured on the load's side of the bearing
-        if solved < time_s.size:
-            break
-    if isinstance(load, AngleLoad):
-        out[5] -= _added(settings.load_bearing_laws, transmission, time_s, out[4])
     return _response(transmission, active, time_s[:solved], theta_in[:solved], out)
-
-
-def _added(
-    laws: Sequence[Callable], transmission: Transmission, time_s: NDArray, theta_out: NDArray
-) -> NDArray | float:
-    """Torque of laws that take the load's motion, shape (n,); 0 without a law."""
-    motion = Sensing(time_s, {THETA_OUT: theta_out}, transmission.drive_radius_m, transmission.load_radius_m)
-    return sum(law(motion) for law in laws)
 
 
 def _zeroed(motor: Motor, settings: Settings, solved: int, out: NDArray) -> Motor:
@@ -209,7 +185,8 @@ def prepared(
     added_rad = _added_bend(settings, grid, transmission.path.length_m)
     piece, node = _constants(transmission, settings, grid, added_rad)
     friction_factor = _friction_factor(transmission, settings, time_s, theta_in)
-    mean, state = np.zeros((rows.MEAN_ROWS, 2)), np.zeros(rows.LOAD_ROWS)
+    mean = np.zeros((rows.MEAN_ROWS, 2))
+    state = np.concatenate([np.zeros(rows.LOAD_ROWS), *_load_laws(settings).values()])
     held_rad = grid.held_rad + np.concatenate([[0.0], np.cumsum(added_rad)])
     tension_A, tension_B = initial.at(grid.boundary_m, held_rad)
     if transmission.is_single_cable:
@@ -363,6 +340,16 @@ def _added_bend(settings: Settings, grid: Grid, length_m: float) -> NDArray:
     return np.maximum(law.at(grid.middle_m / length_m) * grid.cell_m / length_m, -grid.cell_rad)
 
 
+def _load_laws(settings: Settings) -> dict[str, NDArray]:
+    """Rows of each law of the load and its pulley's bearing that a run has."""
+    laws = {name: getattr(settings, name) for name in rows.LOAD_LAWS}
+    return {
+        name: law.rows_of_elements if name.endswith("elements") else law.rows
+        for name, law in laws.items()
+        if law is not None
+    }
+
+
 def _rows(law: Table | None) -> NDArray | None:
     return None if law is None else law.rows
 
@@ -384,12 +371,15 @@ def _with_tables(array: NDArray, tables: Sequence[NDArray | None]) -> NDArray:
 def _physics(transmission: Transmission, load: Load, settings: Settings, elements: int) -> rows.Physics:
     K_e = load.stiffness_Nm_per_rad if isinstance(load, SpringLoad) else 0.0
     K_e = load.parallel_Nm_per_rad if isinstance(load, TorqueLoad) else K_e
-    values = {name: float(getattr(settings, name)) for name in registry.march_settings()}
+    values: dict[str, Any] = {name: float(getattr(settings, name)) for name in registry.march_settings()}
     values["inertia"] += sum(settings.load_masses)
     has_friction_table, has_drag_table = settings.friction_by_tension is not None, settings.conduit_drag is not None
     has_drag = settings.drag_N != 0 or settings.added_drag is not None
     contacts, has_presliding = _contacts(settings)
     springs = settings.cable_compliance, settings.drive_end_stretch, settings.load_end_stretch
+    load_laws, first_rows, end = _load_laws(settings), dict.fromkeys(rows.LOAD_LAWS, 0), rows.LOAD_ROWS
+    for name, law in load_laws.items():
+        first_rows[name], end = end, end + law.size
     return rows.Physics(
         has_settling=settings.settling_N > 0,
         has_relaxation=settings.relaxing_share != 0,
@@ -410,6 +400,8 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
         has_spring_table=any(law is not None for law in springs),
         has_friction_table=has_friction_table,
         drag_table=rows.NODE_ROWS + _size(settings.friction_by_tension) if has_drag_table else 0,
+        has_load_laws=bool(load_laws) and not isinstance(load, FixedLoad),
+        **first_rows,
         **values,
     )
 
