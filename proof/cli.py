@@ -101,8 +101,19 @@ def family(
 
 @app.command()
 def quick(out: Out, cores: Cores = 1) -> None:
-    """Run the four cases with fixed seeds."""
-    _judge_each([draw(q.seed, q.kind, q.effect) for q in read_plan().quick], out, False, cores)
+    """Run the cases with fixed seeds; exit with 1 if a verdict is not the one that the plan states."""
+    fixed = read_plan().quick
+    cases = [draw(q.seed, q.kind, q.effect, q.strength) for q in fixed]
+    _judge_each(cases, out, False, cores)
+    failed = False
+    for case, wanted in zip(cases, fixed, strict=True):
+        result = json.loads((out / case.name / "result.json").read_text(encoding="utf-8"))
+        found = result["diagnosis"]["verdict"] if result["diagnosis"] else None
+        if wanted.verdict not in (None, found):
+            typer.echo(f"{case.name}: the verdict is {found}; {wanted.verdict} was expected", err=True)
+            failed = True
+    if failed:
+        raise typer.Exit(1)
 
 
 @app.command()

@@ -137,11 +137,13 @@ class KeptBackPlan(Strict):
 
 
 class FixedCase(Strict):
-    """A case whose seed is fixed."""
+    """A case whose seed is fixed, and the verdict that its diagnosis must have, if one is stated."""
 
     seed: PositiveInt
     kind: str
     effect: str | None = None
+    strength: Share | None = None
+    verdict: str | None = None
 
 
 class FamiliesPlan(Strict):

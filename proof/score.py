@@ -61,12 +61,9 @@ def _rates_of_listed(outcomes: Sequence[Outcome]) -> list[dict]:
 def _rates_of_outsiders(outsiders: Sequence[Outcome]) -> list[dict]:
     """Rates of effects that are not among the candidates."""
     visible, detected = [o for o in outsiders if o.is_visible], [o for o in outsiders if o.is_detected]
-
-    def is_right(o: Outcome) -> bool:
-        return o.verdict in ("unexplained", "undecided") or (o.verdict == "learned" and is_slot_right(o))
-
+    name = "no candidate: unexplained, undecided, or a law learned in the true slot"
     return [
-        count("no candidate: unexplained, undecided, or a law learned in the true slot", outsiders, is_right, 0.85),
+        count(name, outsiders, _is_left_open_or_learned, 0.85),
         count("no candidate: unexplained", outsiders, lambda o: o.verdict == "unexplained"),
         count("no candidate, visible: detected", visible, lambda o: o.is_detected),
         count("no candidate, detected: located", detected, is_located),
@@ -195,6 +192,11 @@ def _gap_closed(o: Outcome, method: str) -> float:
     return o.gap_closed_by(_error(o, method)[o.worst_channel])
 
 
+def _is_left_open_or_learned(o: Outcome) -> bool:
+    """Whether nothing is said to be the cause of an effect without a candidate, or a law of its slot."""
+    return o.verdict in ("unexplained", "undecided") or (o.verdict == "learned" and is_slot_right(o))
+
+
 def misses(outcomes: Iterable[Outcome]) -> list[dict]:
     """Every case with a wrong diagnosis, and what it reported."""
     return [
@@ -224,7 +226,7 @@ def is_right(o: Outcome) -> bool:
         case "clean":
             return o.verdict == "agrees"
         case "unlisted" | "removed":
-            return o.verdict in ("unexplained", "undecided") or is_tolerated
+            return _is_left_open_or_learned(o) or is_tolerated
         case "pair":
             return _are_all_identified(o)
         case "poor":

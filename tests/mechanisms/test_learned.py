@@ -9,7 +9,7 @@ from ccmodel.channels import TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
 from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.mechanisms import Sensing, laws
-from ccmodel.mechanisms.law_forms import DRAG, basis
+from ccmodel.mechanisms.law_forms import DRAG, RISING, basis
 from ccmodel.mechanisms.learned import COARSE, FINE
 from ccmodel.mechanisms.presliding import Contacts
 from ccmodel.mechanisms.tables import Table, pulled, stretched
@@ -485,6 +485,24 @@ def test_a_torque_by_speed_beside_a_mass_that_rings_is_its_damping():
     for channel in (THETA_OUT, TAU_OUT):
         effect = np.std(undamped.read[channel] - damped.read[channel])
         assert np.std(found.read[channel] - damped.read[channel]) < 0.04 * effect, channel
+
+
+@pytest.mark.parametrize("name", ["learned-load-by-speed", "learned-bearing-torque-load-by-speed"])
+def test_a_torque_on_the_load_never_falls_with_the_speed(name):
+    """With a load without mass there would be no balance of torques."""
+    law = laws()[name]
+    falling = with_values(law, lambda x: -0.01 * x, scale=0.01)
+    rising = with_values(law, lambda x: 0.01 * x, scale=0.01)
+    assert largest_difference(run(sine(), falling), run(sine())) < 1e-9
+    assert largest_difference(run(sine(), rising), run(sine())) > 0.05
+    rugged = run(sine(), learned(law, **{z: (-1.0) ** k for k, z in enumerate(law.coefficients)}))
+    assert rugged.reached == sine().size
+
+
+def test_what_rises_stays_and_of_what_falls_the_mean_of_its_ends_is_left():
+    y = np.array([-1.0, 0.5, 0.2, 2.0])
+    np.testing.assert_allclose(RISING.possible(y), [-1.0, 0.35, 0.35, 2.0])
+    np.testing.assert_allclose(RISING.possible(-np.sort(y)), np.full(4, -0.5))
 
 
 def test_elements_of_the_load_are_a_spring_until_they_yield():

@@ -105,3 +105,21 @@ def test_a_family_that_there_is_not_is_refused(tmp_path):
     done = CliRunner().invoke(app, ["family", "strange", "--out", str(tmp_path)])
     assert done.exit_code == 2
     assert "there is no family 'strange'; there are removed, unlisted" in done.output
+
+
+@pytest.mark.parametrize(("found", "exit_code"), [("learned", 0), ("unexplained", 1), (None, 1)])
+def test_the_fixed_cases_must_have_the_verdicts_that_the_plan_states(tmp_path, monkeypatch, found, exit_code):
+    """Also where the diagnosis was refused and there is no verdict."""
+
+    def judged(cases, out, *_):
+        for case in cases:
+            (out / case.name).mkdir(parents=True)
+            diagnosis = None if found is None else {"verdict": found}
+            (out / case.name / "result.json").write_text(json.dumps({"diagnosis": diagnosis}))
+
+    monkeypatch.setattr("proof.cli._judge_each", judged)
+    stated = [fixed.kind for fixed in PLAN.quick if fixed.verdict]
+    done = CliRunner().invoke(app, ["quick", "--out", str(tmp_path)])
+    assert sorted(stated) == ["removed", "unlisted"]
+    assert done.exit_code == exit_code
+    assert done.output.count("learned was expected") == (0 if found == "learned" else len(stated))

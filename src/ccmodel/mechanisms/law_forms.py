@@ -41,6 +41,8 @@ class Form:
         travel over the longest. None of a law without memory.
     in_proportion : bool
         Whether the values are the argument times one number, which is never negative.
+    rises : bool
+        Whether the values never fall with the argument.
     """
 
     meaning: str
@@ -52,6 +54,7 @@ class Form:
     name: str = ""
     shortest_yield: float | None = None
     in_proportion: bool = False
+    rises: bool = False
 
     @property
     def is_factor(self) -> bool:
@@ -63,8 +66,15 @@ class Form:
         """Whether the values are of elements that yield."""
         return self.shortest_yield is not None
 
+    @property
+    def has_impossible_opposites(self) -> bool:
+        """Whether next to no effect only one of a curve and its opposite is possible."""
+        return self.in_proportion or self.rises or (self.least is not None and self.least >= self.neutral)
+
     def possible(self, y: NDArray) -> NDArray:
         """Values within what is physically possible."""
+        if self.rises:
+            y = (np.maximum.accumulate(y) + np.minimum.accumulate(y[::-1])[::-1]) / 2
         return y if self.least is None else y.clip(self.least)
 
 
@@ -87,12 +97,14 @@ CONTACT_ELEMENTS = Form(
 ADDED = Form("added to {symbol}, in {unit}")
 # A mass.
 IN_PROPORTION = replace(ADDED, in_proportion=True)
+# A load without mass on which less acts as it moves faster has no balance but a jump.
+RISING = replace(ADDED, rises=True)
 # The zero of a load cell scatters between recordings by its accuracy; beyond that it belongs to no calibration.
 ADDED_TO_SUM = Form("added to {symbol}, in {unit}", is_centred=False)
 # A torque whose elements yield one after the other. A ball bearing's yield within a few hundredths of a millimetre.
 AGAINST_MOTION = Form("added to {symbol}, against the motion, in {unit}", is_centred=False, shortest_yield=0.002)
 # The bearing of the load's pulley is between the cables and the torque sensor.
-IN_BEARING = Form("torque of the {side} pulley's bearing on the cables, in N m", "N m")
+IN_BEARING = Form("torque of the {side} pulley's bearing on the cables, in N m", "N m", rises=True)
 ELEMENTS_IN_BEARING = replace(
     AGAINST_MOTION, meaning="torque of the {side} pulley's bearing, against its motion, in N m", unit="N m"
 )

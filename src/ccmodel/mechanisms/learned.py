@@ -84,6 +84,7 @@ from ccmodel.mechanisms.law_forms import (
     IN_PROPORTION,
     LEAST_COMPLIANCE,
     RADIUS_FACTOR,
+    RISING,
     STRETCH_FACTOR,
     Form,
     basis,
@@ -406,7 +407,7 @@ def _laws() -> Iterator[Law]:
         (LOAD, "load", TAU_OUT, load),
     ):
         yield Law(slot, place, motion["angle"], ADDED, channel)
-        yield Law(slot, place, motion["speed"], ADDED, channel)
+        yield Law(slot, place, motion["speed"], RISING if slot == LOAD else ADDED, channel)
         yield Law(slot, place, motion["since"], AGAINST_MOTION, channel)
     yield Law(LOAD, "load", load["acceleration"], IN_PROPORTION, TAU_OUT)
     yield Law(BEARING_TORQUE, "load-pulley", load["speed"], IN_BEARING)
