@@ -56,6 +56,26 @@ def test_the_load_follows_with_mechanisms(mechanism):
     assert np.sqrt(np.mean(lost**2)) < straight / 50
 
 
+@pytest.mark.parametrize(
+    ("name", "first", "last", "scale"),
+    [
+        ("learned-load-by-load-angle", -0.5, 0.5, 0.005),
+        ("learned-load-by-speed", -3.0, 3.0, 0.002),
+        ("learned-sliding-friction-by-tension", 2.0, 15.0, 0.3),
+        ("learned-pulley-radius-drive-by-drive-angle", -0.7, 0.7, 0.05),
+    ],
+)
+def test_the_load_follows_with_a_law_that_was_learned(name, first, last, scale):
+    law = registry.laws()[name]
+    coefficients = dict.fromkeys(law.coefficients, 0.0) | {law.coefficients[0]: 1.0}
+    acting = Active(name, law.place, {"first": first, "last": last, "scale": scale} | coefficients)
+    found = compensated(WANTED, replace(PARAMETERS, mechanisms=(acting,)), RIG, FREE)
+    plain = compensated(WANTED, PARAMETERS, RIG, FREE)
+    straight, lost = (np.sqrt(np.mean((of - SWING) ** 2)) for of in (found.straight_rad, found.table["theta_out_rad"]))
+    assert np.abs(found.straight_rad - plain.straight_rad).max() > 1e-3
+    assert lost < straight / 50
+
+
 def test_a_fault_of_a_sensor_changes_no_motion_of_the_drive():
     fault = acting("torque-scale", "drive-sensor")
     sound, faulty = (

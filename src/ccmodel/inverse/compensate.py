@@ -7,7 +7,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ccmodel import mechanisms as registry
 from ccmodel.channels import THETA_IN, THETA_OUT
 from ccmodel.failure import ModelError
 from ccmodel.inverse import follow
@@ -96,12 +95,12 @@ def _drive(given: ModelInput, parameters: Parameters, wanted: NDArray) -> NDArra
     """Drive angles without limits, shape (n,), rad."""
     if not np.ptp(wanted) > 0:
         raise ModelError("the wanted motion does not move")
-    kept = tuple(m for m in parameters.mechanisms if m.name not in registry.laws())
     transmission = transmission_of(given.recording, parameters)
     initial, time_s = initial_tension(given, parameters), given.recording.time_s
     stiffness = parameters.load_stiffness_Nm_per_rad or 0.0
-    if modify_physics(kept):
-        theta_in, solved = follow.general(transmission, stiffness, settings_of(kept), initial, time_s, wanted)
+    if modify_physics(parameters.mechanisms):
+        settings = settings_of(parameters.mechanisms)
+        theta_in, solved = follow.general(transmission, stiffness, settings, initial, time_s, wanted)
     else:
         theta_in, solved = follow.exact(transmission, stiffness, initial, wanted)
     if solved < wanted.size:

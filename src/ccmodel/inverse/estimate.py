@@ -290,7 +290,9 @@ class _Problem:
 
 def _without_what_looks_ahead(parameters: Parameters) -> tuple[Parameters, tuple[str, ...]]:
     """Parameters without mechanisms that no causal estimate can have, and a line on each."""
-    kept = tuple(m for m in parameters.mechanisms if m.name not in (*LOOKS_AHEAD, *registry.laws()))
-    left = [m for m in parameters.mechanisms if m not in kept]
-    notes = tuple(f"{m.name} at {m.place} is left out: it may depend on later samples" for m in left)
+    laws = (law.name for law in registry.laws().values() if law.looks_ahead)
+    ahead = {*LOOKS_AHEAD, *laws}
+    kept = tuple(m for m in parameters.mechanisms if m.name not in ahead)
+    left = [m for m in parameters.mechanisms if m.name in ahead]
+    notes = tuple(f"{m.name} at {m.place} is left out: it depends on later samples" for m in left)
     return replace(parameters, mechanisms=kept), notes

@@ -129,17 +129,23 @@ class Proximal:
     def torque_of(self, parameters: Parameters) -> NDArray:
         """Torque of the drive from its sensor's reading without zero and faults, shape (n,), N m."""
         read = self.recording[TAU_IN] - parameters.tau_in_zero_Nm
-        return true_torque(parameters.mechanisms, self.recording.time_s, self.theta_in, read)
+        radii = parameters.drive_radius_m, parameters.load_radius_m
+        return true_torque(parameters.mechanisms, self.recording.time_s, self.theta_in, read, radii)
 
 
-def true_torque(mechanisms: tuple[Active, ...], time_s: NDArray, theta_in: NDArray, read: NDArray) -> NDArray:
-    """What the drive torque's sensor would have read without its faults, by fixed-point iteration."""
+def true_torque(
+    mechanisms: tuple[Active, ...], time_s: NDArray, theta_in: NDArray, read: NDArray, radii: tuple[float, float]
+) -> NDArray:
+    """What the drive torque's sensor would have read without its faults, by fixed-point iteration.
+
+    `radii` are those of the drive and the load pulley, m.
+    """
     faults = [m for m in mechanisms if m.name not in LOOKS_AHEAD]
     nothing = np.zeros_like(read)
     rest = {THETA_IN: theta_in, THETA_OUT: nothing, TAU_OUT: nothing, F_DRIVE: nothing, F_LOAD: nothing}
     true = read
     for _ in range(FAULT_ITERATIONS):
-        reading = read_by_sensors(faults, time_s, rest | {TAU_IN: true}, (1.0, 1.0))[TAU_IN]
+        reading = read_by_sensors(faults, time_s, rest | {TAU_IN: true}, radii)[TAU_IN]
         if np.array_equal(reading, read):
             break
         true = true + read - reading

@@ -156,6 +156,12 @@ class Law:
         return self.form.meaning.format(symbol=symbol, unit=self.unit, side=side(self.place))
 
     @property
+    def looks_ahead(self) -> bool:
+        """Whether its values depend on later samples: a rate is taken between the samples before and after."""
+        is_in_equations = self.setting not in (None, "friction_laws")
+        return self.form is DELAY or (self.argument.name in ("rate", "speed") and not is_in_equations)
+
+    @property
     def setting(self) -> str | None:
         """The solver's setting that takes the law, if it is one of the solver.
 
