@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
+from scipy.optimize import least_squares
 
 from ccmodel import mechanisms as registry
 from ccmodel.channels import TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
@@ -381,7 +382,8 @@ def test_a_law_of_the_sliding_distance_is_a_sum_of_elements_at_every_contact():
     assert by_law.element_share == pytest.approx(by_mechanism.element_share)
     assert (by_law.creep, by_law.elements) == (0.0, by_mechanism.elements)
     # A law is smooth over its knots, so that it has these shares nearly.
-    z = np.linalg.lstsq(values["scale"] * law.basis, shares, rcond=None)[0]
+    first = np.linalg.lstsq(values["scale"] * law.basis, shares, rcond=None)[0]
+    z = least_squares(lambda z: law.at_knots(values | dict(zip(law.coefficients, z, strict=True)))[1] - shares, first).x
     theta_in = sine(cycles=2)
     found = run(theta_in, (law.name, "conduit", values | dict(zip(law.coefficients, z, strict=True))))
     expected, without = run(theta_in, ("presliding", "conduit", alike)), run(theta_in)
@@ -440,10 +442,17 @@ def test_a_drag_at_one_place_of_a_straight_conduit_is_the_loss_wherever_it_is(pl
         np.testing.assert_allclose(slid.T1_N[samples] - slid.T2_N[samples], direction * 0.4, rtol=0.02)
 
 
-def test_more_than_all_friction_does_not_build_up():
-    shares = np.full(4, 0.5)
-    found = Contacts.of_law(np.geomspace(1e-5, 1e-3, 4), shares)
+def test_elements_take_work_and_no_more_than_all_friction_builds_up():
+    law = laws()["learned-sliding-friction-by-distance-since-reversal"]
+    name, place, values = with_values(law, lambda x: np.where(np.arange(x.size) < 4, 0.5, -0.5), scale=1.0)
+    x, shares = law.at_knots(values)
+    assert shares.min() == 0.0
+    found = Contacts.of_law(x, shares)
     assert (sum(found.element_share), found.creep) == pytest.approx((1.0, 0.0))
+    assert run(sine(), (name, place, values)).reached == sine().size
+    bearing = laws()["learned-bearing-torque-by-distance-since-reversal"]
+    assert bearing.at_knots(values_of(bearing, z1=1.0))[1].sum() > 1e-3
+    assert bearing.at_knots(values_of(bearing, z1=-1.0))[1].sum() == pytest.approx(0.0, abs=1e-3)
 
 
 def test_friction_builds_up_by_one_law_only():

@@ -1,5 +1,7 @@
 """A learned law as plain data: its curve with a band, and the shortest formula that stays in the band."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,9 @@ from ccmodel.diagnosis.verdict import Judgement
 from ccmodel.distributions import normal_quantile
 from ccmodel.inference.intervals import COVERAGE
 from ccmodel.mechanisms.learned import Law
+
+# Step of derivatives by a coefficient, in its standard deviation a priori.
+STEP = 1e-6
 
 
 def laws_of(judgement: Judgement) -> list[dict]:
@@ -51,13 +56,22 @@ def curve_of(candidate: CandidateFit, law: Law) -> tuple[NDArray, NDArray, tuple
     x, y = law.at_knots(values)
     shown = law.shown(x)
     by_unknowns = np.zeros((len(x), len(candidate.values)))
-    by_unknowns[:, unknowns_of(candidate, law)] = values["scale"] * (shown @ law.basis)
+    by_unknowns[:, unknowns_of(candidate, law)] = shown @ _derivatives_of(law, values)
     y = shown @ y
     by_pieces = normal_quantile(0.5 + COVERAGE / 2) * of_straight_pieces(x, y)
     reach = np.hypot(half_widths_of(candidate, by_unknowns), by_pieces)
     middle, possible = y + law.form.neutral, law.form.possible
     low, high = (possible(middle + sign * reach) for sign in (-1, 1))
     return x, possible(middle), (low, high)
+
+
+def _derivatives_of(law: Law, values: Mapping[str, float]) -> NDArray:
+    """Derivatives of a law's values at its knots by its coefficients, shape (knots, coefficients).
+
+    The values are piecewise linear in the coefficients: elements are never negative.
+    """
+    sides = [[law.at_knots({**values, z: values[z] + sign * STEP})[1] for sign in (1, -1)] for z in law.coefficients]
+    return np.column_stack([(above - below) / (2 * STEP) for above, below in sides])
 
 
 def of_straight_pieces(x: NDArray, y: NDArray) -> NDArray:

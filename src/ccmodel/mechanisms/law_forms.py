@@ -69,7 +69,13 @@ class Form:
     @property
     def has_impossible_opposites(self) -> bool:
         """Whether next to no effect only one of a curve and its opposite is possible."""
-        return self.in_proportion or self.rises or (self.least is not None and self.least >= self.neutral)
+        is_at_least = self.least is not None and self.least >= self.neutral
+        return self.in_proportion or self.rises or self.has_elements or is_at_least
+
+    def of_elements(self, y: NDArray) -> NDArray:
+        """Values of elements that take work and give none; shares of friction add up to no more than all of it."""
+        y = y.clip(0.0)
+        return y / max(float(y.sum()), 1.0) if self.is_factor else y
 
     def possible(self, y: NDArray) -> NDArray:
         """Values within what is physically possible."""

@@ -185,6 +185,8 @@ class Law:
         if not y.any():
             return before
         if self.form.has_elements:
+            if before is not None and self.form is CONTACT_ELEMENTS:
+                raise ValueError("friction builds up by two laws of the sliding distance: keep one of them")
             return Table(x, y) if before is None else before.with_elements(x, y)
         knots = x if before is None else np.union1d(x, before.knots)
         neutral = self.form.neutral if before is None else before.at(knots)
@@ -206,7 +208,10 @@ class Law:
         """Its arguments at the knots and its values there, both of shape (knots,)."""
         z = [values[name] for name in self.coefficients]
         space = np.geomspace if self.is_spaced_by_ratio else np.linspace
-        return space(values["first"], values["last"], len(self.basis)), values["scale"] * (self.basis @ z)
+        y = values["scale"] * (self.basis @ z)
+        if self.form.has_elements:
+            y = self.form.of_elements(y)
+        return space(values["first"], values["last"], len(self.basis)), y
 
     def range_of(self, visited: NDArray) -> tuple[float, float]:
         """First and last knot for the arguments that recordings visit."""

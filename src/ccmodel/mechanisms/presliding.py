@@ -65,12 +65,12 @@ class Contacts(NamedTuple):
 
     @classmethod
     def of_law(cls, travel_m: NDArray, shares: NDArray) -> "Contacts":
-        """Those whose elements have these shares of friction, and yield after these travels since a reversal, m.
+        """Those whose elements have these shares of friction, at most 1 together, and yield after these travels since a
+        reversal, m.
 
         After a reversal from sliding an element has twice its length to go. The rest of friction acts from the start:
         its bristle is short.
         """
-        shares = shares / max(float(shares.sum()), 1.0)
         lengths = (float(travel) / 2 for travel in travel_m)
         return cls._of(SHORTEST_BRISTLE_M, 1.0 - float(shares.sum()), tuple(lengths), tuple(map(float, shares)))
 
