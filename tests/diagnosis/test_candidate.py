@@ -85,6 +85,12 @@ def test_a_fit_that_is_evaluated_again_is_the_same_fit():
     assert np.diag(again.covariance) == pytest.approx(np.diag(once.covariance), rel=0.2)
 
 
+def test_two_fits_with_the_same_values_are_two_fits():
+    """A candidate is looked for among others, whose arrays are equal where the values are."""
+    found = calibrated(batch())
+    assert [replace(found), found].index(found) == 1
+
+
 def test_a_model_without_unknowns_is_evaluated_as_it_is():
     recordings = batch()
     found = fit(recordings, Hypothesis(), {}, {})

@@ -17,6 +17,7 @@ from ccmodel.deadline import UNLIMITED
 from ccmodel.diagnosis.equation_error import INERTIA
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.laws import _missing_mass, _unit_of, proposals
+from ccmodel.diagnosis.selection import finer_laws
 from ccmodel.diagnosis.settings import WITHIN_BAND
 from ccmodel.geometry import ConduitPath
 from ccmodel.mechanisms import laws
@@ -38,6 +39,16 @@ def cogging(table):
     theta = 0.6 * np.sin(2 * np.pi * np.maximum(table["time_s"].to_numpy() - 0.5, 0))
     table["drive_current_A"] += COGGING_NM * np.sin(2 * np.pi * theta / PERIOD_RAD) / K_TORQUE
     return table
+
+
+def test_laws_with_more_knots_are_fitted_once():
+    """Those of an angle are among the first already, and may be behind the ones that are refined."""
+    by_angle, by_time = "learned-sliding-friction-by-drive-angle", "learned-sensor-map-tau-in-by-time"
+    places = {by_angle: "conduit", f"{by_angle}-fine": "conduit", by_time: "drive-sensor"}
+    every = [Hypothesis(((name, places[name]),)) for name in (by_angle, by_time, f"{by_angle}-fine")]
+    assert [law.name for law in finer_laws(every)] == [f"{by_time}-fine"]
+    assert [law.name for law in finer_laws(every[:2])] == [f"{by_angle}-fine", f"{by_time}-fine"]
+    assert finer_laws(every[2:]) == []
 
 
 def test_the_size_of_a_bend_or_drag_is_that_of_all_recordings():

@@ -47,7 +47,8 @@ LAST_SEARCH = replace(
 )
 
 
-@dataclass(frozen=True)
+# Two fits are the same if they are one object: arrays have no equality.
+@dataclass(frozen=True, eq=False)
 class CandidateFit:
     """A candidate model fitted to all recordings.
 

@@ -132,10 +132,7 @@ class Selection:
             return self.fit_all(found.whitened, beside, [Score(p.hypothesis, 0.0, p.values) for p in leading])
 
         first = sorted(fitted(self.laws, settings.LAWS_FITTED), key=lambda c: c.mean_square)
-        found_first = [law_of(c.hypothesis) for c in first[: settings.LAWS_REFINED]]
-        tried = {law.name for law in found_first if law is not None}
-        finer = [law.finer() for law in found_first if law is not None]
-        learned = first + fitted([f for f in finer if f is not None and f.name not in tried], settings.LAWS_REFINED)
+        learned = first + fitted(finer_laws([c.hypothesis for c in first]), settings.LAWS_REFINED)
         excess = settings.MOSTLY_LISTED * found.excess
         listed = [c for c in found.candidates if c.hypothesis.size == 1 and c.mean_square - 1 < excess]
         found = found.with_candidates([*found.candidates, *learned])
@@ -322,6 +319,13 @@ class Selection:
             return found
         every = {c.hypothesis: c for c in [*found.candidates, *again]}
         return found.with_candidates(list(every.values()))
+
+
+def finer_laws(fitted: Sequence[Hypothesis]) -> list[Law]:
+    """The leading ones of some laws with more knots, but for those that are among them."""
+    first = [law for law in map(law_of, fitted) if law is not None]
+    finer = [law.finer() for law in first[: settings.LAWS_REFINED]]
+    return [law for law in finer if law is not None and law not in first]
 
 
 def contenders(found: Comparison) -> tuple[list[CandidateFit], list[CandidateFit]]:
