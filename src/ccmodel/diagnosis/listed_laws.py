@@ -75,8 +75,9 @@ class _Distance:
 
     @classmethod
     def of(cls, learned: Learned, curve: Curve) -> "_Distance":
-        x, _ = learned.law.at_knots(learned.values)
-        z = np.array([learned.values[name] for name in learned.law.coefficients])
+        x, y = learned.law.at_knots(learned.values)
+        # Elements are never negative: their coefficients count as far as their values show them.
+        z = np.linalg.lstsq(learned.values["scale"] * learned.law.basis, y, rcond=None)[0]
         return cls(learned, curve, x, z, np.linalg.cholesky(learned.covariance))
 
     def errors(self, u: NDArray, signs: Sequence[float]) -> NDArray:
