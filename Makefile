@@ -115,9 +115,10 @@ table-one: $(VENV)/.ready  ## ask which left-out effect errs as the paper's Tabl
 	  --cores $(CORES)
 
 proof: $(VENV)/.ready  ## diagnose six cases with concealed effects and score them: results/proof/quick.md
-	$(BIN)/python -m proof quick --out results/proof/quick --cores $(CORES)
+	status=0; $(BIN)/python -m proof quick --out results/proof/quick --cores $(CORES) || status=1; \
 	$(BIN)/python -m proof score results/proof/quick --out results/proof/quick.json --page results/proof/quick.md \
-	  --figures results/proof/figures --command "make proof" --selection "Six cases with fixed seeds." --strict
+	  --figures results/proof/figures --command "make proof" --selection "Six cases with fixed seeds." --strict \
+	  || status=1; exit $$status
 
 proof-full: $(VENV)/.ready  ## the full validation, or N of its cases drawn at random: docs/proof.md; resumes an interrupted run
 	$(BIN)/python workflow/run.py results/proof \

@@ -135,14 +135,19 @@ def test_a_name_that_no_new_mechanism_can_have_is_refused(name):
 
 
 def test_two_laws_of_one_slot_stand_beside_each_other_where_they_add(listed):
-    """Friction by speed and by time are two factors' additions; two tables of one setting are refused."""
+    """Friction by speed and by time are additions to one factor, and two tables have a sum; not so other settings."""
     for law in ("learned-sliding-friction-by-speed", "learned-sliding-friction-by-time"):
         listed(replace(laws()[law].mechanism, name=f"kept-{law}", mistaken_for=("mu",)))
     mechanisms.neutral_settings()
-    table = laws()["learned-sliding-friction-by-tension"].mechanism
+    law = laws()["learned-load-by-load-angle"]
     for name in ("one", "two"):
-        listed(replace(table, name=name, mistaken_for=("mu",)))
-    with pytest.raises(ValueError, match="two declares settings of another mechanism: friction_by_tension"):
+        listed(replace(law.mechanism, name=name, mistaken_for=("mu",)))
+    values = {"first": -1.0, "last": 1.0, "scale": 0.005} | dict.fromkeys(law.coefficients, 0.3)
+    both = run(sine(), [(name, "load", values) for name in ("one", "two")])
+    twice = run(sine(), (law.name, "load", values | {"scale": 0.01}))
+    np.testing.assert_allclose(both.tau_out_Nm, twice.tau_out_Nm, atol=1e-9)
+    listed(replace(mechanisms.get("running-in"), name="again", mistaken_for=("mu",)))
+    with pytest.raises(ValueError, match="again.* declares settings of another mechanism|running-in declares settings"):
         mechanisms.neutral_settings()
 
 

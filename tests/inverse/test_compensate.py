@@ -61,6 +61,8 @@ def test_the_load_follows_with_mechanisms(mechanism):
     [
         ("learned-load-by-load-angle", -0.5, 0.5, 0.005),
         ("learned-load-by-speed", -3.0, 3.0, 0.002),
+        ("learned-load-by-distance-since-reversal", 1e-5, 2e-3, 0.002),
+        ("learned-bearing-torque-load-by-distance-since-reversal", 1e-5, 2e-3, 0.002),
         ("learned-sliding-friction-by-tension", 2.0, 15.0, 0.3),
         ("learned-pulley-radius-drive-by-drive-angle", -0.7, 0.7, 0.05),
     ],

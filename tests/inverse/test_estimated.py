@@ -129,6 +129,8 @@ def test_faults_of_the_torque_sensor_are_undone():
 LEARNED = {
     "learned-load-by-load-angle": (-0.6, 0.6, 0.005),
     "learned-load-by-speed": (-3.0, 3.0, 0.002),
+    "learned-load-by-distance-since-reversal": (1e-5, 2e-3, 0.002),
+    "learned-bearing-torque-load-by-distance-since-reversal": (1e-5, 2e-3, 0.002),
     "learned-bearing-torque-by-distance-since-reversal": (1e-5, 2e-3, 0.002),
     "learned-sensor-map-tau-in-by-reading": (-0.1, 0.1, 0.003),
 }

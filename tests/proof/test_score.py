@@ -153,6 +153,11 @@ def test_too_many_mechanisms_count_as_none():
     assert o.is_confidently_wrong
 
 
+def test_a_law_that_was_learned_is_right_in_the_true_slot():
+    assert scoring.is_right(LEARNED)
+    assert not scoring.is_right(LEARNED_ELSEWHERE)
+
+
 def test_a_refused_result_is_never_right():
     assert not scoring.is_right(Outcome(answer("clean"), None, "refused"))
     assert not scoring.is_right(Outcome(answer("single", GAIN), None, "refused"))

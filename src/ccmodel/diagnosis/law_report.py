@@ -57,10 +57,10 @@ def curve_of(candidate: CandidateFit, law: Law) -> tuple[NDArray, NDArray, tuple
     shown = law.shown(x)
     by_unknowns = np.zeros((len(x), len(candidate.values)))
     by_unknowns[:, unknowns_of(candidate, law)] = shown @ _derivatives_of(law, values)
-    y = shown @ y
+    y = shown @ (law.form.possible(y) if law.form.has_elements else y)
     by_pieces = normal_quantile(0.5 + COVERAGE / 2) * of_straight_pieces(x, y)
     reach = np.hypot(half_widths_of(candidate, by_unknowns), by_pieces)
-    middle, possible = y + law.form.neutral, law.form.possible
+    middle, possible = y + law.form.neutral, law.form.possible_curve
     low, high = (possible(middle + sign * reach) for sign in (-1, 1))
     return x, possible(middle), (low, high)
 
@@ -68,9 +68,13 @@ def curve_of(candidate: CandidateFit, law: Law) -> tuple[NDArray, NDArray, tuple
 def _derivatives_of(law: Law, values: Mapping[str, float]) -> NDArray:
     """Derivatives of a law's values at its knots by its coefficients, shape (knots, coefficients).
 
-    The values are piecewise linear in the coefficients: elements are never negative.
+    They are constant but for shares of friction, of which more than all has no effect.
     """
-    sides = [[law.at_knots({**values, z: values[z] + sign * STEP})[1] for sign in (1, -1)] for z in law.coefficients]
+
+    def value(coefficient: str, step: float) -> NDArray:
+        return law.form.shares(law.at_knots({**values, coefficient: values[coefficient] + step})[1])
+
+    sides = [(value(z, STEP), value(z, -STEP)) for z in law.coefficients]
     return np.column_stack([(above - below) / (2 * STEP) for above, below in sides])
 
 

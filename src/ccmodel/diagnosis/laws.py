@@ -170,13 +170,13 @@ def _linearised(base: CandidateFit, tried: Hypothesis, law: Law, start: Mapping[
     hypothesis, about = base.hypothesis.and_also(tried), base.values | dict(start)
     names = [mechanism_key(law.name, law.place, name) for name in law.coefficients]
     has_effect = any(start.values())
-    # What is impossible has no effect: only the difference of a curve and its opposite has that of the whole curve.
-    has_half = law.form.has_impossible_opposites
+    # What is impossible has no effect: the difference of a curve and its opposite shows most of what the curve does.
+    one_sided = law.form.has_impossible_opposites
 
     def of(i: int) -> tuple[NDArray, NDArray]:
         w = base.whitened[i]
         w = w.with_parameters(hypothesis.of(w.observations.parameters))
-        if has_half and not has_effect:
+        if one_sided and not has_effect:
             columns = [w.errors(about | {n: 1.0}) - w.errors(about | {n: -1.0}) for n in names]
             return base.residuals[i], np.column_stack(columns)
         here = w.errors(about)

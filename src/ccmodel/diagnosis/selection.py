@@ -322,7 +322,7 @@ class Selection:
 
 
 def finer_laws(fitted: Sequence[Hypothesis]) -> list[Law]:
-    """The leading ones of some laws with more knots, but for those that are among them."""
+    """The leading laws with more knots, without those that were fitted already."""
     first = [law for law in map(law_of, fitted) if law is not None]
     finer = [law.finer() for law in first[: settings.LAWS_REFINED]]
     return [law for law in finer if law is not None and law not in first]

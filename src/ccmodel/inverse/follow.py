@@ -210,10 +210,10 @@ def general(
     time_s: NDArray,
     wanted_rad: NDArray,
 ) -> tuple[NDArray, int]:
-    """As `exact`, with the mechanisms' settings."""
+    """As `exact`, with the mechanisms' settings; friction that follows the drive's motion has that of stiff cables."""
     theta_in = np.zeros(wanted_rad.size)
-    at_rest = prepared(
-        transmission, SpringLoad(stiffness_Nm_per_rad), settings, time_s, wanted_rad, initial, ELEMENTS, 1, np.zeros(1)
-    )
+    straight = wanted_rad * transmission.load_radius_m / transmission.drive_radius_m
+    load = SpringLoad(stiffness_Nm_per_rad)
+    at_rest = prepared(transmission, load, settings, time_s, straight, initial, ELEMENTS, 1, np.zeros(1))
     solved = _followed_general(*at_rest, time_s, wanted_rad, theta_in)
     return theta_in, solved

@@ -54,9 +54,10 @@ def _declared() -> Iterator[tuple[Mechanism, str]]:
 @cache
 def _neutral() -> dict[str, Any]:
     neutral: dict[str, Any] = {}
+    # A setting that holds several effects is a tuple or a law, to which each of them adds.
+    of_laws = {law.setting for law in laws().values()}
     for mechanism in _registry().values():
-        # A setting that holds several effects is a tuple, to which each of them adds.
-        own = {name for name, value in mechanism.neutral_settings.items() if not isinstance(value, tuple)}
+        own = {name for name, value in mechanism.neutral_settings.items() if not isinstance(value, tuple)} - of_laws
         if taken := neutral.keys() & own:
             raise ValueError(f"{mechanism.name} declares settings of another mechanism: {', '.join(sorted(taken))}")
         neutral |= mechanism.neutral_settings

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import isotonic_regression
 
 # A spring is never without stretch: its least compliance over its mean.
 LEAST_COMPLIANCE = 0.05
@@ -68,20 +69,27 @@ class Form:
 
     @property
     def has_impossible_opposites(self) -> bool:
-        """Whether next to no effect only one of a curve and its opposite is possible."""
+        """Whether next to no effect a curve or its opposite is impossible, or parts of both are."""
         is_at_least = self.least is not None and self.least >= self.neutral
         return self.in_proportion or self.rises or self.has_elements or is_at_least
 
-    def of_elements(self, y: NDArray) -> NDArray:
-        """Values of elements that take work and give none; shares of friction add up to no more than all of it."""
-        y = y.clip(0.0)
-        return y / max(float(y.sum()), 1.0) if self.is_factor else y
+    def shares(self, y: NDArray) -> NDArray:
+        """Values of elements; shares of friction add up to no more than all of it."""
+        return y / max(float(y.clip(0.0).sum()), 1.0) if self.has_elements and self.is_factor else y
 
     def possible(self, y: NDArray) -> NDArray:
-        """Values within what is physically possible."""
+        """The nearest values that are physically possible: elements take work and give none."""
+        if self.has_elements:
+            return self.shares(y).clip(0.0)
         if self.rises:
-            y = (np.maximum.accumulate(y) + np.minimum.accumulate(y[::-1])[::-1]) / 2
+            y = isotonic_regression(y).x
         return y if self.least is None else y.clip(self.least)
+
+    def possible_curve(self, curve: NDArray) -> NDArray:
+        """A curve, or an end of its band, within what is physically possible."""
+        if self.has_elements:
+            return curve.clip(-1.0, 1.0) if self.is_factor else curve.clip(0.0)
+        return self.possible(curve)
 
 
 FRICTION_FACTOR = Form("factor of the friction coefficient", "1", neutral=1.0, least=0.0)
@@ -101,7 +109,7 @@ CONTACT_ELEMENTS = Form(
     "friction over that of sliding, after a reversal", "1", neutral=1.0, is_centred=False, shortest_yield=0.002
 )
 ADDED = Form("added to {symbol}, in {unit}")
-# A mass.
+# A mass: an inertia is one number.
 IN_PROPORTION = replace(ADDED, in_proportion=True)
 # A load without mass on which less acts as it moves faster has no balance but a jump.
 RISING = replace(ADDED, rises=True)

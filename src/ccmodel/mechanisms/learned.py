@@ -187,7 +187,8 @@ class Law:
         if self.form.has_elements:
             if before is not None and self.form is CONTACT_ELEMENTS:
                 raise ValueError("friction builds up by two laws of the sliding distance: keep one of them")
-            return Table(x, y) if before is None else before.with_elements(x, y)
+            table = Table(x, self.form.possible(y))
+            return table if before is None else before.with_elements(table)
         knots = x if before is None else np.union1d(x, before.knots)
         neutral = self.form.neutral if before is None else before.at(knots)
         values = self.form.possible(neutral + np.interp(knots, x, y))
@@ -208,10 +209,7 @@ class Law:
         """Its arguments at the knots and its values there, both of shape (knots,)."""
         z = [values[name] for name in self.coefficients]
         space = np.geomspace if self.is_spaced_by_ratio else np.linspace
-        y = values["scale"] * (self.basis @ z)
-        if self.form.has_elements:
-            y = self.form.of_elements(y)
-        return space(values["first"], values["last"], len(self.basis)), y
+        return space(values["first"], values["last"], len(self.basis)), values["scale"] * (self.basis @ z)
 
     def range_of(self, visited: NDArray) -> tuple[float, float]:
         """First and last knot for the arguments that recordings visit."""
@@ -254,7 +252,7 @@ class Law:
     def added(self, sensing: Sensing, x: NDArray, y: NDArray) -> NDArray:
         """What it adds along a run, to 1 if it is a factor, for values at knots; shape (n,)."""
         if self.form.has_elements:  # of the drive pulley's bearing; the march has those of the contacts and the load
-            return y @ _slip(sensing.drive_radius_m * sensing.channels[THETA_IN], x)
+            return self.form.possible(y) @ _slip(sensing.drive_radius_m * sensing.channels[THETA_IN], x)
         return np.interp(self.argument.of(sensing), x, y)
 
     def is_of_slot(self, other: "Law") -> bool:
@@ -336,8 +334,8 @@ _SETTING_OF = {
     IN_BEARING: "bearing_by_speed",
     ELEMENTS_IN_BEARING: "bearing_elements",
 }
-# Settings of the solver by slot and argument or place, or by slot for all others; and those whose neutral value is not
-# None.
+# Settings of the solver by slot and argument, or by slot for laws of the drive's motion; and those whose neutral value
+# is not None.
 _SETTINGS = {
     (SLIDING_FRICTION, "direction"): "direction_bias",
     (SLIDING_FRICTION, "cable"): "friction_by_cable",

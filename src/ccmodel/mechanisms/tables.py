@@ -17,7 +17,10 @@ from ccmodel.kernel import kernel
 
 
 class Table(NamedTuple):
-    """A law: its arguments at the knots, increasing, and its values there; both of shape (knots,)."""
+    """A law: its arguments at the knots and its values there, both of shape (knots,).
+
+    Arguments increase, but for the travels of elements.
+    """
 
     knots: NDArray
     values: NDArray
@@ -38,9 +41,9 @@ class Table(NamedTuple):
         stretches = x[0] * c[0] + np.cumsum(np.diff(x, prepend=x[0]) * (c + np.roll(c, 1)) / 2)
         return np.concatenate([self.rows, stretches])
 
-    def with_elements(self, yields: NDArray, values: NDArray) -> "Table":
-        """Its Maxwell-slip elements and these."""
-        return Table(np.concatenate([self.knots, yields]), np.concatenate([self.values, values]))
+    def with_elements(self, other: "Table") -> "Table":
+        """Its Maxwell-slip elements and those of another, in no order."""
+        return Table(np.concatenate([self.knots, other.knots]), np.concatenate([self.values, other.values]))
 
     @property
     def rows_of_elements(self) -> NDArray:

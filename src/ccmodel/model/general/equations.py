@@ -241,14 +241,14 @@ def _nodes(ph: Physics, piece: NDArray, node: NDArray, slide: NDArray, dt: float
 
 @kernel(error_model="numpy")
 def _laws_of_load(
-    ph: Physics, load: NDArray, theta: float, rotation: float, omega: float, by_rotation: float
+    ph: Physics, load: NDArray, theta: float, travel: float, omega: float, by_rotation: float
 ) -> tuple[float, float, float]:
     """Torque of the load's laws, and of those of its pulley's bearing (N m), and the slope of their sum by rotation.
 
     `by_rotation` is the derivative of the speed omega by the rotation.
     """
     of_load, in_bearing, slope = 0.0, 0.0, 0.0
-    table, travel = load.reshape((load.size, 1, 1)), ph.load_pulley.radius_m * rotation
+    table = load.reshape((load.size, 1, 1))
     if ph.load_by_angle > 0:
         of_load, slope = interpolated(table, ph.load_by_angle, 0, 0, theta)
     if ph.load_by_speed > 0:
@@ -292,7 +292,9 @@ def _load(
         slope += ph.load_friction_Nm * (by_sliding if rotation != 0.0 else 1.0 / ph.load_presliding_rad)
     in_bearing = ph.load_friction_Nm * bearing
     if ph.has_load_laws:
-        torque_of_load, torque_in_bearing, by_laws = _laws_of_load(ph, load, theta, rotation, omega, by_rotation)
+        # The first step only balances the start: elements begin there without a torque.
+        travel = ph.load_pulley.radius_m * rotation if dt > 0.0 else 0.0
+        torque_of_load, torque_in_bearing, by_laws = _laws_of_load(ph, load, theta, travel, omega, by_rotation)
         tau, in_bearing, slope = tau + torque_of_load, in_bearing + torque_in_bearing, slope + by_laws
     difference = max(piece[rows.TENSION, 0, n], 0.0) - max(piece[rows.TENSION, 1, n], 0.0)
     load[rows.OMEGA_NEXT], load[rows.BEARING_NEXT] = omega, bearing

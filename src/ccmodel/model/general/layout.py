@@ -77,7 +77,8 @@ PIECE_ROWS, NODE_ROWS, SLIDE_ROWS, MEAN_ROWS, LOAD_ROWS = 10 + BRANCHES, 22 + 2 
 # one of drag by speed, from the row `drag_table` of the run's constants. The load may have the tables of `LOAD_LAWS`,
 # each from the row of its name in the run's constants.
 SPRING_TABLE, FRICTION_TABLE = PIECE_ROWS, NODE_ROWS
-LOAD_LAWS = "load_by_angle", "load_by_speed", "load_elements", "bearing_by_speed", "bearing_elements"
+BEARING_LAWS = "bearing_by_speed", "bearing_elements"
+LOAD_LAWS = "load_by_angle", "load_by_speed", "load_elements", *BEARING_LAWS
 
 # Constants of a run: its own, and every setting of the mechanisms.
 if TYPE_CHECKING:

@@ -186,7 +186,7 @@ def prepared(
     piece, node = _constants(transmission, settings, grid, added_rad)
     friction_factor = _friction_factor(transmission, settings, time_s, theta_in)
     mean = np.zeros((rows.MEAN_ROWS, 2))
-    state = np.concatenate([np.zeros(rows.LOAD_ROWS), *_load_laws(settings).values()])
+    state = np.concatenate([np.zeros(rows.LOAD_ROWS), *_load_laws(settings, load).values()])
     held_rad = grid.held_rad + np.concatenate([[0.0], np.cumsum(added_rad)])
     tension_A, tension_B = initial.at(grid.boundary_m, held_rad)
     if transmission.is_single_cable:
@@ -340,9 +340,13 @@ def _added_bend(settings: Settings, grid: Grid, length_m: float) -> NDArray:
     return np.maximum(law.at(grid.middle_m / length_m) * grid.cell_m / length_m, -grid.cell_rad)
 
 
-def _load_laws(settings: Settings) -> dict[str, NDArray]:
-    """Rows of each law of the load and its pulley's bearing that a run has."""
-    laws = {name: getattr(settings, name) for name in rows.LOAD_LAWS}
+def _load_laws(settings: Settings, load: Load) -> dict[str, NDArray]:
+    """Rows of each law of the load and its pulley's bearing that a run has.
+
+    A torque or a motion that was measured at the load is all that the load does; it has no law beside it.
+    """
+    names = rows.LOAD_LAWS if isinstance(load, SpringLoad) else rows.BEARING_LAWS
+    laws = {name: getattr(settings, name) for name in names}
     return {
         name: law.rows_of_elements if name.endswith("elements") else law.rows
         for name, law in laws.items()
@@ -377,7 +381,7 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
     has_drag = settings.drag_N != 0 or settings.added_drag is not None
     contacts, has_presliding = _contacts(settings)
     springs = settings.cable_compliance, settings.drive_end_stretch, settings.load_end_stretch
-    load_laws, first_rows, end = _load_laws(settings), dict.fromkeys(rows.LOAD_LAWS, 0), rows.LOAD_ROWS
+    load_laws, first_rows, end = _load_laws(settings, load), dict.fromkeys(rows.LOAD_LAWS, 0), rows.LOAD_ROWS
     for name, law in load_laws.items():
         first_rows[name], end = end, end + law.size
     return rows.Physics(
@@ -400,7 +404,7 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
         has_spring_table=any(law is not None for law in springs),
         has_friction_table=has_friction_table,
         drag_table=rows.NODE_ROWS + _size(settings.friction_by_tension) if has_drag_table else 0,
-        has_load_laws=bool(load_laws) and not isinstance(load, FixedLoad),
+        has_load_laws=bool(load_laws),
         **first_rows,
         **values,
     )
