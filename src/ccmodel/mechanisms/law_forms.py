@@ -73,14 +73,14 @@ class Form:
         is_at_least = self.least is not None and self.least >= self.neutral
         return self.in_proportion or self.rises or self.has_elements or is_at_least
 
-    def shares(self, y: NDArray) -> NDArray:
-        """Values of elements; shares of friction add up to no more than all of it."""
-        return y / max(float(y.clip(0.0).sum()), 1.0) if self.has_elements and self.is_factor else y
-
     def possible(self, y: NDArray) -> NDArray:
-        """The nearest values that are physically possible: elements take work and give none."""
+        """Values that are physically possible.
+
+        Elements take work and give none, and shares of friction add up to no more than all of it.
+        """
         if self.has_elements:
-            return self.shares(y).clip(0.0)
+            y = y.clip(0.0)
+            return y / max(float(y.sum()), 1.0) if self.is_factor else y
         if self.rises:
             y = isotonic_regression(y).x
         return y if self.least is None else y.clip(self.least)
