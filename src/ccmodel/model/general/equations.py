@@ -247,23 +247,28 @@ def _laws_of_load(
 
     `by_rotation` is the derivative of the speed omega by the rotation.
     """
-    of_load, in_bearing, slope = 0.0, 0.0, 0.0
-    table = load.reshape((load.size, 1, 1))
+    motion, R = (travel, omega, by_rotation), ph.load_pulley.radius_m
+    of_load, slope = _by_motion(load, ph.load_by_speed, ph.load_elements, *motion, R)
+    in_bearing, slope_in_bearing = _by_motion(load, ph.bearing_by_speed, ph.bearing_elements, *motion, R)
     if ph.load_by_angle > 0:
-        of_load, slope = interpolated(table, ph.load_by_angle, 0, 0, theta)
-    if ph.load_by_speed > 0:
-        torque, by_speed = interpolated(table, ph.load_by_speed, 0, 0, omega)
-        of_load, slope = of_load + torque, slope + by_speed * by_rotation
-    if ph.load_elements > 0:
-        torque, by_travel = slipped(load, ph.load_elements, travel)
-        of_load, slope = of_load + torque, slope + by_travel * ph.load_pulley.radius_m
-    if ph.bearing_by_speed > 0:
-        torque, by_speed = interpolated(table, ph.bearing_by_speed, 0, 0, omega)
-        in_bearing, slope = in_bearing + torque, slope + by_speed * by_rotation
-    if ph.bearing_elements > 0:
-        torque, by_travel = slipped(load, ph.bearing_elements, travel)
-        in_bearing, slope = in_bearing + torque, slope + by_travel * ph.load_pulley.radius_m
-    return of_load, in_bearing, slope
+        torque, by_angle = interpolated(load.reshape((load.size, 1, 1)), ph.load_by_angle, 0, 0, theta)
+        of_load, slope = of_load + torque, slope + by_angle
+    return of_load, in_bearing, slope + slope_in_bearing
+
+
+@kernel(error_model="numpy")
+def _by_motion(
+    load: NDArray, by_speed: int, elements: int, travel: float, omega: float, by_rotation: float, R: float
+) -> tuple[float, float]:
+    """Torque of a table by speed and of elements, in these rows if there are any, and its slope by rotation."""
+    torque, slope = 0.0, 0.0
+    if by_speed > 0:
+        torque, by_omega = interpolated(load.reshape((load.size, 1, 1)), by_speed, 0, 0, omega)
+        slope = by_omega * by_rotation
+    if elements > 0:
+        held, by_travel = slipped(load, elements, travel)
+        torque, slope = torque + held, slope + by_travel * R
+    return torque, slope
 
 
 @kernel(error_model="numpy")
