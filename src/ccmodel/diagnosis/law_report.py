@@ -57,7 +57,7 @@ def curve_of(candidate: CandidateFit, law: Law) -> tuple[NDArray, NDArray, tuple
     shown = law.shown(x)
     by_unknowns = np.zeros((len(x), len(candidate.values)))
     by_unknowns[:, unknowns_of(candidate, law)] = shown @ _derivatives_of(law, values)
-    y = shown @ _acting(law, y)
+    y = shown @ law.form.acting(y)
     by_pieces = normal_quantile(0.5 + COVERAGE / 2) * of_straight_pieces(x, y)
     reach = np.hypot(half_widths_of(candidate, by_unknowns), by_pieces)
     middle, possible = y + law.form.neutral, law.form.possible_curve
@@ -72,15 +72,10 @@ def _derivatives_of(law: Law, values: Mapping[str, float]) -> NDArray:
     """
 
     def value(coefficient: str, step: float) -> NDArray:
-        return _acting(law, law.at_knots({**values, coefficient: values[coefficient] + step})[1])
+        return law.form.acting(law.at_knots({**values, coefficient: values[coefficient] + step})[1])
 
     sides = [(value(z, STEP), value(z, -STEP)) for z in law.coefficients]
     return np.column_stack([(above - below) / (2 * STEP) for above, below in sides])
-
-
-def _acting(law: Law, y: NDArray) -> NDArray:
-    """Values at the knots of which a curve is made: of elements only those that are possible."""
-    return law.form.possible(y) if law.form.has_elements else y
 
 
 def of_straight_pieces(x: NDArray, y: NDArray) -> NDArray:

@@ -76,9 +76,8 @@ class _Distance:
     @classmethod
     def of(cls, learned: Learned, curve: Curve) -> "_Distance":
         x, y = learned.law.at_knots(learned.values)
-        # Coefficients count as far as possible values of elements show them.
-        y = learned.law.form.possible(y) if learned.law.form.has_elements else y
-        z = np.linalg.lstsq(learned.values["scale"] * learned.law.basis, y, rcond=None)[0]
+        # Coefficients of elements count as far as the values that act show them.
+        z = np.linalg.lstsq(learned.values["scale"] * learned.law.basis, learned.law.form.acting(y), rcond=None)[0]
         return cls(learned, curve, x, z, np.linalg.cholesky(learned.covariance))
 
     def errors(self, u: NDArray, signs: Sequence[float]) -> NDArray:

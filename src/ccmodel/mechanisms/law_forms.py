@@ -85,6 +85,10 @@ class Form:
             y = isotonic_regression(y).x
         return y if self.least is None else y.clip(self.least)
 
+    def acting(self, y: NDArray) -> NDArray:
+        """Values of which a curve is made: of elements only possible ones act."""
+        return self.possible(y) if self.has_elements else y
+
     def possible_curve(self, curve: NDArray) -> NDArray:
         """A curve, or an end of its band, within what is physically possible."""
         if self.has_elements:

@@ -181,12 +181,13 @@ def prepared(
     `series` is the load's prescribed torque or angle, shape (n,) or (1,).
     """
     grid = make_grid(transmission.path, elements, settings.kinks)
-    physics = _physics(transmission, load, settings, elements)
+    load_laws = _load_laws(settings, load)
+    physics = _physics(transmission, load, settings, elements, load_laws)
     added_rad = _added_bend(settings, grid, transmission.path.length_m)
     piece, node = _constants(transmission, settings, grid, added_rad)
     friction_factor = _friction_factor(transmission, settings, time_s, theta_in)
     mean = np.zeros((rows.MEAN_ROWS, 2))
-    state = np.concatenate([np.zeros(rows.LOAD_ROWS), *_load_laws(settings, load).values()])
+    state = np.concatenate([np.zeros(rows.LOAD_ROWS), *load_laws.values()])
     held_rad = grid.held_rad + np.concatenate([[0.0], np.cumsum(added_rad)])
     tension_A, tension_B = initial.at(grid.boundary_m, held_rad)
     if transmission.is_single_cable:
@@ -372,7 +373,9 @@ def _with_tables(array: NDArray, tables: Sequence[NDArray | None]) -> NDArray:
     return np.concatenate([array, added])
 
 
-def _physics(transmission: Transmission, load: Load, settings: Settings, elements: int) -> rows.Physics:
+def _physics(
+    transmission: Transmission, load: Load, settings: Settings, elements: int, load_laws: Mapping[str, NDArray]
+) -> rows.Physics:
     K_e = load.stiffness_Nm_per_rad if isinstance(load, SpringLoad) else 0.0
     K_e = load.parallel_Nm_per_rad if isinstance(load, TorqueLoad) else K_e
     values: dict[str, Any] = {name: float(getattr(settings, name)) for name in registry.march_settings()}
@@ -381,7 +384,7 @@ def _physics(transmission: Transmission, load: Load, settings: Settings, element
     has_drag = settings.drag_N != 0 or settings.added_drag is not None
     contacts, has_presliding = _contacts(settings)
     springs = settings.cable_compliance, settings.drive_end_stretch, settings.load_end_stretch
-    load_laws, first_rows, end = _load_laws(settings, load), dict.fromkeys(rows.LOAD_LAWS, 0), rows.LOAD_ROWS
+    first_rows, end = dict.fromkeys(rows.LOAD_LAWS, 0), rows.LOAD_ROWS
     for name, law in load_laws.items():
         first_rows[name], end = end, end + law.size
     return rows.Physics(
