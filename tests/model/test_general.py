@@ -235,7 +235,7 @@ def test_a_ring_that_samples_hardly_show_is_followed_between_them():
 
 def test_a_load_without_mass_is_stepped_once_a_sample():
     pair = transmission()
-    physics = _physics(pair, SpringLoad(K_E), settings_of(()), 32)
+    physics = _physics(pair, SpringLoad(K_E), settings_of(()), 32, {})
     assert _steps(physics, pair, np.arange(1000) / 500) == 1
 
 
