@@ -11,13 +11,23 @@ from ccmodel.deadline import UNLIMITED, Deadline
 from ccmodel.diagnosis import comparison as comparisons
 from ccmodel.diagnosis import selection as selections
 from ccmodel.diagnosis.candidate import LAST_SEARCH, CandidateFit
-from ccmodel.diagnosis.comparison import Comparison, imitation, log_priors
+from ccmodel.diagnosis.comparison import Comparison, imitation, log_priors, priors_of_further
 from ccmodel.diagnosis.discrepancy import Evidence
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.result import alternatives_of
 from ccmodel.diagnosis.screening import Score
 from ccmodel.diagnosis.selection import Selection
-from ccmodel.diagnosis.settings import DECIDED, MISSTATED_NOISE, PRIOR_AGREES, PRIOR_FURTHER, PRIOR_LISTED, SCATTER
+from ccmodel.diagnosis.settings import (
+    DECIDED,
+    LAW_FAR_BEHIND,
+    MISSTATED_NOISE,
+    PRIOR_AGREES,
+    PRIOR_FURTHER,
+    PRIOR_LAW,
+    PRIOR_LISTED,
+    SCATTER,
+    SETTLED,
+)
 from ccmodel.diagnosis.verdict import judge, nested_choice
 from ccmodel.inference.problem import Free
 from ccmodel.mechanisms import laws
@@ -362,8 +372,30 @@ def test_a_weak_mechanism_is_not_named():
     """Of an effect that no discrepancy shows, no share is known: it may be an imitation, as probably as a priori."""
     found = verdict(evidence(NONE - 20), (fitted(1.0, FRICTION), evidence(NONE)), model=fitted(1.01))
     assert found.verdict == "undecided"
-    assert found.probability[0] == pytest.approx(imitation(0.0, 1.0, False)[0], rel=1e-3)
+    assert found.probability[0] == pytest.approx(imitation(0.0, 1.0, priors_of_further(False, False))[0], rel=1e-3)
     assert 0.5 < found.probability[0] < DECIDED
+
+
+@pytest.mark.parametrize("law, said", [(NONE - 20, "explained"), (NONE, "undecided"), (NONE + 20, "learned")])
+def test_a_weak_mechanism_is_named_if_no_law_does_as_well(law, said):
+    """Laws were tried: what they describe is no imitation, but a candidate of its own."""
+    direction = ("learned-sliding-friction-by-direction", "conduit")
+    listed, learned = (fitted(1.0, FRICTION), evidence(NONE)), (fitted(1.0, direction), evidence(law))
+    found = compared(evidence(NONE - 20), listed, learned, model=fitted(1.01))
+    assert judge(found, []).verdict != "explained", "laws were fitted, but not all of them were tried"
+    tried = replace(found, laws_beside=frozenset([found.base.hypothesis]))
+    assert judge(tried, []).verdict == said
+
+
+def test_laws_beside_a_mechanism_say_nothing_of_another():
+    alone, both = (fitted(3.0, FRICTION), evidence(NONE - 40)), (fitted(1.0, FRICTION, SCALE), evidence(NONE))
+    found = compared(evidence(), alone, both)
+    beside = [Hypothesis((one,)) for one in (FRICTION, SCALE)]
+    before, of_part, of_other = (
+        replace(found, laws_beside=frozenset(tried)).unlisted for tried in ([], beside[:1], beside[1:])
+    )
+    assert of_part < before
+    assert of_other == before
 
 
 def test_slips_that_no_feature_follows_are_left_all_the_same():
@@ -373,18 +405,19 @@ def test_slips_that_no_feature_follows_are_left_all_the_same():
     assert noisy.unexplained_mean_square(noisy.candidates[0]) == 0.0
 
 
+@pytest.mark.parametrize("with_laws", [False, True])
 @pytest.mark.parametrize("has_part", [False, True])
-def test_shares_have_proper_densities(has_part):
+def test_shares_have_proper_densities(has_part, with_laws):
     """Each of the three explanations has all of its shares, so that on average none is more probable than a priori."""
     shares = np.linspace(0, 1, 20001)
     for smallest in (0.003, 0.1, 1.0):
-        weights = np.array([imitation(share, smallest, has_part) for share in shares])
+        priors = priors_of_further(has_part, with_laws)
+        weights = np.array([imitation(share, smallest, priors) for share in shares])
         # The third has the same density at every share.
         densities = weights / weights[:, 2:]
-        prior = PRIOR_FURTHER if has_part else 1.0
-        expected = np.array([prior * PRIOR_LISTED, 1 - prior, prior * (1 - PRIOR_LISTED)]) / (
-            prior * (1 - PRIOR_LISTED)
-        )
+        further, unlisted = PRIOR_FURTHER if has_part else 1.0, 1 - PRIOR_LISTED
+        unlisted *= 1 - PRIOR_LAW if with_laws else 1.0
+        expected = np.array([further * PRIOR_LISTED, 1 - further, further * unlisted]) / (further * unlisted)
         assert np.trapezoid(densities, shares, axis=0) == pytest.approx(expected, rel=0.05)
 
 
@@ -428,18 +461,19 @@ def test_a_selection_ends_with_laws_where_what_is_certain_leaves_something(monke
 
 
 @pytest.mark.parametrize(
-    "left, law, is_proposed",
+    "left, law, left_by_listed, is_proposed",
     [
-        (0.0, NONE + 5, False),  # it leads, and leaves nothing
-        (0.4, NONE + 5, True),  # it leaves something, with a good fit
-        (0.0, NONE - 20, True),  # it leaves nothing, but the listed mechanism leads
+        (0.0, NONE + 5, 0.4, False),  # it leads, and leaves nothing
+        (0.4, NONE + 5, 0.4, True),  # it leaves something, with a good fit
+        (0.0, NONE - 20, 0.4, True),  # it leaves nothing, but the listed mechanism leads
+        (0.0, NONE - 20, 0.0, False),  # the listed mechanism leaves nothing
     ],
 )
-def test_laws_are_proposed_beside_what_is_listed_unless_one_leads_that_leaves_nothing(
-    monkeypatch, left, law, is_proposed
+def test_laws_are_proposed_beside_what_is_listed_unless_one_of_them_leaves_nothing(
+    monkeypatch, left, law, left_by_listed, is_proposed
 ):
     direction = ("learned-sliding-friction-by-direction", "conduit")
-    listed = fitted(1.4, FRICTION), evidence(NONE, NONE, size=0.4)
+    listed = fitted(1.0 + left_by_listed, FRICTION), evidence(NONE, NONE, size=left_by_listed)
     learned = fitted(1.0 + left, direction), evidence(law, law, size=left)
     found, proposed = compared(evidence(size=60.0), listed, model=fitted(61.0)), []
     fits = iter([[learned[0]]])
@@ -453,6 +487,42 @@ def test_laws_are_proposed_beside_what_is_listed_unless_one_leads_that_leaves_no
         monkeypatch.setattr(Selection, step, lambda self, found: found)
     assert Selection({}, [], laws=[laws()[direction[0]]]).learn(found) is both
     assert ((FRICTION,) in proposed) == is_proposed
+
+
+def test_what_may_be_an_imitation_competes_with_laws():
+    """A mechanism that leaves nothing is identified without laws only with the probability `SETTLED`."""
+    strong = compared(evidence(), (fitted(1.0, FRICTION), evidence(NONE)), model=fitted(61.0))
+    weak = compared(evidence(NONE - 20), (fitted(1.0, FRICTION), evidence(NONE)), model=fitted(1.01))
+    assert strong.probability[0] > SETTLED
+    assert strong.is_settled
+    assert weak.is_adequate
+    assert not weak.is_settled
+
+
+def test_laws_count_as_tried_where_all_of_them_were():
+    found = compared(evidence(NONE - 20), (fitted(1.0, FRICTION), evidence(NONE)), model=fitted(1.01))
+    found = replace(found, discrepancy=object())
+    every = {c.hypothesis: found.evidence[c.hypothesis] for c in [found.base, *found.candidates]}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Comparison, "_evidence_of", lambda self, candidate: every[candidate.hypothesis])
+        in_time, late = (
+            Selection({}, [], deadline=deadline).with_laws(found, found.base, [])
+            for deadline in (UNLIMITED, Deadline(0.0))
+        )
+        assert in_time.laws_beside == {found.base.hypothesis}
+        assert in_time.with_candidates([]).laws_beside == {found.base.hypothesis}
+    assert late.laws_beside == frozenset()
+
+
+def test_a_law_far_behind_a_listed_mechanism_is_fitted_only_where_effects_are_large(monkeypatch):
+    given = {"base": -60.0, "pulley-friction": -20.0}
+    of = lambda candidate: SimpleNamespace(log_evidence=given["".join(candidate.hypothesis.names) or "base"])  # noqa: E731
+    monkeypatch.setattr(selections, "NormalEquations", SimpleNamespace(of=of))
+    listed = fitted(1.0, FRICTION), evidence(NONE)
+    small, large = (compared(evidence(NONE - 20), listed, model=fitted(size)) for size in (1.01, 9.0))
+    assert selections.least_evidence(small) == 40.0 - LAW_FAR_BEHIND
+    assert selections.least_evidence(large) == -np.inf
+    assert selections.least_evidence(compared(evidence(NONE - 20), model=fitted(1.01))) == -np.inf
 
 
 def test_no_law_is_learned_where_nothing_is_missing():
@@ -602,6 +672,10 @@ def test_the_covariance_is_linearised_about_the_best_candidate(monkeypatch):
     deadline.has_passed = False
     before = Comparison.of(recordings, base, candidates, SCREENED)
     assert replace(late_selection, goes_on=True).relinearise(before) is before
+    # What was tried before counts as tried.
+    deadline.has_passed = False
+    tried = Comparison.of(recordings, base, candidates, SCREENED, laws_beside=frozenset([base.hypothesis]))
+    assert late_selection.relinearise(tried).laws_beside == {base.hypothesis}
 
 
 def test_a_law_beside_which_something_is_missing_counts_once_as_unexplained():

@@ -53,6 +53,8 @@ class Comparison:
         The candidate, with its values, about which the covariance is linearised; None for the model of the first fit.
     discrepancy : Discrepancy or None
         From which the evidence was computed.
+    laws_beside : frozenset of Hypothesis
+        Models, the calibrated one or candidates, beside each of which every law that may be learned was tried.
     """
 
     whitened: Sequence[Whitened]
@@ -62,6 +64,7 @@ class Comparison:
     screened: int = 0
     linearised_about: CandidateFit | None = None
     discrepancy: Discrepancy | None = field(default=None, repr=False)
+    laws_beside: frozenset[Hypothesis] = frozenset()
 
     @classmethod
     def of(
@@ -72,12 +75,12 @@ class Comparison:
         screened: int = 0,
         linearised_about: CandidateFit | None = None,
         discrepancy: Discrepancy | None = None,
+        laws_beside: frozenset[Hypothesis] = frozenset(),
     ) -> "Comparison":
         """Order the candidates, and compute their evidence; `discrepancy` is that of the same calibrated model."""
         ordered = sorted(candidates, key=lambda c: (not c.is_plausible, c.mean_square))
-        found = cls(
-            whitened, base, ordered, {}, screened, linearised_about, discrepancy or Discrepancy.of(whitened, base)
-        )
+        discrepancy = discrepancy or Discrepancy.of(whitened, base)
+        found = cls(whitened, base, ordered, {}, screened, linearised_about, discrepancy, laws_beside)
         return replace(found, evidence={c.hypothesis: found._evidence_of(c) for c in [base, *ordered]})
 
     def _evidence_of(self, candidate: CandidateFit) -> Evidence:
@@ -89,7 +92,13 @@ class Comparison:
     def with_candidates(self, candidates: Sequence[CandidateFit]) -> "Comparison":
         """The same with other candidates, fitted to the same whitened observations."""
         return Comparison.of(
-            self.whitened, self.base, candidates, self.screened, self.linearised_about, self.discrepancy
+            self.whitened,
+            self.base,
+            candidates,
+            self.screened,
+            self.linearised_about,
+            self.discrepancy,
+            self.laws_beside,
         )
 
     def is_linearised_about(self, candidate: CandidateFit) -> bool:
@@ -175,7 +184,8 @@ class Comparison:
         has_part = part is not self.base
         further = set(candidate.hypothesis.acting) - set(part.hypothesis.acting)
         support = min(candidate.log_support(*one) for one in further)
-        return limited(imitation(share, smallest, has_part), prior_of_further(has_part), support)
+        prior = priors_of_further(has_part, part.hypothesis in self.laws_beside)
+        return limited(imitation(share, smallest, prior), prior[0], support)
 
     def unexplained_mean_square(self, candidate: CandidateFit) -> float:
         """Mean square above the noise that a candidate does not explain (1: noise).
@@ -230,13 +240,17 @@ class Comparison:
 
     @property
     def is_settled(self) -> bool:
-        """Whether no law is learned: a model is complete with the probability `DECIDED`, or has no lack of fit.
+        """Whether no law is learned: nothing is missing, or what is missing has a probability of `SETTLED`.
 
-        A mechanism that is certain and leaves something may be the best imitation of a law that no list holds.
+        A mechanism that is less probable, or that leaves something, may be the best imitation of a law that no list
+        holds, and has to compete with laws.
         """
-        if self._has_complete:
+        if self.probability_of_base > 0.5 or max(self.probability, default=0.0) >= settings.SETTLED:
             return True
-        return self.is_adequate if self.certain is None else self.unexplained_mean_square(self.certain) == 0.0
+        certain = self.certain
+        if certain is None or self.unexplained_mean_square(certain) > 0.0:
+            return False
+        return min(map(self.confidence_in, certain.hypothesis.names)) >= settings.SETTLED
 
     def confidence_in(self, name: str) -> float:
         """Probability that a mechanism acts, at whatever place and beside whatever others."""
@@ -360,7 +374,7 @@ def log_priors(size: int, screened: int) -> NDArray:
     return np.array([of_number(size) + listed, of_number(size + 1) + listed + beside])
 
 
-def imitation(share: float, smallest: float, has_part: bool) -> NDArray:
+def imitation(share: float, smallest: float, prior: NDArray) -> NDArray:
     """Probabilities of the three explanations of a mechanism's effect.
 
     Parameters
@@ -369,8 +383,8 @@ def imitation(share: float, smallest: float, has_part: bool) -> NDArray:
         Unexplained mean square with the mechanism over that without it, from 0 to 1.
     smallest : float
         The least share that would be noticed, above 0.
-    has_part : bool
-        Whether there are other mechanisms, whose equations may leave what this one takes off.
+    prior : ndarray, shape (3,)
+        Prior probabilities of the explanations (`priors_of_further`).
 
     Returns
     -------
@@ -390,14 +404,7 @@ def imitation(share: float, smallest: float, has_part: bool) -> NDArray:
         by_law = 1 / (log(most / least) * at) if at < most else 0.0
         of_others = uniform + (1 - uniform) * power * at ** (power - 1)
     of_its_own = settings.SAME_LAW * exact + (1 - settings.SAME_LAW) * by_law
-    further = settings.PRIOR_FURTHER if has_part else 1.0
-    found = np.array(
-        [
-            prior_of_further(has_part) * of_its_own,
-            (1 - further) * of_others,
-            further * (1 - settings.PRIOR_LISTED),
-        ]
-    )
+    found = prior * np.array([of_its_own, of_others, 1.0])
     return found / found.sum()
 
 
@@ -410,9 +417,21 @@ def limited(probabilities: NDArray, prior: float, log_support: float) -> NDArray
     return np.array([most, *others])
 
 
-def prior_of_further(has_part: bool) -> float:
-    """Prior probability that a mechanism of the list is missing, beside others or alone where something is."""
-    return (settings.PRIOR_FURTHER if has_part else 1.0) * settings.PRIOR_LISTED
+def priors_of_further(has_part: bool, with_laws: bool) -> NDArray:
+    """Prior probabilities of the three explanations of what a mechanism takes off; shape (3,).
+
+    Parameters
+    ----------
+    has_part : bool
+        Whether there are other mechanisms, whose equations may leave something.
+    with_laws : bool
+        Whether the laws that may be learned were tried. What they describe is then a candidate of its own, and only the
+        rest of what is unlisted can be imitated.
+    """
+    further = settings.PRIOR_FURTHER if has_part else 1.0
+    unlisted = (1 - settings.PRIOR_LISTED) * (1 - settings.PRIOR_LAW if with_laws else 1.0)
+    found = np.array([further * settings.PRIOR_LISTED, 1 - further, further * unlisted])
+    return found / found.sum()
 
 
 def log_bayes_factor_of_repeats(candidate: CandidateFit) -> float:

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Self
 
+import numpy as np
+
 from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import LAST_SEARCH, SEARCH, CandidateFit, evaluated, fit
@@ -12,6 +14,7 @@ from ccmodel.diagnosis.comparison import Comparison, is_part_of
 from ccmodel.diagnosis.equation_error import other_start
 from ccmodel.diagnosis.hypothesis import Hypothesis, law_of, laws_in
 from ccmodel.diagnosis.laws import proposals
+from ccmodel.diagnosis.normal_equations import NormalEquations
 from ccmodel.diagnosis.repeatability import estimated
 from ccmodel.diagnosis.screening import Score, Screening, screen
 from ccmodel.diagnosis.whitening import Whitened, relinearised
@@ -124,24 +127,31 @@ class Selection:
 
     def learn(self, found: Comparison) -> Comparison:
         """The same with laws that no list holds: the leading ones, and the best of them with more knots."""
-        base = found.base
+        base, least = found.base, least_evidence(found)
         self.progress("learning a law from the recordings", 0.0)
 
         def fitted(every: Sequence[Law], most: int, beside: CandidateFit = base) -> list[CandidateFit]:
-            leading = proposals(beside, every, self.deadline, self.progress, self.known)[:most]
+            proposed = proposals(beside, every, self.deadline, self.progress, self.known)
+            leading = [p for p in proposed if p.evidence > least or beside is not base][:most]
             return self.fit_all(found.whitened, beside, [Score(p.hypothesis, 0.0, p.values) for p in leading])
 
         first = sorted(fitted(self.laws, settings.LAWS_FITTED), key=lambda c: c.mean_square)
         learned = first + fitted(finer_laws([c.hypothesis for c in first]), settings.LAWS_REFINED)
         excess = settings.MOSTLY_LISTED * found.excess
         listed = [c for c in found.candidates if c.hypothesis.size == 1 and c.mean_square - 1 < excess]
-        found = found.with_candidates([*found.candidates, *learned])
-        # A listed effect that is far larger hides the law from the calibrated model, unless a law leaves nothing.
-        if listed and not found.leading_law_leaves_nothing:
-            beside = min(listed, key=lambda c: c.mean_square)
-            found = found.with_candidates([*found.candidates, *fitted(self.laws, settings.PARTNERS, beside)])
+        found = self.with_laws(found, base, learned)
+        # A listed effect that is far larger hides the law from the calibrated model, unless one of them leaves nothing.
+        beside = min(listed, key=lambda c: c.mean_square, default=base)
+        if listed and not found.leading_law_leaves_nothing and found.unexplained_mean_square(beside) > 0.0:
+            found = self.with_laws(found, beside, fitted(self.laws, settings.PARTNERS, beside))
         found = self.relinearise(found) if found.candidates else found
         return self.beside_law(found) if law_of(found.leading[0].hypothesis) is not None else found
+
+    def with_laws(self, found: Comparison, beside: CandidateFit, learned: Sequence[CandidateFit]) -> Comparison:
+        """The same with laws beside a model, which is then known to have been compared with them, if time allowed."""
+        tried = frozenset() if self.deadline.has_passed else {beside.hypothesis}
+        found = replace(found, laws_beside=found.laws_beside | tried)
+        return found.with_candidates([*found.candidates, *learned])
 
     def beside_law(self, found: Comparison) -> Comparison:
         """The same with what acts beside the leading law, a listed mechanism or a second law, if something is left."""
@@ -292,7 +302,7 @@ class Selection:
         reached = next(c.mean_square for c in again if c.hypothesis == best.hypothesis)
         if about and about.hypothesis == best.hypothesis and reached >= best.mean_square:
             return found
-        return Comparison.of(whitened, base, again, found.screened, best)
+        return Comparison.of(whitened, base, again, found.screened, best, laws_beside=found.laws_beside)
 
     def _evaluated(self, late: Sequence[CandidateFit], whitened: Sequence[Whitened]) -> list[CandidateFit]:
         """Candidates under another covariance with the values that they have."""
@@ -319,6 +329,18 @@ class Selection:
             return found
         every = {c.hypothesis: c for c in [*found.candidates, *again]}
         return found.with_candidates(list(every.values()))
+
+
+def least_evidence(found: Comparison) -> float:
+    """Log evidence to first order, over that of the calibrated model, from which a law is worth a fit.
+
+    Where the calibrated model's own fit is good, all effects are small and nearly linear, and a law that is far behind
+    a listed mechanism stays behind. Elsewhere any law may be better than it seems.
+    """
+    if not (found.base.is_good and found.candidates):
+        return -np.inf
+    best = max(NormalEquations.of(c).log_evidence for c in found.candidates)
+    return best - NormalEquations.of(found.base).log_evidence - settings.LAW_FAR_BEHIND
 
 
 def finer_laws(fitted: Sequence[Hypothesis]) -> list[Law]:
