@@ -123,6 +123,15 @@ def test_the_headline_says_how_far_the_error_fell():
     assert "falls" not in headline(diagnosis("b", "agrees"))
 
 
+def test_the_headline_of_a_small_effect_does_not_promise_a_smaller_error():
+    small = diagnosis("b", "explained")
+    small["fit"]["error"] = {"F_load": {"before": 0.218, "after": 0.219, "noise": 0.0565}}
+    small["fit"]["mean_square"] = {"calibrated": 1.11, "extended": 1.05}
+    said = headline(small)
+    assert "the held-out error of F_load stays at 3.9 times the noise" in said
+    assert "falls from 1.11 to 1.05 (1: noise)" in said
+
+
 def test_the_nearest_model_is_never_said_without_its_label():
     assert nearest_sentence(diagnosis("b", "unexplained")).startswith("Nearest model, not accepted: ")
     assert nearest_sentence(diagnosis("b", "explained")) is None

@@ -110,9 +110,16 @@ def headline(diagnosis: Mapping) -> str:
         return text
     worst = worst_channel(diagnosis["fit"]["error"])
     e = diagnosis["fit"]["error"][worst]
-    before, after = e["before"] / e["noise"], e["after"] / e["noise"]
-    fall = f"falls from {before:.1f} to {after:.1f} times the noise"
-    return f"{text} With this in the model, the held-out error of {SYMBOL[worst]} {fall}."
+    before, after = (f"{e[when] / e['noise']:.1f}" for when in ("before", "after"))
+    if float(after) < float(before):
+        fall = f"falls from {before} to {after} times the noise"
+        return f"{text} With this in the model, the held-out error of {SYMBOL[worst]} {fall}."
+    squares = diagnosis["fit"]["mean_square"]
+    fall = f"falls from {squares['calibrated']:.2f} to {squares['extended']:.2f} (1: noise)"
+    return (
+        f"{text} The effect is smaller than what differs from run to run: the held-out error of {SYMBOL[worst]} stays at"
+        f" {after} times the noise, but beyond such differences the mean square of all errors {fall}."
+    )
 
 
 # What has a law of each slot; that of a sensor is named by its channel, and that of all channels of a side is a delay.
