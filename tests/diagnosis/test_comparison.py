@@ -14,6 +14,7 @@ from ccmodel.diagnosis.candidate import LAST_SEARCH, CandidateFit
 from ccmodel.diagnosis.comparison import Comparison, imitation, log_priors, priors_of_further
 from ccmodel.diagnosis.discrepancy import Evidence
 from ccmodel.diagnosis.hypothesis import Hypothesis
+from ccmodel.diagnosis.laws import Proposal
 from ccmodel.diagnosis.result import alternatives_of
 from ccmodel.diagnosis.screening import Score
 from ccmodel.diagnosis.selection import Selection
@@ -372,7 +373,7 @@ def test_a_weak_mechanism_is_not_named():
     """Of an effect that no discrepancy shows, no share is known: it may be an imitation, as probably as a priori."""
     found = verdict(evidence(NONE - 20), (fitted(1.0, FRICTION), evidence(NONE)), model=fitted(1.01))
     assert found.verdict == "undecided"
-    assert found.probability[0] == pytest.approx(imitation(0.0, 1.0, priors_of_further(False, False))[0], rel=1e-3)
+    assert found.probability[0] == pytest.approx(imitation(0.0, 1.0, priors_of_further(False))[0], rel=1e-3)
     assert 0.5 < found.probability[0] < DECIDED
 
 
@@ -411,7 +412,7 @@ def test_shares_have_proper_densities(has_part, with_laws):
     """Each of the three explanations has all of its shares, so that on average none is more probable than a priori."""
     shares = np.linspace(0, 1, 20001)
     for smallest in (0.003, 0.1, 1.0):
-        priors = priors_of_further(has_part, with_laws)
+        priors = priors_of_further(has_part, laws_tried=with_laws)
         weights = np.array([imitation(share, smallest, priors) for share in shares])
         # The third has the same density at every share.
         densities = weights / weights[:, 2:]
@@ -497,6 +498,39 @@ def test_what_may_be_an_imitation_competes_with_laws():
     assert strong.is_settled
     assert weak.is_adequate
     assert not weak.is_settled
+    # Certain by a good fit while something may be missing beside it, and not probable enough.
+    between = evidence(NONE, NONE + 2), evidence(NONE - 1.5, NONE)
+    doubtful = compared(
+        evidence(), (fitted(1.0, FRICTION), between[0]), (fitted(1.0, SCALE), between[1]), model=fitted(61.0)
+    )
+    assert doubtful.certain is not None
+    assert DECIDED <= doubtful.confidence_in(FRICTION[0]) < SETTLED
+    assert not doubtful.is_settled
+
+
+def test_a_discounted_mechanism_is_settled_with_a_discounted_probability():
+    strong = (fitted([1.0], FRICTION), evidence(NONE))
+    alone = compared(evidence(), strong, whitened=WHITENED[:1], model=fitted(61.0))
+    assert alone.probability[0] < DECIDED
+    assert alone.is_settled
+
+
+def test_a_scattered_strength_has_the_prior_of_the_laws_that_were_tried(monkeypatch):
+    monkeypatch.setattr(CandidateFit, "log_support", lambda self, name, place: 0.0)
+    found = compared(evidence(), (fitted(1.0, FRICTION), evidence(NONE)), model=fitted(61.0))
+    tried = replace(found, laws_beside=frozenset([found.base.hypothesis]))
+    assert found.probability[0] == pytest.approx(priors_of_further(False)[0], rel=1e-3)
+    assert tried.probability[0] == pytest.approx(priors_of_further(False, laws_tried=True)[0], rel=1e-3)
+
+
+def test_a_law_imitates_what_is_no_law():
+    """Of a small effect that only a law describes: it acts as probably as an unlisted effect is a law."""
+    direction = ("learned-sliding-friction-by-direction", "conduit")
+    found = compared(evidence(NONE - 20), (fitted(1.0, direction), evidence(NONE)), model=fitted(1.01))
+    own, _, other = priors_of_further(False, is_law=True)
+    assert own / (own + other) == pytest.approx(PRIOR_LAW)
+    expected = imitation(0.0, 1.0, priors_of_further(False, is_law=True))[0]
+    assert found.probability[0] == pytest.approx(expected, rel=1e-3)
 
 
 def test_laws_count_as_tried_where_all_of_them_were():
@@ -505,24 +539,67 @@ def test_laws_count_as_tried_where_all_of_them_were():
     every = {c.hypothesis: found.evidence[c.hypothesis] for c in [found.base, *found.candidates]}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Comparison, "_evidence_of", lambda self, candidate: every[candidate.hypothesis])
-        in_time, late = (
-            Selection({}, [], deadline=deadline).with_laws(found, found.base, [])
-            for deadline in (UNLIMITED, Deadline(0.0))
+        of_laws = ["a law"]
+        in_time, late, without = (
+            Selection({}, [], laws=laws_tried, deadline=deadline).with_laws(found, found.base, [])
+            for laws_tried, deadline in ((of_laws, UNLIMITED), (of_laws, Deadline(0.0)), ([], UNLIMITED))
         )
         assert in_time.laws_beside == {found.base.hypothesis}
         assert in_time.with_candidates([]).laws_beside == {found.base.hypothesis}
-    assert late.laws_beside == frozenset()
+    assert late.laws_beside == without.laws_beside == frozenset()
 
 
 def test_a_law_far_behind_a_listed_mechanism_is_fitted_only_where_effects_are_large(monkeypatch):
-    given = {"base": -60.0, "pulley-friction": -20.0}
-    of = lambda candidate: SimpleNamespace(log_evidence=given["".join(candidate.hypothesis.names) or "base"])  # noqa: E731
-    monkeypatch.setattr(selections, "NormalEquations", SimpleNamespace(of=of))
-    listed = fitted(1.0, FRICTION), evidence(NONE)
-    small, large = (compared(evidence(NONE - 20), listed, model=fitted(size)) for size in (1.01, 9.0))
-    assert selections.least_evidence(small) == 40.0 - LAW_FAR_BEHIND
+    monkeypatch.setattr(selections, "NormalEquations", SimpleNamespace(of=evidence_to_first_order))
+    listed, both = (fitted(1.0, FRICTION), evidence(NONE)), (fitted(1.0, FRICTION, SCALE), evidence(NONE))
+    impossible = fitted(1.0, SCALE, **{"torque-scale/drive-sensor/gain": 9.0}), evidence(NONE)
+    small, large = (compared(evidence(NONE - 20), listed, impossible, model=fitted(size)) for size in (1.01, 9.0))
+    assert selections.least_evidence(small) == pytest.approx(40.0 - LAW_FAR_BEHIND)
     assert selections.least_evidence(large) == -np.inf
     assert selections.least_evidence(compared(evidence(NONE - 20), model=fitted(1.01))) == -np.inf
+    pair = compared(evidence(NONE - 20), both, model=fitted(1.01))
+    behind = pair.log_prior(1) - pair.log_prior(2)
+    assert behind > 3.0
+    assert selections.least_evidence(pair) == pytest.approx(50.0 - behind - LAW_FAR_BEHIND)
+
+
+def evidence_to_first_order(candidate):
+    given = {(): -60.0, (FRICTION[0],): -20.0, (SCALE[0],): 30.0, (FRICTION[0], SCALE[0]): -10.0}
+    return SimpleNamespace(log_evidence=given[candidate.hypothesis.names])
+
+
+def test_laws_that_are_learned_are_those_in_reach_and_count_as_tried(monkeypatch):
+    """Of a calibrated model with a good fit, and beside a listed mechanism that leaves something."""
+    direction = laws()["learned-sliding-friction-by-direction"]
+    acting = Hypothesis(((direction.name, "conduit"),))
+    monkeypatch.setattr(selections, "NormalEquations", SimpleNamespace(of=evidence_to_first_order))
+    monkeypatch.setattr(
+        selections,
+        "proposals",
+        lambda *given: [Proposal(acting, value, {}) for value in (31.0, 29.0)] if given[1] else [],
+    )
+    asked = []
+    monkeypatch.setattr(Selection, "fit_all", lambda *given: asked.append(len(given[3])) or [])
+    for step in ("relinearise", "beside_law"):
+        monkeypatch.setattr(Selection, step, lambda self, found: found)
+    listed = fitted(1.1, FRICTION), evidence(NONE, NONE, size=0.1)
+    found = compared(evidence(size=0.5), listed, model=fitted(1.5))
+    every = {c.hypothesis: found.evidence[c.hypothesis] for c in [found.base, *found.candidates]}
+    monkeypatch.setattr(Comparison, "_evidence_of", lambda self, candidate: every[candidate.hypothesis])
+    learned = Selection({}, [], laws=[direction]).learn(replace(found, discrepancy=object()))
+    assert asked == [1, 0, 2]
+    assert learned.laws_beside == {found.base.hypothesis, listed[0].hypothesis}
+
+
+def test_nothing_is_learned_where_nothing_was_fitted(monkeypatch):
+    """The time was over before, or no law could be proposed."""
+    found = replace(compared(evidence(FAR, NONE)), discrepancy=object())
+    assert not found.is_settled
+    late = Selection({}, [], laws=["a law"], deadline=Deadline(0.0), sets_until=Deadline(0.0))
+    assert late.further(found, None) is found
+    monkeypatch.setattr(selections, "proposals", lambda *given: [])
+    monkeypatch.setattr(Comparison, "_evidence_of", lambda self, candidate: found.evidence[candidate.hypothesis])
+    assert Selection({}, [], laws=["a law"]).learn(found).candidates == []
 
 
 def test_no_law_is_learned_where_nothing_is_missing():

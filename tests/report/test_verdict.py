@@ -123,13 +123,28 @@ def test_the_headline_says_how_far_the_error_fell():
     assert "falls" not in headline(diagnosis("b", "agrees"))
 
 
-def test_the_headline_of_a_small_effect_does_not_promise_a_smaller_error():
+def headline_of(mean_square, **errors):
+    """Headline of errors before and after, over a noise of 1."""
     small = diagnosis("b", "explained")
-    small["fit"]["error"] = {"F_load": {"before": 0.218, "after": 0.219, "noise": 0.0565}}
-    small["fit"]["mean_square"] = {"calibrated": 1.11, "extended": 1.05}
-    said = headline(small)
-    assert "the held-out error of F_load stays at 3.9 times the noise" in said
-    assert "falls from 1.11 to 1.05 (1: noise)" in said
+    small["fit"]["error"] = {c: {"before": b, "after": a, "noise": 1.0} for c, (b, a) in errors.items()}
+    small["fit"]["mean_square"] = dict(zip(("calibrated", "extended"), mean_square, strict=True))
+    return headline(small)
+
+
+def test_the_headline_of_a_small_effect_does_not_promise_a_smaller_error():
+    said = headline_of((1.11, 1.05), F_load=(3.88, 3.9), tau_in=(1.5, 1.5))
+    assert "the held-out error of F_load is 3.9 times the noise before and 3.9 after" in said
+    assert "the mean square of the errors falls from 1.11 to 1.05 (1: noise)" in said
+    assert "is 1.2 times the noise before and 1.9 after" in headline_of((1.11, 1.05), F_load=(1.2, 1.9))
+    nothing = headline_of((1.04, 1.04), F_load=(1.2, 1.2))
+    assert "The held-out error of no channel falls; that of F_load is 1.2" in nothing
+    assert "falls from" not in nothing
+
+
+def test_where_the_worst_error_stays_the_headline_names_the_one_that_falls_most():
+    said = headline_of((9.0, 2.0), F_load=(3.9, 3.9), tau_out=(1.2, 1.1), tau_in=(3.5, 1.0))
+    assert said.endswith("the held-out error of τ_in falls from 3.5 to 1.0 times the noise.")
+    assert "of F_load falls from 3.9 to 3.5" in headline_of((9.0, 2.0), F_load=(3.9, 3.5), tau_in=(3.5, 1.0))
 
 
 def test_the_nearest_model_is_never_said_without_its_label():

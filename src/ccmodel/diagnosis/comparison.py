@@ -54,7 +54,8 @@ class Comparison:
     discrepancy : Discrepancy or None
         From which the evidence was computed.
     laws_beside : frozenset of Hypothesis
-        Models, the calibrated one or candidates, beside each of which every law that may be learned was tried.
+        Models, the calibrated one or candidates, beside each of which every law that may be learned was proposed and
+        the leading ones fitted.
     """
 
     whitened: Sequence[Whitened]
@@ -133,7 +134,7 @@ class Comparison:
         found = []
         for candidate in [self.base, *self.candidates]:
             evidence, repeats = self.evidence[candidate.hypothesis], log_bayes_factor_of_repeats(candidate)
-            priors = log_priors(candidate.hypothesis.size, max(self.screened, len(self.candidates)))
+            priors = log_priors(candidate.hypothesis.size, self._alike)
             # What no list holds is any law of any slot.
             unlisted = log((1 - settings.PRIOR_LISTED) / settings.PRIOR_LISTED)
             priors = priors + len(laws_in(candidate.hypothesis)) * unlisted
@@ -145,6 +146,15 @@ class Comparison:
             is_possible = candidate is self.base or candidate.is_plausible
             found.append(weights if is_possible else np.full(2, -np.inf))
         return np.array(found)
+
+    @property
+    def _alike(self) -> int:
+        """Number of hypotheses among which the prior probability is shared."""
+        return max(self.screened, len(self.candidates))
+
+    def log_prior(self, size: int) -> float:
+        """Log prior that a set of `size` listed mechanisms is complete."""
+        return float(log_priors(size, self._alike)[0])
 
     def is_far_behind(self, candidate: CandidateFit) -> bool:
         """Whether a candidate has a far lower weight than the leading one; False of one that is not plausible."""
@@ -184,7 +194,8 @@ class Comparison:
         has_part = part is not self.base
         further = set(candidate.hypothesis.acting) - set(part.hypothesis.acting)
         support = min(candidate.log_support(*one) for one in further)
-        prior = priors_of_further(has_part, part.hypothesis in self.laws_beside)
+        is_law = bool(laws_in(Hypothesis(tuple(further))))
+        prior = priors_of_further(has_part, is_law, part.hypothesis in self.laws_beside)
         return limited(imitation(share, smallest, prior), prior[0], support)
 
     def unexplained_mean_square(self, candidate: CandidateFit) -> float:
@@ -242,15 +253,16 @@ class Comparison:
     def is_settled(self) -> bool:
         """Whether no law is learned: nothing is missing, or what is missing has a probability of `SETTLED`.
 
-        A mechanism that is less probable, or that leaves something, may be the best imitation of a law that no list
-        holds, and has to compete with laws.
+        That is a candidate that is complete, or one that is `certain` and leaves nothing. What is less probable may be
+        the best imitation of a law that no list holds, and has to compete with laws.
         """
-        if self.probability_of_base > 0.5 or max(self.probability, default=0.0) >= settings.SETTLED:
+        enough = settings.SETTLED * self._discount
+        if self.probability_of_base > 0.5 or max(self.probability, default=0.0) >= enough:
             return True
         certain = self.certain
         if certain is None or self.unexplained_mean_square(certain) > 0.0:
             return False
-        return min(map(self.confidence_in, certain.hypothesis.names)) >= settings.SETTLED
+        return min(map(self.confidence_in, certain.hypothesis.names)) >= enough
 
     def confidence_in(self, name: str) -> float:
         """Probability that a mechanism acts, at whatever place and beside whatever others."""
@@ -417,20 +429,23 @@ def limited(probabilities: NDArray, prior: float, log_support: float) -> NDArray
     return np.array([most, *others])
 
 
-def priors_of_further(has_part: bool, with_laws: bool) -> NDArray:
-    """Prior probabilities of the three explanations of what a mechanism takes off; shape (3,).
+def priors_of_further(has_part: bool, is_law: bool = False, laws_tried: bool = False) -> NDArray:
+    """Prior probabilities of the three explanations of what a mechanism, or a law, takes off; shape (3,).
 
     Parameters
     ----------
     has_part : bool
         Whether there are other mechanisms, whose equations may leave something.
-    with_laws : bool
-        Whether the laws that may be learned were tried. What they describe is then a candidate of its own, and only the
-        rest of what is unlisted can be imitated.
+    is_law : bool
+        Whether it is a law that no list holds.
+    laws_tried : bool
+        Whether these laws were tried beside the other mechanisms. What they describe is then a candidate of its own,
+        and only the rest of what is unlisted can be imitated.
     """
-    further = settings.PRIOR_FURTHER if has_part else 1.0
-    unlisted = (1 - settings.PRIOR_LISTED) * (1 - settings.PRIOR_LAW if with_laws else 1.0)
-    found = np.array([further * settings.PRIOR_LISTED, 1 - further, further * unlisted])
+    further, unlisted = settings.PRIOR_FURTHER if has_part else 1.0, 1 - settings.PRIOR_LISTED
+    of_laws, no_law = unlisted * settings.PRIOR_LAW, unlisted * (1 - settings.PRIOR_LAW)
+    own = of_laws if is_law else settings.PRIOR_LISTED
+    found = np.array([further * own, 1 - further, further * (no_law if is_law or laws_tried else unlisted)])
     return found / found.sum()
 
 

@@ -101,8 +101,8 @@ class Selection:
 
         Sets of increasing size are fitted first, within `SETS_SHARE` of both limits. Laws are learned when a size does
         not halve what smaller sets leave, or when that share has passed, unless the comparison is decided; larger sets
-        follow unless a law leads. Otherwise laws are learned at the end, unless the comparison is settled: a mechanism
-        that is certain but has a lack of fit competes with laws.
+        follow unless a law leads. Otherwise laws are learned at the end, unless the comparison is settled: what is less
+        probable or has a lack of fit competes with laws.
         """
         sets, size = replace(self, deadline=self.sets_until, goes_on=True), 2
         while size <= settings.MOST_MECHANISMS:
@@ -123,33 +123,40 @@ class Selection:
             if is_over or listed.hypothesis.size < size:
                 break
             size += 1
-        return self.learn(found) if sets.laws and not found.is_settled else found
+        has_time = sets.laws and not self.deadline.has_passed
+        return self.learn(found) if has_time and not found.is_settled else found
 
     def learn(self, found: Comparison) -> Comparison:
         """The same with laws that no list holds: the leading ones, and the best of them with more knots."""
         base, least = found.base, least_evidence(found)
         self.progress("learning a law from the recordings", 0.0)
 
-        def fitted(every: Sequence[Law], most: int, beside: CandidateFit = base) -> list[CandidateFit]:
+        def fitted(
+            every: Sequence[Law], most: int, beside: CandidateFit = base, least: float = -np.inf
+        ) -> list[CandidateFit]:
             proposed = proposals(beside, every, self.deadline, self.progress, self.known)
-            leading = [p for p in proposed if p.evidence > least or beside is not base][:most]
+            leading = [p for p in proposed if p.evidence > least][:most]
             return self.fit_all(found.whitened, beside, [Score(p.hypothesis, 0.0, p.values) for p in leading])
 
-        first = sorted(fitted(self.laws, settings.LAWS_FITTED), key=lambda c: c.mean_square)
-        learned = first + fitted(finer_laws([c.hypothesis for c in first]), settings.LAWS_REFINED)
+        first = sorted(fitted(self.laws, settings.LAWS_FITTED, least=least), key=lambda c: c.mean_square)
+        learned = first + fitted(finer_laws([c.hypothesis for c in first]), settings.LAWS_REFINED, least=least)
         excess = settings.MOSTLY_LISTED * found.excess
-        listed = [c for c in found.candidates if c.hypothesis.size == 1 and c.mean_square - 1 < excess]
+        single = (c for c in found.candidates if c.hypothesis.size == 1 and c.is_plausible)
+        listed = [c for c in single if c.mean_square - 1 < excess]
         found = self.with_laws(found, base, learned)
-        # A listed effect that is far larger hides the law from the calibrated model, unless one of them leaves nothing.
+        # A listed effect that is far larger hides a law from the calibrated model. None is hidden if it leaves nothing,
+        # or if a law that leaves nothing leads.
         beside = min(listed, key=lambda c: c.mean_square, default=base)
         if listed and not found.leading_law_leaves_nothing and found.unexplained_mean_square(beside) > 0.0:
             found = self.with_laws(found, beside, fitted(self.laws, settings.PARTNERS, beside))
-        found = self.relinearise(found) if found.candidates else found
+        if not found.candidates:
+            return found
+        found = self.relinearise(found)
         return self.beside_law(found) if law_of(found.leading[0].hypothesis) is not None else found
 
     def with_laws(self, found: Comparison, beside: CandidateFit, learned: Sequence[CandidateFit]) -> Comparison:
-        """The same with laws beside a model, which is then known to have been compared with them, if time allowed."""
-        tried = frozenset() if self.deadline.has_passed else {beside.hypothesis}
+        """The same with laws beside a model, which counts as compared with them if there was time for all."""
+        tried = {beside.hypothesis} if self.laws and not self.deadline.has_passed else frozenset()
         found = replace(found, laws_beside=found.laws_beside | tried)
         return found.with_candidates([*found.candidates, *learned])
 
@@ -335,12 +342,14 @@ def least_evidence(found: Comparison) -> float:
     """Log evidence to first order, over that of the calibrated model, from which a law is worth a fit.
 
     Where the calibrated model's own fit is good, all effects are small and nearly linear, and a law that is far behind
-    a listed mechanism stays behind. Elsewhere any law may be better than it seems.
+    a plausible listed candidate, their priors included, stays behind. Elsewhere any law may be better than it seems.
     """
-    if not (found.base.is_good and found.candidates):
+    plausible = [c for c in found.candidates if c.is_plausible]
+    if not (found.base.is_good and plausible):
         return -np.inf
-    best = max(NormalEquations.of(c).log_evidence for c in found.candidates)
-    return best - NormalEquations.of(found.base).log_evidence - settings.LAW_FAR_BEHIND
+    prior_of_law = found.log_prior(1)
+    best = max(NormalEquations.of(c).log_evidence + found.log_prior(c.hypothesis.size) for c in plausible)
+    return best - prior_of_law - NormalEquations.of(found.base).log_evidence - settings.LAW_FAR_BEHIND
 
 
 def finer_laws(fitted: Sequence[Hypothesis]) -> list[Law]:

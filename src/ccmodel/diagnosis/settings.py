@@ -176,10 +176,11 @@ CLEARLY_WORSE = 3.0
 
 # Prior probabilities: that nothing is missing; that a further effect is missing if one is; and that a missing effect is
 # a listed mechanism. Chosen: even odds, one rig in four, and two effects in three. The last is below `DECIDED`, so that
-# recordings without information identify no mechanism.
+# no mechanism is identified as long as nothing but the calibrated model and the list competes with it.
 PRIOR_AGREES, PRIOR_FURTHER, PRIOR_LISTED = 0.5, 0.25, 2 / 3
-# Prior probability that an effect on no list is one of the laws that are tried. Practice: of 34 simulated rigs whose
-# effect was on no list, or taken off it, 28 were `learned` (docs/further-validation.md). Chosen: three in four.
+# Prior probability that an effect on no list is one of the laws that are tried. Practice: a law of the true slot was
+# learned for 28 of 34 effects on no list or taken off it, most of them larger than those that it decides, and for 15 of
+# 17 small ones (docs/further-validation.md). Chosen: three in four.
 PRIOR_LAW = 0.75
 # Prior probability that an effect's law is that of the mechanism, and shares of its effect that the mechanism's
 # equation leaves otherwise, log-uniform between these. Practice (`make form-errors`): 17 published laws of 9 effects
@@ -234,8 +235,9 @@ LAW_DELAY_S = 0.1
 # Laws that are fitted, the leading ones to first order; and of these, how many are also fitted with more knots. Chosen
 # for time.
 LAWS_FITTED, LAWS_REFINED = 8, 2
-# Log evidence, to first order, by which a law is behind a listed mechanism and is not fitted. Chosen for time: at
-# odds of 20,000 it has no share in the comparison, also if they are wrong by a factor of a hundred.
+# Log of the odds, to first order, by which a law is behind a listed candidate and is not fitted, where the calibrated
+# model's own fit is good. Chosen for time: at odds of 20,000 it has no share in the comparison, also if they are wrong
+# by a factor of a hundred.
 LAW_FAR_BEHIND = 10.0
 # Share of the knots of a learned law at which a formula must lie in its band. Chosen.
 IN_BAND = 0.9
@@ -245,7 +247,7 @@ LISTED_STARTS = 3
 # distribution's 90 % interval.
 WITHIN_BAND = 1.645
 # Laws are also learned beside the best single listed mechanism if its excess mean square is below this share of the
-# calibrated model's, and no law leads that leaves nothing. Chosen.
+# calibrated model's, it leaves something, and no law leads that leaves nothing. Chosen.
 MOSTLY_LISTED = 0.5
 # Share of both limits after which no further set is fitted before laws are learned. Chosen: laws take some 40 s.
 SETS_SHARE = 0.6
@@ -270,7 +272,7 @@ NAMED_CHANNEL, NAMED_PHASE = 0.35, 0.7  # Chosen.
 # Posterior probability from which a mechanism is identified (the decision threshold), and from which it is listed as an
 # alternative. Chosen.
 DECIDED, ALTERNATIVE = 0.8, 0.02
-# Posterior probability from which a mechanism is identified although no law that may be learned was compared with it.
+# Posterior probability from which a mechanism is not compared with the laws that may be learned, before the discount.
 # Chosen: one in twenty is wrong, and laws take longer than all else in the diagnosis of a single effect.
 SETTLED = 0.95
 # Largest rms error of a channel, over its noise, in a good fit (`CandidateFit.is_good`). Chosen: an error of this size

@@ -108,17 +108,27 @@ def headline(diagnosis: Mapping) -> str:
     text = f"{diagnosis['batch']}: {sentence(diagnosis)}"
     if diagnosis["verdict"] not in ("explained", "learned"):
         return text
-    worst = worst_channel(diagnosis["fit"]["error"])
-    e = diagnosis["fit"]["error"][worst]
-    before, after = (f"{e[when] / e['noise']:.1f}" for when in ("before", "after"))
-    if float(after) < float(before):
-        fall = f"falls from {before} to {after} times the noise"
-        return f"{text} With this in the model, the held-out error of {SYMBOL[worst]} {fall}."
-    squares = diagnosis["fit"]["mean_square"]
-    fall = f"falls from {squares['calibrated']:.2f} to {squares['extended']:.2f} (1: noise)"
+    return f"{text} {_gain(diagnosis['fit'])}"
+
+
+def _gain(fit: Mapping) -> str:
+    """How far the held-out error falls: of the worst channel, or else of the one in which it falls most.
+
+    Where it falls in none, the mean square of the errors says how far it falls beyond what differs from run to run.
+    """
+    worst = worst_channel(fit["error"])
+    before, after = ({c: round(e[w] / e["noise"], 1) for c, e in fit["error"].items()} for w in ("before", "after"))
+    most = max(before, key=lambda c: before[c] - after[c] if after[worst] >= before[worst] else c == worst)
+    if after[most] < before[most]:
+        fall = f"falls from {before[most]:.1f} to {after[most]:.1f} times the noise"
+        return f"With this in the model, the held-out error of {SYMBOL[most]} {fall}."
+    changes = f"{before[worst]:.1f} times the noise before and {after[worst]:.1f} after"
+    low, high = (f"{fit['mean_square'][model]:.2f}" for model in ("extended", "calibrated"))
+    if not float(low) < float(high):
+        return f"The held-out error of no channel falls; that of {SYMBOL[worst]} is {changes}."
     return (
-        f"{text} The effect is smaller than what differs from run to run: the held-out error of {SYMBOL[worst]} stays at"
-        f" {after} times the noise, but beyond such differences the mean square of all errors {fall}."
+        f"The effect is smaller than what differs from run to run: the held-out error of {SYMBOL[worst]} is {changes}."
+        f" Beyond such differences the mean square of the errors falls from {high} to {low} (1: noise)."
     )
 
 
