@@ -118,8 +118,9 @@ def _gain(fit: Mapping) -> str:
     """
     worst = worst_channel(fit["error"])
     before, after = ({c: round(e[w] / e["noise"], 1) for c, e in fit["error"].items()} for w in ("before", "after"))
-    most = max(before, key=lambda c: before[c] - after[c] if after[worst] >= before[worst] else c == worst)
-    if after[most] < before[most]:
+    falls = {channel: before[channel] - after[channel] for channel in before}
+    most = worst if falls[worst] > 0.0 else max(falls, key=lambda channel: falls[channel])
+    if falls[most] > 0.0:
         fall = f"falls from {before[most]:.1f} to {after[most]:.1f} times the noise"
         return f"With this in the model, the held-out error of {SYMBOL[most]} {fall}."
     changes = f"{before[worst]:.1f} times the noise before and {after[worst]:.1f} after"
