@@ -89,7 +89,7 @@ from ccmodel.mechanisms.law_forms import (
     Form,
     basis,
 )
-from ccmodel.mechanisms.tables import Table
+from ccmodel.mechanisms.tables import Table, slip
 
 # Knots of a law, and the length over which its values are correlated a priori, as a share of its range: at first, and
 # where the recordings show more. The fastening of a cable is smooth at first: with more coefficients its law would be
@@ -392,8 +392,7 @@ def _slip(travel: NDArray, yields: NDArray) -> NDArray:
     states = np.zeros((yields.size, travel.size))
     for k in range(yields.size):
         for i in range(1, travel.size):
-            moved = (travel[i] - travel[i - 1]) / yields[k]
-            states[k, i] = min(max(states[k, i - 1] + moved, -1.0), 1.0)
+            states[k, i] = slip(states[k, i - 1], travel[i] - travel[i - 1], yields[k])
     return states
 
 

@@ -109,6 +109,12 @@ def pulled(rows: NDArray, at: int, c: int, i: int, stretch: float) -> tuple[floa
 
 
 @kernel
+def slip(before: float, travel: float, yields: float) -> float:
+    """State of a Maxwell-slip element, -1 to 1, after a further travel; it yields after the travel `yields`."""
+    return float(min(max(before + travel / yields, -1.0), 1.0))
+
+
+@kernel
 def slipped(rows: NDArray, at: int, travel: float) -> tuple[float, float]:
     """Torque of the elements in the rows from `at` after a further travel, and its derivative.
 
@@ -118,11 +124,10 @@ def slipped(rows: NDArray, at: int, travel: float) -> tuple[float, float]:
     torque, slope = 0.0, 0.0
     for k in range(at + 1, at + 1 + elements):
         yields, largest, before = rows[k], rows[k + elements], rows[k + 2 * elements]
-        trial = before + travel / yields
-        after = min(max(trial, -1.0), 1.0)
+        after = slip(before, travel, yields)
         rows[k + 3 * elements] = after
         torque += largest * after
-        slope += largest / yields if abs(trial) < 1.0 else 0.0
+        slope += largest / yields if abs(after) < 1.0 else 0.0
     return torque, slope
 
 
