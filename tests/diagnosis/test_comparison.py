@@ -388,6 +388,15 @@ def test_a_weak_mechanism_is_named_if_no_law_does_as_well(law, said):
     assert judge(tried, []).verdict == said
 
 
+@pytest.mark.parametrize("before, left, is_more_probable", [(0.02, 0.005, True), (60.0, 0.0, True), (60.0, 3.0, False)])
+def test_laws_say_nothing_for_a_mechanism_that_visibly_leaves_something(before, left, is_more_probable):
+    """What is missing may then be no law of one quantity."""
+    listed = fitted(1.0 + left, FRICTION), evidence(NONE, size=left)
+    found = compared(evidence(size=before), listed, model=fitted(1.0 + before))
+    tried = replace(found, laws_beside=frozenset([found.base.hypothesis]))
+    assert (tried.probability[0] > found.probability[0]) == is_more_probable
+
+
 def test_laws_beside_a_mechanism_say_nothing_of_another():
     alone, both = (fitted(3.0, FRICTION), evidence(NONE - 40)), (fitted(1.0, FRICTION, SCALE), evidence(NONE))
     found = compared(evidence(), alone, both)

@@ -195,7 +195,9 @@ class Comparison:
         further = set(candidate.hypothesis.acting) - set(part.hypothesis.acting)
         support = min(candidate.log_support(*one) for one in further)
         is_law = bool(laws_in(Hypothesis(tuple(further))))
-        prior = priors_of_further(has_part, is_law, part.hypothesis in self.laws_beside)
+        # Where a mechanism visibly leaves something and no law does better, what is missing may be no law at all.
+        laws_tried = part.hypothesis in self.laws_beside and share <= smallest
+        prior = priors_of_further(has_part, is_law, laws_tried)
         return limited(imitation(share, smallest, prior), prior[0], support)
 
     def unexplained_mean_square(self, candidate: CandidateFit) -> float:
