@@ -75,14 +75,12 @@ class Comparison:
         candidates: Sequence[CandidateFit],
         screened: int = 0,
         linearised_about: CandidateFit | None = None,
-        discrepancy: Discrepancy | None = None,
         laws_beside: frozenset[Hypothesis] = frozenset(),
     ) -> "Comparison":
-        """Order the candidates, and compute their evidence; `discrepancy` is that of the same calibrated model."""
-        ordered = sorted(candidates, key=lambda c: (not c.is_plausible, c.mean_square))
-        discrepancy = discrepancy or Discrepancy.of(whitened, base)
-        found = cls(whitened, base, ordered, {}, screened, linearised_about, discrepancy, laws_beside)
-        return replace(found, evidence={c.hypothesis: found._evidence_of(c) for c in [base, *ordered]})
+        """Order the candidates, and compute their evidence."""
+        discrepancy = Discrepancy.of(whitened, base)
+        nothing = cls(whitened, base, [], {}, screened, linearised_about, discrepancy, laws_beside)
+        return nothing.with_candidates(candidates)
 
     def _evidence_of(self, candidate: CandidateFit) -> Evidence:
         assert self.discrepancy is not None
@@ -92,15 +90,9 @@ class Comparison:
 
     def with_candidates(self, candidates: Sequence[CandidateFit]) -> "Comparison":
         """The same with other candidates, fitted to the same whitened observations."""
-        return Comparison.of(
-            self.whitened,
-            self.base,
-            candidates,
-            self.screened,
-            self.linearised_about,
-            self.discrepancy,
-            self.laws_beside,
-        )
+        ordered = sorted(candidates, key=lambda c: (not c.is_plausible, c.mean_square))
+        found = replace(self, candidates=ordered, evidence={})
+        return replace(found, evidence={c.hypothesis: found._evidence_of(c) for c in [self.base, *ordered]})
 
     def is_linearised_about(self, candidate: CandidateFit) -> bool:
         """Whether the covariance is linearised about these mechanisms, within a standard deviation of each value."""

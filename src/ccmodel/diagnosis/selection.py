@@ -123,8 +123,8 @@ class Selection:
             if is_over or listed.hypothesis.size < size:
                 break
             size += 1
-        has_time = sets.laws and not self.deadline.has_passed
-        return self.learn(found) if has_time and not found.is_settled else found
+        can_learn = sets.laws and not self.deadline.has_passed
+        return self.learn(found) if can_learn and not found.is_settled else found
 
     def learn(self, found: Comparison) -> Comparison:
         """The same with laws that no list holds: the leading ones, and the best of them with more knots."""
@@ -309,7 +309,7 @@ class Selection:
         reached = next(c.mean_square for c in again if c.hypothesis == best.hypothesis)
         if about and about.hypothesis == best.hypothesis and reached >= best.mean_square:
             return found
-        return Comparison.of(whitened, base, again, found.screened, best, laws_beside=found.laws_beside)
+        return Comparison.of(whitened, base, again, found.screened, best, found.laws_beside)
 
     def _evaluated(self, late: Sequence[CandidateFit], whitened: Sequence[Whitened]) -> list[CandidateFit]:
         """Candidates under another covariance with the values that they have."""
