@@ -71,6 +71,29 @@ def test_a_study_of_a_batch_that_is_not_there_is_refused(edited):
         expand_studies(config, ["half-loop", "loops", "pretension", "radius"])
 
 
+@pytest.mark.parametrize("key", ["fits", "studies"])
+def test_the_name_of_a_fit_or_study_can_be_that_of_a_file(key):
+    values = {"fits": TWO_RIGS["fits"]["fitted"], "studies": {"batches": ["a"]}}
+    with pytest.raises(ValueError, match=rf"{key}.a/b: becomes the name of a file"):
+        two_rigs(**{key: {"a/b": values[key]}})
+
+
+def test_two_studies_make_no_file_of_one_name():
+    each = two_rigs(studies={"s": {"batches": "each"}, "s-a": {"batches": ["a"]}})
+    with pytest.raises(InputError, match="studies.s-a: 's-a' is the name of another study"):
+        expand_studies(each, BATCHES)
+    history = two_rigs(
+        studies={"accuracy-history": {"batches": ["a"]}}, baseline={"file": "a.json", "history": "a.csv"}
+    )
+    with pytest.raises(InputError, match="both make the figure accuracy-history"):
+        expand_studies(history, BATCHES)
+
+
+def test_a_folder_with_a_decomposed_letter_is_a_batch(tmp_path):
+    (tmp_path / "pru\u0308f").mkdir()
+    assert len(batches_in(tmp_path)[0]) == 1
+
+
 def test_a_study_of_what_no_diagnosis_finds_is_refused():
     study = {"s": {"batches": ["b"], "parameters": "extended"}}
     with pytest.raises(ValueError, match=r"asks for parameters .extended.; there are estimated \["):
@@ -182,7 +205,7 @@ def test_every_visible_folder_is_a_batch_or_named_as_none(tmp_path):
     names, unusable = batches_in(tmp_path)
     assert names == ["a", "b"]
     assert len(unusable) == 2
-    assert "my batch: a batch's name is" in unusable[1]
+    assert "my batch: a name is" in unusable[1]
 
 
 def test_a_folder_without_batches_is_refused(tmp_path):

@@ -1,7 +1,9 @@
 """The typed configuration of a pipeline run: which batches, what is fitted, which studies are made of them."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Self
+from unicodedata import normalize
 
 from pydantic import Field, model_validator
 
@@ -90,6 +92,10 @@ class Config(TypedModel):
         for name in self.fits:
             if name in means:
                 raise ValueError(f"fits.{name}: '{name}' names {means[name]}; call the fit something else")
+        for key, named in (("fits", self.fits), ("studies", self.studies)):
+            for name in named:
+                if not valid_name(name):
+                    raise ValueError(f"{key}.{name}: becomes the name of a file; {NAMES}")
         if taken := self.studies.keys() & self.judgements.keys():
             raise ValueError(f"studies.{min(taken)}: that is the name of another study; call it something else")
         named = {f"study '{name}'": study for name, study in self.studies.items()}
@@ -161,11 +167,10 @@ def batches_in(raw: Path) -> tuple[list[str], list[str]]:
         If there is no such folder or no batch in it.
     """
     names = sorted(p.name for p in raw.glob("*") if p.is_dir() and not p.name.startswith("."))
-    usable = [name for name in names if valid_name(name)]
+    usable = [name for name in names if valid_name(normalize("NFC", name))]
     if not usable:
         raise InputError(f"{raw}: no batch here; a batch is a folder with a batch.yaml and its logs")
-    advice = "a batch's name is letters, digits and -_.+=,@ only: rename the folder"
-    return usable, [f"{raw / name}: {advice}" for name in names if name not in usable]
+    return usable, [f"{raw / name}: {NAMES}: rename the folder" for name in names if name not in usable]
 
 
 def expand_studies(config: Config, batches: list[str]) -> dict[str, Study]:
@@ -202,5 +207,20 @@ def expand_studies(config: Config, batches: list[str]) -> dict[str, Study]:
         copies: dict[str, dict[str, Any]] = {name: {"title": title}}
         if study.batches == EACH:
             copies = {f"{name}-{batch}": {"batches": [batch], "title": f"{title}, {batch}"} for batch in batches}
+        if taken := expanded.keys() & copies.keys():
+            raise InputError(f"studies.{name}: '{min(taken)}' is the name of another study; call it something else")
         expanded |= {figure: study.model_copy(update=update) for figure, update in copies.items()}
+    _check_figures(expanded | config.judgements)
     return expanded
+
+
+def _check_figures(studies: Mapping[str, StudySettings]) -> None:
+    """Refuse two studies that would make one figure."""
+    made_by: dict[str, str] = {}
+    for name, study in studies.items():
+        for figure in (stem.format(name=name) for stem in study.figures):
+            if figure in made_by:
+                raise InputError(
+                    f"studies: '{made_by[figure]}' and '{name}' both make the figure {figure}; call one something else"
+                )
+            made_by[figure] = name

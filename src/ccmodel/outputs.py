@@ -16,12 +16,20 @@ _UNFINISHED = ".unfinished-"
 
 
 @contextmanager
-def _written(path: Path) -> Iterator[None]:
-    """Say of which file or folder an error of the system is; one of a full disk does not say it."""
+def _naming(path: Path) -> Iterator[None]:
+    """Name the file or folder in an error of the system: one of a full disk does not.
+
+    An error that names a file elsewhere is one of reading it.
+    """
     try:
         yield
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
+        place = path.resolve()
+        named = Path(error.filename).resolve() if isinstance(error.filename, str) else place
+        is_unfinished = any(part.startswith(_UNFINISHED) for part in named.parts)
+        if is_unfinished or named.is_relative_to(place) or place.is_relative_to(named):
+            raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
+        raise InputError(f"{error.filename}: cannot be read ({error.strerror or error})") from None
 
 
 @contextmanager
@@ -36,7 +44,7 @@ def new_file(path: str | Path) -> Iterator[Path]:
         If it cannot be written.
     """
     path = Path(path).expanduser()
-    with _written(path):
+    with _naming(path):
         place = path.resolve()
         place.parent.mkdir(parents=True, exist_ok=True)
         fresh = place.with_name(_UNFINISHED + place.name)
@@ -68,7 +76,7 @@ def new_files(folder: str | Path, last: str | None = None, without: Collection[s
         If they cannot be written.
     """
     folder = Path(folder).expanduser()
-    with _written(folder):
+    with _naming(folder):
         folder.mkdir(parents=True, exist_ok=True)
         fresh = folder / f"{_UNFINISHED}files"
         shutil.rmtree(fresh, ignore_errors=True)
@@ -99,7 +107,7 @@ def new_folder(path: str | Path) -> Iterator[Path]:
         If it cannot be written.
     """
     path = Path(path).expanduser()
-    with _written(path):
+    with _naming(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         # In the parent of `path`, since a folder can only be renamed within a file system.
         work = path.with_name(_UNFINISHED + path.name)

@@ -1,7 +1,7 @@
 """Recording: the common type of measured and simulated data, and its netCDF file."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
@@ -213,6 +213,12 @@ def write_recordings(path: Path, recordings: list[Recording], provenance: Mappin
             variable[:] = written
 
 
+def in_order(recordings: Sequence[Recording]) -> list[Recording]:
+    """Recordings with their positions in the session by their order, -1/2 to 1/2; a single one has 0."""
+    at = np.linspace(-0.5, 0.5, len(recordings)) if len(recordings) > 1 else [0.0] * len(recordings)
+    return [replace(r, position=float(x)) for r, x in zip(recordings, at, strict=True)]
+
+
 def read_recordings(path: Path) -> list[Recording]:
     """Read a file of `write_recordings`, in the same order."""
     with xr.open_datatree(path, engine="netcdf4") as tree:
@@ -225,7 +231,9 @@ def read_provenance(path: Path) -> dict:
         return json.loads(tree.attrs["provenance"])
 
 
-_SCALARS = {"batch": str, "origin": str, "pretension_N": float, "rest_s": float, "settled_s": float}
+_SCALARS = {
+    "batch": str, "origin": str, "pretension_N": float, "rest_s": float, "settled_s": float, "position": float
+}  # fmt: skip
 _IF_STATED = ("far_end", "started_at_s", "tensioned_at_s")
 # Numbers of each channel of a sensor.
 _OF_SENSORS = ("accuracy", "encoder_step_rad")

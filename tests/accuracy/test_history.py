@@ -87,6 +87,13 @@ def test_rows_of_a_commit_replace_earlier_ones_and_stand_in_the_order_of_dates(m
     assert len(table) == 2 * len(batches["tiny"].sets["estimated"].channels)
 
 
+def test_dates_of_two_time_zones_are_in_their_order(measured, tmp_path):
+    file = tmp_path / "history.csv"
+    for name, date in (("later", "2026-01-01T09:00:00+00:00"), ("earlier", "2026-01-01T10:30:00+02:00")):
+        add_rows(file, rows_of(measured[1], name, date, "1"))
+    assert list(dict.fromkeys(read_history(file)["commit"])) == ["earlier", "later"]
+
+
 def test_a_file_with_other_columns_is_refused(tmp_path):
     file = tmp_path / "history.csv"
     file.write_text("commit,error\na,1\n")

@@ -7,7 +7,8 @@ import pytest
 from ccmodel.report.verdict import sentence
 
 ERROR = {"tau_in": {"before": 0.012, "after": 0.002, "noise": 0.001, "unit": "N*m"}}
-AGREES = {"batch": "loops", "verdict": "agrees", "is_held": False, "fit": {"error": ERROR}, "not_judged": []}
+FIT = {"error": ERROR, "held_out": ["a"]}
+AGREES = {"batch": "loops", "verdict": "agrees", "is_held": False, "fit": FIT, "not_judged": []}
 
 
 def write(file, content):

@@ -112,6 +112,11 @@ def test_a_forced_candidate_that_is_not_known_is_refused(forced_candidates, said
         Config(diagnosing={"forced_candidates": forced_candidates})
 
 
+def test_a_channel_has_one_tolerance():
+    with pytest.raises(InputError, match="one share for a channel"):
+        tolerance_of(["tau_in_Nm=0.02", "tau_in_Nm=0.3"])
+
+
 def test_a_tolerance_may_differ_by_channel():
     recorded = jaw(-0.01)
     plain, allowing = (

@@ -137,3 +137,13 @@ def test_what_cannot_be_compensated_is_refused():
     far = WANTED.assign(theta_out_rad=20 * SWING)
     with pytest.raises(ModelError, match="no motion of the drive .* at sample"):
         compensated(far, PARAMETERS, replace(RIG, far_end="spring"), FREE)
+
+
+@pytest.mark.parametrize(
+    "mechanisms", [(), (Active("constant-drag", "conduit", {"f0": 0.1}),)], ids=["exact", "general"]
+)
+def test_a_wanted_motion_counts_from_where_the_load_rests(mechanisms):
+    wanted = 0.2 * np.cos(np.pi * TIME_S)
+    table = WANTED.assign(theta_out_rad=wanted)
+    found = compensated(table, replace(PARAMETERS, mechanisms=mechanisms), RIG, FREE).table
+    assert np.abs(found["theta_out_rad"] - wanted).max() < 0.01 * np.ptp(wanted)

@@ -165,7 +165,7 @@ def test_laws_of_rates_look_ahead_unless_they_are_in_the_equations_of_a_step():
 
 
 def test_what_looks_ahead_is_left_out_and_named(seen):
-    skew = Active("time-skew", "load-sensor", {"skew": 0.01})
+    skew = Active("time-skew", "load-sensor", {"delay": 0.01})
     found = estimated(seen, replace(PARAMETERS, mechanisms=(skew,)))
     assert found.notes == ("time-skew at load-sensor is left out: it depends on later samples",)
     assert found.table.equals(estimated(seen, PARAMETERS).table)
@@ -184,3 +184,18 @@ def test_the_noise_is_that_of_the_rest(seen):
     resting.channels["tau_in_Nm"][:] = draw
     assert Proximal.of(resting).torque_noise_Nm == pytest.approx(3e-4, rel=0.2)
     assert Proximal.of(seen).torque_noise_Nm == 1e-4
+
+
+def test_a_single_cables_load_rests_at_its_tension_in_both_solvers():
+    """A mechanism without strength changes no estimate; the load has no law."""
+    single = replace(PAIR, is_single_cable=True)
+    drive = 0.3 * (1 - np.cos(np.pi * TIME_S))
+    true = simulate_pair(single, SpringLoad(0.2), drive, EVEN)
+    seen = replace(recording(true, drive), far_end="measured-tension")
+    found = []
+    for mechanisms in ((), (Active("constant-drag", "conduit", {"f0": 0.0}),)):
+        known = replace(PARAMETERS, mechanisms=mechanisms, load_stiffness_Nm_per_rad=None)
+        found.append(estimated(seen, known, uses_law=False).table["tau_out_Nm"].to_numpy())
+    exactly, generally = found
+    assert exactly[0] == pytest.approx(true.tau_out_Nm[0], rel=1e-6)
+    assert np.abs(generally - exactly).max() < 0.02 * np.ptp(true.tau_out_Nm)

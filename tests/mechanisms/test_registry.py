@@ -10,8 +10,10 @@ from typer.testing import CliRunner
 
 from ccmodel import mechanisms
 from ccmodel.cli import app
+from ccmodel.failure import ModelError
 from ccmodel.mechanisms import catalogue
 from ccmodel.mechanisms.contract import PARAGRAPHS
+from ccmodel.model.active import active_of
 from ccmodel.model.general import Active
 from general_runs import OUTPUTS, rms, run, sine
 
@@ -195,3 +197,17 @@ def test_any_pair_of_them(seed):
             values.append(Active(a.name, a.place, drawn))
         r = run(sine(cycles=1), values, T=rng.uniform(0.7, 10))
         assert all(np.isfinite(r.read[channel]).all() for channel in READ), values
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "parameter"),
+    [
+        ("presliding", "conduit", "spread"),
+        ("relaxation", "cable", "spread"),
+        ("pulley-friction", "drive-pulley", "presliding"),
+    ],
+)
+def test_a_length_or_ratio_of_zero_is_refused(name, place, parameter):
+    values = mechanisms.get(name).start | {parameter: 0.0}
+    with pytest.raises(ModelError, match=f"{parameter} = 0 .* must be above 0"):
+        active_of([Active(name, place, values)])

@@ -20,8 +20,11 @@ from ccmodel.model.run import (
     _true_at_rest,
     _zeroed,
     initial_tension,
+    simulate,
     simulate_recording,
+    spring_load,
 )
+from ccmodel.model.sensors import read_by_sensors
 from general_runs import evenly_added_bend
 from model_runs import CABLE
 
@@ -38,7 +41,7 @@ def read(t):
 
 @pytest.mark.parametrize("settled_s", [0.0, 0.5])
 def test_the_zero_is_that_of_the_rest(settled_s):
-    found = _zeroed(THETA, moved(0.5, settled_s, theta_out_rad=read))
+    found = _zeroed(THETA, THETA[0], moved(0.5, settled_s, theta_out_rad=read))
     assert found == pytest.approx(THETA - THETA[0])
 
 
@@ -46,13 +49,13 @@ def test_the_zero_is_that_of_the_rest(settled_s):
 def test_without_a_rest_of_use_the_judged_samples_have_the_recordings_mean(rest_s, settled_s):
     one = moved(rest_s, settled_s, theta_out_rad=read)
     judged = one.time_s >= settled_s
-    found = _zeroed(THETA, one)
+    found = _zeroed(THETA, THETA[0], one)
     assert found[judged].mean() == pytest.approx(one["theta_out_rad"][judged].mean())
     assert np.ptp(found - THETA) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_without_a_rest_and_without_that_angle_the_first_sample_is_the_zero():
-    assert _zeroed(THETA, moved(0.0, 1.0)) == pytest.approx(THETA - THETA[0])
+    assert _zeroed(THETA, THETA[0], moved(0.0, 1.0)) == pytest.approx(THETA - THETA[0])
 
 
 @pytest.mark.parametrize(
@@ -152,3 +155,44 @@ def test_the_exact_solver_runs_what_only_modifies_the_observation(name, place):
         # The two differ, by the error of the general solver's grid.
         assert 0 < np.abs(faulty[channel] - by_grid[channel]).max() < 5e-3 * np.ptp(faulty[channel])
     assert any((faulty[channel] != sound[channel]).any() for channel in MEASURED)
+
+
+def test_a_motion_that_starts_elsewhere_comes_from_rest_in_both_solvers():
+    """A mechanism without strength changes no motion, and the solvers agree on it to the general one's grid."""
+    time_s = np.arange(0, 2, 0.002)
+    given = ModelInput.prescribed(recording(), time_s, 0.5 * np.cos(2 * np.pi * time_s), 7.0)
+    exactly = simulate(given, CABLE)
+    none = (Active("constant-drag", "conduit", {"f0": 0.0}),)
+    generally = simulate(given, replace(CABLE, mechanisms=none, refinement=4))
+    for channel in ("tau_in_Nm", "tau_out_Nm", "theta_out_rad"):
+        assert np.abs(generally[channel] - exactly[channel]).max() < 0.01 * np.ptp(exactly[channel]), channel
+    assert 0.3 < exactly["theta_out_rad"][0] < 0.5
+
+
+def test_a_load_cell_responds_to_the_torque_and_not_to_its_sensors_reading():
+    """Whatever the order of two faults: of 14 N and 60 mN m over 6 mm, a tenth is 1 N."""
+    faults = (
+        Active("torque-scale", "load-sensor", {"gain": 0.1}),
+        Active("load-cell-crosstalk", "load-sensor", {"crosstalk": 0.1}),
+    )
+    true = {"tau_out_Nm": np.full(3, 0.06), "F_load_N": np.full(3, 14.0)}
+    for order in (faults, faults[::-1]):
+        read = read_by_sensors(order, np.arange(3.0), true, (0.006, 0.006))
+        assert read["F_load_N"] == pytest.approx(15.0)
+        assert read["tau_out_Nm"] == pytest.approx(0.066)
+
+
+def test_a_load_that_is_driven_by_its_torque_rests_at_what_drives_it():
+    """The rest holds the torque's reading, a fault of its sensor included, where the run does."""
+    fault = replace(CABLE, mechanisms=(Active("torque-scale", "load-sensor", {"gain": 0.1}),))
+    rest = {"tau_in_Nm": 0.0, "F_drive_N": 14.0, "tau_out_Nm": 0.0099, "F_load_N": 14.0, "time_s": 0.1}
+    given = SimpleNamespace(resting_mean=rest, recording=recording())
+    assert _true_at_rest(given, fault)["tau_out_Nm"] == pytest.approx(0.009)
+    assert _true_at_rest(given, fault, "torque")["tau_out_Nm"] == pytest.approx(0.0099)
+
+
+@pytest.mark.parametrize(
+    ("accuracy", "known_to"), [({"tau_out_Nm": 1e-4}, 2e-4), ({"tau_in_Nm": 3e-4}, 6e-4), ({}, 0.0)]
+)
+def test_the_torque_at_rest_is_known_to_the_accuracy_of_a_sensor(accuracy, known_to):
+    assert spring_load(0.05, CABLE, accuracy).rest_known_to_Nm == pytest.approx(known_to)

@@ -11,7 +11,8 @@ from ccmodel.model.files import model_as_dict
 from ccmodel.model.general import Active
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
-from ccmodel.model.session import in_order, known_states, of_recording, position_of, with_session
+from ccmodel.model.session import known_states, of_recording, position_of, with_session
+from ccmodel.recording import in_order, read_recordings, write_recordings
 
 PARAMETERS = Parameters(9000.0, 1.2, 0.15, 0.006, 0.006, 0.05)
 FRICTION = Active("friction-drift", "conduit", {"change": 0.2})
@@ -26,6 +27,7 @@ def started(*minutes):
 def test_without_times_a_recordings_place_is_its_order():
     assert [r.position for r in in_order([recording()] * 5)] == [-0.5, -0.25, 0.0, 0.25, 0.5]
     assert in_order([recording()])[0].position == 0.0
+    assert in_order([]) == []
     assert recording().position == 0.0
 
 
@@ -82,3 +84,17 @@ def test_a_model_file_has_its_session_only_where_it_is_known():
     assert "session_start_s" not in model_as_dict(PARAMETERS, {})["parameters"]
     stated = model_as_dict(with_session(PARAMETERS, started(1, 2)), {})["parameters"]
     assert (stated["session_start_s"], stated["session_end_s"]) == (60.0, 120.0)
+
+
+def test_the_place_in_the_session_is_kept_in_a_file(tmp_path):
+    every = in_order([recording(id=f"r{k}") for k in range(3)])
+    write_recordings(tmp_path / "b.nc", every, {})
+    assert [r.position for r in read_recordings(tmp_path / "b.nc")] == [-0.5, 0.0, 0.5]
+
+
+def test_a_state_that_is_not_stated_follows_from_stated_times():
+    bare = Active("relaxation", "cable", {"r": 0.1, "tau": 20.0})
+    timed = replace(recording(), started_at_s=100.0, tensioned_at_s=80.0)
+    (found,) = of_recording(replace(PARAMETERS, mechanisms=(bare,)), timed).mechanisms
+    (stated,) = of_recording(replace(PARAMETERS, mechanisms=(RELAXATION,)), timed).mechanisms
+    assert found.values["relaxed"] == stated.values["relaxed"] > 0.3

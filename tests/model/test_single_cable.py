@@ -57,3 +57,8 @@ def test_an_unlike_cable_B_that_is_absent_changes_nothing():
     plain, unlike = (by_general(SpringLoad(0.05), [general.Active("cable-asymmetry", "cable", v)]) for v in (
         {"ratio": 1.0, "K_ratio": 1.0}, start))  # fmt: skip
     assert pytest.approx(plain.T1_N, abs=1e-6) == unlike.T1_N
+
+
+def test_a_load_that_turns_freely_lets_the_cable_go_slack():
+    response = exact.simulate_pair(CABLE, SpringLoad(0.0), DRIVE, INITIAL).complete()
+    assert np.abs([response.T1_N, response.T2_N]).max() < 1e-9

@@ -1,16 +1,20 @@
 """The page's section on fits: what a reader must not miss."""
 
+from dataclasses import asdict
 from math import inf
+from pathlib import Path
 
 import pandas as pd
 import pytest
+from made_pages import diagnosis
 
 from ccmodel.errors import COLUMNS
 from ccmodel.inference.fit import FitResult
 from ccmodel.inference.intervals import Interval, Scatter, Undetermined
 from ccmodel.report.page import write_page
 from ccmodel.report.page.formats import about, interval
-from ccmodel.report.page.writing import Content
+from ccmodel.report.page.writing import Content, messages_of
+from ccmodel.rig.findings import Finding
 
 APART = "friction_coefficient and extra_bend_rad are not determined apart; known is mu + 0.05 x e = 0.16"
 FIT = FitResult(
@@ -72,3 +76,20 @@ def test_numbers_have_as_many_digits_as_are_known():
     assert interval(said) == "7741.2 to 7758.9"
     assert about({"low": -2e-5, "high": 4e-5, "sd": 2e-5}) == "0.000010 ± 3e-05"
     assert about({"low": None, "high": None, "sd": None}) == "not determined"
+
+
+def messages(diagnoses, findings=()):
+    of = [{"findings": [asdict(f) for f in findings if f.batch == batch]} for batch in ("a", "b")]
+    return messages_of(Path("none"), [], of, [], [], diagnoses)
+
+
+def test_a_batch_that_could_not_be_diagnosed_is_left_out():
+    assert messages([diagnosis("a", None)])["left_out"] == ["a: not diagnosed: no recording that can be used"]
+
+
+@pytest.mark.parametrize(("verdict", "kind"), [("agrees", "warnings"), ("inputs-inconsistent", "inconsistent")])
+def test_contradictions_of_a_rig_that_was_diagnosed_are_trusted(verdict, kind):
+    contradiction = Finding("a", "a/one.csv", None, None, "inconsistent", "the signs differ")
+    found = messages([diagnosis("rig", verdict, batches=["a", "b"])], [contradiction])
+    assert found[kind] == [str(contradiction)]
+    assert sum(map(len, found.values())) == 1

@@ -120,11 +120,8 @@ def test_what_the_logs_show_is_stated_with_its_source(tmp_path):
     assert re.search(r"encoder_rad: 0\.00153  # the smallest step seen, rad", text)
     assert "encoder_counts_per_rev" not in text and "load_cell:" not in text and "torque_constant" not in text
     fast, slow = (line for line in text.splitlines() if line.startswith("- {"))
-    assert "excitation: {wave: sine, amplitude_rad: 0.3, frequency_Hz: 1}}" in fast
-    assert (
-        "excitation: {wave: sine, amplitude_rad: 0.601, frequency_Hz: 0.25}}  # 250 Hz, 9 s, rest 1 s, stroke 1.2"
-        in slow
-    )
+    assert "excitation: {wave: sine, frequency_Hz: 1}}" in fast
+    assert "excitation: {wave: sine, frequency_Hz: 0.25}}  # 250 Hz, 9 s, rest 1 s, stroke 1.2" in slow
     assert "2.0 cycles of 0.25 Hz" in slow
 
 
@@ -239,3 +236,25 @@ def test_the_command_says_what_to_fill_in(tmp_path):
     checked = CliRunner().invoke(app, ["check", str(folder)])
     assert checked.exit_code == 1
     assert all(line.split(": ", 2)[2] in checked.output.replace("\n", "") for line in rest)
+
+
+@pytest.mark.parametrize("scale", [1e3, 1.0])
+def test_a_log_that_cannot_be_read_is_named_with_its_place(tmp_path, scale):
+    gap = run(1)
+    gap.loc[1000:, "time_s"] += 0.5
+    damaged = {1e3: run(1).assign(time_s=lambda t: scale * t.time_s), 1.0: gap}[scale]
+    draft_batch(folder_of(tmp_path, {"good.csv": run(0), "bad.csv": damaged}))
+    (said,) = [line for line in (tmp_path / "lab/batch.yaml").read_text().splitlines() if "not used" in line]
+    assert said.startswith("# not used: bad.csv: row ")
+    assert ("are the times in ms?" if scale > 1 else "too long to be bridged") in said
+
+
+def test_a_log_whose_angle_stands_still_hides_no_step(tmp_path):
+    still = run(1).assign(theta_out_rad=0.2)
+    draft_batch(folder_of(tmp_path, {"moves.csv": run(0), "stands.csv": still}))
+    assert "angle_resolution_rad: 0 " not in (tmp_path / "lab/batch.yaml").read_text()
+
+
+def test_a_name_with_a_raised_digit_is_a_name(tmp_path):
+    draft_batch(folder_of(tmp_path, {"1²2.csv": run(0)}))
+    assert "file: " in (tmp_path / "lab/batch.yaml").read_text()

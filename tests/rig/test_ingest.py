@@ -432,7 +432,7 @@ def test_nothing_left_after_the_transient(bench):
     ingested = ingest_batch(bench.write().folder)
     assert [r.id for r in ingested.recordings] == ["two"]
     (finding,) = ingested.findings
-    assert "before settled_s 4 s" in finding.text
+    assert "with 0 samples after settled_s 4 s" in finding.text
     assert (finding.severity, finding.is_inconsistent) == ("refused", True)
 
 
@@ -648,3 +648,23 @@ def test_the_committed_batches_have_no_finding(name):
         assert 0.3 < recording.rest_s < 0.9
         assert abs(recording["theta_in_rad"][recording.time_s <= recording.rest_s]).max() < 0.0032
         assert recording["F_drive_N"][:50].mean() == pytest.approx(2 * recording.pretension_N, rel=0.3)
+
+
+@pytest.mark.parametrize("shift", [-1.0, -2.5, 100.0])
+def test_times_count_from_the_first_sample(bench, shift):
+    plain = ingest_batch(bench.write().folder).recordings
+    for log in bench.tables.values():
+        log["time_s"] += shift
+    shifted = ingest_batch(bench.write().folder).recordings
+    for one, other in zip(plain, shifted, strict=True):
+        assert other.time_s[0] == 0
+        assert other.time_s == pytest.approx(one.time_s, abs=1e-9)
+        assert other.rest_s == pytest.approx(one.rest_s) != 0
+        for channel, values in one.channels.items():
+            assert other[channel] == pytest.approx(values, abs=1e-12)
+
+
+def test_a_transient_that_leaves_a_few_samples_leaves_too_few(bench):
+    bench.described["recordings"][0]["settled_s"] = 1.59
+    (finding,) = ingest_batch(bench.write().folder).findings
+    assert "with 2 samples after settled_s 1.59 s" in finding.text

@@ -206,7 +206,7 @@ def test_one_batch_is_made_of_one_folder_and_replaces_nothing_else(tmp_path):
     for source, name, said in (
         (tmp_path / "set/tool", "mine", "mine: would be replaced, but is from no import"),
         (tmp_path / "set", "new", "has trials in tool; a batch is made of one folder"),
-        (tmp_path / "set/tool", "a batch", "a batch's name is letters"),
+        (tmp_path / "set/tool", "a batch", "a name is letters"),
         (tmp_path / "raw", "new", "no trial found"),
     ):
         with pytest.raises(InputError, match=said):

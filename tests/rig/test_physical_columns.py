@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -91,8 +93,8 @@ def test_an_angle_without_a_step_is_not_snapped_and_its_noise_is_seen(bench, cou
     assert ingested.findings == []
     recording = ingested.recordings[0]
     assert recording.encoder_step_rad == {}
-    assert recording.rest_s == pytest.approx(0.4, abs=0.02)
-    resting = recording.time_s <= 0.39
+    assert recording.rest_s == pytest.approx(0.396, abs=0.02)
+    resting = recording.time_s <= 0.386
     assert recording["theta_in_rad"][resting].mean() == pytest.approx(0, abs=3 * noise)
     given = ModelInput.of(recording)
     assert (given.theta_in == recording["theta_in_rad"]).all()
@@ -134,6 +136,28 @@ def test_one_tension_of_a_pair_is_kept_and_the_other_follows(bench, counted):
     recording = ingest_batch(bench.write().folder).recordings[0]
     assert recording["T1_N"] == pytest.approx(bench.tables["one"].T1_N.to_numpy())
     assert recording["T3_N"] == pytest.approx(counted["T3_N"], abs=1e-6)
+
+
+@pytest.mark.parametrize("logged", ["F_drive_N", "tau_in_Nm"])
+def test_the_other_tension_follows_from_the_sum_or_the_torque(bench, counted, logged):
+    gone = {"F_drive_N", "tau_in_Nm"} - {logged}
+    one = counted["T1_N"]
+    changed(without_scales(bench), lambda t: in_si_units(t).drop(columns=list(gone)).assign(T1_N=one[: len(t)]))
+    recording = ingest_batch(bench.write().folder).recordings[0]
+    for channel in ("T3_N", *gone):
+        assert recording[channel] == pytest.approx(counted[channel], abs=1e-5), channel
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_formula_of_an_angle_gives_the_channel(bench, sign):
+    changed(without_scales(bench), lambda t: in_si_units(t))
+    bench.described["rig"]["drive"]["encoder_sign"] = sign
+    recording = ingest_batch(bench.write().folder).recordings[0]
+    formula = re.sub(" rad, the mean at rest", "", recording.derived_from["theta_in_rad"])
+    table = bench.tables["one"]
+    assert eval(formula, {"theta_in_rad": table.theta_in_rad.to_numpy()}) == pytest.approx(
+        recording["theta_in_rad"], abs=1e-4
+    )
 
 
 def single(bench, change):

@@ -80,5 +80,6 @@ def test_a_note_of_the_excitation_that_is_no_number_is_not_stated():
 def test_labels_name_values_as_people_do():
     assert label_of(2 * np.pi, "bend") == "2 × 180°"
     assert label_of(1.0, "bend") == "57°"
+    assert label_of(np.inf, "radius") == "straight"
     assert label_of(0.0457, "radius") == "4.57 cm"
     assert label_of(np.nan, "load_level") == "load level not stated"

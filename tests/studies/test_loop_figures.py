@@ -190,3 +190,11 @@ def test_of_very_many_recordings_some_are_drawn_from_the_best_to_the_worst():
     assert "48 of 200 panels" in drawn.get_suptitle()
     (legend,) = drawn.legends
     assert len(legend.get_texts()) == 2, "the titles of the panels name the recordings"
+
+
+def test_a_run_without_two_channels_of_one_end_has_a_figure_that_says_so():
+    recorded, simulated = pair()
+    few = {name: recorded[name] for name in ("theta_in_rad", "tau_in_Nm")}
+    recorded = recorded.with_channels(few, recorded.derived_from, recorded.origin)
+    drawn = draw([(recorded, simulated)], "transmission")
+    assert any("no two channels of one end" in t for t in texts(drawn))

@@ -45,6 +45,11 @@ def recordings_of(batch):
     return f"{RESULTS}/recordings/{batch}.nc"
 
 
+def summary_of(batch):
+    """File with what was read of a batch beside its recordings; jobs that read these read it too."""
+    return f"{RESULTS}/recordings/{batch}.json"
+
+
 def simulated_of(parameters, batch):
     return f"{RESULTS}/simulated/{parameters}/{batch}.nc"
 

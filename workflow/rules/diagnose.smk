@@ -1,9 +1,15 @@
-# A batch, or all batches of a rig together; the wildcard is the name of either.
+def diagnosed_together(wildcards):
+    """A batch, or all batches of a rig; the wildcard is the name of either."""
+    return CONFIG.diagnosed_rigs.get(wildcards.batch, [wildcards.batch])
+
+
 rule diagnose:
     input:
-        lambda wildcards: [
-            recordings_of(batch)
-            for batch in CONFIG.diagnosed_rigs.get(wildcards.batch, [wildcards.batch])
+        recordings=lambda wildcards: [
+            recordings_of(b) for b in diagnosed_together(wildcards)
+        ],
+        summaries=lambda wildcards: [
+            summary_of(b) for b in diagnosed_together(wildcards)
         ],
     output:
         f"{RESULTS}/diagnoses/{{batch}}/diagnosis.json",

@@ -1,13 +1,13 @@
+def fitted_to(wildcards):
+    """Batches of one fit."""
+    batches = CONFIG.fits[wildcards.parameters].batches
+    return [wildcards.scope] if batches == EACH else batches
+
+
 rule fit:
     input:
-        recordings=lambda wildcards: [
-            recordings_of(batch)
-            for batch in (
-                [wildcards.scope]
-                if CONFIG.fits[wildcards.parameters].batches == EACH
-                else CONFIG.fits[wildcards.parameters].batches
-            )
-        ],
+        recordings=lambda wildcards: [recordings_of(b) for b in fitted_to(wildcards)],
+        summaries=lambda wildcards: [summary_of(b) for b in fitted_to(wildcards)],
     output:
         f"{RESULTS}/fits/{{parameters}}/{{scope}}.json",
     log:

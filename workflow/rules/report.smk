@@ -30,7 +30,9 @@ rule write_report:
     input:
         errors=f"{RESULTS}/tables/errors.parquet",
         fits=sorted({fit_of(p, batch) for p, batch in runs() if p in CONFIG.fits}),
-        summaries=[f"{RESULTS}/recordings/{batch}.json" for batch in BATCHES],
+        summaries=[summary_of(batch) for batch in BATCHES],
+        # What an import of all batches has left out.
+        findings=[str(file) for file in [RAW / "findings.json"] if file.exists()],
         simulations=[
             simulated_of(p, batch).removesuffix(".nc") + ".json" for p, batch in runs()
         ],

@@ -1,6 +1,7 @@
 rule simulate:
     input:
         recordings=lambda wildcards: recordings_of(wildcards.batch),
+        read=lambda wildcards: summary_of(wildcards.batch),
         fit=lambda wildcards: fit_of(wildcards.parameters, wildcards.batch) or [],
     output:
         simulated=f"{RESULTS}/simulated/{{parameters}}/{{batch}}.nc",

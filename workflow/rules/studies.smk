@@ -8,8 +8,17 @@ for name, study in STUDIES.items():
             f"study_{name}"
         input:
             recordings=[recordings_of(batch) for _, _, batch in needs],
+            summaries=sorted({summary_of(batch) for _, _, batch in needs}),
             simulated=[simulated_of(p, batch) for _, p, batch in needs],
             fits=sorted(set(fits) - {""}),
+            # A model of a diagnosis stands beside its verdict, which some studies state.
+            verdicts=sorted(
+                {
+                    f"{RESULTS}/diagnoses/{batch}/diagnosis.json"
+                    for _, parameters, batch in needs
+                    if parameters in MODEL_FILES
+                }
+            ),
             files=study.files,
         output:
             csv=[in_report(f, "table", "Tables", study=name) for f in csv_tables(name)],

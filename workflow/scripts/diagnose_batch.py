@@ -10,7 +10,7 @@ from ccmodel.studies.diagnosis.settings import Diagnosing
 
 with logged(snakemake.log[0], snakemake.threads) as progress:
     diagnose_recordings(
-        [Path(file) for file in snakemake.input],
+        [Path(file) for file in snakemake.input.recordings],
         Path(snakemake.output[0]).parent,
         Diagnosing.model_validate_json(snakemake.params.settings),
         progress,

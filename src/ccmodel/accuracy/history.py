@@ -60,7 +60,8 @@ def add_rows(file: Path, rows: pd.DataFrame) -> None:
     """Add the rows of a commit, in the order of dates; they replace earlier rows of the same commit."""
     table = read_history(file)
     table = pd.concat([table[~table["commit"].isin(rows["commit"])], rows], ignore_index=True)
-    table = table.sort_values("date", kind="stable")
+    # Dates have the time zones of their authors.
+    table = table.sort_values("date", kind="stable", key=lambda dates: pd.to_datetime(dates, utc=True))
     with new_file(file) as fresh:
         table.to_csv(fresh, index=False, lineterminator="\n")
 

@@ -18,7 +18,7 @@ from ccmodel.model.files import Model
 from ccmodel.outputs import new_file
 from ccmodel.paths import try_folder
 from ccmodel.progress import Progress, within
-from ccmodel.report.verdict import SYMBOL, held_out_errors, nearest_sentence, sentence
+from ccmodel.report.verdict import SYMBOL, error_name, errors_in_words, nearest_sentence, sentence
 from ccmodel.studies.diagnosis.page import candidates_of
 from ccmodel.studies.diagnosis.run import INGEST, PAGE, Outcome, diagnosed, write_alone
 from ccmodel.typed import InputError
@@ -172,7 +172,7 @@ class Diagnosis:
         if nearest := nearest_sentence(self.report):
             parts.append(nearest)
         if self._outcome.found is not None:
-            parts.append(held_out_errors(self.report["fit"]["error"]))
+            parts.append(errors_in_words(self.report["fit"]))
         return "\n".join(parts)
 
     def _repr_html_(self) -> str:
@@ -185,7 +185,7 @@ class Diagnosis:
             return paragraphs
         errors = self.errors
         ratios = errors.drop(columns=["noise", "unit"]).div(errors["noise"], axis=0).rename(index=SYMBOL)
-        caption = f"<p>held-out error over the noise floor, {self._recorded}</p>"
+        caption = f"<p>{error_name(self.report['fit'])} over the noise floor, {self._recorded}</p>"
         return paragraphs + caption + ratios.to_html(float_format="{:.1f}".format, border=0)
 
     @property

@@ -110,6 +110,8 @@ def tolerance_of(stated: list[str]) -> float | dict[str, float] | None:
         shares = {channel: float(share) for channel, _, share in (one.rpartition("=") for one in stated)}
     except ValueError:
         raise InputError(f"--tolerance: a share is a number, as 0.02; got {', '.join(stated)}") from None
+    if len(shares) < len(stated):
+        raise InputError(f"--tolerance: got {', '.join(stated)}: one share for a channel")
     if "" not in shares:
         return shares or None
     if len(stated) > 1:

@@ -74,7 +74,7 @@ def say(text: str, style: str | None = None, end: str = "\n") -> None:
     """Print on standard error, in colour on a terminal; a line is never broken."""
     from rich.console import Console
 
-    Console(stderr=True, soft_wrap=True, highlight=False).print(text, style=style, markup=False, end=end)
+    Console(stderr=True, soft_wrap=True, highlight=False, emoji=False).print(text, style=style, markup=False, end=end)
 
 
 def print_table(table: "RenderableType") -> None:
@@ -83,9 +83,9 @@ def print_table(table: "RenderableType") -> None:
     from rich.text import Text
 
     if sys.stdout.isatty():
-        Console(highlight=False).print(table, soft_wrap=isinstance(table, Text), markup=False)
+        Console(highlight=False, emoji=False).print(table, soft_wrap=isinstance(table, Text), markup=False)
         return
-    console = Console(width=_WIDE, highlight=False, color_system=None)
+    console = Console(width=_WIDE, highlight=False, emoji=False, color_system=None)
     with console.capture() as captured:
         console.print(table, markup=False)
     typer.echo("\n".join(line.rstrip() for line in captured.get().splitlines()))

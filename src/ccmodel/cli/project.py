@@ -8,7 +8,7 @@ import typer
 
 from ccmodel.cli.group import PROJECT, command
 from ccmodel.cli.interruption import leaving
-from ccmodel.cli.options import Cores, Json, Quiet, input_file, out_folder
+from ccmodel.cli.options import Cores, Json, Quiet, input_file, new_file, out_folder
 from ccmodel.cli.output import Output
 
 
@@ -28,7 +28,9 @@ def table_one(
         ),
     ],
     out: Annotated[Path, out_folder("Folder for the tables.")],
-    figure: Annotated[Path, typer.Option(help="File for the figure, PNG or SVG.", show_default=False)],
+    figure: Annotated[
+        Path, typer.Option(help="File for the figure, PNG, SVG or PDF.", callback=new_file, show_default=False)
+    ],
     cores: Cores = 1,
     as_json: Json = False,
     quiet: Quiet = False,

@@ -63,7 +63,7 @@ unit is a value beside it (`unit`). A value that there is not is `null`. `out` i
 | `accept` of `accuracy` | `baseline`, `history`, `batches` |
 | `history` of `accuracy` | `history`: a list of its rows; `left_out` |
 | `mechanisms` | a list of mechanisms, or with NAME one: `name`, `summary`, `places`, `equation`, `tex`, `signature`, `look_alikes`, `separating_experiment`, `depends_on_rate`, `source`; `parameters`: a list of `name`, `meaning`, `unit` ("1" for a pure number), `low`, `high`, `signed` (both signs are possible), `start`, `default` (`null` if it must be given) |
-| `report` | `verdicts`: a list of `batch`, `verdict`, `sentence`, `held_out_error` (by channel `before`, `after`, `noise`, `unit`), `page`; `left_out`, `inconsistent`, `warnings`, `page` |
+| `report` | `verdicts`: a list of `batch`, `verdict`, `sentence`, `held_out_error` (by channel `before`, `after`, `noise`, `unit`), `held_out`, `page`; `left_out`, `inconsistent`, `warnings`, `page` |
 | `import-mis-tool` | `batches`; `findings`, as of `check` |
 
 `table-one` prints its `summary.json`.

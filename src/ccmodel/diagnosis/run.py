@@ -24,9 +24,9 @@ from ccmodel.diagnosis.whitening import Whitened, relinearised, whiten
 from ccmodel.inference.observations import Tolerance
 from ccmodel.inference.pool import each
 from ccmodel.model.parameters import Parameters
-from ccmodel.model.session import in_order, with_session
+from ccmodel.model.session import with_session
 from ccmodel.progress import Progress, silent, within
-from ccmodel.recording import Recording
+from ccmodel.recording import Recording, in_order
 
 # Shares of the time at which the model is calibrated, the mechanisms are selected and the verdict is decided; and share
 # of the first fit in the time of a calibration. Measured on two batches, data/raw/loops and half-loop.
@@ -213,7 +213,9 @@ def diagnose(
     if options.freeze:
         why = "frozen at the baseline's values, as requested"
         unjudged.append({"what": "stiffness, friction and everything else that a calibration would fit", "why": why})
-    mechanisms = single_mechanisms(options.without, tested.hypothesis, _recorded_by_all(recordings))
+    used = {w.name for w in whitened}
+    compared = [r for r in recordings if f"{r.batch}/{r.id}" in used] or recordings
+    mechanisms = single_mechanisms(options.without, tested.hypothesis, _recorded_by_all(compared))
     forced = [stated_hypothesis(stated) for stated in options.forced_candidates]
     of_selection = within(progress, CALIBRATED, SELECTED)
     has_spring = LOAD_SPRING in tested.free

@@ -18,7 +18,7 @@ from ccmodel.model.general.run import settings_of
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad, TorqueLoad
 from ccmodel.model.parameters import Parameters, mechanism_key
-from ccmodel.model.run import initial_tension, transmission_of
+from ccmodel.model.run import initial_tension, spring_load, transmission_of
 from ccmodel.model.session import of_recording
 from ccmodel.recording import Recording
 
@@ -185,8 +185,13 @@ class _Problem:
         """
         if self.proximal.rests and self.parameters.pretension_N is None:
             return 0.0
-        ends = self.initial.tension_A_N[-1], 0.0 if self.proximal.recording.far_end else self.initial.tension_B_N[-1]
+        ends = self._at_load(self.initial)
         return float((FALL * UNIFORM * np.hypot(*ends) * self.parameters.load_radius_m) ** 2)
+
+    def _at_load(self, initial: InitialTension) -> tuple[float, float]:
+        """Initial tensions of A and B at the load, N; a single cable has no B."""
+        of_B = 0.0 if self.proximal.recording.far_end else initial.tension_B_N[-1]
+        return float(initial.tension_A_N[-1]), float(of_B)
 
     def run(
         self,
@@ -208,10 +213,11 @@ class _Problem:
         if not modify_physics(parameters.mechanisms) and not (K_e is None and parameters.spring_beside_load_Nm_per_rad):
             return exact.run(transmission, K_e or 0.0, initial, drive, self.prior, misfit_Nm)
         if K_e is None:
-            rest = (initial.tension_A_N[-1] - initial.tension_B_N[-1]) * transmission.load_radius_m
+            of_A, of_B = self._at_load(initial)
+            rest = (of_A - of_B) * transmission.load_radius_m
             load: SpringLoad | TorqueLoad = TorqueLoad(np.array([rest]), parameters.spring_beside_load_Nm_per_rad)
         else:
-            load = SpringLoad(K_e, 0.0, parameters.load_gap_position)
+            load = spring_load(K_e, parameters, recording.accuracy)
         settings = settings_of(parameters.mechanisms)
         finer = parameters.refinement
         return general.run(

@@ -183,12 +183,15 @@ class Sensing:
     channels : mapping of str to ndarray, each of shape (n,)
         theta_in_rad, theta_out_rad, tau_in_Nm, tau_out_Nm, F_drive_N, F_load_N.
     load_radius_m, drive_radius_m : float
+    true : mapping of str to ndarray, each of shape (n,)
+        The same channels without the fault of any sensor.
     """
 
     time_s: NDArray
     channels: Mapping[str, NDArray]
     drive_radius_m: float
     load_radius_m: float
+    true: Mapping[str, NDArray] = field(default_factory=dict)
 
     @property
     def drive_travel_m(self) -> NDArray:

@@ -63,7 +63,7 @@ def _drift(force: NDArray, rate: float, sensing: Sensing, end: str) -> NDArray:
 def _crosstalk(force: NDArray, crosstalk: float, sensing: Sensing, end: str) -> NDArray:
     """A load cell responds to the torque.
 
-    Equation: The cell reads F + crosstalk tau / R, with tau the torque on the same side.
+    Equation: The cell reads F + crosstalk tau / R, with tau the torque on the same side, whatever its sensor reads.
 
     Signature: One force sum disagrees with all other channels, also with the torque on the same side. The model
     errs only in this sum and the two tensions derived from it, by an error that follows the torque.
@@ -73,7 +73,7 @@ def _crosstalk(force: NDArray, crosstalk: float, sensing: Sensing, end: str) -> 
     Source: JCGM 200:2012, International vocabulary of metrology, 2012, doi:10.59161/JCGM200-2012, 4.13 (selectivity).
     """
     radius = sensing.drive_radius_m if end == "drive" else sensing.load_radius_m
-    return force + crosstalk * (sensing.channels[TORQUE_AT[end]] / radius)
+    return force + crosstalk * (sensing.true[TORQUE_AT[end]] / radius)
 
 
 def _fault(

@@ -113,6 +113,7 @@ _PARAMETERS = (
         neutral=SPREAD,
         screening_grid=(0.4,),
         default=SPREAD,
+        above=0.0,
     ),
     Parameter(
         "creep",

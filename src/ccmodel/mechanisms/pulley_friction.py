@@ -72,6 +72,7 @@ MECHANISM = Mechanism(
             neutral=PRESLIDING_RAD,
             screening_grid=(0.4,),
             default=PRESLIDING_RAD,
+            above=0.0,
         ),
     ),
     mistaken_for=("torque-scale", "constant-drag"),

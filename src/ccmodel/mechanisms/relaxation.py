@@ -100,6 +100,7 @@ _CHAIN = (
         neutral=1.0,
         screening_grid=(0.3,),
         default=1.0,
+        above=0.0,
     ),
 )
 

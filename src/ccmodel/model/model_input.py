@@ -118,9 +118,12 @@ class ModelInput:
         """Times, drive, load and motor with the points at which the drive turns between samples; and the samples there.
 
         Only a motion behind an encoder's counts has them: the noise of any other angle turns at most samples, and a
-        prescribed motion is linear between its samples.
+        prescribed motion is linear between its samples. One that does not start at zero, where the initial tension
+        stands, has a point there before its first sample.
         """
         recording = self.recording
+        if not self.resting and self.theta_in.size > 1 and self.theta_in[0] != 0.0:
+            return self._from_rest, np.arange(1, self.theta_in.size + 1)
         if THETA_IN not in recording.encoder_step_rad:
             return self, np.arange(self.theta_in.size)
         turns = TurningPoints.of(recording.time_s, self.theta_in)
@@ -134,6 +137,24 @@ class ModelInput:
             theta_motor=turns.inserted(self.theta_motor),
         )
         return given, turns.samples(recording.time_s.size)
+
+    @property
+    def _from_rest(self) -> "ModelInput":
+        """The same with a point of rest before the first sample."""
+        time_s = self.recording.time_s
+        times = np.concatenate([[2 * time_s[0] - time_s[1]], time_s])
+
+        def held(values: NDArray | None) -> NDArray | None:
+            return None if values is None else np.concatenate([values[:1], values])
+
+        return replace(
+            self,
+            recording=replace(self.recording, time_s=times, channels={}),
+            theta_in=np.concatenate([[0.0], self.theta_in]),
+            theta_out=held(self.theta_out),
+            tau_out=held(self.tau_out),
+            F_load=held(self.F_load),
+        )
 
     @cached_property
     def resting_mean(self) -> dict[str, float]:

@@ -90,13 +90,14 @@ def simulate(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "l
     count_run()
     parameters = of_recording(parameters, recording)
     transmission = transmission_of(recording, parameters)
-    initial = initial_tension(given, parameters)
+    initial = initial_tension(given, parameters, load_from)
     if parameters.drive_encoder_offset:
         given = replace(given, theta_in=given.theta_in + parameters.drive_encoder_offset * given.drive_encoder_offset)
     given, samples = given.with_turning_points
     load, measured = _load(given, parameters, load_from)
     read = _readings(transmission, load, given, samples, initial, parameters)
-    channels = _channels({c: values[samples] for c, values in read.items()}, recording, parameters)
+    at_samples = {c: values[samples] for c, values in read.items()}
+    channels = _channels(at_samples, float(read[THETA_OUT][0]), recording, parameters)
     sources = dict.fromkeys(channels, "model") | dict.fromkeys((THETA_IN, *measured), PRESCRIBED)
     return recording.with_channels(channels, sources, origin="model")
 
@@ -143,9 +144,14 @@ def _motor(given: ModelInput) -> general.Motor:
     return general.Motor(given.theta_motor, within, judged)
 
 
-def _channels(read: Mapping[str, NDArray], recording: Recording, parameters: Parameters) -> dict[str, NDArray]:
-    """Channels of a recording from readings: zeros added, tensions derived as in a recording."""
-    theta_out = _zeroed(read[THETA_OUT], recording) + parameters.theta_out_zero_rad
+def _channels(
+    read: Mapping[str, NDArray], at_rest: float, recording: Recording, parameters: Parameters
+) -> dict[str, NDArray]:
+    """Channels of a recording from readings: zeros added, tensions derived as in a recording.
+
+    `at_rest` is the load's angle before the drive moves, rad.
+    """
+    theta_out = _zeroed(read[THETA_OUT], at_rest, recording) + parameters.theta_out_zero_rad
     sensed = {c: read[c] + getattr(parameters, zero) for c, zero in ZERO_OF.items()}
     return {THETA_IN: read[THETA_IN], THETA_OUT: theta_out, **sensed, **_tensions(sensed, recording, parameters)}
 
@@ -168,7 +174,7 @@ def _by_torque_alone(end: str, recording: Recording) -> bool:
     return SUM_AT[end] not in recording and TORQUE_AT[end] in recording
 
 
-def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension:
+def initial_tension(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "law") -> InitialTension:
     """Tension before the drive moves: the fitted one, else the one observed at rest, else the nominal one."""
     path = given.recording.path.with_extra_bend(parameters.extra_bend_rad)
     scale = parameters.pretension_scale
@@ -176,7 +182,7 @@ def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension
         return InitialTension.uniform(path, scale * parameters.pretension_N)
     if not given.initial_tension_observed:
         return InitialTension.uniform(path, scale * parameters.pretension_share * given.recording.pretension_N)
-    tensions = _tensions(_true_at_rest(given, parameters), given.recording, parameters)
+    tensions = _tensions(_true_at_rest(given, parameters, load_from), given.recording, parameters)
     settings = general.settings_of(parameters.mechanisms)
     seconds = given.resting_mean["time_s"] - float(given.recording.time_s[0])
     # The rest's mean is what the cables have after half of the rest.
@@ -191,7 +197,7 @@ def initial_tension(given: ModelInput, parameters: Parameters) -> InitialTension
     return InitialTension.between_ends(path, parameters.friction, A, B, curvatures, kinks_rad)
 
 
-def _true_at_rest(given: ModelInput, parameters: Parameters) -> dict[str, float]:
+def _true_at_rest(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "law") -> dict[str, float]:
     """Torques and sums at rest, from their sensors' readings without zeros and faults.
 
     A torque that is the load of a run keeps its reading, at rest as later. A single cable's sensors measure one tension
@@ -209,7 +215,7 @@ def _true_at_rest(given: ModelInput, parameters: Parameters) -> dict[str, float]
     true = true_at(parameters.mechanisms, seconds, sensed | {THETA_IN: 0.0, THETA_OUT: 0.0}, radii)
     if recording.far_end == "measured-tension":
         true |= {channel: sensed[channel] for channel in (TAU_OUT, F_LOAD)}
-    elif recording.far_end is None and parameters.load_stiffness_Nm_per_rad is None:
+    elif recording.far_end is None and (load_from == "torque" or parameters.load_stiffness_Nm_per_rad is None):
         true[TAU_OUT] = sensed[TAU_OUT]
     return true
 
@@ -225,10 +231,17 @@ def _load(given: ModelInput, parameters: Parameters, load_from: LoadFrom) -> tup
         torque = (given.F_load - parameters.F_load_zero_N) * parameters.load_radius_m
         return TorqueLoad(torque, parameters.spring_beside_load_Nm_per_rad), (F_LOAD, T2)
     if far_end != "measured-tension" and load_from == "law" and parameters.load_stiffness_Nm_per_rad is not None:
-        known_to = KNOWN_TO * given.recording.accuracy.get(TAU_OUT, 0.0)
-        return SpringLoad(parameters.load_stiffness_Nm_per_rad, known_to, parameters.load_gap_position), ()
+        return spring_load(parameters.load_stiffness_Nm_per_rad, parameters, given.recording.accuracy), ()
     torque = _measured(given, given.tau_out, "torque") - parameters.tau_out_zero_Nm
-    return TorqueLoad(torque, parameters.spring_beside_load_Nm_per_rad), (TAU_OUT,)
+    # A single cable's tension at the load is the torque over the radius where no load cell was there.
+    same = (TAU_OUT, T2) if far_end and _by_torque_alone("load", given.recording) else (TAU_OUT,)
+    return TorqueLoad(torque, parameters.spring_beside_load_Nm_per_rad), same
+
+
+def spring_load(stiffness: float, parameters: Parameters, accuracy: Mapping[str, float]) -> SpringLoad:
+    """The load of a law. Its torque at rest is as accurate as the torque sensor at the load, or else at the drive."""
+    known_to = KNOWN_TO * accuracy.get(TAU_OUT, accuracy.get(TAU_IN, 0.0))
+    return SpringLoad(stiffness, known_to, parameters.load_gap_position)
 
 
 def _measured(given: ModelInput, values: NDArray | None, what: str) -> NDArray:
@@ -240,11 +253,11 @@ def _measured(given: ModelInput, values: NDArray | None, what: str) -> NDArray:
     return values
 
 
-def _zeroed(theta_out: NDArray, recording: Recording) -> NDArray:
+def _zeroed(theta_out: NDArray, at_rest: float, recording: Recording) -> NDArray:
     """The load's angle with the recording's zero, rad."""
     from_rest = recording.rest_s > 0 and recording.settled_s <= recording.rest_s
     if from_rest or THETA_OUT not in recording:
-        return theta_out - theta_out[0]
+        return theta_out - at_rest
     judged = recording.time_s >= recording.settled_s
     return theta_out - theta_out[judged].mean() + recording[THETA_OUT][judged].mean()
 

@@ -46,9 +46,10 @@ def read_by_sensors(
     """Readings of the sensors (n samples a channel) from true values, with the faults that act on them."""
     if time_s.size == 0:  # a run that ended before its first sample
         return channels
+    true = channels
     for a in active:
         mechanism = registry.get(a.name)
         if mechanism.modifies_observation is not None:
-            sensing = Sensing(time_s, channels, *radii)
+            sensing = Sensing(time_s, channels, *radii, true)
             channels = channels | mechanism.modifies_observation(sensing, a.place, a.values)
     return channels

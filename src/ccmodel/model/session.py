@@ -6,17 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from ccmodel import mechanisms as registry
+from ccmodel.model.active import active_of
 from ccmodel.model.parameters import Parameters, mechanism_key
 from ccmodel.recording import Recording
 
 # A drift is extrapolated to the length of the session before its middle and after it, and no further.
 FURTHEST = 1.0
-
-
-def in_order(recordings: Sequence[Recording]) -> list[Recording]:
-    """Recordings with their positions in the session by their order, -1/2 to 1/2; a single one has 0."""
-    at = np.linspace(-0.5, 0.5, len(recordings)) if len(recordings) > 1 else [0.0]
-    return [replace(r, position=float(x)) for r, x in zip(recordings, at, strict=True)]
 
 
 def with_session(parameters: Parameters, recordings: Sequence[Recording]) -> Parameters:
@@ -56,6 +51,8 @@ def of_recording(parameters: Parameters, recording: Recording) -> Parameters:
     """
     if not parameters.mechanisms:
         return parameters
+    # With a value for every parameter, states that are not stated included.
+    parameters = replace(parameters, mechanisms=tuple(active_of(parameters.mechanisms)))
     parameters = parameters.with_values(known_states(recording, parameters))
     drifts = [m for m in parameters.mechanisms if registry.get(m.name).drift is not None]
     if not drifts:

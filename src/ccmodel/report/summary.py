@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import BaseModel
 
 from ccmodel.report.page.writing import left_out_of
-from ccmodel.report.verdict import INPUTS_INCONSISTENT, SYMBOL, held_out_errors, sentence
+from ccmodel.report.verdict import INPUTS_INCONSISTENT, SYMBOL, errors_in_words, sentence
 from ccmodel.steps.files import read_json
 from ccmodel.typed import InputError, OneOf, Positive, load_json_model
 
@@ -23,6 +23,7 @@ class _Error(BaseModel):
 
 
 class _Fit(BaseModel):
+    held_out: list[str] = []
     error: dict[Annotated[str, OneOf(tuple(SYMBOL))], _Error] = {}
 
 
@@ -52,6 +53,8 @@ class Verdict:
     sentence : str
     held_out_error : dict of str to dict
         By channel: ``before``, ``after``, ``noise``, in the ``unit`` that is stated there.
+    held_out : list of str
+        Recordings of which these are the errors; none if there was one recording only, and the errors are of its fit.
     page : Path or None
         Report of the diagnosis.
     """
@@ -60,6 +63,7 @@ class Verdict:
     verdict: str | None
     sentence: str
     held_out_error: dict[str, dict]
+    held_out: list[str]
     page: Path | None
 
 
@@ -93,7 +97,7 @@ class Summary:
             verdict = f"{one.verdict}. " if one.verdict else ""
             lines.append(f"{one.batch}: {verdict}{one.sentence}")
             if one.held_out_error:
-                lines.append(f"  {held_out_errors(one.held_out_error)}")
+                lines.append(f"  {errors_in_words({'error': one.held_out_error, 'held_out': one.held_out})}")
         return lines + ([f"page: {self.page}"] if self.page else [])
 
 
@@ -127,7 +131,8 @@ def _verdict(file: Path) -> Verdict:
     error = {channel: one.model_dump() for channel, one in stated.fit.error.items()} if stated.fit else {}
     page = _if_there(file.parent / "report.html")
     try:
-        return Verdict(stated.batch, stated.verdict, sentence(read_json(file)), error, page)
+        held_out = stated.fit.held_out if stated.fit else []
+        return Verdict(stated.batch, stated.verdict, sentence(read_json(file)), error, held_out, page)
     except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError):
         raise InputError(f"{file}: is not what {WRITER} wrote") from None
 

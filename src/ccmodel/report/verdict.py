@@ -116,19 +116,19 @@ def _gain(fit: Mapping) -> str:
 
     Where it falls in none, the mean square of the errors says how far it falls beyond what differs from run to run.
     """
-    worst = worst_channel(fit["error"])
+    worst, error = worst_channel(fit["error"]), error_name(fit)
     before, after = ({c: round(e[w] / e["noise"], 1) for c, e in fit["error"].items()} for w in ("before", "after"))
     falls = {channel: before[channel] - after[channel] for channel in before}
     most = worst if falls[worst] > 0.0 else max(falls, key=lambda channel: falls[channel])
     if falls[most] > 0.0:
         fall = f"falls from {before[most]:.1f} to {after[most]:.1f} times the noise"
-        return f"With this in the model, the held-out error of {SYMBOL[most]} {fall}."
+        return f"With this in the model, the {error} of {SYMBOL[most]} {fall}."
     changes = f"{before[worst]:.1f} times the noise before and {after[worst]:.1f} after"
     low, high = (f"{fit['mean_square'][model]:.2f}" for model in ("extended", "calibrated"))
     if not float(low) < float(high):
-        return f"The held-out error of no channel falls; that of {SYMBOL[worst]} is {changes}."
+        return f"The {error} of no channel falls; that of {SYMBOL[worst]} is {changes}."
     return (
-        f"The effect is smaller than what differs from run to run: the held-out error of {SYMBOL[worst]} is {changes}."
+        f"The effect is smaller than what differs from run to run: the {error} of {SYMBOL[worst]} is {changes}."
         f" Beyond such differences the mean square of the errors falls from {high} to {low} (1: noise)."
     )
 
@@ -194,14 +194,20 @@ def nearest_sentence(diagnosis: Mapping) -> str | None:
     return f"Nearest model, {NOT_ACCEPTED}{where}: {'; and '.join(map(claim, nearest['mechanisms']))}."
 
 
-def held_out_errors(error: Mapping[str, Mapping]) -> str:
-    """Held-out errors over the noise floor, as ``τ_in 12.1 -> 1.3``; one number where no mechanism was added."""
+def error_name(fit: Mapping) -> str:
+    """What the errors of a diagnosis are called: of a single recording nothing can be held out."""
+    return "held-out error" if fit.get("held_out") else "error of the fit"
+
+
+def errors_in_words(fit: Mapping) -> str:
+    """Errors over the noise floor, as ``τ_in 12.1 -> 1.3``; one number where no mechanism was added."""
+    error = fit["error"]
 
     def fall(channel: str) -> str:
         before, after = (f"{error[channel][when] / error[channel]['noise']:.1f}" for when in ("before", "after"))
         return f"{SYMBOL[channel]} {before}" if before == after else f"{SYMBOL[channel]} {before} -> {after}"
 
-    return f"held-out error over the noise floor: {', '.join(map(fall, error))}"
+    return f"{error_name(fit)} over the noise floor: {', '.join(map(fall, error))}"
 
 
 def worst_channel(error: Mapping[str, Mapping]) -> str:

@@ -78,7 +78,7 @@ _COMPRESSED = (".gz",)
 # Bytes of a name in UTF-8. File systems allow 255 and netCDF 256, endings and names of studies included.
 LONGEST_NAME = 150
 NAMES = (
-    "a name is letters, digits and -_.+=,@ only and begins with a letter or digit; it has at most"
+    "a name is letters, digits and -_.+=,@ only and begins with a letter, digit or _; it has at most"
     f" {LONGEST_NAME} letters (bytes in UTF-8)"
 )
 

@@ -93,7 +93,7 @@ def _add_angle(
     if angle.rad_per_unit is None:
         result.unused[angle.column] = _lacks(angle.key)
         return
-    values, sign, formula = table[angle.column].to_numpy(), end.side.encoder_sign, "{0} - {1:g} rad, {2}"
+    values, sign, formula = table[angle.column].to_numpy(), end.side.encoder_sign, "({0} - {1:g} rad, {2})"
     zero, where = (values[:resting].mean(), "the mean at rest") if resting else (values[0], "the first sample")
     turned = values - zero
     if angle.column != end.angle:
@@ -180,6 +180,7 @@ def _tensions(result: Calibrated, end: End, load_cell_N: float | None) -> None:
     force, torque, radius = end.force, end.torque, end.side.pulley_radius_m
     cable_a, cable_b = end.tensions
     channels = result.channels
+    _other_tension(result, end, load_cell_N)
     if cable_a in channels and cable_b in channels:
         # The errors of the two sensors are independent.
         accuracy = float(np.sqrt(2) * load_cell_N)
@@ -196,6 +197,23 @@ def _tensions(result: Calibrated, end: End, load_cell_N: float | None) -> None:
         if name not in channels:
             formula = f"({force} {'+' if sign > 0 else '-'} {torque} / {radius:g} m) / 2"
             result.add(name, (channels[force] + sign * difference) / 2, formula, accuracy)
+
+
+def _other_tension(result: Calibrated, end: End, load_cell_N: float | None) -> None:
+    """Add the second tension of an end that logs one of them, and either the sum or the torque."""
+    force, torque, radius = end.force, end.torque, end.side.pulley_radius_m
+    logged = [name for name in end.tensions if name in result.channels]
+    if len(logged) != 1 or load_cell_N is None or {force, torque} <= result.channels.keys():
+        return
+    (one,), (other,) = logged, [name for name in end.tensions if name not in logged]
+    if force in result.channels:
+        accuracy = float(np.hypot(result.accuracy[force], load_cell_N))
+        result.add(other, result.channels[force] - result.channels[one], f"{force} - {one}", accuracy)
+    elif torque in result.channels:
+        sign, symbol = (-1, "-") if one == end.tensions[0] else (1, "+")
+        accuracy = float(np.hypot(result.accuracy[torque] / radius, load_cell_N))
+        values = result.channels[one] + sign * result.channels[torque] / radius
+        result.add(other, values, f"{one} {symbol} {torque} / {radius:g} m", accuracy)
 
 
 def _single_tension(result: Calibrated, end: End, load_cell_N: float | None) -> None:

@@ -128,8 +128,9 @@ def _read(folder: Path) -> tuple[list[_Log], dict[str, str]]:
         try:
             logs.append(_Log(file, read_log(path)[0]))
         except LogError as error:
-            row, column, text = error.args
-            refused[file] = ", ".join(str(part) for part in (f"row {row}" if row else "", column, text) if part)
+            defect = error.defect
+            place = f"row {defect.row}" if defect.row else None
+            refused[file] = ", ".join(part for part in (place, defect.column, defect.text) if part)
     return logs, refused
 
 
@@ -140,7 +141,7 @@ def _suffixes() -> tuple[str, ...]:
 
 def _natural(path: Path) -> list:
     """Order in which people count: run-2 before run-10."""
-    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.as_posix())]
+    return [int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", path.as_posix())]
 
 
 def _content(name: str, logs: Sequence[_Log], refused: dict[str, str]) -> Lines:
@@ -203,7 +204,8 @@ def _side(end: str, columns: set[str], logs: Sequence[_Log]) -> Lines:
 
 
 def _step(steps: Sequence[float]) -> str:
-    step = min(steps)
+    # An angle that stands still shows no step.
+    step = min((step for step in steps if step), default=0.0)
     if not step:
         return "0  # no step seen"
     per_rev = round(2 * np.pi / step)
@@ -270,8 +272,8 @@ def _entry(name: str, log: _Log, pretension_N: float | None) -> Lines:
     if pretension_N is not None:
         entry += f", pretension_N: {pretension_N:.3g}"
     if seen.wave:
-        amplitude = f"amplitude_rad: {seen.stroke / 2:.3g}, " if in_rad else ""
-        entry += f", excitation: {{wave: {seen.wave}, {amplitude}frequency_Hz: {seen.frequency_Hz:.3g}}}"
+        # No amplitude: one that was measured always agrees with the recording, and hides a wrong scale of the angles.
+        entry += f", excitation: {{wave: {seen.wave}, frequency_Hz: {seen.frequency_Hz:.3g}}}"
     comment = [
         f"{seen.rate_Hz:.4g} Hz, {seen.duration_s:.3g} s",
         f"rest {seen.rest_s:.2g} s" if seen.rest_s else "no rest",

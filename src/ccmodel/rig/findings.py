@@ -30,6 +30,11 @@ class Defect(NamedTuple):
 class LogError(Exception):
     """A log cannot be used; the arguments are those of `Defect`."""
 
+    @property
+    def defect(self) -> Defect:
+        """What is wrong with the log."""
+        return Defect(*self.args)
+
 
 Severity = Literal["warning", "refused", "inconsistent"]
 # Word before a line on a finding.

@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 
 from ccmodel.progress import Progress, each_of, silent, within
-from ccmodel.recording import Recording
+from ccmodel.recording import Recording, in_order
+from ccmodel.rig import limits
 from ccmodel.rig.batch import Batch, RecordingEntry, load_batch
 from ccmodel.rig.calibration import calibrate
 from ccmodel.rig.column_checks import ColumnChecks
@@ -125,6 +126,7 @@ def ingest_batch(folder: Path, progress: Progress = silent) -> Ingested:
                 used_files.append(file)
                 findings += warnings
         findings += refusals
+    recordings = in_order(recordings)
     # What a faulty sensor reads contradicts everything else too: it is named once.
     faulty = {finding.file for finding in findings if finding.severity == "inconsistent"}
     sound = [r for r, file in zip(recordings, used_files, strict=True) if file not in faulty]
@@ -141,7 +143,7 @@ def _attempt(batch: str, file: str, step: Callable[..., T], *args: Any) -> tuple
     except InputError as error:
         return None, [_finding(batch, p.file, "refused", Defect(p.line, None, p.text)) for p in error.problems]
     except LogError as error:
-        defect = Defect(*error.args)
+        defect = error.defect
     except Exception as error:  # an error that one log causes must not stop the others
         text = f"cannot be read because of an unexpected error ({type(error).__name__}: {error})"
         defect = Defect(None, None, " ".join(text.split()))
@@ -171,9 +173,9 @@ def _recording(
     table, reading_defects = log
     rare_columns = columns.check(table)
     table, faulty_sensors = check_sensors(table, batch.rig, travel)
-    end = table["time_s"].iloc[-1]
-    if entry.settled_s >= end:
-        text = f"ends at {end:g} s, before settled_s {entry.settled_s:g} s of batch.yaml: no samples left"
+    end, left = table["time_s"].iloc[-1], (table["time_s"] >= entry.settled_s).sum()
+    if left < limits.FEWEST_SAMPLES:
+        text = f"ends at {end:g} s, with {left} samples after settled_s {entry.settled_s:g} s of batch.yaml: too few"
         raise LogError(None, None, text, True)
     calibrated = calibrate(table, batch.rig)
     unconverted = [Defect(None, column, f"not used: {why}") for column, why in calibrated.unused.items()]

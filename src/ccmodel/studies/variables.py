@@ -52,7 +52,7 @@ def label_of(value: float | str, variable: str) -> str:
         return f"{half_loops:.0f} × 180°" if whole else f"{np.degrees(value):.0f}°"
     return {
         "pretension": f"{value:g} N",
-        "radius": f"{100 * value:.2f} cm",
+        "radius": "straight" if np.isinf(value) else f"{100 * value:.2f} cm",
         "frequency": f"{value:g} Hz",
         "load_level": f"load {100 * value:g} %",
     }[variable]

@@ -12,7 +12,7 @@ from ccmodel.failure import ModelError
 from ccmodel.model.exact import run as kernels
 from ccmodel.model.exact.path import tabulate
 from ccmodel.model.exact.profile import CableProfile, cable_profile, initial_state
-from ccmodel.model.exact.state import T_LOAD
+from ccmodel.model.exact.state import T_DRIVE, T_LOAD
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import FixedLoad, SpringLoad, one_row
 from ccmodel.model.response import PairResponse, Status
@@ -99,7 +99,9 @@ def simulate_pair(
     # Moving the pulleys does not change the corners, so the copy shares them.
     saved = state._replace(front=state.front.copy(), value=state.value.copy(), kind=state.kind.copy())
     out, phase = np.empty((9, theta_in.size)), np.empty(theta_in.size, dtype=np.int8)
-    progress, balance, profiles = np.zeros(3, dtype=np.int64), np.zeros(2), {}
+    progress, profiles = np.zeros(3, dtype=np.int64), {}
+    # A load that holds nothing gives all tension away: the scale of the balance is what the cables had.
+    balance = np.array([0.0, state.value[:2][present][:, [T_DRIVE, T_LOAD]].max()])
     kernels.settle(tables, state, saved, offset, stiffness)
     for stop in stops:
         drive = theta_in[: stop + 1], R_i
@@ -119,7 +121,7 @@ def simulate_pair(
         phase=phase,
         moving_A_m=out[5:7].T,
         moving_B_m=out[7:9].T,
-        status=Status.OK if balance[0] <= BALANCE_TOLERANCE * max(balance[1], 1e-9) else Status.UNBALANCED,
+        status=Status.OK if balance[0] <= BALANCE_TOLERANCE * balance[1] else Status.UNBALANCED,
         reached=theta_in.size,
         profiles=profiles,
     )

@@ -11,7 +11,7 @@ from ccmodel.mechanisms.learned import end_spring
 from ccmodel.mechanisms.load_dependent_friction import FLOOR_N, REFERENCE_N
 from ccmodel.mechanisms.relaxation import followed
 from ccmodel.mechanisms.strand_settling import stretch_at
-from ccmodel.mechanisms.tables import stretched
+from ccmodel.mechanisms.tables import Table, stretched
 from ccmodel.mechanisms.winding import winding
 from ccmodel.model.general import layout as rows
 from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad
@@ -79,8 +79,11 @@ def remove_cable_B(piece: NDArray) -> None:
     piece[rows.STRETCH, 1] = -ABSENT_SLACK_M * compliance / compliance.sum()
 
 
-def load_angle(physics: rows.Physics, T: NDArray, load: Load, series: NDArray) -> float:
-    """Angle at which the load holds the initial tensions, rad; 0 for a load without a neutral position."""
+def load_angle(physics: rows.Physics, T: NDArray, load: Load, series: NDArray, by_angle: Table | None) -> float:
+    """Angle at which the load holds the initial tensions, rad; 0 for a load without a neutral position.
+
+    `by_angle` is a law of the load's angle beside its spring.
+    """
     if isinstance(load, AngleLoad):
         return float(series[0])
     K, K3 = physics.stiffness_load, physics.cubic_stiffness
@@ -89,6 +92,8 @@ def load_angle(physics: rows.Physics, T: NDArray, load: Load, series: NDArray) -
     theta, force = 0.0, T[0, -1] - T[1, -1]
     for _ in range(50):
         torque = physics.load_pulley.radius_m * winding(theta, physics.load_pulley)[1] * force
+        if by_angle is not None:
+            torque -= float(by_angle.at(np.array(theta)))
         before, theta = theta, _angle_at_rest(K, K3, physics.half_gap, torque, load)
         if theta == before:
             break

@@ -196,7 +196,7 @@ def prepared(
     if transmission.is_single_cable:
         remove_cable_B(piece)
     mean[rows.MEAN] = (piece[rows.SHARE] * T).sum(axis=1)
-    state[rows.ANGLE] = load_angle(physics, T, load, series)
+    state[rows.ANGLE] = load_angle(physics, T, load, series, settings.load_by_angle)
     slide = np.zeros((rows.SLIDE_ROWS, 2, node.shape[2] + 2))
     drive = _pulley(settings, "drive", transmission.drive_radius_m)
     steps *= _steps(physics, transmission, time_s)

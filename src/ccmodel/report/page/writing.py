@@ -101,7 +101,7 @@ def write_report(
     progress("reading the results", 0.0)
     batches, fits, simulations = ([read_json(Path(f)) for f in inputs[k]] for k in ("summaries", "fits", "simulations"))
     diagnoses = [read_json(Path(file)) for file in inputs["diagnoses"]]
-    messages = _messages(raw, unusable, batches, fits, simulations, diagnoses)
+    messages = messages_of(raw, unusable, batches, fits, simulations, diagnoses)
     write_json(page_file.parent / LEFT_OUT, messages)
     reports = [Path(file).read_text(encoding="utf-8") for file in inputs["reports"]]
     content = Content(
@@ -135,7 +135,7 @@ def _runs(
     ]
 
 
-def _messages(
+def messages_of(
     raw: Path, unusable: Sequence[str], batches: Sequence[dict], fits: Sequence[dict], simulations: Sequence[dict],
     diagnoses: Sequence[dict],
 ) -> dict[str, list[str]]:  # fmt: skip
@@ -144,7 +144,8 @@ def _messages(
     findings = [Finding(**f) for f in (read_json(imported) if imported.exists() else [])]
     findings += [Finding(**f) for batch in batches for f in batch["findings"]]
     # A contradiction in a batch that was diagnosed nevertheless is in inputs that the configuration trusts.
-    trusted = {d["batch"] for d in diagnoses if d["verdict"] not in (None, INPUTS_INCONSISTENT)}
+    judged = [d for d in diagnoses if d["verdict"] not in (None, INPUTS_INCONSISTENT)]
+    trusted = {batch for d in judged for batch in d.get("batches", [d["batch"]])}
     contradictions = [f for f in findings if f.severity == "inconsistent"]
     failures = [line for simulation in simulations for line in simulation["failures"]]
     left_out = [
@@ -153,6 +154,7 @@ def _messages(
         *(f"fit {f['fit']}: {f['message']}" for f in fits if not f["succeeded"]),
         # A recording fails with every parameter set; one message is enough.
         *dict.fromkeys(f"not simulated: {line}" for line in failures),
+        *(f"{d['batch']}: not diagnosed: {d['why']}" for d in diagnoses if d["verdict"] is None),
     ]
     return {
         "left_out": left_out,
@@ -303,8 +305,9 @@ def _headline(errors: pd.DataFrame) -> list[str]:
         means = table.groupby(["batch", "channel"])["nrmse_percent"].mean()
         batch, channel = means.idxmax()
         sentences.append(
-            f"With {parameters} parameters the median error of the model is {table['nrmse_percent'].median():.2g} % of"
-            f" peak to peak; the largest is {means.max():.2g} %, in {symbol_of(channel)} of batch {batch}."
+            f"With {parameters} parameters the median error of the model in a recording is"
+            f" {table['nrmse_percent'].median():.2g} % of peak to peak; the largest mean over the recordings of a batch"
+            f" is {means.max():.2g} %, in {symbol_of(channel)} of batch {batch}."
         )
     return sentences
 

@@ -102,8 +102,7 @@ def _read_all(names: Mapping[Path, str], progress: Progress) -> dict[Path, Signa
         try:
             read[path] = readers.read_signals(path)
         except LogError as error:
-            row, _, text = error.args
-            problems.append(Problem(name, row, text))
+            problems.append(Problem(name, error.defect.row, error.defect.text))
     if problems:
         raise InputError.of(*problems)
     return read

@@ -97,8 +97,8 @@ def import_files(files: Sequence[Path], map_file: Path, out: Path, progress: Pro
         (fresh / PROVENANCE).write_text(text + "\n", encoding="utf-8")
         if (out / BATCH).exists():
             shutil.copy2(out / BATCH, fresh / BATCH)
-        drafted = _draft(fresh)
-    return Written(out, built, remarks, drafted)
+    # In its place, so that a message on a log names a file that is there.
+    return Written(out, built, remarks, _draft(out))
 
 
 def check_folder(out: Path) -> None:
@@ -156,9 +156,9 @@ def _build_all(
 
 
 def _one_line(error: FileError) -> str:
-    row, column, text = error.args
-    place = [f"line {row}" if row is not None else None, column]
-    return ", ".join(p for p in place if p) + (": " if any(place) else "") + text
+    defect = error.defect
+    place = [f"line {defect.row}" if defect.row is not None else None, defect.column]
+    return ", ".join(p for p in place if p) + (": " if any(place) else "") + defect.text
 
 
 def _write_log(path: Path, table: pd.DataFrame) -> None:

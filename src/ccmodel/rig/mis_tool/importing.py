@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ccmodel.outputs import new_folder
 from ccmodel.progress import Progress, each_of, silent
-from ccmodel.rig.batch import valid_name
+from ccmodel.rig.batch import NAMES, valid_name
 from ccmodel.rig.findings import Finding, LogError
 from ccmodel.rig.mis_tool.description import write_batch
 from ccmodel.rig.mis_tool.signs import sensor_signs
@@ -96,7 +96,7 @@ def import_batch(source: Path, out: Path) -> Imported:
     """
     out = Path(out).resolve()
     if not valid_name(out.name):
-        raise InputError(f"{out.name}: a batch's name is letters, digits and -_.+=,@ only")
+        raise InputError(f"{out.name}: {NAMES}")
     if out.exists() and not _is_imported(out):
         raise InputError(f"{out}: would be replaced, but is from no import; choose another name for the batch")
     files = _text_files(source)
@@ -160,7 +160,7 @@ def _read_folder(files: list[Path], batch: str) -> tuple[dict[str, Trial], list[
         try:
             trial = read_trial(file)
         except LogError as error:
-            findings.append(Finding(batch, str(file), None, None, "refused", error.args[2]))
+            findings.append(Finding(batch, str(file), None, None, "refused", error.defect.text))
             continue
         if trial is not None:
             trials[_unique(f"trial-{_safe(file.stem)}", taken)] = trial

@@ -28,6 +28,7 @@ from ccmodel.report.figures import COLOURS, STYLE, legend_below, print_figure, s
 from ccmodel.report.verdict import (
     NOT_ACCEPTED,
     SYMBOL,
+    error_name,
     headline,
     law_claim,
     nearest_sentence,
@@ -242,7 +243,8 @@ def _map(found: Diagnosis) -> Figure:
             dark = value < np.sqrt(0.7 * highest)
             text, colour = (f"{value:.1f}", "white" if dark else "black") if np.isfinite(value) else ("none", "black")
             ax.text(column, row, text, ha="center", va="center", color=colour)
-    title_figure(figure, "held-out rms error, each recording's over its own noise floor", _origin(found))
+    what = error_name(found.report["fit"])
+    title_figure(figure, f"{what} (rms), each recording's over its own noise floor", _origin(found))
     stamp_figure(figure, _stamp(found))
     return figure
 

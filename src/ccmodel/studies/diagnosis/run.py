@@ -1,5 +1,6 @@
 """A batch, or several of one rig -> a diagnosis: diagnosis.json, a page, and the models that were compared."""
 
+import traceback
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
@@ -188,8 +189,11 @@ def diagnose_recordings(
         if ingested.batch is None or not (ingested.recordings or (ingested.contradicts and not settings.trust_inputs)):
             raise ModelError("no recording that can be used")
         outcome = diagnosed(ingested, inputs, options_of(settings), None, progress, settings.trust_inputs)
-    except (InputError, ModelError, ValueError) as error:
+    except Exception as error:  # an error that one batch causes must not stop the others
         reason = str(error)
+        if not isinstance(error, InputError | ModelError):
+            traceback.print_exc()
+            reason = f"an unexpected error ({type(error).__name__}: {error}); the log of the job has its traceback"
         batches = {"batches": [file.stem for file in recordings_files]} if len(recordings_files) > 1 else {}
         with _new_files(out) as fresh:
             write_json(fresh / VERDICT, {"batch": name, **batches, "verdict": None, "why": reason})

@@ -64,6 +64,8 @@ def transmission_figure(pairs: Sequence[Pair], study: Study, smoothing_share: fl
     """
     recorded, _ = pair = pairs[0]
     panels = [(x, y) for x, y in figures.TRANSMISSION if x in recorded and y in recorded]
+    if not panels:
+        return figures.empty_figure(f"{study.title}: {recorded.batch}/{recorded.id} has no two channels of one end")
     figure, cells = _grid(len(panels), 1, columns=2, shared=False)
     for (x, y), (loop, (strip,)) in zip(panels, cells, strict=True):
         _loops(loop, {ALONE: [pair]}, x, y)

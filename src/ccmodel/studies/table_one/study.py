@@ -21,7 +21,7 @@ from ccmodel.studies.table_one.figure import table_one_figure
 from ccmodel.studies.table_one.rank import RANKINGS, nearest, rankings, room_for_torque, scored
 from ccmodel.studies.table_one.rigs import conditions
 from ccmodel.studies.table_one.settings import TableOne
-from ccmodel.typed import load_yaml_model
+from ccmodel.typed import InputError, load_yaml_model
 
 # Shares of the time at which the coarse and the finer cases of one effect are done.
 SINGLES, FINER = 0.4, 0.5
@@ -111,8 +111,10 @@ def table_one(settings: Path, out: Path, figure: Path, cores: int = 1, progress:
     Raises
     ------
     InputError
-        If the settings cannot be used.
+        If the settings cannot be used, or the figure's name has no ending of a figure.
     """
+    if figure.suffix.lower().removeprefix(".") not in FORMATS:
+        raise InputError(f"{figure}: a figure's name ends with {', '.join(f'.{ending}' for ending in FORMATS)}")
     study = load_yaml_model(settings, TableOne)
     found = run_study(study, cores, progress)
     ranked = rankings(found.singles, found.pairs, study)
@@ -127,11 +129,13 @@ def table_one(settings: Path, out: Path, figure: Path, cores: int = 1, progress:
     }
     drawn = table_one_figure(ranked, found.singles, study)
     stamp_figure(drawn, provenance.stamp(__name__, study.model_dump(mode="json")))
-    with new_file(figure) as fresh_figure, new_files(out, last="summary.json") as fresh:
+    with new_files(out, last="summary.json") as fresh:
         for name, table in tables.items():
             write_table(fresh / f"{name}.csv", table)
         write_json(fresh / "summary.json", summary)
-        save_figure(drawn, fresh_figure, *(fresh / f"table-one.{ending}" for ending in FORMATS))
+        save_figure(drawn, *(fresh / f"table-one.{ending}" for ending in FORMATS))
+    with new_file(figure) as fresh_figure:
+        save_figure(drawn, fresh_figure)
     return (
         f"{len(found.singles)} cases of one effect and {len(found.pairs)} of two; {len(found.failed)} could not be "
         f"run, {found.left_out} conditions are beyond the sensors' ranges: {out / 'ranking.csv'}, {figure}"
