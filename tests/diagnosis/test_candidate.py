@@ -82,7 +82,8 @@ def test_a_fit_that_is_evaluated_again_is_the_same_fit():
     again = evaluated(once, found.whitened)
     assert again.values == pytest.approx(once.values, rel=1e-6, abs=1e-6)
     assert again.mean_square == pytest.approx(once.mean_square, rel=0.02)
-    assert np.diag(again.covariance) == pytest.approx(np.diag(once.covariance), rel=0.2)
+    # The wider of two intervals; which of them it is may differ.
+    assert again.half_widths() == pytest.approx(once.half_widths(), rel=0.2)
 
 
 def test_two_fits_with_the_same_values_are_two_fits():
@@ -119,6 +120,11 @@ def test_recordings_may_differ_in_the_state_that_they_begin_at():
     assert found.mean_square < 1.3
     own = [w.own_values(found.values)[STATE] for w in found.whitened]
     # What is yet to be lost; a larger share in cables that have relaxed further looks much the same.
+    # The mean of the states has a prior, in the cost of a fit and in a screening about it.
+    distances, derivatives = found.prior
+    assert (derivatives**2).sum(axis=0) == pytest.approx(found.prior_precision**2)
+    assert found.prior_precision[list(found.values).index(STATE)] > 0
+    assert distances == pytest.approx([found.prior_precision.max() * (found.values[STATE] - 0.5)])
     left = [found.values[SHARE] * (1 - state) for state in own]
     assert left == pytest.approx([0.2 * (1 - state) for state in RELAXED], abs=0.02)
     assert found.values[SHARE] == pytest.approx(0.2, abs=0.05)

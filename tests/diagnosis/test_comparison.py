@@ -43,6 +43,7 @@ STARTS = [
 BASE_VALUES = {"friction_coefficient": 0.15}
 VALUES = {
     "pulley-friction/drive-pulley/friction_torque": 4e-3,
+    "pulley-friction/load-pulley/friction_torque": 4e-3,
     "torque-scale/drive-sensor/gain": 0.05,
     "torque-scale/load-sensor/gain": 0.05,
     "kink/conduit/beta": 0.5,
@@ -133,6 +134,41 @@ def test_a_mechanism_at_either_of_two_places_is_named():
     found = verdict(evidence(), (fitted(1.0, SCALE), evidence(NONE)), (fitted(1.0, at_load), evidence(NONE)))
     assert found.verdict == "explained"
     assert max(found.probability) < DECIDED
+
+
+def test_a_mechanism_at_a_second_place_has_a_confidence_of_its_own():
+    """The set with both places is the most probable complete one, but one place alone may be all."""
+    other = ("pulley-friction", "load-pulley")
+    both, one = fitted(1.0, FRICTION, other), fitted(1.01, FRICTION)
+    found = verdict(evidence(), (both, evidence(NONE)), (one, evidence(NONE - 3.0)))
+    first, second = found.comparison.confidences(both.hypothesis)
+    assert first == found.confidence_in("pulley-friction") >= DECIDED > second
+    assert found.verdict != "explained" or found.best is not both
+
+
+def test_a_set_that_leaves_nothing_is_outdone_by_none():
+    """One bad channel makes the fit no good one, but a larger set leaves no less."""
+    bad = np.full((8, 5), np.sqrt(0.7))
+    bad[:, 1] = np.sqrt(2.4)
+    single = replace(fitted(1.0, FRICTION), loo_residuals=list(bad))
+    assert not single.is_good
+    pair = fitted(1.0, FRICTION, KINK)
+    of_both = compared(evidence(), (single, evidence(NONE)), (pair, evidence(NONE - 5.0)))
+    assert of_both.unexplained_mean_square(single) == of_both.unexplained_mean_square(pair) == 0.0
+    assert not of_both.is_outdone(single)
+
+
+def test_no_recording_is_predicted_by_an_implausible_candidate():
+    kink = fitted(0.5, KINK, **{"kink/conduit/beta": 50.0})
+    found = verdict(evidence(), (fitted(1.0, FRICTION), evidence(NONE)), (kink, evidence(NONE)))
+    assert found.verdict == "explained"
+    assert {c.hypothesis.acting for c in nested_choice(found)} == {(FRICTION,)}
+
+
+def test_a_set_in_another_order_is_the_same_set():
+    pairs = fitted(1.2, FRICTION, KINK), fitted(1.1, KINK, FRICTION)
+    found = comparisons.lowest(pairs)
+    assert [c.hypothesis.acting for c in found] == [(KINK, FRICTION)]
 
 
 def test_a_mechanism_has_the_probability_of_all_sets_that_contain_it():
@@ -258,6 +294,39 @@ def test_a_strength_is_judged_for_the_shape_that_was_fitted(degrees, left):
     for_shape = 0.25 * (1 - 2 * 0.96**2 / 1.96)
     t2 = 1 / (for_shape if left < degrees else 0.25)
     assert found == pytest.approx((left + 1) / 2 * np.log1p(t2 / left) - np.log(left + 1) / 2)
+
+
+def test_a_wider_interval_is_no_support():
+    """Ten standard deviations of the scatter on 3 degrees; seven of an interval that counts every sample."""
+    one = fitted(1.0, SCALE)
+    k = list(one.values).index("torque-scale/drive-sensor/gain")
+
+    def of(sd, degrees):
+        covariance = np.zeros((len(one.values),) * 2)
+        covariance[k, k] = sd**2
+        return covariance, np.full(len(one.values), degrees)
+
+    scatter, interval = of(0.005, 3.0), of(0.05 / 7, np.inf)
+    by_scatter = replace(one, covariance=scatter[0], degrees_of_freedom=scatter[1])
+    by_interval = replace(one, covariance=interval[0], degrees_of_freedom=interval[1])
+    assert by_interval.log_support(*SCALE) == pytest.approx(24.5)
+    assert by_scatter.log_support(*SCALE) == pytest.approx(2 * np.log1p(100 / 3) - np.log(2))
+    assert replace(by_interval, jackknife=scatter).log_support(*SCALE) == by_scatter.log_support(*SCALE)
+
+
+def test_the_strength_of_a_frozen_baselines_mechanism_is_its_change():
+    """4.0 mN m, where the baseline has 3.9, with a standard deviation of 0.1: no clear change, though clearly there."""
+    known = SimpleNamespace(name=FRICTION[0], place=FRICTION[1], values={"friction_torque": 3.9e-3, "presliding": 2e-3})
+    observations = SimpleNamespace(**vars(OBSERVATIONS), parameters=SimpleNamespace(mechanisms=(known,)))
+    whitened = [SimpleNamespace(observations=observations, measured=np.zeros((5, 1)))] * 8
+    free = fitted(1.0, FRICTION)
+    k = list(free.values).index("pulley-friction/drive-pulley/friction_torque")
+    covariance = np.zeros((len(free.values),) * 2)
+    covariance[k, k] = (1e-4) ** 2
+    free = replace(free, whitened=whitened, covariance=covariance, degrees_of_freedom=np.full(len(free.values), 7.0))
+    frozen = replace(free, hypothesis=Hypothesis((FRICTION,), baseline=(FRICTION,), is_frozen=True))
+    assert free.log_support(*FRICTION) > 10
+    assert frozen.log_support(*FRICTION) < 0
 
 
 def test_a_search_goes_on_from_what_may_be_an_imitation():
@@ -787,6 +856,7 @@ def test_a_law_beside_which_something_is_missing_counts_once_as_unexplained():
         best_of_list=None,
         faulty_channels={},
         confidence_in=whole.__getitem__,
+        confidences=lambda hypothesis: [whole[name] for name, _ in hypothesis.acting],
         log_weight=lambda c: np.log(whole[c.hypothesis.names[0]]),
     )
     assert judge(found, []).verdict == "undecided"

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from ccmodel.inference.cross_validation import jackknife, shortened
+from ccmodel.inference.cross_validation import jackknife, leave_one_out, shortened
+from ccmodel.inference.least_squares import Search, minimise
 from ccmodel.inference.problem import Free, Problem
 
 
@@ -63,3 +64,33 @@ def test_a_newton_step_that_raises_the_cost_is_shortened():
         return shortened(problem, np.array([0.0]), np.array([to]), joint, 3)[0]
 
     assert [step(1.0), step(4.0), step(40.0)] == [1.0, 2.0, 0.0]
+
+
+def line_fit(wanted, free, **bounds):
+    """A fit of one slope to recordings each of which wants a slope of its own, and its cross-validation."""
+    x = np.linspace(-1, 1, 20)
+
+    def recording(k, slope):
+        return SimpleNamespace(name=str(k), session="", errors=lambda values: (values["slope"] - slope) * x)
+
+    recordings = [recording(k, slope) for k, slope in enumerate(wanted)]
+    problem = Problem(recordings, {"slope": free}, weight=lambda r: 1.0)
+    return leave_one_out(problem, minimise(problem, problem.start, Search()))
+
+
+@pytest.mark.parametrize("recordings", [3, 8])
+def test_an_unknown_on_its_bound_stays_there_for_every_part_of_the_recordings(recordings):
+    found = line_fit([-1.0] * recordings, Free(0.5, 0.0, 10.0))
+    assert np.array(found.values) == pytest.approx(np.zeros((recordings, 1)), abs=1e-6)
+
+
+def test_an_unknown_leaves_its_bound_where_the_others_pull_it_off():
+    """Without the last recording the best slope is 1, with it it is on the bound."""
+    found = line_fit([1.0, 1.0, -30.0], Free(0.5, 0.0, 10.0))
+    assert np.array(found.values)[:, 0] == pytest.approx([0.0, 0.0, 1.0], abs=1e-5)
+
+
+def test_of_a_single_recording_nothing_is_left_out():
+    found = line_fit([2.0], Free(0.5, -10.0, 10.0, spread=5.0))
+    assert found.values[0] == pytest.approx([2.0], abs=0.1)
+    assert np.abs(found.residuals[0]).max() < 0.1

@@ -22,6 +22,7 @@ from ccmodel.inference.least_squares import STALLED, Search, Solution, minimise
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.pool import each
 from ccmodel.inference.problem import Free, Problem
+from ccmodel.mechanisms import Parameter
 from ccmodel.model.parameters import Parameters, mechanism_key
 
 SEARCH = Search(
@@ -77,6 +78,8 @@ class CandidateFit:
         Why the search stopped.
     converged : bool
         Whether it came to a minimum.
+    jackknife : tuple of ndarray, or None
+        Covariance and degrees of freedom from the scatter between recordings alone; None if those above are these.
     """
 
     hypothesis: Hypothesis
@@ -91,6 +94,7 @@ class CandidateFit:
     loo_residuals: list[NDArray]
     message: str = ""
     converged: bool = True
+    jackknife: tuple[NDArray, NDArray] | None = None
 
     @cached_property
     def by_recording(self) -> NDArray:
@@ -119,12 +123,18 @@ class CandidateFit:
         return self.mean_square <= settings.GOOD_FIT and worst <= settings.CONSPICUOUS**2
 
     @cached_property
+    def _unknowns(self) -> dict[str, Free]:
+        """Its unknowns with their priors, in the order of its values."""
+        unknowns = _unknowns(self.whitened, self.hypothesis, self.free, self.values)
+        return {name: unknowns[name] for name in self.values}
+
+    @cached_property
     def prior(self) -> tuple[NDArray, NDArray]:
         """Distances of unknowns from their prior's means over its standard deviations, and derivatives of these.
 
         Rows of the cost beside those of the recordings; shapes (priors,) and (priors, unknowns).
         """
-        stated = [(name, one) for name, one in self.free.items() if one.prior_precision]
+        stated = [(name, one) for name, one in self._unknowns.items() if one.prior_precision]
         distances = np.array([f.prior_precision * (self.values[name] - f.prior_mean) for name, f in stated])
         derivatives = np.array([[f.prior_precision * (name == other) for other in self.values] for name, f in stated])
         return distances, derivatives.reshape(len(stated), len(self.values))
@@ -132,8 +142,7 @@ class CandidateFit:
     @cached_property
     def prior_precision(self) -> NDArray:
         """Reciprocal standard deviation of each unknown's prior in the cost of the fit, 0 without one; (unknowns,)."""
-        unknowns = _unknowns(self.whitened, self.hypothesis, self.free, self.values)
-        return np.array([unknowns[name].prior_precision for name in self.values])
+        return np.array([one.prior_precision for one in self._unknowns.values()])
 
     @property
     def sizes(self) -> NDArray:
@@ -174,11 +183,18 @@ class CandidateFit:
         Raftery, Bayes factors, Journal of the American Statistical Association 90(430), 773-795, 1995,
         doi:10.1080/01621459.1995.10476572). Of several strengths, the clearest one counts. The result is infinite for a
         law, which has no strength, and if nothing scatters. The strength of a mechanism with states is the part that
-        remains when the recordings start.
+        remains when the recordings start. That of a frozen baseline's mechanism is its change.
 
         The variance is conditional on the mechanism's other parameters, which have no meaning without the mechanism;
         each of them takes a degree of freedom. If fewer than one would be left, the variance is the marginal one.
+
+        Where the interval is wider than the scatter, as that of an unknown with a prior may be, the lower support of
+        the two counts: a wider interval has the degrees of freedom of all samples.
         """
+        support = self._log_support(name, place, self.covariance, self.degrees_of_freedom)
+        return support if self.jackknife is None else min(support, self._log_support(name, place, *self.jackknife))
+
+    def _log_support(self, name: str, place: str, covariance: NDArray, degrees: NDArray) -> float:
         mechanism, names = registry.get(name), list(self.values)
         apart = {p.name for p in (*mechanism.strengths, *mechanism.states)}
         keys = [mechanism_key(name, place, p.name) for p in mechanism.parameters if p.name not in apart]
@@ -188,19 +204,27 @@ class CandidateFit:
         most = -np.inf
         for strength in mechanism.strengths:
             k = names.index(mechanism_key(name, place, strength.name))
-            whole, nu = self.values[names[k]] - strength.neutral, float(self.degrees_of_freedom[k])
+            whole = self.values[names[k]] - self._without(name, place, strength)
+            nu = float(degrees[k])
             # The derivatives of what is left: by the strength, and by each state.
             slopes = [float(left.prod()), *(-whole * float(np.delete(left, i).prod()) for i in range(left.size))]
-            covariance = self.covariance[np.ix_([k, *states], [k, *states])]
+            of_part = covariance[np.ix_([k, *states], [k, *states])]
             if nu - len(shapes) >= 1:
-                covariance, nu = _given(self.covariance, [k, *states], shapes), nu - len(shapes)
-            variance = np.array(slopes) @ covariance @ np.array(slopes)
+                of_part, nu = _given(covariance, [k, *states], shapes), nu - len(shapes)
+            variance = np.array(slopes) @ of_part @ np.array(slopes)
             if not variance > 0.0:
                 return np.inf
             t2 = (whole * float(left.prod())) ** 2 / variance
             by_recordings = (nu + 1) / 2 * np.log1p(t2 / nu) - np.log(nu + 1) / 2 if np.isfinite(nu) else t2 / 2
             most = max(most, float(by_recordings))
         return most if np.isfinite(most) else np.inf
+
+    def _without(self, name: str, place: str, strength: Parameter) -> float:
+        """Value of a strength without its mechanism, or without a change of a mechanism of a frozen baseline."""
+        if (name, place) not in self.hypothesis.baseline:
+            return strength.neutral
+        known = {(m.name, m.place): m.values for m in self.whitened[0].observations.parameters.mechanisms}
+        return known.get((name, place), {}).get(strength.name, strength.neutral)
 
     def intervals(self) -> dict[str, Interval]:
         """The 90 % interval of each unknown of the calibration, within its bounds."""
@@ -319,7 +343,9 @@ def _cross_validated(
     covariance, degrees = left_out.covariance, left_out.degrees_of_freedom
     if len(modelled) == 1:
         covariance = covariance / of_recording(modelled[0].observations)
+    alone = None
     if problem.prior_precision.any():
+        alone = covariance, degrees
         covariance, degrees = at_least_by_information(problem, solution, covariance, degrees)
     roots = [np.sqrt(w.measured.size) for w in modelled]
     return CandidateFit(
@@ -335,6 +361,7 @@ def _cross_validated(
         left_out.residuals,
         solution.message,
         solution.converged,
+        alone,
     )
 
 

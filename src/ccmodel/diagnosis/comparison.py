@@ -14,6 +14,7 @@ best imitation of something unlisted leaves any share, and a mechanism that only
 takes off little of it.
 """
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -89,8 +90,8 @@ class Comparison:
         return evidence_of(self.discrepancy, candidate, effect, self.excess)
 
     def with_candidates(self, candidates: Sequence[CandidateFit]) -> "Comparison":
-        """The same with other candidates, fitted to the same whitened observations."""
-        ordered = sorted(candidates, key=lambda c: (not c.is_plausible, c.mean_square))
+        """The same with other candidates, fitted to the same whitened observations; of each set its best fit."""
+        ordered = sorted(lowest(candidates), key=lambda c: (not c.is_plausible, c.mean_square))
         found = replace(self, candidates=ordered, evidence={})
         return replace(found, evidence={c.hypothesis: found._evidence_of(c) for c in [self.base, *ordered]})
 
@@ -256,13 +257,22 @@ class Comparison:
         certain = self.certain
         if certain is None or self.unexplained_mean_square(certain) > 0.0:
             return False
-        return min(map(self.confidence_in, certain.hypothesis.names)) >= enough
+        return min(self.confidences(certain.hypothesis)) >= enough
 
-    def confidence_in(self, name: str) -> float:
-        """Probability that a mechanism acts, at whatever place and beside whatever others."""
+    def confidence_in(self, name: str, places: int = 1) -> float:
+        """Probability that a mechanism acts at so many places or more, whichever, and beside whatever others."""
         weights = np.logaddexp.reduce(self.log_posterior[1:], axis=1).tolist()
         pairs = zip(self.candidates, weights, strict=True)
-        return sum(exp(weight) for c, weight in pairs if name in c.hypothesis.names)
+        return sum(exp(weight) for c, weight in pairs if c.hypothesis.names.count(name) >= places)
+
+    def confidences(self, hypothesis: Hypothesis) -> list[float]:
+        """Confidence in each mechanism of a set, in its order; a second place of one has that of two places."""
+        seen = Counter[str]()
+        found = []
+        for name, _ in hypothesis.acting:
+            seen[name] += 1
+            found.append(self.confidence_in(name, seen[name]))
+        return found
 
     @property
     def certain(self) -> CandidateFit | None:
@@ -273,8 +283,11 @@ class Comparison:
         """
         if self.base.is_good:
             return None
-        every = {name for c in self.candidates for name in c.hypothesis.names}
-        identified = sorted(name for name in every if self.confidence_in(name) >= settings.DECIDED)
+        most = Counter[str]()
+        for c in self.candidates:
+            most |= Counter(c.hypothesis.names)
+        every = ((name, places) for name, count in most.items() for places in range(1, count + 1))
+        identified = sorted(name for name, places in every if self.confidence_in(name, places) >= settings.DECIDED)
         alone = (c for c in self.leading if identified and list(c.hypothesis.names) == identified)
         return next((c for c in alone if c.is_plausible and c.is_good), None)
 
@@ -292,7 +305,7 @@ class Comparison:
             return None
         names, complete = best.hypothesis.names, np.array(self.probability)
         same = np.array([c.hypothesis.names == names for c in self.candidates])
-        if min(map(self.confidence_in, names)) <= 0.5 or complete[same].sum() < settings.DECIDED * complete.sum():
+        if min(self.confidences(best.hypothesis)) <= 0.5 or complete[same].sum() < settings.DECIDED * complete.sum():
             return None
         return best
 
@@ -327,21 +340,19 @@ class Comparison:
             min((self.unexplained_mean_square(c) for c in ranked if is_size(c.hypothesis.size)), default=np.inf)
             for is_size in (lambda s: s == size, lambda s: s < size)
         )
-        return bool(left <= settings.LEADING_ON * before)
+        return bool(left <= settings.LEADING_ON * before) and before > 0.0
 
     def is_outdone(self, candidate: CandidateFit) -> bool:
-        """Whether a candidate's fit is not good, and a larger set has at most half of its `unexplained_mean_square`.
+        """Whether a candidate's fit is not good, and a larger set has at most half of what it leaves.
 
         Whether the further mechanisms are missing or imitate what the equations leave, the candidate alone is then no
         complete account: what an imitation takes off is seldom half.
         """
-        if candidate.is_good:
+        left = self.unexplained_mean_square(candidate)
+        if candidate.is_good or left == 0.0:
             return False
         larger = (c for c in self.candidates if c.is_plausible and is_part_of(candidate, c))
-        return any(
-            self.unexplained_mean_square(c) <= settings.LEADING_ON * self.unexplained_mean_square(candidate)
-            for c in larger
-        )
+        return any(self.unexplained_mean_square(c) <= settings.LEADING_ON * left for c in larger)
 
     def log_weight(self, candidate: CandidateFit) -> float:
         """Log posterior of a candidate, complete or not."""
@@ -450,6 +461,16 @@ def log_bayes_factor_of_repeats(candidate: CandidateFit) -> float:
     """
     tests = friction_p_values(candidate.whitened, candidate.residuals, FRICTION in candidate.values)
     return sum(map(log_bayes_factor, tests))
+
+
+def lowest(every: Sequence[CandidateFit]) -> list[CandidateFit]:
+    """Of the fits of each set of mechanisms the one with the lowest mean square."""
+    best: dict[frozenset, CandidateFit] = {}
+    for candidate in every:
+        members = frozenset(candidate.hypothesis.acting)
+        if members not in best or candidate.mean_square < best[members].mean_square:
+            best[members] = candidate
+    return list(best.values())
 
 
 def is_part_of(candidate: CandidateFit, other: CandidateFit) -> bool:

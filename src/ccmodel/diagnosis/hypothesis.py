@@ -11,7 +11,7 @@ from ccmodel.inference.problem import Free
 from ccmodel.mechanisms import Parameter
 from ccmodel.mechanisms.learned import Law
 from ccmodel.model.general.run import Active
-from ccmodel.model.parameters import Parameters, mechanism_key
+from ccmodel.model.parameters import Parameters, mechanism_key, mechanism_parameter
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,13 @@ class Hypothesis:
 
     def and_also(self, other: "Hypothesis") -> "Hypothesis":
         """The same with another's mechanisms added."""
-        return replace(self, acting=self.acting + other.acting, fixed=self.fixed + other.fixed)
+        fixed = tuple(dict.fromkeys(self.fixed + other.fixed))
+        return replace(self, acting=self.acting + other.acting, fixed=fixed)
+
+    def part(self, acting: tuple[tuple[str, str], ...]) -> "Hypothesis":
+        """The same with some of its mechanisms alone."""
+        kept = tuple(one for one in self.fixed if (mechanism_parameter(one[0]) or ())[:2] in acting)
+        return replace(self, acting=acting, fixed=kept)
 
     @property
     def size(self) -> int:

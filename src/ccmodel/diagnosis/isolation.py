@@ -24,7 +24,7 @@ def isolate(whitened: Sequence[Whitened], calibrated: CandidateFit) -> list[tupl
     channels = channels_of(whitened)
     found = [(excess(without(c, whitened), calibrated), PLACES_OF[c]) for c in channels if len(channels) > 1]
     if all({TAU_OUT, THETA_OUT} < set(w.observations.channels) for w in whitened):
-        driven = [w.observations.driven_by_torque() for w in whitened]
+        driven = [(w, w.observations.driven_by_torque()) for w in whitened]
         found.append((excess(driven, calibrated), AT_THE_LOAD))
     return found
 
@@ -34,16 +34,19 @@ def channels_of(whitened: Sequence[Whitened]) -> list[str]:
     return list(dict.fromkeys(c for w in whitened for c in w.observations.channels))
 
 
-def without(channel: str, whitened: Sequence[Whitened]) -> list[Observations]:
-    """Observations without a channel; recordings with no other channel are left out."""
-    return [o for w in whitened if (o := w.observations.without(channel)).channels]
+def without(channel: str, whitened: Sequence[Whitened]) -> list[tuple[Whitened, Observations]]:
+    """Recordings, and their observations without a channel; recordings with no other channel are left out."""
+    return [(w, o) for w in whitened if (o := w.observations.without(channel)).channels]
 
 
-def excess(observations: Sequence[Observations], calibrated: CandidateFit) -> float:
-    """Mean square above the noise of the calibrated model, fitted to these observations; infinite if it fails."""
-    model = calibrated.model(observations[0].parameters)
+def excess(parts: Sequence[tuple[Whitened, Observations]], calibrated: CandidateFit) -> float:
+    """Mean square above the noise of the calibrated model, fitted to a part of each recording; infinite if it fails.
+
+    What differs from run to run has the spreads, and each recording the own values, of the whole recordings.
+    """
+    model = calibrated.model(parts[0][1].parameters)
     try:
-        whitened = each(observations, lambda i, o: whiten(o, model))
+        whitened = each(parts, lambda i, part: whiten(part[1], model, part[0].repeatability, part[0].own))
         return fit(whitened, calibrated.hypothesis, calibrated.free, calibrated.values).mean_square - 1.0
     except ModelError:
         return np.inf

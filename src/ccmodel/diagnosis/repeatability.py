@@ -277,7 +277,8 @@ def sequences(whitened: Sequence["Whitened"]) -> list[list[int]]:
 def trend_p_value(found: Deviations, runs: Sequence[Sequence[int]]) -> float:
     """Two-sided p-value of the trend over the recordings of each batch, under the hypothesis that there is none."""
     at, values = _over_sequence(found, runs)
-    freedom = settings.SPREAD_FREEDOM + values.size - len(runs) - 1
+    means = sum(bool(np.isfinite(found.values[list(run)]).any()) for run in runs)
+    freedom = settings.SPREAD_FREEDOM + values.size - means - 1
     if values.size < settings.FEWEST_FOR_SCATTER or not at.any():
         return 1.0
     left = values - _slope(at, values) * at

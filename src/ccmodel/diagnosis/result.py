@@ -38,7 +38,9 @@ def report(
     """
     best, base, whitened = judgement.best, judgement.calibrated, judgement.whitened
     is_named = judgement.verdict in ("explained", "learned")
+    confidence = judgement.comparison.confidences(best.hypothesis)
     of_list = [k for k, (name, _) in enumerate(best.hypothesis.acting) if is_named and name not in registry.laws()]
+    of_list.sort(key=lambda k: -min(settings.MOST_CONFIDENT, confidence[k]))
     named = [best.hypothesis.acting[k] for k in of_list]
     shift, failures = _discretisation(judgement) if named else (None, [])
     return {
@@ -47,7 +49,7 @@ def report(
         "verdict": judgement.verdict,
         "is_held": base.hypothesis.is_frozen,
         "location": location.location(judgement, calibrated),
-        "mechanisms": [mechanism_of(best, k, _stated(judgement, best.hypothesis.acting[k][0]), shift) for k in of_list],
+        "mechanisms": [mechanism_of(best, k, _below_certainty(confidence[k]), shift) for k in of_list],
         "laws": laws_of(judgement),
         "alternatives": alternatives_of(judgement, dict(named)),
         "likeliest": [{"name": n, "place": p} for n, p in best.hypothesis.acting if judgement.verdict == "undecided"],
@@ -86,14 +88,14 @@ def alternatives_of(judgement: Judgement, named: Mapping[str, str]) -> list[dict
     places: dict[str, str] = {}
     for name, place in sorted(every, key=lambda acting: (-_place_probability(acting, confidence), acting)):
         places.setdefault(name, place)
-    others = [(n, p, _stated(judgement, n)) for n, p in places.items() if n not in named]
+    others = [(n, p, _below_certainty(judgement.confidence_in(n))) for n, p in places.items() if n not in named]
     ranked = sorted(others, key=lambda one: -one[2])[: settings.MOST_ALTERNATIVES]
     return [{"name": n, "place": p, "confidence": round(c, 4)} for n, p, c in ranked if c > settings.ALTERNATIVE]
 
 
-def _stated(judgement: Judgement, name: str) -> float:
-    """Confidence in a mechanism, below certainty."""
-    return min(settings.MOST_CONFIDENT, judgement.confidence_in(name))
+def _below_certainty(confidence: float) -> float:
+    """A confidence as it is reported."""
+    return min(settings.MOST_CONFIDENT, confidence)
 
 
 def _place_probability(acting: tuple[str, str], confidence: Mapping[Hypothesis, float]) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import LAST_SEARCH, SEARCH, CandidateFit, evaluated, fit
-from ccmodel.diagnosis.comparison import Comparison, is_part_of
+from ccmodel.diagnosis.comparison import Comparison, is_part_of, lowest
 from ccmodel.diagnosis.equation_error import other_start
 from ccmodel.diagnosis.hypothesis import Hypothesis, law_of, laws_in
 from ccmodel.diagnosis.laws import proposals
@@ -221,12 +221,12 @@ class Selection:
         if best.hypothesis.size < size:
             return extended
         parts = self._part(0.6, 0.8)._subsets(found, best)
-        extended = extended.with_candidates(lowest([*extended.candidates, *parts]))
+        extended = extended.with_candidates([*extended.candidates, *parts])
         first = lower(parts, found.candidates)
         if first is None:
             return extended
         again = self._part(0.8, 1.0)._beside(found.whitened, first, set())
-        return extended.with_candidates(lowest([*extended.candidates, *again]))
+        return extended.with_candidates([*extended.candidates, *again])
 
     def _sets(self, found: Comparison, screening: Screening, size: int) -> list[CandidateFit]:
         """Fitted sets: the leading smaller ones with the best partner each, and those that lead the first screening."""
@@ -258,7 +258,8 @@ class Selection:
         Also those that were fitted before: from other values a search may have ended at a worse minimum, and the
         further member would be credited with the difference.
         """
-        subsets = map(Hypothesis, combinations(best.hypothesis.acting, best.hypothesis.size - 1))
+        parts = combinations(best.hypothesis.acting, best.hypothesis.size - 1)
+        subsets = map(best.hypothesis.part, parts)
         starts = [Score(h, 0.0, {key: best.values[key] for key in h.start}) for h in subsets]
         base = replace(found.base, values={name: best.values[name] for name in found.base.values})
         return self.fit_all(found.whitened, base, starts)
@@ -378,16 +379,6 @@ def contenders(found: Comparison) -> tuple[list[CandidateFit], list[CandidateFit
         if is_largest_part or (c.mean_square <= highest and (k < most or is_part)):
             (near if c is best or is_part or not found.is_far_behind(c) else far).append(c)
     return near, far
-
-
-def lowest(every: Sequence[CandidateFit]) -> list[CandidateFit]:
-    """Of the fits of each set of mechanisms the one with the lowest mean square."""
-    best: dict[frozenset, CandidateFit] = {}
-    for candidate in every:
-        members = frozenset(candidate.hypothesis.acting)
-        if members not in best or candidate.mean_square < best[members].mean_square:
-            best[members] = candidate
-    return list(best.values())
 
 
 def lower(again: Sequence[CandidateFit], before: Sequence[CandidateFit]) -> CandidateFit | None:

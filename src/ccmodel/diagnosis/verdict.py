@@ -127,8 +127,9 @@ def _is_explained(judgement: Judgement, best: CandidateFit) -> bool:
     names = sorted(best.hypothesis.names)
     pairs = zip(judgement.candidates, judgement.probability, strict=True)
     alone = sum(p for c, p in pairs if sorted(c.hypothesis.names) == names)
-    is_decided = min(map(judgement.confidence_in, names)) >= settings.DECIDED and alone > 0.5
-    return is_decided and not judgement.comparison.is_outdone(best)
+    comparison = judgement.comparison
+    is_decided = min(comparison.confidences(best.hypothesis)) >= settings.DECIDED and alone > 0.5
+    return is_decided and not comparison.is_outdone(best)
 
 
 def single_fault_places(comparison: Comparison) -> list[str]:
@@ -139,15 +140,16 @@ def single_fault_places(comparison: Comparison) -> list[str]:
 
 
 def nested_choice(judgement: Judgement) -> list[CandidateFit]:
-    """By recording, the model with the lowest mean square on all other recordings (nested cross-validation).
+    """By recording, the plausible model with the lowest mean square on all other recordings (nested cross-validation).
 
-    The error of a recording that is reported as held out must not have influenced the choice of the model either. The
-    choice is the verdict's model throughout if that is the calibrated model, or if there is a single recording.
+    The error of a recording that is reported as held out must not have influenced the choice of the model either, but
+    for the fits that leave out one of the others. The choice is the verdict's model throughout if that is the
+    calibrated model, or if there is a single recording.
     """
     count = len(judgement.whitened)
     if judgement.best is judgement.calibrated or count == 1:
         return [judgement.best] * count
-    every = [judgement.calibrated, *judgement.candidates]
+    every = [judgement.calibrated, *(c for c in judgement.candidates if c.is_plausible)]
     mean_squares = np.stack([c.by_recording for c in every])
     others = mean_squares.sum(axis=1, keepdims=True) - mean_squares
     return [every[k] for k in np.argmin(others, axis=0)]

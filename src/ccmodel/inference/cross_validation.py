@@ -47,15 +47,18 @@ def leave_one_out(problem: Problem, solution: Solution) -> LeaveOneOut:
 
     Where the model cannot be run at a recording's left-out optimum, the joint optimum stands for it.
     """
-    low, high = problem.bounds
     information = [block.information for block in solution.blocks]
     total = sum(information, np.diag(problem.prior_precision**2))
     inverse, without = inverse_of(total, problem.sizes), [inverse_of(total - H, problem.sizes) for H in information]
-    values = [
-        np.clip(solution.x + V @ block.score, low, high) for V, block in zip(without, solution.blocks, strict=True)
-    ]
     blocks_of = zip(solution.blocks, problem.observations, strict=True)
     joint = [block.errors / np.sqrt(problem.weight(o)) for block, o in blocks_of]
+    if len(information) == 1:
+        # No other recording is left that could tell anything.
+        return LeaveOneOut([solution.x], joint, inverse, np.full(solution.x.size, np.inf))
+    values = [
+        _stepped(problem, solution, total - H, V, block.score)
+        for H, V, block in zip(information, without, solution.blocks, strict=True)
+    ]
     residuals = each(problem.observations, lambda i, _: _errors_if_any(problem, values[i], i))
     for i, (out, own) in enumerate(zip(residuals, joint, strict=True)):
         if out is None or np.mean(out**2) > CHECKED_FROM * np.mean(own**2):
@@ -63,10 +66,29 @@ def leave_one_out(problem: Problem, solution: Solution) -> LeaveOneOut:
             residuals[i] = _errors_if_any(problem, values[i], i)
             if residuals[i] is None:
                 values[i], residuals[i] = solution.x, own
-    if len(information) == 1:
-        return LeaveOneOut(values, residuals, inverse, np.full(solution.x.size, np.inf))
     covariance, degrees = jackknife(np.array(values) - solution.x, information, inverse, without)
     return LeaveOneOut(values, residuals, covariance, degrees)
+
+
+def _stepped(problem: Problem, solution: Solution, information: NDArray, inverse: NDArray, score: NDArray) -> NDArray:
+    """The joint optimum after a Newton step to that of all recordings but one, within the bounds; (unknowns,).
+
+    `score` is the gradient of the recording that is left out, and `information` that of the others, whose inverse is
+    `inverse`. At the joint optimum the gradient of all recordings is zero, so that the step depends on `score` alone.
+    An unknown on a bound, where the gradient is not zero, stays there unless the others pull it off.
+    """
+    low, high = problem.bounds
+    on_bound = np.flatnonzero(solution.active)
+    if not on_bound.size:
+        return np.clip(solution.x + inverse @ score, low, high)
+    prior = problem.prior_precision**2 * (solution.x - problem.prior_mean)
+    of_all = sum((block.score for block in solution.blocks), prior)
+    down = score - np.where(solution.active != 0, of_all, 0.0)
+    held = [k for k in on_bound if down[k] * solution.active[k] >= 0]
+    kept = np.setdiff1d(np.arange(solution.x.size), held)
+    step = np.zeros(solution.x.size)
+    step[kept] = inverse_of(information[np.ix_(kept, kept)], problem.sizes[kept]) @ down[kept]
+    return np.clip(solution.x + step, low, high)
 
 
 def _errors_if_any(problem: Problem, x: NDArray, i: int) -> NDArray | None:
