@@ -151,5 +151,5 @@ def test_a_link_stays_a_link(tmp_path):
 
 def test_an_error_of_reading_is_not_one_of_writing(tmp_path):
     source = tmp_path / "missing.txt"
-    with pytest.raises(InputError, match=r"missing.txt: cannot be read \(No such file"), new_folder(tmp_path / "made"):
+    with pytest.raises(InputError, match=r"missing.txt: cannot be used \(No such file"), new_folder(tmp_path / "made"):
         source.read_text()

@@ -19,7 +19,7 @@ _UNFINISHED = ".unfinished-"
 def _naming(path: Path) -> Iterator[None]:
     """Name the file or folder in an error of the system: one of a full disk does not.
 
-    An error that names a file elsewhere is one of reading it.
+    An error that names a file elsewhere, such as one that is read, is one of that file.
     """
     try:
         yield
@@ -29,7 +29,7 @@ def _naming(path: Path) -> Iterator[None]:
         is_unfinished = any(part.startswith(_UNFINISHED) for part in named.parts)
         if is_unfinished or named.is_relative_to(place) or place.is_relative_to(named):
             raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
-        raise InputError(f"{error.filename}: cannot be read ({error.strerror or error})") from None
+        raise InputError(f"{error.filename}: cannot be used ({error.strerror or error})") from None
 
 
 @contextmanager

@@ -146,6 +146,10 @@ def test_the_other_tension_follows_from_the_sum_or_the_torque(bench, counted, lo
     recording = ingest_batch(bench.write().folder).recordings[0]
     for channel in ("T3_N", *gone):
         assert recording[channel] == pytest.approx(counted[channel], abs=1e-5), channel
+    (derived,), of = gone, recording.accuracy
+    cell, torque = of["T1_N"], bench.described["rig"]["accuracy"]["torque_Nm"] / R
+    expected = {"F_drive_N": np.hypot(2 * cell, torque), "tau_in_Nm": R * np.hypot(2 * cell, cell)}
+    assert of[derived] == pytest.approx(expected[derived])
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -91,7 +91,7 @@ class Comparison:
 
     def with_candidates(self, candidates: Sequence[CandidateFit]) -> "Comparison":
         """The same with other candidates, fitted to the same whitened observations; of each set its best fit."""
-        ordered = sorted(lowest(candidates), key=lambda c: (not c.is_plausible, c.mean_square))
+        ordered = sorted(lowest(candidates), key=_rank)
         found = replace(self, candidates=ordered, evidence={})
         return replace(found, evidence={c.hypothesis: found._evidence_of(c) for c in [self.base, *ordered]})
 
@@ -463,12 +463,16 @@ def log_bayes_factor_of_repeats(candidate: CandidateFit) -> float:
     return sum(map(log_bayes_factor, tests))
 
 
+def _rank(candidate: CandidateFit) -> tuple[bool, float]:
+    return not candidate.is_plausible, candidate.mean_square
+
+
 def lowest(every: Sequence[CandidateFit]) -> list[CandidateFit]:
-    """Of the fits of each set of mechanisms the one with the lowest mean square."""
+    """Of the fits of each set of mechanisms the one with the lowest mean square, a plausible one if there is one."""
     best: dict[frozenset, CandidateFit] = {}
     for candidate in every:
         members = frozenset(candidate.hypothesis.acting)
-        if members not in best or candidate.mean_square < best[members].mean_square:
+        if members not in best or _rank(candidate) < _rank(best[members]):
             best[members] = candidate
     return list(best.values())
 

@@ -1,4 +1,4 @@
-"""A judgement as plain data, the content of diagnosis.json (docs/diagnosis.md)."""
+"""A judgement as plain data, the content of diagnosis.json (docs/diagnosis-files.md)."""
 
 from collections.abc import Mapping, Sequence
 

@@ -55,32 +55,34 @@ def leave_one_out(problem: Problem, solution: Solution) -> LeaveOneOut:
     if len(information) == 1:
         # No other recording is left that could tell anything.
         return LeaveOneOut([solution.x], joint, inverse, np.full(solution.x.size, np.inf))
+    low, high = problem.bounds
+    # What scatters about a bound: values that are held there would be known exactly.
+    free = [np.clip(solution.x + V @ block.score, low, high) for V, block in zip(without, solution.blocks, strict=True)]
     values = [
-        _stepped(problem, solution, total - H, V, block.score)
-        for H, V, block in zip(information, without, solution.blocks, strict=True)
+        _stepped(problem, solution, total - H, block.score) if solution.active.any() else one
+        for H, one, block in zip(information, free, solution.blocks, strict=True)
     ]
     residuals = each(problem.observations, lambda i, _: _errors_if_any(problem, values[i], i))
     for i, (out, own) in enumerate(zip(residuals, joint, strict=True)):
         if out is None or np.mean(out**2) > CHECKED_FROM * np.mean(own**2):
-            values[i] = shortened(problem, solution.x, values[i], joint, i)
+            values[i] = free[i] = shortened(problem, solution.x, values[i], joint, i)
             residuals[i] = _errors_if_any(problem, values[i], i)
             if residuals[i] is None:
                 values[i], residuals[i] = solution.x, own
-    covariance, degrees = jackknife(np.array(values) - solution.x, information, inverse, without)
+                free[i] = solution.x
+    covariance, degrees = jackknife(np.array(free) - solution.x, information, inverse, without)
     return LeaveOneOut(values, residuals, covariance, degrees)
 
 
-def _stepped(problem: Problem, solution: Solution, information: NDArray, inverse: NDArray, score: NDArray) -> NDArray:
-    """The joint optimum after a Newton step to that of all recordings but one, within the bounds; (unknowns,).
+def _stepped(problem: Problem, solution: Solution, information: NDArray, score: NDArray) -> NDArray:
+    """The joint optimum after a Newton step to that of all recordings but one, with unknowns on bounds; (unknowns,).
 
-    `score` is the gradient of the recording that is left out, and `information` that of the others, whose inverse is
-    `inverse`. At the joint optimum the gradient of all recordings is zero, so that the step depends on `score` alone.
-    An unknown on a bound, where the gradient is not zero, stays there unless the others pull it off.
+    At the joint optimum the gradient of all recordings is zero, so that the step depends on that of the recording that
+    is left out, `score`, alone. An unknown on a bound, where the gradient is not zero, stays there unless the others
+    pull it off. `information` is that of the others.
     """
     low, high = problem.bounds
     on_bound = np.flatnonzero(solution.active)
-    if not on_bound.size:
-        return np.clip(solution.x + inverse @ score, low, high)
     prior = problem.prior_precision**2 * (solution.x - problem.prior_mean)
     of_all = sum((block.score for block in solution.blocks), prior)
     down = score - np.where(solution.active != 0, of_all, 0.0)

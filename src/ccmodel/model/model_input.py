@@ -140,7 +140,7 @@ class ModelInput:
 
     @property
     def _from_rest(self) -> "ModelInput":
-        """The same with a point of rest before the first sample."""
+        """A prescribed motion with a point of rest before its first sample."""
         time_s = self.recording.time_s
         times = np.concatenate([[2 * time_s[0] - time_s[1]], time_s])
 
@@ -154,6 +154,7 @@ class ModelInput:
             theta_out=held(self.theta_out),
             tau_out=held(self.tau_out),
             F_load=held(self.F_load),
+            theta_motor=held(self.theta_motor),
         )
 
     @cached_property

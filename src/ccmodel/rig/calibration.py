@@ -200,20 +200,27 @@ def _tensions(result: Calibrated, end: End, load_cell_N: float | None) -> None:
 
 
 def _other_tension(result: Calibrated, end: End, load_cell_N: float | None) -> None:
-    """Add the second tension of an end that logs one of them, and either the sum or the torque."""
+    """Add the second tension of an end that logs one of them and either the sum or the torque, and the other of these.
+
+    The errors of these channels are not independent: each has its own accuracy from those of the two sensors.
+    """
     force, torque, radius = end.force, end.torque, end.side.pulley_radius_m
     logged = [name for name in end.tensions if name in result.channels]
     if len(logged) != 1 or load_cell_N is None or {force, torque} <= result.channels.keys():
         return
     (one,), (other,) = logged, [name for name in end.tensions if name not in logged]
+    logged_N, sign = result.channels[one], 1 if one == end.tensions[0] else -1
     if force in result.channels:
-        accuracy = float(np.hypot(result.accuracy[force], load_cell_N))
-        result.add(other, result.channels[force] - result.channels[one], f"{force} - {one}", accuracy)
+        total, accuracy = result.channels[force], result.accuracy[force]
+        result.add(other, total - logged_N, f"{force} - {one}", float(np.hypot(accuracy, load_cell_N)))
+        formula = f"{'-' if sign < 0 else ''}(2 {one} - {force}) * {radius:g} m"
+        of_both = radius * float(np.hypot(accuracy, 2 * load_cell_N))
+        result.add(torque, sign * (2 * logged_N - total) * radius, formula, of_both)
     elif torque in result.channels:
-        sign, symbol = (-1, "-") if one == end.tensions[0] else (1, "+")
-        accuracy = float(np.hypot(result.accuracy[torque] / radius, load_cell_N))
-        values = result.channels[one] + sign * result.channels[torque] / radius
-        result.add(other, values, f"{one} {symbol} {torque} / {radius:g} m", accuracy)
+        difference, accuracy = sign * result.channels[torque] / radius, result.accuracy[torque] / radius
+        formula = f"{'-' if sign > 0 else '+'} {torque} / {radius:g} m"
+        result.add(other, logged_N - difference, f"{one} {formula}", float(np.hypot(accuracy, load_cell_N)))
+        result.add(force, 2 * logged_N - difference, f"2 {one} {formula}", float(np.hypot(accuracy, 2 * load_cell_N)))
 
 
 def _single_tension(result: Calibrated, end: End, load_cell_N: float | None) -> None:

@@ -113,7 +113,7 @@ def table_one(settings: Path, out: Path, figure: Path, cores: int = 1, progress:
     InputError
         If the settings cannot be used, or the figure's name has no ending of a figure.
     """
-    if figure.suffix.lower().removeprefix(".") not in FORMATS:
+    if figure.suffix.removeprefix(".") not in FORMATS:
         raise InputError(f"{figure}: a figure's name ends with {', '.join(f'.{ending}' for ending in FORMATS)}")
     study = load_yaml_model(settings, TableOne)
     found = run_study(study, cores, progress)
