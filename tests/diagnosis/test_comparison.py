@@ -171,6 +171,11 @@ def test_a_set_in_another_order_is_the_same_set():
     assert [c.hypothesis.acting for c in found] == [(KINK, FRICTION)]
 
 
+def test_an_implausible_fit_of_a_set_takes_no_plausible_ones_place():
+    high = fitted(1.1, KINK, **{"kink/conduit/beta": 50.0})
+    assert comparisons.lowest([fitted(1.2, KINK), high])[0].is_plausible
+
+
 def test_a_mechanism_has_the_probability_of_all_sets_that_contain_it():
     """Which of two look-alikes stands beside a mechanism is open; the mechanism itself is not."""
     sets = [(fitted(1.0, FRICTION, other), evidence(NONE)) for other in (SCALE, KINK)]

@@ -105,7 +105,7 @@ def test_of_both_starts_the_better_fit_that_can_be_made_is_kept(monkeypatch, end
         end = left.pop(0)
         if isinstance(end, Exception):
             raise end
-        return SimpleNamespace(hypothesis=hypothesis, mean_square=end)
+        return SimpleNamespace(hypothesis=hypothesis, mean_square=end, is_plausible=True)
 
     monkeypatch.setattr(selection, "fit", fit)
     chosen = selection.Selection({}, [], known={K_E: 0.05, J: 2e-3, ZETA: 0.01})
