@@ -64,6 +64,17 @@ def fit_of(parameters, batch):
     return f"{RESULTS}/fits/{parameters}/{scope}.json"
 
 
+def fitted_to(wildcards):
+    """Batches of one fit."""
+    batches = CONFIG.fits[wildcards.parameters].batches
+    return [wildcards.scope] if batches == EACH else batches
+
+
+def diagnosed_together(wildcards):
+    """A batch, or all batches of a rig; the wildcard is the name of either."""
+    return CONFIG.diagnosed_rigs.get(wildcards.batch, [wildcards.batch])
+
+
 def runs():
     """Every parameter set and batch that are simulated."""
     return [

@@ -1,8 +1,3 @@
-def diagnosed_together(wildcards):
-    """A batch, or all batches of a rig; the wildcard is the name of either."""
-    return CONFIG.diagnosed_rigs.get(wildcards.batch, [wildcards.batch])
-
-
 rule diagnose:
     input:
         recordings=lambda wildcards: [

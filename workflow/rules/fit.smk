@@ -1,9 +1,3 @@
-def fitted_to(wildcards):
-    """Batches of one fit."""
-    batches = CONFIG.fits[wildcards.parameters].batches
-    return [wildcards.scope] if batches == EACH else batches
-
-
 rule fit:
     input:
         recordings=lambda wildcards: [recordings_of(b) for b in fitted_to(wildcards)],
