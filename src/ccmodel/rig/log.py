@@ -32,7 +32,7 @@ def read_log(path: Path) -> tuple[pd.DataFrame, list[Defect]]:
     Returns
     -------
     table : DataFrame, shape (n, columns)
-        Known columns as floats, with times from the first sample; the index is the row in the file.
+        Known columns as floats; the index is the row in the file.
     warnings : list of Defect
         Faults within the limits.
 
@@ -50,9 +50,6 @@ def read_log(path: Path) -> tuple[pd.DataFrame, list[Defect]]:
     if len(table) < limits.FEWEST_SAMPLES:
         raise LogError(None, None, f"has {len(table)} samples only: too few for a recording; record it again")
     _check_time(table["time_s"], warnings)
-    if first := table["time_s"].iloc[0]:
-        # A logger may count from its start or, with a trigger, from before zero.
-        table = table.assign(time_s=table["time_s"] - first)
     return table, warnings
 
 
