@@ -3,12 +3,11 @@
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Self
-from unicodedata import normalize
 
 from pydantic import Field, model_validator
 
 from ccmodel.model.parameters import FORMER_NAMES
-from ccmodel.rig.batch import NAMES, valid_name
+from ccmodel.rig.batch import NAMES, one_spelling, valid_name
 from ccmodel.steps.settings import Fit
 from ccmodel.studies.accuracy.settings import Accuracy
 from ccmodel.studies.baseline.settings import AgainstBaseline
@@ -167,7 +166,7 @@ def batches_in(raw: Path) -> tuple[list[str], list[str]]:
         If there is no such folder or no batch in it.
     """
     names = sorted(p.name for p in raw.glob("*") if p.is_dir() and not p.name.startswith("."))
-    usable = [name for name in names if valid_name(normalize("NFC", name))]
+    usable = [name for name in names if valid_name(one_spelling(name))]
     if not usable:
         raise InputError(f"{raw}: no batch here; a batch is a folder with a batch.yaml and its logs")
     return usable, [f"{raw / name}: {NAMES}: rename the folder" for name in names if name not in usable]

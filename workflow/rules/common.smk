@@ -64,6 +64,11 @@ def fit_of(parameters, batch):
     return f"{RESULTS}/fits/{parameters}/{scope}.json"
 
 
+def verdict_of(diagnosed):
+    """File with the verdict on a batch, or on the batches of a rig."""
+    return f"{RESULTS}/diagnoses/{diagnosed}/diagnosis.json"
+
+
 def fitted_to(wildcards):
     """Batches of one fit."""
     batches = CONFIG.fits[wildcards.parameters].batches

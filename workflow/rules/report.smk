@@ -38,7 +38,7 @@ rule write_report:
         ],
         recordings=[recordings_of(batch) for _, batch in runs()],
         simulated=[simulated_of(parameters, batch) for parameters, batch in runs()],
-        diagnoses=[f"{RESULTS}/diagnoses/{name}/diagnosis.json" for name in DIAGNOSES],
+        diagnoses=[verdict_of(name) for name in DIAGNOSES],
         reports=[f"{RESULTS}/diagnoses/{name}/report.html" for name in DIAGNOSES],
         # Read here alone, after all verdicts.
         concealed=CONFIG.concealed or [],

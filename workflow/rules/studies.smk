@@ -14,7 +14,7 @@ for name, study in STUDIES.items():
             # A model of a diagnosis stands beside its verdict, which some studies state.
             verdicts=sorted(
                 {
-                    f"{RESULTS}/diagnoses/{batch}/diagnosis.json"
+                    verdict_of(batch)
                     for _, parameters, batch in needs
                     if parameters in MODEL_FILES
                 }

@@ -343,7 +343,7 @@ class Comparison:
         return bool(left <= settings.LEADING_ON * before) and before > 0.0
 
     def is_outdone(self, candidate: CandidateFit) -> bool:
-        """Whether a candidate's fit is not good, and a larger set has at most half of what it leaves.
+        """Whether a candidate's fit is not good, and a larger set has at most half of its `unexplained_mean_square`.
 
         Whether the further mechanisms are missing or imitate what the equations leave, the candidate alone is then no
         complete account: what an imitation takes off is seldom half.

@@ -56,12 +56,15 @@ def leave_one_out(problem: Problem, solution: Solution) -> LeaveOneOut:
         # No other recording is left that could tell anything.
         return LeaveOneOut([solution.x], joint, inverse, np.full(solution.x.size, np.inf))
     low, high = problem.bounds
+    scores = [block.score for block in solution.blocks]
     # What scatters about a bound: values that are held there would be known exactly.
-    free = [np.clip(solution.x + V @ block.score, low, high) for V, block in zip(without, solution.blocks, strict=True)]
-    values = [
-        _stepped(problem, solution, total - H, block.score) if solution.active.any() else one
-        for H, one, block in zip(information, free, solution.blocks, strict=True)
-    ]
+    free = [np.clip(solution.x + V @ score, low, high) for V, score in zip(without, scores, strict=True)]
+    values = list(free)
+    if solution.active.any():
+        of_all = sum(scores, problem.prior_precision**2 * (solution.x - problem.prior_mean))
+        values = [
+            _stepped(problem, solution, total - H, score, of_all) for H, score in zip(information, scores, strict=True)
+        ]
     residuals = each(problem.observations, lambda i, _: _errors_if_any(problem, values[i], i))
     for i, (out, own) in enumerate(zip(residuals, joint, strict=True)):
         if out is None or np.mean(out**2) > CHECKED_FROM * np.mean(own**2):
@@ -74,17 +77,15 @@ def leave_one_out(problem: Problem, solution: Solution) -> LeaveOneOut:
     return LeaveOneOut(values, residuals, covariance, degrees)
 
 
-def _stepped(problem: Problem, solution: Solution, information: NDArray, score: NDArray) -> NDArray:
+def _stepped(problem: Problem, solution: Solution, information: NDArray, score: NDArray, of_all: NDArray) -> NDArray:
     """The joint optimum after a Newton step to that of all recordings but one, with unknowns on bounds; (unknowns,).
 
-    At the joint optimum the gradient of all recordings is zero, so that the step depends on that of the recording that
-    is left out, `score`, alone. An unknown on a bound, where the gradient is not zero, stays there unless the others
-    pull it off. `information` is that of the others.
+    At the joint optimum the gradient of all recordings, `of_all`, is zero, so that the step depends on that of the
+    recording that is left out, `score`, alone. An unknown on a bound, where it is not zero, stays there unless the
+    others pull it off. `information` is that of the others.
     """
     low, high = problem.bounds
     on_bound = np.flatnonzero(solution.active)
-    prior = problem.prior_precision**2 * (solution.x - problem.prior_mean)
-    of_all = sum((block.score for block in solution.blocks), prior)
     down = score - np.where(solution.active != 0, of_all, 0.0)
     held = [k for k in on_bound if down[k] * solution.active[k] >= 0]
     kept = np.setdiff1d(np.arange(solution.x.size), held)

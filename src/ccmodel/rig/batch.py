@@ -105,13 +105,13 @@ def recording_id(file: str) -> str:
 
 
 def _checked_name(name: str) -> str:
-    name = _one_spelling(name)
+    name = one_spelling(name)
     if not valid_name(name):
         raise ValueError(NAMES)
     return name
 
 
-def _one_spelling(name: str) -> str:
+def one_spelling(name: str) -> str:
     """A name as netCDF stores it: letters that look alike, as a composed and a decomposed é, are the same."""
     return normalize("NFC", name)
 
@@ -430,11 +430,11 @@ def load_batch(folder: Path) -> Batch:
     """
     path = Path(folder) / "batch.yaml"
     folder_name = Path(folder).resolve().name
-    if not valid_name(_one_spelling(folder_name)):
+    if not valid_name(one_spelling(folder_name)):
         text = f"{folder_name!r} cannot be a batch's name: {NAMES}; rename the folder"
         raise InputError.of(Problem(str(folder), None, text))
     batch = load_yaml_model(path, Batch)
-    if batch.batch != _one_spelling(folder_name):
+    if batch.batch != one_spelling(folder_name):
         text = f"batch: must be the folder's name, '{folder_name}', found '{batch.batch}': rename either"
         raise InputError.of(Problem(str(path), None, text))
     return batch
