@@ -26,6 +26,8 @@ ROOMS = ("model", "inference", "rig", "diagnosis", "accuracy", "studies")
 TESTS = {"model": ("tests/model", "tests/mechanisms")}
 # A union of types in an annotation is no calculation.
 NO_MUTANTS = re.compile("BitOr|BitXor|BitAnd")
+# Without those of `make long-tests`, which would take hours.
+PYTEST = ("-m", "pytest", "-x", "-q", "-m", "not long", "-p", "no:cacheprovider")
 TIMEOUT_S = 900
 CONFIG = """[cosmic-ray]
 module-path = [{modules}]
@@ -50,7 +52,7 @@ def test() -> int:
     """Run the tests of the one file that differs from the commit; the exit code of the first run that fails."""
     changed = subprocess.run(["git", "diff", "--name-only"], capture_output=True, text=True, check=True).stdout.split()
     for some in files_for(Path(changed[0])) if changed else [["tests/test_elementary.py"]]:
-        found = subprocess.run([sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *some])
+        found = subprocess.run([sys.executable, *PYTEST, *some])
         if found.returncode:
             return found.returncode
     return 0
@@ -70,7 +72,7 @@ def prepare(out: Path, count: int, seed: int) -> None:
         drawn = sample(every.work_items, count, seed)
     modules = {item.mutations[0].module_path for item in drawn}
     files = sorted({file for module in modules for some in files_for(module, tree) for file in some})
-    run_in(tree, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *files)
+    run_in(tree, *PYTEST, *files)
     with use_db(out / "new.sqlite", WorkDB.Mode.create) as session:
         session.add_work_items(drawn)
     (out / "new.sqlite").rename(out / "session.sqlite")

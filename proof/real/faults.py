@@ -212,7 +212,8 @@ def write_batch(
         log = pd.read_csv(before)
         changed = FAULTS[fault](log, stated["rig"], size)
         changed.to_csv(after, index=False, float_format="%.9g")
-        settled = (log["time_s"] >= recording.get("settled_s", 0.0)).to_numpy()
+        since_start = (log["time_s"] - log["time_s"].iloc[0]).to_numpy()
+        settled = since_start >= recording.get("settled_s", 0.0)
         for channel, share in _shares(log[settled], changed[settled], stated["rig"]).items():
             shares.setdefault(channel, []).append(share)
     text = yaml.safe_dump(stated | {"batch": out.name, "recordings": chosen}, sort_keys=False)

@@ -44,7 +44,7 @@ class Recording:
     origin : str
         "rig" (measured), "virtual-rig" (a simulated rig) or "model".
     time_s : ndarray, shape (n,)
-        Sample times, s, strictly increasing.
+        Sample times, s, strictly increasing; a measured recording's count from its first sample.
     channels : mapping of str to ndarray, each of shape (n,)
         SI values by channel name (`CHANNELS`). A channel that cannot be derived is absent, never zero.
     derived_from : mapping of str to str
@@ -67,6 +67,8 @@ class Recording:
         Faults that leave the recording usable.
     started_at_s, tensioned_at_s : float or None
         When the recording started and when its cables were tensioned, s since 1970 (UTC); None if not stated.
+    log_start_s : float
+        Time of the first sample on the log's own clock, s; see `log_time_s`.
     position : float
         Place in the session by the order of the recordings, -1/2 to 1/2; 0 if unknown.
     far_end : str or None
@@ -90,6 +92,7 @@ class Recording:
     far_end: str | None = None
     started_at_s: float | None = None
     tensioned_at_s: float | None = None
+    log_start_s: float = 0.0
     position: float = 0.0
 
     def __post_init__(self) -> None:
@@ -129,14 +132,19 @@ class Recording:
         return replace(self, time_s=self.time_s[wanted], channels=channels)
 
     @property
+    def log_time_s(self) -> NDArray:
+        """Sample times on the log's own clock, s, shape (n,): those of every table that stands beside the log."""
+        return self.time_s + self.log_start_s
+
+    @property
     def rate_Hz(self) -> float:
         """Samples per second, by the median step."""
         return float(1 / np.median(np.diff(self.time_s)))
 
     def to_frame(self) -> pd.DataFrame:
-        """Channels over time: index ``time_s``, a column for each channel, SI units as the names say."""
+        """Channels over time: index ``time_s`` as in the log, a column for each channel, SI units as the names say."""
         columns = {name: self.channels[name] for name in CHANNELS if name in self.channels}
-        return pd.DataFrame(columns, index=pd.Index(self.time_s, name="time_s"))
+        return pd.DataFrame(columns, index=pd.Index(self.log_time_s, name="time_s"))
 
     def to_xarray(self) -> xr.Dataset:
         """Channels over ``time_s`` and the conduit's pieces; units and sources are attributes of the variables."""
@@ -232,7 +240,8 @@ def read_provenance(path: Path) -> dict:
 
 
 _SCALARS = {
-    "batch": str, "origin": str, "pretension_N": float, "rest_s": float, "settled_s": float, "position": float
+    "batch": str, "origin": str, "pretension_N": float, "rest_s": float, "settled_s": float, "log_start_s": float,
+    "position": float,
 }  # fmt: skip
 _IF_STATED = ("far_end", "started_at_s", "tensioned_at_s")
 # Numbers of each channel of a sensor.

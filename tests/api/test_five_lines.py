@@ -3,6 +3,7 @@
 import gzip
 import json
 import re
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -152,7 +153,7 @@ def test_a_fit_or_a_diagnosis_stands_for_its_model(fitted, found, batch):
 def test_a_recording_is_a_motion(fitted, batch):
     recording = batch["t-6N"]
     simulated = cc.simulate(fitted, recording)
-    assert np.array_equal(simulated.time_s, recording.time_s)
+    assert np.array_equal(simulated.time_s, recording.log_time_s)
     assert np.array_equal(simulated["theta_in_rad"], recording["theta_in_rad"])
 
 
@@ -225,6 +226,17 @@ def test_a_model_predicts_recordings_that_it_was_not_fitted_to(fitted, tmp_path)
     assert "t-6.5N" in repr(predicted)
     assert "t-6.5N" in predicted._repr_html_()
     assert predicted.left_out == ()
+
+
+def test_the_clock_of_a_log_is_that_of_its_prediction_alone(fitted, folder, batch, tmp_path):
+    later = shutil.copytree(folder, tmp_path / folder.name)
+    for log in later.glob("*.csv*"):
+        pd.read_csv(log).eval("time_s = time_s + 100").to_csv(log, index=False, float_format="%.12g")
+    predicted, moved = cc.predict(fitted.model, batch), cc.predict(fitted.model, cc.load(later))
+    pd.testing.assert_frame_equal(moved.errors, predicted.errors, rtol=1e-5)
+    before = predicted.to_frame().reset_index("time_s")
+    after = moved.to_frame().reset_index("time_s")
+    np.testing.assert_allclose(after["time_s"] - 100, before["time_s"], atol=1e-9)
 
 
 def test_a_baseline_is_a_model_or_its_file(batch, found, tmp_path):

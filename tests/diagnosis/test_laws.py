@@ -161,7 +161,7 @@ def test_friction_by_tension_is_learned_inside_the_solver(tmp_path, monkeypatch)
 
     monkeypatch.setattr(builders, "simulate_pair", pair)
     batch = spoil(write_batch(tmp_path / "power", pretensions=(9.0, 6.0, 3.5, 2.0)))
-    (law,) = diagnosed(batch, tmp_path / "out", "--run-limit", RUNS, "--without", power.name)["laws"]
+    (law,) = diagnosed(batch, tmp_path / "out", "--without", power.name)["laws"]
     assert (law["slot"], law["place"], law["arguments"]) == ("sliding-friction", "conduit", ["tension"])
     assert (law["formula"], law["nearest_listed"]["name"]) == ("a x^n", power.name)
     assert law["parameters"][-1]["value"] == pytest.approx(-0.3, abs=0.02)

@@ -650,14 +650,23 @@ def test_the_committed_batches_have_no_finding(name):
         assert recording["F_drive_N"][:50].mean() == pytest.approx(2 * recording.pretension_N, rel=0.3)
 
 
-def test_times_are_those_of_the_log(bench):
-    """A prediction is written at the recording's own times, wherever they begin."""
-    bench.tables["one"]["time_s"] += 0.25
-    recording = ingest_batch(bench.write().folder).recordings[0]
-    assert recording.time_s == pytest.approx(bench.tables["one"]["time_s"].to_numpy())
+@pytest.mark.parametrize("shift", [-1.0, -2.5, 100.0, 1.7e9])
+def test_the_clock_of_a_log_changes_nothing_but_the_times_of_tables(bench, shift, tmp_path):
+    plain = ingest_batch(bench.write().folder).recordings
+    for log in bench.tables.values():
+        log["time_s"] += shift
+    shifted = ingest_batch(bench.write().folder).recordings
+    write_recordings(tmp_path / "r.nc", shifted, {})
+    for one, other in zip(plain, read_recordings(tmp_path / "r.nc"), strict=True):
+        assert other.time_s[0] == 0
+        assert other.time_s == pytest.approx(one.time_s, abs=1e-6)
+        assert other.rest_s == pytest.approx(one.rest_s, abs=1e-6) != 0
+        assert other.to_frame().index.to_numpy() == pytest.approx(one.to_frame().index.to_numpy() + shift, abs=1e-6)
+        for channel, values in one.channels.items():
+            assert other[channel] == pytest.approx(values, abs=1e-12)
 
 
 def test_a_transient_that_leaves_a_few_samples_leaves_too_few(bench):
     bench.described["recordings"][0]["settled_s"] = 1.59
     (finding,) = ingest_batch(bench.write().folder).findings
-    assert "with 3 samples after settled_s 1.59 s" in finding.text
+    assert "with 2 samples after settled_s 1.59 s" in finding.text

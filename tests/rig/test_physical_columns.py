@@ -93,8 +93,8 @@ def test_an_angle_without_a_step_is_not_snapped_and_its_noise_is_seen(bench, cou
     assert ingested.findings == []
     recording = ingested.recordings[0]
     assert recording.encoder_step_rad == {}
-    assert recording.rest_s == pytest.approx(0.4, abs=0.02)
-    resting = recording.time_s <= 0.39
+    assert recording.rest_s == pytest.approx(0.396, abs=0.02)
+    resting = recording.time_s <= 0.386
     assert recording["theta_in_rad"][resting].mean() == pytest.approx(0, abs=3 * noise)
     given = ModelInput.of(recording)
     assert (given.theta_in == recording["theta_in_rad"]).all()

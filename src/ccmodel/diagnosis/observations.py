@@ -93,7 +93,7 @@ def first_cycles(recording: Recording, cycles: int | None) -> Recording:
     frequency = recording.excitation.get("frequency_Hz")
     if cycles is None or not frequency or recording.excitation.get("wave") != "sine":
         return recording
-    wanted = recording.time_s <= recording.time_s[0] + max(recording.settled_s, recording.rest_s) + cycles / frequency
+    wanted = recording.time_s <= max(recording.settled_s, recording.rest_s) + cycles / frequency
     return recording[: int(wanted.sum())]
 
 

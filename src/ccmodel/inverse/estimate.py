@@ -123,7 +123,7 @@ def estimated(
     spread[0] += (angle_tolerance * range_so_far) ** 2
     half = HALF_WIDTH * np.sqrt(spread)
     columns = dict(zip(COLUMNS, (x for m, h in zip(middle, half, strict=True) for x in (m, m - h, m + h)), strict=True))
-    table = pd.DataFrame(columns, index=pd.Index(recording.time_s, name="time_s"))
+    table = pd.DataFrame(columns, index=pd.Index(recording.log_time_s, name="time_s"))
     table[VISIBLE] = nominal.trace[BY_MISFIT] > 0.0
     return Estimated(recording, table, problem.notes)
 

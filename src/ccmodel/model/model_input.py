@@ -108,6 +108,7 @@ class ModelInput:
             excitation={},
             rest_s=0.0,
             settled_s=0.0,
+            log_start_s=0.0,
         )
         theta_out, tau_out, F_load = (load.get(name) for name in ("theta_out", "tau_out", "F_load"))
         exact = np.zeros((0, theta_in.size)), np.zeros(theta_in.size)

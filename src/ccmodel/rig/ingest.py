@@ -126,6 +126,8 @@ def ingest_batch(folder: Path, progress: Progress = silent) -> Ingested:
                 used_files.append(file)
                 findings += warnings
         findings += refusals
+        # Otherwise the last table would stay.
+        log = None
     recordings = in_order(recordings)
     # What a faulty sensor reads contradicts everything else too: it is named once.
     faulty = {finding.file for finding in findings if finding.severity == "inconsistent"}
@@ -173,9 +175,12 @@ def _recording(
     table, reading_defects = log
     rare_columns = columns.check(table)
     table, faulty_sensors = check_sensors(table, batch.rig, travel)
-    end, left = table["time_s"].iloc[-1], (table["time_s"] >= entry.settled_s).sum()
+    # A logger may count from the day before or, with a trigger, from before zero.
+    start = float(table["time_s"].iloc[0])
+    table = table.assign(time_s=table["time_s"] - start)
+    lasts, left = table["time_s"].iloc[-1], (table["time_s"] >= entry.settled_s).sum()
     if left < limits.FEWEST_SAMPLES:
-        text = f"ends at {end:g} s, with {left} samples after settled_s {entry.settled_s:g} s of batch.yaml: too few"
+        text = f"lasts {lasts:g} s, with {left} samples after settled_s {entry.settled_s:g} s of batch.yaml: too few"
         raise LogError(None, None, text, True)
     calibrated = calibrate(table, batch.rig)
     unconverted = [Defect(None, column, f"not used: {why}") for column, why in calibrated.unused.items()]
@@ -201,5 +206,6 @@ def _recording(
         far_end=batch.rig.far_end,
         started_at_s=entry.started_at.timestamp() if entry.started_at else None,
         tensioned_at_s=entry.tensioned_at.timestamp() if entry.tensioned_at else None,
+        log_start_s=start,
     )
     return recording, findings
