@@ -29,7 +29,7 @@ def test_a_run(run, tmp_path):
         "  held-out error over the noise floor: τ_in 12.0 -> 2.0",
         f"page: {tmp_path / 'index.html'}",
     ]
-    assert ended.err.splitlines() == ["warning: b.csv: has a gap", "left out: a.csv: is empty"]
+    assert ended.err.splitlines() == ["warning: b.csv: has a gap", "refused: a.csv: is empty"]
     content = json.loads(run("report", tmp_path, "--json").out)
     assert content["left_out"] == ["a.csv: is empty"]
     assert [v["verdict"] for v in content["verdicts"]] == [None, "agrees"]

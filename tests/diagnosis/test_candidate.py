@@ -9,7 +9,14 @@ import pytest
 
 from ccmodel.api.batch import load
 from ccmodel.diagnosis import settings
-from ccmodel.diagnosis.candidate import LAST_SEARCH, continued, discretisation_shift, evaluated, fit
+from ccmodel.diagnosis.candidate import (
+    LAST_SEARCH,
+    at_least_by_information,
+    continued,
+    discretisation_shift,
+    evaluated,
+    fit,
+)
 from ccmodel.diagnosis.hypothesis import Hypothesis, single_mechanisms
 from ccmodel.diagnosis.result import least_strength, mechanism_of
 from ccmodel.diagnosis.run import Options, calibrate
@@ -202,10 +209,29 @@ def test_a_strength_may_be_no_more_than_what_shows_in_one_recording():
     found = fit(recordings, RELAXATION, base.free, base.values | {SHARE: 0.1, TAU: 8.0, SPREAD: 1.5, STATE: 0.5})
     shown = found.values[SHARE] * (1 - found.values[STATE])
     least = least_strength(found, SHARE, STATE)
+    surer = least_strength(replace(found, covariance=found.covariance / 4), SHARE, STATE)
+    assert least < surer < least_strength(replace(found, covariance=0 * found.covariance), SHARE, STATE)
     assert 0.2 * shown < least < 1.3 * shown
     ends = {p["name"]: (p["low"], p["high"]) for p in mechanism_of(found, 0, 0.9)["parameters"]}["r"]
     assert ends[0] <= min(least, 0.1)
     assert ends[0] < found.values[SHARE] < ends[1]
+
+
+@pytest.mark.parametrize("jackknife", [0.0, 1e-6, 100.0])
+def test_what_no_recording_determines_lies_anywhere_within_its_bounds(jackknife):
+    recordings = batch()
+    blocks = [SimpleNamespace(derivatives=np.zeros((w.measured.size + len(w.scalar_nuisances), 1))) for w in recordings]
+    problem = SimpleNamespace(
+        bounds=(np.zeros(1), np.full(1, 12.0)),
+        observations=recordings,
+        prior_precision=np.zeros(1),
+        sizes=np.ones(1),
+    )
+    of_fits = np.array([[jackknife]]), np.array([3.0])
+    covariance, degrees = at_least_by_information(problem, SimpleNamespace(blocks=blocks), *of_fits)
+    uniform = 12.0**2 / 12
+    assert covariance[0, 0] == pytest.approx(max(jackknife, uniform))
+    assert degrees[0] == (np.inf if jackknife < uniform else 3.0)
 
 
 def test_the_total_share_of_cables_that_have_settled_is_uncertain():

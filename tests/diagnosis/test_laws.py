@@ -14,11 +14,13 @@ from builders import spoil, write_batch
 from ccmodel import cli
 from ccmodel.channels import T1
 from ccmodel.deadline import UNLIMITED
+from ccmodel.diagnosis import laws as proposing
 from ccmodel.diagnosis.equation_error import INERTIA
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.laws import _missing_mass, _unit_of, proposals
 from ccmodel.diagnosis.selection import finer_laws
 from ccmodel.diagnosis.settings import WITHIN_BAND
+from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.mechanisms import laws
 from ccmodel.mechanisms.law_forms import ADDED_BEND, DRAG
@@ -225,6 +227,23 @@ def test_a_mass_is_proposed_about_the_one_that_a_regression_shows():
         fixed = {name.rsplit("/", 1)[1]: value for name, value in proposal.hypothesis.fixed}
         x, torque = law.at_knots(fixed | {"z1": next(iter(proposal.values.values()))})
         assert torque[-1] / x[-1] == pytest.approx(J, rel=0.1)
+
+
+def test_a_mass_that_the_model_cannot_be_run_with_leaves_the_law_about_none(monkeypatch):
+    real, law = proposing._proposed, laws()["learned-load-by-acceleration"]
+
+    def proposed(base, law, motions, nothing, about):
+        if about:
+            raise ModelError("no balance")
+        return real(base, law, motions, nothing, about)
+
+    monkeypatch.setattr(proposing, "_proposed", proposed)
+    said = []
+    base = calibrated(batch())
+    found = proposals(base, [law], UNLIMITED, lambda text, done=None: said.append(text), known={MASS: 2e-4})
+    assert [one.hypothesis.acting[0][0] for one in found] == [law.name]
+    assert all("no balance" in text for text in said)
+    assert len(said) == len(proposing.MASSES_TRIED)
 
 
 def test_a_mass_that_the_model_has_already_is_not_proposed_again():

@@ -128,6 +128,11 @@ def test_a_pretension_of_its_own():
     assert np.abs(nominal - half).max() > 0.01
 
 
+def test_a_limit_of_the_acceleration_alone_is_refused():
+    with pytest.raises(ValueError, match="needs one of the speed"):
+        Limits(acceleration_rad_per_s2=1.0)
+
+
 def test_what_cannot_be_compensated_is_refused():
     with pytest.raises(ModelError, match="no law of its load"):
         compensated(WANTED, replace(PARAMETERS, load_stiffness_Nm_per_rad=None), RIG, FREE)

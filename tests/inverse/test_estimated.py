@@ -176,6 +176,8 @@ def test_what_cannot_be_estimated_is_refused(seen):
         estimated(replace(seen, channels={"theta_in_rad": seen["theta_in_rad"]}), PARAMETERS)
     with pytest.raises(ModelError, match="far end is fixed"):
         estimated(replace(seen, far_end="fixed"), PARAMETERS)
+    with pytest.raises(ModelError, match="no initial tension"):
+        estimated(seen, replace(PARAMETERS, pretension_N=0.0))
 
 
 def test_the_noise_is_that_of_the_rest(seen):

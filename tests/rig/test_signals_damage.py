@@ -272,7 +272,7 @@ def test_a_missing_library_is_named_with_its_extra(sound, tmp_path, library):
     child = subprocess.run(
         [sys.executable, "-c", code, path], env={"PYTHONPATH": search}, capture_output=True, text=True
     )
-    assert f"needs the library {library}: pip install 'ccmodel[{LIBRARIES[library]}]'" in child.stderr
+    assert f"needs the library {library}: in a copy of ccmodel: pip install '.[{LIBRARIES[library]}]'" in child.stderr
     assert "During handling" not in child.stderr
 
 

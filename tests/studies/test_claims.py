@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ccmodel.errors import last_cycle
 from ccmodel.repeats import condition_of, estimates, pooled_scatter
 from ccmodel.report.figures import save_figure
 from ccmodel.studies.claims import model_runs
@@ -123,6 +124,22 @@ def test_every_panel_shows_recordings_and_model(found):
         drawn = {line.get_marker() for line in ax.lines if np.isfinite(np.asarray(line.get_ydata(), float)).any()}
         assert "_" in drawn, f"no model in the panel {ax.get_xlabel()}, {ax.get_ylabel()}"
         assert ax.containers, f"no recording in the panel {ax.get_xlabel()}, {ax.get_ylabel()}"
+
+
+def test_a_panel_shows_how_far_the_load_lags_behind_the_drive(found):
+    placed = model_runs.loop_placements(CABLE, STUDY)
+    (panel,) = (ax for ax in model_figure(list(found.values()), placed).axes if "lag" in ax.get_ylabel())
+    for line, run in zip(panel.lines, placed.values(), strict=True):
+        cycle = run[last_cycle(run)]
+        assert line.get_ydata() == pytest.approx(line.get_xdata() - cycle["theta_out_rad"])
+
+
+def test_an_interval_reaches_as_far_above_a_spread_as_below_it(found):
+    rows = [row for row in found["radius"].rows if row.quantity.endswith("_spread") and row.low is not None]
+    assert rows
+    for row in rows:
+        assert row.high > row.value
+        assert row.low == pytest.approx(max(0.0, 2 * row.value - row.high))
 
 
 def test_without_repeats_there_is_no_interval_and_it_is_said():

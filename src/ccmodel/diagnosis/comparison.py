@@ -360,7 +360,7 @@ class Comparison:
 
     @property
     def faulty_channels(self) -> dict[str, float]:
-        """Probability that the calibrated model is right but for one channel, by channel."""
+        """Probability that the calibrated model is right but for one channel, by channel, imitations aside."""
         evidence, total = self.evidence[self.base.hypothesis], np.logaddexp.reduce(self.log_weights, axis=None)
         shift = self.log_weights[0, 1] - evidence.incomplete - log(2 * len(evidence.in_channel)) - total
         return {channel: exp(value + shift) for channel, value in evidence.in_channel.items()}

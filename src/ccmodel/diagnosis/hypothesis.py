@@ -10,7 +10,7 @@ from ccmodel.diagnosis import settings
 from ccmodel.inference.problem import Free
 from ccmodel.mechanisms import Parameter
 from ccmodel.mechanisms.learned import Law
-from ccmodel.model.general.run import Active
+from ccmodel.model.active import Active
 from ccmodel.model.parameters import Parameters, mechanism_key, mechanism_parameter
 
 

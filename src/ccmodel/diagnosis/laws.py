@@ -79,12 +79,15 @@ def proposals(
             break
         if law.channel is not None and law.channel not in channels:
             continue
-        try:
-            masses = [share * mass for share in MASSES_TRIED] if law.form.in_proportion and mass > 0.0 else []
-            tried = (p for about in (0.0, *masses) for p in _proposed(base, law, motions, nothing, about))
+        masses = [share * mass for share in MASSES_TRIED] if law.form.in_proportion and mass > 0.0 else []
+        tried: list[Proposal] = []
+        for about in (0.0, *masses):
+            try:
+                tried += _proposed(base, law, motions, nothing, about)
+            except (ModelError, ValueError) as error:
+                progress(f"{law.name} at {law.place}: not proposed ({error})")
+        if tried:
             found.append(max(tried, key=lambda p: p.evidence))
-        except (ModelError, ValueError) as error:
-            progress(f"{law.name} at {law.place}: not proposed ({error})")
     return sorted(found, key=lambda p: -p.evidence)
 
 

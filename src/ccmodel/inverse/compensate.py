@@ -35,6 +35,10 @@ class Limits:
     speed_rad_per_s: float = inf
     acceleration_rad_per_s2: float = inf
 
+    def __post_init__(self) -> None:
+        if self.acceleration_rad_per_s2 < inf and self.speed_rad_per_s == inf:
+            raise ValueError("a limit of the acceleration needs one of the speed")
+
 
 @dataclass(frozen=True)
 class Compensated:
@@ -104,7 +108,9 @@ def _drive(given: ModelInput, parameters: Parameters, wanted: NDArray) -> NDArra
     else:
         theta_in, solved = follow.exact(transmission, stiffness, initial, wanted)
     if solved < wanted.size:
-        raise ModelError(f"no motion of the drive brings the load to its wanted angle at sample {solved}")
+        raise ModelError(
+            f"no motion of the drive was found that turns the load to its wanted angle at sample {solved}"
+        )
     return theta_in
 
 

@@ -11,7 +11,7 @@ from ccmodel import mechanisms as registry
 from ccmodel.channels import TAU_OUT, THETA_OUT, ZERO_OF
 from ccmodel.failure import ModelError
 from ccmodel.inverse import exact, general
-from ccmodel.inverse.proximal import FALL, LOOKS_AHEAD, UNIFORM, Proximal
+from ccmodel.inverse.proximal import FALL, UNIFORM, Proximal
 from ccmodel.inverse.update import BY_MISFIT, EXPECTED, MISFIT, Considered, Drive, Prior, Run, joint_estimate, variances
 from ccmodel.model.active import modify_physics
 from ccmodel.model.general.run import settings_of
@@ -22,7 +22,7 @@ from ccmodel.model.run import initial_tension, spring_load, transmission_of
 from ccmodel.model.session import of_recording
 from ccmodel.recording import Recording
 
-# Friction and initial tension of a recording repeat to 1 % (docs/rig-log-format.md, What recordings are like).
+# Friction and initial tension of a recording repeat to 1 % (docs/rig-log-format.md, Repeatability).
 REPEATS_TO = 0.01
 # Standard deviation of the torque of a load from the law of its spring, as a share: of a spring that is linear to a few
 # per cent, as torsion springs are sold.
@@ -251,6 +251,8 @@ class _Problem:
         misfit = nominal.trace[MISFIT, ::EVERY]
         unperturbed = coarse.run(self.parameters, misfit)
         shift = SHIFT * self.drive_tensions_N * self.parameters.load_radius_m
+        if shift <= 0.0:
+            raise ModelError("the cables have no initial tension, so that the drive torque shows no load")
         runs = [coarse.run(self.parameters, misfit + shift), *coarse.perturbed(misfit)]
         torque = np.array([run.trace[EXPECTED] - unperturbed.trace[EXPECTED] for run in runs])
         outputs = np.array([run.out - unperturbed.out for run in runs])
@@ -296,9 +298,7 @@ class _Problem:
 
 def _without_what_looks_ahead(parameters: Parameters) -> tuple[Parameters, tuple[str, ...]]:
     """Parameters without mechanisms that no causal estimate can have, and a line on each."""
-    laws = (law.name for law in registry.laws().values() if law.looks_ahead)
-    ahead = {*LOOKS_AHEAD, *laws}
-    kept = tuple(m for m in parameters.mechanisms if m.name not in ahead)
-    left = [m for m in parameters.mechanisms if m.name in ahead]
+    kept = tuple(m for m in parameters.mechanisms if not registry.get(m.name).looks_ahead)
+    left = [m for m in parameters.mechanisms if m not in kept]
     notes = tuple(f"{m.name} at {m.place} is left out: it depends on later samples" for m in left)
     return replace(parameters, mechanisms=kept), notes

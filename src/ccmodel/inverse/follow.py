@@ -21,7 +21,6 @@ from ccmodel.model.general import layout as rows
 from ccmodel.model.general.equations import set_grip
 from ccmodel.model.general.layout import Physics
 from ccmodel.model.general.march import accept, solve_with_contacts
-from ccmodel.model.general.newton import copy_slides
 from ccmodel.model.general.run import ELEMENTS, prepared
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad
@@ -192,7 +191,6 @@ def _followed_general(
             if not solved:
                 return j
             guess = move
-            copy_slides(slide, rows.LAST, rows.NOW)
             accept(ph, piece, node, slide, mean, load, rotation, dt)
             here += direction * move
             travelled += move

@@ -199,6 +199,8 @@ def filtered(
                         solved, rotation = solve_with_contacts(
                             ph, piece, node, slide, mean, load, rotation, misfit, step_dt, bristle, factor, fixed_grip
                         )
+                        if not solved:
+                            return j
                         break
                     near = max(piece[rows.TENSION, 0, 0], 0.0) - max(piece[rows.TENSION, 1, 0], 0.0)
                     expected = lever * near

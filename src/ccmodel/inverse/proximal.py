@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel import mechanisms as registry
 from ccmodel.channels import F_DRIVE, F_LOAD, T1, T2, T3, T4, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
 from ccmodel.encoder.filtering import causal_motion
 from ccmodel.failure import ModelError
@@ -14,12 +15,10 @@ from ccmodel.model.parameters import Parameters
 from ccmodel.model.sensors import FAULT_ITERATIONS, read_by_sensors
 from ccmodel.recording import Recording
 
-# Sensors with these faults read what comes later, so that no causal estimate can undo them.
-LOOKS_AHEAD = ("time-skew",)
 # White noise of a torque is measured over so many samples of the rest at least.
 FEWEST_AT_REST = 20
 # Cables are tensioned from the drive against friction: towards the load their tension falls, most often by a tenth, and
-# by nothing to twice as much (docs/rig-log-format.md, What recordings are like).
+# by nothing to twice as much (docs/rig-log-format.md, Repeatability).
 FALL = 0.1
 # A drive that moves less in a sample than this share of a count counts as moving by as much.
 SMALLEST_SHARE = 1e-3
@@ -140,7 +139,7 @@ def true_torque(
 
     `radii` are those of the drive and the load pulley, m.
     """
-    faults = [m for m in mechanisms if m.name not in LOOKS_AHEAD]
+    faults = [m for m in mechanisms if not registry.get(m.name).looks_ahead]
     nothing = np.zeros_like(read)
     rest = {THETA_IN: theta_in, THETA_OUT: nothing, TAU_OUT: nothing, F_DRIVE: nothing, F_LOAD: nothing}
     true = read

@@ -223,6 +223,8 @@ class Mechanism:
         Look-alikes: other mechanisms, or `PAPER_LOOK_ALIKES`.
     depends_on_time : bool
         Whether its effect depends on the rate of the motion, not only on its path.
+    looks_ahead : bool
+        Whether a reading depends on later samples, so that no causal estimate can undo it.
     needs : tuple of str
         Channels without which it has no effect: a diagnosis considers it where they were recorded.
     settings : mapping of str to str
@@ -250,6 +252,7 @@ class Mechanism:
     parameters: tuple[Parameter, ...]
     mistaken_for: tuple[str, ...]
     depends_on_time: bool
+    looks_ahead: bool = False
     needs: tuple[str, ...] = ()
     settings: Mapping[str, str] = field(default_factory=dict)
     structures: Mapping[str, Any] = field(default_factory=dict)

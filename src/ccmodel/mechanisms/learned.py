@@ -296,6 +296,7 @@ class Law:
             parameters=fixed + coefficients,
             mistaken_for=(),
             depends_on_time=self.argument.depends_on_time,
+            looks_ahead=self.looks_ahead,
             **self.acting(self.at_knots),
         )
 

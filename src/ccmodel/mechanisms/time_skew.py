@@ -37,6 +37,7 @@ MECHANISM = Mechanism(
     parameters=(_DELAY,),
     mistaken_for=("viscous-friction", "load-inertia"),
     depends_on_time=True,
+    looks_ahead=True,
     modifies_observation=_modifies_observation,
     curves=(Curve(SENSOR_MAP, "time", lambda t, values: np.full(t.shape, values["delay"]), (_DELAY,), form="delay"),),
 )

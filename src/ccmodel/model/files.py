@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError
 
 from ccmodel import mechanisms as registry
 from ccmodel.geometry import ConduitPath
-from ccmodel.model.general.run import Active
+from ccmodel.model.active import Active
 from ccmodel.model.parameters import FORMER_NAMES, Parameters
 from ccmodel.outputs import new_file
 from ccmodel.recording import FAR_ENDS, ORIGIN, Recording

@@ -63,8 +63,11 @@ def simulate_pair(
     Raises
     ------
     ModelError
-        If an input is not finite or of the wrong shape, or a step finds no balance at the load.
+        If an input is not finite or of the wrong shape, the transmission is a single cable, or a step finds no balance
+        at the load.
     """
+    if transmission.is_single_cable:
+        raise ModelError("the paper's discretisation is that of a pair, not of a single cable")
     theta_in = one_row(theta_in, "theta_in")
     if sections < 1:
         raise ModelError(f"each cable needs at least one section; got {sections}")

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ccmodel.channels import TABLE, THETA_OUT, ZERO_OF
-from ccmodel.model.general.run import Active
+from ccmodel.model.active import Active
 from ccmodel.rig.batch import Rig
 
 

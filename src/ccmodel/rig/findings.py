@@ -38,7 +38,7 @@ class LogError(Exception):
 
 Severity = Literal["warning", "refused", "inconsistent"]
 # Word before a line on a finding.
-WORD: dict[Severity, str] = {"warning": "warning", "refused": "left out", "inconsistent": "inconsistent"}
+WORD: dict[Severity, str] = {"warning": "warning", "refused": "refused", "inconsistent": "inconsistent"}
 
 
 @dataclass(frozen=True)

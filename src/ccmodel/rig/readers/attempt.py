@@ -30,7 +30,7 @@ def read_here(format: Format, path: Path, text: TextLayout | None = None) -> Sig
         except LogError as error:
             return LogError(*error.args)
         except ModuleNotFoundError as error:
-            advice = f"pip install 'ccmodel[{format.extra}]'"
+            advice = f"in a copy of ccmodel: pip install '.[{format.extra}]'"
             return LogError(None, None, f"a {format.name} needs the library {error.name}: {advice}")
         except FileNotFoundError:
             return LogError(None, None, "there is no such file")
