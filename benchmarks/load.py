@@ -5,8 +5,8 @@ these runs, each with noise, instants and a load angle of its own: otherwise som
 and are taken for copies. The pipeline runs on each of them: ingest, fit, simulation, study, diagnosis and page. The
 long log repeats one run until it has ten million samples; `ccmodel check` reads it.
 
-Memory is the highest that a process and its children had resident together, sampled every 50 ms. Pages that
-processes share count once for each of them.
+Memory is the highest that a process and its children had resident together, sampled every 50 ms. A page that several
+of them share counts once (proportional set size).
 """
 
 import argparse
@@ -54,8 +54,8 @@ def resident_bytes(process: psutil.Process) -> int:
     total = 0
     try:
         for one in (process, *process.children(recursive=True)):
-            total += one.memory_info().rss
-    except psutil.NoSuchProcess:
+            total += one.memory_full_info().pss
+    except (psutil.NoSuchProcess, psutil.AccessDenied):
         pass
     return total
 

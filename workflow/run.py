@@ -34,7 +34,9 @@ def main(results: str, *command: str) -> int:
             # A run that was killed did not empty its record.
             shutil.rmtree(LOCKS, ignore_errors=True)
         code = _run(command, record)
-        record.truncate(0)
+        # What a signal has killed leaves its lock, and the record says so.
+        if code >= 0:
+            record.truncate(0)
     return code
 
 

@@ -10,8 +10,14 @@ from pathlib import Path
 
 # Largest sizes, MB, by the variable of the environment that changes them. A log of ten million samples of seven sensors
 # has 0.7 GB as text. A batch.yaml of a thousand recordings has 0.3 MB, and the reader of YAML takes 1 s for 0.1 MB.
-LARGEST_MB = {"CCMODEL_LARGEST_LOG_MB": 1000.0, "CCMODEL_LARGEST_UNPACKED_MB": 1000.0, "CCMODEL_LARGEST_YAML_MB": 0.7}
-LOG, UNPACKED, DOCUMENT = LARGEST_MB
+# A model has 0.1 MB.
+LARGEST_MB = {
+    "CCMODEL_LARGEST_LOG_MB": 1000.0,
+    "CCMODEL_LARGEST_UNPACKED_MB": 1000.0,
+    "CCMODEL_LARGEST_YAML_MB": 0.7,
+    "CCMODEL_LARGEST_MODEL_MB": 50.0,
+}
+LOG, UNPACKED, DOCUMENT, MODEL = LARGEST_MB
 _KINDS = {
     stat.S_ISFIFO: "a pipe",
     stat.S_ISCHR: "a device",

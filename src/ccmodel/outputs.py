@@ -9,10 +9,8 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from ccmodel.paths import UNFINISHED
 from ccmodel.typed import InputError
-
-# Before the name of what is being made.
-_UNFINISHED = ".unfinished-"
 
 
 @contextmanager
@@ -26,7 +24,7 @@ def _naming(path: Path) -> Iterator[None]:
     except OSError as error:
         place = path.resolve()
         named = Path(error.filename).resolve() if isinstance(error.filename, str) else place
-        is_unfinished = any(part.startswith(_UNFINISHED) for part in named.parts)
+        is_unfinished = any(part.startswith(UNFINISHED) for part in named.parts)
         if is_unfinished or named.is_relative_to(place) or place.is_relative_to(named):
             raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
         raise InputError(f"{error.filename}: cannot be used ({error.strerror or error})") from None
@@ -47,7 +45,7 @@ def new_file(path: str | Path) -> Iterator[Path]:
     with _naming(path):
         place = path.resolve()
         place.parent.mkdir(parents=True, exist_ok=True)
-        fresh = place.with_name(_UNFINISHED + place.name)
+        fresh = place.with_name(UNFINISHED + place.name)
         try:
             yield fresh
             fresh.replace(place)
@@ -78,7 +76,7 @@ def new_files(folder: str | Path, last: str | None = None, without: Collection[s
     folder = Path(folder).expanduser()
     with _naming(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        fresh = folder / f"{_UNFINISHED}files"
+        fresh = folder / f"{UNFINISHED}files"
         shutil.rmtree(fresh, ignore_errors=True)
         fresh.mkdir()
         try:
@@ -110,7 +108,7 @@ def new_folder(path: str | Path) -> Iterator[Path]:
     with _naming(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         # In the parent of `path`, since a folder can only be renamed within a file system.
-        work = path.with_name(_UNFINISHED + path.name)
+        work = path.with_name(UNFINISHED + path.name)
         fresh, earlier = work / path.name, work / f"earlier-{path.name}"
         # A command that was killed between the two renamings below.
         if earlier.exists() and not path.exists():

@@ -5,6 +5,8 @@ of the trial.
 """
 
 import difflib
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import NoReturn
@@ -12,6 +14,8 @@ from typing import NoReturn
 from ccmodel import inputs
 
 BATCH_FILE = "batch.yaml"
+# Before the name of what is being made (`ccmodel.outputs`).
+UNFINISHED = ".unfinished-"
 
 
 def batch_folder(path: str | Path) -> Path:
@@ -22,7 +26,7 @@ def batch_folder(path: str | Path) -> Path:
     InputError
         If there is no such folder, or it holds no `batch.yaml`.
     """
-    path = Path(path).expanduser()
+    path = _expanded(path)
     folder = path.parent if path.name == BATCH_FILE and path.is_file() else existing_folder(path)
     if not (folder / BATCH_FILE).exists():
         inside = batches_in(folder)
@@ -48,7 +52,7 @@ def existing_folder(path: str | Path) -> Path:
     InputError
         If there is none.
     """
-    path = Path(path).expanduser()
+    path = _expanded(path)
     return path if path.is_dir() else _missing(path, "folder", "file")
 
 
@@ -60,7 +64,7 @@ def existing_file(path: str | Path) -> Path:
     InputError
         If there is none.
     """
-    path = Path(path).expanduser()
+    path = _expanded(path)
     if not path.exists() or path.is_dir():
         _missing(path, "file", "folder")
     _check_regular(path, "")
@@ -79,7 +83,7 @@ def _missing(path: Path, wanted: str, other: str) -> NoReturn:
 
 
 def try_folder(path: str | Path, option: str = "out") -> Path:
-    """A folder that can be written to, or made.
+    """A folder that can be written to, or made, for results.
 
     Parameters
     ----------
@@ -90,25 +94,43 @@ def try_folder(path: str | Path, option: str = "out") -> Path:
     Raises
     ------
     InputError
-        If it cannot.
+        If it cannot, or is the folder of a batch: a result may have the name of a log.
     """
-    path = Path(path).expanduser()
-    _try(path, path, option)
+    path = try_batch_folder(path, option)
+    if (path / BATCH_FILE).exists():
+        _refuse(f"{option}: {path}: is the folder of a batch; name another one")
     return path
 
 
-def try_file(path: str | Path, option: str = "out") -> Path:
+def try_batch_folder(path: str | Path, option: str = "out") -> Path:
+    """As `try_folder`, for logs and a `batch.yaml`."""
+    path = _expanded(path)
+    _try(path, path, option, path / f"{UNFINISHED}files")
+    return path
+
+
+def try_file(path: str | Path, option: str = "out", read: Iterable[str | Path] = ()) -> Path:
     """A file that can be written; parameters as of `try_folder`.
+
+    Parameters
+    ----------
+    read : iterable of str or Path
+        Files that are read.
 
     Raises
     ------
     InputError
-        If it cannot.
+        If it cannot, or if it is read, or a file of a batch.
     """
-    path = Path(path).expanduser()
+    path = _expanded(path)
     if path.is_dir():
         _refuse(f"{option}: {path}: is a folder; name a file")
-    _try(path.parent, path, option)
+    if path.exists():
+        if (path.parent / BATCH_FILE).exists():
+            _refuse(f"{option}: {path}: is a file of a batch; name another one")
+        if any(path.samefile(one) for one in map(_expanded, read) if one.exists()):
+            _refuse(f"{option}: {path}: is read by this command; name another file")
+    _try(path.parent, path, option, path.with_name(UNFINISHED + path.name))
     if path.exists():
         _check_regular(path, f"{option}: ")
         try:
@@ -125,21 +147,35 @@ def _check_regular(path: Path, option: str) -> None:
         _refuse(f"{option}{path}: {error.strerror}")
 
 
-def _try(folder: Path, named: Path, option: str) -> None:
-    """Write a nameless file into a folder, or make the first of its missing folders and remove it again."""
+def _try(folder: Path, named: Path, option: str, unfinished: Path) -> None:
+    """Write a nameless file into a folder, whose missing folders are made and removed again; try a name in it too."""
     try:
         missing = [f for f in (folder, *folder.parents) if not f.exists()]
         existing = missing[-1].parent if missing else folder
         if not existing.is_dir():
             text = "is a file; name a folder" if existing == named else f"cannot be made: {existing} is a file"
             _refuse(f"{option}: {named}: {text}")
-        if missing:
-            missing[-1].mkdir()
-            missing[-1].rmdir()
-        else:
+        made: list[Path] = []
+        try:
+            for one in reversed(missing):
+                one.mkdir()
+                made.append(one)
             TemporaryFile(dir=folder).close()
-    except OSError as error:
-        _refuse(f"{option}: {named}: cannot be written ({error.strerror})")
+            with suppress(FileNotFoundError):
+                unfinished.lstat()
+        finally:
+            for one in reversed(made):
+                one.rmdir()
+    except (OSError, ValueError) as error:  # the latter for a name with a zero byte
+        _refuse(f"{option}: {named}: cannot be written ({getattr(error, 'strerror', None) or error})")
+
+
+def _expanded(path: str | Path) -> Path:
+    """A path with `~` and `~name` replaced by the user's folder."""
+    try:
+        return Path(path).expanduser()
+    except RuntimeError:
+        _refuse(f"{path}: there is no such user")
 
 
 def _refuse(line: str) -> NoReturn:

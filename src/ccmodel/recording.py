@@ -147,8 +147,8 @@ class Recording:
         return pd.DataFrame(columns, index=pd.Index(self.log_time_s, name="time_s"))
 
     def to_xarray(self) -> xr.Dataset:
-        """Channels over ``time_s`` and the conduit's pieces; units and sources are attributes of the variables."""
-        return _to_dataset(self)
+        """Channels over ``time_s`` as in the log, and the conduit's pieces; units and sources are attributes."""
+        return _to_dataset(replace(self, time_s=self.log_time_s, log_start_s=0.0))
 
     def plot(self, channel: str | None = None) -> "Figure":
         """Channels over time, a panel for each.
@@ -269,7 +269,9 @@ def _to_dataset(recording: Recording) -> xr.Dataset:
 
 def _from_dataset(name: str, dataset: xr.Dataset) -> Recording:
     channels = {c: dataset[c].values for c in CHANNELS if c in dataset}
-    scalars: dict[str, Any] = {name: kind(dataset.attrs[name]) for name, kind in _SCALARS.items()}
+    # An earlier version did not write all of them.
+    written = {name: kind for name, kind in _SCALARS.items() if name in dataset.attrs}
+    scalars: dict[str, Any] = {name: kind(dataset.attrs[name]) for name, kind in written.items()}
     attributes = {c: dataset[c].attrs for c in channels}
     of_sensors: dict[str, Any] = {
         key: {c: float(a[key]) for c, a in attributes.items() if key in a} for key in _OF_SENSORS

@@ -29,6 +29,7 @@ from ccmodel import inputs
 LARGEST = 1e30
 Positive = Annotated[float, Field(gt=0, lt=LARGEST)]
 NotNegative = Annotated[float, Field(ge=0, lt=LARGEST)]
+Finite = Annotated[float, Field(gt=-LARGEST, lt=LARGEST)]
 M = TypeVar("M", bound=BaseModel)
 # Path of a value: keys and indices from the top of a file. `Borrowed` gives the file's own path of a value.
 Loc = tuple[str | int, ...]
@@ -176,6 +177,7 @@ def load_json_model(path: Path, model: type[M], wrote: str) -> M:
         In one line, if the file cannot be read or does not fit.
     """
     try:
+        inputs.check_file(Path(path), inputs.LOG)
         return model.model_validate_json(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         reason = error.strerror
@@ -253,7 +255,7 @@ class _ValuesWithLines(RoundTripConstructor):
 
     def construct_document(self, node: Node) -> Any:
         if _size(node, {}) > MAX_VALUES:
-            raise _error_at(node, f"its aliases repeat values to more than {MAX_VALUES}: write out what is needed")
+            raise _error_at(node, f"holds more than {MAX_VALUES} values, repeated ones counted each time: write less")
         return super().construct_document(node)
 
     def construct_object(self, node: Node, deep: bool = False) -> Any:

@@ -1,12 +1,13 @@
 """The comparison with an accepted accuracy: what is a loss, what is covered, what cannot be compared."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import t
 
 from ccmodel.accuracy.baseline import make_baseline, read_baseline, write_baseline
 from ccmodel.accuracy.comparison import GAINED, KEPT, LOST, UNKNOWN, Limits, compare
-from ccmodel.accuracy.measure import BatchAccuracy, ChannelAccuracy, SetAccuracy
+from ccmodel.accuracy.measure import BatchAccuracy, ChannelAccuracy, SetAccuracy, _error_by_channel
 from ccmodel.typed import InputError
 
 LIMITS = Limits(coverage=0.99, reproducibility=0.01)
@@ -181,3 +182,8 @@ def test_a_baseline_that_cannot_be_read_is_one_line(tmp_path, text, says):
     assert str(file) in message
     assert "ccmodel accuracy accept" in message
     assert "\n" not in message
+
+
+def test_errors_of_recordings_are_added_in_squares_by_channel():
+    table = pd.DataFrame({"channel": ["a", "b", "a"], "nrmse_percent": [3.0, 7.0, 4.0]})
+    assert dict(_error_by_channel(table)) == pytest.approx({"a": 12.5**0.5, "b": 7.0})

@@ -94,6 +94,28 @@ def test_dates_of_two_time_zones_are_in_their_order(measured, tmp_path):
     assert list(dict.fromkeys(read_history(file)["commit"])) == ["earlier", "later"]
 
 
+@pytest.mark.parametrize("date", ["yesterday", "9999999-01-01"])
+def test_a_date_that_is_none_is_named(measured, tmp_path, date):
+    rows = rows_of(measured[1], "abc", "2026-01-01T00:00:00+00:00", "1")
+    add_rows(tmp_path / "history.csv", rows)
+    text = (tmp_path / "history.csv").read_text().replace("2026-01-01T00:00:00+00:00", date)
+    (tmp_path / "history.csv").write_text(text)
+    with pytest.raises(InputError, match="history.csv: a date is none of ISO 8601"):
+        add_rows(tmp_path / "history.csv", rows.assign(commit="def"))
+
+
+def test_a_day_stands_among_times(measured, tmp_path):
+    for name, date in (("b", "2026-01-02"), ("c", "2026-01-02T10:00:00+00:00"), ("a", "2026-01-01T00:00:00+00:00")):
+        add_rows(tmp_path / "history.csv", rows_of(measured[1], name, date, "1"))
+    assert list(dict.fromkeys(read_history(tmp_path / "history.csv")["commit"])) == ["a", "b", "c"]
+
+
+def test_rows_with_more_cells_than_the_header_are_refused(tmp_path):
+    (tmp_path / "history.csv").write_text(",".join(COLUMNS) + "\n" + ",".join("0" * (len(COLUMNS) + 1)) + "\n")
+    with pytest.raises(InputError, match="more cells than its header"):
+        read_history(tmp_path / "history.csv")
+
+
 def test_a_file_with_other_columns_is_refused(tmp_path):
     file = tmp_path / "history.csv"
     file.write_text("commit,error\na,1\n")

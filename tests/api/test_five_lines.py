@@ -153,7 +153,7 @@ def test_a_fit_or_a_diagnosis_stands_for_its_model(fitted, found, batch):
 def test_a_recording_is_a_motion(fitted, batch):
     recording = batch["t-6N"]
     simulated = cc.simulate(fitted, recording)
-    assert np.array_equal(simulated.time_s, recording.log_time_s)
+    assert np.array_equal(simulated.time_s, recording.time_s)
     assert np.array_equal(simulated["theta_in_rad"], recording["theta_in_rad"])
 
 
@@ -226,6 +226,26 @@ def test_a_model_predicts_recordings_that_it_was_not_fitted_to(fitted, tmp_path)
     assert "t-6.5N" in repr(predicted)
     assert "t-6.5N" in predicted._repr_html_()
     assert predicted.left_out == ()
+
+
+def test_a_prediction_says_what_is_wrong_with_its_batch(fitted, folder, tmp_path):
+    other = shutil.copytree(folder, tmp_path / folder.name)
+    described = (other / "batch.yaml").read_text()
+    (other / "batch.yaml").write_text(
+        described.replace("encoder_counts_per_rev: 2000", "encoder_counts_per_rev: 8000", 1)
+    )
+    predicted, estimated = cc.predict(fitted, other), cc.estimate(fitted, other)
+    for found in (predicted, estimated):
+        assert any(finding.is_inconsistent and "encoder" in str(finding) for finding in found.findings)
+    assert cc.predict(fitted, folder).findings == ()
+
+
+def test_a_model_of_a_pair_does_not_predict_a_single_cable(fitted, batch):
+    of_single = replace(fitted.model, rig=replace(fitted.model.rig, far_end="fixed"))
+    with pytest.raises(
+        cc.InputError, match="is a pair of cables, and the model is of a single cable with the far end fixed"
+    ):
+        cc.predict(of_single, batch)
 
 
 def test_the_clock_of_a_log_is_that_of_its_prediction_alone(fitted, folder, batch, tmp_path):

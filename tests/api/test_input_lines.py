@@ -47,6 +47,10 @@ def test_a_motion_that_cannot_be_simulated_is_refused_by_name(fitted, motion, li
         ("time_s,theta_in_rad\n0,0\n0,1\n", "row 3: time_s does not increase: 0 after 0"),
         ("time_s,theta_in_rad\n", "no samples"),
         ("", "is empty; a motion is a CSV with the columns time_s and theta_in_rad"),
+        (
+            "time_s,theta_in_rad,x\n0,0.5,0.1,9\n1,0.6,0.2,9\n",
+            "a motion is a CSV with the columns time_s and theta_in_rad; its rows have more cells than its header",
+        ),
         ("t,angle\n0,0\n", "no column time_s and no theta_in_rad; the columns are t, angle"),
     ],
 )

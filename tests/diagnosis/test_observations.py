@@ -2,12 +2,14 @@
 
 from collections import Counter
 
+import numpy as np
 import pytest
 
 import made_observations
 from builders import recording
 from ccmodel.diagnosis import observations as stage
 from ccmodel.diagnosis.observations import observations_of, spread_over_conditions
+from ccmodel.failure import ModelError
 
 
 def batch(counts):
@@ -45,6 +47,12 @@ def test_of_a_large_one_each_condition_has_an_equal_number(counts, most, share):
 def test_recordings_of_a_condition_are_taken_over_the_whole_sequence():
     found = [int(one.split("-")[1]) for one in chosen({7.0: 101}, 5)]
     assert found == [0, 25, 50, 75, 100]
+
+
+def test_no_recording_that_can_be_compared_is_an_error_with_the_last_reason():
+    drive_alone = recording(theta_in_rad=np.sin)
+    with pytest.raises(ModelError, match="none of the recordings can be compared with the model: .*b/r"):
+        observations_of([drive_alone], made_observations.PARAMETERS)
 
 
 def test_what_is_left_out_is_said(monkeypatch):

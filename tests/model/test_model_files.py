@@ -54,6 +54,20 @@ def test_a_required_value_is_not_null(tmp_path):
     assert read_model_file(write(tmp_path / "model.json", pretension_N=None)).parameters == MODEL
 
 
+@pytest.mark.parametrize("name", ["load_radius_m", "drive_radius_m"])
+@pytest.mark.parametrize("value", [1e300, 1e-300, float("inf")])
+def test_a_value_that_overflows_is_named(tmp_path, name, value):
+    with pytest.raises(InputError, match=f"parameters.{name}"):
+        read_model_file(write(tmp_path / "model.json", **{name: value}))
+
+
+def test_a_file_that_is_far_too_large_is_not_read(tmp_path):
+    with open(tmp_path / "model.json", "wb") as file:
+        file.truncate(1_500_000_000)
+    with pytest.raises(InputError, match="larger than 50 MB"):
+        read_model_file(tmp_path / "model.json")
+
+
 def test_a_value_that_is_missing_is_named(tmp_path):
     content = json.loads(write(tmp_path / "model.json").read_text())
     del content["parameters"]["friction_coefficient"]

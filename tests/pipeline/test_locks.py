@@ -53,6 +53,17 @@ def ended(process: subprocess.Popen) -> tuple[int, str]:
     return process.returncode, said
 
 
+def test_a_command_that_is_killed_alone_leaves_no_lock(tmp_path):
+    (tmp_path / ".snakemake/locks").mkdir(parents=True)
+    (tmp_path / "killed.py").write_text("import os; os.kill(os.getpid(), 9)")
+    (tmp_path / "lock.py").write_text("import os; print(os.path.exists('.snakemake/locks/0'))")
+    run = [sys.executable, str(RUN), "results", sys.executable]
+    (tmp_path / ".snakemake/locks/0").touch()
+    assert subprocess.run([*run, "lock.py"], cwd=tmp_path, capture_output=True, text=True).stdout == "True\n"
+    assert subprocess.run([*run, "killed.py"], cwd=tmp_path).returncode != 0
+    assert subprocess.run([*run, "lock.py"], cwd=tmp_path, capture_output=True, text=True).stdout == "False\n"
+
+
 def test_a_second_run_says_which_process_goes_on_and_other_results_do_not_wait(start, tmp_path):
     first = start("one")
     until_it_works(tmp_path, "one")

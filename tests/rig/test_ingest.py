@@ -2,6 +2,7 @@ import gzip
 from dataclasses import replace
 from pathlib import Path
 
+import netCDF4
 import numpy as np
 import pytest
 from made_up_batch import COUNTS, KT, table
@@ -664,6 +665,48 @@ def test_the_clock_of_a_log_changes_nothing_but_the_times_of_tables(bench, shift
         assert other.to_frame().index.to_numpy() == pytest.approx(one.to_frame().index.to_numpy() + shift, abs=1e-6)
         for channel, values in one.channels.items():
             assert other[channel] == pytest.approx(values, abs=1e-12)
+
+
+def test_recordings_of_an_earlier_version_are_read(bench, tmp_path):
+    recordings = ingest_batch(bench.write().folder).recordings
+    write_recordings(tmp_path / "r.nc", recordings, {})
+    with netCDF4.Dataset(tmp_path / "r.nc", "a") as root:
+        for group in root.groups.values():
+            group.delncattr("log_start_s")
+            group.delncattr("position")
+    assert [r.log_start_s for r in read_recordings(tmp_path / "r.nc")] == [0.0, 0.0]
+
+
+def test_a_file_name_that_does_not_show_is_refused(bench):
+    bench.described["recordings"][0]["file"] = "\x1b]0;evil\x07.csv"
+    (finding,) = ingest_batch(bench.write().folder).findings
+    assert "has characters that do not show" in str(finding)
+    assert str(finding).isprintable()
+
+
+def test_a_day_is_no_moment(bench):
+    bench.described["recordings"][0]["started_at"] = "2026-01-01"
+    (finding,) = ingest_batch(bench.write().folder).findings
+    assert "must be a date with a time of day" in finding.text
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            lambda d: d["rig"]["accuracy"].update(encoder_rad=1.0),
+            "rig.accuracy.encoder_rad is 1, but theta_",
+        ),
+        (
+            lambda d: d["rig"]["cable"].update(length_m=0.0012),
+            "no conduit of a cable rig; state",
+        ),
+    ],
+)
+def test_a_value_that_no_rig_has_is_inconsistent(bench, change, said):
+    change(bench.described)
+    found = [f for f in ingest_batch(bench.write().folder).findings if f.severity == "inconsistent"]
+    assert any(said in f.text for f in found)
 
 
 def test_a_transient_that_leaves_a_few_samples_leaves_too_few(bench):

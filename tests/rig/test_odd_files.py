@@ -85,7 +85,7 @@ def test_aliases_that_repeat_one_another_are_refused(written):
     file = written.folder / "batch.yaml"
     file.write_text("\n".join(["l0: &l0 [1]", *levels, file.read_text()]))
     assert refusals(written) == [
-        f"batch.yaml: not valid YAML: its aliases repeat values to more than {MAX_VALUES}: write out what is needed"
+        f"batch.yaml: not valid YAML: holds more than {MAX_VALUES} values, repeated ones counted each time: write less"
     ]
 
 

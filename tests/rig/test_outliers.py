@@ -3,7 +3,8 @@ import pytest
 from made_up_batch import table
 
 from ccmodel.rig.ingest import ingest_batch
-from ccmodel.rig.outliers import outliers
+from ccmodel.rig.log import read_log
+from ccmodel.rig.outliers import frequent_outliers, outliers
 
 TIME = np.linspace(0.0, 4.0, 2000)
 NOISE = np.random.default_rng(3).normal(size=TIME.size)
@@ -37,6 +38,44 @@ def test_impossible_readings_are_found(value, at):
     values[at] = value
     is_seen = abs(value) > 30.0 or at not in ([0], [TIME.size - 1])
     assert outliers(values).tolist() == (at if is_seen else [])
+
+
+@pytest.mark.parametrize("at", [0, TIME.size - 1])
+def test_a_first_or_last_reading_may_be_impossible(at):
+    values = 2.3 * np.sin(3 * TIME) + 0.05 * NOISE
+    values[at] = 30.0
+    assert outliers(values).tolist() == [at]
+
+
+def test_readings_that_are_too_many_to_be_dropped_are_named():
+    values = 2.3 * np.sin(3 * TIME) + 0.01 * NOISE
+    at = np.arange(7, TIME.size, 80)
+    values[at] = 1000.0
+    assert outliers(values).size == 0
+    assert frequent_outliers(values).tolist() == at.tolist()
+    others = (name for name in CHANNELS if name != "spikes of a switching drive")
+    assert all(frequent_outliers(CHANNELS[name]).size == 0 for name in others)
+
+
+def test_a_log_with_many_of_them_has_a_warning(bench):
+    log = table()
+    log.loc[::60, "drive_current_A"] = 1000.0
+    bench.write()
+    log.to_csv(bench.log(), index=False)
+    _, warnings = read_log(bench.log())
+    assert [w.column for w in warnings] == ["drive_current_A"]
+    assert "are far from all near them, up to 1000: is the sensor faulty? They are used" in warnings[0].text
+
+
+@pytest.mark.parametrize(("column", "value", "said"), [("time_s", 7.0, "time must increase")])
+def test_times_and_angles_have_checks_of_their_own(bench, column, value, said):
+    log = table()
+    log.loc[200, column] = value
+    bench.write()
+    log.to_csv(bench.log(), index=False)
+    (finding,) = (f for f in ingest_batch(bench.folder).findings if f.severity == "refused")
+    assert finding.column == column
+    assert said in finding.text
 
 
 def test_an_impossible_reading_may_lie_within_the_range():

@@ -324,6 +324,7 @@ def test_steps_that_are_not_stated_are_a_warning(bench):
     ("values", "step"),
     [
         (np.array([3.0, 3.0]), None),
+        (np.array([0.0, 1e-10, 1.0]), 1.0),
         (np.array([0.0, 6.0, 15.0]), 3.0),
         (0.1 + STEP * np.array([0, 2, 5, 9, 100, 101.0]), STEP),
         ((0.1 + STEP * np.r_[np.arange(0, 300, 2), 333, 20001]).round(6), STEP),

@@ -4,6 +4,8 @@ from importlib import import_module
 from pkgutil import iter_modules
 
 import h5py
+import numpy as np
+import pandas as pd
 import pytest
 from asammdf import MDF, Signal
 from made_up_batch import table
@@ -13,6 +15,9 @@ from scipy.io import savemat
 from ccmodel.rig import readers
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.ingest import ingest_batch
+from ccmodel.rig.readers.columns import Columns
+from ccmodel.rig.readers.mat import _axis_of_capture
+from ccmodel.rig.readers.stamps import seconds_of_stamps
 
 
 def test_every_module_of_the_folder_with_a_format_is_registered():
@@ -102,3 +107,23 @@ def test_a_log_of_an_unknown_suffix_is_read_as_csv(bench, name):
 def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(LogError, match="there is no such file"):
         readers.read(tmp_path / "nowhere.csv")
+
+
+@pytest.mark.parametrize(("shape", "samples", "signals"), [((2, 3), 2, 3), ((3, 2), 2, 3), ((2, 3), 3, 2)])
+def test_the_time_axis_says_which_side_of_a_matrix_are_its_samples(shape, samples, signals):
+    columns = Columns()
+    columns.add("m", "N", np.zeros(shape), np.arange(samples))
+    assert [signal.values.size for signal in columns.signals] == [samples] * signals
+
+
+def test_a_capture_without_an_axis_or_numbers_has_no_times():
+    axis = {"Raster": np.array([0.1])}
+    assert _axis_of_capture(axis, None) is None
+    assert _axis_of_capture(None, np.zeros(3)) is None
+    assert _axis_of_capture(axis, np.zeros(3)).tolist() == pytest.approx([0.0, 0.1, 0.2])
+
+
+def test_the_first_stamp_that_cannot_be_read_is_named():
+    with pytest.raises(LogError) as refused:
+        seconds_of_stamps([pd.Series(["2024-13-45 1:00", "2024-14-45 2:00"])])
+    assert "times such as '2024-13-45 1:00' cannot be read" in refused.value.defect.text

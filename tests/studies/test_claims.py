@@ -9,8 +9,9 @@ from ccmodel.errors import last_cycle
 from ccmodel.repeats import condition_of, estimates, pooled_scatter
 from ccmodel.report.figures import save_figure
 from ccmodel.studies.claims import model_runs
-from ccmodel.studies.claims.claim import Verdict
+from ccmodel.studies.claims.claim import Row, Verdict
 from ccmodel.studies.claims.figure import model_figure, recordings_figure
+from ccmodel.studies.claims.recordings import _model_has_sign, _Series
 from ccmodel.studies.claims.settings import Claims
 from ccmodel.studies.claims.study import claims_of
 from ccmodel.studies.loops.settings import Measuring
@@ -140,6 +141,17 @@ def test_an_interval_reaches_as_far_above_a_spread_as_below_it(found):
     for row in rows:
         assert row.high > row.value
         assert row.low == pytest.approx(max(0.0, 2 * row.value - row.high))
+
+
+def test_one_value_of_the_model_has_no_trend():
+    def of(*values):
+        return _Series(
+            [Row("width", "rad", str(k), float(k), "model", model=value) for k, value in enumerate(values)], []
+        )
+
+    assert _model_has_sign(of(1.0), 1) == _model_has_sign(of(None, 1.0), -1) == Verdict.OPEN
+    assert _model_has_sign(of(1.0, 2.0), 1) == Verdict.YES
+    assert _model_has_sign(of(1.0, 2.0), -1) == Verdict.NO
 
 
 def test_without_repeats_there_is_no_interval_and_it_is_said():

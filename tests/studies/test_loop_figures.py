@@ -1,6 +1,7 @@
 """What figures say of themselves; the pictures are looked at by people."""
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import get_args
 
 import matplotlib.pyplot as plt
@@ -12,6 +13,7 @@ from ccmodel.channels import TABLE
 from ccmodel.model.run import PRESCRIBED
 from ccmodel.report.figures import stamp_figure
 from ccmodel.studies.loops.settings import Figure, Measuring, Study
+from ccmodel.studies.loops.study import _grid
 from ccmodel.studies.loops.study import draw as draw_study
 
 FIGURES = get_args(Figure)
@@ -198,3 +200,11 @@ def test_a_run_without_two_channels_of_one_end_has_a_figure_that_says_so():
     recorded = recorded.with_channels(few, recorded.derived_from, recorded.origin)
     drawn = draw([(recorded, simulated)], "transmission")
     assert any("no two channels of one end" in t for t in texts(drawn))
+
+
+def test_residuals_stand_below_their_loop():
+    _, cells = _grid(cells=4, strips=2, columns=2)
+    for loop, strips in cells:
+        heights = [ax.get_position() for ax in (loop, *strips)]
+        assert all(above.y0 > below.y1 for above, below in pairwise(heights))
+        assert all(one.x0 == heights[0].x0 for one in heights)

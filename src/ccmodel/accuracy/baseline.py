@@ -8,7 +8,7 @@ from typing import Any, Final, Literal
 
 from pydantic import ValidationError
 
-from ccmodel import __version__
+from ccmodel import __version__, inputs
 from ccmodel.accuracy.comparison import Limits, intervals
 from ccmodel.accuracy.measure import Batches
 from ccmodel.outputs import new_file
@@ -41,10 +41,11 @@ def read_baseline(file: Path) -> Baseline:
         In one line, if there is none or it cannot be read.
     """
     try:
+        inputs.check_file(file, inputs.LOG)
         content = json.loads(file.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(f"{file}: there is no baseline of the model's accuracy; accept one: {ACCEPT}") from None
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{file}: not a baseline ({error}); restore it, or accept a new one: {ACCEPT}") from None
     found = content.get("format") if isinstance(content, dict) else None
     if found != FORMAT:

@@ -97,6 +97,8 @@ def accept(results: Path, reason: str) -> State:
     if not reason.strip():
         raise InputError(f"--reason: state why this accuracy is right, for example: {ACCEPT}")
     state = state_of(results)
+    if not state.batches:
+        raise InputError(f"{results}: the run has measured no batch; there is nothing to accept")
     commit, date = head()
     baseline = make_baseline(state.batches, state.limits, date, commit, reason.strip())
     # The history first: if the baseline fails, the same command replaces this commit's rows.

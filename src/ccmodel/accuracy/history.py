@@ -11,8 +11,10 @@ from tempfile import TemporaryDirectory
 
 import pandas as pd
 
+from ccmodel import inputs
 from ccmodel.accuracy.measure import Batches, Simulated, measure
 from ccmodel.outputs import new_file
+from ccmodel.steps.files import longer_rows_refused
 from ccmodel.typed import InputError
 
 COLUMNS = (
@@ -36,7 +38,9 @@ def read_history(file: Path) -> pd.DataFrame:
     if not file.exists():
         return pd.DataFrame(columns=list(COLUMNS)).astype(COLUMNS)
     try:
-        table = pd.read_csv(file, dtype=COLUMNS, keep_default_na=False)
+        inputs.check_file(file, inputs.LOG)
+        with longer_rows_refused():
+            table = pd.read_csv(file, dtype=COLUMNS, keep_default_na=False, index_col=False)
     except (ValueError, OSError) as error:
         raise InputError(f"{file}: not a history of the model's accuracy ({error})") from None
     if list(table.columns) != list(COLUMNS):
@@ -60,8 +64,12 @@ def add_rows(file: Path, rows: pd.DataFrame) -> None:
     """Add the rows of a commit, in the order of dates; they replace earlier rows of the same commit."""
     table = read_history(file)
     table = pd.concat([table[~table["commit"].isin(rows["commit"])], rows], ignore_index=True)
-    # Dates have the time zones of their authors.
-    table = table.sort_values("date", kind="stable", key=lambda dates: pd.to_datetime(dates, utc=True))
+    try:
+        # Dates have the time zones of their authors.
+        dates = pd.to_datetime(table["date"], utc=True, format="ISO8601")
+    except ValueError as error:
+        raise InputError(f"{file}: a date is none of ISO 8601 ({error})") from None
+    table = table.iloc[dates.argsort(kind="stable")]
     with new_file(file) as fresh:
         table.to_csv(fresh, index=False, lineterminator="\n")
 

@@ -27,7 +27,7 @@ from ccmodel.model.model_input import ModelInput
 from ccmodel.model.run import simulate
 from ccmodel.recording import read_provenance
 from ccmodel.steps.files import Fitted, Pair, fitted, read_json, read_pairs
-from ccmodel.typed import OneOf, TypedModel
+from ccmodel.typed import LARGEST, OneOf, TypedModel
 
 DIGITS = 5
 # Beginning and end of what is compared of a recording, s, and its samples.
@@ -67,7 +67,9 @@ class ChannelAccuracy(TypedModel):
     )
     biases: list[float | None] = Field(description="bias_r, in the order of the batch's recordings")
     errors: list[float | None] = Field(description="error_r, in the same order")
-    fit_sd: float = Field(0.0, description="relative standard deviation of the error due to the fit's uncertainty")
+    fit_sd: float = Field(
+        0.0, ge=0.0, lt=LARGEST, description="relative standard deviation of the error due to the fit's uncertainty"
+    )
 
     @property
     def bias(self) -> float:
@@ -107,6 +109,9 @@ class BatchAccuracy(TypedModel):
         for one in (channel for of in self.sets.values() for channel in of.channels.values()):
             if not len(one.biases) == len(one.errors) == len(self.recordings):
                 raise ValueError("biases and errors have a number for each of the batch's recordings")
+            errors = _numbers(one.errors)
+            if not errors.size or not np.all((errors > 0.0) & (errors < LARGEST)):
+                raise ValueError("at least one recording has an error, and an error is a positive number")
         return self
 
 

@@ -11,7 +11,15 @@ import numpy as np
 import pandas as pd
 
 from ccmodel.api.batch import Batch, as_batch
-from ccmodel.api.model import HasModel, Motion, as_model, as_motion
+from ccmodel.api.model import (
+    HasModel,
+    Motion,
+    as_model,
+    as_motion,
+    check_same_rig,
+    files_among,
+    sorted_findings,
+)
 from ccmodel.api.options import progress_of
 from ccmodel.api.recordings import counted
 from ccmodel.channels import TAU_IN, TAU_OUT, THETA_IN, THETA_OUT, unit_of
@@ -23,6 +31,7 @@ from ccmodel.model.parameters import Parameters
 from ccmodel.outputs import new_file, new_files
 from ccmodel.paths import try_file, try_folder
 from ccmodel.progress import Progress, each_of, within
+from ccmodel.rig.findings import Finding
 from ccmodel.steps.files import write_table
 from ccmodel.steps.predict import READING, conditions_of
 from ccmodel.typed import InputError, advice
@@ -50,11 +59,14 @@ class Estimate(Mapping[str, pd.DataFrame]):
         A line on each recording without an estimate.
     notes : tuple of str
         A line on each part of the model that an estimate cannot have.
+    findings : tuple of Finding
+        Faults and contradictions of the batch, which is used all the same; ``str(finding)`` says where and what.
     """
 
     errors: pd.DataFrame
     left_out: tuple[str, ...]
     notes: tuple[str, ...]
+    findings: tuple[Finding, ...]
     _tables: Mapping[str, pd.DataFrame]
 
     def __getitem__(self, id: str) -> pd.DataFrame:
@@ -164,7 +176,7 @@ def estimate(
     left_out, rows = [], []
     with progress_of(progress) as report:
         batch = as_batch(batch, within(report, 0.0, READING))
-        batch._ingested.check_usable(batch.folder)
+        check_same_rig(known, batch)
         texts = within(report, READING, 1.0)
         for recording in each_of(batch.recordings, texts, lambda one: f"estimating the load of {one.batch}/{one.id}"):
             try:
@@ -175,9 +187,9 @@ def estimate(
             tables[recording.id] = found.table
             notes |= dict.fromkeys(found.notes)
             rows += _errors(found, known.parameters)
-    refused = [str(f) for f in batch.findings if f.severity == "refused"]
+    refused, others = sorted_findings(batch)
     columns = ["recording", "channel", "unit", "bias", "rms", "share_within", "samples"]
-    result = Estimate(pd.DataFrame(rows, columns=columns), (*refused, *left_out), tuple(notes), tables)
+    result = Estimate(pd.DataFrame(rows, columns=columns), (*refused, *left_out), tuple(notes), others, tables)
     if out is not None:
         result.save(out)
     return result
@@ -324,7 +336,7 @@ def compensate(
     if pretension_N is not None and not (isinstance(pretension_N, Real) and 0 <= pretension_N < inf):
         raise InputError(f"pretension_N: a tension that is not negative, N; got {pretension_N!r}")
     if out is not None:
-        try_file(out)
+        try_file(out, read=files_among(model, wanted))
     with progress_of(progress) as report:
         of_rig = None if batch is None else as_batch(batch, within(report, 0.0, READING))
         given = () if of_rig is None else (of_rig.recordings, of_rig.name)

@@ -20,6 +20,7 @@ from ccmodel.outputs import new_files
 from ccmodel.paths import existing_file, try_file, try_folder
 from ccmodel.progress import Progress, within
 from ccmodel.recording import Recording
+from ccmodel.rig.findings import Finding
 from ccmodel.steps.files import write_channels
 from ccmodel.steps.predict import (
     MOTION,
@@ -62,11 +63,14 @@ class Prediction(Recordings):
         cycle in ``unit``, ``nrmse_percent`` over the recording's peak to peak in that cycle.
     left_out : tuple of str
         A line on each recording without a prediction.
+    findings : tuple of Finding
+        Faults and contradictions of the batch, which is used all the same; ``str(finding)`` says where and what.
     """
 
     recordings: tuple[Recording, ...]
     errors: pd.DataFrame
     left_out: tuple[str, ...]
+    findings: tuple[Finding, ...]
     # What was predicted, in the order of `recordings`.
     _recorded: tuple[Recording, ...]
 
@@ -203,12 +207,12 @@ def predict(
         try_folder(out)
     with progress_of(progress) as report:
         batch = as_batch(batch, within(report, 0.0, READING))
-        batch._ingested.check_usable(batch.folder)
+        check_same_rig(known, batch)
         name = Path(model).stem if isinstance(model, str | Path) else "model"
         found = predicted(batch.recordings, known.parameters, name, within(report, READING, 1.0))
-    refused = [str(f) for f in batch.findings if f.severity == "refused"]
+    refused, others = sorted_findings(batch)
     recorded, simulations = (tuple(pair[i] for pair in found.pairs) for i in (0, 1))
-    prediction = Prediction(simulations, found.errors, (*refused, *found.failures), recorded)
+    prediction = Prediction(simulations, found.errors, (*refused, *found.failures), others, recorded)
     if out is not None:
         prediction.save(out)
     return prediction
@@ -277,7 +281,7 @@ def simulate(
     if pretension_N is not None and not (isinstance(pretension_N, Real) and 0 <= pretension_N < inf):
         raise InputError(f"pretension_N: a tension that is not negative, N; got {pretension_N!r}")
     if out is not None:
-        try_file(out)
+        try_file(out, read=files_among(model, motion))
     with progress_of(progress) as report:
         of_rig = None if batch is None else as_batch(batch, within(report, 0.0, READING))
         if of_rig is None:
@@ -292,6 +296,32 @@ def simulate(
     if out is not None:
         write_channels(Path(out), simulated)
     return simulated
+
+
+def check_same_rig(model: Model, batch: Batch) -> None:
+    """Check that a batch can be used, and that a model of its rig's kind was given.
+
+    Raises
+    ------
+    InputError
+        If no recording can be used, or one of the two is a pair of cables and the other a single one.
+    """
+    batch._ingested.check_usable(batch.folder)
+    ends = [(model.rig.far_end if model.rig else None), batch.recordings[0].far_end]
+    if model.rig and ends[0] != ends[1]:
+        of_model, of_batch = (f"a single cable with the far end {end}" if end else "a pair of cables" for end in ends)
+        raise InputError(f"{batch.folder}: is {of_batch}, and the model is of {of_model}")
+
+
+def sorted_findings(batch: Batch) -> tuple[list[str], tuple[Finding, ...]]:
+    """Lines on what a batch's files are refused for, and its other findings."""
+    refused = [str(f) for f in batch.findings if f.severity == "refused"]
+    return refused, tuple(f for f in batch.findings if f.severity != "refused")
+
+
+def files_among(*given: object) -> list[str | Path]:
+    """Those of the arguments that name a file."""
+    return [one for one in given if isinstance(one, str | Path)]
 
 
 def as_model(given: Model | HasModel | str | Path) -> Model:
@@ -333,7 +363,7 @@ def as_motion(motion: Motion, name: str = "motion", columns: Sequence[str] = MOT
     if isinstance(motion, str | Path):
         return read_motion(existing_file(motion), columns), str(motion)
     if isinstance(motion, Recording):
-        motion = motion.to_frame()
+        motion = motion.to_frame().set_axis(pd.Index(motion.time_s, name="time_s"))
     if isinstance(motion, xr.Dataset):
         found = [one for one in columns if one in motion]
         motion = motion[found].to_dataframe() if found else pd.DataFrame(columns=list(map(str, motion)))

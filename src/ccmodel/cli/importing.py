@@ -7,7 +7,7 @@ import typer
 
 from ccmodel.cli.group import PREPARE, PROJECT, command
 from ccmodel.cli.interruption import leaving
-from ccmodel.cli.options import Json, Quiet, input_folder, out_folder
+from ccmodel.cli.options import Json, Quiet, input_folder, out_batch
 from ccmodel.cli.output import Output
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def import_(
     files: Annotated[
         list[Path], typer.Argument(metavar="FILES", help="The rig's logs, in any format.", show_default=False)
     ],
-    out: Annotated[Path, out_folder("Folder of the batch; its name becomes the batch's.")],
+    out: Annotated[Path, out_batch("Folder of the batch; its name becomes the batch's.")],
     map_file: Annotated[
         Path | None,
         typer.Option("--map", help="What each column is made of; without it, a map is guessed.", show_default=False),
@@ -89,7 +89,7 @@ def import_mis_tool(
             metavar="SOURCE", help="The data set or one of its folders.", callback=input_folder, show_default=False
         ),
     ],
-    out: Annotated[Path, out_folder("Folder for the batches, one for each tool and angle.")],
+    out: Annotated[Path, out_batch("Folder for the batches, one for each tool and angle.")],
     name: Annotated[
         str | None,
         typer.Option(

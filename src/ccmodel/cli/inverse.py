@@ -56,8 +56,11 @@ def estimate(
         found = ccmodel.estimate(model, batch, out, unknown_load=unknown_load, tolerance=shares, progress=progress)
     lines = [found.errors.to_string(index=False, float_format="{:.3g}".format)] if len(found.errors) else []
     errors, visible = found.errors.to_dict("records"), found.visible_share.to_dict()
-    data = {"out": out, "errors": errors, "visible_share": visible, "notes": found.notes, "left_out": found.left_out}
+    data = {"out": out, "errors": errors, "visible_share": visible, "notes": found.notes}
+    data |= {"findings": [str(finding) for finding in found.findings], "left_out": found.left_out}
     output.result(data, *lines)
+    for finding in found.findings:
+        output.finding(str(finding), finding.severity)
     for line in found.notes:
         output.message(line)
     for line in found.left_out:

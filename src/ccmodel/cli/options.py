@@ -31,7 +31,9 @@ def _checked(check: Callable[..., Path], *, says: bool = False) -> Callable:
 
 
 batch_folder, input_folder, input_file = map(_checked, (paths.batch_folder, paths.existing_folder, paths.existing_file))
-new_folder, new_file = _checked(paths.try_folder, says=True), _checked(paths.try_file, says=True)
+new_folder, new_batch, new_file = (
+    _checked(check, says=True) for check in (paths.try_folder, paths.try_batch_folder, paths.try_file)
+)
 
 _BATCH = {"callback": batch_folder, "autocompletion": completion.batch_folders, "show_default": False}
 
@@ -89,6 +91,11 @@ Quiet = Annotated[bool, typer.Option("--quiet", help="Print the result alone: no
 def out_folder(text: str) -> typer.models.OptionInfo:
     """`--out` of a command that writes a folder."""
     return typer.Option("--out", help=text, callback=new_folder, show_default=False)
+
+
+def out_batch(text: str) -> typer.models.OptionInfo:
+    """`--out` of a command that writes the folder of a batch, or adds to it."""
+    return typer.Option("--out", help=text, callback=new_batch, show_default=False)
 
 
 def out_file(text: str) -> typer.models.OptionInfo:

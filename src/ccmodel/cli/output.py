@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from ccmodel.progress import Progress, shown, silent
+from ccmodel.sentences import shown as as_shown
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -71,10 +72,12 @@ class Output:
 
 
 def say(text: str, style: str | None = None, end: str = "\n") -> None:
-    """Print on standard error, in colour on a terminal; a line is never broken."""
+    """Print on standard error, in colour on a terminal; a line is never broken, and no text of a file controls it."""
     from rich.console import Console
 
-    Console(stderr=True, soft_wrap=True, highlight=False, emoji=False).print(text, style=style, markup=False, end=end)
+    Console(stderr=True, soft_wrap=True, highlight=False, emoji=False).print(
+        "\n".join(map(as_shown, text.split("\n"))), style=style, markup=False, end=end
+    )
 
 
 def print_table(table: "RenderableType") -> None:

@@ -38,7 +38,10 @@ def predict(
         table = predicted.table.reset_index().to_string(index=False, float_format="%.2f")
         lines = ["root mean square error over the last cycle, % of peak to peak", table]
     errors = predicted.errors.to_dict("records")
-    output.result({"out": out, "errors": errors, "left_out": predicted.left_out}, *lines)
+    findings = [str(finding) for finding in predicted.findings]
+    output.result({"out": out, "errors": errors, "findings": findings, "left_out": predicted.left_out}, *lines)
+    for finding in predicted.findings:
+        output.finding(str(finding), finding.severity)
     for line in predicted.left_out:
         output.finding(line, "refused")
     if predicted.left_out:

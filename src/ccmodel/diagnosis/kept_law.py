@@ -19,6 +19,7 @@ from ccmodel.mechanisms.contract import (
 )
 from ccmodel.typed import InputError
 
+LONGEST_NAME = 60
 NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 # What a law of each slot is mistaken for, where no listed mechanism has a law of its argument.
 LOOK_ALIKES = {
@@ -34,8 +35,9 @@ LOOK_ALIKES = {
 
 def check_name(name: str, prefix: str = "") -> None:
     """Raise `InputError` unless a new mechanism can have this name."""
-    if NAME.fullmatch(name) is None:
-        raise InputError(f"{prefix}keep-law: {name!r} is no name of a mechanism: small letters, as in stick-in-seal")
+    if NAME.fullmatch(name) is None or len(name) > LONGEST_NAME:
+        wanted = f"at most {LONGEST_NAME} small letters, as in stick-in-seal"
+        raise InputError(f"{prefix}keep-law: {name!r} is no name of a mechanism: {wanted}")
     if name in registry.names() or name in registry.laws():
         raise InputError(f"{prefix}keep-law: {name} is a mechanism already; take another name")
 

@@ -108,9 +108,7 @@ def _drive(given: ModelInput, parameters: Parameters, wanted: NDArray) -> NDArra
     else:
         theta_in, solved = follow.exact(transmission, stiffness, initial, wanted)
     if solved < wanted.size:
-        raise ModelError(
-            f"no motion of the drive was found that turns the load to its wanted angle at sample {solved}"
-        )
+        raise ModelError(f"no motion of the drive was found that turns the load to its wanted angle at sample {solved}")
     return theta_in
 
 

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, ValidationError
 
+from ccmodel import inputs
 from ccmodel import mechanisms as registry
 from ccmodel.geometry import ConduitPath
 from ccmodel.model.active import Active
@@ -24,6 +25,10 @@ _KNOWN = {f.name: f for f in fields(Parameters) if f.name not in ("mechanisms", 
 _REQUIRED = [name for name, f in _KNOWN.items() if f.default is MISSING]
 _SESSION = ("session_start_s", "session_end_s")  # not in a file where they are not known
 _OPTIONAL = [name for name, f in _KNOWN.items() if "None" in str(f.type)]
+
+
+# Magnitudes of parameters in SI units other than zero: what is beyond them overflows.
+SMALLEST, LARGEST = 1e-15, 1e15
 
 
 class _ActiveEntry(TypedModel):
@@ -257,6 +262,7 @@ def read_model_file(path: Path) -> Model:
         With one line on the file's fault.
     """
     try:
+        inputs.check_file(Path(path), inputs.MODEL)
         text = Path(path).read_text(encoding="utf-8")
         stated = _ModelFile.model_validate_json(text)
     except (OSError, UnicodeDecodeError) as error:
@@ -285,6 +291,8 @@ def _parameters(path: Path, stated: _ModelFile) -> Parameters:
             raise InputError(f"{path}: parameters: no parameter is called '{name}'; {advice(name, _KNOWN)}")
         if value is None and name not in _OPTIONAL:
             raise InputError(f"{path}: parameters.{name}: null; a number is needed")
+        if value and not SMALLEST < abs(value) < LARGEST:
+            raise InputError(f"{path}: parameters.{name}: {value:g} is no value of a rig")
     if missing := [name for name in _REQUIRED if name not in values]:
         raise InputError(f"{path}: parameters: no {', '.join(missing)}; a model needs it")
     return Parameters(**values, mechanisms=mechanisms)

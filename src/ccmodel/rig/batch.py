@@ -4,6 +4,7 @@ All keys that were added later are optional, so a file written before them keeps
 """
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from functools import reduce
@@ -35,6 +36,7 @@ from ccmodel.typed import (
     LARGEST,
     Borrowed,
     FillIn,
+    Finite,
     InputError,
     Loc,
     NotNegative,
@@ -123,14 +125,14 @@ class LoadCell(TypedModel):
     """A load cell between slide and conduit plate: force = (V - zero_V) / sensitivity_V_per_N, in N."""
 
     sensitivity_V_per_N: Annotated[Positive, FillIn("the sensitivity of this load cell, V/N")]
-    zero_V: Annotated[float, FillIn("the reading of this load cell without force, V")]
+    zero_V: Annotated[Finite, FillIn("the reading of this load cell without force, V")]
 
 
 class TorqueSensor(TypedModel):
     """A torque sensor logged in counts: torque = (counts - zero_counts) * Nm_per_count, in N m."""
 
     Nm_per_count: Annotated[Positive, FillIn("the scale of this torque sensor, N m per count")]
-    zero_counts: float = 0.0
+    zero_counts: Finite = 0.0
 
 
 class Side(TypedModel):
@@ -297,6 +299,8 @@ CONDUIT = "the pieces of the conduit from the drive end, as [{length_m: 1.2, ben
 def _moment(stated: Any) -> datetime | None:
     """A date with a time of day; without an offset from UTC it is UTC."""
     try:
+        if isinstance(stated, str) and not re.search("[Tt ]", stated.strip()):
+            raise ValueError
         at = datetime.fromisoformat(stated) if isinstance(stated, str) else stated
         return at if at is None or at.tzinfo else at.replace(tzinfo=UTC)
     except (AttributeError, TypeError, ValueError):
@@ -346,6 +350,8 @@ class RecordingEntry(TypedModel):
     def _file_inside_the_batch(cls, file: str) -> str:
         if not file.strip():
             raise ValueError("must be the log's path, from the batch's folder")
+        if not file.isprintable():
+            raise ValueError(f"{file!r}: has characters that do not show; rename the log")
         if Path(file).is_absolute() or ".." in Path(file).parts:
             raise ValueError("a log lies inside its batch's folder: give its path from there")
         return file
@@ -403,9 +409,9 @@ class Batch(TypedModel):
     def _each_once(cls, recordings: tuple[RecordingEntry, ...]) -> tuple[RecordingEntry, ...]:
         # A file may be written in several ways: a.csv, ./a.csv.
         for key, values in {"id": [r.id for r in recordings], "file": [normpath(r.file) for r in recordings]}.items():
-            twice = sorted({v for v in values if values.count(v) > 1})
-            if twice:
-                raise ValueError(f"{key} '{twice[0]}' is given to {values.count(twice[0])} recordings")
+            counts = Counter(values)
+            if twice := sorted(value for value, count in counts.items() if count > 1):
+                raise ValueError(f"{key} '{twice[0]}' is given to {counts[twice[0]]} recordings")
         return recordings
 
 

@@ -22,6 +22,7 @@ from ccmodel.rig.findings import LogError
 from ccmodel.rig.log import read_log
 from ccmodel.rig.overview import ChannelOverview, Overview, overview
 from ccmodel.rig.readers import registry
+from ccmodel.sentences import shown
 from ccmodel.typed import InputError, Problem
 
 ENDS = ("drive", "load")
@@ -125,6 +126,9 @@ def _read(folder: Path) -> tuple[list[_Log], dict[str, str]]:
         if not path.is_file() or not path.name.lower().removesuffix(".gz").endswith(_suffixes()):
             continue
         file = path.relative_to(folder).as_posix()
+        if not file.isprintable():
+            text = f"{file!r}: has characters that do not show; rename the log"
+            raise InputError.of(Problem(str(folder), None, text))
         try:
             logs.append(_Log(file, read_log(path)[0]))
         except LogError as error:
@@ -182,7 +186,7 @@ def _content(name: str, logs: Sequence[_Log], refused: dict[str, str]) -> Lines:
     for log in logs:
         yield from _entry(ids[log.file], log, pretensions[log.file] if differ else None)
     for file, text in refused.items():
-        yield f"# not used: {file}: {text}"
+        yield f"# not used: {file}: {shown(text)}"
 
 
 def _side(end: str, columns: set[str], logs: Sequence[_Log]) -> Lines:

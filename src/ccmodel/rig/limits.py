@@ -76,4 +76,6 @@ OUTSTANDING_FACTOR, OUTSTANDING_GRAINS, NEAR_SAMPLES = 2.5, 2.0, 12
 OUTLIER_NEIGHBOURS, OUTLIER_FACTOR, OUTLIER_SHARE, OUTLIER_GRAINS = 5, 4.0, 0.05, 5
 OUTLIER_RANGE = (0.005, 0.995)
 # The first and the last reading must be this many ranges from the median.
-OUTLIER_AT_ENDS = 10
+OUTLIER_AT_ENDS = 4
+# Share of the samples up to which frequent outliers are looked for.
+MOST_OUTLIERS = 0.3

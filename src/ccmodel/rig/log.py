@@ -55,8 +55,9 @@ def read_log(path: Path) -> tuple[pd.DataFrame, list[Defect]]:
 
 def _check_header(header: list[str]) -> list[Defect]:
     unknown = [name for name in header if name not in COLUMNS]
+    missing = [column for column in COLUMNS if column not in set(header)]
     for name in unknown:
-        guess = nearest(name, [c for c in COLUMNS if c not in header], MISSPELT)
+        guess = nearest(name, missing, MISSPELT)
         if guess:
             convert = f" That is in {_unit(guess)}: convert the values." if _unit(guess) != _unit(name) else ""
             raise LogError(1, name, f"unknown column; did you mean '{guess}'?{convert}")

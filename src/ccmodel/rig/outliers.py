@@ -37,10 +37,10 @@ def drop_outliers(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Defect]]:
     table : DataFrame
         The other rows.
     warnings : list of Defect
-        One for each column with impossible readings.
+        One for each column with impossible readings; where they are many, they are not dropped.
     """
     is_bad, warnings = np.zeros(len(table), bool), []
-    for column in table.columns.drop(NOT_ANALOG, errors="ignore"):
+    for column in table.columns.drop(list(NOT_ANALOG), errors="ignore"):
         values = table[column].to_numpy()
         found = outliers(values)
         if found.size:
@@ -52,6 +52,10 @@ def drop_outliers(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Defect]]:
             )
             warnings.append(Defect(int(table.index[at]), column, text))
             is_bad[found] = True
+        elif (often := frequent_outliers(values)).size:
+            share = f"{often.size} single readings ({often.size / values.size:.1%})"
+            text = f"{share} are far from all near them, up to {values[often[np.argmax(np.abs(values[often]))]]:g}"
+            warnings.append(Defect(int(table.index[often[0]]), column, f"{text}: is the sensor faulty? They are used"))
     return without(table, is_bad), warnings
 
 
@@ -76,18 +80,41 @@ def outliers(values: NDArray) -> NDArray:
     ndarray of int
         In ascending order.
     """
+    distance, least = _distances(values)
+    return _standing_out(distance, max(int(limits.BAD_CELLS_FRACTION * values.size), 1), least)
+
+
+def frequent_outliers(values: NDArray) -> NDArray:
+    """As `outliers`, of readings that are more than a few: each is also far from the readings before and after it.
+
+    A load that snaps again and again is not back in the next sample.
+    """
+    distance, least = _distances(values)
+    if not distance.size:
+        return outliers(values)
+    steps = np.abs(np.diff(values))
+    # The first and the last reading have one neighbour, and may be part of another motion.
+    single = np.minimum(np.append(steps, 0.0), np.insert(steps, 0, 0.0))
+    return _standing_out(np.minimum(distance, single), int(limits.MOST_OUTLIERS * values.size), least)
+
+
+def _distances(values: NDArray) -> tuple[NDArray, float]:
+    """Distances from the median of the neighbours, and the least that counts; none where no step is large enough."""
     steps = np.abs(np.diff(values))
     low, high = np.quantile(values, limits.OUTLIER_RANGE)
     least = max(limits.OUTLIER_SHARE * (high - low), limits.OUTLIER_GRAINS * steps[steps > 0].min(initial=np.inf))
-    # Most channels have no step that is large enough, and are done.
     if not (2 * steps > least).any():
-        return np.array([], int)
+        return np.array([]), least
     distance = np.abs(values - median_filter(values, footprint=NEIGHBOURS, mode="mirror"))
     # A first or last reading may be part of a motion that the log has not, as in the public recordings.
     is_far = np.abs(values - np.median(values)) > limits.OUTLIER_AT_ENDS * (high - low)
     distance[[0, -1]] *= is_far[[0, -1]]
+    return distance, least
+
+
+def _standing_out(distance: NDArray, most: int, least: float) -> NDArray:
+    """Positions of the largest distances, at most so many, of which the last is larger than the next by a factor."""
     order = np.argsort(-distance, kind="stable")
-    most = max(int(limits.BAD_CELLS_FRACTION * values.size), 1)
     leading = distance[order[: most + 1]]
     stands_out = (leading[:-1] > limits.OUTLIER_FACTOR * leading[1:]) & (leading[:-1] > least)
     return np.sort(order[: np.flatnonzero(stands_out)[-1] + 1]) if stands_out.any() else np.array([], int)

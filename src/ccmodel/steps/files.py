@@ -1,6 +1,9 @@
 """Files that the steps exchange: recordings of a batch, its summary, fits and simulations."""
 
 import json
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from math import inf
 from pathlib import Path
@@ -78,8 +81,24 @@ def read_pairs(recordings_file: Path, simulated_file: Path) -> list[Pair]:
     return [(r, simulated.get(r.id)) for r in read_recordings(recordings_file)]
 
 
+@contextmanager
+def longer_rows_refused() -> Iterator[None]:
+    """Raise `ValueError` where a CSV that pandas reads has rows with more cells than its header.
+
+    Their first cells would be taken for an index, and all columns be shifted.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", pd.errors.ParserWarning)
+        try:
+            yield
+        except pd.errors.ParserWarning:
+            raise ValueError("its rows have more cells than its header") from None
+
+
 def write_table(file: Path, table: pd.DataFrame, digits: int = 6) -> None:
-    """Write a table as CSV."""
+    """Write a table as CSV. Times have nine decimals: on the clock of a log they may be seconds since 1970."""
+    if "time_s" in table:
+        table = table.assign(time_s=[f"{t:.9f}".rstrip("0").rstrip(".") for t in table["time_s"]])
     with new_file(file) as fresh:
         table.to_csv(fresh, index=False, float_format=f"%.{digits}g")
 

@@ -1,5 +1,6 @@
 """A model file -> predicted sensor readings: of a batch's recordings, or of any motion of the drive."""
 
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from ccmodel import inputs
 from ccmodel.channels import THETA_IN
 from ccmodel.errors import error_table
 from ccmodel.model.files import Model
@@ -14,6 +16,9 @@ from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
 from ccmodel.progress import Progress, silent
 from ccmodel.recording import Recording
+from ccmodel.rig.findings import LogError
+from ccmodel.rig.readers.content import content_of
+from ccmodel.steps.files import longer_rows_refused
 from ccmodel.steps.simulate import simulate_each
 from ccmodel.typed import InputError
 
@@ -132,7 +137,14 @@ def read_motion(file: Path, columns: Sequence[str] = MOTION) -> pd.DataFrame:
         If the file cannot be used.
     """
     try:
-        table = pd.read_csv(file, skipinitialspace=True, skip_blank_lines=False, low_memory=False)
+        inputs.check_file(file, inputs.LOG)
+        content = io.BytesIO(content_of(file))
+        with longer_rows_refused():
+            table = pd.read_csv(
+                content, skipinitialspace=True, skip_blank_lines=False, low_memory=False, index_col=False
+            )
+    except LogError as error:
+        raise InputError(f"{file}: {error.defect.text}") from None
     except pd.errors.EmptyDataError:
         raise InputError(f"{file}: is empty; {_expected(columns)}") from None
     except (OSError, ValueError) as error:

@@ -38,6 +38,7 @@ def test_a_german_lab(tmp_path):
     layout = {"separator": ";", "decimal": ",", "encoding": "cp1252", "head": ["Prüfstand 3", "Datum: 1.2.2024"]}
     guessed, sure, open_ = guess(tmp_path, columns, **layout)
     assert (guessed.time.signal, guessed.time.unit, guessed.time_is_sure) == ("Zeit", "ms", True)
+    assert guessed.time_why.endswith("; the file states ms")
     assert sure == {
         "theta_in_rad": (1, "Antriebswinkel", "°"),
         "theta_out_rad": (-1, "Abtriebswinkel", "°"),

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 from made_up_lab import recording, write_text
+from pydantic import ValidationError
 
 from ccmodel.rig.importing import import_files
-from ccmodel.rig.importing.map import load_map
+from ccmodel.rig.importing.map import Clock, load_map
 from ccmodel.typed import InputError
 
 GOOD = """\
@@ -134,3 +135,13 @@ def test_the_map_wins_over_the_file_and_says_so(tmp_path):
     built = import_of(tmp_path, GOOD, **columns)
     assert built.table["theta_in_rad"].to_numpy() == pytest.approx(r["theta_in_rad"])
     assert "run.csv: 'q' is taken in rad as the map says; the file says deg" in built.remarks
+    assert not any("'F' is taken in" in remark for remark in built.remarks)
+
+
+@pytest.mark.parametrize(("drift", "is_one"), [(-1e-4, True), (1e-4, True), (-1.0, False), (1.0, False)])
+def test_a_clock_may_be_fast_or_slow_by_little(drift, is_one):
+    if is_one:
+        assert Clock(offset_s=0.0, drift=drift).drift == drift
+    else:
+        with pytest.raises(ValidationError):
+            Clock(offset_s=0.0, drift=drift)

@@ -60,6 +60,18 @@ def test_a_gain_leads_from_one_dimension_to_another():
         gain_factor("about two", "V", "N")
 
 
+@pytest.mark.parametrize(
+    "text", ["A**9**9**9", "9^9^9^9 A", "2**99999999999*A", "((9**9)**9)**9*A", "A^(10)", "A" + "*A" * 40]
+)
+def test_powers_without_an_end_are_no_unit(text):
+    assert not is_unit(text)
+
+
+@pytest.mark.parametrize("text", ["m/s^2", "kg*m**2", "V/Hz**0.5", "s^-1", "m²"])
+def test_powers_of_units_are_read(text):
+    assert is_unit(text)
+
+
 def test_what_is_no_unit():
     assert not any(map(is_unit, ("", "-", "1", "[-]", "hello world", "__import__('os')", "1e9")))
     assert quantity_of("hello") == ""

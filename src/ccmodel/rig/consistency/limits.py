@@ -53,8 +53,8 @@ PRETENSION_FACTOR = 2.0
 MOST_TORQUE = 1.5
 # Radii of pulleys, m.
 SMALLEST_RADIUS_M, LARGEST_RADIUS_M = 3e-4, 0.25
-# Longest conduit or cable, m, and stated accuracy as a share of the largest range that its sensors show.
-LONGEST_PATH_M, COARSEST_ACCURACY = 100.0, 0.5
+# Longest and shortest conduit or cable, m, and stated accuracy as a share of the largest range that its sensors show.
+LONGEST_PATH_M, SHORTEST_PATH_M, COARSEST_ACCURACY = 100.0, 5e-3, 0.5
 # Largest bend of a conduit, rad: more than nine loops. A quarter of a turn in degrees is 90.
 LARGEST_BEND_RAD = 60.0
 # Bend below which a conduit counts as straight, rad, and logarithm of the ratio of tensions that a straight one lacks.

@@ -110,16 +110,28 @@ def _conduits(parities: Sequence[Parity], batch: Batch) -> list[Contradiction]:
     bend = most_bent.path.bend_rad
     text = f"the conduit of {most_bent.id} bends by {bend:g} rad: is the bend in degrees? State bend_rad in rad"
     bent = [Contradiction("bend_rad", text)] if bend > limits.LARGEST_BEND_RAD else []
-    return bent + [
-        Contradiction(key, f"{what} is {length:g} m long: is the length in mm? State {key} in m")
-        for (key, what), length in lengths.items()
-        if length > limits.LONGEST_PATH_M
-    ]
+    return (
+        bent
+        + [
+            Contradiction(key, f"{what} is {length:g} m long: is the length in mm? State {key} in m")
+            for (key, what), length in lengths.items()
+            if length > limits.LONGEST_PATH_M
+        ]
+        + [
+            Contradiction(key, f"{what} is {length:g} m long: no conduit of a cable rig; state {key} in m")
+            for (key, what), length in lengths.items()
+            if length < limits.SHORTEST_PATH_M
+        ]
+    )
 
 
 def _accuracies(parities: Sequence[Parity]) -> list[Contradiction]:
     """Stated accuracies that are as large as what the sensors read."""
-    stated = {**dict.fromkeys(TORQUE_AT.values(), "torque_Nm"), **dict.fromkeys(SUM_AT.values(), "load_cell_N")}
+    stated = {
+        **dict.fromkeys(TORQUE_AT.values(), "torque_Nm"),
+        **dict.fromkeys(SUM_AT.values(), "load_cell_N"),
+        **dict.fromkeys(ANGLE_AT.values(), "encoder_rad"),
+    }
     found = {}
     for channel, key in stated.items():
         reading = [p for p in parities if channel in p.recording]

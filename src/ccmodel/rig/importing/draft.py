@@ -19,6 +19,7 @@ from ccmodel.rig.importing.names import DRIVE, LOAD, read_name
 from ccmodel.rig.importing.sources import names_of
 from ccmodel.rig.importing.writing import MAP, check_folder
 from ccmodel.rig.readers.contract import SignalFile
+from ccmodel.sentences import shown
 from ccmodel.typed import InputError, Problem
 
 _HEAD = """\
@@ -231,7 +232,7 @@ def map_text(guessed: Mapping[str, GuessedFile], patterns: Mapping[str, str], re
         YAML with comments.
     """
     several = len(guessed) > 1
-    lines = [_HEAD, *(f"# {remark}" for remark in remarks), "format: 1"]
+    lines = [_HEAD, *(f"# {shown(remark)}" for remark in remarks), "format: 1"]
     if not several:
         lines += _time_lines(next(iter(guessed.values())), "")
     lines += ["channels:"]

@@ -30,7 +30,10 @@ def names_of(files: Sequence[Path]) -> dict[Path, str]:
     """Names of files for people and for provenance: their paths below the folder that they share."""
     resolved = {file: _absolute(file) for file in files}
     shared = os.path.commonpath([path.parent for path in resolved.values()])
-    return {file: path.relative_to(shared).as_posix() for file, path in resolved.items()}
+    names = {file: path.relative_to(shared).as_posix() for file, path in resolved.items()}
+    if odd := [name for name in names.values() if not name.isprintable()]:
+        raise InputError(f"{odd[0]!r}: has characters that do not show; rename the file")
+    return names
 
 
 def recordings_of(files: Sequence[Path], stated: ImportMap) -> tuple[list[Source], list[str]]:

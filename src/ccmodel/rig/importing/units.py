@@ -22,6 +22,9 @@ _SPELT = {
     "°": " degree ",
     "%": " percent ",
 }
+LONGEST_UNIT = 60
+# A power of a unit: a small number that has no further power.
+_POWER = re.compile(r"(?<!\))\*\*\s*[-+]?\d(\.\d)?(?![\d.])(?!\s*\*\*)")
 _AMBIGUOUS = {"grad": "'deg' for degrees or 'gon'", "nm": "'Nm' for newton metres", "NM": "'Nm' for newton metres"}
 # What a dimension is called, by a unit that has it.
 _CALLED = {
@@ -115,10 +118,14 @@ def _unit(text: str) -> pint.Unit:
     for pattern, meant in _SPELT.items():
         spelt = re.sub(pattern, meant, spelt)
     try:
+        # The parser computes powers: those of a number to a power to a power have no end.
+        if len(spelt) > LONGEST_UNIT or "**" in _POWER.sub("", spelt):
+            raise ValueError
         return _registry().parse_units(spelt.strip())
     # A text that is no unit makes the parser of expressions raise errors of many kinds.
     except Exception:
-        raise UnitError(f"unit '{stripped}' is not known: write it as 'N*m', 'mN', 'deg', 'count', 'ms'") from None
+        text = f"unit '{stripped[:LONGEST_UNIT]}' is not known: write it as 'N*m', 'mN', 'deg', 'count', 'ms'"
+        raise UnitError(text) from None
 
 
 def _stripped(text: str) -> str:

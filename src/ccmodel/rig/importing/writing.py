@@ -12,8 +12,9 @@ import numpy as np
 import pandas as pd
 
 import ccmodel
+from ccmodel import inputs
 from ccmodel.outputs import new_folder
-from ccmodel.paths import try_folder
+from ccmodel.paths import try_batch_folder
 from ccmodel.progress import Progress, each_of, silent, within
 from ccmodel.provenance import file_digest
 from ccmodel.rig.batch import NAMES, valid_name
@@ -111,7 +112,7 @@ def check_folder(out: Path) -> None:
     """
     if not valid_name(out.name):
         raise InputError(f"{out}: its name becomes the batch's, and {NAMES}: choose another folder")
-    try_folder(out.parent)
+    try_batch_folder(out.parent)
     if not out.exists():
         return
     if not out.is_dir():
@@ -134,6 +135,7 @@ def _files_of_import(folder: Path) -> list[str]:
 
 def _content(file: Path) -> bytes:
     try:
+        inputs.check_file(Path(file), inputs.DOCUMENT)
         return Path(file).read_bytes()
     except FileNotFoundError:
         raise InputError(f"{file}: there is no such map; leave --map out and one is written to begin with") from None
