@@ -1,11 +1,14 @@
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from ccmodel import mechanisms
-from ccmodel.diagnosis.hypothesis import Hypothesis, plausible, single_mechanisms
+from ccmodel.diagnosis import settings
+from ccmodel.diagnosis.hypothesis import Hypothesis, _bounds, plausible, single_mechanisms
 from ccmodel.diagnosis.screening import scaled
+from ccmodel.mechanisms import Parameter
 from ccmodel.model.parameters import mechanism_parameter
 from made_observations import PARAMETERS
 
@@ -102,3 +105,10 @@ def test_of_a_strength_with_a_state_what_is_left_is_judged():
     change, done = (f"running-in/conduit/{name}" for name in ("change", "done"))
     found = [plausible(running_in, {change: -0.5, done: share}) for share in (0.0, 0.05, 0.5)]
     assert found == [False, False, True]
+
+
+def test_a_signed_strength_is_bounded_alike_on_both_sides():
+    signed = Parameter("x", "1", 0.02, 0.2, 0.05, "a share", signed=True)
+    low, high = _bounds(signed, is_strength=True)
+    assert -low == high == settings.BEYOND_RANGE * 0.2
+    assert _bounds(replace(signed, signed=False), is_strength=True) == (0.0, high)

@@ -1,6 +1,7 @@
 """Where the checks of sensors begin to speak, on both sides of each limit."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from made_up_batch import description, table
 from ccmodel.rig import limits
 from ccmodel.rig.angle import angle_of
 from ccmodel.rig.batch import Rig
+from ccmodel.rig.consistency.runs import _bend_for
 from ccmodel.rig.sensor_checks import _frozen, _is_moved, _lost_samples, _saturated, _standstills
 
 RIG = Rig.model_validate_json(json.dumps(description()["rig"]))
@@ -89,3 +91,11 @@ def test_angles_that_jump_all_the_time_lost_no_samples():
     assert jumped([]) is None
     assert jumped(range(100, 700, 25)) is not None
     assert jumped(range(100, 700, 13)) is None
+
+
+def test_a_forgotten_bend_is_that_of_the_friction_that_is_seen():
+    cable = SimpleNamespace(friction_coefficient=0.15)
+    parity = SimpleNamespace(batch=SimpleNamespace(rig=SimpleNamespace(cable=cable)))
+    assert _bend_for(parity, 0.3) == "2 rad"
+    cable.friction_coefficient = 0.0
+    assert _bend_for(parity, 0.3) == "some radians"

@@ -156,6 +156,12 @@ def test_a_capture_with_two_axes_one_of_them_a_step(tmp_path):
     np.testing.assert_allclose(signals["torque"].time_s, T, atol=1e-12)
 
 
+def test_a_capture_that_names_no_axis_has_the_first(tmp_path):
+    xs = np.array([{"Name": "slow", "Data": T, "Unit": "s"}, {"Name": "fast", "Data": 2 * T}])
+    signals = read(v5(tmp_path, capture={"X": xs, "Y": np.array([{"Name": "a", "Data": X}, {"Name": "b", "Data": X}])}))
+    assert (signals["a"].time_s == T).all()
+
+
 def opaque(name: str, kind: str) -> bytes:
     """A variable of a MATLAB class in a v5 file: names of variable, object system and class, then a reference."""
 

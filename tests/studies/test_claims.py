@@ -1,6 +1,7 @@
 """Claims on runs whose answer is known, and on too little to go by."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,9 +9,9 @@ import pytest
 from ccmodel.errors import last_cycle
 from ccmodel.repeats import condition_of, estimates, pooled_scatter
 from ccmodel.report.figures import save_figure
-from ccmodel.studies.claims import model_runs
+from ccmodel.studies.claims import model_runs, study
 from ccmodel.studies.claims.claim import Row, Verdict
-from ccmodel.studies.claims.figure import model_figure, recordings_figure
+from ccmodel.studies.claims.figure import _reach, model_figure, recordings_figure
 from ccmodel.studies.claims.recordings import _model_has_sign, _Series
 from ccmodel.studies.claims.settings import Claims
 from ccmodel.studies.claims.study import claims_of
@@ -186,3 +187,29 @@ def test_repeats_are_told_by_their_last_letter(found):
     recorded = pairs_over([(model_runs.even(STUDY), 7.0)])[0][0]
     assert condition_of(recorded) == "b/r0"
     assert condition_of(replace(recorded, id="t-7N")) == "b/t-7N"
+
+
+def test_the_recordings_of_a_study_are_those_of_its_runs(monkeypatch):
+    asked = {}
+    monkeypatch.setattr(study, "claims_of", lambda pairs, parameters, *_: asked.update(pairs, of=parameters) or [])
+    monkeypatch.setattr(study, "recordings_figure", lambda *_: None)
+    monkeypatch.setattr(study, "model_figure", lambda found, loops: asked.update(loops=loops))
+    monkeypatch.setattr(study, "batches_of", lambda pairs: "")
+    runs = [
+        SimpleNamespace(label=label, pairs=[label], fitted=SimpleNamespace(parameters=None))
+        for label in ("radius", "bend", "pretension", "bend")
+    ]
+    study.judge(CLAIMS, runs, HOW)
+    assert asked == {
+        "bend": ["bend", "bend"],
+        "pretension": ["pretension"],
+        "radius": ["radius"],
+        "of": None,
+        "loops": {},
+    }
+
+
+def test_an_error_bar_ends_where_the_interval_does():
+    row = Row("width", "rad", "a", 0.0, "model", value=3.0, low=1.0, high=4.0)
+    assert _reach(3.0, row) == (2.0, 1.0)
+    assert _reach(3.0, replace(row, low=None)) == _reach(3.0, replace(row, high=None)) == (0.0, 0.0)
