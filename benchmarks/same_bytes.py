@@ -34,13 +34,16 @@ ROOT = Path(__file__).parents[1]
 TUTORIAL = ROOT / "docs/tutorial"
 PIPELINE = "pipeline"
 # Verdicts, with the batches that have them.
-VERDICTS = ("agrees", "explained", "undecided", "learned")
+VERDICTS = ("agrees", "explained", "undecided", "learned", "unexplained")
 # Seed of a rig of the proof whose motor cogs, which is on no list, and how many of its recordings are enough.
 COGGING, ENOUGH = 60003, 4
 # A batch of the repository whose diagnosis reaches this limit on model runs.
 LIMITED, RUN_LIMIT = "rich", "9000"
 JOBS = (PIPELINE, *VERDICTS, LIMITED)
-RUBBING_A = 0.17
+# Currents of a bearing that rubs at the drive: one too small to be told from others in a single recording, and one
+# whose mechanism is not on the list and whose law is not tried.
+RUBBING_A = {"undecided": 0.04, "unexplained": 0.17}
+WITHOUT_LAWS = ("--without", "pulley-friction", "--run-limit", "3000")
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 BASE = dict.fromkeys(THREADS, "1") | {"PYTHONHASHSEED": "0", "LC_ALL": "C.UTF-8", "TZ": "UTC"}
 GERMAN = "de_DE.UTF-8"
@@ -81,11 +84,11 @@ VARIANTS = {
 }
 
 
-def rubbing(table: pd.DataFrame) -> pd.DataFrame:
+def rubbing(table: pd.DataFrame, current_A: float) -> pd.DataFrame:
     """A bearing at the drive: a torque against the motion, which the cables know nothing of."""
     turn = np.diff(table["drive_encoder_counts"], prepend=table["drive_encoder_counts"].iloc[0])
     way = pd.Series(np.sign(turn)).replace(0, np.nan).ffill().fillna(0)
-    table["drive_current_A"] += RUBBING_A * way
+    table["drive_current_A"] += current_A * way
     return table
 
 
@@ -110,7 +113,8 @@ def prepare(folder: Path) -> None:
     config = {"studies": studies, "baseline": {"file": "config/baseline.json", "history": "config/history.csv"}}
     (folder / "config.yaml").write_text(yaml.safe_dump(config))
     write_batch(folder / "agrees")
-    spoil(write_batch(folder / "undecided", pretensions=(7.0,)), rubbing)
+    for name, pretensions in (("undecided", (7.0,)), ("unexplained", (7.0, 6.0, 5.0))):
+        spoil(write_batch(folder / name, pretensions=pretensions), partial(rubbing, current_A=RUBBING_A[name]))
     logs = [str(log) for log in sorted((TUTORIAL / "logs").glob("*.csv"))]
     line = ["-m", "ccmodel.cli", "import", *logs, "--map", str(TUTORIAL / "map.yaml"), "--out", "explained", "--quiet"]
     subprocess.run([sys.executable, *line], cwd=folder, check=True, capture_output=True)
@@ -125,6 +129,8 @@ def line_of(job: str, cores: int) -> list[str]:
         snakemake = ["-m", "snakemake", "--snakefile", str(ROOT / "Snakefile"), "--configfile", "config.yaml"]
         return [*snakemake, "--cores", str(cores)]
     limits = ["--time-limit", "100000", *(["--run-limit", RUN_LIMIT] if job == LIMITED else [])]
+    if job == "unexplained":
+        limits += WITHOUT_LAWS
     return ["-m", "ccmodel.cli", "diagnose", job, "--out", "results", *limits, "--quiet"]
 
 

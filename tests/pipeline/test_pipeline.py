@@ -387,7 +387,7 @@ def test_bad_input_is_a_line_each_and_nothing_else_is_lost(copy):
     assert run.returncode == 0, run.stdout + run.stderr
     said = ccmodel("report", str(copy / "results"))
     assert said.returncode == 1
-    lines = [line for line in said.stderr.splitlines() if line.startswith("left out")]
+    lines = [line for line in said.stderr.splitlines() if line.startswith("refused")]
     assert len(lines) == 4, said.stderr
     for place, what in (
         ("misspelt/batch.yaml", "did you mean 'pretension_N'"),
@@ -415,7 +415,8 @@ def test_a_refused_batch_takes_only_its_own_with_it(copy):
     run = snakemake(copy)
     assert run.returncode == 0, run.stdout + run.stderr
     lines = ccmodel("report", str(copy / "results")).stderr
-    for said in ("did you mean 'format'", "not a batch: a batch's name", "empty/batch.yaml", "fit fitted: no usable"):
+    every = "did you mean 'format'", "not a batch: a name is letters", "empty/batch.yaml", "fit fitted: no usable"
+    for said in every:
         assert said in lines
     assert "not simulated" in (copy / "results/figures/added.svg").read_text()
     assert set(pd.read_parquet(copy / "results/tables/errors.parquet")["batch"]) == {"other"}
