@@ -242,9 +242,7 @@ def test_a_prediction_says_what_is_wrong_with_its_batch(fitted, folder, tmp_path
 
 def test_a_model_of_a_pair_does_not_predict_a_single_cable(fitted, batch):
     of_single = replace(fitted.model, rig=replace(fitted.model.rig, far_end="fixed"))
-    with pytest.raises(
-        cc.InputError, match="is a pair of cables, and the model is of a single cable with the far end fixed"
-    ):
+    with pytest.raises(cc.InputError, match="is of a pair of cables, and the model is of a single cable"):
         cc.predict(of_single, batch)
 
 

@@ -61,6 +61,11 @@ def test_a_value_that_overflows_is_named(tmp_path, name, value):
         read_model_file(write(tmp_path / "model.json", **{name: value}))
 
 
+def test_a_value_may_be_as_small_as_a_fit_leaves_it(tmp_path):
+    read = read_model_file(write(tmp_path / "model.json", tau_in_zero_Nm=-1e-18, pretension_N=0.0)).parameters
+    assert (read.tau_in_zero_Nm, read.pretension_N) == (-1e-18, 0.0)
+
+
 def test_a_file_that_is_far_too_large_is_not_read(tmp_path):
     with open(tmp_path / "model.json", "wb") as file:
         file.truncate(1_500_000_000)

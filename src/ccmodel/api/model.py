@@ -307,10 +307,13 @@ def check_same_rig(model: Model, batch: Batch) -> None:
         If no recording can be used, or one of the two is a pair of cables and the other a single one.
     """
     batch._ingested.check_usable(batch.folder)
-    ends = [(model.rig.far_end if model.rig else None), batch.recordings[0].far_end]
-    if model.rig and ends[0] != ends[1]:
-        of_model, of_batch = (f"a single cable with the far end {end}" if end else "a pair of cables" for end in ends)
-        raise InputError(f"{batch.folder}: is {of_batch}, and the model is of {of_model}")
+    if model.rig is None:
+        return
+    of_model, of_batch = (
+        "a single cable" if end else "a pair of cables" for end in (model.rig.far_end, batch.recordings[0].far_end)
+    )
+    if of_model != of_batch:
+        raise InputError(f"{batch.folder}: is of {of_batch}, and the model is of {of_model}")
 
 
 def sorted_findings(batch: Batch) -> tuple[list[str], tuple[Finding, ...]]:
