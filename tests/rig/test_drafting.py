@@ -1,4 +1,5 @@
 import gzip
+import os
 import re
 
 import numpy as np
@@ -10,7 +11,9 @@ from ccmodel.cli import app
 from ccmodel.model.model_input import ModelInput
 from ccmodel.rig.batch import load_batch
 from ccmodel.rig.drafting import draft_batch
+from ccmodel.rig.importing.sources import names_of
 from ccmodel.rig.ingest import ingest_batch
+from ccmodel.sentences import controls_in
 from ccmodel.typed import InputError
 
 STEP = 2 * np.pi / 4096
@@ -258,3 +261,19 @@ def test_a_log_whose_angle_stands_still_hides_no_step(tmp_path):
 def test_a_name_with_a_raised_digit_is_a_name(tmp_path):
     draft_batch(folder_of(tmp_path, {"1²2.csv": run(0)}))
     assert "file: " in (tmp_path / "lab/batch.yaml").read_text()
+
+
+@pytest.mark.parametrize("name", ["z\nnote: EVIL\n#.csv", "\x1b]0;evil\x07.csv", os.fsdecode(b"Pr\xfcf.csv")])
+def test_a_log_whose_name_does_not_show_is_refused(tmp_path, name):
+    (tmp_path / name).write_text("time_s\n0\n")
+    with pytest.raises(InputError) as refused:
+        draft_batch(tmp_path)
+    assert str(refused.value).isprintable()
+    assert "has characters that do not show; rename the log" in str(refused.value)
+    assert not (tmp_path / "batch.yaml").exists()
+    with pytest.raises(InputError, match="has characters that do not show; rename the file"):
+        names_of([tmp_path / name])
+
+
+def test_a_wide_or_fixed_space_is_a_name():
+    assert not controls_in("run\u00a01\u3000Prüf.csv")

@@ -32,6 +32,7 @@ from ccmodel.channels import (
 )
 from ccmodel.geometry import ConduitPath
 from ccmodel.recording import FAR_ENDS
+from ccmodel.sentences import controls_in, shown
 from ccmodel.typed import (
     LARGEST,
     Borrowed,
@@ -350,8 +351,8 @@ class RecordingEntry(TypedModel):
     def _file_inside_the_batch(cls, file: str) -> str:
         if not file.strip():
             raise ValueError("must be the log's path, from the batch's folder")
-        if not file.isprintable():
-            raise ValueError(f"{file!r}: has characters that do not show; rename the log")
+        if controls_in(file):
+            raise ValueError(f"{shown(file)}: has characters that do not show; rename the log")
         if Path(file).is_absolute() or ".." in Path(file).parts:
             raise ValueError("a log lies inside its batch's folder: give its path from there")
         return file

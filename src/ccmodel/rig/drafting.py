@@ -22,7 +22,7 @@ from ccmodel.rig.findings import LogError
 from ccmodel.rig.log import read_log
 from ccmodel.rig.overview import ChannelOverview, Overview, overview
 from ccmodel.rig.readers import registry
-from ccmodel.sentences import shown
+from ccmodel.sentences import controls_in, shown
 from ccmodel.typed import InputError, Problem
 
 ENDS = ("drive", "load")
@@ -126,8 +126,8 @@ def _read(folder: Path) -> tuple[list[_Log], dict[str, str]]:
         if not path.is_file() or not path.name.lower().removesuffix(".gz").endswith(_suffixes()):
             continue
         file = path.relative_to(folder).as_posix()
-        if not file.isprintable():
-            text = f"{file!r}: has characters that do not show; rename the log"
+        if controls_in(file):
+            text = f"{shown(file)}: has characters that do not show; rename the log"
             raise InputError.of(Problem(str(folder), None, text))
         try:
             logs.append(_Log(file, read_log(path)[0]))

@@ -7,6 +7,7 @@ from pathlib import Path, PurePath
 
 from ccmodel.rig.batch import recording_id
 from ccmodel.rig.importing.map import MAIN, ImportMap
+from ccmodel.sentences import controls_in, shown
 from ccmodel.typed import InputError
 
 
@@ -31,8 +32,8 @@ def names_of(files: Sequence[Path]) -> dict[Path, str]:
     resolved = {file: _absolute(file) for file in files}
     shared = os.path.commonpath([path.parent for path in resolved.values()])
     names = {file: path.relative_to(shared).as_posix() for file, path in resolved.items()}
-    if odd := [name for name in names.values() if not name.isprintable()]:
-        raise InputError(f"{odd[0]!r}: has characters that do not show; rename the file")
+    if odd := [name for name in names.values() if controls_in(name)]:
+        raise InputError(f"{shown(odd[0])}: has characters that do not show; rename the file")
     return names
 
 
