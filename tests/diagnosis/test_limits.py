@@ -1,6 +1,7 @@
 """When a diagnosis fits no further candidate: the limits on model runs and on time."""
 
 import time
+from functools import partial
 
 import pytest
 
@@ -17,7 +18,10 @@ from made_observations import PARAMETERS
 
 @pytest.fixture(scope="module")
 def batch(tmp_path_factory):
-    return spoil(write_batch(tmp_path_factory.mktemp("raw") / "rubbing", pretensions=(7.0, 6.0)), rubbing)
+    return spoil(
+        write_batch(tmp_path_factory.mktemp("raw") / "rubbing", pretensions=(7.0, 6.0)),
+        partial(rubbing, current_A=0.17),
+    )
 
 
 def test_a_deadline_ends_after_its_runs_or_its_time():
