@@ -1,7 +1,7 @@
 """Models in use: simulations of motions, predictions of recordings."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from math import inf
 from numbers import Real
@@ -366,7 +366,7 @@ def as_motion(motion: Motion, name: str = "motion", columns: Sequence[str] = MOT
     if isinstance(motion, str | Path):
         return read_motion(existing_file(motion), columns), str(motion)
     if isinstance(motion, Recording):
-        motion = motion.to_frame().set_axis(pd.Index(motion.time_s, name="time_s"))
+        motion = replace(motion, log_start_s=0.0).to_frame()
     if isinstance(motion, xr.Dataset):
         found = [one for one in columns if one in motion]
         motion = motion[found].to_dataframe() if found else pd.DataFrame(columns=list(map(str, motion)))

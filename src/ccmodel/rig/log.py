@@ -55,7 +55,8 @@ def read_log(path: Path) -> tuple[pd.DataFrame, list[Defect]]:
 
 def _check_header(header: list[str]) -> list[Defect]:
     unknown = [name for name in header if name not in COLUMNS]
-    missing = [column for column in COLUMNS if column not in set(header)]
+    present = set(header)
+    missing = [column for column in COLUMNS if column not in present]
     for name in unknown:
         guess = nearest(name, missing, MISSPELT)
         if guess:

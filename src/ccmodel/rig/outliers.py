@@ -42,7 +42,8 @@ def drop_outliers(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Defect]]:
     is_bad, warnings = np.zeros(len(table), bool), []
     for column in table.columns.drop(list(NOT_ANALOG), errors="ignore"):
         values = table[column].to_numpy()
-        found = outliers(values)
+        distances = _distances(values)
+        found = _few(*distances)
         if found.size:
             at, others = found[0], np.delete(values, found)
             more = f" (and {found.size - 1} more such readings): their rows are" if found.size > 1 else ": row"
@@ -52,7 +53,7 @@ def drop_outliers(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Defect]]:
             )
             warnings.append(Defect(int(table.index[at]), column, text))
             is_bad[found] = True
-        elif (often := frequent_outliers(values)).size:
+        elif (often := _many(values, *distances)).size:
             share = f"{often.size} single readings ({often.size / values.size:.1%})"
             text = f"{share} are far from all near them, up to {values[often[np.argmax(np.abs(values[often]))]]:g}"
             warnings.append(Defect(int(table.index[often[0]]), column, f"{text}: is the sensor faulty? They are used"))
@@ -80,8 +81,7 @@ def outliers(values: NDArray) -> NDArray:
     ndarray of int
         In ascending order.
     """
-    distance, least = _distances(values)
-    return _standing_out(distance, max(int(limits.BAD_CELLS_FRACTION * values.size), 1), least)
+    return _few(*_distances(values))
 
 
 def frequent_outliers(values: NDArray) -> NDArray:
@@ -89,9 +89,16 @@ def frequent_outliers(values: NDArray) -> NDArray:
 
     A load that snaps again and again is not back in the next sample.
     """
-    distance, least = _distances(values)
+    return _many(values, *_distances(values))
+
+
+def _few(distance: NDArray, least: float) -> NDArray:
+    return _standing_out(distance, max(int(limits.BAD_CELLS_FRACTION * distance.size), 1), least)
+
+
+def _many(values: NDArray, distance: NDArray, least: float) -> NDArray:
     if not distance.size:
-        return outliers(values)
+        return np.array([], int)
     steps = np.abs(np.diff(values))
     # The first and the last reading have one neighbour, and may be part of another motion.
     single = np.minimum(np.append(steps, 0.0), np.insert(steps, 0, 0.0))

@@ -100,7 +100,7 @@ def _radii(batch: Batch) -> list[Contradiction]:
 
 
 def _conduits(parities: Sequence[Parity], batch: Batch) -> list[Contradiction]:
-    """Conduits and a cable that are longer than any, as lengths in mm are, or bend more, as angles in degrees do."""
+    """Conduits and a cable that are longer or shorter than any, as lengths in mm are, or bend more, as degrees do."""
     longest = max(parities, key=lambda p: p.recording.path.length_m).recording
     lengths = {
         ("length_m", f"the conduit of {longest.id}"): longest.path.length_m,
@@ -109,20 +109,12 @@ def _conduits(parities: Sequence[Parity], batch: Batch) -> list[Contradiction]:
     most_bent = max(parities, key=lambda p: p.recording.path.bend_rad).recording
     bend = most_bent.path.bend_rad
     text = f"the conduit of {most_bent.id} bends by {bend:g} rad: is the bend in degrees? State bend_rad in rad"
-    bent = [Contradiction("bend_rad", text)] if bend > limits.LARGEST_BEND_RAD else []
-    return (
-        bent
-        + [
-            Contradiction(key, f"{what} is {length:g} m long: is the length in mm? State {key} in m")
-            for (key, what), length in lengths.items()
-            if length > limits.LONGEST_PATH_M
-        ]
-        + [
-            Contradiction(key, f"{what} is {length:g} m long: no conduit of a cable rig; state {key} in m")
-            for (key, what), length in lengths.items()
-            if length < limits.SHORTEST_PATH_M
-        ]
-    )
+    found = [Contradiction("bend_rad", text)] if bend > limits.LARGEST_BEND_RAD else []
+    for (key, what), length in lengths.items():
+        if not limits.SHORTEST_PATH_M <= length <= limits.LONGEST_PATH_M:
+            why = "is the length in mm? State" if length > limits.LONGEST_PATH_M else "no conduit of a cable rig; state"
+            found.append(Contradiction(key, f"{what} is {length:g} m long: {why} {key} in m"))
+    return found
 
 
 def _accuracies(parities: Sequence[Parity]) -> list[Contradiction]:
