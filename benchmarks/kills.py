@@ -87,11 +87,19 @@ def whole(there: Files, before: Files, after: Files) -> str:
 
 
 def state_of_set(there: Files, before: Files, after: Files) -> str:
-    """Files that belong together: those of one run, and without its verdict if they are not all there."""
-    there = visible(there)
-    of_one = any(there.items() <= files.items() for files in (before, after))
-    has_verdict = any(name.endswith(VERDICT) for name in there)
-    return whole(there, before, after) or ("between" if of_one and not has_verdict else "wrong")
+    """Files that belong together: those of one run, and without its verdict if they are not all there.
+
+    The others then lie beside them, where the next run finds them.
+    """
+    seen = visible(there)
+
+    def is_between(files: Files, aside: str) -> bool:
+        kept = {name.replace(f"{UNFINISHED}files/{aside}/", ""): content for name, content in there.items()}
+        return seen.items() <= files.items() <= kept.items()
+
+    has_verdict = any(name.endswith(VERDICT) for name in seen)
+    between = not has_verdict and (is_between(before, "earlier") or is_between(after, "complete"))
+    return whole(seen, before, after) or ("between" if between else "wrong")
 
 
 def state_of_folder(there: Files, before: Files, after: Files) -> str:

@@ -3,10 +3,10 @@
     python -m benchmarks.mutants --count 300 --out DIR
 
 Cosmic Ray makes the mutants of the folders in `ROOMS`, in a clone of the last commit. Of each place in the code that
-has mutants one is drawn, and of the places `--count`. A mutant first meets the test files that import its module; if
-it survives these, all tests of its folder. What was tried is kept: the same command goes on where it was stopped. At
-the end stands a table, and DIR/survivors.txt has the survivors as differences. Each of them is a missing test, or
-changes nothing. Without a mutant all of these tests must pass first.
+has mutants one is drawn, and of the places `--count`. A mutant first meets the test files that import its module; if it
+survives these, all tests of its folder. One that Python cannot compile does not count. What was tried is kept: the same
+command goes on where it was stopped. At the end stands a table, and DIR/survivors.txt has the survivors as differences.
+Each of them is a missing test, or changes nothing. Without a mutant all of these tests must pass first.
 """
 
 import argparse
@@ -125,6 +125,8 @@ def report(out: Path) -> None:
     died, tried, survivors = Counter[str](), Counter[str](), []
     with use_db(out / "session.sqlite", WorkDB.Mode.open) as session:
         for item, result in session.completed_work_items:
+            if "SyntaxError: " in (result.output or ""):
+                continue
             room = item.mutations[0].module_path.parts[2]
             tried[room] += 1
             if result.test_outcome == TestOutcome.SURVIVED:

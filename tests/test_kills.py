@@ -58,9 +58,13 @@ def test_a_full_disk_takes_the_earlier_result_of_a_command_that_writes_in_place(
 
 def test_what_may_be_there_after_a_kill():
     old, new = {"out/diagnosis.json": b"1", "out/a": b"1"}, {"out/diagnosis.json": b"2", "out/a": b"2"}
-    assert [state_of_set(files, old, new) for files in (old, new, {}, {"out/a": b"1"})] == [
-        "before", "after", "between", "between",
-    ]  # fmt: skip
+    aside, complete = "out/.unfinished-files/earlier", "out/.unfinished-files/complete"
+    verdict_aside = {"out/a": b"1", f"{aside}/diagnosis.json": b"1"}
+    new_to_come = {f"{aside}/a": b"1", f"{aside}/diagnosis.json": b"1", f"{complete}/diagnosis.json": b"2"}
+    found = [state_of_set(files, old, new) for files in (old, new, verdict_aside, new_to_come | {"out/a": b"2"})]
+    assert found == ["before", "after", "between", "between"]
+    assert state_of_set({"out/a": b"1"}, old, new) == "wrong"
+    assert state_of_set(verdict_aside | {"out/a": b"2"}, old, new) == "wrong"
     assert state_of_set({"out/a": b"1", "out/diagnosis.json": b"2"}, old, new) == "wrong"
     assert state_of_set({"out/diagnosis.json": b"2"}, old, new) == "wrong"
     old, new = {"raw/first/a": b"1"}, {"raw/first/a": b"2"}

@@ -64,14 +64,17 @@ def killed_at(step, work, *args):
     work(*args)
 
 
-def every_kill(work, place, begin, folder):
-    """What is there after a kill at each step of the work, and then after an undisturbed run; first step to last."""
+def every_kill(work, place, begin, folder, again=None):
+    """What is there after a kill at each step of the work, and then after another run; first step to last.
+
+    The other run is an undisturbed one, unless one is given.
+    """
     states, done, step = [], False, 0
     while not done:
         begin()
         done = in_child(killed_at, step, work, place, "new")
         after_kill = content(folder)
-        assert in_child(work, place, "new")
+        assert in_child(again or work, place, "new")
         states.append((after_kill, content(folder)))
         step += 1
     assert step > 4
@@ -82,13 +85,15 @@ def visible(files):
     return {name: text for name, text in files.items() if not name.startswith(".unfinished")}
 
 
-def test_files_of_a_killed_command_are_never_from_two_runs(tmp_path):
-    def begin():
-        write_files(tmp_path, "old")
-        (tmp_path / "nearest.json").write_text("old")
-        (tmp_path / "notes.txt").write_text("mine")
+def begin_with(folder):
+    """A folder with the files of an earlier run, one of which the new one does not write, and another's file."""
+    write_files(folder, "old")
+    (folder / "nearest.json").write_text("old")
+    (folder / "notes.txt").write_text("mine")
 
-    states = every_kill(write_files, tmp_path, begin, tmp_path)
+
+def test_files_of_a_killed_command_are_never_from_two_runs(tmp_path):
+    states = every_kill(write_files, tmp_path, lambda: begin_with(tmp_path), tmp_path)
     found = [visible(after_kill) for after_kill, _ in states]
     for files in found:
         assert files.pop("notes.txt") == "mine"
@@ -99,6 +104,22 @@ def test_files_of_a_killed_command_are_never_from_two_runs(tmp_path):
     # Kills before, between and after the renamings were tried.
     assert {files.get(VERDICT) for files in found} == {"old", None, "new"}
     assert all(after == dict.fromkeys(NAMES, "new") | {"notes.txt": "mine"} for _, after in states)
+
+
+def fail(folder, _):
+    with pytest.raises(ZeroDivisionError), new_files(folder, last=VERDICT):
+        raise ZeroDivisionError
+
+
+def test_files_of_a_killed_command_are_lost_at_no_step(tmp_path):
+    states = every_kill(write_files, tmp_path, lambda: begin_with(tmp_path), tmp_path, again=fail)
+    notes = {"notes.txt": "mine"}
+    old = dict.fromkeys((*NAMES, "nearest.json"), "old") | notes
+    new = dict.fromkeys(NAMES, "new") | notes
+    found = [after for _, after in states]
+    assert all(after in (old, new) for after in found)
+    # A kill before the earlier files were put aside, and one after.
+    assert old in found[:-1] and new in found[:-1]
 
 
 def test_a_file_of_a_killed_command_is_the_old_or_the_new_one(tmp_path):

@@ -1,16 +1,21 @@
 """Files and folders that are written whole: made beside their place, then renamed.
 
 Whatever ends a command (an error, a full disk, a kill), a place holds what was there before or what is new, never half
-of it. What a killed command has left beside the place, the next one that writes there removes.
+of it, and nothing of what was there before is lost. What a killed command has left, the next one that writes there
+brings to an end.
 """
 
 import shutil
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ccmodel.paths import UNFINISHED
+from ccmodel.paths import UNFINISHED, expanded
 from ccmodel.typed import InputError
+
+# Where `new_files` works, within the folder of its files, and what its new files are called once they may take places.
+_FILES = f"{UNFINISHED}files"
+_COMPLETE = "complete"
 
 
 @contextmanager
@@ -41,7 +46,7 @@ def new_file(path: str | Path) -> Iterator[Path]:
     InputError
         If it cannot be written.
     """
-    path = Path(path).expanduser()
+    path = expanded(path)
     with _naming(path):
         place = path.resolve()
         place.parent.mkdir(parents=True, exist_ok=True)
@@ -57,7 +62,8 @@ def new_file(path: str | Path) -> Iterator[Path]:
 def new_files(folder: str | Path, last: str | None = None, without: Collection[str] = ()) -> Iterator[Path]:
     """Where to write files that belong together; at the end they take their places in `folder`, if nothing was raised.
 
-    The files that they replace go first, and other files stay. So the files in the folder are never from two runs.
+    The files that they replace are put aside first, and other files stay. So the files in the folder are never from two
+    runs. After a kill in between, the next call brings the earlier files back, or the rest of the new ones.
 
     Parameters
     ----------
@@ -73,21 +79,41 @@ def new_files(folder: str | Path, last: str | None = None, without: Collection[s
     InputError
         If they cannot be written.
     """
-    folder = Path(folder).expanduser()
+    folder = expanded(folder)
     with _naming(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        fresh = folder / f"{UNFINISHED}files"
-        shutil.rmtree(fresh, ignore_errors=True)
-        fresh.mkdir()
+        _settle(folder, last)
+        work = folder / _FILES
+        fresh, earlier = work / "new", work / "earlier"
+        for made in (work, fresh, earlier):
+            made.mkdir()
         try:
             yield fresh
-            names = sorted((file.name for file in fresh.iterdir()), key=lambda name: (name == last, name))
-            for name in (*reversed(names), *without):
-                (folder / name).unlink(missing_ok=True)
-            for name in names:
-                (fresh / name).rename(folder / name)
+            for name in (*reversed(_in_order(fresh, last)), *without):
+                with suppress(FileNotFoundError):
+                    (folder / name).rename(earlier / name)
+            fresh.rename(work / _COMPLETE)
         finally:
-            shutil.rmtree(fresh, ignore_errors=True)
+            _settle(folder, last)
+
+
+def _settle(folder: Path, last: str | None) -> None:
+    """Bring what `new_files` began to an end: all new files take their places, or all earlier ones take them again.
+
+    The new ones do if all earlier files were put aside.
+    """
+    work = folder / _FILES
+    complete, earlier = work / _COMPLETE, work / "earlier"
+    source = complete if complete.exists() else earlier
+    if source.exists():
+        for name in _in_order(source, last):
+            (source / name).rename(folder / name)
+    shutil.rmtree(work, ignore_errors=True)
+
+
+def _in_order(folder: Path, last: str | None) -> list[str]:
+    """Names of the files in a folder, with `last` at the end."""
+    return sorted((file.name for file in folder.iterdir()), key=lambda name: (name == last, name))
 
 
 @contextmanager
@@ -104,7 +130,7 @@ def new_folder(path: str | Path) -> Iterator[Path]:
     InputError
         If it cannot be written.
     """
-    path = Path(path).expanduser()
+    path = expanded(path)
     with _naming(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         # In the parent of `path`, since a folder can only be renamed within a file system.

@@ -26,7 +26,7 @@ def batch_folder(path: str | Path) -> Path:
     InputError
         If there is no such folder, or it holds no `batch.yaml`.
     """
-    path = _expanded(path)
+    path = expanded(path)
     folder = path.parent if path.name == BATCH_FILE and path.is_file() else existing_folder(path)
     if not (folder / BATCH_FILE).exists():
         inside = batches_in(folder)
@@ -52,7 +52,7 @@ def existing_folder(path: str | Path) -> Path:
     InputError
         If there is none.
     """
-    path = _expanded(path)
+    path = expanded(path)
     return path if path.is_dir() else _missing(path, "folder", "file")
 
 
@@ -64,7 +64,7 @@ def existing_file(path: str | Path) -> Path:
     InputError
         If there is none.
     """
-    path = _expanded(path)
+    path = expanded(path)
     if not path.exists() or path.is_dir():
         _missing(path, "file", "folder")
     _check_regular(path, "")
@@ -104,7 +104,7 @@ def try_folder(path: str | Path, option: str = "out") -> Path:
 
 def try_batch_folder(path: str | Path, option: str = "out") -> Path:
     """As `try_folder`, for logs and a `batch.yaml`."""
-    path = _expanded(path)
+    path = expanded(path)
     _try(path, path, option, path / f"{UNFINISHED}files")
     return path
 
@@ -122,13 +122,13 @@ def try_file(path: str | Path, option: str = "out", read: Iterable[str | Path] =
     InputError
         If it cannot, or if it is read, or a file of a batch.
     """
-    path = _expanded(path)
+    path = expanded(path)
     if path.is_dir():
         _refuse(f"{option}: {path}: is a folder; name a file")
     if path.exists():
         if (path.parent / BATCH_FILE).exists():
             _refuse(f"{option}: {path}: is a file of a batch; name another one")
-        if any(path.samefile(one) for one in map(_expanded, read) if one.exists()):
+        if any(path.samefile(one) for one in map(expanded, read) if one.exists()):
             _refuse(f"{option}: {path}: is read by this command; name another file")
     _try(path.parent, path, option, path.with_name(UNFINISHED + path.name))
     if path.exists():
@@ -170,7 +170,7 @@ def _try(folder: Path, named: Path, option: str, unfinished: Path) -> None:
         _refuse(f"{option}: {named}: cannot be written ({getattr(error, 'strerror', None) or error})")
 
 
-def _expanded(path: str | Path) -> Path:
+def expanded(path: str | Path) -> Path:
     """A path with `~` and `~name` replaced by the user's folder."""
     try:
         return Path(path).expanduser()

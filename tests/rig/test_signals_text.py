@@ -205,6 +205,11 @@ def test_a_row_of_another_width_is_named(tmp_path):
     assert error.value.args[0] == 52 and "has 3 cells, the other rows 2" in error.value.args[2]
 
 
+def test_separators_at_the_end_of_some_rows_hold_no_cell(tmp_path):
+    file = read(tmp_path, "t,x\n" + "".join(f"{i},{i + 0.5}{',' * (i == 20)}{', ,' * (i == 30)}\n" for i in range(50)))
+    assert columns(file)["x"][1] == [i + 0.5 for i in range(50)]
+
+
 def test_names_and_units():
     assert split_unit("angle [deg]") == ("angle", "deg")
     assert split_unit("angle (filtered)") == ("angle (filtered)", "")

@@ -318,8 +318,8 @@ def check_same_rig(model: Model, batch: Batch) -> None:
 
 def sorted_findings(batch: Batch) -> tuple[list[str], tuple[Finding, ...]]:
     """Lines on what a batch's files are refused for, and its other findings."""
-    refused = [str(f) for f in batch.findings if f.severity == "refused"]
-    return refused, tuple(f for f in batch.findings if f.severity != "refused")
+    refused = [str(f) for f in batch.findings if f.is_refused]
+    return refused, tuple(f for f in batch.findings if not f.is_refused)
 
 
 def files_among(*given: object) -> list[str | Path]:

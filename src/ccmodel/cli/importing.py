@@ -114,5 +114,5 @@ def import_mis_tool(
     output.result({"batches": imported.batches, "findings": imported.findings}, *map(str, imported.batches))
     for finding in imported.findings:
         output.finding(str(finding), finding.severity)
-    if any(finding.severity == "refused" for finding in imported.findings):
+    if any(finding.is_refused for finding in imported.findings):
         raise typer.Exit(1)

@@ -59,14 +59,9 @@ def estimate(
     data = {"out": out, "errors": errors, "visible_share": visible, "notes": found.notes}
     data |= {"findings": [str(finding) for finding in found.findings], "left_out": found.left_out}
     output.result(data, *lines)
-    for finding in found.findings:
-        output.finding(str(finding), finding.severity)
     for line in found.notes:
         output.message(line)
-    for line in found.left_out:
-        output.finding(line, "refused")
-    if found.left_out:
-        raise typer.Exit(1)
+    output.findings(found.findings, found.left_out)
 
 
 def compensate(

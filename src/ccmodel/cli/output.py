@@ -3,6 +3,7 @@
 import json
 import math
 import sys
+from collections.abc import Collection, Iterable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, is_dataclass
 from pathlib import Path
@@ -16,7 +17,7 @@ from ccmodel.sentences import shown as as_shown
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from ccmodel.rig.findings import Severity
+    from ccmodel.rig.findings import Finding, Severity
 
 # Style of the word before a line on a finding, by its severity.
 _STYLE: "dict[Severity, str]" = {"warning": "yellow", "refused": "red", "inconsistent": "red"}
@@ -60,6 +61,15 @@ class Output:
 
         say(f"{WORD[severity]}: ", _STYLE[severity], end="")
         say(line)
+
+    def findings(self, findings: "Iterable[Finding]", left_out: Collection[str]) -> None:
+        """Print findings and what was left out; the command ends with 1 if something was."""
+        for finding in findings:
+            self.finding(str(finding), finding.severity)
+        for line in left_out:
+            self.finding(line, "refused")
+        if left_out:
+            raise typer.Exit(1)
 
     def message(self, text: str, style: str | None = None) -> None:
         """Print a message beside the result."""

@@ -40,9 +40,4 @@ def predict(
     errors = predicted.errors.to_dict("records")
     findings = [str(finding) for finding in predicted.findings]
     output.result({"out": out, "errors": errors, "findings": findings, "left_out": predicted.left_out}, *lines)
-    for finding in predicted.findings:
-        output.finding(str(finding), finding.severity)
-    for line in predicted.left_out:
-        output.finding(line, "refused")
-    if predicted.left_out:
-        raise typer.Exit(1)
+    output.findings(predicted.findings, predicted.left_out)

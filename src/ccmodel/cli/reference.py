@@ -81,7 +81,8 @@ unit is a value beside it (`unit`). A value that there is not is `null`. `out` i
 
 An interrupted command says in one line what it has written and how to go on. Files are written beside their place and
 renamed at the end, so that a kill or a full disk leaves the earlier result or the new one, never a mixture: an earlier
-verdict goes first and the new one comes last, an import replaces its folder as a whole, and other files stay.
+verdict goes first and the new one comes last, an import replaces its folder as a whole, and other files stay. What a
+kill in between leaves in a folder `.unfinished-files`, the next run brings back to its places.
 
 ## Completion
 

@@ -26,7 +26,7 @@ _REQUIRED = [name for name, f in _KNOWN.items() if f.default is MISSING]
 _SESSION = ("session_start_s", "session_end_s")  # not in a file where they are not known
 _OPTIONAL = [name for name, f in _KNOWN.items() if "None" in str(f.type)]
 # Limits of parameters in SI units: what is beyond them overflows.
-LARGEST, RADII, SMALLEST_RADIUS_M = 1e15, ("drive_radius_m", "load_radius_m"), 1e-9
+LARGEST_PARAMETER, RADII, SMALLEST_RADIUS_M = 1e15, ("drive_radius_m", "load_radius_m"), 1e-9
 
 
 class _ActiveEntry(TypedModel):
@@ -289,7 +289,10 @@ def _parameters(path: Path, stated: _ModelFile) -> Parameters:
             raise InputError(f"{path}: parameters: no parameter is called '{name}'; {advice(name, _KNOWN)}")
         if value is None and name not in _OPTIONAL:
             raise InputError(f"{path}: parameters.{name}: null; a number is needed")
-        if value is not None and not (SMALLEST_RADIUS_M if name in RADII else -LARGEST) < value < LARGEST:
+        if (
+            value is not None
+            and not (SMALLEST_RADIUS_M if name in RADII else -LARGEST_PARAMETER) < value < LARGEST_PARAMETER
+        ):
             raise InputError(f"{path}: parameters.{name}: {value:g} is no value of a rig")
     if missing := [name for name in _REQUIRED if name not in values]:
         raise InputError(f"{path}: parameters: no {', '.join(missing)}; a model needs it")

@@ -247,7 +247,7 @@ def spring_load(stiffness: float, parameters: Parameters, accuracy: Mapping[str,
 def _measured(given: ModelInput, values: NDArray | None, what: str) -> NDArray:
     if values is None:
         raise ModelError(
-            f"{given.recording.batch}/{given.recording.id}: the batch states no load spring and no {what} was measured"
+            f"{given.recording.batch}/{given.recording.id}: no load spring is stated and no {what} was measured"
             " at the load pulley; one of the two is needed to know the load"
         )
     return values

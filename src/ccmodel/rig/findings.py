@@ -84,6 +84,11 @@ class Finding:
         return f"{self.batch}/{self.place}" if several else self.place
 
     @property
+    def is_refused(self) -> bool:
+        """Whether the data are not used."""
+        return self.severity == "refused"
+
+    @property
     def is_inconsistent(self) -> bool:
         """Whether no verdict on the physics can be drawn from the batch: its inputs contradict one another."""
         return self.severity == "inconsistent" or self.contradicts

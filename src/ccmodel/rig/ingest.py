@@ -76,7 +76,7 @@ class Ingested:
         """
         reported = self.contradicts and not trust_inputs
         if self.batch is None or not (self.recordings or reported):
-            refused = [str(f) for f in self.findings if f.severity == "refused"]
+            refused = [str(f) for f in self.findings if f.is_refused]
             raise InputError("\n".join(refused) or f"{source}: no recording that can be used")
 
 

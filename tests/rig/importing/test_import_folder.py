@@ -223,6 +223,15 @@ def test_a_main_file_belongs_to_the_recording_of_its_folder(tmp_path):
     assert list(import_files(files, tmp_path / "map.yaml", tmp_path / "batch").recordings) == ["run1"]
 
 
+def test_a_folder_that_is_called_as_a_recording_names_none_unless_the_map_says_so(tmp_path):
+    _, (first, load) = several(tmp_path)
+    folder = tmp_path / "lab/run1"
+    folder.mkdir()
+    (tmp_path / "map.yaml").write_text(SEVERAL.replace("CLOCK", "").replace("signal: F,", "signal: G,"))
+    with pytest.raises(InputError, match=r"recording 'run1-drive': there is no run1-drive_load\.csv"):
+        import_files([first.rename(folder / "drive.csv"), load], tmp_path / "map.yaml", tmp_path / "batch")
+
+
 def test_two_files_without_a_common_clock_are_taken_to_start_together(tmp_path):
     _, written = import_several(tmp_path, "", -12.5)
     one = written.recordings["run1"]

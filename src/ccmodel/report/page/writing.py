@@ -150,7 +150,7 @@ def messages_of(
     failures = [line for simulation in simulations for line in simulation["failures"]]
     left_out = [
         *unusable,
-        *(str(f) for f in findings if f.severity == "refused"),
+        *(str(f) for f in findings if f.is_refused),
         *(f"fit {f['fit']}: {f['message']}" for f in fits if not f["succeeded"]),
         # A recording fails with every parameter set; one message is enough.
         *dict.fromkeys(f"not simulated: {line}" for line in failures),

@@ -27,7 +27,7 @@ def report(batch: str, findings: Sequence[Finding], is_held: bool = False, sever
         Whether the findings are of several batches of one rig.
     """
     contradictions = sorted((f for f in findings if f.is_inconsistent), key=lambda f: -f.confidence)
-    damaged = [f for f in findings if f.severity == "refused" and not f.is_inconsistent]
+    damaged = [f for f in findings if f.is_refused and not f.is_inconsistent]
     return {
         "format": FORMAT,
         "batch": batch,

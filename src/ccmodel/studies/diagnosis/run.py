@@ -219,7 +219,7 @@ def _not_judged(ingested: Ingested) -> list[dict]:
     Of several batches also their estimates, if these differ.
     """
     findings, several = ingested.findings, bool(ingested.parts)
-    refused = [replace(f, row=None, column=None) for f in findings if f.severity == "refused"]
+    refused = [replace(f, row=None, column=None) for f in findings if f.is_refused]
     trusted = [f for f in findings if f.severity == "inconsistent"]
     differing = [f for f in findings if several and f.batch == ingested.stated.batch]
     return [
