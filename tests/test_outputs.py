@@ -122,6 +122,16 @@ def test_files_of_a_killed_command_are_lost_at_no_step(tmp_path):
     assert old in found[:-1] and new in found[:-1]
 
 
+def test_files_that_have_been_replaced_never_come_back(tmp_path):
+    """A kill while what is left of the earlier files is removed, whatever the order in which the disk lists it."""
+    write_files(tmp_path, "new")
+    work = tmp_path / ".unfinished-files"
+    write_files(work / "earlier", "old")
+    (work / "complete").mkdir()
+    fail(tmp_path, None)
+    assert content(tmp_path) == dict.fromkeys(NAMES, "new")
+
+
 def test_a_file_of_a_killed_command_is_the_old_or_the_new_one(tmp_path):
     file = tmp_path / "model.json"
     states = every_kill(write_file, file, lambda: file.write_text("old"), tmp_path)

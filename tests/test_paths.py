@@ -36,6 +36,24 @@ def test_predictions_leave_the_logs_of_a_batch(fitted_model, tmp_path):
     assert {file.name: file.read_bytes() for file in batch.iterdir()} == before
 
 
+def test_results_do_not_go_among_the_logs_of_a_batch_that_lie_in_a_folder(tmp_path):
+    batch = write_batch(tmp_path / "known", pretensions=(7.0,))
+    logs, log = batch / "logs", batch / "logs/t-7N.csv.gz"
+    logs.mkdir()
+    (batch / "t-7N.csv.gz").rename(log)
+    stated = (batch / "batch.yaml").read_text()
+    (batch / "batch.yaml").write_text(stated.replace("t-7N.csv.gz", "logs/t-7N.csv.gz"))
+    with pytest.raises(InputError, match="logs: holds t-7N.csv.gz, a log of a batch"):
+        try_folder(logs)
+    with pytest.raises(InputError, match="is a file of a batch"):
+        try_file(log)
+    # Other places in the folder of a batch may be used.
+    assert try_folder(batch / "out") == batch / "out"
+    (batch / "out").mkdir()
+    (batch / "out/diagnosis.json").touch()
+    assert try_folder(batch / "out") == batch / "out"
+
+
 @pytest.mark.parametrize("read", ["motion", "model"])
 def test_a_simulation_does_not_replace_what_it_reads(fitted_model, tmp_path, read):
     motion = tmp_path / "motion.csv"

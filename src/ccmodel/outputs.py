@@ -108,6 +108,8 @@ def _settle(folder: Path, last: str | None) -> None:
     if source.exists():
         for name in _in_order(source, last):
             (source / name).rename(folder / name)
+    # Before the sign that they are not wanted again.
+    shutil.rmtree(earlier, ignore_errors=True)
     shutil.rmtree(work, ignore_errors=True)
 
 

@@ -94,12 +94,25 @@ def try_folder(path: str | Path, option: str = "out") -> Path:
     Raises
     ------
     InputError
-        If it cannot, or is the folder of a batch: a result may have the name of a log.
+        If it cannot, or is the folder of a batch or of its logs: a result may have the name of a log.
     """
     path = try_batch_folder(path, option)
     if (path / BATCH_FILE).exists():
         _refuse(f"{option}: {path}: is the folder of a batch; name another one")
+    if path.exists() and (log := next(filter(_is_log, path.iterdir()), None)):
+        _refuse(f"{option}: {path}: holds {log.name}, a log of a batch; name another folder")
     return path
+
+
+def _is_log(file: Path) -> bool:
+    """Whether a batch in a folder above names a file."""
+    place = file.resolve()
+    for folder in place.parents:
+        stated = folder / BATCH_FILE
+        with suppress(OSError, UnicodeDecodeError):  # one that cannot be read names nothing
+            if stated.is_file() and place.relative_to(folder).as_posix() in stated.read_text(encoding="utf-8"):
+                return True
+    return False
 
 
 def try_batch_folder(path: str | Path, option: str = "out") -> Path:
@@ -126,7 +139,7 @@ def try_file(path: str | Path, option: str = "out", read: Iterable[str | Path] =
     if path.is_dir():
         _refuse(f"{option}: {path}: is a folder; name a file")
     if path.exists():
-        if (path.parent / BATCH_FILE).exists():
+        if (path.parent / BATCH_FILE).exists() or _is_log(path):
             _refuse(f"{option}: {path}: is a file of a batch; name another one")
         if any(path.samefile(one) for one in map(expanded, read) if one.exists()):
             _refuse(f"{option}: {path}: is read by this command; name another file")

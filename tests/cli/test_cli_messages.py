@@ -152,3 +152,10 @@ def test_agreement_is_no_failure_if_asked_for(folder, run, monkeypatch):
 def test_a_verdict_is_no_failure_unless_asked_for(verdict, strict, code, folder, run, monkeypatch):
     monkeypatch.setattr("ccmodel.diagnose", said(verdict))
     assert run("diagnose", folder / "raw/loops", "--out", folder / "out", *strict).code == code
+
+
+def test_no_text_of_a_file_steers_the_terminal(run, tmp_path):
+    said = {"format": 1, "batch": "\x1b]0;evil\x07", "verdict": None, "why": "a\x1b[2J"}
+    (tmp_path / "diagnosis.json").write_text(json.dumps(said))
+    ended = run("report", tmp_path)
+    assert "\x1b" not in ended.out + ended.err and "\\x1b]0;evil" in ended.out + ended.err

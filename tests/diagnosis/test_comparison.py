@@ -451,6 +451,18 @@ def test_a_weak_mechanism_is_not_named():
     assert 0.5 < found.probability[0] < DECIDED
 
 
+def test_the_laws_of_a_slot_are_learned_together_though_another_slots_law_is_the_most_probable():
+    """Maps of one load cell by collinear arguments, beside friction of the drive's bearing."""
+    arguments = ("reading", "drive-angle", "torque")
+    of_cell = [(f"learned-sensor-map-F-drive-by-{argument}", "drive-sensor") for argument in arguments]
+    bearing = ("learned-bearing-torque-by-speed", "drive-pulley")
+    every = [(fitted(1.0, bearing), evidence(NONE)), *((fitted(1.0, one), evidence(NONE - 0.3)) for one in of_cell)]
+    found = verdict(evidence(NONE - 40), *every)
+    assert found.candidates[0].hypothesis.acting == (bearing,)
+    assert found.verdict == "learned"
+    assert found.best.hypothesis.acting[0] in of_cell
+
+
 @pytest.mark.parametrize("law, said", [(NONE - 20, "explained"), (NONE, "undecided"), (NONE + 20, "learned")])
 def test_a_weak_mechanism_is_named_if_no_law_does_as_well(law, said):
     """Laws were tried: what they describe is no imitation, but a candidate of its own."""

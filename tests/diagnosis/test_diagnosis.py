@@ -213,9 +213,14 @@ def test_alternatives_are_others_than_what_is_named_each_once():
         (*elsewhere, 0.25),
         (*drag, 0.2),
     ]
-    judgement.verdict = "explained"
+    # Of what is named, the other place is an alternative.
+    judgement.verdict, judgement.best = "explained", SimpleNamespace(hypothesis=Hypothesis((there,)))
     found = alternatives_of(judgement, dict([there]))
-    assert [a["name"] for a in found] == ["torque-scale", "constant-drag"]
+    assert [(a["name"], a["place"], a["confidence"]) for a in found] == [
+        (*scale, 0.5),
+        (*drag, 0.2),
+        (*elsewhere, 0.15),
+    ]
 
 
 @pytest.mark.parametrize(

@@ -4,13 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
 from scipy.stats import multivariate_normal
 
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.discrepancy import Discrepancy, Modes, Products, _log_evidence, evidence_of
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.normal_equations import NormalEquations, sample_weight
-from made_observations import batch, calibrated
+from ccmodel.diagnosis.settings import LARGEST_MISSING
+from ccmodel.diagnosis.whitening import with_states_of
+from ccmodel.inference.effective_samples import IN_EVIDENCE, prior_spread
+from ccmodel.inference.problem import Free
+from ccmodel.model.general import Active
+from made_observations import PARAMETERS, batch, calibrated
 
 EXCESS = 10.0
 
@@ -137,7 +143,55 @@ def test_the_tolerance_counts_once_for_all_recordings(recordings, discrepancy):
 def test_what_a_tolerance_allows_weighs_as_one_recording_of_all(recordings, share, weight):
     one = replace(recordings[0], observations=_allowing(recordings[0].observations, share))
     n = one.measured.shape[1]
-    assert sample_weight(one, samples=n, recordings=4) == pytest.approx(weight)
+    assert sample_weight(one, recordings=4) == pytest.approx(weight * IN_EVIDENCE / n)
+
+
+def test_friction_between_batches_has_its_prior_in_the_evidence(recordings):
+    """Five standard deviations cost 12.5, where the recordings determine it."""
+    whole, key, spread = calibrated(recordings), "friction_scale@monday", 0.02
+    prior = Free(1.0, 0.8, 1.25, prior_spread(spread, [w.observations for w in recordings]), mean=1.0)
+
+    def at(value):
+        # One row more, which is met.
+        jacobian = [block_diag(J, 1e4) for J in whole.jacobian]
+        residuals = [np.append(e, 0.0) for e in whole.residuals]
+        values, free = whole.values | {key: value}, whole.free | {key: prior}
+        return replace(whole, values=values, free=free, jacobian=jacobian, residuals=residuals)
+
+    mean, away = (NormalEquations.of(at(value)).log_evidence for value in (1.0, 1.0 + 5 * spread))
+    assert mean - away == pytest.approx(12.5, rel=1e-3)
+
+
+@pytest.mark.parametrize("weight", [1.0, 0.2])
+def test_the_states_of_a_mechanism_cost_their_determinant(recordings, weight):
+    """That of the covariance with the states over that without, of residuals that all count alike."""
+    worn = replace(
+        PARAMETERS,
+        mechanisms=(Active("running-in", "conduit", {"change": 0.1, "tau": 2.0, "per_m": 1.0, "done": 0.5}),),
+    )
+    plain, with_states = recordings[0], with_states_of(recordings[0], worn)
+    assert plain.state_log_determinant(weight) == 0.0
+    N, N0, states = with_states.effects, plain.effects, len(with_states.scalar_nuisances) - len(plain.scalar_nuisances)
+    assert states > 0
+    without = np.eye(len(N0)) + N0 @ N0.T
+    own = N[:, [k for k, (name, *_) in enumerate(with_states.scalar_nuisances) if "/" in name]]
+    information = own.T @ np.linalg.solve(without, own)
+    expected = np.linalg.slogdet(np.eye(states) + weight * information)[1]
+    assert expected > 0.5 * weight
+    assert with_states.state_log_determinant(weight) == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_fault_in_one_channel_may_be_as_large_there_as_all_that_is_missing(recordings, discrepancy):
+    """One channel of five that is off by five times the excess of all."""
+
+    def of_one(k, o):
+        error = np.zeros_like(o.measured)
+        error[o.channels.index("tau_in_Nm")] = np.sqrt(10 * LARGEST_MISSING * EXCESS) * following_the_drive(1.0)(k, o)
+        return error
+
+    found = fitted(recordings, of_one)
+    too_small = discrepancy.log_evidence(found, [LARGEST_MISSING * EXCESS], {"tau_in_Nm": 1.0})[0]
+    assert evidence_of(discrepancy, found, 0.0, EXCESS).in_channel["tau_in_Nm"] > too_small
 
 
 def _allowing(o, share):

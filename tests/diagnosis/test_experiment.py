@@ -1,12 +1,13 @@
 """The experiment that separates candidate models."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from ccmodel.diagnosis import experiment as experiment_module
 from ccmodel.diagnosis.candidate import CandidateFit
-from ccmodel.diagnosis.comparison import Comparison
 from ccmodel.diagnosis.drive import speed
 from ccmodel.diagnosis.experiment import (
     experiments,
@@ -35,9 +36,9 @@ def fitted(recordings, *acting, known_to=KNOWN_TO, **numbers):
     return CandidateFit(Hypothesis(acting), [], FREE, values, [], [], covariance, np.ones(len(values)), [], residuals)
 
 
-def judged(recordings, *rivals):
-    shares = [1 / len(rivals)] * len(rivals)
-    found = Comparison(recordings, fitted(recordings), list(rivals), {})
+def judged(recordings, *rivals, of_base=0.0):
+    shares = [(1 - of_base) / len(rivals)] * len(rivals)
+    found = SimpleNamespace(whitened=recordings, base=fitted(recordings), probability_of_base=of_base)
     return Judgement("undecided", rivals[0], found, list(rivals), shares, [])
 
 
@@ -76,6 +77,18 @@ def test_slow_and_fast_friction_are_told_apart_by_speed():
     assert asked["bend_rad"] in {w.observations.given.recording.path.bend_rad for w in recordings}
     highest_N = max(w.observations.given.recording.pretension_N for w in recordings)
     assert asked["pretension_N"] / highest_N == pytest.approx(1.0) or asked["pretension_N"] / highest_N < 0.5
+
+
+@pytest.mark.parametrize("of_base", [0.0, 0.45])
+def test_candidates_are_told_from_the_calibrated_model_if_that_may_be_all(monkeypatch, of_base):
+    recordings, planned = batch(), []
+    rivals = [fitted(recordings, one) for one in (("kink", "conduit"), ("stribeck", "conduit"))]
+    monkeypatch.setattr(
+        experiment_module, "planned_observations", lambda e, c, *rest: planned.append(c.hypothesis.names)
+    )
+    monkeypatch.setattr(experiment_module, "separation", lambda *given: 0.0)
+    assert proposed(judged(recordings, *rivals, of_base=of_base), PARAMETERS) is None
+    assert set(planned) == {("kink",), ("stribeck",), *([()] if of_base else [])}
 
 
 def test_a_load_that_was_measured_is_taken_as_in_the_recordings():

@@ -70,6 +70,24 @@ def test_an_exchange_of_names_throughout_is_no_mistake(tmp_path):
     assert said_of(write_copy(copy, tmp_path / "mirrored")) == []
 
 
+def test_a_drive_torque_that_no_tension_takes_is_named(tmp_path):
+    """A torque constant in mN m; friction of the drive train makes a torque larger, but not by a thousand times."""
+    copy = read_copy(SIMULATED)
+    copy.description["rig"]["drive"]["torque_constant_Nm_per_A"] *= 1000
+    assert any(
+        "the drive torque over the radius reaches" in sentence for sentence in said_of(write_copy(copy, tmp_path / "b"))
+    )
+
+
+def test_a_pretension_that_both_ends_contradict_alike_is_the_stated_one(tmp_path):
+    """Though at one end the ratio is a little within the limit."""
+    copy = read_copy(SIMULATED)
+    for entry in copy.description["recordings"]:
+        entry["pretension_N"] *= 2.05
+    said = said_of(write_copy(copy, tmp_path / "b"))
+    assert [sentence for sentence in said if "pretension_N is that of one cable" in sentence], said
+
+
 def test_a_load_with_mass_contradicts_no_spring(tmp_path):
     """Above its resonance the torque of a load with mass falls with its angle: most slopes here are negative."""
     copy, inertia_over_spring_s2 = read_copy(Path("data/raw/rich")), 0.15

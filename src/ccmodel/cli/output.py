@@ -46,7 +46,7 @@ class Output:
             typer.echo(as_json(data))
             return
         for one in printed:
-            typer.echo(one) if isinstance(one, str) else print_table(one)
+            typer.echo(_lines_shown(one)) if isinstance(one, str) else print_table(one)
 
     def hint(self, text: str) -> None:
         """Print what can be done next, at the end of the result for a person."""
@@ -86,8 +86,13 @@ def say(text: str, style: str | None = None, end: str = "\n") -> None:
     from rich.console import Console
 
     Console(stderr=True, soft_wrap=True, highlight=False, emoji=False).print(
-        "\n".join(map(as_shown, text.split("\n"))), style=style, markup=False, end=end
+        _lines_shown(text), style=style, markup=False, end=end
     )
+
+
+def _lines_shown(text: str) -> str:
+    """Lines in which no text of a file steers the terminal."""
+    return "\n".join(map(as_shown, text.split("\n")))
 
 
 def print_table(table: "RenderableType") -> None:
@@ -101,7 +106,7 @@ def print_table(table: "RenderableType") -> None:
     console = Console(width=_WIDE, highlight=False, emoji=False, color_system=None)
     with console.capture() as captured:
         console.print(table, markup=False)
-    typer.echo("\n".join(line.rstrip() for line in captured.get().splitlines()))
+    typer.echo(_lines_shown("\n".join(line.rstrip() for line in captured.get().split("\n"))).rstrip("\n"))
 
 
 def as_json(data: Any) -> str:

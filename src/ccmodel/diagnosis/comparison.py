@@ -415,7 +415,7 @@ def imitation(share: float, smallest: float, prior: NDArray) -> NDArray:
     # Shares below the smallest that would be noticed are not told apart, and have their mean density.
     at = max(share, smallest)
     if share < smallest:
-        by_law = min(log(at / least) / log(most / least), 1.0) / at
+        by_law = float(np.clip(log(at / least) / log(most / least), 0.0, 1.0)) / at
         of_others = uniform + (1 - uniform) * at ** (power - 1)
     else:
         by_law = 1 / (log(most / least) * at) if at < most else 0.0

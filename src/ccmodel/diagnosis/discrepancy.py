@@ -22,7 +22,6 @@ from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.drive import since_reversal, speed
 from ccmodel.diagnosis.normal_equations import NormalEquations, sample_weight
 from ccmodel.diagnosis.whitening import Whitened
-from ccmodel.inference.effective_samples import IN_EVIDENCE
 from ccmodel.inference.pool import each
 from ccmodel.model.run import simulate
 
@@ -138,7 +137,7 @@ class Discrepancy:
         by_unknowns, by_residuals = np.zeros((features, unknowns)), np.zeros(features)
         count = len(candidate.whitened)
         for w, F, e, J in zip(candidate.whitened, self.features, candidate.residuals, candidate.jacobian, strict=True):
-            n, weight = w.measured.size, sample_weight(w, IN_EVIDENCE, count)
+            n, weight = w.measured.size, sample_weight(w, count)
             both = np.column_stack([J[:n], e[:n]])
             whitened = both - w.directions @ (w.shrinkage[:, None] * (w.directions.T @ both))
             whitened = whitened.reshape(*w.measured.shape, unknowns + 1)
@@ -173,7 +172,7 @@ class Discrepancy:
         gram, total = np.zeros((size * len(self.channels),) * 2), np.zeros(size * len(self.channels))
         count = np.zeros(len(total))
         for w, F in zip(whitened, self.features, strict=True):
-            own, weight = F.T @ F, sample_weight(w, IN_EVIDENCE, len(whitened))
+            own, weight = F.T @ F, sample_weight(w, len(whitened))
             along = np.zeros((w.directions.shape[1], len(total)))
             directions = w.directions.reshape(*w.measured.shape, -1)
             for k, channel in enumerate(w.observations.channels):
@@ -236,14 +235,17 @@ def evidence_of(discrepancy: Discrepancy, candidate: CandidateFit, effect: float
         tried = (sizes >= low) & (sizes <= high)
         return {c: _mean(value[tried]) for c, value in own.items()}
 
-    def anywhere(low: float, high: float) -> float:
-        """In all channels or in a single one."""
-        return _mean([_mean(every[(sizes >= low) & (sizes <= high)]), _mean(list(by_channel(low, high).values()))])
+    def anywhere(low: float, high: float, of_one: int = 1) -> float:
+        """In all channels or in a single one, whose limits are so many times as large."""
+        in_one = by_channel(of_one * low, of_one * high)
+        return _mean([_mean(every[(sizes >= low) & (sizes <= high)]), _mean(list(in_one.values()))])
 
     slight = sizes <= settings.NOT_WHITE
     exact = _mean([none, *every[slight], *(value for by_size in own.values() for value in by_size[slight])])
     least, most = settings.LEFT_BY_LAW
-    missing = settings.SMALLEST_MISSING, settings.LARGEST_MISSING * max(excess, settings.SMALLEST_MISSING)
+    low, high = settings.SMALLEST_MISSING, settings.LARGEST_MISSING * max(excess, settings.SMALLEST_MISSING)
+    # An excess of all channels that comes from one fault in one of them is so many times as large there.
+    of_one = len(channels)
     tried = [(none, 0.0), *zip(every, sizes, strict=True)]
     # In a single channel a size is a mean square of that channel only.
     tried += [(value, size / len(own)) for by_size in own.values() for value, size in zip(by_size, sizes, strict=True)]
@@ -251,8 +253,8 @@ def evidence_of(discrepancy: Discrepancy, candidate: CandidateFit, effect: float
     return Evidence(
         exact,
         anywhere(least * effect, most * effect),
-        anywhere(*missing),
-        by_channel(*missing),
+        anywhere(low, high, of_one),
+        by_channel(of_one * low, of_one * high),
         min(size for value, size in tried if value >= best - settings.CLEARLY_WORSE),
         discrepancy.resolution(candidate, settings.DISCREPANCIES),
     )

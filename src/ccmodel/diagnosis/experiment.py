@@ -71,8 +71,8 @@ def proposed(judgement: Judgement, estimates: Parameters) -> dict | None:
     """The experiment that best separates the leading candidates; None without two that can be run."""
     pairs = zip(judgement.candidates, judgement.probability, strict=True)
     candidates = [c for c, p in pairs if p > settings.ALTERNATIVE]
-    if len(candidates) < 2:
-        candidates = [judgement.calibrated, *judgement.candidates]
+    if judgement.comparison.probability_of_base > settings.ALTERNATIVE or len(candidates) < 2:
+        candidates = [judgement.calibrated, *(candidates or judgement.candidates)]
     candidates = candidates[: settings.SEPARATED]
     if len(candidates) < 2:
         return None

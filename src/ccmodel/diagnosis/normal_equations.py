@@ -14,7 +14,7 @@ from ccmodel import mechanisms as registry
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.hypothesis import coefficients_of
 from ccmodel.diagnosis.whitening import Whitened
-from ccmodel.inference.effective_samples import IN_DIAGNOSIS, IN_EVIDENCE
+from ccmodel.inference.effective_samples import IN_DIAGNOSIS, IN_EVIDENCE, prior_spread
 from ccmodel.mechanisms import Parameter
 from ccmodel.model.parameters import mechanism_key
 
@@ -30,12 +30,12 @@ class NormalEquations:
     score : ndarray, shape (unknowns,)
         Weighted J'e.
     square : float
-        Weighted e'e.
+        Weighted e'e, and the log determinant of the states that its mechanisms have when a recording starts.
     prior_sd : ndarray, shape (unknowns,)
         Standard deviation of the unknowns' prior.
     from_mean : ndarray, shape (unknowns,)
         Distance of the unknowns from their prior's mean over its standard deviation, where the prior has a mean of its
-        own, as that of a law's coefficients; 0 elsewhere.
+        own: that of a law's coefficients, and that of what differs between batches; 0 elsewhere.
     """
 
     information: NDArray
@@ -52,16 +52,20 @@ class NormalEquations:
         count = len(candidate.whitened)
         for w, e, J in zip(candidate.whitened, candidate.residuals, candidate.jacobian, strict=True):
             both, n = np.column_stack([J, e]), w.measured.size
-            weights = np.full(len(e), sample_weight(w, IN_DIAGNOSIS, count))
-            weights[:n] = sample_weight(w, IN_EVIDENCE, count)
+            weights = np.full(len(e), _nuisance_weight(w, count))
+            weights[:n] = sample_weight(w, count)
             products = both.T @ (weights[:, None] * both)
             information += products[:-1, :-1]
             score += products[:-1, -1]
-            square += float(products[-1, -1])
+            square += float(products[-1, -1]) + w.state_log_determinant(sample_weight(w, count))
         prior_sd = np.array([_prior_sd(candidate, name) for name in candidate.values])
-        coefficients = coefficients_of(candidate.hypothesis)
-        from_mean = np.array([candidate.values[n] / coefficients.get(n, np.inf) for n in candidate.values])
-        return cls(information, score, square, prior_sd, from_mean)
+        means = dict.fromkeys(coefficients_of(candidate.hypothesis), 0.0)
+        means |= {n: f.prior_mean for n, f in candidate.free.items() if f.spread}
+        from_mean = [
+            (value - means[name]) / sd if name in means else 0.0
+            for (name, value), sd in zip(candidate.values.items(), prior_sd, strict=True)
+        ]
+        return cls(information, score, square, prior_sd, np.array(from_mean))
 
     def scaled(self, factors: NDArray) -> Self:
         """The same with unknowns in units that are larger by factors, shape (unknowns,)."""
@@ -91,13 +95,21 @@ class NormalEquations:
         return np.eye(len(self.score)) + self.prior_sd[:, None] * self.information * self.prior_sd
 
 
-def sample_weight(w: Whitened, samples: int, recordings: int) -> float:
-    """Weight of each squared residual of a recording, so that a channel counts as so many independent samples.
+def sample_weight(w: Whitened, recordings: int) -> float:
+    """Weight of each squared residual of a recording, so that a channel counts as `IN_EVIDENCE` samples at most."""
+    samples = w.measured.shape[1]
+    return min(IN_EVIDENCE, samples) / samples * _share_of_one(w, recordings)
 
-    The tolerance stands for errors that are the same in every recording, and counts once for all of them.
-    """
+
+def _nuisance_weight(w: Whitened, recordings: int) -> float:
+    """Weight of each squared posterior mean of a nuisance, which then counts by its own standard deviation."""
+    return IN_DIAGNOSIS / w.measured.shape[1] * _share_of_one(w, recordings)
+
+
+def _share_of_one(w: Whitened, recordings: int) -> float:
+    """The tolerance stands for errors that are the same in every recording, and counts once for all of them."""
     shared = w.observations.tolerance_share
-    return samples / w.measured.shape[1] * (1 - shared + shared / recordings)
+    return 1 - shared + shared / recordings
 
 
 def _prior_sd(candidate: CandidateFit, unknown: str) -> float:
@@ -107,12 +119,15 @@ def _prior_sd(candidate: CandidateFit, unknown: str) -> float:
             if mechanism_key(name, place, p.name) == unknown:
                 return p.spread or p.prior_sd or _sd_within_range(p, candidate.values[unknown])
     free = candidate.free.get(unknown)
+    if free is not None and free.spread is not None:
+        # A fit has it in the units of its cost.
+        return free.spread / prior_spread(1.0, [w.observations for w in candidate.whitened])
     # A baseline's mechanisms are in every candidate, and so are their priors.
     return (free.high - free.low) / np.sqrt(12) if free else 1.0
 
 
 def _sd_within_range(p: Parameter, value: float) -> float:
     if (p.scale == "log" or p.ratio) and p.low > 0:
-        both_signs = np.log(2) if p.signed else 0.0
-        return float(np.clip(abs(value), p.low, p.high) * (np.log(p.high / p.low) + both_signs) / np.sqrt(12))
+        both_signs = 2 if p.signed else 1
+        return float(np.clip(abs(value), p.low, p.high) * both_signs * np.log(p.high / p.low) / np.sqrt(12))
     return abs(p.high - p.low) * (2 if p.signed else 1) / np.sqrt(12)

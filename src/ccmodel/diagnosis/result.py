@@ -80,7 +80,7 @@ def _nearest(judgement: Judgement, calibrated: CandidateFit) -> dict | None:
 
 
 def alternatives_of(judgement: Judgement, named: Mapping[str, str]) -> list[dict]:
-    """Every other mechanism with a probability worth mentioning, at its most likely place."""
+    """Every other mechanism with a probability worth mentioning, at its likeliest place; of a named one, the others."""
     if judgement.verdict in ("agrees", "learned", "unexplained"):
         return []
     confidence = judgement.confidence
@@ -89,6 +89,8 @@ def alternatives_of(judgement: Judgement, named: Mapping[str, str]) -> list[dict
     for name, place in sorted(every, key=lambda acting: (-_place_probability(acting, confidence), acting)):
         places.setdefault(name, place)
     others = [(n, p, _below_certainty(judgement.confidence_in(n))) for n, p in places.items() if n not in named]
+    elsewhere = [acting for acting in every if acting[0] in named and acting not in judgement.best.hypothesis.acting]
+    others += [(*acting, _below_certainty(_place_probability(acting, confidence))) for acting in sorted(elsewhere)]
     ranked = sorted(others, key=lambda one: -one[2])[: settings.MOST_ALTERNATIVES]
     return [{"name": n, "place": p, "confidence": round(c, 4)} for n, p, c in ranked if c > settings.ALTERNATIVE]
 

@@ -87,7 +87,7 @@ def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
     The first of these whose condition holds:
 
     - ``agrees``: the calibrated model is complete with a probability above one half.
-    - ``learned``: the laws of the leading law's slot have a probability above one half together.
+    - ``learned``: the laws of one slot have a probability above one half together.
     - ``explained``, for one of three reasons. Each mechanism of the most probable complete candidate has at least the
       probability `DECIDED`, exactly these are missing with a probability above one half, and no larger set outdoes
       them (`Comparison.is_outdone`). Or the mechanisms with at least the probability `DECIDED` give a good fit
@@ -102,9 +102,8 @@ def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
     found = Judgement("agrees", comparison.base, comparison, candidates, probability[order].tolist(), scores)
     if comparison.probability_of_base > 0.5:
         return found
-    by_law = ((c, law) for c in comparison.leading if (law := law_of(c.hypothesis)) is not None)
-    candidate, law = next(by_law, (None, None))
-    if candidate is not None and law is not None and found.confidence_in_slot(law) > 0.5:
+    by_law = ((c, law) for c in comparison.leading for law in laws_in(c.hypothesis))
+    if candidate := next((c for c, law in by_law if found.confidence_in_slot(law) > 0.5), None):
         return replace(found, verdict="learned", best=candidate)
     listed = [c for c in candidates if law_of(c.hypothesis) is None]
     if comparison.most_probable in listed and _is_explained(found, comparison.most_probable):

@@ -164,6 +164,22 @@ class Whitened:
         """Weight of a nuisance's posterior mean among the errors: that of one effective sample."""
         return float(np.sqrt(self.measured.shape[1] / IN_DIAGNOSIS))
 
+    def state_log_determinant(self, weight: float) -> float:
+        """Log determinant of 1 + the information on the states of mechanisms, in units of their prior.
+
+        The evidence integrates over these states, as over the other nuisances. Only those are the same for all
+        candidates, so that theirs need not be counted. Residuals count with a weight.
+        """
+        states = [k for k, (name, _, _) in enumerate(self.scalar_nuisances) if mechanism_parameter(name) is not None]
+        if not states:
+            return 0.0
+        # The covariance of the states, all other nuisances integrated out, is that of their information and prior.
+        covariance = np.linalg.inv(np.eye(self.effects.shape[1]) + self.effects.T @ self.effects)[
+            np.ix_(states, states)
+        ]
+        one = np.eye(len(states))
+        return float(np.linalg.slogdet(one + weight * (np.linalg.inv(covariance) - one))[1])
+
     def deviation(self, nuisance: str, residuals: NDArray) -> tuple[float, float]:
         """Deviation of a nuisance, in stated standard deviations, and the variance of its error, from `errors`.
 

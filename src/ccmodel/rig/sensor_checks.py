@@ -228,11 +228,14 @@ def _lost_samples(table: pd.DataFrame, drive: Angle, load: Angle | None) -> Defe
     if jumps.size == 0 or jumps.size > limits.FAST_FRACTION * len(table):
         return None
     at = jumps[0]
+    # The load's change may be logged a sample earlier or later.
+    near = np.arange(max(at - 1, 0), min(at + 2, at_load.size))
+    also = near[np.argmax(np.abs(np.diff(load.values)[near]))]
     more = f" (and {jumps.size - 1} more times)" if jumps.size > 1 else ""
     text = (
         f"{drive.column} jumps by {drive.in_words(np.diff(drive.values)[at])} and {load.column} by"
-        f" {load.in_words(np.diff(load.values)[at])} in one sample{more}: samples were lost and the time does not show"
-        " it"
+        f" {load.in_words(np.diff(load.values)[also])} in one sample{more}: samples were lost and the time does not"
+        " show it"
     )
     return Defect(int(table.index[at + 1]), "time_s", text, contradicts=True)
 

@@ -232,6 +232,20 @@ def test_a_folder_that_is_called_as_a_recording_names_none_unless_the_map_says_s
         import_files([first.rename(folder / "drive.csv"), load], tmp_path / "map.yaml", tmp_path / "batch")
 
 
+def test_a_log_of_the_batch_is_not_imported_into_it(tmp_path):
+    """Its columns would be turned a second time."""
+    _, (first, _) = several(tmp_path)
+    (tmp_path / "map.yaml").write_text(
+        "format: 1\ntime: {signal: t, unit: s}\nchannels:\n  theta_in_rad: {signal: q, unit: rad}\n"
+    )
+    import_files([first], tmp_path / "map.yaml", tmp_path / "batch")
+    written = tmp_path / "batch/run1.csv.gz"
+    before = written.read_bytes()
+    with pytest.raises(InputError, match=r"run1.csv.gz: lies in .*batch, which an import replaces"):
+        import_files([written], tmp_path / "map.yaml", tmp_path / "batch")
+    assert written.read_bytes() == before
+
+
 def test_two_files_without_a_common_clock_are_taken_to_start_together(tmp_path):
     _, written = import_several(tmp_path, "", -12.5)
     one = written.recordings["run1"]

@@ -4,7 +4,9 @@ from made_up_lab import recording, write_text
 from pydantic import ValidationError
 
 from ccmodel.rig.importing import import_files
-from ccmodel.rig.importing.map import Clock, load_map
+from ccmodel.rig.importing.draft import map_text
+from ccmodel.rig.importing.guess import Guess, GuessedFile
+from ccmodel.rig.importing.map import Clock, TimeSource, load_map
 from ccmodel.typed import InputError
 
 GOOD = """\
@@ -14,6 +16,21 @@ channels:
   theta_in_rad: {signal: q, unit: rad}
   F_drive_N: {signal: F, unit: N}
 """
+
+
+HOSTILE = ("a\n  tau_in_Nm: {signal: odd, unit: Nm}\n  # b", "a\x85  tau_in_Nm: {signal: odd}", "\x1b]0;evil\x07")
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_no_text_of_a_file_becomes_a_line_of_the_map(tmp_path, text):
+    guesses = (
+        Guess(text, "theta_in_rad", "rad", sure=True, why=(text,)),
+        Guess("q", None, text, why=(text, text)),
+    )
+    guessed = GuessedFile(TimeSource(signal="t", unit="s"), True, text, guesses, (text,))
+    written = map_text({"main": guessed}, {}, [text])
+    assert not any(c in written for c in "\x85\x1b\x07")
+    assert list(load_map(map_of(tmp_path, written)).channels) == ["theta_in_rad"]
 
 
 def map_of(tmp_path, text):

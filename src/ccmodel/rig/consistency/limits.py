@@ -49,8 +49,12 @@ LEAST_TRAVEL, MOST_TRAVEL = 0.35, 1.6
 AMPLITUDE_FACTOR = 2.5
 # Factor between the sum of tensions at rest and twice the pretension.
 PRETENSION_FACTOR = 2.0
+# Factor between these sums at the two ends below which what is wrong is common to both.
+BOTH_ENDS_ALIKE = 1.3
 # Torque over radius and sum at the load; above 1 a cable would push.
 MOST_TORQUE = 1.5
+# The same at the drive, where friction of the pulley's bearing and the drive train add to the cables' torque.
+MOST_DRIVE_TORQUE = 5.0
 # Radii of pulleys, m.
 SMALLEST_RADIUS_M, LARGEST_RADIUS_M = 3e-4, 0.25
 # Longest and shortest conduit or cable, m, and stated accuracy as a share of the largest range that its sensors show.

@@ -110,7 +110,7 @@ class Parity:
           uncertain, and ``nearest stiffness`` is the value within its bounds that is nearest to the stated one
         - ``pretension at the drive``, ``pretension at the load``: sum of tensions at rest over twice the pretension
         - ``pretension``: their geometric mean, which friction while the cables were tensioned leaves as it is
-        - ``torque at the load``: torque over radius and sum of tensions, its 95 % quantile
+        - ``torque at the drive``, ``torque at the load``: torque over radius and sum of tensions, its 95 % quantile
         """
         x, rig, entry = self.moving, self.batch.rig, self.recording
         radii = rig.drive.pulley_radius_m, rig.load.pulley_radius_m
@@ -137,9 +137,11 @@ class Parity:
         ]
         if ends and min(ends) > 0:
             found["pretension"] = np.exp(np.mean(np.log(ends)))
-        if TAU_OUT in x and F_LOAD in x:
-            force = np.maximum(np.abs(x[F_LOAD]), limits.TAUT_N)
-            found["torque at the load"] = np.quantile(np.abs(x[TAU_OUT]) / radii[1] / force, 0.95)
+        ends_of_torque = (("drive", TAU_IN, F_DRIVE, radii[0]), ("load", TAU_OUT, F_LOAD, radii[1]))
+        for name, torque, force, radius in ends_of_torque:
+            if torque in x and force in x:
+                sums = np.maximum(np.abs(x[force]), limits.TAUT_N)
+                found[f"torque at the {name}"] = np.quantile(np.abs(x[torque]) / radius / sums, 0.95)
         if (log_ratio := self.log_ratio) is not None and self.capstan > limits.LEAST_CAPSTAN:
             both = [log_ratio, log_ratio if self.offset_free_ratio is None else self.offset_free_ratio]
             found["friction"] = min(both, key=lambda one: abs(one - self.capstan)) / self.capstan

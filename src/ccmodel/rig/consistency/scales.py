@@ -5,7 +5,7 @@ from math import isclose
 
 import numpy as np
 
-from ccmodel.channels import ANGLE_AT, F_DRIVE, F_LOAD, SUM_AT, TAU_OUT, THETA_IN, THETA_OUT, TORQUE_AT
+from ccmodel.channels import ANGLE_AT, F_DRIVE, F_LOAD, SUM_AT, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT, TORQUE_AT
 from ccmodel.rig.batch import Batch
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
@@ -42,7 +42,8 @@ def wrong_geometry(parities: Sequence[Parity]) -> list[Contradiction]:
 def wrong_scales(parities: Sequence[Parity]) -> list[Contradiction]:
     """Scale of the load torque, and stated values of spring, cable and pretension that the recordings contradict."""
     ratios, batch = pooled(parities), parities[0].batch
-    found = (_load_torque(ratios) or _spring(ratios, batch)) + _pretension(ratios) + _cable(ratios, batch)
+    found = (_load_torque(ratios) or _spring(ratios, batch)) + _drive_torque(ratios)
+    found += _pretension(ratios) + _cable(ratios, batch)
     found += _frequency(ratios)
     return [*found, *_accuracies(parities)]
 
@@ -203,6 +204,17 @@ def _load_torque(ratios: Mapping[str, float]) -> list[Contradiction]:
     return [Contradiction(TAU_OUT, text)]
 
 
+def _drive_torque(ratios: Mapping[str, float]) -> list[Contradiction]:
+    found = ratios.get("torque at the drive")
+    if found is None or found <= limits.MOST_DRIVE_TORQUE:
+        return []
+    text = (
+        f"the drive torque over the radius reaches {found:.3g} times the sum of tensions there, of which cables that"
+        " only pull take 1 at most; check the scale of the drive torque, the radius and the load cell of the drive"
+    )
+    return [Contradiction(TAU_IN, text)]
+
+
 def _spring(ratios: Mapping[str, float], batch: Batch) -> list[Contradiction]:
     key = "load.spring_stiffness_Nm_per_rad"
     ratio, stated = ratios.get("spring"), batch.rig.load.spring_stiffness_Nm_per_rad
@@ -221,7 +233,8 @@ def _pretension(ratios: Mapping[str, float]) -> list[Contradiction]:
     if not any(sides.values()):
         return []
     values = " and ".join(f"{ratio:.3g} times at the {name.rsplit(' ', 1)[1]}" for name, ratio in ends.items())
-    if len(ends) == 2 and len(set(sides.values())) == 1:
+    alike = max(ends.values()) < limits.BOTH_ENDS_ALIKE * min(ends.values())
+    if len(ends) == 2 and (alike or len(set(sides.values())) == 1):
         text = (
             f"the sums of tensions at rest are {values} twice the stated pretension; pretension_N is that of one"
             " cable, in N; check it, or the scale of both load cells"

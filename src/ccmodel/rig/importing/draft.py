@@ -19,7 +19,7 @@ from ccmodel.rig.importing.names import DRIVE, LOAD, read_name
 from ccmodel.rig.importing.sources import names_of
 from ccmodel.rig.importing.writing import MAP, check_folder
 from ccmodel.rig.readers.contract import SignalFile
-from ccmodel.sentences import shown
+from ccmodel.sentences import controls_in, shown
 from ccmodel.typed import InputError, Problem
 
 _HEAD = """\
@@ -240,7 +240,7 @@ def map_text(guessed: Mapping[str, GuessedFile], patterns: Mapping[str, str], re
     for role, one in guessed.items():
         lines += [f"  {_channel_line(guess, role if several else None)}" for guess in one.guesses if guess.column]
         unused += [guess for guess in one.guesses if not guess.column]
-    lines += [f"  # not used: {_quoted(guess.signal)} ({'; '.join(guess.why)})" for guess in unused]
+    lines += [f"  # not used: {_quoted(guess.signal)} ({_reasons(guess)})" for guess in unused]
     if several:
         lines += ["files:"]
         for role, one in guessed.items():
@@ -249,16 +249,16 @@ def map_text(guessed: Mapping[str, GuessedFile], patterns: Mapping[str, str], re
                 match = "{match: [signal here, the same quantity in the first file]}"
                 lines += [f"    # clock: {{offset_s: , drift: 0}}   # or {match}; without it, the files start together"]
     questions = dict.fromkeys(text for one in guessed.values() for text in one.open)
-    lines += ["", "# Not in these files:", *(f"# - {question}" for question in questions)]
+    lines += ["", "# Not in these files:", *(f"# - {shown(question)}" for question in questions)]
     return "\n".join(lines) + "\n"
 
 
 def _time_lines(one: GuessedFile, indent: str) -> list[str]:
     if one.time is None:
         line = "" if one.time_is_sure else f"{indent}# time: {{rate_Hz: }}   "
-        return [f"{line or indent}# {one.time_why}"]
+        return [f"{line or indent}# {shown(one.time_why)}"]
     sign = "" if one.time_is_sure else "# "
-    return [f"{indent}{sign}time: {time_text(one.time)}   # {one.time_why}"]
+    return [f"{indent}{sign}time: {time_text(one.time)}   # {shown(one.time_why)}"]
 
 
 def time_text(time: TimeSource) -> str:
@@ -274,10 +274,15 @@ def _channel_line(guess: Guess, role: str | None) -> str:
         parts.append(f'gain: "? {UNIT_OF[guess.column]}/{guess.unit}"')
     parts += [f"file: {role}"] if role else []
     line = f"{'' if guess.sure else '# '}{guess.column}: {{{', '.join(parts)}}}"
-    return f"{line}   # {'; '.join(filter(None, guess.why))}"
+    return f"{line}   # {_reasons(guess)}"
+
+
+def _reasons(guess: Guess) -> str:
+    """Why a signal was taken for a column, in one line; units and names are those of the file."""
+    return shown("; ".join(filter(None, guess.why)))
 
 
 def _quoted(text: str) -> str:
     """A text that YAML reads as this text, inside braces too."""
     plain = _PLAIN.fullmatch(text) and text == text.strip() and text.lower() not in _NO_TEXT
-    return text if plain else json.dumps(text, ensure_ascii=False)
+    return text if plain else json.dumps(text, ensure_ascii=controls_in(text))

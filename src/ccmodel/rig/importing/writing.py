@@ -79,10 +79,14 @@ def import_files(files: Sequence[Path], map_file: Path, out: Path, progress: Pro
     Raises
     ------
     InputError
-        If the map or a file cannot be used (a line for each), or `out` holds anything but an import.
+        If the map or a file cannot be used (a line for each), `out` holds anything but an import, or a file lies in it.
     """
     out = Path(out).resolve()
     check_folder(out)
+    if inside := [file for file in files if Path(file).resolve().is_relative_to(out)]:
+        raise InputError(
+            f"{inside[0]}: lies in {out}, which an import replaces; give the rig's own files or another folder"
+        )
     map_content = _content(map_file)
     stated = load_map(map_file)
     sources, remarks = recordings_of([Path(f) for f in files], stated)
