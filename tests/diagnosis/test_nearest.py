@@ -7,6 +7,7 @@ import pytest
 from ccmodel.channels import short_name
 from ccmodel.diagnosis.candidate import fit
 from ccmodel.diagnosis.comparison import Comparison
+from ccmodel.diagnosis.discrepancy import Evidence
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.result import report
 from ccmodel.diagnosis.verdict import Judgement
@@ -22,7 +23,8 @@ def test_its_held_out_errors_stand_apart_from_those_of_the_verdict():
     base = calibrated(recordings)
     hypothesis = Hypothesis((("torque-scale", "drive-sensor"),))
     nearest = fit(recordings, hypothesis, base.free, base.values | {SCALE: 0.05})
-    comparison = Comparison(recordings, base, [nearest], {})
+    far, near = (Evidence(log, log, log, {"tau_in_Nm": log}, 0.0, 0.01) for log in (-500.0, -10.0))
+    comparison = Comparison(recordings, base, [nearest], {base.hypothesis: far, hypothesis: near}, screened=1)
     found = report("b", Judgement("unexplained", base, comparison, [nearest], [1.0], []), base, PARAMETERS, [])
     error, of_nearest = found["fit"]["error"], found["nearest"]["error"]
     assert {c: e["after"] for c, e in error.items()} == {c: e["before"] for c, e in error.items()}
