@@ -123,7 +123,7 @@ def test_files_of_a_killed_command_are_lost_at_no_step(tmp_path):
 
 
 def test_files_that_have_been_replaced_never_come_back(tmp_path):
-    """A kill while what is left of the earlier files is removed, whatever the order in which the disk lists it."""
+    """After a kill while the earlier files are removed, in whatever order the disk lists them."""
     write_files(tmp_path, "new")
     work = tmp_path / ".unfinished-files"
     write_files(work / "earlier", "old")

@@ -112,7 +112,4 @@ def import_mis_tool(
         else:
             imported = mis_tool.import_mis_tool(source, out, progress)
     output.result({"batches": imported.batches, "findings": imported.findings}, *map(str, imported.batches))
-    for finding in imported.findings:
-        output.finding(str(finding), finding.severity)
-    if any(finding.is_refused for finding in imported.findings):
-        raise typer.Exit(1)
+    output.findings(imported.findings)

@@ -3,7 +3,7 @@
 import json
 import math
 import sys
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, is_dataclass
 from pathlib import Path
@@ -62,13 +62,13 @@ class Output:
         say(f"{WORD[severity]}: ", _STYLE[severity], end="")
         say(line)
 
-    def findings(self, findings: "Iterable[Finding]", left_out: Collection[str]) -> None:
-        """Print findings and what was left out; the command ends with 1 if something was."""
+    def findings(self, findings: "Collection[Finding]", left_out: Collection[str] = ()) -> None:
+        """Print findings and what was left out; the command ends with 1 if something was, or is refused."""
         for finding in findings:
             self.finding(str(finding), finding.severity)
         for line in left_out:
             self.finding(line, "refused")
-        if left_out:
+        if left_out or any(finding.is_refused for finding in findings):
             raise typer.Exit(1)
 
     def message(self, text: str, style: str | None = None) -> None:

@@ -174,10 +174,8 @@ class Whitened:
         if not states:
             return 0.0
         # The covariance of the states, all other nuisances integrated out, is that of their information and prior.
-        covariance = np.linalg.inv(np.eye(self.effects.shape[1]) + self.effects.T @ self.effects)[
-            np.ix_(states, states)
-        ]
-        one = np.eye(len(states))
+        of_all = np.linalg.inv(np.eye(self.effects.shape[1]) + self.effects.T @ self.effects)
+        covariance, one = of_all[np.ix_(states, states)], np.eye(len(states))
         return float(np.linalg.slogdet(one + weight * (np.linalg.inv(covariance) - one))[1])
 
     def deviation(self, nuisance: str, residuals: NDArray) -> tuple[float, float]:

@@ -42,7 +42,8 @@ def wrong_geometry(parities: Sequence[Parity]) -> list[Contradiction]:
 def wrong_scales(parities: Sequence[Parity]) -> list[Contradiction]:
     """Scale of the load torque, and stated values of spring, cable and pretension that the recordings contradict."""
     ratios, batch = pooled(parities), parities[0].batch
-    found = (_load_torque(ratios) or _spring(ratios, batch)) + _drive_torque(ratios)
+    found = _torque(ratios, "load", TAU_OUT, limits.MOST_TORQUE) or _spring(ratios, batch)
+    found += _torque(ratios, "drive", TAU_IN, limits.MOST_DRIVE_TORQUE)
     found += _pretension(ratios) + _cable(ratios, batch)
     found += _frequency(ratios)
     return [*found, *_accuracies(parities)]
@@ -193,26 +194,15 @@ def _named(ratio: float) -> str:
     return ""
 
 
-def _load_torque(ratios: Mapping[str, float]) -> list[Contradiction]:
-    found = ratios.get("torque at the load")
-    if found is None or found <= limits.MOST_TORQUE:
+def _torque(ratios: Mapping[str, float], end: str, channel: str, most: float) -> list[Contradiction]:
+    found = ratios.get(f"torque at the {end}")
+    if found is None or found <= most:
         return []
     text = (
-        f"the load torque over the radius reaches {found:.3g} times the sum of tensions there, which cables that only"
-        " pull cannot do; check the scale of the load torque, the radius and the load cell of the load"
+        f"the {end} torque over the radius reaches {found:.3g} times the sum of tensions there, which cables that only"
+        f" pull cannot do; check the scale of the {end} torque, the radius and the load cell of the {end}"
     )
-    return [Contradiction(TAU_OUT, text)]
-
-
-def _drive_torque(ratios: Mapping[str, float]) -> list[Contradiction]:
-    found = ratios.get("torque at the drive")
-    if found is None or found <= limits.MOST_DRIVE_TORQUE:
-        return []
-    text = (
-        f"the drive torque over the radius reaches {found:.3g} times the sum of tensions there, of which cables that"
-        " only pull take 1 at most; check the scale of the drive torque, the radius and the load cell of the drive"
-    )
-    return [Contradiction(TAU_IN, text)]
+    return [Contradiction(channel, text)]
 
 
 def _spring(ratios: Mapping[str, float], batch: Batch) -> list[Contradiction]:
