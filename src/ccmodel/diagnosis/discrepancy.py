@@ -235,26 +235,25 @@ def evidence_of(discrepancy: Discrepancy, candidate: CandidateFit, effect: float
         tried = (sizes >= low) & (sizes <= high)
         return {c: _mean(value[tried]) for c, value in own.items()}
 
-    def anywhere(low: float, high: float, of_one: int = 1) -> float:
-        """In all channels or in a single one, whose limits are so many times as large."""
-        in_one = by_channel(of_one * low, of_one * high)
+    def anywhere(low: float, high: float, in_one: dict[str, float]) -> float:
+        """In all channels or in a single one."""
         return _mean([_mean(every[(sizes >= low) & (sizes <= high)]), _mean(list(in_one.values()))])
 
     slight = sizes <= settings.NOT_WHITE
     exact = _mean([none, *every[slight], *(value for by_size in own.values() for value in by_size[slight])])
-    least, most = settings.LEFT_BY_LAW
+    of_law = settings.LEFT_BY_LAW[0] * effect, settings.LEFT_BY_LAW[1] * effect
     low, high = settings.SMALLEST_MISSING, settings.LARGEST_MISSING * max(excess, settings.SMALLEST_MISSING)
     # An excess of all channels that comes from one fault in one of them is so many times as large there.
-    of_one = len(channels)
+    in_one = by_channel(len(channels) * low, len(channels) * high)
     tried = [(none, 0.0), *zip(every, sizes, strict=True)]
     # In a single channel a size is a mean square of that channel only.
     tried += [(value, size / len(own)) for by_size in own.values() for value, size in zip(by_size, sizes, strict=True)]
     best = max(value for value, _ in tried)
     return Evidence(
         exact,
-        anywhere(least * effect, most * effect),
-        anywhere(low, high, of_one),
-        by_channel(of_one * low, of_one * high),
+        anywhere(*of_law, by_channel(*of_law)),
+        anywhere(low, high, in_one),
+        in_one,
         min(size for value, size in tried if value >= best - settings.CLEARLY_WORSE),
         discrepancy.resolution(candidate, settings.DISCREPANCIES),
     )

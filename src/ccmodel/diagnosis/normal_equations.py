@@ -52,12 +52,12 @@ class NormalEquations:
         count = len(candidate.whitened)
         for w, e, J in zip(candidate.whitened, candidate.residuals, candidate.jacobian, strict=True):
             both, n = np.column_stack([J, e]), w.measured.size
-            weights = np.full(len(e), _nuisance_weight(w, count))
-            weights[:n] = sample_weight(w, count)
+            weight, weights = sample_weight(w, count), np.full(len(e), _nuisance_weight(w, count))
+            weights[:n] = weight
             products = both.T @ (weights[:, None] * both)
             information += products[:-1, :-1]
             score += products[:-1, -1]
-            square += float(products[-1, -1]) + w.state_log_determinant(sample_weight(w, count))
+            square += float(products[-1, -1]) + w.state_log_determinant(weight)
         prior_sd = np.array([_prior_sd(candidate, name) for name in candidate.values])
         means = dict.fromkeys(coefficients_of(candidate.hypothesis), 0.0)
         means |= {n: f.prior_mean for n, f in candidate.free.items() if f.spread}

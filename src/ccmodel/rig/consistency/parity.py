@@ -26,6 +26,7 @@ from ccmodel.channels import (
     TENSIONS_AT,
     THETA_IN,
     THETA_OUT,
+    TORQUE_AT,
 )
 from ccmodel.recording import Recording
 from ccmodel.rig.angle import passes_of_zero
@@ -129,7 +130,7 @@ class Parity:
             angle = x[THETA_OUT] - x[THETA_OUT].mean()
             found["spring"] = (angle * x[TAU_OUT]).sum() / (angle * angle).sum() / spring
         resting = entry.time_s <= entry.rest_s if entry.rest_s else np.zeros(entry.time_s.size, dtype=bool)
-        for name, channel in (("drive", F_DRIVE), ("load", F_LOAD)):
+        for name, channel in SUM_AT.items():
             if channel in entry and resting.any() and not entry.far_end:
                 found[f"pretension at the {name}"] = entry[channel][resting].mean() / (2 * entry.pretension_N)
         ends = [
@@ -137,9 +138,8 @@ class Parity:
         ]
         if ends and min(ends) > 0:
             found["pretension"] = np.exp(np.mean(np.log(ends)))
-        ends_of_torque = (("drive", TAU_IN, F_DRIVE, radii[0]), ("load", TAU_OUT, F_LOAD, radii[1]))
-        for name, torque, force, radius in ends_of_torque:
-            if torque in x and force in x:
+        for name, radius in zip(("drive", "load"), radii, strict=True):
+            if (torque := TORQUE_AT[name]) in x and (force := SUM_AT[name]) in x:
                 sums = np.maximum(np.abs(x[force]), limits.TAUT_N)
                 found[f"torque at the {name}"] = np.quantile(np.abs(x[torque]) / radius / sums, 0.95)
         if (log_ratio := self.log_ratio) is not None and self.capstan > limits.LEAST_CAPSTAN:

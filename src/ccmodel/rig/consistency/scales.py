@@ -5,7 +5,7 @@ from math import isclose
 
 import numpy as np
 
-from ccmodel.channels import ANGLE_AT, F_DRIVE, F_LOAD, SUM_AT, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT, TORQUE_AT
+from ccmodel.channels import ANGLE_AT, F_DRIVE, F_LOAD, SUM_AT, THETA_IN, THETA_OUT, TORQUE_AT
 from ccmodel.rig.batch import Batch
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
@@ -42,8 +42,8 @@ def wrong_geometry(parities: Sequence[Parity]) -> list[Contradiction]:
 def wrong_scales(parities: Sequence[Parity]) -> list[Contradiction]:
     """Scale of the load torque, and stated values of spring, cable and pretension that the recordings contradict."""
     ratios, batch = pooled(parities), parities[0].batch
-    found = _torque(ratios, "load", TAU_OUT, limits.MOST_TORQUE) or _spring(ratios, batch)
-    found += _torque(ratios, "drive", TAU_IN, limits.MOST_DRIVE_TORQUE)
+    found = _torque(ratios, "load", limits.MOST_TORQUE) or _spring(ratios, batch)
+    found += _torque(ratios, "drive", limits.MOST_DRIVE_TORQUE)
     found += _pretension(ratios) + _cable(ratios, batch)
     found += _frequency(ratios)
     return [*found, *_accuracies(parities)]
@@ -194,7 +194,7 @@ def _named(ratio: float) -> str:
     return ""
 
 
-def _torque(ratios: Mapping[str, float], end: str, channel: str, most: float) -> list[Contradiction]:
+def _torque(ratios: Mapping[str, float], end: str, most: float) -> list[Contradiction]:
     found = ratios.get(f"torque at the {end}")
     if found is None or found <= most:
         return []
@@ -202,7 +202,7 @@ def _torque(ratios: Mapping[str, float], end: str, channel: str, most: float) ->
         f"the {end} torque over the radius reaches {found:.3g} times the sum of tensions there, which cables that only"
         f" pull cannot do; check the scale of the {end} torque, the radius and the load cell of the {end}"
     )
-    return [Contradiction(channel, text)]
+    return [Contradiction(TORQUE_AT[end], text)]
 
 
 def _spring(ratios: Mapping[str, float], batch: Batch) -> list[Contradiction]:
