@@ -97,6 +97,11 @@ def new_files(folder: str | Path, last: str | None = None, without: Collection[s
             _settle(folder, last)
 
 
+def is_unfinished(folder: Path) -> bool:
+    """Whether files of a command lie aside in a folder: it goes on, or it was killed."""
+    return (folder / _FILES).exists()
+
+
 def _settle(folder: Path, last: str | None) -> None:
     """Bring what `new_files` began to an end: all new files take their places, or all earlier ones take them again.
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar, Union, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetCoreSchemaHandler, ValidationError
 from pydantic.fields import FieldInfo
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
@@ -31,6 +31,16 @@ Positive = Annotated[float, Field(gt=0, lt=LARGEST)]
 NotNegative = Annotated[float, Field(ge=0, lt=LARGEST)]
 Finite = Annotated[float, Field(gt=-LARGEST, lt=LARGEST)]
 M = TypeVar("M", bound=BaseModel)
+
+
+def _no_truth(value: Any) -> Any:
+    if isinstance(value, bool):
+        raise ValueError("must be a number")
+    return value
+
+
+# Before a choice among numbers, since true equals 1 for Python.
+IS_NUMBER = BeforeValidator(_no_truth)
 # Path of a value: keys and indices from the top of a file. `Borrowed` gives the file's own path of a value.
 Loc = tuple[str | int, ...]
 Borrowed = Mapping[Loc, Loc]
@@ -39,8 +49,10 @@ ErrorEntry = Mapping[str, Any]
 
 # Lists and mappings within each other that a file may hold; our own formats need 6.
 MAX_DEPTH = 50
-# Keys and values that a file may hold, those that aliases repeat included; a recording has 20 to 30.
-MAX_VALUES = 100_000
+# Keys and values that a file may hold, those that aliases repeat included; a recording has 20 to 30. To read so many
+# takes 7 s.
+MAX_VALUES = 75_000
+TOO_MANY = f"holds more than {MAX_VALUES} values, repeated ones counted each time: write less"
 # Letters of a value in a message.
 MOST_SHOWN = 100
 
@@ -236,10 +248,18 @@ def _filled(data: Any) -> Any:
 
 
 class _TextKeys(Composer):
-    """Reads every key as text, also one that looks like a number or a date: JSON has no other keys."""
+    """Reads every key as text, also one that looks like a number or a date: JSON has no other keys.
+
+    A file of too many values is not read to its end.
+    """
+
+    nodes = 0
 
     def compose_node(self, parent: Node | None, index: Any) -> Node:
         node = super().compose_node(parent, index)
+        self.nodes += 1
+        if self.nodes > MAX_VALUES:
+            raise _error_at(node, TOO_MANY)
         if isinstance(parent, MappingNode) and index is None:
             if not isinstance(node, ScalarNode):
                 raise _error_at(
@@ -255,7 +275,7 @@ class _ValuesWithLines(RoundTripConstructor):
 
     def construct_document(self, node: Node) -> Any:
         if _size(node, {}) > MAX_VALUES:
-            raise _error_at(node, f"holds more than {MAX_VALUES} values, repeated ones counted each time: write less")
+            raise _error_at(node, TOO_MANY)
         return super().construct_document(node)
 
     def construct_object(self, node: Node, deep: bool = False) -> Any:

@@ -10,6 +10,7 @@ from example_folder import noisy_batch
 
 CHECKS = {
     "no such folder": (["check", "raw/loopss"], "raw/loopss: there is no such folder; did you mean raw/loops?"),
+    "an empty word": (["check", ""], "the word after 'ccmodel check' is empty: is a variable of the shell not set?"),
     "a file in place of a folder": (["check", "a-file"], "a-file: is a file; a folder is expected"),
     "an empty folder": (["check", "empty"], "empty: has no batch.yaml; "),
     "a folder of batches": (["check", "raw"], "it holds the batches loops"),

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from ccmodel.outputs import new_files
 from ccmodel.report.verdict import sentence
 
 ERROR = {"tau_in": {"before": 0.012, "after": 0.002, "noise": 0.001, "unit": "N*m"}}
@@ -40,6 +41,19 @@ def test_a_diagnosis(run, tmp_path):
     ended = run("report", tmp_path)
     assert ended.code == 0
     assert ended.out.startswith("loops: agrees.")
+
+
+def test_a_folder_whose_files_a_killed_command_has_put_aside(run, tmp_path):
+    with pytest.raises(ValueError, match="stopped"), new_files(tmp_path) as fresh:
+        write(fresh / "diagnosis.json", AGREES)
+        write(tmp_path / "diagnosis.json", AGREES)
+        ended = run("report", tmp_path)
+        raise ValueError("stopped")
+    assert ended.err.splitlines() == [
+        f"warning: {tmp_path}: a command is writing there, or was killed: run it again, and it brings the earlier files"
+        " back or ends"
+    ]
+    assert run("report", tmp_path).err == ""
 
 
 @pytest.mark.parametrize("quiet, warned", [([], True), (["--quiet"], False)])

@@ -20,6 +20,12 @@ from ccmodel.model.transmission import MAX_FRICTION_ANGLE, Transmission
 from fuzzing import examples
 
 LOADS = ("fixed", "spring", "free")
+# A solver that always gives up satisfies all else. Up to these mu phi none does, whatever the drive; a rig's is 2. A
+# load that moves freely between cables as soft as 10 N may leave the general solver without a balance at any mu phi.
+EXACT_SOLVES = 20.0
+GENERAL_SOLVES = {"fixed": 5.0, "spring": 5.0, "free": 0.0}
+# Share of the general solver's runs that come to their end, of those to 300 too.
+SOLVED = 0.5
 
 
 def decades(low, high):
@@ -47,18 +53,28 @@ def cases(draw, load):
 @given(data=st.data())
 def test_a_status_or_tensions_within_the_capstan_bound(load, data):
     one, far, initial, theta = data.draw(cases(load))
-    assert one.friction_coefficient * one.path.bend_rad <= MAX_FRICTION_ANGLE
-    check_mechanics(one, far, initial, simulate_pair(one, far, theta, initial), solved_to=1e-9)
+    assert friction_angle(one) <= MAX_FRICTION_ANGLE
+    found = simulate_pair(one, far, theta, initial)
+    assert found.status is Status.OK or friction_angle(one) > EXACT_SOLVES
+    check_mechanics(one, far, initial, found, solved_to=1e-9)
 
 
 @pytest.mark.parametrize("load", LOADS)
-@settings(max_examples=examples(50), deadline=None)
-@given(data=st.data(), elements=st.sampled_from([1, 8, 32]))
-def test_the_general_solver_too(load, data, elements):
-    one, far, initial, theta = data.draw(cases(load))
-    found = simulate(one, far, 0.01 * np.arange(theta.size), theta, initial, elements=elements)
-    # What a step whose search stalls is accepted with (`ccmodel.model.general.newton.LOOSE_TOLERANCE`).
-    check_mechanics(one, far, initial, found, solved_to=1e-5)
+def test_the_general_solver_too(load):
+    statuses = []
+
+    @settings(max_examples=examples(50), deadline=None)
+    @given(data=st.data(), elements=st.sampled_from([1, 8, 32]))
+    def each(data, elements):
+        one, far, initial, theta = data.draw(cases(load))
+        found = simulate(one, far, 0.01 * np.arange(theta.size), theta, initial, elements=elements)
+        statuses.append(found.status)
+        assert found.status is Status.OK or friction_angle(one) > GENERAL_SOLVES[load]
+        # What a step whose search stalls is accepted with (`ccmodel.model.general.newton.LOOSE_TOLERANCE`).
+        check_mechanics(one, far, initial, found, solved_to=1e-5)
+
+    each()
+    assert np.mean([status is Status.OK for status in statuses]) > SOLVED
 
 
 @pytest.mark.parametrize("name", mechanisms.names())
@@ -77,6 +93,11 @@ def test_the_general_solver_with_each_mechanism_has_a_status_or_tensions_that_no
         assert np.min(ends) >= 0
 
 
+def friction_angle(one):
+    """Product mu phi of a conduit."""
+    return one.friction_coefficient * one.path.bend_rad
+
+
 def check_mechanics(one, far, initial, found, solved_to):
     """Nothing is claimed of a run that ended with a status.
 
@@ -86,7 +107,7 @@ def check_mechanics(one, far, initial, found, solved_to):
         return
     both = ((found.T1_N, found.T2_N), (found.T3_N, found.T4_N))[: 1 if one.is_single_cable else 2]
     error_N = solved_to * max(np.max(both), initial.tension_A_N.max())
-    bound = one.friction_coefficient * one.path.bend_rad * (1 + 1e-9) + 1e-9
+    bound = friction_angle(one) * (1 + 1e-9) + 1e-9
     for near, beyond in both:
         assert np.isfinite([near, beyond]).all() and (near >= 0).all() and (beyond >= 0).all()
         low, high = np.minimum(near, beyond), np.maximum(near, beyond)

@@ -314,6 +314,34 @@ def test_range_of_a_sensor(bench):
     assert all("end of the sensor's range [-0.4, 0.4]" in f.text for f in findings)
 
 
+def test_a_reading_outside_the_range_of_its_sensor_is_not_used(bench):
+    rows = len(bench.tables["one"])
+    bench.described["rig"]["ranges"] = {"drive_current_A": [-5.0, 5.0]}
+    assert ingest_batch(bench.write().folder).findings == []
+    # Among many peaks of a drive that switches, it does not stand out by itself.
+    changed("drive_current_A", lambda t: t.drive_current_A.where(t.index % 20 != 7, 3.5))(bench)
+    before = [f.text for f in ingest_batch(bench.folder).findings]
+    changed("drive_current_A", lambda t: t.drive_current_A.where(~t.index.isin([150, 250]), 5.4))(bench)
+    ingested = ingest_batch(bench.folder)
+    (finding,) = [f for f in ingested.findings if "outside its range" in f.text]
+    assert "outside its range" not in str(before)
+    assert (finding.column, finding.severity) == ("drive_current_A", "warning")
+    assert "reads 5.4, outside its range [-5, 5] in rig.ranges (and 1 more such readings): not used" in finding.text
+    assert ingested.recordings[0].time_s.size == rows - 2
+
+
+def test_a_range_that_many_single_readings_leave_is_wrong(bench):
+    current = bench.tables["one"].drive_current_A
+    top = float(current.abs().max())
+    bench.described["rig"]["ranges"] = {"drive_current_A": [-1.5 * top, 1.5 * top]}
+    changed("drive_current_A", lambda t: t.drive_current_A.where(t.index % 40 != 7, 1.6 * top))(bench)
+    ingested = ingest_batch(bench.folder)
+    (finding, *_) = [f for f in ingested.findings if "outside its range" in f.text]
+    assert (finding.column, finding.severity) == ("drive_current_A", "inconsistent")
+    assert "is the range right" in finding.text
+    assert ingested.recordings[0].time_s.size == len(current)
+
+
 def test_gzipped_and_cut(bench):
     bench.write()
     for name in ("one", "two"):

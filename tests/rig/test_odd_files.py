@@ -89,6 +89,14 @@ def test_aliases_that_repeat_one_another_are_refused(written):
     ]
 
 
+def test_a_batch_file_of_too_many_values_is_not_read_to_its_end(written):
+    file = written.folder / "batch.yaml"
+    # The bracket that is never closed lies behind so many values.
+    file.write_text(f"a: [{'1, ' * (MAX_VALUES + 10)}{{")
+    (refused,) = refusals(written)
+    assert "holds more than" in refused
+
+
 def test_an_alias_in_its_place_is_read(written):
     file = written.folder / "batch.yaml"
     pieces = "\n  - length_m: 0.4\n    bend_rad: 0.0\n  - length_m: 0.8\n    bend_rad: 3.1416\n"

@@ -88,6 +88,34 @@ def test_signals_without_a_common_time_are_for_the_import(bench):
     assert "none is named time_s" in error.value.args[2] and "ccmodel import" in error.value.args[2]
 
 
+@pytest.mark.parametrize(
+    ("column", "unit", "is_refused"),
+    [
+        ("theta_in_rad", "deg", True),
+        ("theta_in_rad", "rad", False),
+        ("theta_in_rad", "N", True),
+        ("F_drive_N", "mN", True),
+        ("time_s", "ms", True),
+        ("time_s", "s", False),
+        ("theta_in_rad", "no unit at all", False),
+        ("own_name", "deg", False),
+    ],
+)
+def test_a_unit_that_the_name_of_a_column_contradicts_is_refused(column, unit, is_refused, tmp_path):
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        for name in {"time_s": None, column: None}:
+            file[name] = np.linspace(0.0, 1.0, 50)
+        file[column].attrs["units"] = unit
+    if not is_refused:
+        assert len(readers.read(tmp_path / "log.h5")) == 50
+        return
+    with pytest.raises(LogError) as refused:
+        readers.read(tmp_path / "log.h5")
+    assert refused.value.defect.column == column
+    assert f"states its unit as '{unit}'" in refused.value.defect.text
+    assert "ccmodel import" in refused.value.defect.text
+
+
 def test_the_checks_name_the_rows_of_the_format(bench):
     bench.described["recordings"][0]["file"] = "one.parquet"
     table(seed=1).drop(index=range(100, 150)).to_parquet(bench.folder / "one.parquet")

@@ -79,6 +79,7 @@ def main() -> None:
     """
     try:
         with signals():
+            _check_words(sys.argv[1:])
             code = app(prog_name="ccmodel", standalone_mode=False)
         # Typer turns an interruption that no command answers into this code.
         lines = [f"interrupted: {INTERRUPTED}"] if code == 130 else []
@@ -98,6 +99,15 @@ def main() -> None:
     if lines:
         _print_error(lines)
     sys.exit(code or 0)
+
+
+def _check_words(words: list[str]) -> None:
+    """Raise `InputError` if a word is empty, as a variable that is not set makes it: as a path it means this folder."""
+    if "" in words:
+        from ccmodel.typed import InputError
+
+        before = " ".join(words[: words.index("")])
+        raise InputError(f"the word after 'ccmodel {before}' is empty: is a variable of the shell not set?")
 
 
 def _lines_on(error: Exception) -> list[str]:

@@ -21,9 +21,13 @@ def report(results: Results = Path("results"), as_json: Json = False, quiet: Qui
 
     Exits with 1 if something was left out or inputs contradict one another.
     """
+    from ccmodel.outputs import is_unfinished
     from ccmodel.report.summary import summary_of
 
     output = Output(as_json, quiet)
+    if is_unfinished(results):
+        text = "a command is writing there, or was killed: run it again, and it brings the earlier files back or ends"
+        output.finding(f"{results}: {text}", "warning")
     summary = summary_of(results)
     output.result(summary.as_dict(), *summary.lines())
     for line in summary.warnings:

@@ -34,6 +34,7 @@ from ccmodel.geometry import ConduitPath
 from ccmodel.recording import FAR_ENDS
 from ccmodel.sentences import controls_in, shown
 from ccmodel.typed import (
+    IS_NUMBER,
     LARGEST,
     Borrowed,
     FillIn,
@@ -75,7 +76,8 @@ SENSOR_COLUMNS = (
 )
 COLUMNS = ("time_s", *DRIVE_ANGLE_COLUMNS, *SENSOR_COLUMNS)
 
-Sign = Literal[1, -1]
+Sign = Annotated[Literal[1, -1], IS_NUMBER]
+Format = Annotated[Literal[1], IS_NUMBER]
 # Endings that a compressed file has beside that of its content.
 _COMPRESSED = (".gz",)
 # Bytes of a name in UTF-8. File systems allow 255 and netCDF 256, endings and names of studies included.
@@ -377,7 +379,7 @@ class RecordingDefaults(TypedModel):
 class Batch(TypedModel):
     """A whole `batch.yaml`; the recordings have the defaults that they do not state."""
 
-    format: Literal[1]
+    format: Format
     batch: Name
     origin: Literal["rig", "virtual-rig"]
     note: Any = None

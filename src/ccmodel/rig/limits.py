@@ -77,5 +77,7 @@ OUTLIER_NEIGHBOURS, OUTLIER_FACTOR, OUTLIER_SHARE, OUTLIER_GRAINS = 5, 4.0, 0.05
 OUTLIER_RANGE = (0.005, 0.995)
 # The first and the last reading must be this many ranges from the median.
 OUTLIER_AT_ENDS = 4
+# Share of a sensor's stated range by which a reading at its end may lie outside.
+BEYOND_RANGE = 0.01
 # Share of the samples up to which frequent outliers are looked for.
 MOST_OUTLIERS = 0.3

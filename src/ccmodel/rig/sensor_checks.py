@@ -4,6 +4,8 @@ A faulty drive encoder refuses the recording, since the drive angle is the input
 only removes its channel. Both contradict `batch.yaml`, which states a sensor that works.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from ccmodel.rig.angle import Angle, angle_of, angle_of_motor, resolution_seen, 
 from ccmodel.rig.batch import Rig
 from ccmodel.rig.findings import Defect, LogError
 from ccmodel.rig.log import length, longest_run, runs
+from ccmodel.rig.outliers import without
 
 
 def check_sensors(table: pd.DataFrame, rig: Rig, largest_travel: float) -> tuple[pd.DataFrame, list[Defect]]:
@@ -31,7 +34,7 @@ def check_sensors(table: pd.DataFrame, rig: Rig, largest_travel: float) -> tuple
     Returns
     -------
     table : DataFrame
-        The columns that can be used.
+        The columns and rows that can be used.
     warnings : list of Defect
         Faults of the other sensors, and faults that leave a column usable.
 
@@ -40,12 +43,13 @@ def check_sensors(table: pd.DataFrame, rig: Rig, largest_travel: float) -> tuple
     LogError
         If the drive encoder is faulty.
     """
+    table, beyond = _drop_beyond(table, rig.ranges)
     drive, load = _drive_angle(table, rig), angle_of(table, rig.ends[1])
     for angle in (drive, load):
         if angle:
             _check_steps(table, angle)
     _check_drive(table, drive, load)
-    defects, dead = _missing_steps(table, drive), []
+    defects, dead = [*beyond, *_missing_steps(table, drive)], []
     motor = angle_of_motor(table, rig)
     is_small = drive_travel(table, rig) < limits.SMALL_TRAVEL_FRACTION * largest_travel
     for column in table.columns.drop(["time_s", drive.column]):
@@ -64,6 +68,32 @@ def check_sensors(table: pd.DataFrame, rig: Rig, largest_travel: float) -> tuple
             # A sensor at the end of its range repeats one value: it is clipped and not frozen.
             defects += _saturated(table, column, drive, rig.ranges.get(column)) or _frozen(table, column, drive)
     return table.drop(columns=dead), defects
+
+
+def _drop_beyond(table: pd.DataFrame, ranges: Mapping[str, tuple[float, float]]) -> tuple[pd.DataFrame, list[Defect]]:
+    """Drop the rows of single readings outside the stated range of their sensor, which no sensor gives.
+
+    Where they are many, the range is wrong, and they are not dropped. Several in a row are a sensor at the end of its
+    range.
+    """
+    bad, defects = np.zeros(len(table), bool), []
+    for column in (name for name in ranges if name in table):
+        values, (low, high) = table[column].to_numpy(), ranges[column]
+        slack = limits.BEYOND_RANGE * (high - low)
+        beyond = (values < low - slack) | (values > high + slack)
+        for run in runs(beyond, limits.FLAT_SAMPLES):
+            beyond[run] = False
+        if not (count := int(beyond.sum())):
+            continue
+        first = int(np.argmax(beyond))
+        is_wrong = beyond.mean() > limits.BAD_CELLS_FRACTION
+        text = f"reads {values[first]:g}, outside its range [{low:g}, {high:g}] in rig.ranges"
+        more = f" (and {count - 1} more such readings)" if count > 1 else ""
+        end = ": is the range right, and in the column's unit? They are used" if is_wrong else ": not used"
+        defects.append(Defect(int(table.index[first]), column, f"{text}{more}{end}", contradicts=is_wrong))
+        if not is_wrong:
+            bad |= beyond
+    return without(table, bad), defects
 
 
 def drive_travel(table: pd.DataFrame, rig: Rig) -> float:

@@ -55,6 +55,10 @@ def refused(tmp_path, text):
         ("unit: N}", "unit: V}", "state the gain with its unit, as '0.5 N/V'"),
         ("unit: N}", "unit: V, gain: 10}", "state the gain with its unit, as '10 N/V'"),
         ("unit: N}", "unit: V, gain: 10 Nm/V}", "gives no N; the gain's unit must be that of N per V"),
+        ("unit: N}", "unit: N, sign: true}", "channels.F_drive_N.sign: must be a number, found True"),
+        ("format: 1", "format: true", "format: must be a number, found True"),
+        ("unit: N}", "unit: N, gain: .nan}", "channels.F_drive_N.gain: must be a finite number, or one with its unit"),
+        ("unit: N}", "unit: N, gain: [1]}", "channels.F_drive_N.gain: must be a finite number, or one with its unit"),
         ("unit: N}", "unit: N, gain: 0}", "channels.F_drive_N.gain: must not be zero"),
         ("unit: N}", "unit: A, gain: 0 N/A}", "channels.F_drive_N: found '0 N/A'; a gain is a number other than 0"),
         ("unit: N}", "unit: A, gain: 1e400 N/A}", "a gain is a number other than 0"),
@@ -117,6 +121,16 @@ def test_a_signal_that_is_not_in_the_file_is_named_with_its_nearest(tmp_path):
         import_of(tmp_path, GOOD.replace("signal: q,", "signal: q_moter,"), **columns)
     with pytest.raises(InputError, match="has no signal 'zzz'; it has t, q_motor, F$"):
         import_of(tmp_path, GOOD.replace("signal: q,", "signal: zzz,"), **columns)
+
+
+def test_samples_without_a_time_are_named(tmp_path):
+    r = recording()
+    time = np.array(r["time_s"], float)
+    time[[70, 72]] = np.nan
+    columns = {"t": time, "q": r["theta_in_rad"], "F": r["F_drive_N"]}
+    said = rf"^run.csv: 'q': sample 71 of {time.size} has no time \(and 1 more\): the file is damaged$"
+    with pytest.raises(InputError, match=said):
+        import_of(tmp_path, GOOD, **columns)
 
 
 def test_a_file_without_units_needs_them_in_the_map(tmp_path):

@@ -11,8 +11,8 @@ from ccmodel.outputs import new_file
 from ccmodel.progress import Progress, each_of, silent
 from ccmodel.rig import readers
 from ccmodel.rig.batch import DRIVE_ANGLE_COLUMNS
+from ccmodel.rig.columns import UNIT_OF
 from ccmodel.rig.findings import LogError
-from ccmodel.rig.importing.columns import UNIT_OF
 from ccmodel.rig.importing.guess import Guess, GuessedFile, guess_file, open_questions
 from ccmodel.rig.importing.map import MAIN, TimeSource
 from ccmodel.rig.importing.names import DRIVE, LOAD, read_name

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.channels import ANGLE_AT
+from ccmodel.rig import units
 from ccmodel.rig.batch import DRIVE_ANGLE_COLUMNS, RAW_COLUMNS
-from ccmodel.rig.importing import names, shapes, units
-from ccmodel.rig.importing.columns import CHANNELS, UNIT_OF
+from ccmodel.rig.columns import CHANNELS, UNIT_OF
+from ccmodel.rig.importing import names, shapes
 from ccmodel.rig.importing.map import TimeSource
 from ccmodel.rig.importing.names import ANGLE, CURRENT, DRIVE, FORCE, LOAD, TIME, TORQUE, Reading
 from ccmodel.rig.readers.contract import Signal, SignalFile

@@ -1,13 +1,14 @@
 """The map of an import: what each column of a log is made of (`map.yaml`, `docs/how-to/import-logs.md`)."""
 
+from collections.abc import Callable
 from pathlib import Path, PurePath
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
-from ccmodel.rig.batch import DRIVE_ANGLE_COLUMNS, RAW_COLUMNS, Name, Sign
-from ccmodel.rig.importing import units
-from ccmodel.rig.importing.columns import CHANNELS, UNIT_OF
+from ccmodel.rig import units
+from ccmodel.rig.batch import DRIVE_ANGLE_COLUMNS, RAW_COLUMNS, Format, Name, Sign
+from ccmodel.rig.columns import CHANNELS, UNIT_OF
 from ccmodel.rig.readers.contract import TextLayout
 from ccmodel.typed import InputError, OneOf, Positive, Problem, TypedModel, load_yaml_model
 
@@ -79,9 +80,14 @@ class Channel(TypedModel):
     file: str | None = None
     time: TimeSource | None = None
 
-    @field_validator("gain")
+    @field_validator("gain", mode="wrap")
     @classmethod
-    def _a_gain_is_not_zero(cls, gain: float | str | None) -> float | str | None:
+    def _a_number_with_or_without_a_unit(cls, stated: Any, read: Callable[[Any], Any]) -> float | str | None:
+        try:
+            gain = read(stated)
+        # Otherwise a line for each of the two.
+        except ValidationError:
+            raise ValueError("must be a finite number, or one with its unit as '0.0234 N*m/A'") from None
         if gain == 0:
             raise ValueError("must not be zero")
         return gain
@@ -201,7 +207,7 @@ class ImportMap(TypedModel):
         Empty if each main file is a recording of its own.
     """
 
-    format: Literal[1]
+    format: Format
     note: str | None = None
     text: TextLayout | None = None
     time: TimeSource | None = None

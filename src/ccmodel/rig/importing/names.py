@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ccmodel.rig.importing import units
+from ccmodel.rig import units
 
 ANGLE, TORQUE, CURRENT, FORCE, TIME = "angle", "torque", "current", "force", "time"
 VELOCITY, COMMAND, COUNTER, OTHER = "speed", "command", "sample counter", "quantity without a column"

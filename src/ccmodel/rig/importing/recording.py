@@ -10,12 +10,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ccmodel.rig import readers
+from ccmodel.rig import readers, units
 from ccmodel.rig.batch import DRIVE_ANGLE_COLUMNS
+from ccmodel.rig.columns import TIME, UNIT_OF, is_encoder
 from ccmodel.rig.findings import LogError
-from ccmodel.rig.importing import units
 from ccmodel.rig.importing.clocks import Clock, Cost, Samples, join
-from ccmodel.rig.importing.columns import TIME, UNIT_OF, is_encoder
 from ccmodel.rig.importing.map import MAIN, Channel, ImportMap, TimeSource
 from ccmodel.rig.importing.matching import match_clocks
 from ccmodel.rig.importing.sources import Source
@@ -179,8 +178,10 @@ def _samples(
         remarks.append(f"{file.name}: '{signal.name}' is taken in {unit} as the map says; the file says {signal.unit}")
     times = clocks[file.role].on_first(file.times(signal, channel.time)) - channel.delay_s
     known = np.isfinite(times)
-    if np.isfinite(signal.values[~known]).any():
-        raise FileError(file.name, None, None, f"'{signal.name}' has samples without a time: the file is damaged")
+    if (timeless := np.flatnonzero(~known & np.isfinite(signal.values))).size:
+        more = f" (and {timeless.size - 1} more)" if timeless.size > 1 else ""
+        text = f"'{signal.name}': sample {timeless[0] + 1} of {known.size} has no time{more}: the file is damaged"
+        raise FileError(file.name, None, None, text)
     values = (signal.values[known] - channel.zero) * factor
     if is_encoder(column):
         values = _whole(values, file.name, column)

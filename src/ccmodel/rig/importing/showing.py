@@ -8,8 +8,8 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from ccmodel.rig.columns import UNIT_OF
 from ccmodel.rig.importing.clocks import Cost
-from ccmodel.rig.importing.columns import UNIT_OF
 from ccmodel.rig.importing.draft import GuessedMap
 from ccmodel.rig.importing.guess import Guess
 from ccmodel.rig.importing.writing import BATCH, MAP, Written

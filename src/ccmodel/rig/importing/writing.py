@@ -18,8 +18,8 @@ from ccmodel.paths import try_batch_folder
 from ccmodel.progress import Progress, each_of, silent, within
 from ccmodel.provenance import file_digest
 from ccmodel.rig.batch import NAMES, valid_name
+from ccmodel.rig.columns import TIME
 from ccmodel.rig.drafting import draft_batch
-from ccmodel.rig.importing.columns import TIME
 from ccmodel.rig.importing.map import ImportMap, load_map
 from ccmodel.rig.importing.recording import Built, FileError, build
 from ccmodel.rig.importing.sources import Source, names_of, recordings_of

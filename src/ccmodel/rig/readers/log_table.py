@@ -1,12 +1,17 @@
 """The table of a log whose signals already carry the names of the format's columns."""
 
+from math import isclose
+
 import numpy as np
 import pandas as pd
 
+from ccmodel.rig import units
+from ccmodel.rig.columns import UNIT_OF
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers.contract import SignalFile
 
 TIME = "time_s"
+IMPORTING = "bring it to the format of a batch with 'ccmodel import'"
 
 
 def log_of_signals(file: SignalFile, format: str) -> pd.DataFrame:
@@ -27,21 +32,32 @@ def log_of_signals(file: SignalFile, format: str) -> pd.DataFrame:
     Raises
     ------
     LogError
-        If the signals have no common time.
+        If the signals have no common time, or a unit is stated that is not the one in the column's name.
     """
     names = [s.name.rpartition("/")[2] for s in file.signals]
+    for name, signal in zip(names, file.signals, strict=True):
+        _check_unit(name, signal.unit, format)
     lengths = {len(s.values) for s in file.signals}
-    importing = "bring it to the format of a batch with 'ccmodel import'"
     if len(lengths) > 1:
         text = f"the signals of the {format} have different lengths ({min(lengths)} to {max(lengths)} samples)"
-        raise LogError(None, None, f"{text}: {importing}")
+        raise LogError(None, None, f"{text}: {IMPORTING}")
     columns = [s.values for s in file.signals]
     if TIME not in names:
         axes = [s.time_s for s in file.signals]
         if axes[0] is None or any(a is None or not np.array_equal(a, axes[0]) for a in axes):
             text = f"the signals of the {format} have no common time axis and none is named {TIME}"
-            raise LogError(None, TIME, f"{text}: {importing}")
+            raise LogError(None, TIME, f"{text}: {IMPORTING}")
         names, columns = [TIME, *names], [axes[0], *columns]
     index = np.arange(1, len(columns[0]) + 1)
     # By position: a log with a name twice is refused by the checks of the columns.
     return pd.DataFrame(dict(enumerate(columns)), index=index).set_axis(names, axis=1)
+
+
+def _check_unit(column: str, stated: str, format: str) -> None:
+    """Raise `LogError` if the file states another unit of a column than its name ends in."""
+    needed = UNIT_OF.get(column)
+    if needed is None or not units.is_unit(stated):
+        return
+    if units.quantity_of(stated) != units.quantity_of(needed) or not isclose(units.factor(stated, needed), 1.0):
+        text = f"the {format} states its unit as '{stated}', and its name ends in another one"
+        raise LogError(None, column, f"{text}: {IMPORTING}")

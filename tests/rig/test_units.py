@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from ccmodel.rig.importing.units import UnitError, factor, gain_factor, is_unit, quantity_of
+from ccmodel.rig.units import UnitError, factor, gain_factor, is_unit, quantity_of
 
 
 @pytest.mark.parametrize(

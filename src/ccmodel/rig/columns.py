@@ -1,4 +1,4 @@
-"""Columns that an import writes, with their units as pint reads them."""
+"""Columns of a log with their units as pint reads them."""
 
 from ccmodel.rig.batch import COLUMNS
 
@@ -6,7 +6,7 @@ TIME = "time_s"
 # A column's name ends in its unit.
 _UNITS = {"s": "s", "counts": "count", "A": "A", "V": "V", "rad": "rad", "Nm": "Nm", "N": "N"}
 UNIT_OF = {column: _UNITS[column.rpartition("_")[2]] for column in COLUMNS}
-# Every column but time, which follows from the drive angle's samples.
+# Those that an import is told of: time follows from the samples of the drive angle.
 CHANNELS = tuple(column for column in UNIT_OF if column != TIME)
 
 
