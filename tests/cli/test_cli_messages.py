@@ -39,7 +39,7 @@ CHECKS = {
     "logs that are not there": (["import", "no.csv", "--out", "new"], "no.csv"),
     "no map": (["import", "a-file", "--map", "no.yaml", "--out", "new"], "no.yaml: there is no such map"),
     "no results": (["report", "nowhere"], "nowhere: there is no such folder"),
-    "results of nothing": (["report", "empty"], "no run came to its end"),
+    "results of nothing": (["report", "empty"], "empty: holds no results of a run that came to its end"),
     "a broken diagnosis": (["report", "broken"], "broken/diagnosis.json: "),
     "no accepted run": (["accuracy", "check", "empty"], "tables/baseline.json: "),
     "no reason": (["accuracy", "accept", "empty", "--reason", " "], "--reason: "),

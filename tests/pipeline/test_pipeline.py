@@ -425,7 +425,7 @@ def test_a_refused_batch_takes_only_its_own_with_it(copy):
 def test_left_out_of_a_run_that_did_not_end_says_so(tmp_path):
     said = ccmodel("report", str(tmp_path))
     assert said.returncode == 2
-    assert "no run came to its end" in said.stderr
+    assert "holds no results of a run that came to its end" in said.stderr
     assert "Traceback" not in said.stderr
 
 

@@ -85,7 +85,7 @@ def test_a_pretension_that_both_ends_contradict_alike_is_the_stated_one(tmp_path
     for entry in copy.description["recordings"]:
         entry["pretension_N"] *= 2.05
     said = said_of(write_copy(copy, tmp_path / "b"))
-    assert [sentence for sentence in said if "pretension_N is that of one cable" in sentence], said
+    assert [sentence for sentence in said if "pretension_N is the tension of one cable" in sentence], said
 
 
 def test_a_load_with_mass_contradicts_no_spring(tmp_path):
@@ -145,6 +145,17 @@ def test_relations_of_a_rig_whose_values_are_known(tmp_path):
     assert {name: parity.ratios[name] for name in expected} == pytest.approx(expected, rel=0.03)
     assert parity.ratios["noise of F_load_N"] == pytest.approx(0.1, rel=0.2)
     assert all(value > 0.1 for value in parity.signs.values())
+
+
+@pytest.mark.parametrize("quantity", ["load_cell_V", "current_A"])
+def test_one_sensor_under_the_names_of_both_ends_is_named(tmp_path, quantity):
+    bench = Bench(tmp_path)
+    if f"load_{quantity}" not in bench.tables["one"]:
+        pytest.skip(f"the rig's load has no {quantity}")
+    bench.tables = {name: t.assign(**{f"load_{quantity}": t[f"drive_{quantity}"]}) for name, t in bench.tables.items()}
+    (finding,) = ingest_batch(bench.write().folder).findings
+    assert finding.severity == "inconsistent"
+    assert "both columns hold one of them" in finding.text
 
 
 def test_a_relation_without_its_sensors_is_absent(tmp_path):

@@ -249,6 +249,10 @@ def test_a_log_that_cannot_be_read_is_named_with_its_place(tmp_path, scale):
     draft_batch(folder_of(tmp_path, {"good.csv": run(0), "bad.csv": damaged}))
     (said,) = [line for line in (tmp_path / "lab/batch.yaml").read_text().splitlines() if "not used" in line]
     assert said.startswith("# not used: bad.csv: row ")
+    (tmp_path / "lab/batch.yaml").unlink()
+    ended = CliRunner().invoke(app, ["init", str(tmp_path / "lab")])
+    assert ended.exit_code == 1
+    assert f"refused: {tmp_path}/lab/bad.csv: row " in ended.output.replace("\n", "")
     assert ("are the times in ms?" if scale > 1 else "too long to be bridged") in said
 
 

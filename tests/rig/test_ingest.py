@@ -342,6 +342,13 @@ def test_a_range_that_many_single_readings_leave_is_wrong(bench):
     assert ingested.recordings[0].time_s.size == len(current)
 
 
+def test_a_transient_that_is_most_of_a_log_is_named(bench):
+    bench.described["recordings"][0]["settled_s"] = 1.2
+    (finding,) = ingest_batch(bench.write().folder).findings
+    assert finding.severity == "warning"
+    assert "settled_s 1.2 s of batch.yaml leaves 0.396 of 1.6 s to be compared" in finding.text
+
+
 def test_gzipped_and_cut(bench):
     bench.write()
     for name in ("one", "two"):

@@ -57,6 +57,19 @@ def test_readings_that_are_too_many_to_be_dropped_are_named():
     assert all(frequent_outliers(CHANNELS[name]).size == 0 for name in others)
 
 
+@pytest.mark.parametrize("column", ["drive_encoder_counts", "load_encoder_counts"])
+def test_a_single_wrong_reading_of_an_encoder_is_dropped_and_lost_counts_are_not(bench, column):
+    counts = bench.tables["one"][column]
+    off = counts + int(0.2 * np.ptp(counts))
+    single, lost = counts.where(counts.index != 230, off), counts.where(counts.index < 230, off)
+    bench.tables["one"] = bench.tables["one"].assign(**{column: single})
+    (finding,) = ingest_batch(bench.write().folder).findings
+    assert (finding.column, finding.row, finding.severity) == (column, 232, "warning")
+    bench.tables["one"] = bench.tables["one"].assign(**{column: lost})
+    findings = ingest_batch(bench.write().folder).findings
+    assert findings and not any("far from those near it" in f.text for f in findings)
+
+
 def test_a_log_with_many_of_them_has_a_warning(bench):
     log = table()
     log.loc[::60, "drive_current_A"] = 1000.0

@@ -91,6 +91,16 @@ def test_without_a_header_columns_are_numbered(tmp_path):
     assert "no line of names" in file.remarks[0]
 
 
+@pytest.mark.parametrize("separator", ["\t", ";", ",", "|", " "])
+def test_a_date_and_a_time_with_a_blank_between_them_are_one_cell(tmp_path, separator):
+    rows = [f"2026-02-03 14:05:0{k}.000{separator}{k / 2}{separator}{k}" for k in range(5)]
+    stamp = "Date Time" if separator == " " else "Stamp"
+    file = read(tmp_path, "\n".join([separator.join([stamp, "x", "y"]), *rows, ""]))
+    assert [s.name for s in file.signals][-2:] == ["x", "y"]
+    assert file.signals[0].values.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert file.signals[-2].values.tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
+
+
 def test_rows_that_end_with_a_separator(tmp_path):
     file = read(tmp_path, "t,x\n0,1,\n1,2,\n2,3,\n")
     assert columns(file) == {"t": ("", [0, 1, 2]), "x": ("", [1, 2, 3])}

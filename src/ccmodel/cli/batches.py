@@ -29,13 +29,16 @@ def init(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a commented batch.yaml for a folder of logs, and print what to fill in; keeps an existing one."""
+    """Write a commented batch.yaml for a folder of logs, and print what to fill in; keeps an existing one.
+
+    Exits with 1 if a log cannot be read; it has no entry.
+    """
     from ccmodel.rig.batch import load_batch
-    from ccmodel.rig.drafting import draft_batch
+    from ccmodel.rig.drafting import draft_and_refuse
     from ccmodel.typed import InputError, Problem
 
     output = Output(as_json, quiet)
-    file = draft_batch(folder)
+    file, refused = draft_and_refuse(folder)
     try:
         load_batch(folder)
         problems: tuple[Problem, ...] = ()
@@ -43,7 +46,12 @@ def init(
         problems = error.problems
     output.hint(f"{file}: fill in what is empty, then run: ccmodel check {folder}")
     fill_in = [{"line": p.line, "text": p.text} for p in problems]
-    output.result({"batch_file": file, "fill_in": fill_in}, *(f"  line {p.line}: {p.text}" for p in problems))
+    content = {"batch_file": file, "fill_in": fill_in, "refused": refused}
+    output.result(content, *(f"  line {p.line}: {p.text}" for p in problems))
+    for log, why in refused.items():
+        output.finding(f"{folder / log}: {why}", "refused")
+    if refused:
+        raise typer.Exit(1)
 
 
 def check(batch: Batch, as_json: Json = False, quiet: Quiet = False) -> None:

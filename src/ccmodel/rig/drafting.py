@@ -82,6 +82,11 @@ class _Log:
 
 
 def draft_batch(folder: Path) -> Path:
+    """As `draft_and_refuse`; the file alone."""
+    return draft_and_refuse(folder)[0]
+
+
+def draft_and_refuse(folder: Path) -> tuple[Path, dict[str, str]]:
     """Write a `batch.yaml` with one entry for each log of a folder.
 
     Parameters
@@ -91,8 +96,10 @@ def draft_batch(folder: Path) -> Path:
 
     Returns
     -------
-    Path
-        The file. Keys that the logs cannot show are empty, with a comment.
+    file : Path
+        Keys that the logs cannot show are empty, with a comment.
+    refused : dict of str to str
+        Logs that cannot be read, and why; they have no entry.
 
     Raises
     ------
@@ -116,7 +123,7 @@ def draft_batch(folder: Path) -> Path:
         raise InputError.of(*(problems or [none]))
     with new_file(path) as fresh:
         fresh.write_text("\n".join(_content(name, logs, refused)) + "\n", encoding="utf-8")
-    return path
+    return path, refused
 
 
 def _read(folder: Path) -> tuple[list[_Log], dict[str, str]]:
@@ -140,7 +147,7 @@ def _read(folder: Path) -> tuple[list[_Log], dict[str, str]]:
 
 def _suffixes() -> tuple[str, ...]:
     """Endings of the names of logs, of all formats."""
-    return tuple(suffix for format in registry().values() for suffix in format.suffixes)
+    return tuple(dict.fromkeys(suffix for format in registry().values() for suffix in format.suffixes))
 
 
 def _natural(path: Path) -> list:

@@ -182,11 +182,15 @@ def _recording(
     if left < limits.FEWEST_SAMPLES:
         text = f"lasts {lasts:g} s, with {left} samples after settled_s {entry.settled_s:g} s of batch.yaml: too few"
         raise LogError(None, None, text, True)
+    short = []
+    if entry.settled_s > limits.MOST_SETTLING * lasts:
+        text = f"settled_s {entry.settled_s:g} s of batch.yaml leaves {lasts - entry.settled_s:.3g} of {lasts:.3g} s"
+        short.append(Defect(None, "time_s", f"{text} to be compared"))
     calibrated = calibrate(table, batch.rig)
     unconverted = [Defect(None, column, f"not used: {why}") for column, why in calibrated.unused.items()]
     # A column whose sensor batch.yaml does not state contradicts nothing: it is not used anyway.
     faulty_sensors = [d._replace(contradicts=d.contradicts and d.column in columns.stated) for d in faulty_sensors]
-    defects = [*reading_defects, *rare_columns, *faulty_sensors, *unconverted]
+    defects = [*reading_defects, *rare_columns, *short, *faulty_sensors, *unconverted]
     findings = [_finding(batch.batch, file, "warning", defect) for defect in defects]
     recording = Recording(
         batch=batch.batch,

@@ -1,7 +1,8 @@
-"""Impossible readings: single cells of an analog column that are far from all readings near them.
+"""Impossible readings: single cells of a column that are far from all readings near them.
 
-A converter or a logger writes one now and then. Least squares would follow it: one current of 30 A among 9 A moves a
-fitted friction by as much as a real effect does.
+A converter, counter or logger writes one now and then. Least squares would follow it: one current of 30 A among 9 A
+moves a fitted friction by as much as a real effect does, and so does one angle that is off by 0.6 rad. An angle that
+stays off after a jump is a counter that lost counts, and has a check of its own.
 """
 
 import numpy as np
@@ -9,16 +10,9 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from ccmodel.channels import THETA_IN, THETA_MOTOR, THETA_OUT
 from ccmodel.rig import limits
-from ccmodel.rig.batch import RAW_COLUMNS
 from ccmodel.rig.findings import Defect
 
-# A pulley's angle has checks of its own: a cell that is off is a counter that lost counts.
-NOT_ANALOG = (
-    "time_s",
-    *(column for angle in (THETA_IN, THETA_OUT, THETA_MOTOR) for column in (angle, *RAW_COLUMNS[angle])),
-)
 # The readings that one is compared with: so many on each side, without itself.
 NEIGHBOURS = np.ones(2 * limits.OUTLIER_NEIGHBOURS + 1, bool)
 NEIGHBOURS[limits.OUTLIER_NEIGHBOURS] = False
@@ -40,7 +34,7 @@ def drop_outliers(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Defect]]:
         One for each column with impossible readings; where they are many, they are not dropped.
     """
     is_bad, warnings = np.zeros(len(table), bool), []
-    for column in table.columns.drop(list(NOT_ANALOG), errors="ignore"):
+    for column in table.columns.drop("time_s", errors="ignore"):
         values = table[column].to_numpy()
         distances = _distances(values)
         found = _few(*distances)

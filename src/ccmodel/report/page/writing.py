@@ -181,7 +181,8 @@ def left_out_of(results: Path) -> dict[str, list[str]]:
     """
     file = results / LEFT_OUT
     if not file.exists():
-        raise InputError(f"{file}: not there, so no run came to its end; its own messages say why")
+        text = "holds no results of a run that came to its end, and none of a diagnosis"
+        raise InputError(f"{results}: {text}; give the folder that --out has named, or that of a run's results")
     return load_json_model(file, _LeftOut, "a run").model_dump()
 
 

@@ -11,7 +11,7 @@ from ccmodel.rig.batch import Batch
 from ccmodel.rig.consistency.clocks import drifting_clocks
 from ccmodel.rig.consistency.contradiction import Contradiction
 from ccmodel.rig.consistency.parity import Parity
-from ccmodel.rig.consistency.runs import copied_channels, foreign_runs
+from ccmodel.rig.consistency.runs import copied_channels, foreign_runs, one_sensor_twice
 from ccmodel.rig.consistency.scales import wrong_geometry, wrong_scales
 from ccmodel.rig.consistency.signs import wrong_signs
 from ccmodel.rig.findings import Finding
@@ -26,6 +26,8 @@ def contradictions(recordings: Sequence[Recording], batch: Batch) -> list[Contra
     if not recordings:
         return []
     parities = [Parity(recording, batch) for recording in recordings]
+    if found := one_sensor_twice(parities):
+        return found
     copies = copied_channels(parities)
     named = {c.recording for c in copies}
     intact = [p for p in parities if p.recording.id not in named]

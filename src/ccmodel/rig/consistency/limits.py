@@ -29,6 +29,8 @@ WRONG_SIGN = -0.1
 WRONG_LOSS = -0.15
 # Share of the recordings that must show a wrong sign, so that the batch file is named and not the recordings.
 MOST_RECORDINGS = 0.7
+# Correlation of the noise of two sensors above which it is that of one.
+SAME_NOISE = 0.99
 # Correlation of the two angles below which they are not of one run. Small strokes in much friction reach 0.7.
 SAME_RUN = 0.4
 

@@ -20,7 +20,7 @@ from ccmodel.channels import (
 )
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
-from ccmodel.rig.consistency.parity import Parity, white_noise
+from ccmodel.rig.consistency.parity import Parity, correlation, white_noise
 from ccmodel.rig.sensor_checks import is_noisy
 
 ANGLES = {*ANGLE_AT.values(), THETA_MOTOR}
@@ -63,6 +63,27 @@ def copied_channels(parities: Sequence[Parity]) -> list[Contradiction]:
                     text = f"{ids[0]} holds the same samples as {ids[1]}: take one of the two recordings out"
                 found.append(Contradiction(names, text, parity.recording.id))
     return found
+
+
+def one_sensor_twice(parities: Sequence[Parity]) -> list[Contradiction]:
+    """Sensors of the two ends whose columns hold one and the same signal."""
+    found = []
+    for at_drive, at_load in ((F_DRIVE, F_LOAD), (TAU_IN, TAU_OUT)):
+        same = [p for p in parities if at_drive in p.recording and at_load in p.recording]
+        same = [p for p in same if _is_same_noise(p.recording[at_drive], p.recording[at_load])]
+        if same:
+            text = (
+                f"{at_load} follows {at_drive} change by change in {len(same)} of {len(parities)} recordings: the noise"
+                " of two sensors differs, so both columns hold one of them"
+            )
+            found.append(Contradiction(f"{at_drive} and {at_load}", text))
+    return found
+
+
+def _is_same_noise(one: NDArray, other: NDArray) -> bool:
+    """Whether two noisy channels have the same noise, at whatever scale; motions hardly reach the third differences."""
+    noisy = all(is_noisy(np.diff(values)) for values in (one, other))
+    return noisy and abs(correlation(np.diff(one, 3), np.diff(other, 3))) > limits.SAME_NOISE
 
 
 def _alike(parities: Sequence[Parity], channel: str) -> NDArray:

@@ -222,16 +222,14 @@ def _pretension(ratios: Mapping[str, float]) -> list[Contradiction]:
     sides = {name: beyond(ratio, limits.PRETENSION_FACTOR) for name, ratio in ends.items()}
     if not any(sides.values()):
         return []
-    values = " and ".join(f"{ratio:.3g} times at the {name.rsplit(' ', 1)[1]}" for name, ratio in ends.items())
+    of_ends = [f"{ratio:.3g} times pretension_N at the {name.rsplit(' ', 1)[1]}" for name, ratio in ends.items()]
+    values = f"half the sum of tensions at rest is {' and '.join(of_ends)}"
     alike = max(ends.values()) < limits.BOTH_ENDS_ALIKE * min(ends.values())
     if len(ends) == 2 and (alike or len(set(sides.values())) == 1):
-        text = (
-            f"the sums of tensions at rest are {values} twice the stated pretension; pretension_N is that of one"
-            " cable, in N; check it, or the scale of both load cells"
-        )
+        text = f"{values}; pretension_N is the tension of one cable, in N: check it, or the scale of both load cells"
         return [Contradiction("pretension_N", text, None, LIKELY)]
     name = next(name for name, side in sides.items() if side).rsplit(" ", 1)[1]
-    text = f"the sums of tensions at rest are {values} twice the stated pretension; check rig.{name}.load_cell"
+    text = f"{values}; check rig.{name}.load_cell"
     return [Contradiction(SUM_AT[name], text, None, LIKELY)]
 
 

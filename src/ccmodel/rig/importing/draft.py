@@ -164,7 +164,8 @@ def _roles(
     recordings = [{name[: len(name) - len(end)] for name in group} for group, end in zip(stems, ends, strict=True)]
     if "" in recordings[0] or any(r != recordings[0] for r in recordings) or len(set(ends)) < len(ends):
         others = ", ".join(names[kinds[key][0][0]] for key in keys[1:])
-        text = f"{others}: other signals than {names[kinds[keys[0]][0][0]]}, and the guess is of the latter only"
+        main = names[kinds[keys[0]][0][0]]
+        text = f"{others}: other signals than {main}, and the guess is of {main} alone"
         advice = "state by 'files' how they belong together, or import them apart"
         return {MAIN: keys[0]}, {}, [f"{text}; {advice}"]
     roles, patterns = {}, {}

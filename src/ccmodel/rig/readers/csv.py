@@ -66,7 +66,8 @@ class _Column:
 def _header(line: str) -> list[str]:
     header = [name.strip().strip('"') for name in line.split(",")]
     if len(header) == 1 and any(c in header[0] for c in ";\t "):
-        raise LogError(1, None, "columns must be separated by commas and numbers written with a point")
+        text = "columns must be separated by commas and numbers written with a point"
+        raise LogError(1, None, f"{text}; or bring it to the format of a batch with 'ccmodel import'")
     return header
 
 
@@ -106,7 +107,8 @@ def _blocks(path: Path) -> Iterator[list[str]]:
             text = raw.decode("utf-8" if rows else "utf-8-sig")
         except UnicodeDecodeError as error:
             row = rows + raw[: error.start].count(b"\n") + 1
-            raise LogError(row, None, "is not text: the file is damaged, copy it again from the rig") from None
+            text = "is not text in UTF-8: bring it to the format of a batch with 'ccmodel import', which reads other"
+            raise LogError(row, None, f"{text} encodings; if it is damaged, copy it again from the rig") from None
         is_cut = text.rstrip(" \t")[-1:] not in ("", "\n", "\r")
         lines = text.splitlines()
         rows += len(lines)

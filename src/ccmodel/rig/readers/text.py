@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -231,7 +232,10 @@ def _candidate(rows: list[str], separator: str, decimal: str) -> tuple[int, _Gri
     known = sum(bool(c) and (n or s) for c, n, s in zip(filled, numbers, stamps, strict=True))
     if not any(c and n for c, n in zip(filled, numbers, strict=True)):
         return None
-    return count * (2 * known - sum(map(bool, filled))), _Grid(separator, decimal, numbers, stamps, not filled[-1])
+    # A date and a time with a blank between them are one cell under any other separator.
+    dates = sum(map(all, pairwise(stamps))) if separator == WHITESPACE else 0
+    score = count * (2 * known - sum(map(bool, filled)) - dates)
+    return score, _Grid(separator, decimal, numbers, stamps, not filled[-1])
 
 
 def _no_numbers(rows: list[str], lines: list[str]) -> str:
