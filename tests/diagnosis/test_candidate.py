@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 from ccmodel.api.batch import load
+from ccmodel.diagnosis import candidate as candidates
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import (
     LAST_SEARCH,
+    SEARCH,
+    _search,
     at_least_by_information,
     continued,
     discretisation_shift,
@@ -22,6 +25,7 @@ from ccmodel.diagnosis.result import least_strength, mechanism_of
 from ccmodel.diagnosis.run import Options, calibrate
 from ccmodel.diagnosis.screening import screen
 from ccmodel.diagnosis.whitening import relinearised, with_states_of
+from ccmodel.inference.least_squares import CONVERGED, STOPPED
 from ccmodel.mechanisms.relaxation import relaxed_after
 from ccmodel.model.general import Active
 from ccmodel.model.parameters import Parameters
@@ -71,6 +75,19 @@ def test_the_last_search_ends_in_one_place_wherever_it_starts():
     ends = [squares() for _ in range(6)]
     assert min(ends) > 10.0, "something is missing"
     assert max(ends) < min(ends) * (1 + 1e-5), ends
+
+
+@pytest.mark.parametrize("size", [1, 2])
+def test_a_set_whose_search_was_stopped_is_searched_on(size, monkeypatch):
+    messages = [STOPPED, CONVERGED]
+
+    def search(problem, start, how, *args):
+        return SimpleNamespace(x=start + 1.0, cost=1.0, message=messages[int(start[0])])
+
+    monkeypatch.setattr(candidates, "minimise", search)
+    acting = (("pulley-friction", "drive-pulley"), ("torque-scale", "drive-sensor"))[:size]
+    problem = SimpleNamespace(names=["a"], start=np.zeros(1), bounds=(np.full(1, -9.0), np.full(1, 9.0)))
+    assert _search(problem, Hypothesis(acting), SEARCH).message == messages[size - 1]
 
 
 @pytest.mark.parametrize(("least", "end"), [(0.005, 0.00625), (0.08, 0.1), (0.0, 0.0015625)])

@@ -10,14 +10,14 @@ import pytest
 from ccmodel.deadline import UNLIMITED, Deadline
 from ccmodel.diagnosis import comparison as comparisons
 from ccmodel.diagnosis import selection as selections
-from ccmodel.diagnosis.candidate import LAST_SEARCH, CandidateFit
+from ccmodel.diagnosis.candidate import LAST_SEARCH, VALUES_STAY, CandidateFit
 from ccmodel.diagnosis.comparison import Comparison, imitation, log_priors, priors_of_further
 from ccmodel.diagnosis.discrepancy import Evidence
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.laws import Proposal
 from ccmodel.diagnosis.result import alternatives_of
 from ccmodel.diagnosis.screening import Score
-from ccmodel.diagnosis.selection import Selection
+from ccmodel.diagnosis.selection import Selection, contenders, lower
 from ccmodel.diagnosis.settings import (
     DECIDED,
     LAW_FAR_BEHIND,
@@ -782,6 +782,50 @@ def test_laws_come_where_sets_do_not_lead_on_or_their_time_is_over(monkeypatch, 
     assert steps == order
 
 
+def of_three(all_three, singles=(50.0, 70.0, 95.0), pairs=(20.0, 40.0, 60.0)):
+    """A rig with three effects: what single mechanisms, pairs and all three of them leave, of 100."""
+    every = (FRICTION, SCALE, KINK)
+    sets = zip([*((one,) for one in every), *itertools.combinations(every, 2)], [*singles, *pairs], strict=True)
+    further = [(fitted(1 + left, *acting), evidence(-30 * left, -30 * left + 5, size=left)) for acting, left in sets]
+    whole = fitted(1 + all_three, *every), evidence(NONE, NONE, size=all_three)
+    return compared(evidence(-9e3, -9e3, size=100.0), *further, whole, model=fitted(101.0))
+
+
+@pytest.mark.parametrize(("left", "least"), [(0.0, 0.95), (0.5, 0.9), (2.0, 0.7)])
+def test_each_of_several_effects_is_judged_by_what_it_takes_off_beside_the_others(left, least):
+    """The first takes off half by itself, and what is left then is the effect of the others."""
+    found = of_three(left)
+    assert min(found.confidence_in(name) for name, _ in (FRICTION, SCALE)) > least
+    assert found.probability_of_base < 1e-6, "nothing says that all is explained without them"
+
+
+def test_a_mechanism_that_a_second_one_imitates_is_judged_by_itself_too():
+    """Either accounts for all, and both together for hardly more."""
+    sets = [(fitted(1.02, FRICTION), 0.02), (fitted(1.03, SCALE), 0.03), (fitted(1.015, FRICTION, SCALE), 0.015)]
+    given = [(c, evidence(NONE - 5 * (c.hypothesis.size - 1), NONE - 5, size=size)) for c, size in sets]
+    found = compared(evidence(size=100.0), *given, model=fitted(101.0))
+    assert found.confidence_in(FRICTION[0]) + found.confidence_in(SCALE[0]) > 0.9
+    assert found.unlisted < 0.2
+
+
+def test_the_set_that_leaves_least_stays_to_be_extended():
+    far = compared(
+        evidence(FAR, NONE, size=100.0),
+        *((fitted(ms, one), evidence(log, log)) for ms, one, log in SINGLES),
+        (fitted(31.0, ("presliding", "conduit")), evidence(-200.0, -200.0)),
+        (fitted(96.0, ("pulley-friction", "load-pulley")), evidence(-115.0, -115.0)),
+        model=fitted(101.0),
+    )
+    near, _ = contenders(far)
+    assert STRIBECK in [c.hypothesis.acting[0] for c in near], "it leaves 30, and is fifth by its evidence"
+
+
+def test_values_that_stayed_are_no_minimum():
+    before, now = fitted(10.0, FRICTION), fitted(5.0, FRICTION)
+    assert lower([now], [before]) is now
+    assert lower([now], [replace(before, message=VALUES_STAY)]) is None
+
+
 def test_contenders_are_fitted_to_the_end_and_others_stay(monkeypatch):
     """A lower cost counts, also if the held-out mean square is a little higher."""
     best, hopeless = fitted(1.4, SCALE), fitted(60.0, FRICTION)
@@ -840,7 +884,14 @@ def test_the_covariance_is_linearised_about_the_best_candidate(monkeypatch):
     assert late.hypothesis == candidates[1].hypothesis
     assert late.values == pytest.approx(candidates[1].values, rel=1e-6, abs=1e-6)
     assert late.whitened[0].shrinkage == pytest.approx(again.whitened[0].shrinkage)
+    # So does one that cannot be run from them.
+    deadline.has_passed = False
+    monkeypatch.setattr(Selection, "fit_all", lambda *given: candidates[:1])
+    failed = late_selection.relinearise(Comparison.of(recordings, base, candidates, SCREENED)).candidates[1]
+    assert failed.values == pytest.approx(candidates[1].values, rel=1e-6, abs=1e-6)
+    assert failed.message == VALUES_STAY
     # Where laws follow, all are fitted again with them.
+    monkeypatch.setattr(Selection, "fit_all", in_time_for_one)
     deadline.has_passed = False
     before = Comparison.of(recordings, base, candidates, SCREENED)
     assert replace(late_selection, goes_on=True).relinearise(before) is before

@@ -1,12 +1,14 @@
 """Evidence of candidates beside a model discrepancy."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
 from scipy.stats import multivariate_normal
 
+from ccmodel import mechanisms as registry
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.discrepancy import Discrepancy, Modes, Products, _log_evidence, evidence_of
 from ccmodel.diagnosis.hypothesis import Hypothesis
@@ -192,6 +194,33 @@ def test_a_fault_in_one_channel_may_be_as_large_there_as_all_that_is_missing(rec
     found = fitted(recordings, of_one)
     too_small = discrepancy.log_evidence(found, [LARGEST_MISSING * EXCESS], {"tau_in_Nm": 1.0})[0]
     assert evidence_of(discrepancy, found, 0.0, EXCESS).in_channel["tau_in_Nm"] > too_small
+
+
+def test_a_fault_in_one_channel_of_three_may_be_small():
+    """Three times the smallest discrepancy is a size of the grid but for its rounding."""
+    alike = SimpleNamespace(
+        channels=("a", "b", "c"),
+        log_evidence=lambda c, sizes, s: np.zeros(len(sizes)),
+        resolution=lambda c, sizes: 0.01,
+    )
+    assert all(np.isfinite(value) for value in evidence_of(alike, None, 0.0, 0.0).in_channel.values())
+
+
+def test_a_state_far_from_its_prior_costs_what_the_prior_says(recordings):
+    """Two standard deviations cost 2, where the recordings determine it."""
+    whole, key = calibrated(recordings), "running-in/conduit/done"
+    done = next(p for p in registry.get("running-in").states if p.name == "done")
+    hypothesis = Hypothesis((("running-in", "conduit"),))
+
+    def at(value):
+        jacobian = [block_diag(J, 1e4) for J in whole.jacobian]
+        residuals = [np.append(e, 0.0) for e in whole.residuals]
+        return replace(
+            whole, hypothesis=hypothesis, values=whole.values | {key: value}, jacobian=jacobian, residuals=residuals
+        )
+
+    mean, away = (NormalEquations.of(at(v)).log_evidence for v in (done.start, done.start + 2 * done.spread))
+    assert mean - away == pytest.approx(2.0, rel=1e-3)
 
 
 def _allowing(o, share):

@@ -18,7 +18,7 @@ from ccmodel.inference.cross_validation import inverse_of, leave_one_out
 from ccmodel.inference.effective_samples import mean_weight, of_recording, prior_spread
 from ccmodel.inference.intervals import COVERAGE, Interval
 from ccmodel.inference.jacobian import size_of
-from ccmodel.inference.least_squares import STALLED, Search, Solution, minimise
+from ccmodel.inference.least_squares import STALLED, STOPPED, Search, Solution, minimise
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.pool import each
 from ccmodel.inference.problem import Free, Problem
@@ -31,7 +31,6 @@ SEARCH = Search(
     gradient=settings.FIT_TOLERANCE,
     difference=settings.FIT_DIFFERENCE,
     most_evaluations=settings.FIT_EVALUATIONS,
-    retreats=False,
     own_units=True,
     secants=True,
 )
@@ -46,6 +45,10 @@ LAST_SEARCH = replace(
     most_evaluations=settings.LAST_EVALUATIONS,
     secants=False,
 )
+
+
+# Message of a fit that takes the values of another one.
+VALUES_STAY = "no search: the values are those of a fit under another covariance"
 
 
 # Two fits are the same if they are one object: arrays have no equality.
@@ -318,7 +321,7 @@ def evaluated(candidate: CandidateFit, whitened: Sequence[Whitened]) -> Candidat
     problem = Problem(_with_states(whitened, hypothesis, values, own), unknowns, weight=mean_weight)
     solution = minimise(problem, inside_bounds(problem, problem.start), replace(SEARCH, most_evaluations=1))
     again = _cross_validated(hypothesis, candidate.free, problem, solution)
-    return replace(again, message=candidate.message, converged=candidate.converged)
+    return replace(again, message=VALUES_STAY, converged=candidate.converged)
 
 
 def _has_states(hypothesis: Hypothesis) -> bool:
@@ -435,6 +438,9 @@ def _search(problem: Problem, hypothesis: Hypothesis, search: Search) -> Solutio
     if solution.message == STALLED:
         rough = minimise(problem, solution.x, replace(search, difference=settings.ROUGH_DIFFERENCE))
         solution = min(solution, rough, key=lambda s: s.cost)
+    # A set has many unknowns and starts from a linear guess, or from where a smaller one ended.
+    if solution.message == STOPPED and hypothesis.size > 1:
+        solution = minimise(problem, solution.x, search)
     for name in hypothesis.continuation:
         solution = continued(
             lambda x: minimise(problem, x, search), solution, problem.names.index(name), problem.bounds[0]

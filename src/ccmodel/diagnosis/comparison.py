@@ -181,17 +181,31 @@ class Comparison:
         return weights
 
     def _imitation(self, candidate: CandidateFit, part: CandidateFit) -> NDArray:
-        before, resolution = self.unexplained_mean_square(part), self.evidence[candidate.hypothesis].resolution
-        before = max(before, self.evidence[part.hypothesis].resolution, 1e-12)
-        share, smallest = (min(x / before, 1.0) for x in (self.unexplained_mean_square(candidate), resolution))
-        has_part = part is not self.base
+        """Probabilities of the three explanations of what a candidate takes off beyond its part; shape (3,)."""
         further = set(candidate.hypothesis.acting) - set(part.hypothesis.acting)
+        pairs = [(candidate, part), *self._extended_alike(candidate, part)]
+        # What other mechanisms account for is no lack of fit of these: the pair counts of which least is left.
+        share, smallest = min((self._left(*pair) for pair in pairs), key=lambda left: left[0])
         support = min(candidate.log_support(*one) for one in further)
         is_law = bool(laws_in(Hypothesis(tuple(further))))
         # Where a mechanism visibly leaves something and no law does better, what is missing may be no law at all.
         laws_tried = part.hypothesis in self.laws_beside and share <= smallest
-        prior = priors_of_further(has_part, is_law, laws_tried)
+        prior = priors_of_further(part is not self.base, is_law, laws_tried)
         return limited(imitation(share, smallest, prior), prior[0], support)
+
+    def _left(self, candidate: CandidateFit, part: CandidateFit) -> tuple[float, float]:
+        """Share of a part's lack of fit that a candidate leaves, and the least share that would be noticed."""
+        before = max(self.unexplained_mean_square(part), self.evidence[part.hypothesis].resolution, 1e-12)
+        resolution = self.evidence[candidate.hypothesis].resolution
+        return min(self.unexplained_mean_square(candidate) / before, 1.0), min(resolution / before, 1.0)
+
+    def _extended_alike(self, candidate: CandidateFit, part: CandidateFit) -> list[tuple[CandidateFit, CandidateFit]]:
+        """The fitted sets that extend a candidate and its part by the same mechanisms."""
+        further = set(candidate.hypothesis.acting) - set(part.hypothesis.acting)
+        fitted = {frozenset(c.hypothesis.acting): c for c in self.candidates if c.is_plausible}
+        larger = (c for c in fitted.values() if is_part_of(candidate, c))
+        pairs = ((c, fitted.get(frozenset(set(c.hypothesis.acting) - further))) for c in larger)
+        return [(c, without) for c, without in pairs if without is not None]
 
     def unexplained_mean_square(self, candidate: CandidateFit) -> float:
         """Mean square above the noise that a candidate does not explain (1: noise).

@@ -25,6 +25,9 @@ from ccmodel.diagnosis.whitening import Whitened
 from ccmodel.inference.pool import each
 from ccmodel.model.run import simulate
 
+# Relative rounding of a limit: 3 * 0.1 is not exactly a size of the grid.
+ROUNDING = 1e-9
+
 
 @dataclass(frozen=True)
 class Modes:
@@ -232,7 +235,7 @@ def evidence_of(discrepancy: Discrepancy, candidate: CandidateFit, effect: float
     own = {c: discrepancy.log_evidence(candidate, settings.DISCREPANCIES, {c: 1.0}) for c in channels}
 
     def by_channel(low: float, high: float) -> dict[str, float]:
-        tried = (sizes >= low) & (sizes <= high)
+        tried = (sizes >= low * (1 - ROUNDING)) & (sizes <= high * (1 + ROUNDING))
         return {c: _mean(value[tried]) for c, value in own.items()}
 
     def anywhere(low: float, high: float, in_one: dict[str, float]) -> float:

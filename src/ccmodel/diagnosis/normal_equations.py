@@ -35,7 +35,8 @@ class NormalEquations:
         Standard deviation of the unknowns' prior.
     from_mean : ndarray, shape (unknowns,)
         Distance of the unknowns from their prior's mean over its standard deviation, where the prior has a mean of its
-        own: that of a law's coefficients, and that of what differs between batches; 0 elsewhere.
+        own: that of a law's coefficients, of what differs between batches, and of the states of mechanisms when a
+        recording starts; 0 elsewhere.
     """
 
     information: NDArray
@@ -61,6 +62,11 @@ class NormalEquations:
         prior_sd = np.array([_prior_sd(candidate, name) for name in candidate.values])
         means = dict.fromkeys(coefficients_of(candidate.hypothesis), 0.0)
         means |= {n: f.prior_mean for n, f in candidate.free.items() if f.spread}
+        means |= {
+            mechanism_key(name, place, state.name): state.start
+            for name, place in candidate.hypothesis.acting
+            for state in registry.get(name).states
+        }
         from_mean = [
             (value - means[name]) / sd if name in means else 0.0
             for (name, value), sd in zip(candidate.values.items(), prior_sd, strict=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis import settings
-from ccmodel.diagnosis.candidate import LAST_SEARCH, SEARCH, CandidateFit, evaluated, fit
+from ccmodel.diagnosis.candidate import LAST_SEARCH, SEARCH, VALUES_STAY, CandidateFit, evaluated, fit
 from ccmodel.diagnosis.comparison import Comparison, is_part_of, lowest
 from ccmodel.diagnosis.equation_error import other_start
 from ccmodel.diagnosis.hypothesis import Hypothesis, law_of, laws_in
@@ -101,21 +101,21 @@ class Selection:
 
         Sets of increasing size are fitted first, within `SETS_SHARE` of both limits. Laws are learned when a size does
         not halve what smaller sets leave, or when that share has passed, unless the comparison is decided; larger sets
-        follow unless a law leads. Otherwise laws are learned at the end, unless the comparison is settled: what is less
-        probable or has a lack of fit competes with laws.
+        follow unless a law leads that leaves nothing. Otherwise laws are learned at the end, unless the comparison is
+        settled: what is less probable or has a lack of fit competes with laws.
         """
         sets, size = replace(self, deadline=self.sets_until, goes_on=True), 2
         while size <= settings.MOST_MECHANISMS:
             part = sets._part((size - 2) / SIZES, (size - 1) / SIZES)
             if not found.is_adequate:
                 found = part._part(0.0, RELINEARISED).relinearise(found)
-            if found.is_adequate or (size > 2 and found.by_evidence[0].is_good):
+            if found.is_adequate or (size > 2 and found.by_evidence[0].is_good and found.is_decided):
                 break
             found = part._part(RELINEARISED, 1.0).extended(found, screening, size)
             is_over = part.deadline.has_passed
             if sets.laws and (is_over or not found.leads_on(size)) and not found.is_decided:
                 found, sets = self.learn(found), replace(self, laws=())
-                if law_of(found.leading[0].hypothesis) is not None:
+                if found.leading_law_leaves_nothing:
                     break
                 if is_over:
                     continue
@@ -295,14 +295,12 @@ class Selection:
             return found
         near, far = contenders(found)
         again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in near for s in starts(c)])
-        if self.deadline.has_passed:
-            # Until the selection ends, all are fitted again.
-            if self.goes_on:
-                return found
-            in_time = {c.hypothesis for c in again}
-            far = [*far, *(c for c in near if c.hypothesis not in in_time)]
-        # No rival must be lost: without it, the others would be more probable.
-        again += self._evaluated(far, whitened)
+        # Until the selection ends, all are fitted again.
+        if self.deadline.has_passed and self.goes_on:
+            return found
+        # No rival must be lost, as one that could not be fitted again: without it, the others would be more probable.
+        fitted = {c.hypothesis for c in again}
+        again += self._evaluated([*far, *(c for c in near if c.hypothesis not in fitted)], whitened)
         if not any(c.hypothesis == best.hypothesis for c in again):
             return found
         # About the same mechanisms once more: only if that leads on.
@@ -361,29 +359,32 @@ def finer_laws(fitted: Sequence[Hypothesis]) -> list[Law]:
 
 
 def contenders(found: Comparison) -> tuple[list[CandidateFit], list[CandidateFit]]:
-    """The candidates that stay: the best one by evidence, its largest parts, and its rivals.
+    """The candidates that stay: the best one by evidence, its largest parts, its rivals, and the one that leads on.
 
-    The first ones are worth another fit; the other rivals are far behind.
+    The first ones are worth another fit; the other rivals are far behind. Of the largest listed sets, the one of least
+    mean square leads on: it is extended, whatever its evidence (`Selection.extended`).
     """
     best = found.by_evidence[0]
     # Every rival of a complete candidate matters; of an incomplete one, only the leading ones lead on.
     most = len(found.candidates) if found.unlisted < 0.5 else settings.CONTENDERS
     highest = 1.0 + settings.HOPELESS * max(best.mean_square - 1.0, settings.NEAR_NOISE)
 
+    listed = [c for c in found.candidates if c.is_plausible and law_of(c.hypothesis) is None]
+    leads_on = min(listed, key=lambda c: (-c.hypothesis.size, c.mean_square), default=best)
     near: list[CandidateFit] = []
     far: list[CandidateFit] = []
     for k, c in enumerate(found.by_evidence):
         is_part = is_part_of(c, best)
         # What the best one's last mechanism adds is judged by its largest parts.
         is_largest_part = is_part and c.hypothesis.size == best.hypothesis.size - 1
-        if is_largest_part or (c.mean_square <= highest and (k < most or is_part)):
-            (near if c is best or is_part or not found.is_far_behind(c) else far).append(c)
+        if c is leads_on or is_largest_part or (c.mean_square <= highest and (k < most or is_part)):
+            (near if c is best or c is leads_on or is_part or not found.is_far_behind(c) else far).append(c)
     return near, far
 
 
 def lower(again: Sequence[CandidateFit], before: Sequence[CandidateFit]) -> CandidateFit | None:
     """Of sets that were fitted before, the best one that has now come to another minimum, which is far lower."""
-    was = {frozenset(c.hypothesis.acting): c.mean_square for c in before}
+    was = {frozenset(c.hypothesis.acting): c.mean_square for c in before if c.message != VALUES_STAY}
     found = (c for c in again if c.mean_square < settings.FAR_LOWER * was.get(frozenset(c.hypothesis.acting), 0.0))
     return min(found, key=lambda c: c.mean_square, default=None)
 
