@@ -163,16 +163,23 @@ class Comparison:
         all sets goes to the incomplete calibrated model.
         """
         every, weights = [self.base, *self.candidates], self.log_weights.copy()
+        # By candidate: log weights that it is incomplete, from larger sets of which a member imitates what is unlisted.
+        inherited: list[list[tuple[float, CandidateFit]]] = [[] for _ in every]
         for k in sorted(range(1, len(every)), key=lambda k: -every[k].hypothesis.size):
             part = self.part_of(every[k])
             assert part is not None
             p = every.index(part)
-            with np.errstate(divide="ignore"):
-                true, of_part, other = np.log(self._imitation(every[k], part))
+            true, of_part, other = self._log_imitation(every[k], part)
+            total = np.logaddexp.reduce(weights[k])
             # What an imitation of the part's remainder leaves is that remainder too, and nothing unlisted.
-            imitates = np.logaddexp.reduce(weights[k]) + np.array([of_part, other])
-            weights[p] = np.logaddexp(weights[p], imitates)
+            weights[p, 0] = np.logaddexp(weights[p, 0], total + of_part)
+            inherited[p].append((total + other, every[k]))
             weights[k] += true
+            for weight, larger in inherited[k]:
+                true, *imitates = self._log_imitation(every[k], part, larger)
+                weights[k, 1] = np.logaddexp(weights[k, 1], weight + true)
+                inherited[p].append((weight + np.logaddexp(*imitates), larger))
+        weights[0, 1] = np.logaddexp.reduce([weights[0, 1], *(weight for weight, _ in inherited[0])])
         weights -= np.logaddexp.reduce(weights, axis=None)
         if self._discount < 1:
             discounted = float(np.logaddexp.reduce(weights[1:], axis=None, initial=-np.inf)) + np.log1p(-self._discount)
@@ -180,18 +187,25 @@ class Comparison:
             weights[1:] += log(self._discount)
         return weights
 
-    def _imitation(self, candidate: CandidateFit, part: CandidateFit) -> NDArray:
-        """Probabilities of the three explanations of what a candidate takes off beyond its part; shape (3,)."""
+    def _log_imitation(
+        self, candidate: CandidateFit, part: CandidateFit, larger: CandidateFit | None = None
+    ) -> NDArray:
+        """Log probabilities of the three explanations of what a candidate takes off beyond its part; shape (3,).
+
+        Beside what is unlisted, which a `larger` set imitates, a candidate leaves that too, and this is no lack of fit
+        of its own: it takes off what the larger set does beside the same set without the mechanisms in question.
+        """
         further = set(candidate.hypothesis.acting) - set(part.hypothesis.acting)
-        pairs = [(candidate, part), *self._extended_alike(candidate, part)]
-        # What other mechanisms account for is no lack of fit of these: the pair counts of which least is left.
-        share, smallest = min((self._left(*pair) for pair in pairs), key=lambda left: left[0])
+        share, smallest = self._left(candidate, part)
+        if larger is not None and (without := self._without(larger, further)) is not None:
+            share, smallest = min((share, smallest), self._left(larger, without))
         support = min(candidate.log_support(*one) for one in further)
         is_law = bool(laws_in(Hypothesis(tuple(further))))
         # Where a mechanism visibly leaves something and no law does better, what is missing may be no law at all.
         laws_tried = part.hypothesis in self.laws_beside and share <= smallest
         prior = priors_of_further(part is not self.base, is_law, laws_tried)
-        return limited(imitation(share, smallest, prior), prior[0], support)
+        with np.errstate(divide="ignore"):
+            return np.log(limited(imitation(share, smallest, prior), prior[0], support))
 
     def _left(self, candidate: CandidateFit, part: CandidateFit) -> tuple[float, float]:
         """Share of a part's lack of fit that a candidate leaves, and the least share that would be noticed."""
@@ -199,13 +213,10 @@ class Comparison:
         resolution = self.evidence[candidate.hypothesis].resolution
         return min(self.unexplained_mean_square(candidate) / before, 1.0), min(resolution / before, 1.0)
 
-    def _extended_alike(self, candidate: CandidateFit, part: CandidateFit) -> list[tuple[CandidateFit, CandidateFit]]:
-        """The fitted sets that extend a candidate and its part by the same mechanisms."""
-        further = set(candidate.hypothesis.acting) - set(part.hypothesis.acting)
-        fitted = {frozenset(c.hypothesis.acting): c for c in self.candidates if c.is_plausible}
-        larger = (c for c in fitted.values() if is_part_of(candidate, c))
-        pairs = ((c, fitted.get(frozenset(set(c.hypothesis.acting) - further))) for c in larger)
-        return [(c, without) for c, without in pairs if without is not None]
+    def _without(self, candidate: CandidateFit, members: set[tuple[str, str]]) -> CandidateFit | None:
+        """The fitted candidate of the same mechanisms but for some; None if they were not fitted."""
+        wanted = set(candidate.hypothesis.acting) - members
+        return next((c for c in self.candidates if c.is_plausible and set(c.hypothesis.acting) == wanted), None)
 
     def unexplained_mean_square(self, candidate: CandidateFit) -> float:
         """Mean square above the noise that a candidate does not explain (1: noise).
