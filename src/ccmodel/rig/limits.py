@@ -3,7 +3,7 @@
 # Samples of a recording. A log that was closed as soon as it was opened has fewer.
 FEWEST_SAMPLES = 10
 # Share of a log from which a start-up transient that is not compared is named.
-MOST_SETTLING = 0.5
+MOST_SETTLING = 0.75
 # A number from which on a cell has none: calibrated or squared, it would be infinite.
 LARGEST_NUMBER = 1e100
 # Rows with empty cells that may be dropped. A lost sample now and then has no effect on the others; a run of them or a
