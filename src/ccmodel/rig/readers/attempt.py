@@ -16,6 +16,8 @@ from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers.contract import Format, SignalFile, TextLayout
 
 COPY = "copy it again from the recorder"
+# What to do with a log that is not in the format of a batch.
+IMPORTING = "bring it to the format of a batch with 'ccmodel import'"
 
 
 def read_here(format: Format, path: Path, text: TextLayout | None = None) -> SignalFile | LogError:

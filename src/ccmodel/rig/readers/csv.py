@@ -12,6 +12,7 @@ import pandas as pd
 from ccmodel import inputs
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers import signatures
+from ccmodel.rig.readers.attempt import IMPORTING
 from ccmodel.rig.readers.content import blocks_of
 
 SUFFIXES = (".csv", ".csv.gz")
@@ -67,7 +68,7 @@ def _header(line: str) -> list[str]:
     header = [name.strip().strip('"') for name in line.split(",")]
     if len(header) == 1 and any(c in header[0] for c in ";\t "):
         text = "columns must be separated by commas and numbers written with a point"
-        raise LogError(1, None, f"{text}; or bring it to the format of a batch with 'ccmodel import'")
+        raise LogError(1, None, f"{text}; or {IMPORTING}")
     return header
 
 
@@ -107,8 +108,8 @@ def _blocks(path: Path) -> Iterator[list[str]]:
             text = raw.decode("utf-8" if rows else "utf-8-sig")
         except UnicodeDecodeError as error:
             row = rows + raw[: error.start].count(b"\n") + 1
-            text = "is not text in UTF-8: bring it to the format of a batch with 'ccmodel import', which reads other"
-            raise LogError(row, None, f"{text} encodings; if it is damaged, copy it again from the rig") from None
+            text = f"is not text in UTF-8: {IMPORTING}, which reads other encodings; if it is damaged,"
+            raise LogError(row, None, f"{text} copy it again from the rig") from None
         is_cut = text.rstrip(" \t")[-1:] not in ("", "\n", "\r")
         lines = text.splitlines()
         rows += len(lines)

@@ -8,10 +8,10 @@ import pandas as pd
 from ccmodel.rig import units
 from ccmodel.rig.columns import UNIT_OF
 from ccmodel.rig.findings import LogError
+from ccmodel.rig.readers.attempt import IMPORTING
 from ccmodel.rig.readers.contract import SignalFile
 
 TIME = "time_s"
-IMPORTING = "bring it to the format of a batch with 'ccmodel import'"
 
 
 def log_of_signals(file: SignalFile, format: str) -> pd.DataFrame:
