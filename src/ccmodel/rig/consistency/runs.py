@@ -17,6 +17,7 @@ from ccmodel.channels import (
     TENSIONS,
     THETA_MOTOR,
     THETA_OUT,
+    TORQUE_AT,
 )
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
@@ -68,7 +69,7 @@ def copied_channels(parities: Sequence[Parity]) -> list[Contradiction]:
 def one_sensor_twice(parities: Sequence[Parity]) -> list[Contradiction]:
     """Sensors of the two ends whose columns hold one and the same signal."""
     found = []
-    for at_drive, at_load in ((F_DRIVE, F_LOAD), (TAU_IN, TAU_OUT)):
+    for at_drive, at_load in (SUM_AT.values(), TORQUE_AT.values()):
         same = [p for p in parities if at_drive in p.recording and at_load in p.recording]
         same = [p for p in same if _is_same_noise(p.recording[at_drive], p.recording[at_load])]
         if same:
