@@ -50,8 +50,8 @@ def test_a_folder_whose_files_a_killed_command_has_put_aside(run, tmp_path):
         ended = run("report", tmp_path)
         raise ValueError("stopped")
     assert ended.err.splitlines() == [
-        f"warning: {tmp_path}: a command is writing there, or was killed: run it again, and it brings the earlier files"
-        " back or ends"
+        f"warning: {tmp_path}: a command is writing there, or was killed: run it again, and it restores or replaces the"
+        " earlier files"
     ]
     assert run("report", tmp_path).err == ""
 

@@ -15,11 +15,11 @@ from builders import spoil, write_batch
 from ccmodel import cli
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.hypothesis import Hypothesis
-from ccmodel.diagnosis.result import alternatives_of, interval, mechanism_of
+from ccmodel.diagnosis.result import alternatives_of, identified, interval, mechanism_of
 from ccmodel.failure import ModelError
 from ccmodel.inference import pool
 from ccmodel.model.files import read_model_file
-from ccmodel.report.verdict import headline
+from ccmodel.report.verdict import claim, headline
 from ccmodel.steps.ingest import ingest
 from ccmodel.studies.diagnosis import run as stage
 from ccmodel.typed import InputError
@@ -245,17 +245,28 @@ def test_the_headline_separates_a_pair_from_alternatives(alternatives, likeliest
         [{"name": name, "place": "conduit", "confidence": 0.5} for name in names] for names in (alternatives, likeliest)
     ]
     error = {"tau_in": {"before": 2.0, "after": 1.0, "noise": 1.0}}
-    said = {"batch": "b", "verdict": "undecided", "is_held": False, "fit": {"error": error}}
+    said = {"batch": "b", "verdict": "undecided", "is_held": False, "mechanisms": [], "fit": {"error": error}}
     assert sentence in headline(said | {"alternatives": claims[0], "likeliest": claims[1]})
 
 
 def test_the_headline_says_what_is_sure_and_what_is_open():
-    claims = [{"name": n, "place": "conduit", "confidence": p} for n, p in (("kink", 0.95), ("stribeck", 0.4))]
-    said = {"batch": "b", "verdict": "undecided", "is_held": False, "alternatives": claims, "likeliest": claims}
-    assert headline(said) == (
-        "b: Part of what is missing is kink at the conduit (0.95). These recordings do not tell what else is missing,"
-        " if anything: perhaps stribeck at the conduit (0.40)."
+    gap = {"name": "half_gap", "value": 0.02, "low": 0.019, "high": 0.021, "unit": "rad"}
+    sure = {"name": "backlash", "place": "load-pulley", "confidence": 0.95, "parameters": [gap]}
+    open_ = {"name": "stribeck", "place": "conduit", "confidence": 0.4}
+    said = {"batch": "b", "verdict": "undecided", "is_held": False, "mechanisms": [sure], "likeliest": [sure, open_]}
+    assert headline(said | {"alternatives": [open_]}) == (
+        f"b: Part of what is missing: {claim(sure)}, confidence 0.95. These recordings do not tell what else is"
+        " missing, if anything: perhaps stribeck at the conduit (0.40)."
     )
+
+
+@pytest.mark.parametrize(
+    ("verdict", "named"), [("explained", [1, 0]), ("learned", [1, 0]), ("undecided", [1]), ("unexplained", [])]
+)
+def test_an_undecided_verdict_names_the_mechanisms_that_are_certain(verdict, named):
+    law = ("learned-sliding-friction-by-speed", "conduit")
+    hypothesis = Hypothesis((("kink", "conduit"), ("stribeck", "conduit"), law))
+    assert identified(verdict, hypothesis, [0.6, 0.8, 0.99]) == named
 
 
 @pytest.mark.parametrize("is_there", [True, False])

@@ -59,12 +59,12 @@ class Diagnosis:
     def confidence(self) -> float | None:
         """Probability of what the verdict names, 0 to 1.
 
-        Of the least certain of the mechanisms (``explained``), of the most probable alternative (``undecided``), of the
+        Of the least certain of the mechanisms (``explained``), of the most probable mechanism (``undecided``), of the
         surest contradiction (``inputs-inconsistent``); None for the verdicts that name nothing.
         """
         named = {
             "explained": self.report["mechanisms"],
-            "undecided": self.report["alternatives"][:1],
+            "undecided": [*self.report["mechanisms"], *self.report["alternatives"]][:1],
             "inputs-inconsistent": self.report["not_judged"][:1],
         }
         return min((one["confidence"] for one in named.get(self.verdict, ())), default=None)

@@ -26,7 +26,7 @@ def report(results: Results = Path("results"), as_json: Json = False, quiet: Qui
 
     output = Output(as_json, quiet)
     if is_unfinished(results):
-        text = "a command is writing there, or was killed: run it again, and it brings the earlier files back or ends"
+        text = "a command is writing there, or was killed: run it again, and it restores or replaces the earlier files"
         output.finding(f"{results}: {text}", "warning")
     summary = summary_of(results)
     output.result(summary.as_dict(), *summary.lines())

@@ -37,10 +37,8 @@ def report(
     not_judged : list of {"what", "why"}
     """
     best, base, whitened = judgement.best, judgement.calibrated, judgement.whitened
-    is_named = judgement.verdict in ("explained", "learned")
     confidence = judgement.comparison.confidences(best.hypothesis)
-    of_list = [k for k, (name, _) in enumerate(best.hypothesis.acting) if is_named and name not in registry.laws()]
-    of_list.sort(key=lambda k: -min(settings.MOST_CONFIDENT, confidence[k]))
+    of_list = identified(judgement.verdict, best.hypothesis, confidence)
     named = [best.hypothesis.acting[k] for k in of_list]
     shift, failures = _discretisation(judgement) if named else (None, [])
     return {
@@ -64,6 +62,17 @@ def report(
         "next_experiment": experiment.proposed(judgement, estimates) if judgement.is_open else None,
         "not_judged": [*not_judged, *contradicting_recording(judgement), *_at_bounds(best), *failures],
     }
+
+
+def identified(verdict: str, hypothesis: Hypothesis, confidence: Sequence[float]) -> list[int]:
+    """Positions of the listed mechanisms that a verdict names, the highest confidence first.
+
+    An undecided verdict names those with at least the probability `DECIDED`: what is open is what else is missing.
+    """
+    least = {"explained": 0.0, "learned": 0.0, "undecided": settings.DECIDED}.get(verdict, np.inf)
+    listed = [k for k, (name, _) in enumerate(hypothesis.acting) if name not in registry.laws()]
+    named = (k for k in listed if confidence[k] >= least)
+    return sorted(named, key=lambda k: -min(settings.MOST_CONFIDENT, confidence[k]))
 
 
 def _nearest(judgement: Judgement, calibrated: CandidateFit) -> dict | None:

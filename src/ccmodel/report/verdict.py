@@ -7,7 +7,7 @@ from math import floor, log10
 from ccmodel import mechanisms as registry
 from ccmodel.channels import TABLE, symbol_of
 from ccmodel.diagnosis.formula import CONSTANT
-from ccmodel.diagnosis.settings import DECIDED, WITHIN_BAND
+from ccmodel.diagnosis.settings import WITHIN_BAND
 from ccmodel.mechanisms.contract import (
     BEARING_TORQUE,
     CABLE_STRETCH,
@@ -85,10 +85,9 @@ def _with_confidence(mechanisms: Sequence[Mapping]) -> str:
 def _undecided(diagnosis: Mapping, missing: str) -> str:
     together = [_placed(one) for one in diagnosis["likeliest"]]
     names = [f"{_placed(one)} ({one['confidence']:.2f})" for one in diagnosis["alternatives"]]
-    sure = sum(one["confidence"] >= DECIDED for one in diagnosis["alternatives"])
-    if sure:
-        rest = f": perhaps {' or '.join(names[sure:])}" if names[sure:] else ""
-        part = f"Part of what {missing} is {' and '.join(names[:sure])}"
+    if diagnosis["mechanisms"]:
+        rest = f": perhaps {' or '.join(names)}" if names else ""
+        part = f"Part of what {missing}: {_with_confidence(diagnosis['mechanisms'])}"
         return f"{part}. These recordings do not tell what else {missing}, if anything{rest}."
     if len(together) > 1:
         all_of_them = " and ".join(together)
