@@ -19,6 +19,7 @@ from ccmodel.diagnosis.result import alternatives_of
 from ccmodel.diagnosis.screening import Score
 from ccmodel.diagnosis.selection import Selection, contenders, lower
 from ccmodel.diagnosis.settings import (
+    CONTENDERS,
     DECIDED,
     LAW_FAR_BEHIND,
     MISSTATED_NOISE,
@@ -818,6 +819,23 @@ def test_the_set_that_leaves_least_stays_to_be_extended():
     )
     near, _ = contenders(far)
     assert STRIBECK in [c.hypothesis.acting[0] for c in near], "it leaves 30, and is fifth by its evidence"
+
+
+def test_every_rival_of_a_complete_candidate_stays():
+    """Of an incomplete one only the leading ones do, which lead on."""
+    rivals = [(FRICTION, NONE), (KINK, -40.0), (SCALE, -50.0), (STRIBECK, -60.0), (("presliding", "conduit"), -70.0)]
+    rivals.append((("pulley-friction", "load-pulley"), -80.0))
+    assert len(rivals) > CONTENDERS
+
+    def stay(incomplete):
+        of = [
+            (fitted(3.0, one), evidence(FAR if incomplete else log, log if incomplete else FAR)) for one, log in rivals
+        ]
+        near, far = contenders(compared(evidence(size=100.0), *of, model=fitted(101.0)))
+        return len(near) + len(far)
+
+    assert stay(incomplete=False) == len(rivals)
+    assert stay(incomplete=True) == CONTENDERS
 
 
 def test_values_that_stayed_are_no_minimum():

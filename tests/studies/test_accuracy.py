@@ -7,6 +7,7 @@ import pytest
 
 from builders import recording
 from ccmodel.model.run import simulate_recording
+from ccmodel.studies.accuracy.figure import ratio_figure, scatter_figure
 from ccmodel.studies.accuracy.settings import Accuracy
 from ccmodel.studies.accuracy.study import (
     BY_RECORDING,
@@ -121,6 +122,17 @@ def test_a_model_that_is_off_by_more_is_not():
     # Lost motion goes with the cable's compliance.
     assert line["delta"] == pytest.approx(1 / 1.2, rel=0.01)
     assert line["within"] == 0
+
+
+@pytest.mark.parametrize("drawn", [scatter_figure, ratio_figure])
+def test_each_batch_has_a_colour_and_a_marker_of_its_own(drawn):
+    every = [replace(c, recorded=replace(c.recorded, batch=name)) for name in ("b", "c", "d") for c in cases()]
+    table = comparison_table(every, ASKED, HOW)
+    axes = drawn(table, summary(table, ASKED)).axes[0]
+    of_batch = {line.get_label(): line for line in axes.lines if str(line.get_label()).startswith("batch")}
+    assert list(of_batch) == ["batch b", "batch c", "batch d"]
+    for style in ("get_color", "get_marker"):
+        assert len({getattr(line, style)() for line in of_batch.values()}) == 3
 
 
 def test_a_sensor_that_states_no_accuracy_judges_nothing():
