@@ -1,6 +1,6 @@
 """How often are mistakes in logs and batch files identified, and how many are false positives? (`make input-checks`)
 
-Twenty mistakes are made in copies of batches, each with sizes, recordings and channels drawn from a seed, and the
+Thirty-one mistakes are made in copies of batches, each with sizes, recordings and channels drawn from a seed, and the
 copies are read as `ccmodel check` reads them. The batches are a measured one, a simulated one and concealed cases of
 the proof with fresh seeds. The same batches without a mistake count the false alarms. Writes a section of
 docs/input-checks.md.
@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -147,6 +148,14 @@ def _scale_of_angles(factor: Callable[[np.random.Generator], float], ends: Seque
     return damage
 
 
+def _counts_by_two(copy: Copy, random) -> str:
+    end, by = str(random.choice(["drive", "load"])), float(random.choice([0.5, 2.0]))
+    if (end == "load") == (by > 1.0):  # less travel arrives, which friction may take: seen by the spring or the note
+        _spring_of(copy)
+    copy.rig[end]["encoder_counts_per_rev"] = float(copy.rig[end]["encoder_counts_per_rev"] * by)
+    return "theta"
+
+
 def _spring_of(copy: Copy) -> float:
     if "spring_stiffness_Nm_per_rad" not in copy.rig["load"]:
         raise NotApplicableError
@@ -177,12 +186,15 @@ def _either_load_cell(copy: Copy, random) -> str:
     return _wrong_sign(f"^{end}_load_cell_V", f"F_{end}")(copy, random)
 
 
-def _exchanged_ends(copy: Copy, random) -> str:
-    exchange = {"drive": "load", "load": "drive"}
-    for name, table in copy.logs.items():
-        renamed = {c: re.sub("^(drive|load)_", lambda m: f"{exchange[m[1]]}_", c) for c in table}
-        copy.logs[name] = table.rename(columns=renamed)
-    return "drive and load"
+def _exchanged(pattern: str, what: str):
+    def damage(copy: Copy, random) -> str:
+        exchange = {"drive": "load", "load": "drive"}
+        renamed = {c: re.sub("^(drive|load)_", lambda m: f"{exchange[m[1]]}_", c) for c in copy.columns(pattern)}
+        for name, table in copy.logs.items():
+            copy.logs[name] = table.rename(columns=renamed)
+        return what
+
+    return damage
 
 
 def _constant(copy: Copy, random) -> str:
@@ -244,6 +256,44 @@ def _drifting_clocks(copy: Copy, random) -> str:
     return "clocks"
 
 
+def _magnitude(copy: Copy, random) -> str:
+    column = random.choice(copy.columns("_current_A$"))
+    for table in copy.logs.values():
+        table[column] = table[column].abs()
+    return {"drive_current_A": "tau_in", "load_current_A": "tau_out"}[column]
+
+
+def _held(copy: Copy, random) -> str:
+    hold_s = random.uniform(0.03, 0.1)
+    columns = copy.columns(NOISY.pattern)
+    for table in copy.logs.values():
+        samples = max(round(hold_s / float(np.median(np.diff(table["time_s"])))), 5)
+        table[columns] = table[columns].to_numpy()[np.arange(len(table)) // samples * samples]
+    return columns[0]
+
+
+def _fine_accuracy(copy: Copy, random) -> str:
+    stated = copy.rig["accuracy"]
+    key = random.choice([key for key in ("torque_Nm", "load_cell_N") if key in stated])
+    stated[key] = float(stated[key] / np.exp(random.uniform(np.log(50), np.log(1000))))
+    return f"rig.accuracy.{key}"
+
+
+def _near_starts(copy: Copy, random) -> str:
+    at = datetime(2026, 3, 31, 14, 5, int(random.integers(60)), tzinfo=UTC)
+    for entry in copy.description["recordings"]:
+        entry["started_at"] = at.isoformat()
+        at += timedelta(seconds=int(random.integers(1, 6)))
+    return "started_at"
+
+
+def _single_cable(copy: Copy, random) -> str:
+    copy.columns("^load_load_cell_V")
+    copy.rig.update({"transmission": "single-cable", "far_end": "measured-tension"})
+    copy.rig["load"].pop("spring_stiffness_Nm_per_rad", None)
+    return "rig.transmission"
+
+
 def _other_rig(copy: Copy, random) -> str:
     name = copy.any_log(random)
     donor = copy.donors[random.integers(len(copy.donors))]
@@ -291,7 +341,7 @@ MISTAKES: Mapping[str, Callable[[Copy, np.random.Generator], str]] = {
     "sign of the load torque": _wrong_sign("^load_(current_A|torque_counts)", "tau_out"),
     "sign of the load angle": _wrong_sign("^load_encoder_counts", "theta_out"),
     "sign of a load cell": _either_load_cell,
-    "drive and load exchanged": _exchanged_ends,
+    "drive and load exchanged": _exchanged("^(drive|load)_", "drive and load"),
     "cables A and B exchanged": _wrong_sign("(current_A|torque_counts)$", "A and B"),
     "a channel constant": _constant,
     "a channel saturated": _saturated,
@@ -305,6 +355,14 @@ MISTAKES: Mapping[str, Callable[[Copy, np.random.Generator], str]] = {
     "stated stiffness": _stated("cable", "stiffness_N_per_m"),
     "stated friction": _stated("cable", "friction_coefficient"),
     "stated spring": _stated("load", "spring_stiffness_Nm_per_rad", "^load_(current_A|torque_counts)"),
+    "torques of drive and load exchanged": _exchanged("(current_A|torque_counts)$", "tau_in_Nm and tau_out_Nm"),
+    "encoders of drive and load exchanged": _exchanged("^(drive|load)_encoder", "theta_in_rad and theta_out_rad"),
+    "counts per turn of one end off by two": _counts_by_two,
+    "magnitude of a current": _magnitude,
+    "readings held for many samples": _held,
+    "an accuracy far finer than the noise": _fine_accuracy,
+    "starts of recordings too near": _near_starts,
+    "a pair called a single cable": _single_cable,
 }
 
 

@@ -5,22 +5,36 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from made_up_batch import T0, Bench, table
 
 from benchmarks.input_mistakes import MISTAKES, Copy, outcome, read_copy, said_of, write_copy
 from ccmodel.rig.consistency.clocks import drift_of, trend
 from ccmodel.rig.consistency.fitted import contradicted_by_fit
 from ccmodel.rig.consistency.parity import Parity, closed_part, crossings, speed, white_noise
+from ccmodel.rig.consistency.rectified import is_rectified
 from ccmodel.rig.consistency.scales import pooled
 from ccmodel.rig.consistency.signs import EXCHANGED, FAULTS, explanation, negative_relations, wrong_signs
 from ccmodel.rig.ingest import ingest_batch
+from ccmodel.rig.sensor_checks import held_for
 from proof.build import record
 from proof.cases import draw
+from single_cable_batches import write_batch
 
 SIMULATED, OTHER = Path("data/raw/pretension"), Path("tests/data/ideal-rig/loops")
 SIGNS = {"angles": 1.0, "torques": 0.5, "work": 0.9, "load": 1.0, "loss": 0.9, "F_drive": 1.0, "F_load": 1.0}
-# Values that a rig without load cells and spring does not have, and recordings of another rig: all are of one tool.
-NOT_MEASURED = ("both angles", "both ends off", "load cell", "forgotten", "stated", "another rig")
+# Values that a rig without load cells, spring and currents does not have, and recordings of another rig: all are of one
+# tool.
+NOT_MEASURED = (
+    "both angles",
+    "both ends off",
+    "load cell",
+    "forgotten",
+    "stated",
+    "another rig",
+    "magnitude",
+    "single",
+)
 
 
 @pytest.fixture(scope="module")
@@ -192,6 +206,164 @@ def test_an_offset_may_make_the_sum_of_one_recording_negative(tmp_path, sum_N, c
 def test_energy_from_nowhere_means_exchanged_ends_if_all_signs_are_right():
     signs = SIGNS | {"loss": -0.9}
     assert explanation(negative_relations(signs), signs) == (EXCHANGED,)
+
+
+def exchanged_alone(copy, sensors):
+    """Columns of these sensors under the names of the other end."""
+    names = {f"{a}_{s}": f"{b}_{s}" for s in sensors for a, b in (("drive", "load"), ("load", "drive"))}
+    copy.logs = {name: log.rename(columns=names) for name, log in copy.logs.items()}
+    return copy
+
+
+@pytest.mark.parametrize(
+    ("sensors", "late_s"),
+    [
+        (["current_A"], 0.0),
+        (["encoder_counts"], 0.0),
+        (["current_A", "encoder_counts"], 0.0),
+        (["current_A"], 0.05),
+        (["current_A", "encoder_counts"], 0.05),
+    ],
+)
+def test_what_is_exchanged_is_said_also_of_a_rig_whose_drive_comes_late(tmp_path, sensors, late_s):
+    copy = read_copy(SIMULATED)
+    for log in copy.logs.values():
+        for column in ("drive_encoder_counts", "drive_current_A", "drive_load_cell_V"):
+            log[column] = np.interp(log["time_s"] - late_s, log["time_s"], log[column])
+        log["drive_encoder_counts"] = log["drive_encoder_counts"].round()
+    (said,) = said_of(write_copy(exchanged_alone(copy, sensors), tmp_path / "exchanged"))
+    what = {"current_A": "tau_in_Nm and tau_out_Nm", "encoder_counts": "theta_in_rad and theta_out_rad"}
+    truth = what[sensors[0]] if len(sensors) == 1 else "drive and load"
+    assert truth in said.partition(": ")[0]
+    assert late_s or said.startswith(f"batch.yaml {truth}: ")
+
+
+@pytest.mark.parametrize("sensor", ["current_A", "encoder_counts"])
+def test_what_is_exchanged_is_said_also_where_the_signs_of_the_ends_are_unlike(tmp_path, sensor):
+    copy = read_copy(SIMULATED)
+    copy.rig["load"][{"current_A": "torque_sign", "encoder_counts": "encoder_sign"}[sensor]] = -1
+    for log in copy.logs.values():
+        log[f"load_{sensor}"] *= -1
+    assert said_of(write_copy(copy, tmp_path / "right")) == []
+    (said,) = said_of(write_copy(exchanged_alone(copy, [sensor]), tmp_path / "exchanged"))
+    what = {"current_A": "tau_in_Nm and tau_out_Nm", "encoder_counts": "theta_in_rad and theta_out_rad"}[sensor]
+    assert said.startswith(f"batch.yaml {what}: ")
+
+
+@pytest.mark.parametrize("end", ["drive", "load"])
+@pytest.mark.parametrize("late_s", [0.05, 0.1])
+def test_sensors_of_one_end_that_come_late_are_not_exchanged(tmp_path, end, late_s):
+    """Though the load then seems to reverse first, and the radii a tenth off let it move further than the drive."""
+    copy = read_copy(SIMULATED)
+    copy.rig["load"]["pulley_radius_m"] *= 1.2
+    for log in copy.logs.values():
+        for column in (f"{end}_encoder_counts", f"{end}_current_A", f"{end}_load_cell_V"):
+            log[column] = np.interp(log["time_s"] - late_s, log["time_s"], log[column])
+        log[f"{end}_encoder_counts"] = log[f"{end}_encoder_counts"].round()
+    ingested = ingest_batch(write_copy(copy, tmp_path / "late"))
+    assert wrong_signs([Parity(recording, ingested.batch) for recording in ingested.recordings]) == []
+
+
+def test_a_torque_without_its_sign_is_named_and_one_of_a_load_that_only_pulls_is_right(tmp_path):
+    copy, column = read_copy(SIMULATED), "load_current_A"
+    copy.logs = {name: log.assign(**{column: log[column].abs()}) for name, log in copy.logs.items()}
+    (said,) = said_of(write_copy(copy, tmp_path / "magnitude"))
+    assert said.startswith("batch.yaml tau_out_Nm: the load torque is without its sign: in 6 of 6 recordings")
+    to_and_fro = np.sin(np.linspace(0, 40, 5000))
+    parity = parity_of(tmp_path)
+    for angle, is_wrong in ((to_and_fro, True), (1 + to_and_fro, False)):
+        x = {"theta_in_rad": angle, "theta_out_rad": angle, "tau_out_Nm": np.abs(angle)}
+        time = np.arange(angle.size) * 0.002
+        recording = replace(parity.recording, time_s=time, rest_s=0.0, channels=x)
+        assert is_rectified(Parity(recording, parity.batch), "theta_out_rad", "tau_out_Nm") == is_wrong
+
+
+@pytest.mark.parametrize(("samples", "is_late"), [(1, None), (3, None), (4, False), (12, True)])
+def test_readings_that_are_held_are_named_by_how_late_they_are(tmp_path, samples, is_late):
+    """At 500 samples a second: a converter of half the rate is common, one of a twelfth reads as late sensors."""
+    copy = read_copy(SIMULATED)
+    columns = ["drive_current_A", "load_current_A", "drive_load_cell_V", "load_load_cell_V"]
+    for log in copy.logs.values():
+        log[columns] = log[columns].to_numpy()[np.arange(len(log)) // samples * samples]
+    findings = ingest_batch(write_copy(copy, tmp_path / "held")).findings
+    assert len(findings) == (0 if is_late is None else len(copy.logs))
+    for finding in findings:
+        assert finding.column == "drive_current_A" and f"each reading stands in {samples} samples" in finding.text
+        assert finding.is_inconsistent == is_late
+
+
+def test_a_coarse_converter_holds_nothing():
+    """It keeps a value for as long as a smooth signal needs for a step, or noise lets it."""
+    time, noise = np.arange(0, 8, 0.002), np.random.default_rng(3).normal(0, 1, 4000)
+    wave = np.sin(np.pi * time)
+    readings = [100 * wave, 20 * wave, 100 * wave + 0.3 * noise, np.arcsin(wave) * 40]
+    assert [held_for(np.round(r)) for r in readings] == [0, 0, 0, 0]
+    assert held_for(np.round(100 * wave)[np.arange(4000) // 10 * 10]) == 10
+
+
+@pytest.mark.parametrize(("key", "by"), [("torque_Nm", 20), ("load_cell_N", 40), ("encoder_rad", 50)])
+def test_an_accuracy_below_the_noise_is_named(tmp_path, key, by):
+    copy = read_copy(SIMULATED)
+    accuracy = copy.rig["accuracy"]
+    accuracy[key] /= by
+    (said,) = said_of(write_copy(copy, tmp_path / "fine"))
+    assert said.startswith(f"batch.yaml rig.accuracy.{key}: rig.accuracy.{key} is {accuracy[key]:g}, but the ")
+    accuracy[key] *= by / 3
+    assert said_of(write_copy(copy, tmp_path / "honest")) == []
+
+
+@pytest.mark.parametrize(
+    ("starts", "said_starts"),
+    [
+        (["14:00:00", "14:01:00"], None),
+        (["14:01:00", "14:00:00"], None),
+        (["14:00:00", "14:00:00"], None),  # noted to the minute
+        (["14:00:05", "14:00:13"], None),
+        (["14:00:05", "14:00:11"], "two started at 2026-03-31T14:00:11+00:00, 2 s before the end of one"),
+        (["14:00:11", "14:00:05"], "one started at 2026-03-31T14:00:11+00:00, 2 s before the end of two"),
+    ],
+)
+def test_recordings_of_one_rig_do_not_overlap(tmp_path, starts, said_starts):
+    bench = honest_rig(tmp_path)  # of 8 s
+    for entry, start in zip(bench.described["recordings"], starts, strict=True):
+        entry["started_at"] = f"2026-03-31T{start}"
+    said = said_of(bench.write().folder)
+    assert len(said) == (said_starts is not None)
+    assert all(text.startswith("batch.yaml started_at: ") and said_starts in text for text in said)
+
+
+@pytest.mark.parametrize("far_end", ["spring", "measured-tension", "measured-motion"])
+def test_a_single_cable_is_no_pair(tmp_path, far_end):
+    folder = write_batch(tmp_path / "one-cable", far_end)
+    assert said_of(folder) == []
+    described = yaml.safe_load((folder / "batch.yaml").read_text())
+    del described["rig"]["transmission"], described["rig"]["far_end"]
+    (folder / "batch.yaml").write_text(yaml.safe_dump(described))
+    assert any(said.startswith("batch.yaml rig.transmission: no cable B") for said in said_of(folder))
+
+
+@pytest.mark.parametrize("end", ["drive", "load"])
+@pytest.mark.parametrize("by", [0.5, 2.0])
+def test_counts_per_turn_that_are_twice_or_half_the_true_ones_are_named(tmp_path, end, by):
+    copy = read_copy(SIMULATED)
+    copy.rig[end]["encoder_counts_per_rev"] *= by
+    (said,) = said_of(write_copy(copy, tmp_path / "counts"))
+    channel = {"drive": "theta_in_rad", "load": "theta_out_rad"}[end]
+    assert said.startswith(f"batch.yaml {channel}: the scale of the {end} angle is wrong")
+    assert "a factor of 2 is that of" in said and f"rig.{end}.encoder_counts_per_rev" in said
+
+
+@pytest.mark.parametrize(("factor", "warnings"), [(1.1, 0), (1.35, 1)])
+def test_a_load_that_moves_further_than_the_drive_is_doubtful(tmp_path, factor, warnings):
+    """Without load cells nothing else tells which radius or encoder is wrong."""
+    copy = read_copy(SIMULATED)
+    copy.logs = {n: log.drop(columns=["drive_load_cell_V", "load_load_cell_V"]) for n, log in copy.logs.items()}
+    for end in ("drive", "load"):
+        del copy.rig[end]["load_cell"]
+    copy.rig["load"]["pulley_radius_m"] *= factor
+    findings = ingest_batch(write_copy(copy, tmp_path / "radius")).findings
+    assert [f.severity for f in findings] == ["warning"] * warnings
+    assert all("and no cable makes it move further; check" in f.text for f in findings)
 
 
 def test_a_correlation_alone_identifies_no_sensor():

@@ -48,6 +48,14 @@ FROZEN_SAMPLES = 20
 # Repeated samples, as a share, below which a channel counts as noisy for that: a coarse converter repeats a value now
 # and then (a fifth of the samples of the public recordings), but not 20 times in a row.
 FROZEN_NOISE_FRACTION = 0.5
+# Samples in which each reading of a converter stands that is slower than the log. Fewer are common and harmless.
+HELD_SAMPLES = 4
+# Fewest changes of such a channel; share of the intervals between them that must be equal to a sample; and median
+# change over the least one, which is about 1 of a converter that is coarse.
+FEWEST_HELD, HELD_EVENLY, HELD_STEPS = 20, 0.9, 2.0
+# Time for which a reading is held from which the recording is not what the rig did: late by 10 ms on average, it reads
+# as `time-skew`, whose plausible delays begin at 2 ms and typically are 10 ms.
+HELD_S = 0.02
 # Share of the batch's largest drive travel below which a sensor that never changes contradicts nothing: a small motion
 # may stay within what the friction of the conduits takes up.
 SMALL_TRAVEL_FRACTION = 0.5

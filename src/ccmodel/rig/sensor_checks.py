@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ccmodel.channels import TAU_OUT
 from ccmodel.rig import limits
@@ -49,7 +49,7 @@ def check_sensors(table: pd.DataFrame, rig: Rig, largest_travel: float) -> tuple
         if angle:
             _check_steps(table, angle)
     _check_drive(table, drive, load)
-    defects, dead = [*beyond, *_missing_steps(table, drive)], []
+    defects, dead, analog = [*beyond, *_missing_steps(table, drive)], [], []
     motor = angle_of_motor(table, rig)
     is_small = drive_travel(table, rig) < limits.SMALL_TRAVEL_FRACTION * largest_travel
     for column in table.columns.drop(["time_s", drive.column]):
@@ -67,7 +67,8 @@ def check_sensors(table: pd.DataFrame, rig: Rig, largest_travel: float) -> tuple
         elif motor is None or column != motor.column:
             # A sensor at the end of its range repeats one value: it is clipped and not frozen.
             defects += _saturated(table, column, drive, rig.ranges.get(column)) or _frozen(table, column, drive)
-    return table.drop(columns=dead), defects
+            analog.append(column)
+    return table.drop(columns=dead), defects + _held(table[["time_s", *analog]])
 
 
 def _drop_beyond(table: pd.DataFrame, ranges: Mapping[str, tuple[float, float]]) -> tuple[pd.DataFrame, list[Defect]]:
@@ -298,6 +299,41 @@ def _frozen(table: pd.DataFrame, column: str, drive: Angle) -> list[Defect]:
         is_still[part] = True
     contradicts = _is_noisy(table, column, drive, is_still, limits.FROZEN_NOISE_FRACTION)
     return [Defect(int(first), column, text, contradicts)]
+
+
+def _held(table: pd.DataFrame) -> list[Defect]:
+    """Analog readings that are logged several times each, as of a converter that is slower than the log: one line."""
+    step_s = float(np.median(np.diff(table["time_s"])))
+    held = {column: samples for column in table.columns.drop("time_s") if (samples := held_for(table[column]))}
+    if not held:
+        return []
+    first, longest = next(iter(held)), max(held.values())
+    hold_s = longest * step_s
+    others = f", as in {', '.join(c for c in held if c != first)}" if len(held) > 1 else ""
+    text = (
+        f"each reading stands in {longest} samples{others}: a converter that is slower than the log, whose readings"
+        f" are late by up to {1e3 * hold_s:.3g} ms, {500 * hold_s:.3g} ms on average; log at its rate of"
+        f" {1 / hold_s:.3g} Hz or less"
+    )
+    return [Defect(None, first, text, contradicts=hold_s > limits.HELD_S)]
+
+
+def held_for(values: ArrayLike) -> int:
+    """Samples for which each reading is held; 0 if readings differ or their repeats are those of a coarse converter.
+
+    A coarse converter keeps its value as long as it takes to the next step. One that holds changes in even intervals,
+    by whatever came together since.
+    """
+    changes = np.diff(np.asarray(values))
+    at = np.flatnonzero(changes)
+    if at.size < limits.FEWEST_HELD:
+        return 0
+    between = np.diff(at)
+    samples = int(np.median(between))
+    is_even = np.mean(np.abs(between - samples) <= 1) > limits.HELD_EVENLY
+    sizes = np.abs(changes[at])
+    is_fine = np.median(sizes) > limits.HELD_STEPS * sizes.min()
+    return samples if samples >= limits.HELD_SAMPLES and is_even and is_fine else 0
 
 
 def _standstills(table: pd.DataFrame, values: NDArray) -> list[slice]:

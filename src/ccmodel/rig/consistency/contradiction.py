@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-# A relation far beyond its limit, and one near it.
-SURE, LIKELY = 0.98, 0.9
+# A relation far beyond its limit, one near it, and one that leaves more than one cause: a warning.
+SURE, LIKELY, DOUBTFUL = 0.98, 0.9, 0.7
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,27 @@ CHATTER = 3.0
 WRONG_SIGN = -0.1
 # The same for the energy that is lost between the ends: 0.2 or more. Without friction it is 0.
 WRONG_LOSS = -0.15
+# Energy that a spring seems to give over a cycle, as a share of what it exchanges, from which the encoders are
+# exchanged and do not only come late. Measured: 0.03 in a single recording at most, 0.00 in the median of a batch; 0.05
+# or more with exchanged encoders.
+SPRING_GIVES = 0.02
 # Share of the recordings that must show a wrong sign, so that the batch file is named and not the recordings.
 MOST_RECORDINGS = 0.7
+# Shares of a torque's largest readings (95 % quantile): below the first it is at zero, above the second it has left it.
+# Noise of a torque that is read is a hundredth or less.
+AT_ZERO = (0.05, 0.15)
+# Fewest times that a torque comes to zero, so that its sign can be judged: a cycle has two reversals.
+FEWEST_ZEROS = 2
+# Rise of the share of work, or of the correlation with the angle, from which a torque has lost its sign. Magnitudes of
+# the torques of data/raw gained 0.4 or more, but for holds of one step.
+BETTER_WITH_SIGN = 0.3
+# Quantiles of a torque, the smaller over the larger, from which it turns a pulley both ways: bearings of a single cable
+# that is let go turn it by less.
+BOTH_WAYS = 0.5
+# Torque over radius as a share of the sum of tensions from which one cable carries all. That of a pair is zero at rest.
+WHOLE_SUM = 0.7
+# Units to which the times of starts are noted, s, the coarsest first: noted so, two of them may seem too near by one.
+NOTED_TO_S = (60.0, 1.0)
 # Correlation of the noise of two sensors above which it is that of one.
 SAME_NOISE = 0.99
 # Correlation of the two angles below which they are not of one run. Small strokes in much friction reach 0.7.
@@ -47,6 +66,13 @@ FREQUENCY_FACTOR = 3.0
 # Travel of the load over that of the drive, both at the cable, in the recording of the greatest stroke. Friction and
 # stretch only lose travel: at least 0.74 remained, and 1 / 0.74 where the ends are exchanged.
 LEAST_TRAVEL, MOST_TRAVEL = 0.35, 1.6
+# Travel that errors of the stated radii may seem to add: a twentieth, as of calipers on a grooved pulley of 6 mm.
+MOST_TRAVEL_OF_RADII = 1.05
+# Travel below which an angle may be half or twice what it is, if another relation says so too: half of the most that
+# remained (0.93), and an eighth for what is not seen.
+LEAST_OF_TWICE = 0.55
+# Relative deviation within which a relation is off by just a factor.
+JUST = 0.15
 # Factor of the noted amplitude that points at the encoders. Alone it is no contradiction: a note is no measurement.
 AMPLITUDE_FACTOR = 2.5
 # Factor between the sum of tensions at rest and twice the pretension.
@@ -95,5 +121,8 @@ EQUAL_CYCLES, FEWEST_CROSSINGS = 0.05, 4
 COPIED_NOISE, COPIED_ANGLE = 0.5, 0.98
 # Changes by which pairs of recordings are compared first, and the share of them from which all are compared.
 COMPARED_CHANGES, MAYBE_COPIED = 400, 0.25
+# White noise over the stated accuracy, which includes it, that contradicts the accuracy: it was 1.1 at most. And the
+# standard deviation of an even error of one step, as of an encoder, over the step.
+NOISE_BEYOND_ACCURACY, ROUNDING = 10.0, 12**-0.5
 # White noise over the stated accuracy above which a channel has noise, and not only digits.
 NOISE_OVER_ACCURACY = 0.1

@@ -73,7 +73,8 @@ class Parity:
         - ``angles``: correlation of drive and load angle
         - ``torques``: correlation of drive and load torque
         - ``work``: net work of the drive, over the work exchanged
-        - ``load``: correlation of load torque and angle for a spring, otherwise net work on the load
+        - ``load``: correlation of load torque and angle for a spring, otherwise net work on the load; none of a far end
+          that something else moves
         - ``loss``: energy lost between the ends, over the work exchanged at the end that exchanges more
         - ``F_drive``, ``F_load``: sign of the sum of tensions
         """
@@ -85,10 +86,10 @@ class Parity:
         if TAU_IN in x and TAU_OUT in x:
             found["torques"] = correlation(x[TAU_IN], x[TAU_OUT])
         cycles = closed_part(x[THETA_IN])
-        drive, load = (work(x, ends, cycles) for ends in ((TAU_IN, THETA_IN), (TAU_OUT, THETA_OUT)))
+        drive, load = work(x, (TAU_IN, THETA_IN), cycles), self.work_at_load
         if drive:
             found["work"] = drive[0] / drive[1]
-        if load:
+        if load and self.recording.far_end != "measured-motion":
             found["load"] = correlation(x[TAU_OUT], x[THETA_OUT]) if spring else load[0] / load[1]
         if drive and load:
             found["loss"] = (drive[0] - load[0]) / max(drive[1], load[1])
@@ -96,6 +97,25 @@ class Parity:
             if channel in x:
                 found[name] = float(np.sign(np.median(x[channel])))
         return {name: value for name, value in found.items() if np.isfinite(value)}
+
+    @cached_property
+    def work_at_load(self) -> tuple[float, float] | None:
+        """Energy that the load takes over whole cycles and energy that it exchanges, J; None without both sensors."""
+        return work(self.moving, (TAU_OUT, THETA_OUT), closed_part(self.moving[THETA_IN]))
+
+    @cached_property
+    def lags(self) -> dict[str, float]:
+        """By which the load follows the drive, as the area of a loop in -1 to 1, whatever the scales.
+
+        - ``angles``: load angle over drive angle; positive if the drive reverses first, as the end that pulls does
+        - ``torques``: load torque over drive torque; positive if the drive torque turns first, as friction lets it
+
+        Channels of one end that come late change both. The energy at each end (`signs`) is then as it was.
+        """
+        cycles = closed_part(self.moving[THETA_IN])
+        loops = {"angles": (THETA_OUT, THETA_IN), "torques": (TAU_OUT, TAU_IN)}
+        areas = {name: work(self.moving, channels, cycles) for name, channels in loops.items()}
+        return {name: -area[0] / area[1] for name, area in areas.items() if area}
 
     @cached_property
     def ratios(self) -> dict[str, float]:
@@ -124,7 +144,8 @@ class Parity:
         for channel in (TAU_IN, TAU_OUT, F_DRIVE, F_LOAD):
             if channel in x:
                 found[f"noise of {channel}"] = self._noise(channel)
-        if THETA_OUT in x:
+        # A far end that is moved by something else need not follow.
+        if THETA_OUT in x and entry.far_end != "measured-motion":
             found["travel"] = np.ptp(x[THETA_OUT]) * radii[1] / (np.ptp(x[THETA_IN]) * radii[0])
         if THETA_OUT in x and TAU_OUT in x and (spring := rig.load.spring_stiffness_Nm_per_rad):
             angle = x[THETA_OUT] - x[THETA_OUT].mean()
@@ -229,7 +250,7 @@ class Parity:
             return []
         for direction, pulled, other in ((1, T2, T4), (-1, T4, T2)):
             a, b = x[pulled], np.maximum(x[other], 0.0)
-            slips = self._slips(direction) & (a > self._taut) & (a > limits.PULLED * b)
+            slips = self._slips(direction) & (a > self.taut_N) & (a > limits.PULLED * b)
             if slips.sum() >= limits.FEWEST_SAMPLES:
                 found.append((x[F_DRIVE][slips], a[slips], b[slips]))
         return found
@@ -247,7 +268,7 @@ class Parity:
         stretch = rig.drive.pulley_radius_m * x[THETA_IN] - rig.load.pulley_radius_m * x[THETA_OUT]
         tensions, lengths = [], []
         for ends, sign in (((T1, T2), 1), ((T3, T4), -1)):
-            taut = np.minimum(x[ends[0]], x[ends[1]]) > self._taut
+            taut = np.minimum(x[ends[0]], x[ends[1]]) > self.taut_N
             tensions.append((x[ends[0]] + x[ends[1]])[taut] / 2)
             lengths.append(sign * stretch[taut])
         tension, length = np.concatenate(tensions), np.concatenate(lengths)
@@ -269,7 +290,8 @@ class Parity:
         return float(covariance / variance), float(of_tension / covariance)
 
     @property
-    def _taut(self) -> float:
+    def taut_N(self) -> float:
+        """Tension from which a cable counts as taut, N."""
         return limits.TAUT_SHARE * self.recording.pretension_N + limits.TAUT_N
 
     def _slips(self, direction: int) -> NDArray:

@@ -133,7 +133,7 @@ def _two_runs(parity: Parity) -> Contradiction | None:
     together = parity.signs.get("angles")
     if together is None or abs(together) > limits.SAME_RUN:
         return None
-    if parity.ratios["travel"] < limits.LEAST_TRAVEL:  # A load that hardly moves need not follow.
+    if parity.ratios.get("travel", 0.0) < limits.LEAST_TRAVEL:  # A load that hardly moves need not follow.
         return None
     text = (
         f"the load angle of {parity.recording.id} does not follow its drive angle (correlation {together:.2f}): one of"

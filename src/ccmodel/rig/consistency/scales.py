@@ -8,11 +8,17 @@ import numpy as np
 from ccmodel.channels import ANGLE_AT, F_DRIVE, F_LOAD, SUM_AT, THETA_IN, THETA_OUT, TORQUE_AT
 from ccmodel.rig.batch import Batch
 from ccmodel.rig.consistency import limits
-from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
+from ccmodel.rig.consistency.contradiction import DOUBTFUL, LIKELY, SURE, Contradiction
+from ccmodel.rig.consistency.exchanges import travel_of, travels_as_exchanged
 from ccmodel.rig.consistency.parity import Parity
 
 # Factors that have a name, within 30 %: edges of an encoder, units of an angle.
-_NAMED = {4.0: "the edges of a quadrature encoder", 57.3: "degrees for radians", 6.28: "turns for radians"}
+_NAMED = {
+    2.0: "twice the counts per turn",
+    4.0: "the edges of a quadrature encoder",
+    57.3: "degrees for radians",
+    6.28: "turns for radians",
+}
 _NAMED_WITHIN = 0.3
 # What a negative friction or stiffness means.
 _EXCHANGED = {
@@ -35,7 +41,8 @@ def wrong_geometry(parities: Sequence[Parity]) -> list[Contradiction]:
     ratios, batch = pooled(parities), parities[0].batch
     if units := [*_radii(batch), *_conduits(parities, batch)]:
         return units
-    exchanged = _exchanged(ratios, batch) and float(np.median([p.signs.get("loss", 0.0) for p in parities])) < 0
+    turned = [p.signs.get("loss", 0.0) for p in parities], [p.lags.get("angles", 0.0) for p in parities]
+    exchanged = travels_as_exchanged(parities) and any(np.median(values) < 0 for values in turned)
     return [] if exchanged else _angle_of_one_end(ratios) or _both_angles(ratios)
 
 
@@ -54,14 +61,13 @@ def pooled(parities: Sequence[Parity]) -> dict[str, float]:
 
     The spring is the one without what an inertia of the load takes off it, and absent where that is not known.
     """
-    by_relation: dict[str, list[tuple[float, float]]] = {}
+    by_relation: dict[str, list[float]] = {}
     for parity in parities:
-        stroke = float(np.ptp(parity.moving[THETA_IN]))
         for name, value in parity.ratios.items():
-            by_relation.setdefault(name, []).append((stroke, value))
-    found = {name: float(np.median([value for _, value in of])) for name, of in by_relation.items()}
-    if "travel" in by_relation:
-        found["travel"] = max(by_relation["travel"])[1]
+            by_relation.setdefault(name, []).append(value)
+    found = {name: float(np.median(values)) for name, values in by_relation.items()}
+    if (travel := travel_of(parities)) is not None:
+        found["travel"] = travel
     if beyond(found.get("spring"), _SAME) and (spring := _without_inertia(parities, found.pop("spring"))) is not None:
         found["spring"] = spring
     return found
@@ -119,38 +125,57 @@ def _conduits(parities: Sequence[Parity], batch: Batch) -> list[Contradiction]:
     return found
 
 
+# Keys of the accuracies by channel.
+_ACCURACY_OF = {
+    **dict.fromkeys(TORQUE_AT.values(), "torque_Nm"),
+    **dict.fromkeys(SUM_AT.values(), "load_cell_N"),
+    **dict.fromkeys(ANGLE_AT.values(), "encoder_rad"),
+}
+
+
 def _accuracies(parities: Sequence[Parity]) -> list[Contradiction]:
-    """Stated accuracies that are as large as what the sensors read."""
-    stated = {
-        **dict.fromkeys(TORQUE_AT.values(), "torque_Nm"),
-        **dict.fromkeys(SUM_AT.values(), "load_cell_N"),
-        **dict.fromkeys(ANGLE_AT.values(), "encoder_rad"),
-    }
-    found = {}
-    for channel, key in stated.items():
+    """Stated accuracies that are as large as what the sensors read, or far less than their noise or step."""
+    found: dict[str, Contradiction] = {}
+    for channel, key in _ACCURACY_OF.items():
         reading = [p for p in parities if channel in p.recording]
-        largest = max((float(np.abs(p.moving[channel]).max()) for p in reading), default=np.inf)
-        if reading and (accuracy := reading[0].recording.accuracy[channel]) > limits.COARSEST_ACCURACY * largest:
+        if not reading:
+            continue
+        accuracy = reading[0].recording.accuracy[channel]
+        largest = max(float(np.abs(p.moving[channel]).max()) for p in reading)
+        error, of_what = _least_error(reading, channel)
+        if accuracy > limits.COARSEST_ACCURACY * largest:
+            text = f"but {channel} reads at most {largest:.3g}: is it in another unit?"
+        elif error > limits.NOISE_BEYOND_ACCURACY * accuracy:
             text = (
-                f"rig.accuracy.{key} is {accuracy:g}, but {channel} reads at most {largest:.3g}: is it in another unit?"
+                f"but {of_what} of {channel} alone is {error:.3g}, {error / accuracy:.3g} times as much: the accuracy"
+                f" includes noise and zero, state {_rounded_up(error)} or more, in the unit of the key"
             )
-            found[key] = Contradiction(f"rig.accuracy.{key}", text)
+        else:
+            continue
+        found[key] = Contradiction(f"rig.accuracy.{key}", f"rig.accuracy.{key} is {accuracy:g}, {text}")
     return list(found.values())
 
 
-def _exchanged(ratios: Mapping[str, float], batch: Batch) -> bool:
-    """Whether exchanged columns of the two ends would explain the travel, also with encoders of unlike counts."""
-    drive, load = (end.side.encoder_counts_per_rev for end in batch.rig.ends)
-    unlike = (load / drive) ** 2 if drive and load else 1.0
-    return 1 / limits.MOST_TRAVEL < 1 / (ratios.get("travel", 0.0) * unlike or np.inf) <= 1.05
+def _least_error(parities: Sequence[Parity], channel: str) -> tuple[float, str]:
+    """Standard deviation of the error that the readings of a channel have by themselves, and what it is."""
+    if channel in ANGLE_AT.values():
+        steps = [p.recording.encoder_step_rad.get(channel, 0.0) for p in parities]
+        return limits.ROUNDING * min(steps), "the rounding to whole steps"
+    noises = [p.ratios.get(f"noise of {channel}", 0.0) for p in parities]
+    return float(np.median(noises)), "the noise from sample to sample"
+
+
+def _rounded_up(value: float) -> str:
+    digit = 10.0 ** np.floor(np.log10(value))
+    return f"{np.ceil(value / digit) * digit:g}"
 
 
 def _angle_of_one_end(ratios: Mapping[str, float]) -> list[Contradiction]:
     """Scale of one angle, from the travel of the load over that of the drive."""
     travel = ratios.get("travel")
-    if travel is None or limits.LEAST_TRAVEL <= travel <= limits.MOST_TRAVEL:
+    if travel is None or limits.LEAST_OF_TWICE <= travel <= limits.MOST_TRAVEL_OF_RADII:
         return []
-    large = travel > limits.MOST_TRAVEL
+    large = travel > 1
     if not large and ratios.get("nearest stiffness", 0.0) > 1 / _SAME:
         return []  # The cables stretch that much: a stiff load, not a scale.
     # The relations that contain one of the two angles alone.
@@ -158,6 +183,8 @@ def _angle_of_one_end(ratios: Mapping[str, float]) -> list[Contradiction]:
     at_load = beyond(spring, _SAME) == (-1 if large else 1)
     at_drive = beyond(amplitude, _SAME) == (-1 if large else 1)
     end = "load" if at_load and not at_drive else "drive" if at_drive and not at_load else None
+    if limits.LEAST_TRAVEL <= travel <= limits.MOST_TRAVEL and not _twice(spring if end == "load" else amplitude, end):
+        return []
     share = f"at the cable the load moves {travel:.3g} times as far as the drive"
     reason = "it cannot move further" if large else "far more is lost than friction and stretch take"
     which = f"of the {end} angle" if end else "of one of the two angles, or a pulley's radius,"
@@ -165,6 +192,23 @@ def _angle_of_one_end(ratios: Mapping[str, float]) -> list[Contradiction]:
     text = f"the scale {which} is wrong: {share}, and {reason}{_named(travel)}; check {keys} and the unit of the angle"
     what = ANGLE_AT[end] if end else f"{THETA_IN} or {THETA_OUT}"
     return [Contradiction(what, text, None, SURE if end else LIKELY)]
+
+
+def _twice(ratio: float | None, end: str | None) -> bool:
+    """Whether the relation that contains the angle of one end alone is off by just two, as of edges of an encoder."""
+    return bool(end and ratio and isclose(max(ratio, 1 / ratio), 2.0, rel_tol=limits.JUST))
+
+
+def doubtful_travel(parities: Sequence[Parity]) -> list[Contradiction]:
+    """A load that moves further than the drive, by less than an error of one key alone makes it."""
+    travel = travel_of(parities)
+    if travel is None or not travel > limits.MOST_TRAVEL_OF_RADII:
+        return []
+    text = (
+        f"at the cable the load moves {travel:.3g} times as far as the drive, and no cable makes it move further; check"
+        " encoder_counts_per_rev and pulley_radius_m of both ends, and whether the encoders are exchanged"
+    )
+    return [Contradiction(f"{THETA_IN} or {THETA_OUT}", text, None, DOUBTFUL)]
 
 
 def _both_angles(ratios: Mapping[str, float]) -> list[Contradiction]:
@@ -260,6 +304,9 @@ def _cable(ratios: Mapping[str, float], batch: Batch) -> list[Contradiction]:
             found.append(Contradiction(*_EXCHANGED[relation]))
             continue
         other = "bend_rad" if key == "friction_coefficient" else "length_m and the pulley radii"
+        if key == "stiffness_N_per_m" and ratio < 1 and ratios.get("travel", 1.0) < limits.LEAST_OF_TWICE:
+            share = f"{ratios['travel']:.3g} of the drive's travel arrives at the load"
+            other += f", or encoder_counts_per_rev of one end: {share}"
         text = (
             f"rig.cable.{key} is {value:g}, and the recordings show {ratio * value:.3g}{unit} ({how}, {ratio:.3g} times"
             f" as much); correct it, or {other}"

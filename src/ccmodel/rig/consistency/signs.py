@@ -1,4 +1,4 @@
-"""Wrong signs and exchanged ends: which sensor makes the parity relations of sign negative."""
+"""Wrong signs and exchanged sensors: which mistake makes the parity relations of sign negative."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,6 +10,7 @@ import numpy as np
 from ccmodel.channels import F_DRIVE, F_LOAD, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import Contradiction
+from ccmodel.rig.consistency.exchanges import ENCODERS, ENDS, Exchange, exchange_of, travel_of
 from ccmodel.rig.consistency.parity import SUMS, Parity
 
 
@@ -46,12 +47,7 @@ FAULTS = (
     _fault(F_DRIVE, "the load cell at the drive has the wrong sign", "F_drive", "change its sensitivity or wiring"),
     _fault(F_LOAD, "the load cell at the load has the wrong sign", "F_load", "change its sensitivity or wiring"),
 )
-EXCHANGED = _fault(
-    "drive and load",
-    "drive and load are exchanged",
-    "loss",
-    "exchange the columns (or the sides of batch.yaml) of drive and load",
-)
+EXCHANGED = _fault(*ENDS[:2], "loss", ENDS.remedy)
 EVIDENCE = {
     "angles": "the load angle runs against the drive angle (correlation {:.2f})",
     "torques": "the load torque runs against the drive torque (correlation {:.2f})",
@@ -61,10 +57,17 @@ EVIDENCE = {
     "F_drive": "the sum of tensions at the drive is negative, and cables cannot push",
     "F_load": "the sum of tensions at the load is negative, and cables cannot push",
 }
+# Evidence of exchanged sensors by the relation of `Parity.lags` that is turned.
+TURNED = {
+    "angles": "the load angle reverses before the drive angle, which moves it (lag {:.2f}, the area of their loop)",
+    "torques": "the load torque turns before the drive torque, which causes it (lag {:.2f}, the area of their loop)",
+}
 
 
 def wrong_signs(parities: Sequence[Parity]) -> list[Contradiction]:
-    """Sensors with a wrong sign and exchanged ends, of the batch or of single recordings."""
+    """Sensors with a wrong sign and exchanged sensors, of the batch or of single recordings."""
+    if throughout := _exchanged_throughout(parities):
+        return [throughout]
     positive = {name for name in SUMS if any(p.signs.get(name, 0.0) > 0 for p in parities)}
     negatives = [negative_relations(p.signs) for p in parities]
     by_recording = [
@@ -82,15 +85,50 @@ def wrong_signs(parities: Sequence[Parity]) -> list[Contradiction]:
     return found
 
 
+def _exchanged_throughout(parities: Sequence[Parity]) -> Contradiction | None:
+    """Sensors that are exchanged in most recordings that could show it."""
+    telling = [(p, negative_relations(p.signs)) for p in parities if "loss" in p.signs]
+    drive, load = (end.side for end in parities[0].batch.rig.ends)
+    is_unlike = drive.encoder_sign != load.encoder_sign or drive.torque_sign != load.torque_sign
+    for is_mirrored in (False, True) if is_unlike else (False,):
+        # Exchanged signs that are unlike turn the work of both ends; the load's torque does little work at the drive.
+        turned = {"load"} if is_mirrored else set()
+        of = [p for p, negative in telling if negative - {"work", "loss"} == turned]
+        if len(of) < max(limits.MOST_RECORDINGS * len(telling), 1):
+            continue
+        if exchange := exchange_of(of, is_mirrored):
+            where = f"in {len(of)} of {len(parities)} recordings "
+            return _exchange_contradiction(exchange, of, None, where, is_mirrored)
+    return None
+
+
+def _exchange_contradiction(
+    exchange: Exchange, parities: Sequence[Parity], recording: str | None, where: str, is_mirrored: bool = False
+) -> Contradiction:
+    """An exchange with the energies and lags that show it."""
+    loss = (-1) ** is_mirrored * float(np.median([p.signs["loss"] for p in parities]))
+    of_scale = f"at the cable the load moves {travel_of(parities):.3g} times as far as the drive"
+    evidence = [of_scale if exchange == ENCODERS else EVIDENCE["loss"].format(loss)]
+    for name, text in TURNED.items():
+        lag = float(np.median([p.lags.get(name, 0.0) for p in parities]))
+        evidence += [text.format(lag)] if lag < 0 else []
+    return Contradiction(
+        exchange.what, f"{exchange.text}: {where}{' and '.join(evidence)}; {exchange.remedy}", recording
+    )
+
+
 def _may_be_offset(parity: Parity, name: str) -> bool:
     """Whether an offset of the load cell may make a sum of tensions negative that is positive in other recordings."""
     return float(np.median(parity.moving[SUMS[name]])) >= min(limits.CELL_OFFSETS_N)
 
 
 def negative_relations(signs: Mapping[str, float]) -> frozenset[str]:
-    """Relations that are negative. The loss counts if all others are right: every wrong sign makes it negative."""
+    """Relations that are negative. The loss counts if all others are right: every wrong sign makes it negative.
+
+    A drive that takes energy out while all else is right has the load's torque: no wrong sign turns its work alone.
+    """
     negative = {name for name, value in signs.items() if value < limits.WRONG_SIGN and name != "loss"}
-    if not negative and signs.get("loss", 1.0) < limits.WRONG_LOSS:
+    if negative <= {"work"} and signs.get("loss", 1.0) < limits.WRONG_LOSS:
         negative = {"loss"}
     return frozenset(negative)
 
@@ -117,6 +155,8 @@ def _contradictions(
 ) -> list[Contradiction]:
     # A single relation of correlation may turn negative by physics alone; every mistake makes two of them negative.
     faults = explanation(negative, set.intersection(*(set(p.signs) for p in parities)))
+    if faults == (EXCHANGED,):
+        return [_exchange_contradiction(exchange_of(parities) or ENDS, parities, recording, where)]
     found = []
     for fault in faults:
         shown = sorted(fault.negative & negative)
