@@ -28,8 +28,8 @@ WRONG_SIGN = -0.1
 # The same for the energy that is lost between the ends: 0.2 or more. Without friction it is 0.
 WRONG_LOSS = -0.15
 # Energy that a spring seems to give over a cycle, as a share of what it exchanges, from which the encoders are
-# exchanged and do not only come late. Measured: 0.03 in a single recording at most, 0.00 in the median of a batch; 0.05
-# or more with exchanged encoders.
+# exchanged and do not only come late. Measured, as a median over a batch: 0.00, and 0.05 or more with exchanged
+# encoders; of single recordings 0.03 at most, and 0.03 or more.
 SPRING_GIVES = 0.02
 # Share of the recordings that must show a wrong sign, so that the batch file is named and not the recordings.
 MOST_RECORDINGS = 0.7
