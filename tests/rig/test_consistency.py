@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from ccmodel.rig.consistency.clocks import drift_of, trend
 from ccmodel.rig.consistency.fitted import contradicted_by_fit
 from ccmodel.rig.consistency.parity import Parity, closed_part, crossings, speed, white_noise
 from ccmodel.rig.consistency.rectified import is_rectified
+from ccmodel.rig.consistency.runs import deviations_of
 from ccmodel.rig.consistency.scales import pooled
 from ccmodel.rig.consistency.signs import EXCHANGED, FAULTS, explanation, negative_relations, wrong_signs
 from ccmodel.rig.ingest import ingest_batch
@@ -513,6 +515,16 @@ def test_a_load_cell_that_errs_in_all_recordings_makes_none_of_them_foreign(tmp_
     ]
     record(case, case.recordings, tmp_path / case.name)
     assert said_of(tmp_path / case.name) == []
+
+
+def test_a_conduit_with_more_bend_may_take_up_more_travel():
+    def run(bend_rad, travel):
+        recording = SimpleNamespace(path=SimpleNamespace(bend_rad=bend_rad))
+        return SimpleNamespace(recording=recording, ratios={"travel": travel}, stroke_rad=1.2)
+
+    others = [run(3.1, 0.9), run(6.3, 0.85)]
+    assert deviations_of(run(9.4, 0.45), others) == {"travel": 0.0}
+    assert deviations_of(run(3.1, 0.45), others)["travel"] == pytest.approx(np.log(0.45 / 0.85))
 
 
 @pytest.mark.parametrize("end", ["drive", "load"])

@@ -157,7 +157,8 @@ def _natural(path: Path) -> list:
 
 def _content(name: str, logs: Sequence[_Log], refused: dict[str, str]) -> Lines:
     columns = set().union(*(log.table.columns for log in logs))
-    yield f"# Drafted from {len(logs)} {'log' if len(logs) == 1 else 'logs'}. Fill in what is empty and correct what is wrong."
+    from_logs = f"{len(logs)} {'log' if len(logs) == 1 else 'logs'}"
+    yield f"# Drafted from {from_logs}. Fill in what is empty and correct what is wrong."
     yield "# `ccmodel check` names what is still missing. Keys and units: docs/rig-log-format.md."
     yield "format: 1"
     yield f"batch: {_text(name)}"

@@ -216,8 +216,9 @@ def deviations_of(parity: Parity, others: Sequence[Parity]) -> dict[str, float]:
     """Logarithm of each relation over the nearest value of comparable recordings, 0 within their range.
 
     Physics makes a relation rise or fall with the conditions: backlash and a stiffening load raise the spring with the
-    stroke and an inertia lowers it with the frequency; friction falls with the tension, and stiffness rises with it. An
-    excess is therefore compared only with recordings that should have more, a deficit with those that should have less.
+    stroke and an inertia lowers it with the frequency; friction falls with the tension, and stiffness rises with it; a
+    conduit with more bend takes up more travel. An excess is therefore compared only with recordings that should have
+    more, a deficit with those that should have less.
     """
     found = {}
     for name, conditions in _DEPENDENCE.items():
@@ -240,12 +241,16 @@ def _tension(parity: Parity) -> float:
     return parity.recording.pretension_N
 
 
+def _bend_rad(parity: Parity) -> float:
+    return parity.recording.path.bend_rad
+
+
 # Conditions that a relation rises (1) or falls (-1) with.
 _DEPENDENCE = {
     "spring": ((_stroke, 1), (_frequency, -1)),
     "friction": ((_tension, -1),),
     "stiffness": ((_tension, 1),),
-    "travel": ((_stroke, 1),),
+    "travel": ((_stroke, 1), (_bend_rad, -1)),
     "pretension": ((_tension, 1), (_tension, -1)),
     "amplitude": (),
     "frequency": (),
