@@ -11,6 +11,7 @@ from made_up_batch import T0, Bench, table
 
 from benchmarks.input_mistakes import MISTAKES, Copy, outcome, read_copy, said_of, write_copy
 from ccmodel.rig.consistency.clocks import drift_of, trend
+from ccmodel.rig.consistency.exchanges import TORQUES, exchange_of
 from ccmodel.rig.consistency.fitted import contradicted_by_fit
 from ccmodel.rig.consistency.parity import Parity, closed_part, crossings, speed, white_noise
 from ccmodel.rig.consistency.rectified import is_rectified
@@ -240,6 +241,28 @@ def test_what_is_exchanged_is_said_also_of_a_rig_whose_drive_comes_late(tmp_path
     assert late_s or said.startswith(f"batch.yaml {truth}: ")
 
 
+@pytest.mark.parametrize(
+    ("lag_of_angles", "work", "is_mirrored", "found"),
+    [
+        (0.08, -0.3, False, TORQUES),
+        (0.02, -0.3, False, None),  # little friction: a filter of the drive's current turns the energies as well
+        (0.08, 0.1, True, TORQUES),
+        (0.08, 1.0, True, None),  # a load that gives energy, and a drive that gives all it exchanges
+    ],
+)
+def test_torques_are_exchanged_if_nothing_else_turns_the_energies(lag_of_angles, work, is_mirrored, found):
+    loss = 0.3 if is_mirrored else -0.3
+    ends = [SimpleNamespace(side=SimpleNamespace(encoder_counts_per_rev=2000))] * 2
+    parity = SimpleNamespace(
+        signs={"loss": loss, "work": work},
+        lags={"angles": lag_of_angles, "torques": -0.2},
+        ratios={"travel": 0.9},
+        stroke_rad=1.0,
+        batch=SimpleNamespace(rig=SimpleNamespace(ends=ends)),
+    )
+    assert exchange_of([parity] * 3, is_mirrored) is found
+
+
 @pytest.mark.parametrize("sensor", ["current_A", "encoder_counts"])
 def test_what_is_exchanged_is_said_also_where_the_signs_of_the_ends_are_unlike(tmp_path, sensor):
     copy = read_copy(SIMULATED)
@@ -299,8 +322,11 @@ def test_a_coarse_converter_holds_nothing():
     time, noise = np.arange(0, 8, 0.002), np.random.default_rng(3).normal(0, 1, 4000)
     wave = np.sin(np.pi * time)
     readings = [100 * wave, 20 * wave, 100 * wave + 0.3 * noise, np.arcsin(wave) * 40]
-    assert [held_for(np.round(r)) for r in readings] == [0, 0, 0, 0]
-    assert held_for(np.round(100 * wave)[np.arange(4000) // 10 * 10]) == 10
+    moving, in_steps = np.arange(4000), np.arange(4000) // 10
+    assert [held_for(np.round(r), moving) for r in readings] == [0, 0, 0, 0]
+    held = np.round(100 * wave)[10 * in_steps]
+    assert held_for(held, moving) == 10
+    assert held_for(held, in_steps) == 0, "the drive stands still between its steps"
 
 
 @pytest.mark.parametrize(("key", "by"), [("torque_Nm", 20), ("load_cell_N", 40), ("encoder_rad", 50)])
@@ -321,6 +347,8 @@ def test_an_accuracy_below_the_noise_is_named(tmp_path, key, by):
         (["14:01:00", "14:00:00"], None),
         (["14:00:00", "14:00:00"], None),  # noted to the minute
         (["14:00:05", "14:00:13"], None),
+        (["14:01:55", "14:02:00"], None),  # the second noted to the minute
+        (["14:00:05.001", "14:00:12.991"], None),  # a cut of one log, within a few samples
         (["14:00:05", "14:00:11"], "two started at 2026-03-31T14:00:11+00:00, 2 s before the end of one"),
         (["14:00:11", "14:00:05"], "one started at 2026-03-31T14:00:11+00:00, 2 s before the end of two"),
     ],
@@ -342,6 +370,11 @@ def test_a_single_cable_is_no_pair(tmp_path, far_end):
     del described["rig"]["transmission"], described["rig"]["far_end"]
     (folder / "batch.yaml").write_text(yaml.safe_dump(described))
     assert any(said.startswith("batch.yaml rig.transmission: no cable B") for said in said_of(folder))
+    for entry in described["recordings"]:
+        entry["pretension_N"] /= 2
+    (folder / "batch.yaml").write_text(yaml.safe_dump(described))
+    findings = [f for f in ingest_batch(folder).findings if f.column == "rig.transmission"]
+    assert [f.severity for f in findings] == ["warning"] * (far_end != "measured-motion"), "a weight does the same"
 
 
 @pytest.mark.parametrize("end", ["drive", "load"])

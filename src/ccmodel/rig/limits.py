@@ -51,8 +51,9 @@ FROZEN_NOISE_FRACTION = 0.5
 # Samples in which each reading of a converter stands that is slower than the log. Fewer are common and harmless.
 HELD_SAMPLES = 4
 # Fewest changes of such a channel; share of the intervals between them that must be equal to a sample; and median
-# change over the least one, which is about 1 of a converter that is coarse.
-FEWEST_HELD, HELD_EVENLY, HELD_STEPS = 20, 0.9, 2.0
+# change over the least one, which is about 1 of a converter that is coarse; share of the intervals in which the drive
+# moves, which is small of a drive that goes in steps.
+FEWEST_HELD, HELD_EVENLY, HELD_STEPS, HELD_MOVING = 20, 0.9, 2.0, 0.5
 # Time for which a reading is held from which the recording is not what the rig did: late by 10 ms on average, it reads
 # as `time-skew`, whose plausible delays begin at 2 ms and typically are 10 ms.
 HELD_S = 0.02

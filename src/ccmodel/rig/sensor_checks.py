@@ -68,7 +68,7 @@ def check_sensors(table: pd.DataFrame, rig: Rig, largest_travel: float) -> tuple
             # A sensor at the end of its range repeats one value: it is clipped and not frozen.
             defects += _saturated(table, column, drive, rig.ranges.get(column)) or _frozen(table, column, drive)
             analog.append(column)
-    return table.drop(columns=dead), defects + _held(table[["time_s", *analog]])
+    return table.drop(columns=dead), defects + _held(table[["time_s", *analog]], drive.values)
 
 
 def _drop_beyond(table: pd.DataFrame, ranges: Mapping[str, tuple[float, float]]) -> tuple[pd.DataFrame, list[Defect]]:
@@ -301,10 +301,11 @@ def _frozen(table: pd.DataFrame, column: str, drive: Angle) -> list[Defect]:
     return [Defect(int(first), column, text, contradicts)]
 
 
-def _held(table: pd.DataFrame) -> list[Defect]:
+def _held(table: pd.DataFrame, drive: NDArray) -> list[Defect]:
     """Analog readings that are logged several times each, as of a converter that is slower than the log: one line."""
     step_s = float(np.median(np.diff(table["time_s"])))
-    held = {column: samples for column in table.columns.drop("time_s") if (samples := held_for(table[column]))}
+    every = {column: held_for(table[column], drive) for column in table.columns.drop("time_s")}
+    held = {column: samples for column, samples in every.items() if samples}
     if not held:
         return []
     first, longest = next(iter(held)), max(held.values())
@@ -318,15 +319,18 @@ def _held(table: pd.DataFrame) -> list[Defect]:
     return [Defect(None, first, text, contradicts=hold_s > limits.HELD_S)]
 
 
-def held_for(values: ArrayLike) -> int:
+def held_for(values: ArrayLike, drive: NDArray) -> int:
     """Samples for which each reading is held; 0 if readings differ or their repeats are those of a coarse converter.
 
     A coarse converter keeps its value as long as it takes to the next step. One that holds changes in even intervals,
-    by whatever came together since.
+    by whatever came together since. A drive that goes in steps and stands still between them is no converter.
     """
     changes = np.diff(np.asarray(values))
     at = np.flatnonzero(changes)
     if at.size < limits.FEWEST_HELD:
+        return 0
+    moves = drive[at[1:]] != drive[at[:-1] + 1]
+    if np.mean(moves) < limits.HELD_MOVING:
         return 0
     between = np.diff(at)
     samples = int(np.median(between))

@@ -17,7 +17,7 @@ from ccmodel.rig.consistency.runs import copied_channels, foreign_runs, one_sens
 from ccmodel.rig.consistency.scales import doubtful_travel, wrong_geometry, wrong_scales
 from ccmodel.rig.consistency.sessions import overlapping
 from ccmodel.rig.consistency.signs import wrong_signs
-from ccmodel.rig.consistency.transmissions import wrong_transmission
+from ccmodel.rig.consistency.transmissions import doubtful_pair, pair_as_single, single_as_pair
 from ccmodel.rig.findings import Finding, Severity
 
 
@@ -31,7 +31,7 @@ def contradictions(recordings: Sequence[Recording], batch: Batch) -> list[Contra
     if not recordings:
         return []
     parities = [Parity(recording, batch) for recording in recordings]
-    if found := one_sensor_twice(parities) or wrong_transmission(parities):
+    if found := one_sensor_twice(parities) or pair_as_single(parities) or single_as_pair(parities):
         return found
     copies = [*overlapping(parities), *copied_channels(parities)]
     named = {c.recording for c in copies}
@@ -53,7 +53,8 @@ def contradictions(recordings: Sequence[Recording], batch: Batch) -> list[Contra
 
 def doubts(recordings: Sequence[Recording], batch: Batch) -> list[Contradiction]:
     """What is probably wrong with a batch that contradicts itself in nothing."""
-    return doubtful_travel([Parity(recording, batch) for recording in recordings])
+    parities = [Parity(recording, batch) for recording in recordings]
+    return [*doubtful_pair(parities), *doubtful_travel(parities)] if parities else []
 
 
 def check_consistency(recordings: list[Recording], batch: Batch) -> list[Finding]:

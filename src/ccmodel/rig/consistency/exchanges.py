@@ -82,12 +82,16 @@ def exchange_of(parities: Sequence[Parity], is_mirrored: bool = False) -> Exchan
     """
     losses = [(-1.0 if is_mirrored else 1.0) * p.signs["loss"] for p in parities if "loss" in p.signs]
     angles, torques = (_turned(parities, name) for name in ("angles", "torques"))
-    gains = bool(losses) and float(np.median(losses)) < limits.WRONG_LOSS
-    if gains:
+    loss = float(np.median(losses)) if losses else 0.0
+    # A drive that gives nearly all that it exchanges has its own torque: the load's does little work there.
+    gives = [p.signs["work"] for p in parities if "work" in p.signs]
+    is_own = is_mirrored and bool(gives) and float(np.median(gives)) > limits.WORK_OF_DRIVE
+    if loss < limits.WRONG_LOSS and not is_own:
         too_far = travels_as_exchanged(parities)
         if torques and angles is too_far:
             return ENDS if too_far else TORQUES
-        return None if is_mirrored else ENDS_OR_TORQUES
+        # Without a lag of the angles friction is small, and a filter of the drive's current does the same.
+        return None if is_mirrored or angles is None else ENDS_OR_TORQUES
     turns_alone = angles is True and torques is False
     if turns_alone and travels_as_exchanged(parities) and (is_mirrored or _spring_gives(parities)):
         return ENCODERS
@@ -95,9 +99,9 @@ def exchange_of(parities: Sequence[Parity], is_mirrored: bool = False) -> Exchan
 
 
 def _turned(parities: Sequence[Parity], name: str) -> bool | None:
-    """Whether the drive follows the load in a lag of most recordings; None if they disagree."""
+    """Whether the drive follows the load in a lag of most recordings; None if they disagree or show no lag."""
     lags = np.array([p.lags[name] for p in parities if name in p.lags])
-    for turned, of in ((True, lags < 0), (False, lags > 0)):
+    for turned, of in ((True, lags < -limits.LEAST_LAG), (False, lags > limits.LEAST_LAG)):
         if lags.size and of.mean() >= limits.MOST_RECORDINGS:
             return turned
     return None
@@ -125,7 +129,7 @@ def travels_as_exchanged(parities: Sequence[Parity]) -> bool:
     travel = travel_of(parities)
     if not travel:
         return False
-    is_right = limits.LEAST_TRAVEL <= travel <= 1.0
+    is_right = limits.LEAST_TRAVEL <= travel <= limits.MOST_TRAVEL_OF_RADII
     drive, load = (end.side.encoder_counts_per_rev for end in parities[0].batch.rig.ends)
     # Exchanged counts of unlike encoders are converted by each other's counts per turn.
     unlike = (load / drive) ** 2 if drive and load else 1.0

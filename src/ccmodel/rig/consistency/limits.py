@@ -14,6 +14,8 @@ MOSTLY_TAUT = 0.5
 # Measured: 0.64 or more in the recordings of data/raw/rich, below 0.4 in most of them if the drive's sensors come late
 # by 80 ms.
 LEAST_OF_STRETCH = 0.3
+# Delay of one end's sensors that may turn the relation of tension and stretch, s: the largest plausible `time-skew`.
+LATE_S = 0.05
 # Stated mu phi from which the friction can be compared: below it noise decides.
 LEAST_CAPSTAN = 0.05
 # The cable that is pulled carries this many times the tension of the other: its ratio of tensions is then determined.
@@ -31,6 +33,12 @@ WRONG_LOSS = -0.15
 # exchanged and do not only come late. Measured, as a median over a batch: 0.00, and 0.05 or more with exchanged
 # encoders; of single recordings 0.03 at most, and 0.03 or more.
 SPRING_GIVES = 0.02
+# Net work of the drive over the work that it exchanges, above which its torque is no load's. Measured: 0.9 or more, and
+# 0.1 or less with the torque of a spring.
+WORK_OF_DRIVE = 0.5
+# Least area of the loop of one end's sensor over the other's that tells which end comes first. Where friction is small,
+# a filter of one sensor turns the loop: 0.02 at most, and 0.03 or more on all rigs with load cells.
+LEAST_LAG = 0.03
 # Share of the recordings that must show a wrong sign, so that the batch file is named and not the recordings.
 MOST_RECORDINGS = 0.7
 # Shares of a torque's largest readings (95 % quantile): below the first it is at zero, above the second it has left it.
@@ -47,7 +55,8 @@ BOTH_WAYS = 0.5
 # Torque over radius as a share of the sum of tensions from which one cable carries all. That of a pair is zero at rest.
 WHOLE_SUM = 0.7
 # Units to which the times of starts are noted, s, the coarsest first: noted so, two of them may seem too near by one.
-NOTED_TO_S = (60.0, 1.0)
+# The last is what clocks and the ends of logs are uncertain by.
+NOTED_TO_S = (60.0, 1.0, 0.02)
 # Correlation of the noise of two sensors above which it is that of one.
 SAME_NOISE = 0.99
 # Correlation of the two angles below which they are not of one run. Small strokes in much friction reach 0.7.
@@ -68,9 +77,10 @@ FREQUENCY_FACTOR = 3.0
 LEAST_TRAVEL, MOST_TRAVEL = 0.35, 1.6
 # Travel that errors of the stated radii may seem to add: a twentieth, as of calipers on a grooved pulley of 6 mm.
 MOST_TRAVEL_OF_RADII = 1.05
-# Travel below which an angle may be half or twice what it is, if another relation says so too: half of the most that
-# remained (0.93), and an eighth for what is not seen.
-LEAST_OF_TWICE = 0.55
+# Travel below the first or above the second may be that of an angle which is half or twice what it is, if another
+# relation says so too: half of the most that remained (0.93), and an eighth for what is not seen; twice the least that
+# usually remains (0.7).
+LEAST_OF_TWICE, MOST_OF_TWICE = 0.55, 1.4
 # Relative deviation within which a relation is off by just a factor.
 JUST = 0.15
 # Factor of the noted amplitude that points at the encoders. Alone it is no contradiction: a note is no measurement.
@@ -124,5 +134,8 @@ COMPARED_CHANGES, MAYBE_COPIED = 400, 0.25
 # White noise over the stated accuracy, which includes it, that contradicts the accuracy: it was 1.1 at most. And the
 # standard deviation of an even error of one step, as of an encoder, over the step.
 NOISE_BEYOND_ACCURACY, ROUNDING = 10.0, 12**-0.5
+# Fewest samples in a cycle of the motion from which the noise from sample to sample is that of a sensor. With 20 the
+# motion itself is found, with 25 it is not.
+NOISE_CYCLE_SAMPLES = 40
 # White noise over the stated accuracy above which a channel has noise, and not only digits.
 NOISE_OVER_ACCURACY = 0.1

@@ -287,6 +287,9 @@ class Parity:
         )
         if covariance**2 < limits.LEAST_OF_STRETCH * variance * of_tension:
             return None
+        late_m = limits.LATE_S * rig.drive.pulley_radius_m * np.std(speed(x[THETA_IN], x["time_s"]))
+        if covariance < 0 and variance < late_m**2 * length.size:
+            return None  # Sensors of one end that come late turn the relation.
         return float(covariance / variance), float(of_tension / covariance)
 
     @property

@@ -161,8 +161,16 @@ def _least_error(parities: Sequence[Parity], channel: str) -> tuple[float, str]:
     if channel in ANGLE_AT.values():
         steps = [p.recording.encoder_step_rad.get(channel, 0.0) for p in parities]
         return limits.ROUNDING * min(steps), "the rounding to whole steps"
-    noises = [p.ratios.get(f"noise of {channel}", 0.0) for p in parities]
-    return float(np.median(noises)), "the noise from sample to sample"
+    noises = [
+        p.ratios.get(f"noise of {channel}", 0.0) for p in parities if _samples_in_cycle(p) > limits.NOISE_CYCLE_SAMPLES
+    ]
+    return float(np.median(noises or [0.0])), "the noise from sample to sample"
+
+
+def _samples_in_cycle(parity: Parity) -> float:
+    """Of a sine with the speed and size of the drive's motion."""
+    step_s = float(np.median(np.diff(parity.recording.time_s)))
+    return 2 * np.pi / max(parity.frequency_per_s * step_s, 1e-12)
 
 
 def _rounded_up(value: float) -> str:
@@ -183,7 +191,7 @@ def _angle_of_one_end(ratios: Mapping[str, float]) -> list[Contradiction]:
     at_load = beyond(spring, _SAME) == (-1 if large else 1)
     at_drive = beyond(amplitude, _SAME) == (-1 if large else 1)
     end = "load" if at_load and not at_drive else "drive" if at_drive and not at_load else None
-    if limits.LEAST_TRAVEL <= travel <= limits.MOST_TRAVEL and not _twice(spring if end == "load" else amplitude, end):
+    if limits.LEAST_TRAVEL <= travel <= limits.MOST_TRAVEL and not _twice(ratios, end):
         return []
     share = f"at the cable the load moves {travel:.3g} times as far as the drive"
     reason = "it cannot move further" if large else "far more is lost than friction and stretch take"
@@ -194,9 +202,17 @@ def _angle_of_one_end(ratios: Mapping[str, float]) -> list[Contradiction]:
     return [Contradiction(what, text, None, SURE if end else LIKELY)]
 
 
-def _twice(ratio: float | None, end: str | None) -> bool:
-    """Whether the relation that contains the angle of one end alone is off by just two, as of edges of an encoder."""
-    return bool(end and ratio and isclose(max(ratio, 1 / ratio), 2.0, rel_tol=limits.JUST))
+def _twice(ratios: Mapping[str, float], end: str | None) -> bool:
+    """Whether travel and the relation that contains the angle of one end alone are off by two, as of encoder edges.
+
+    A load that is stiff over cables of unknown stiffness loses as much travel.
+    """
+    travel = ratios["travel"]
+    is_likely = travel > limits.MOST_OF_TWICE or "nearest stiffness" in ratios or end == "drive"
+    if limits.LEAST_OF_TWICE < travel < limits.MOST_OF_TWICE or not is_likely:
+        return False
+    ratio = ratios.get({"load": "spring", "drive": "amplitude"}.get(end or "", ""))
+    return bool(ratio and isclose(max(ratio, 1 / ratio), 2.0, rel_tol=limits.JUST))
 
 
 def doubtful_travel(parities: Sequence[Parity]) -> list[Contradiction]:

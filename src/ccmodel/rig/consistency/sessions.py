@@ -17,12 +17,10 @@ def overlapping(parities: Sequence[Parity]) -> list[Contradiction]:
     )
     if not timed:
         return []
-    # Times that all fall on whole minutes, or seconds, are noted no finer.
-    noted_to_s = next((unit for unit in limits.NOTED_TO_S if all(start % unit == 0 for start, _ in timed)), 0.0)
     found = []
     for (start, earlier), (later_start, later) in pairwise(timed):
         early_s = start + float(earlier.time_s[-1]) - later_start
-        if early_s > noted_to_s:
+        if early_s > _noted_to_s(start, later_start):
             found.append(
                 f"{later.id} started at {_clock(later_start)}, {early_s:.3g} s before the end of {earlier.id}, which"
                 f" started at {_clock(start)} and lasts {earlier.time_s[-1]:.3g} s"
@@ -32,6 +30,12 @@ def overlapping(parities: Sequence[Parity]) -> list[Contradiction]:
     more = f" (and {len(found) - 1} more such pairs)" if len(found) > 1 else ""
     text = f"{found[0]}{more}: one rig makes one recording at a time; correct started_at, or take it out of all entries"
     return [Contradiction("started_at", text)]
+
+
+def _noted_to_s(*starts: float) -> float:
+    """Unit to which times are noted, s: one that falls on a whole minute, or second, may be noted no finer."""
+    *units, least = limits.NOTED_TO_S
+    return next((unit for unit in units if any(start % unit == 0 for start in starts)), least)
 
 
 def _clock(at_s: float) -> str:

@@ -123,12 +123,9 @@ def _may_be_offset(parity: Parity, name: str) -> bool:
 
 
 def negative_relations(signs: Mapping[str, float]) -> frozenset[str]:
-    """Relations that are negative. The loss counts if all others are right: every wrong sign makes it negative.
-
-    A drive that takes energy out while all else is right has the load's torque: no wrong sign turns its work alone.
-    """
+    """Relations that are negative. The loss counts if all others are right: every wrong sign makes it negative."""
     negative = {name for name, value in signs.items() if value < limits.WRONG_SIGN and name != "loss"}
-    if negative <= {"work"} and signs.get("loss", 1.0) < limits.WRONG_LOSS:
+    if not negative and signs.get("loss", 1.0) < limits.WRONG_LOSS:
         negative = {"loss"}
     return frozenset(negative)
 
