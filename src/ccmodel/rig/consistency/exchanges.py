@@ -81,7 +81,7 @@ def exchange_of(parities: Sequence[Parity], is_mirrored: bool = False) -> Exchan
     Exchange or None
     """
     losses = [(-1.0 if is_mirrored else 1.0) * p.signs["loss"] for p in parities if "loss" in p.signs]
-    angles, torques = (_turned(parities, name) for name in ("angles", "torques"))
+    angles, torques = _turned(parities, "angles", limits.LEAST_LAG), _turned(parities, "torques", 0.0)
     loss = float(np.median(losses)) if losses else 0.0
     # A drive that gives nearly all that it exchanges has its own torque: the load's does little work there.
     gives = [p.signs["work"] for p in parities if "work" in p.signs]
@@ -98,10 +98,10 @@ def exchange_of(parities: Sequence[Parity], is_mirrored: bool = False) -> Exchan
     return None
 
 
-def _turned(parities: Sequence[Parity], name: str) -> bool | None:
-    """Whether the drive follows the load in a lag of most recordings; None if they disagree or show no lag."""
+def _turned(parities: Sequence[Parity], name: str, least: float) -> bool | None:
+    """Whether the drive follows the load in most recordings, by more than `least`; None if they disagree."""
     lags = np.array([p.lags[name] for p in parities if name in p.lags])
-    for turned, of in ((True, lags < -limits.LEAST_LAG), (False, lags > limits.LEAST_LAG)):
+    for turned, of in ((True, lags < -least), (False, lags > least)):
         if lags.size and of.mean() >= limits.MOST_RECORDINGS:
             return turned
     return None

@@ -36,8 +36,8 @@ SPRING_GIVES = 0.02
 # Net work of the drive over the work that it exchanges, above which its torque is no load's. Measured: 0.9 or more, and
 # 0.1 or less with the torque of a spring.
 WORK_OF_DRIVE = 0.5
-# Least area of the loop of one end's sensor over the other's that tells which end comes first. Where friction is small,
-# a filter of one sensor turns the loop: 0.02 at most, and 0.03 or more on all rigs with load cells.
+# Least area of the loop of the load angle over the drive angle that tells which end comes first. Measured: 0.03 or more
+# on the rigs of data/raw, and 0.02 at most where friction is so small that a filter of the drive's current turns energies.
 LEAST_LAG = 0.03
 # Share of the recordings that must show a wrong sign, so that the batch file is named and not the recordings.
 MOST_RECORDINGS = 0.7
