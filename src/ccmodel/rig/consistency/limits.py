@@ -37,7 +37,7 @@ SPRING_GIVES = 0.02
 # 0.1 or less with the torque of a spring.
 WORK_OF_DRIVE = 0.5
 # Least area of the loop of the load angle over the drive angle that tells which end comes first. Measured: 0.03 or more
-# on the rigs of data/raw, and 0.02 at most where friction is so small that a filter of the drive's current turns energies.
+# on the rigs of data/raw, 0.02 at most where friction is so small that a filter of the drive's current turns energies.
 LEAST_LAG = 0.03
 # Share of the recordings that must show a wrong sign, so that the batch file is named and not the recordings.
 MOST_RECORDINGS = 0.7
