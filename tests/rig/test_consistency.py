@@ -211,21 +211,14 @@ def test_energy_from_nowhere_means_exchanged_ends_if_all_signs_are_right():
     assert explanation(negative_relations(signs), signs) == (EXCHANGED,)
 
 
-def exchanged_alone(copy, sensors):
-    """Columns of these sensors under the names of the other end."""
-    names = {f"{a}_{s}": f"{b}_{s}" for s in sensors for a, b in (("drive", "load"), ("load", "drive"))}
-    copy.logs = {name: log.rename(columns=names) for name, log in copy.logs.items()}
-    return copy
-
-
 @pytest.mark.parametrize(
     ("sensors", "late_s"),
     [
-        (["current_A"], 0.0),
-        (["encoder_counts"], 0.0),
-        (["current_A", "encoder_counts"], 0.0),
-        (["current_A"], 0.05),
-        (["current_A", "encoder_counts"], 0.05),
+        (["torques"], 0.0),
+        (["encoders"], 0.0),
+        (["torques", "encoders"], 0.0),
+        (["torques"], 0.05),
+        (["torques", "encoders"], 0.05),
     ],
 )
 def test_what_is_exchanged_is_said_also_of_a_rig_whose_drive_comes_late(tmp_path, sensors, late_s):
@@ -234,9 +227,9 @@ def test_what_is_exchanged_is_said_also_of_a_rig_whose_drive_comes_late(tmp_path
         for column in ("drive_encoder_counts", "drive_current_A", "drive_load_cell_V"):
             log[column] = np.interp(log["time_s"] - late_s, log["time_s"], log[column])
         log["drive_encoder_counts"] = log["drive_encoder_counts"].round()
-    (said,) = said_of(write_copy(exchanged_alone(copy, sensors), tmp_path / "exchanged"))
-    what = {"current_A": "tau_in_Nm and tau_out_Nm", "encoder_counts": "theta_in_rad and theta_out_rad"}
-    truth = what[sensors[0]] if len(sensors) == 1 else "drive and load"
+    what = [MISTAKES[f"{of} of drive and load exchanged"](copy, None) for of in sensors]
+    (said,) = said_of(write_copy(copy, tmp_path / "exchanged"))
+    truth = what[0] if len(sensors) == 1 else "drive and load"
     assert truth in said.partition(": ")[0]
     assert late_s or said.startswith(f"batch.yaml {truth}: ")
 
@@ -263,15 +256,18 @@ def test_torques_are_exchanged_if_nothing_else_turns_the_energies(lag_of_angles,
     assert exchange_of([parity] * 3, is_mirrored) is found
 
 
-@pytest.mark.parametrize("sensor", ["current_A", "encoder_counts"])
-def test_what_is_exchanged_is_said_also_where_the_signs_of_the_ends_are_unlike(tmp_path, sensor):
+@pytest.mark.parametrize(
+    ("sensors", "column", "sign"),
+    [("torques", "load_current_A", "torque_sign"), ("encoders", "load_encoder_counts", "encoder_sign")],
+)
+def test_what_is_exchanged_is_said_also_where_the_signs_of_the_ends_are_unlike(tmp_path, sensors, column, sign):
     copy = read_copy(SIMULATED)
-    copy.rig["load"][{"current_A": "torque_sign", "encoder_counts": "encoder_sign"}[sensor]] = -1
+    copy.rig["load"][sign] = -1
     for log in copy.logs.values():
-        log[f"load_{sensor}"] *= -1
+        log[column] *= -1
     assert said_of(write_copy(copy, tmp_path / "right")) == []
-    (said,) = said_of(write_copy(exchanged_alone(copy, [sensor]), tmp_path / "exchanged"))
-    what = {"current_A": "tau_in_Nm and tau_out_Nm", "encoder_counts": "theta_in_rad and theta_out_rad"}[sensor]
+    what = MISTAKES[f"{sensors} of drive and load exchanged"](copy, None)
+    (said,) = said_of(write_copy(copy, tmp_path / "exchanged"))
     assert said.startswith(f"batch.yaml {what}: ")
 
 

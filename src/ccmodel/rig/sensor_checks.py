@@ -303,13 +303,12 @@ def _frozen(table: pd.DataFrame, column: str, drive: Angle) -> list[Defect]:
 
 def _held(table: pd.DataFrame, drive: NDArray) -> list[Defect]:
     """Analog readings that are logged several times each, as of a converter that is slower than the log: one line."""
-    step_s = float(np.median(np.diff(table["time_s"])))
     every = {column: held_for(table[column], drive) for column in table.columns.drop("time_s")}
     held = {column: samples for column, samples in every.items() if samples}
     if not held:
         return []
     first, longest = next(iter(held)), max(held.values())
-    hold_s = longest * step_s
+    hold_s = longest * float(np.median(np.diff(table["time_s"])))
     others = f", as in {', '.join(c for c in held if c != first)}" if len(held) > 1 else ""
     text = (
         f"each reading stands in {longest} samples{others}: a converter that is slower than the log, whose readings"

@@ -21,16 +21,13 @@ from ccmodel.rig.consistency.transmissions import doubtful_pair, pair_as_single,
 from ccmodel.rig.findings import Finding, Severity
 
 
-def contradictions(recordings: Sequence[Recording], batch: Batch) -> list[Contradiction]:
+def contradictions(parities: Sequence[Parity]) -> list[Contradiction]:
     """What recordings of a batch and its batch file contradict each other in.
 
     The checks go from what makes all others meaningless to what concerns one value: kind of transmission, times of
     starts, copies, geometry, signs, clocks, stated values, recordings among each other. A mistake of the whole batch
     ends them.
     """
-    if not recordings:
-        return []
-    parities = [Parity(recording, batch) for recording in recordings]
     if found := one_sensor_twice(parities) or pair_as_single(parities) or single_as_pair(parities):
         return found
     copies = [*overlapping(parities), *copied_channels(parities)]
@@ -51,17 +48,21 @@ def contradictions(recordings: Sequence[Recording], batch: Batch) -> list[Contra
     return [*copies, *(found or foreign_runs(intact))]
 
 
-def doubts(recordings: Sequence[Recording], batch: Batch) -> list[Contradiction]:
+def doubts(parities: Sequence[Parity]) -> list[Contradiction]:
     """What is probably wrong with a batch that contradicts itself in nothing."""
-    parities = [Parity(recording, batch) for recording in recordings]
-    return [*doubtful_pair(parities), *doubtful_travel(parities)] if parities else []
+    return [*doubtful_pair(parities), *doubtful_travel(parities)]
 
 
 def check_consistency(recordings: list[Recording], batch: Batch) -> list[Finding]:
     """The contradictions of a batch as findings of severity "inconsistent", otherwise its doubts as warnings."""
+    if not recordings:
+        return []
     files = {entry.id: entry.file for entry in batch.recordings}
-    found: list[tuple[Severity, Contradiction]] = [("inconsistent", c) for c in contradictions(recordings, batch)]
+    parities = [Parity(recording, batch) for recording in recordings]
+    severity: Severity = "inconsistent"
+    if not (found := contradictions(parities)):
+        severity, found = "warning", doubts(parities)
     return [
         Finding(batch.batch, files.get(c.recording or "", "batch.yaml"), None, c.what, severity, c.text, c.confidence)
-        for severity, c in found or [("warning", c) for c in doubts(recordings, batch)]
+        for c in found
     ]

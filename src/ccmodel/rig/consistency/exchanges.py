@@ -80,13 +80,11 @@ def exchange_of(parities: Sequence[Parity], is_mirrored: bool = False) -> Exchan
     -------
     Exchange or None
     """
-    losses = [(-1.0 if is_mirrored else 1.0) * p.signs["loss"] for p in parities if "loss" in p.signs]
     angles, torques = _turned(parities, "angles", limits.LEAST_LAG), _turned(parities, "torques", 0.0)
-    loss = float(np.median(losses)) if losses else 0.0
     # A drive that gives nearly all that it exchanges has its own torque: the load's does little work there.
     gives = [p.signs["work"] for p in parities if "work" in p.signs]
     is_own = is_mirrored and bool(gives) and float(np.median(gives)) > limits.WORK_OF_DRIVE
-    if loss < limits.WRONG_LOSS and not is_own:
+    if median_loss(parities, is_mirrored) < limits.WRONG_LOSS and not is_own:
         too_far = travels_as_exchanged(parities)
         if torques and angles is too_far:
             return ENDS if too_far else TORQUES
@@ -96,6 +94,12 @@ def exchange_of(parities: Sequence[Parity], is_mirrored: bool = False) -> Exchan
     if turns_alone and travels_as_exchanged(parities) and (is_mirrored or _spring_gives(parities)):
         return ENCODERS
     return None
+
+
+def median_loss(parities: Sequence[Parity], is_mirrored: bool = False) -> float:
+    """Energy lost between the ends, as in `Parity.signs` or turned; 0 if no recording shows it."""
+    losses = [p.signs["loss"] for p in parities if "loss" in p.signs]
+    return (-1) ** is_mirrored * float(np.median(losses or [0.0]))
 
 
 def _turned(parities: Sequence[Parity], name: str, least: float) -> bool | None:

@@ -58,6 +58,11 @@ class Parity:
         kept = slice(int(np.searchsorted(r.time_s, max(r.settled_s, r.rest_s))), None)
         return {name: values[kept] for name, values in r.channels.items()} | {"time_s": r.time_s[kept]}
 
+    @cached_property
+    def cycles(self) -> slice | None:
+        """Samples of `moving` over which a zero does no work (`closed_part`); None without a whole cycle."""
+        return closed_part(self.moving[THETA_IN])
+
     def without_cell_error(self, end: str, offset_N: float, drift_N_per_s: float) -> "Parity":
         """The same with an offset and a drift of the load cell at the "drive" or "load" end taken out."""
         r = self.recording
@@ -85,8 +90,7 @@ class Parity:
             found["angles"] = correlation(x[THETA_IN], x[THETA_OUT])
         if TAU_IN in x and TAU_OUT in x:
             found["torques"] = correlation(x[TAU_IN], x[TAU_OUT])
-        cycles = closed_part(x[THETA_IN])
-        drive, load = work(x, (TAU_IN, THETA_IN), cycles), self.work_at_load
+        drive, load = work(x, (TAU_IN, THETA_IN), self.cycles), self.work_at_load
         if drive:
             found["work"] = drive[0] / drive[1]
         if load and self.recording.far_end != "measured-motion":
@@ -101,7 +105,7 @@ class Parity:
     @cached_property
     def work_at_load(self) -> tuple[float, float] | None:
         """Energy that the load takes over whole cycles and energy that it exchanges, J; None without both sensors."""
-        return work(self.moving, (TAU_OUT, THETA_OUT), closed_part(self.moving[THETA_IN]))
+        return work(self.moving, (TAU_OUT, THETA_OUT), self.cycles)
 
     @cached_property
     def lags(self) -> dict[str, float]:
@@ -112,9 +116,8 @@ class Parity:
 
         Channels of one end that come late change both. The energy at each end (`signs`) is then as it was.
         """
-        cycles = closed_part(self.moving[THETA_IN])
         loops = {"angles": (THETA_OUT, THETA_IN), "torques": (TAU_OUT, TAU_IN)}
-        areas = {name: work(self.moving, channels, cycles) for name, channels in loops.items()}
+        areas = {name: work(self.moving, channels, self.cycles) for name, channels in loops.items()}
         return {name: -area[0] / area[1] for name, area in areas.items() if area}
 
     @cached_property
@@ -347,7 +350,11 @@ def work(x: Mapping[str, NDArray], ends: tuple[str, str], part: slice | None) ->
     """Net and exchanged work of a torque over an angle, J; None without both, or if nothing is exchanged."""
     if part is None or not all(name in x for name in ends):
         return None
-    torque, angle = (x[name][part] for name in ends)
+    return work_over(*(x[name][part] for name in ends))
+
+
+def work_over(torque: NDArray, angle: NDArray) -> tuple[float, float] | None:
+    """Net and exchanged work of a torque over an angle on whole cycles, J; None if nothing is exchanged."""
     # Over a closed part the mean torque does no work, but it would count as work exchanged.
     torque = torque - torque.mean()
     steps = (torque[1:] + torque[:-1]) / 2 * np.diff(angle)

@@ -5,19 +5,19 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.channels import ANGLE_AT, TAU_IN, THETA_IN, TORQUE_AT
+from ccmodel.channels import TAU_IN
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import Contradiction
-from ccmodel.rig.consistency.parity import Parity, closed_part, correlation, work
+from ccmodel.rig.consistency.parity import Parity, correlation, work_over
 from ccmodel.rig.log import runs
 
 
 def rectified_torques(parities: Sequence[Parity]) -> list[Contradiction]:
     """Torques that have no sign, of the batch or of single recordings."""
     found = []
-    for end, channel in TORQUE_AT.items():
+    for end, _, angle, channel, *_ in parities[0].batch.rig.ends:
         of_one_sign = [p for p in parities if _is_of_one_sign(p, channel)]
-        rectified = [p for p in of_one_sign if is_rectified(p, ANGLE_AT[end], channel)]
+        rectified = [p for p in of_one_sign if is_rectified(p, angle, channel)]
         if not rectified:
             continue
         # A wrong zero hides it where friction is small, but lets no torque keep one sign.
@@ -37,14 +37,14 @@ def rectified_torques(parities: Sequence[Parity]) -> list[Contradiction]:
 def is_rectified(parity: Parity, angle: str, torque: str) -> bool:
     """Whether a torque of one sign goes with the motion only if it changes its sign wherever it comes to zero."""
     x = parity.moving
-    if angle not in x or not _is_of_one_sign(parity, torque):
+    if angle not in x:
         return False
     read = x[torque]
     is_turned = np.searchsorted(zeros(read), np.arange(read.size), "right") % 2 == 1
     signed = np.where(is_turned, -read, read)
     # Friction makes the drive torque go with the speed, a spring the load torque with the angle.
     relation = _work if torque == TAU_IN else correlation
-    cycles = closed_part(x[THETA_IN]) or slice(None)
+    cycles = parity.cycles or slice(None)
     without, with_sign = (abs(relation(values[cycles], x[angle][cycles])) for values in (read, signed))
     return bool(with_sign > without + limits.BETTER_WITH_SIGN)
 
@@ -66,5 +66,5 @@ def _is_of_one_sign(parity: Parity, torque: str) -> bool:
 
 def _work(torque: NDArray, angle: NDArray) -> float:
     """Net work over the work exchanged."""
-    found = work({"torque": torque, "angle": angle}, ("torque", "angle"), slice(None))
+    found = work_over(torque, angle)
     return found[0] / found[1] if found else 0.0

@@ -169,8 +169,7 @@ def _least_error(parities: Sequence[Parity], channel: str) -> tuple[float, str]:
 
 def _samples_in_cycle(parity: Parity) -> float:
     """Of a sine with the speed and size of the drive's motion."""
-    step_s = float(np.median(np.diff(parity.recording.time_s)))
-    return 2 * np.pi / max(parity.frequency_per_s * step_s, 1e-12)
+    return 2 * np.pi * parity.recording.rate_Hz / max(parity.frequency_per_s, 1e-12)
 
 
 def _rounded_up(value: float) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from ccmodel.channels import F_DRIVE, F_LOAD, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import Contradiction
-from ccmodel.rig.consistency.exchanges import ENCODERS, ENDS, Exchange, exchange_of, travel_of
+from ccmodel.rig.consistency.exchanges import ENCODERS, ENDS, Exchange, exchange_of, median_loss, travel_of
 from ccmodel.rig.consistency.parity import SUMS, Parity
 
 
@@ -106,9 +106,8 @@ def _exchange_contradiction(
     exchange: Exchange, parities: Sequence[Parity], recording: str | None, where: str, is_mirrored: bool = False
 ) -> Contradiction:
     """An exchange with the energies and lags that show it."""
-    loss = (-1) ** is_mirrored * float(np.median([p.signs["loss"] for p in parities]))
     of_scale = f"at the cable the load moves {travel_of(parities):.3g} times as far as the drive"
-    evidence = [of_scale if exchange == ENCODERS else EVIDENCE["loss"].format(loss)]
+    evidence = [of_scale if exchange == ENCODERS else EVIDENCE["loss"].format(median_loss(parities, is_mirrored))]
     for name, text in TURNED.items():
         lag = float(np.median([p.lags.get(name, 0.0) for p in parities]))
         evidence += [text.format(lag)] if lag < 0 else []

@@ -10,7 +10,7 @@ from math import isclose
 import numpy as np
 from numpy.typing import NDArray
 
-from ccmodel.channels import SUM_AT, TORQUE_AT
+from ccmodel.rig.batch import End
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import DOUBTFUL, Contradiction
 from ccmodel.rig.consistency.parity import Parity
@@ -18,32 +18,23 @@ from ccmodel.rig.consistency.parity import Parity
 _KEY = "rig.transmission"
 
 
-def is_single(parities: Sequence[Parity]) -> bool:
-    """Whether the batch states a single cable."""
-    return parities[0].recording.far_end is not None
-
-
 def pair_as_single(parities: Sequence[Parity]) -> list[Contradiction]:
     """A single cable whose torques turn both pulleys both ways, which one cable cannot.
 
     That of the drive alone is no evidence: a motor's current holds the friction of its train, which turns with it.
     """
-    if not is_single(parities):
+    rig = parities[0].batch.rig
+    if not rig.far_end:
         return []
     turns = {}
-    for end, channel in TORQUE_AT.items():
-        least = [p.taut_N * _radius(p, end) for p in parities if channel in p.moving]
-        ranges = [np.quantile(p.moving[channel], [0.05, 0.95]) for p in parities if channel in p.moving]
-        turning = [
-            (low, high)
-            for (low, high), taut in zip(ranges, least, strict=True)
-            if min(-low, high) > max(limits.BOTH_WAYS * max(-low, high), taut)
-        ]
-        if ranges and len(turning) < limits.MOST_RECORDINGS * len(ranges):
+    for end in rig.ends:
+        having = [p for p in parities if end.torque in p.moving]
+        ranges = [r for p in having if (r := _both_ways(p, end)) is not None]
+        if having and len(ranges) < limits.MOST_RECORDINGS * len(having):
             return []
-        if turning:
-            low, high = np.median(turning, axis=0)
-            turns[end] = f"that of the {end} from {low:.3g} to {high:.3g} N m"
+        if ranges:
+            low, high = np.median(ranges, axis=0)
+            turns[end.name] = f"that of the {end.name} from {low:.3g} to {high:.3g} N m"
     if "load" not in turns:
         return []
     text = (
@@ -54,11 +45,19 @@ def pair_as_single(parities: Sequence[Parity]) -> list[Contradiction]:
     return [Contradiction(_KEY, text)]
 
 
+def _both_ways(parity: Parity, end: End) -> NDArray | None:
+    """The 5 and 95 % quantiles of a torque, N m, if it turns the pulley both ways, against a taut cable; else None."""
+    low, high = found = np.quantile(parity.moving[end.torque], [0.05, 0.95])
+    least = max(limits.BOTH_WAYS * max(-low, high), parity.taut_N * end.side.pulley_radius_m)
+    return found if min(-low, high) > least else None
+
+
 def single_as_pair(parities: Sequence[Parity]) -> list[Contradiction]:
     """A pair whose torques are the whole sum of tensions, which at rest is one pretension: there is no cable B."""
     halves = [p.ratios["pretension"] for p in parities if "pretension" in p.ratios]
-    text = _carried_by_one(parities)
-    if text is None or not halves or not isclose(float(np.median(halves)), 0.5, rel_tol=limits.JUST):
+    if not halves or not isclose(float(np.median(halves)), 0.5, rel_tol=limits.JUST):
+        return []
+    if (text := _carried_by_one(parities)) is None:
         return []
     text += "; state single-cable and rig.far_end, or check the zero of the torques"
     return [Contradiction(_KEY, f"{text} (at rest, the sum is one pretension)")]
@@ -78,9 +77,10 @@ def doubtful_pair(parities: Sequence[Parity]) -> list[Contradiction]:
 
 def _carried_by_one(parities: Sequence[Parity]) -> str | None:
     """What shows that one cable of a pair carries all of the tension; None if nothing does."""
-    if is_single(parities):
+    rig = parities[0].batch.rig
+    if rig.far_end:
         return None
-    shares = {end: [s for p in parities if (s := _share(p, end)) is not None] for end in SUM_AT}
+    shares = {end.name: [s for p in parities if (s := _share(p, end)) is not None] for end in rig.ends}
     if not any(shares.values()) or any(np.min(of, initial=np.inf) < limits.WHOLE_SUM for of in shares.values()):
         return None
     of_ends = (f"{np.median(of):.3g} of the sum of tensions at the {end}" for end, of in shares.items() if of)
@@ -90,18 +90,13 @@ def _carried_by_one(parities: Sequence[Parity]) -> str | None:
     )
 
 
-def _share(parity: Parity, end: str) -> float | None:
+def _share(parity: Parity, end: End) -> float | None:
     """Torque over radius and sum of tensions that is exceeded in 95 % of the samples; None without both sensors."""
-    torque, force = TORQUE_AT[end], SUM_AT[end]
     r = parity.recording
-    if torque not in r or force not in r:
+    if end.torque not in r or end.force not in r:
         return None
-    taut = np.abs(r[force]) > parity.taut_N
+    taut = np.abs(r[end.force]) > parity.taut_N
     if taut.sum() < limits.FEWEST_SAMPLES:
         return None
-    pulling: NDArray = np.abs(r[torque][taut]) / _radius(parity, end) / np.abs(r[force][taut])
+    pulling: NDArray = np.abs(r[end.torque][taut]) / end.side.pulley_radius_m / np.abs(r[end.force][taut])
     return float(np.quantile(pulling, 0.05))
-
-
-def _radius(parity: Parity, end: str) -> float:
-    return {e.name: e.side.pulley_radius_m for e in parity.batch.rig.ends}[end]
