@@ -6,7 +6,16 @@ import pytest
 from made_pages import BACKLASH, SCALE, diagnosis
 
 from ccmodel import mechanisms
-from ccmodel.report.verdict import claim, headline, nearest_sentence, quantity, rounded, sentence, with_symbols
+from ccmodel.report.verdict import (
+    claim,
+    headline,
+    nearest_sentence,
+    possible_places,
+    quantity,
+    rounded,
+    sentence,
+    with_symbols,
+)
 
 
 def gain(value, low, high, place="load-sensor"):
@@ -85,6 +94,13 @@ def test_a_rounded_value_has_two_digits(given, shown):
 def test_channels_of_a_text_have_their_symbols():
     said = "tau_in and theta_out are off most; sum_of_tau_inner stays"
     assert with_symbols(said) == "τ_in and θ_out are off most; sum_of_tau_inner stays"
+
+
+def test_the_places_of_an_undecided_verdict_are_those_of_its_whole_model():
+    """Also where some of its mechanisms are certain."""
+    likeliest = [BACKLASH, {"name": "kink", "place": "conduit"}]
+    found = diagnosis("b", "undecided", mechanisms=[BACKLASH], likeliest=likeliest)
+    assert possible_places(found) == ["load-pulley", "conduit"]
 
 
 def test_each_verdict_has_its_sentence():

@@ -68,7 +68,7 @@ def _contradiction(not_judged: Sequence[Mapping]) -> str:
 
 def possible_places(diagnosis: Mapping) -> list[str]:
     """Places of a mismatch: those of the mechanisms that are named or most likely, otherwise all that are possible."""
-    acting = [m["place"] for m in diagnosis["mechanisms"] or diagnosis["likeliest"]]
+    acting = [m["place"] for m in [*diagnosis["mechanisms"], *diagnosis["likeliest"]]]
     location = diagnosis["location"]
     return list(dict.fromkeys(p for p in acting or location.get("places") or [location["place"]] if p))
 
