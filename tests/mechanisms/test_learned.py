@@ -15,6 +15,7 @@ from ccmodel.mechanisms.learned import COARSE, FINE
 from ccmodel.mechanisms.presliding import Contacts
 from ccmodel.mechanisms.tables import Table, pulled, stretched
 from ccmodel.mechanisms.winding import pulley_of, winding, winding_change
+from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, FixedLoad, SpringLoad, TorqueLoad
 from tests.general_runs import HALF_LOOP, K_E, MU, K, L, R, loop_area, run, sine
 
@@ -219,6 +220,20 @@ def test_friction_by_tension_is_that_of_a_power_law_with_these_values():
     found = run(sine(), with_values(law, lambda x: (x / 5) ** -0.25 / power.mean() - 1), mu=MU * power.mean())
     wanted = run(sine(), ("load-dependent-friction", "conduit", {"n": -0.25}))
     assert largest_difference(found, wanted) < 0.1 * largest_difference(run(sine()), wanted)
+
+
+def test_friction_by_tension_holds_the_tension_at_rest_too():
+    """Tensions that friction holds stay as they are at the load until the drive's motion arrives there."""
+    law = laws()["learned-sliding-friction-by-tension-fine"]
+    x = np.geomspace(*RANGES["tension"], FINE[0])
+    power = (x / 5) ** -0.6
+    tensioned = InitialTension.between_ends(HALF_LOOP, 0.6 * MU, (8.0, 6.0), (6.5, 7.0))
+    begins = 0.02 * sine()[:60]
+    table = with_values(law, lambda x: (x / 5) ** -0.6 / power.mean() - 1)
+    found = run(begins, table, mu=MU * power.mean(), T=tensioned)
+    wanted = run(begins, ("load-dependent-friction", "conduit", {"n": -0.6}), T=tensioned)
+    assert np.abs(found.tau_in_Nm - wanted.tau_in_Nm).max() < 0.01 * np.ptp(wanted.tau_in_Nm)
+    assert found.read["F_load_N"] == pytest.approx(6.0 + 7.0, abs=1e-6)
 
 
 def test_a_table_acts_beside_a_power_of_the_tension():

@@ -15,7 +15,7 @@ from ccmodel.rig.consistency.exchanges import TORQUES, exchange_of
 from ccmodel.rig.consistency.fitted import contradicted_by_fit
 from ccmodel.rig.consistency.parity import Parity, closed_part, crossings, speed, white_noise
 from ccmodel.rig.consistency.rectified import is_rectified
-from ccmodel.rig.consistency.runs import deviations_of
+from ccmodel.rig.consistency.runs import deviations_of, forgotten_bend
 from ccmodel.rig.consistency.scales import pooled
 from ccmodel.rig.consistency.signs import EXCHANGED, FAULTS, explanation, negative_relations, wrong_signs
 from ccmodel.rig.ingest import ingest_batch
@@ -554,6 +554,21 @@ def test_a_conduit_with_more_bend_may_take_up_more_travel():
     others = [run(3.1, 0.9), run(6.3, 0.85)]
     assert deviations_of(run(9.4, 0.45), others) == {"travel": 0.0}
     assert deviations_of(run(3.1, 0.45), others)["travel"] == pytest.approx(np.log(0.45 / 0.85))
+
+
+@pytest.mark.parametrize(("of_the_sums", "forgotten"), [(1.9, True), (0.7, False)])
+def test_friction_is_another_only_where_both_estimates_are(of_the_sums, forgotten):
+    """The slope over the load's tensions errs where few samples slip; the nearer to what is stated may be either."""
+
+    def run(sums, slope):
+        recording = SimpleNamespace(path=SimpleNamespace(bend_rad=3.1), pretension_N=5.0, id="half")
+        nearer = min(sums, slope, key=lambda ratio: abs(ratio - 1))
+        ratios = {"friction of the sums": sums, "friction of the slope": slope, "friction": nearer}
+        return SimpleNamespace(recording=recording, ratios=ratios)
+
+    others = [run(0.8, 0.75), run(0.6, 0.72)]
+    found = forgotten_bend(run(of_the_sums, 1.4), others)
+    assert (found is not None) == forgotten
 
 
 @pytest.mark.parametrize("end", ["drive", "load"])

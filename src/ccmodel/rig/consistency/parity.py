@@ -128,8 +128,9 @@ class Parity:
         - ``amplitude``, ``frequency``: those of a periodic motion over the noted ones
         - ``noise of <channel>``: standard deviation of a sensor's white noise, in the channel's unit
         - ``spring``: load torque over load angle, over the stated spring
-        - ``friction``: ln of the ratio of tensions in full slip, over mu phi; of two estimates, on one of which no
-          offset of a load cell acts, the nearer to the stated value
+        - ``friction of the sums``: ln of the ratio of tensions in full slip, over mu phi
+        - ``friction of the slope``: the same without what an offset of a load cell does
+        - ``friction``: the one of the two that is nearer to the stated value
         - ``stiffness``: mean tension over stretch of the taut cables, over the stated stiffness; friction makes it
           uncertain, and ``nearest stiffness`` is the value within its bounds that is nearest to the stated one
         - ``pretension at the drive``, ``pretension at the load``: sum of tensions at rest over twice the pretension
@@ -167,8 +168,11 @@ class Parity:
                 sums = np.maximum(np.abs(x[force]), limits.TAUT_N)
                 found[f"torque at the {name}"] = np.quantile(np.abs(x[torque]) / radius / sums, 0.95)
         if (log_ratio := self.log_ratio) is not None and self.capstan > limits.LEAST_CAPSTAN:
-            both = [log_ratio, log_ratio if self.offset_free_ratio is None else self.offset_free_ratio]
-            found["friction"] = min(both, key=lambda one: abs(one - self.capstan)) / self.capstan
+            estimates = {"friction of the sums": log_ratio}
+            if self.offset_free_ratio is not None:
+                estimates["friction of the slope"] = self.offset_free_ratio
+            estimates = {name: ratio / self.capstan for name, ratio in estimates.items()}
+            found |= estimates | {"friction": min(estimates.values(), key=lambda ratio: abs(ratio - 1))}
         if (slopes := self.stiffnesses) is not None:
             low, high = sorted(slope / self.stated_stiffness for slope in slopes)
             found["stiffness"] = np.sign(low) * np.sqrt(low * high)

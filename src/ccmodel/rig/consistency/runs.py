@@ -37,7 +37,7 @@ def foreign_runs(parities: Sequence[Parity]) -> list[Contradiction]:
         contradiction = (
             _two_runs(parity)
             or _straight(parity)
-            or _whatever_cells_err(_bend, parity, others)
+            or _whatever_cells_err(forgotten_bend, parity, others)
             or _whatever_cells_err(_other_rig, parity, others)
         )
         if contradiction:
@@ -177,7 +177,7 @@ def _whatever_cells_err(check: Check, parity: Parity, others: Sequence[Parity]) 
     return found
 
 
-def _bend(parity: Parity, others: Sequence[Parity]) -> Contradiction | None:
+def forgotten_bend(parity: Parity, others: Sequence[Parity]) -> Contradiction | None:
     """A recording with more friction for its bend than all others."""
     tension = parity.recording.pretension_N
     excess = _excess("friction", parity, [p for p in others if p.recording.pretension_N <= 1.1 * tension])
@@ -245,6 +245,8 @@ def _bend_rad(parity: Parity) -> float:
     return parity.recording.path.bend_rad
 
 
+# Relations of which a recording gives more than one estimate.
+_ESTIMATES = {"friction": ("friction of the sums", "friction of the slope")}
 # Conditions that a relation rises (1) or falls (-1) with.
 _DEPENDENCE = {
     "spring": ((_stroke, 1), (_frequency, -1)),
@@ -264,8 +266,14 @@ def _at_least(other: float, here: float, sign: int) -> bool:
 
 
 def _excess(name: str, parity: Parity, others: Sequence[Parity], sign: int = 1) -> float:
-    """By how much the logarithm of a relation exceeds (sign 1) or falls below (-1) all others; 0 without others."""
-    values = [sign * np.log(p.ratios[name]) for p in others if p.ratios.get(name, 0.0) > 0]
-    if not values or parity.ratios.get(name, 0.0) <= 0:
-        return 0.0
-    return max(0.0, float(sign * np.log(parity.ratios[name]) - max(values)))
+    """By how much the logarithm of a relation exceeds (sign 1) or falls below (-1) all others; 0 without others.
+
+    Of a relation with two estimates that of the smaller excess: one of them may err in one recording, and the ratio
+    itself may be of one estimate here and of the other there.
+    """
+    excesses = []
+    for estimate in _ESTIMATES.get(name, (name,)):
+        values = [sign * np.log(p.ratios[estimate]) for p in others if p.ratios.get(estimate, 0.0) > 0]
+        if values and parity.ratios.get(estimate, 0.0) > 0:
+            excesses.append(float(sign * np.log(parity.ratios[estimate]) - max(values)))
+    return max(0.0, min(excesses, default=0.0))
