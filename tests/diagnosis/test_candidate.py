@@ -25,6 +25,7 @@ from ccmodel.diagnosis.result import least_strength, mechanism_of
 from ccmodel.diagnosis.run import Options, calibrate
 from ccmodel.diagnosis.screening import screen
 from ccmodel.diagnosis.whitening import relinearised, with_states_of
+from ccmodel.inference.effective_samples import of_recording
 from ccmodel.inference.least_squares import CONVERGED, STOPPED
 from ccmodel.mechanisms.relaxation import relaxed_after
 from ccmodel.model.general import Active
@@ -249,6 +250,20 @@ def test_what_no_recording_determines_lies_anywhere_within_its_bounds(jackknife)
     uniform = 12.0**2 / 12
     assert covariance[0, 0] == pytest.approx(max(jackknife, uniform))
     assert degrees[0] == (np.inf if jackknife < uniform else 3.0)
+
+
+def test_what_only_its_prior_determines_is_as_certain_as_the_prior():
+    recordings = batch()
+    blocks = [SimpleNamespace(derivatives=np.zeros((w.measured.size + len(w.scalar_nuisances), 1))) for w in recordings]
+    problem = SimpleNamespace(
+        bounds=(np.zeros(1), np.full(1, 1e6)),
+        observations=recordings,
+        prior_precision=np.full(1, 1 / 3.0) / np.sqrt(np.mean([of_recording(w.observations) for w in recordings])),
+        sizes=np.ones(1),
+    )
+    of_fits = np.zeros((1, 1)), np.array([3.0])
+    covariance, _ = at_least_by_information(problem, SimpleNamespace(blocks=blocks), *of_fits)
+    assert covariance[0, 0] == pytest.approx(3.0**2)
 
 
 def test_the_total_share_of_cables_that_have_settled_is_uncertain():

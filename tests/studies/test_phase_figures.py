@@ -43,6 +43,16 @@ def test_profiles_are_drawn_curved_as_friction_curves_them():
     plt.close(figure)
 
 
+def test_profiles_are_those_of_the_instants_of_each_stroke():
+    figure = DRAW["profiles"](STUDY)
+    columns = [figure.axes[k].get_legend().get_texts() for k in (2, 3)]
+    assert [[text.get_text() for text in texts if text.get_text().isdigit()] for texts in columns] == [
+        ["1", "2", "3", "4", "5"],
+        ["5", "6", "7", "8", "1"],
+    ]
+    plt.close(figure)
+
+
 def test_a_motion_without_all_phases_is_drawn_too():
     small = study_of(EXAMPLE.model_copy(update={"amplitude_rad": 0.05, "samples_per_cycle": 80}))
     for draw in DRAW.values():
