@@ -103,6 +103,28 @@ def test_the_places_of_an_undecided_verdict_are_those_of_its_whole_model():
     assert possible_places(found) == ["load-pulley", "conduit"]
 
 
+@pytest.mark.parametrize(
+    ("further", "others", "said"),
+    [
+        ((), (), "if anything."),
+        ((("kink", "conduit"),), (), "if anything: perhaps kink at the conduit."),
+        ((), (("drift", "drive-sensor", 0.21),), "if anything: perhaps drift at the drive sensor (0.21)."),
+        (
+            (("kink", "conduit"), ("running-in", "conduit")),
+            (("kink", "conduit", 0.55), ("drift", "drive-sensor", 0.21)),
+            "perhaps kink at the conduit (0.55) and running-in at the conduit or drift at the drive sensor (0.21).",
+        ),
+    ],
+)
+def test_beside_what_is_certain_the_rest_of_the_likeliest_model_is_said(further, others, said):
+    likeliest = [{"name": name, "place": place} for name, place in further]
+    alternatives = [{"name": name, "place": place, "confidence": confidence} for name, place, confidence in others]
+    found = diagnosis(
+        "b", "undecided", mechanisms=[BACKLASH], likeliest=[BACKLASH, *likeliest], alternatives=alternatives
+    )
+    assert sentence(found).endswith(said)
+
+
 def test_each_verdict_has_its_sentence():
     assert "confidence 0.97" in sentence(diagnosis("b", "explained"))
     assert "may be backlash at the load pulley (0.50)" in sentence(diagnosis("b", "undecided"))

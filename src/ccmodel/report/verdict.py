@@ -84,17 +84,18 @@ def _with_confidence(mechanisms: Sequence[Mapping]) -> str:
 
 def _undecided(diagnosis: Mapping, missing: str) -> str:
     together = [_placed(one) for one in diagnosis["likeliest"]]
-    names = [f"{_placed(one)} ({one['confidence']:.2f})" for one in diagnosis["alternatives"]]
+    named = {_placed(one): f"{_placed(one)} ({one['confidence']:.2f})" for one in diagnosis["alternatives"]}
+    names = list(named.values())
     if diagnosis["mechanisms"]:
-        rest = f": perhaps {' or '.join(names)}" if names else ""
+        certain = {_placed(one) for one in diagnosis["mechanisms"]}
+        further = " and ".join(named.get(one, one) for one in together if one not in certain)
+        others = [name for one, name in named.items() if one not in together]
+        rest = f": perhaps {' or '.join([further, *others] if further else others)}" if further or others else ""
         part = f"Part of what {missing}: {_with_confidence(diagnosis['mechanisms'])}"
         return f"{part}. These recordings do not tell what else {missing}, if anything{rest}."
     if len(together) > 1:
         all_of_them = " and ".join(together)
-        others = [
-            name for name, one in zip(names, diagnosis["alternatives"], strict=True) if _placed(one) not in together
-        ]
-        names = [f"{all_of_them} together", *others]
+        names = [f"{all_of_them} together", *(name for one, name in named.items() if one not in together)]
     if not names:
         return f"Something {missing}, and these recordings do not tell what."
     if len(names) == 1:
