@@ -300,7 +300,8 @@ def _other_rig(copy: Copy, random) -> str:
     log = as_logged(donor, copy.rig, list(copy.logs[name]))
     if log is None:
         raise NotApplicableError
-    copy.logs[name] = log
+    # The other rig has no sensors at the motor. A log without them would not be compared at all.
+    copy.logs = {other: its[list(log)] for other, its in copy.logs.items()} | {name: log}
     return name
 
 
