@@ -31,8 +31,7 @@ if TYPE_CHECKING:
     from ccmodel.recording import Recording
     from ccmodel.rig.findings import Finding
     from ccmodel.typed import InputError
-
-    __version__: str
+    from ccmodel.version import __version__
 
 # Module of each public name.
 _PLACES = {
@@ -49,6 +48,7 @@ _PLACES = {
     "Prediction": "api.model",
     "Progress": "progress",
     "Recording": "recording",
+    "__version__": "version",
     "compensate": "api.inverse",
     "diagnose": "api.diagnosis",
     "estimate": "api.inverse",
@@ -87,12 +87,9 @@ __all__ = [
 
 def _loaded(name: str) -> object:
     """A public name, loaded at its first use (PEP 562)."""
-    if name == "__version__":
-        value: object = _version()
-    elif name in _PLACES:
-        value = getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
-    else:
+    if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value: object = getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
     globals()[name] = value
     return value
 
@@ -105,13 +102,3 @@ if not TYPE_CHECKING:
 def __dir__() -> list[str]:
     """The public names."""
     return sorted(__all__)
-
-
-def _version() -> str:
-    """Version of the installed package; that of sources that were never installed is unknown."""
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version(__name__)
-    except PackageNotFoundError:
-        return "0+unknown"

@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
-import ccmodel
+from ccmodel.version import __version__
 
-_ROOT = Path(ccmodel.__file__).parents[1]
+_PACKAGE = Path(__file__).parent
+_ROOT = _PACKAGE.parent
 # Endings of templates, styles and scripts.
 PAGE_PARTS = (".j2", ".css", ".js")
 
@@ -28,7 +29,7 @@ def files_in(folder: Path) -> list[Path]:
 def of_inputs(paths: Iterable[Path], folder: Path = Path()) -> dict:
     """Version of the package and digests of the input files of a result, by path relative to `folder`."""
     digests = {os.path.relpath(p, folder): file_digest(p) for p in paths}
-    return {"ccmodel_version": ccmodel.__version__, "sha256": digests}
+    return {"ccmodel_version": __version__, "sha256": digests}
 
 
 def file_digest(path: Path) -> str:
@@ -39,7 +40,7 @@ def file_digest(path: Path) -> str:
 
 def stamp(module: str, *inputs: Any) -> str:
     """A line on a figure: version, and short digests of its inputs (`content_digest`) and of its module's sources."""
-    return f"ccmodel {ccmodel.__version__}, inputs {content_digest(*inputs)[:8]}, sources {source_digest(module)[:8]}"
+    return f"ccmodel {__version__}, inputs {content_digest(*inputs)[:8]}, sources {source_digest(module)[:8]}"
 
 
 def content_digest(*values: Any) -> str:
@@ -111,7 +112,7 @@ def _imports(file: Path) -> list[str]:
         elif isinstance(node, ast.ImportFrom):
             inner = {f"{node.module}.{alias.name}" for alias in node.names}
             names += [name if _file_of(name) else name.rpartition(".")[0] for name in inner]
-    return [name for name in names if name.partition(".")[0] == ccmodel.__name__]
+    return [name for name in names if name.partition(".")[0] == _PACKAGE.name]
 
 
 def _run(block: ast.AST) -> Iterator[ast.AST]:

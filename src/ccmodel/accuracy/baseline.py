@@ -8,11 +8,12 @@ from typing import Any, Final, Literal
 
 from pydantic import ValidationError
 
-from ccmodel import __version__, inputs
+from ccmodel import inputs
 from ccmodel.accuracy.comparison import Limits, intervals
 from ccmodel.accuracy.measure import Batches
 from ccmodel.outputs import new_file
 from ccmodel.typed import InputError, TypedModel
+from ccmodel.version import __version__
 
 FORMAT: Final = 1
 ACCEPT = 'ccmodel accuracy accept --reason "..."'

@@ -6,13 +6,13 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
-from ccmodel import __version__
 from ccmodel.accuracy.baseline import ACCEPT, make_baseline, read_baseline, write_baseline
 from ccmodel.accuracy.comparison import GAINED, Comparison, Limits, compare
 from ccmodel.accuracy.history import add_rows, commits_in, head, rows_of, run_commit
 from ccmodel.accuracy.measure import Batches
 from ccmodel.progress import Progress, each_of
 from ccmodel.typed import InputError, load_json_model
+from ccmodel.version import __version__
 
 # The study's file in a folder of results.
 STATE = "tables/baseline.json"

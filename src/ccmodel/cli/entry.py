@@ -7,7 +7,6 @@ from typing import Annotated, Any
 
 import typer
 
-from ccmodel import __version__
 from ccmodel.cli import (
     accuracy,
     batches,
@@ -24,6 +23,7 @@ from ccmodel.cli import (
 from ccmodel.cli.group import Commands
 from ccmodel.cli.interruption import Interrupted, Terminated, exit_code, signals
 from ccmodel.cli.output import as_json, say
+from ccmodel.version import __version__
 
 CODES = """\
 Exit codes: 0 done; 1 a finding, or something was left out (diagnose: only with --strict); 2 the input cannot be used; \

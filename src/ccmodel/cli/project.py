@@ -52,8 +52,8 @@ def schema() -> None:
     typer.echo(json.dumps(Config.model_json_schema(), indent=1))
 
 
-def reference() -> None:
+def reference(context: typer.Context) -> None:
     """Print docs/command-line.md."""
     from ccmodel.cli.reference import page
 
-    typer.echo(page(), nl=False)
+    typer.echo(page(context.find_root().command), nl=False)

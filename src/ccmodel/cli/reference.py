@@ -5,7 +5,6 @@ from typing import Any
 
 import typer
 from typer.cli import get_docs_for_click
-from typer.main import get_command
 
 # Rows of a table are long lines.
 # ruff: noqa: E501
@@ -95,11 +94,8 @@ instead.
 """
 
 
-def page() -> str:
-    """The page, Markdown."""
-    from ccmodel.cli.entry import app
-
-    group: Any = get_command(app)  # a group; Typer does not export its class
+def page(group: Any) -> str:
+    """The page of a group of commands, whose class Typer does not export: Markdown."""
     context = typer.Context(group, info_name="ccmodel")
     commands = [group.get_command(context, name) for name in group.list_commands(context)]
     sections = [
@@ -107,7 +103,7 @@ def page() -> str:
         for command in commands
         if not command.hidden
     ]
-    text = re.sub(r"^\* `--help`.*\n", "", "".join(sections), flags=re.MULTILINE)
+    text = re.sub(r"^\* `(-h, )?--help`.*\n", "", "".join(sections), flags=re.MULTILINE)
     examples = re.compile(r"^Examples?:\n\n((?:  ccmodel .*\n\n)+)", re.MULTILINE)
     return HEAD + examples.sub(_block, text).rstrip("\n") + "\n"
 

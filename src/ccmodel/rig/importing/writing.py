@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-import ccmodel
 from ccmodel import inputs
 from ccmodel.outputs import new_folder
 from ccmodel.paths import try_batch_folder
@@ -24,6 +23,7 @@ from ccmodel.rig.importing.map import ImportMap, load_map
 from ccmodel.rig.importing.recording import Built, FileError, build
 from ccmodel.rig.importing.sources import Source, names_of, recordings_of
 from ccmodel.typed import InputError, Problem
+from ccmodel.version import __version__
 
 MAP, PROVENANCE, BATCH = "map.yaml", "import.json", "batch.yaml"
 FORMAT = 1
@@ -186,7 +186,7 @@ def _provenance(
 ) -> dict:
     return {
         "format": FORMAT,
-        "ccmodel_version": ccmodel.__version__,
+        "ccmodel_version": __version__,
         "libraries": {name: found for name in LIBRARIES if (found := _version(name))},
         "map": {"file": MAP, "sha256": _sha256(folder / MAP)},
         "remarks": remarks,

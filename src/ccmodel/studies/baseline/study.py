@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pandas as pd
 
-from ccmodel import __version__
 from ccmodel.accuracy.baseline import read_baseline
 from ccmodel.accuracy.comparison import GAINED, Change, Comparison, compare
 from ccmodel.accuracy.gate import summary
@@ -18,6 +17,7 @@ from ccmodel.studies.baseline.settings import AgainstBaseline
 from ccmodel.studies.loops.settings import Measuring
 from ccmodel.studies.run import Outcome, Run
 from ccmodel.typed import InputError
+from ccmodel.version import __version__
 
 SETTINGS = AgainstBaseline
 NOW = "this run"
