@@ -90,7 +90,8 @@ def _undecided(diagnosis: Mapping, missing: str) -> str:
         certain = {_placed(one) for one in diagnosis["mechanisms"]}
         further = " and ".join(named.get(one, one) for one in together if one not in certain)
         others = [name for one, name in named.items() if one not in together]
-        rest = f": perhaps {' or '.join([further, *others] if further else others)}" if further or others else ""
+        possible = [name for name in (further, *others) if name]
+        rest = f": perhaps {' or '.join(possible)}" if possible else ""
         part = f"Part of what {missing}: {_with_confidence(diagnosis['mechanisms'])}"
         return f"{part}. These recordings do not tell what else {missing}, if anything{rest}."
     if len(together) > 1:
