@@ -85,18 +85,15 @@ def _with_confidence(mechanisms: Sequence[Mapping]) -> str:
 def _undecided(diagnosis: Mapping, missing: str) -> str:
     together = [_placed(one) for one in diagnosis["likeliest"]]
     named = {_placed(one): f"{_placed(one)} ({one['confidence']:.2f})" for one in diagnosis["alternatives"]}
-    names = list(named.values())
+    others = [name for one, name in named.items() if one not in together]
     if diagnosis["mechanisms"]:
         certain = {_placed(one) for one in diagnosis["mechanisms"]}
         further = " and ".join(named.get(one, one) for one in together if one not in certain)
-        others = [name for one, name in named.items() if one not in together]
         possible = [name for name in (further, *others) if name]
         rest = f": perhaps {' or '.join(possible)}" if possible else ""
         part = f"Part of what {missing}: {_with_confidence(diagnosis['mechanisms'])}"
         return f"{part}. These recordings do not tell what else {missing}, if anything{rest}."
-    if len(together) > 1:
-        all_of_them = " and ".join(together)
-        names = [f"{all_of_them} together", *(name for one, name in named.items() if one not in together)]
+    names = [f"{' and '.join(together)} together", *others] if len(together) > 1 else list(named.values())
     if not names:
         return f"Something {missing}, and these recordings do not tell what."
     if len(names) == 1:
