@@ -213,7 +213,9 @@ COMMANDS = {
 def run(line: tuple[str, ...], folder: Path, before: Callable[[], None] | None = None) -> subprocess.CompletedProcess:
     """Run a command to its end; a failure is an error, unless it is caught."""
     command = [sys.executable, *line]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True, preexec_fn=before)
+    # A small disk is a file system of its own, and the repository, whose commit is accepted, lies on another.
+    env = {**os.environ, "GIT_DISCOVERY_ACROSS_FILESYSTEM": "1"}
+    return subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=True, preexec_fn=before)
 
 
 @dataclass(frozen=True)
