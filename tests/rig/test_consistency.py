@@ -16,7 +16,7 @@ from ccmodel.rig.consistency.fitted import contradicted_by_fit
 from ccmodel.rig.consistency.parity import Parity, closed_part, crossings, speed, white_noise
 from ccmodel.rig.consistency.rectified import is_rectified
 from ccmodel.rig.consistency.runs import deviations_of, forgotten_bend
-from ccmodel.rig.consistency.scales import pooled
+from ccmodel.rig.consistency.scales import _angle_of_one_end, pooled
 from ccmodel.rig.consistency.signs import EXCHANGED, FAULTS, explanation, negative_relations, wrong_signs
 from ccmodel.rig.ingest import ingest_batch
 from ccmodel.rig.sensor_checks import held_for
@@ -382,6 +382,13 @@ def test_counts_per_turn_that_are_twice_or_half_the_true_ones_are_named(tmp_path
     channel = {"drive": "theta_in_rad", "load": "theta_out_rad"}[end]
     assert said.startswith(f"batch.yaml {channel}: the scale of the {end} angle is wrong")
     assert "a factor of 2 is that of" in said and f"rig.{end}.encoder_counts_per_rev" in said
+
+
+@pytest.mark.parametrize(("spring", "named"), [(0.5, 1), (0.4, 0), (None, 0)])
+def test_a_travel_of_about_twice_is_a_scale_where_another_relation_is_off_by_two(spring, named):
+    ratios = {"travel": 1.5} | ({} if spring is None else {"spring": spring})
+    assert len(_angle_of_one_end(ratios)) == named
+    assert len(_angle_of_one_end(ratios | {"travel": 1.7})) == 1, "a load cannot move so much further"
 
 
 @pytest.mark.parametrize(("factor", "warnings"), [(1.1, 0), (1.35, 1)])

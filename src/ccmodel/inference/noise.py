@@ -116,7 +116,7 @@ def repeated(prior: SensorNoise, variance: float | None, cycles: float) -> Senso
     return SensorNoise(float(np.sqrt(square)), "cycles")
 
 
-def drive_errors(given: ModelInput, parameters: Parameters, offset_is_free: bool = False) -> dict[str, NDArray]:
+def drive_errors(given: ModelInput, parameters: Parameters, offset_is_free: bool) -> dict[str, NDArray]:
     """Draws of the error in each channel that the uncertain drive motion causes, shape (draws, n).
 
     The sub-count offset of the drive encoder is part of that error unless `offset_is_free`, an unknown of the fit.

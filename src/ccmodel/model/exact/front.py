@@ -46,7 +46,6 @@ def aim(path: PathTables, state: State, c: int, end: int) -> None:
         at_end = lo >= state.kind[c, rows.LAST] if end == 0 else hi <= state.kind[c, rows.FIRST]
         if at_end or piece >= (path.table.shape[2] - 1):
             kind[c, rows.OPEN + 3 * end] = 0
-            front[2 * c + end, rows.R_STOP] = 0.0
             return
         if end == 0:
             slope, corner = state.corner[rows.C_SLOPE, c, lo], state.corner[rows.C_M, c, lo + 1]
