@@ -87,6 +87,24 @@ def test_a_flaw_of_the_rig_changes_the_recordings_claim_and_not_the_models():
     assert claim.by_model == Verdict.YES
 
 
+@pytest.mark.parametrize("scales", [(1.0, 1.01, 0.6, 0.61), (0.8, 1.2, 0.82, 1.22)])
+def test_radii_that_differ_in_friction_or_scatter_bear_the_claim_out_for_the_slope_alone(scales):
+    """At a load with a spring the slope is that of the spring, whatever the friction."""
+    placed = [
+        (model_runs.placements(STUDY.model_copy(update={"loop_radius_m": r}))["in the middle"], 7.3)
+        for r in (0.0457, 0.0762)
+    ]
+    study = STUDY.model_copy(update={"pretension_N": 7.3, "amplitude_rad": 0.6})
+    flawed = [
+        (replace(model_runs.run(replace(CABLE, friction_scale=scale), r.path, study, 0.05), batch="b", id=r.id), s)
+        for (r, s), scale in zip(pairs_over(placed), scales, strict=True)
+    ]
+    claims = claims_of({"bend": [], "pretension": [], "radius": flawed}, None, CLAIMS, HOW)
+    (claim,) = (claim for claim in claims if claim.name == "radius")
+    assert claim.borne_out == Verdict.PART
+    assert claim.by_model == Verdict.YES
+
+
 def test_what_the_model_alone_decides_has_no_second_verdict(found):
     assert {name for name, claim in found.items() if claim.by_model is None} == {
         "deadband-and-load",
