@@ -35,6 +35,7 @@ def test_nothing_is_extrapolated_and_what_was_cut_is_said():
     assert np.isfinite(joined.columns["F_drive_N"]).all()
     assert joined.cut_s == pytest.approx((0.502, BASE[-1] - used[-1]))
     assert "0.502 s cut at the start, before the first sample of 's_F_drive_N'" in joined.remarks
+    assert any(said.endswith("s cut at the end, after the last sample of 's_F_drive_N'") for said in joined.remarks)
     np.testing.assert_allclose(joined.columns["theta_in_rad"], wave(used))
 
 

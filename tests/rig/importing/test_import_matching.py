@@ -70,6 +70,17 @@ def test_a_motion_that_repeats_is_refused_rather_than_guessed():
     assert "the matched signals repeat" in caught.value.args[2]
 
 
+def test_two_offsets_that_fit_alike_are_refused():
+    """Of a motion that repeats every 10 s within 20 s: both shifts of half a period have three quarters in common."""
+
+    def motion_of_10_s(time):
+        return np.sin(0.2 * np.pi * time) + 0.5 * np.sin(0.4 * np.pi * time)
+
+    here = np.arange(0, 20, 0.002)
+    with pytest.raises(LogError, match="repeat, and offsets of -?5 s and -?5 s fit alike"):
+        match_clocks(here, motion_of_10_s(here), here.copy(), motion_of_10_s(here - 5.0))
+
+
 def test_a_motion_that_repeats_after_a_rest_is_matched():
     def moves(time):
         return np.sin(np.pi * np.maximum(time - 1, 0))

@@ -24,9 +24,9 @@ _LEAST_OVERLAP, _FULL_OVERLAP, _OVERLAP_POWER = 0.25, 0.7, 0.2
 _CANDIDATES = 6
 # Fits that leave at most this factor and this share of the power more than the best are as good.
 _SAME_MISFIT, _NO_MISFIT = 1.2, 1e-5
-# Width of the filter before the fit, as a share of the period of the highest frequency; and the share of the power up
-# to it.
-_WIDTH, _POWER_SHARE = 0.05, 0.95
+# Width of the filter before the fit, as a share of the period of the highest frequency; the share of the power up to
+# that frequency; and how far the filter reaches, in widths.
+_WIDTH, _POWER_SHARE, _REACH = 0.05, 0.95, 4.0
 # Step of the filtered signals, as a share of the filter's width: they have no more detail than that.
 _THINNED = 0.125
 # Blocks in which errors may be correlated.
@@ -66,9 +66,12 @@ def match_clocks(time: NDArray, values: NDArray, first_time: NDArray, first_valu
     # The same filter on both moves neither, and takes the noise out of the slopes that the fits follow.
     width = _WIDTH / highest / step
     every = max(1, int(width * _THINNED))
-    here, there = (gaussian_filter1d(values, width)[::every] for values in (here, there))
+    # At its ends a filtered signal is distorted, at each shift elsewhere in the motion.
+    end = min(int(_REACH * width), min(here.size, there.size) // 4)
+    here, there = (gaussian_filter1d(values, width)[end : values.size - end : every] for values in (here, there))
     starts = [first_time[0] - time[0] + step * lag for lag in lags]
-    fits = [_fit(start, time[0], here, first_time[0], there, step * every) for start in starts]
+    begins = time[0] + step * end, first_time[0] + step * end
+    fits = [_fit(start, begins[0], here, begins[1], there, step * every) for start in starts]
     return _best([fit for fit in fits if fit is not None], 0.25 / highest)
 
 
@@ -89,7 +92,7 @@ def _fit(start: float, begin: float, here: NDArray, first_begin: float, there: N
     """Fit offset, drift, gain and zero from one start; None if nothing overlaps."""
     slope = np.gradient(there, step)
     t, t_first = begin + step * np.arange(here.size), first_begin + step * np.arange(there.size)
-    middle = (t[0] + t[-1]) / 2
+    every, middle = t, (t[0] + t[-1]) / 2
     inside = _inside(t + start, t_first)
     if inside.sum() < _BLOCKS or np.ptp(here[inside]) == 0:
         return None
@@ -113,7 +116,9 @@ def _fit(start: float, begin: float, here: NDArray, first_begin: float, there: N
     text = f"matched over {np.ptp(t):.4g} s"
     # t_first = t + centre + drift (t - middle), so that the offset at time zero is centre - drift * middle.
     clock = Clock(centre - drift * middle, drift, float(half[0]), float(half[1]), text)
-    return _Fit(clock, float(np.var(fit.fun) / np.var(here)), np.ptp(t) / step / min(inside.size, there.size), centre)
+    # Fits from several starts may end as one clock, and have its overlap.
+    overlap = _inside(every + centre + drift * (every - middle), t_first).sum() / min(every.size, there.size)
+    return _Fit(clock, float(np.var(fit.fun) / np.var(here)), float(overlap), centre)
 
 
 def _best(fits: list[_Fit], apart_s: float) -> Clock:
@@ -130,8 +135,9 @@ def _best(fits: list[_Fit], apart_s: float) -> Clock:
         is_new = all(abs(fit.middle_s - other.middle_s) > apart_s for other in alike)
         if is_new and fit.misfit <= _SAME_MISFIT * least + _NO_MISFIT:
             alike.append(fit)
-    if sum(fit.overlap > _FULL_OVERLAP for fit in alike) > 1:
-        offsets = " and ".join(f"{fit.clock.offset_s:.4g} s" for fit in alike[:2])
+    rivals = [fit for fit in alike if fit.overlap > _FULL_OVERLAP]
+    if len(rivals) > 1:
+        offsets = " and ".join(f"{fit.clock.offset_s:.4g} s" for fit in rivals[:2])
         text = f"the matched signals repeat, and offsets of {offsets} fit alike"
         raise LogError(None, None, f"{text}: match a motion that does not repeat, or state offset_s")
     best = max(alike, key=lambda fit: fit.overlap).clock
