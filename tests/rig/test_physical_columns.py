@@ -63,6 +63,7 @@ def test_counts_and_an_angle_with_its_resolution_give_the_same_input(bench, coun
     ingested = ingest_batch(bench.write().folder)
     assert ingested.findings == []
     physical = ingested.recordings[0]
+    assert physical.derived_from["tau_in_Nm"] == f"{'-' if sign < 0 else ''}tau_in_Nm of the log"
     assert physical.rest_s == counted.rest_s
     assert set(physical.channels) == set(counted.channels)
     assert physical.encoder_step_rad == pytest.approx(dict(counted.encoder_step_rad))

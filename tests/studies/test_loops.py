@@ -48,6 +48,13 @@ def test_a_parallelogram_gives_its_width_its_flat_part_and_its_slope(noise, with
     assert values["slope"] == pytest.approx(0.6, rel=within)
 
 
+def test_the_loop_of_a_load_cell_with_a_zero_is_that_of_one_without():
+    named = ["width", "backlash", "slope"]
+    loop = parallelogram()
+    with_zero = loop.with_channels({**loop.channels, "tau_out_Nm": loop["tau_out_Nm"] + 0.02}, {}, "rig")
+    assert measure(with_zero, named, HOW)[0] == pytest.approx(measure(loop, named, HOW)[0])
+
+
 def test_peak_to_peak_is_not_that_of_the_noise():
     values, _ = measure(parallelogram(0.0005), ["tau_in"], HOW)
     assert values["tau_in"] == pytest.approx(200.0, rel=0.005)
