@@ -318,8 +318,10 @@ def _read_yaml(path: Path) -> CommentedMap:
         text = f"must hold keys and values, found {_kind(content)}"
     except FileNotFoundError:
         text = "there is no such file"
-    except (OSError, UnicodeDecodeError) as error:
-        text = f"cannot be read as text ({error.strerror if isinstance(error, OSError) else error})"
+    except UnicodeDecodeError:
+        text = "is not text in UTF-8: save it in this encoding"
+    except OSError as error:
+        text = f"cannot be read ({error.strerror})"
     except DuplicateKeyError as error:
         line, text = error.problem_mark.line + 1, error.problem.partition(" with value")[0] + ": remove one"
     except MarkedYAMLError as error:

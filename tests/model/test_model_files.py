@@ -61,6 +61,13 @@ def test_a_value_that_overflows_is_named(tmp_path, name, value):
         read_model_file(write(tmp_path / "model.json", **{name: value}))
 
 
+@pytest.mark.parametrize("name", ["stiffness_N_per_m", "reference_length_m"])
+def test_a_cable_without_stiffness_or_length_is_named(tmp_path, name):
+    for value in (-5.0, 0.0):
+        with pytest.raises(InputError, match=rf"model\.json: parameters\.{name}: {value:g} is no value of a rig"):
+            read_model_file(write(tmp_path / "model.json", **{name: value}))
+
+
 def test_a_value_may_be_as_small_as_a_fit_leaves_it(tmp_path):
     read = read_model_file(write(tmp_path / "model.json", tau_in_zero_Nm=-1e-18, pretension_N=0.0)).parameters
     assert (read.tau_in_zero_Nm, read.pretension_N) == (-1e-18, 0.0)

@@ -105,6 +105,15 @@ def test_a_pretension_that_both_ends_contradict_alike_is_the_stated_one(tmp_path
     assert [sentence for sentence in said if "pretension_N is the tension of one cable" in sentence], said
 
 
+@pytest.mark.parametrize("factor", [1000.0, 3.0, 0.3])
+def test_the_pretension_of_a_single_recording_is_named(tmp_path, factor):
+    copy = read_copy(SIMULATED)
+    copy.description["recordings"][1]["pretension_N"] *= factor
+    (said,) = said_of(write_copy(copy, tmp_path / "b"))
+    assert "Check pretension_N of this entry" in said
+    assert f"half the sum of tensions of {copy.description['recordings'][1]['id']} at rest is" in said
+
+
 def test_a_load_with_mass_contradicts_no_spring(tmp_path):
     """Above its resonance the torque of a load with mass falls with its angle: most slopes here are negative."""
     copy, inertia_over_spring_s2 = read_copy(Path("data/raw/rich")), 0.15

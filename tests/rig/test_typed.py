@@ -117,7 +117,7 @@ def test_missing_file(tmp_path):
 
 def test_bytes_that_are_no_text(tmp_path):
     (tmp_path / "x.yaml").write_bytes(b"name: \xff\xfe")
-    with pytest.raises(InputError, match="cannot be read as text"):
+    with pytest.raises(InputError, match="is not text in UTF-8: save it in this encoding"):
         load_yaml_model(tmp_path / "x.yaml", Outer)
 
 

@@ -25,8 +25,9 @@ _KNOWN = {f.name: f for f in fields(Parameters) if f.name not in ("mechanisms", 
 _REQUIRED = [name for name, f in _KNOWN.items() if f.default is MISSING]
 _SESSION = ("session_start_s", "session_end_s")  # not in a file where they are not known
 _OPTIONAL = [name for name, f in _KNOWN.items() if "None" in str(f.type)]
-# Limits of parameters in SI units: what is beyond them overflows.
-LARGEST_PARAMETER, RADII, SMALLEST_RADIUS_M = 1e15, ("drive_radius_m", "load_radius_m"), 1e-9
+# Limits of parameters in SI units: what is beyond them overflows, or can be no part of a rig.
+LARGEST_PARAMETER = 1e15
+LEAST = {"stiffness_N_per_m": 0.0, "reference_length_m": 0.0, "drive_radius_m": 1e-9, "load_radius_m": 1e-9}
 
 
 class _ActiveEntry(TypedModel):
@@ -289,10 +290,7 @@ def _parameters(path: Path, stated: _ModelFile) -> Parameters:
             raise InputError(f"{path}: parameters: no parameter is called '{name}'; {advice(name, _KNOWN)}")
         if value is None and name not in _OPTIONAL:
             raise InputError(f"{path}: parameters.{name}: null; a number is needed")
-        if (
-            value is not None
-            and not (SMALLEST_RADIUS_M if name in RADII else -LARGEST_PARAMETER) < value < LARGEST_PARAMETER
-        ):
+        if value is not None and not LEAST.get(name, -LARGEST_PARAMETER) < value < LARGEST_PARAMETER:
             raise InputError(f"{path}: parameters.{name}: {value:g} is no value of a rig")
     if missing := [name for name in _REQUIRED if name not in values]:
         raise InputError(f"{path}: parameters: no {', '.join(missing)}; a model needs it")

@@ -22,6 +22,7 @@ from ccmodel.channels import (
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import LIKELY, SURE, Contradiction
 from ccmodel.rig.consistency.parity import Parity, correlation, white_noise
+from ccmodel.rig.consistency.scales import beyond
 from ccmodel.rig.sensor_checks import is_noisy
 
 ANGLES = {*ANGLE_AT.values(), THETA_MOTOR}
@@ -39,6 +40,7 @@ def foreign_runs(parities: Sequence[Parity]) -> list[Contradiction]:
             or _straight(parity)
             or _whatever_cells_err(forgotten_bend, parity, others)
             or _whatever_cells_err(_other_rig, parity, others)
+            or wrong_pretension(parity, others)
         )
         if contradiction:
             found.append(contradiction)
@@ -177,6 +179,27 @@ def _whatever_cells_err(check: Check, parity: Parity, others: Sequence[Parity]) 
     return found
 
 
+def wrong_pretension(parity: Parity, others: Sequence[Parity]) -> Contradiction | None:
+    """A recording whose tension at rest is far from the stated one, while that of most others is not.
+
+    An offset of a load cell makes it differ most where the tension is low, but by the same force everywhere.
+    """
+    ratio, stated = parity.ratios.get("pretension", 0.0), _tension(parity)
+    theirs = np.array([(r, _tension(p)) for p in others if (r := p.ratios.get("pretension", 0.0)) > 0]).reshape(-1, 2)
+    if not (theirs.size and ratio > 0):
+        return None
+    typical, common_N = float(np.median(theirs[:, 0])), float(np.median((theirs[:, 0] - 1) * theirs[:, 1]))
+    is_far = beyond(ratio, limits.PRETENSION_FACTOR) and beyond(ratio / typical, limits.PRETENSION_FACTOR)
+    if not is_far or abs((ratio - 1) * stated - common_N) < min(stated, ratio * stated):
+        return None
+    text = (
+        f"half the sum of tensions of {parity.recording.id} at rest is {ratio * stated:.3g} N, but its pretension_N is"
+        f" {stated:g}; in the other recordings it is {typical:.2g} times the stated one. Check pretension_N of this"
+        " entry"
+    )
+    return Contradiction("pretension_N", text, parity.recording.id, LIKELY)
+
+
 def forgotten_bend(parity: Parity, others: Sequence[Parity]) -> Contradiction | None:
     """A recording with more friction for its bend than all others."""
     tension = parity.recording.pretension_N
@@ -199,12 +222,19 @@ def _other_rig(parity: Parity, others: Sequence[Parity]) -> Contradiction | None
     if distance < limits.OTHER_RIG:
         return None
     worst = sorted(deviations, key=lambda name: -abs(deviations[name]))[:3]
-    apart = [f"{name} {_times(name, parity, others)}" for name in worst if abs(deviations[name]) > 1]
+    worst = [name for name in worst if abs(deviations[name]) > 1]
+    apart = [f"{name} {_times(name, parity, others)}" for name in worst]
     text = (
         f"{parity.recording.id} is of another rig or of other conditions than the batch states: compared with the other"
-        f" recordings' medians, {', '.join(apart)}; check that the log is the one of this entry"
+        f" recordings' medians, {', '.join(apart)}; check that the log is the one of this entry{_noted(worst)}"
     )
     return Contradiction(parity.recording.id, text, parity.recording.id, SURE if distance > 6 else LIKELY)
+
+
+def _noted(names: Sequence[str]) -> str:
+    """Keys of the entry in which what is compared was noted."""
+    keys = [_NOTED[name] for name in names if name in _NOTED]
+    return f", and its {' and '.join(keys)}" if keys else ""
 
 
 def _times(name: str, parity: Parity, others: Sequence[Parity]) -> str:
@@ -247,6 +277,8 @@ def _bend_rad(parity: Parity) -> float:
 
 # Relations of which a recording gives more than one estimate.
 _ESTIMATES = {"friction": ("friction of the sums", "friction of the slope")}
+# Key of an entry that states what a relation is compared with.
+_NOTED = {"pretension": "pretension_N", "amplitude": "excitation.amplitude_rad", "frequency": "excitation.frequency_Hz"}
 # Conditions that a relation rises (1) or falls (-1) with.
 _DEPENDENCE = {
     "spring": ((_stroke, 1), (_frequency, -1)),

@@ -39,7 +39,7 @@ def read(path: Path) -> pd.DataFrame:
                 column.add(cells)
         row += len(lines)
     if row == 2:
-        raise LogError(None, None, "has a header but no samples: record it again or take it out of batch.yaml")
+        raise LogError(None, None, "has a header but no samples: record it again or leave it out")
     joined = pd.DataFrame({k: column.whole() for k, column in enumerate(columns)}, copy=False)
     return joined.set_axis(header, axis=1).set_axis(pd.RangeIndex(2, row))
 
@@ -121,7 +121,7 @@ def _blocks(path: Path) -> Iterator[list[str]]:
         if lines:
             yield lines
     if len(waiting) == rows:
-        raise LogError(None, None, "is empty: record it again or take it out of batch.yaml")
+        raise LogError(None, None, "is empty: record it again or leave it out")
 
 
 def _without_empty_end(lines: list[str]) -> tuple[list[str], list[str]]:
