@@ -318,6 +318,16 @@ def _forgotten_bend(copy: Copy, random) -> str:
     return f"{entry['id']}.csv bend_rad"
 
 
+def _pretension_of_one(copy: Copy, random) -> str:
+    copy.columns("load_cell_V")
+    if len(copy.logs) < 2:
+        raise NotApplicableError
+    entry = copy.entry(copy.any_log(random))
+    factor = float(np.exp(random.uniform(np.log(3), np.log(1000)))) ** random.choice([-1, 1])
+    entry["pretension_N"] = float(entry["pretension_N"] * factor)
+    return f"{entry['id']}.csv pretension_N"
+
+
 def _stated(section: str, key: str, needs: str = "load_cell_V"):
     def damage(copy: Copy, random) -> str:
         copy.columns(needs)
@@ -364,6 +374,7 @@ MISTAKES: Mapping[str, Callable[[Copy, np.random.Generator], str]] = {
     "an accuracy far finer than the noise": _fine_accuracy,
     "starts of recordings too near": _near_starts,
     "a pair called a single cable": _single_cable,
+    "the pretension of one recording": _pretension_of_one,
 }
 
 
