@@ -33,6 +33,7 @@ NOT_MEASURED = (
     "both ends off",
     "load cell",
     "forgotten",
+    "pretension",
     "stated",
     "another rig",
     "magnitude",
