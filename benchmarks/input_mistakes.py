@@ -27,6 +27,7 @@ from ccmodel.recording import Recording
 from ccmodel.rig.ingest import ingest_batch
 from proof.build import build
 from proof.cases import draw
+from proof.rig_draw import log_uniform
 
 MEASURED, SIMULATED = Path("data/raw/da-vinci"), Path("data/raw/rich")
 PAGE = Path("docs/input-checks.md")
@@ -275,7 +276,7 @@ def _held(copy: Copy, random) -> str:
 def _fine_accuracy(copy: Copy, random) -> str:
     stated = copy.rig["accuracy"]
     key = random.choice([key for key in ("torque_Nm", "load_cell_N") if key in stated])
-    stated[key] = float(stated[key] / np.exp(random.uniform(np.log(50), np.log(1000))))
+    stated[key] = float(stated[key] / log_uniform((50, 1000), random))
     return f"rig.accuracy.{key}"
 
 
@@ -320,10 +321,8 @@ def _forgotten_bend(copy: Copy, random) -> str:
 
 def _pretension_of_one(copy: Copy, random) -> str:
     copy.columns("load_cell_V")
-    if len(copy.logs) < 2:
-        raise NotApplicableError
     entry = copy.entry(copy.any_log(random))
-    factor = float(np.exp(random.uniform(np.log(3), np.log(1000)))) ** random.choice([-1, 1])
+    factor = log_uniform((3, 1000), random) ** random.choice([-1, 1])
     entry["pretension_N"] = float(entry["pretension_N"] * factor)
     return f"{entry['id']}.csv pretension_N"
 
@@ -333,7 +332,7 @@ def _stated(section: str, key: str, needs: str = "load_cell_V"):
         copy.columns(needs)
         if key not in copy.rig[section]:
             raise NotApplicableError
-        factor = float(np.exp(random.uniform(np.log(4), np.log(20)))) ** random.choice([-1, 1])
+        factor = log_uniform((4, 20), random) ** random.choice([-1, 1])
         copy.rig[section][key] = float(copy.rig[section][key] * factor)
         return f"rig.{section}.{key}"
 

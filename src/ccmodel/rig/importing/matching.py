@@ -66,7 +66,7 @@ def match_clocks(time: NDArray, values: NDArray, first_time: NDArray, first_valu
     # The same filter on both moves neither, and takes the noise out of the slopes that the fits follow.
     width = _WIDTH / highest / step
     every = max(1, int(width * _THINNED))
-    # At its ends a filtered signal is distorted, at each shift elsewhere in the motion.
+    # Near its ends a filtered signal is distorted, and offsets that fit alike would leave unequal errors.
     end = min(int(_REACH * width), min(here.size, there.size) // 4)
     here, there = (gaussian_filter1d(values, width)[end : values.size - end : every] for values in (here, there))
     starts = [first_time[0] - time[0] + step * lag for lag in lags]
@@ -92,7 +92,7 @@ def _fit(start: float, begin: float, here: NDArray, first_begin: float, there: N
     """Fit offset, drift, gain and zero from one start; None if nothing overlaps."""
     slope = np.gradient(there, step)
     t, t_first = begin + step * np.arange(here.size), first_begin + step * np.arange(there.size)
-    every, middle = t, (t[0] + t[-1]) / 2
+    whole, middle = t, (t[0] + t[-1]) / 2
     inside = _inside(t + start, t_first)
     if inside.sum() < _BLOCKS or np.ptp(here[inside]) == 0:
         return None
@@ -117,7 +117,7 @@ def _fit(start: float, begin: float, here: NDArray, first_begin: float, there: N
     # t_first = t + centre + drift (t - middle), so that the offset at time zero is centre - drift * middle.
     clock = Clock(centre - drift * middle, drift, float(half[0]), float(half[1]), text)
     # Fits from several starts may end as one clock, and have its overlap.
-    overlap = _inside(every + centre + drift * (every - middle), t_first).sum() / min(every.size, there.size)
+    overlap = _inside(whole + centre + drift * (whole - middle), t_first).sum() / min(whole.size, there.size)
     return _Fit(clock, float(np.var(fit.fun) / np.var(here)), float(overlap), centre)
 
 
