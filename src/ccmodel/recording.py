@@ -1,6 +1,7 @@
 """Recording: the common type of measured and simulated data, and its netCDF file."""
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
@@ -222,9 +223,17 @@ def write_recordings(path: Path, recordings: list[Recording], provenance: Mappin
 
 
 def in_order(recordings: Sequence[Recording]) -> list[Recording]:
-    """Recordings with their positions in the session by their order, -1/2 to 1/2; a single one has 0."""
-    at = np.linspace(-0.5, 0.5, len(recordings)) if len(recordings) > 1 else [0.0] * len(recordings)
-    return [replace(r, position=float(x)) for r, x in zip(recordings, at, strict=True)]
+    """Recordings with their positions in the session by their order, -1/2 to 1/2; a single one has 0.
+
+    Of batches that are taken together, each is a session: nothing says which of them was recorded first.
+    """
+    sessions = [(r.batch, r.id.rpartition("/")[0]) for r in recordings]
+    size, before, placed = Counter(sessions), Counter[tuple[str, str]](), []
+    for recording, session in zip(recordings, sessions, strict=True):
+        share = before[session] / (size[session] - 1) if size[session] > 1 else 0.5
+        placed.append(replace(recording, position=share - 0.5))
+        before[session] += 1
+    return placed
 
 
 def read_recordings(path: Path) -> list[Recording]:

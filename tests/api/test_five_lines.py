@@ -228,6 +228,20 @@ def test_a_model_predicts_recordings_that_it_was_not_fitted_to(fitted, tmp_path)
     assert predicted.left_out == ()
 
 
+def test_a_drift_of_the_models_session_leaves_other_recordings_alone(fitted, folder, batch, tmp_path):
+    """Their order says nothing of the session that the model was fitted to."""
+    drift = Active("friction-drift", "conduit", {"change": 0.4})
+    drifting = replace(fitted.model, parameters=replace(fitted.model.parameters, mechanisms=(drift,)))
+    other = cc.load(write_batch(tmp_path / "other", pretensions=(6.5, 7.5)))
+    for use in (cc.predict, cc.estimate):
+        changed = {
+            r.id: not np.array_equal(use(drifting, one)[r.id]["theta_out_rad"], use(fitted, one)[r.id]["theta_out_rad"])
+            for one in (batch, other)
+            for r in one
+        }
+        assert changed == {"t-7N": True, "t-6N": False, "t-5N": True, "t-6.5N": False, "t-7.5N": False}
+
+
 def test_a_prediction_says_what_is_wrong_with_its_batch(fitted, folder, tmp_path):
     other = shutil.copytree(folder, tmp_path / folder.name)
     described = (other / "batch.yaml").read_text()

@@ -7,7 +7,7 @@ import pytest
 
 from builders import recording
 from ccmodel.mechanisms.relaxation import relaxed_after
-from ccmodel.model.files import model_as_dict
+from ccmodel.model.files import Model, RigConditions, model_as_dict
 from ccmodel.model.general import Active
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
@@ -29,6 +29,28 @@ def test_without_times_a_recordings_place_is_its_order():
     assert in_order([recording()])[0].position == 0.0
     assert in_order([]) == []
     assert recording().position == 0.0
+
+
+def test_batches_that_are_taken_together_are_a_session_each():
+    """Which of them was recorded first is not known, and no drift goes on from one to the next."""
+    joint = [recording(id=name) for name in ("a/1", "a/2", "b/1", "b/2", "b/3", "c/1")]
+    assert [r.position for r in in_order(joint)] == [-0.5, 0.5, -0.5, 0.0, 0.5, 0.0]
+
+
+def test_a_drift_moves_only_recordings_of_the_session_that_the_model_was_fitted_to():
+    fitted = in_order([recording(id=f"r{k}") for k in range(2)])
+    drifting = replace(PARAMETERS, mechanisms=(FRICTION,))
+    model = Model(drifting, RigConditions.of(fitted))
+    later = in_order([recording(id=name) for name in ("later-1", "later-2")])
+    placed = model.placed([*fitted, *later])
+    frictions = [of_recording(drifting, r).friction for r in placed]
+    assert frictions == pytest.approx([0.9 * 0.15, 1.1 * 0.15, 0.15, 0.15])
+    joint = Model(drifting, RigConditions.of([replace(r, batch="a + b", id=f"{r.batch}/{r.id}") for r in fitted]))
+    assert [r.position for r in joint.placed([*fitted, *later])] == [-0.5, 0.5, 0.0, 0.0]
+    session = with_session(drifting, started(0, 60))
+    timed = replace(model, parameters=session)
+    (hour_later,) = timed.placed(started(90))
+    assert position_of(hour_later, session) == 1.0
 
 
 def test_with_times_it_is_the_elapsed_time_and_goes_on_after_the_session():

@@ -178,7 +178,8 @@ def estimate(
         batch = as_batch(batch, within(report, 0.0, READING))
         check_same_rig(known, batch)
         texts = within(report, READING, 1.0)
-        for recording in each_of(batch.recordings, texts, lambda one: f"estimating the load of {one.batch}/{one.id}"):
+        placed = known.placed(batch.recordings)
+        for recording in each_of(placed, texts, lambda one: f"estimating the load of {one.batch}/{one.id}"):
             try:
                 found = estimated(recording, known.parameters, sds, not unknown_load, **shares)
             except (ModelError, ValueError) as error:

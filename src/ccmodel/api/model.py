@@ -209,7 +209,7 @@ def predict(
         batch = as_batch(batch, within(report, 0.0, READING))
         check_same_rig(known, batch)
         name = Path(model).stem if isinstance(model, str | Path) else "model"
-        found = predicted(batch.recordings, known.parameters, name, within(report, READING, 1.0))
+        found = predicted(known.placed(batch.recordings), known.parameters, name, within(report, READING, 1.0))
     refused, others = sorted_findings(batch)
     recorded, simulations = (tuple(pair[i] for pair in found.pairs) for i in (0, 1))
     prediction = Prediction(simulations, found.errors, (*refused, *found.failures), others, recorded)

@@ -15,7 +15,7 @@ def friction_drift() -> Mechanism:
     -1/2 to 1/2 from the first to the last. The position is the time at which the recording started, if all recordings
     of the session state theirs; a later recording is then extrapolated, to x = 1 at most. Otherwise the position is the
     recording's place in the order of the batch file: that this is the order of recording is a hypothesis. A recording
-    of unknown position has x = 0.
+    of unknown position has x = 0, as one of another batch than the model was fitted to.
 
     Signature: The loss of each recording is even, and grows or falls from recording to recording whatever their
     conditions.

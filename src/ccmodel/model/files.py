@@ -209,6 +209,17 @@ class Model:
         left = tuple(m for m in self.mechanisms if m.name not in names)
         return replace(self, parameters=replace(self.parameters, mechanisms=left))
 
+    def placed(self, recordings: Iterable[Recording]) -> list[Recording]:
+        """Recordings with a place in the session only where the model was fitted to them.
+
+        The order of others says nothing of that session; what drifts is at its middle, unless their times are stated.
+        """
+        every = list(recordings)
+        if self.rig is None:
+            return every
+        fitted = {name for c in self.rig.conditions for name in (c.recording, f"{self.rig.batch}/{c.recording}")}
+        return [r if f"{r.batch}/{r.id}" in fitted else replace(r, position=0.0) for r in every]
+
     def as_dict(self) -> dict:
         """Content of its file, plain data."""
         content = model_as_dict(self.parameters, dict(self.provenance))

@@ -9,7 +9,6 @@ from dataclasses import replace
 from functools import reduce
 from typing import Any
 
-from ccmodel.recording import in_order
 from ccmodel.rig.batch import Rig
 from ccmodel.rig.findings import Finding
 from ccmodel.rig.ingest import Ingested
@@ -72,7 +71,7 @@ def together(batches: Sequence[tuple[str, Ingested]], name: str | None = None) -
     findings = [f for _, ingested in batches for f in ingested.findings]
     findings += [f for file, other in others for f in _estimates(name, first_file, first, file, other)]
     stated = first.stated.model_copy(update={"batch": name})
-    return Ingested(in_order(recordings), findings, stated, parts=tuple(names))
+    return Ingested(recordings, findings, stated, parts=tuple(names))
 
 
 def _differences(first_file: str, first: Ingested, file: str, other: Ingested) -> Iterator[str]:
