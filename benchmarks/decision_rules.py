@@ -36,6 +36,7 @@ from proof.cases import draw
 from proof.intervals import count, text_of
 from proof.judge import judge
 from proof.outcome import Outcome, outcome
+from proof.score import is_left_open_or_learned
 
 PRESENT, FORMER = "present", "former"
 
@@ -104,6 +105,7 @@ def run(seed: int, former: Path, out: Path) -> dict:
             "place": (report.get("location") or {}).get("place"),
             "mechanisms": report.get("mechanisms") or [],
             "alternatives": report.get("alternatives") or [],
+            "laws": report.get("laws") or [],
         }
     }
     diagnosed = found._outcome.found
@@ -158,7 +160,7 @@ def _rates(every: Sequence[Outcome]) -> dict[str, str]:
             lambda o: o.is_first_of_all,
         ),
         "several, one visible: all named": (several, lambda o: o.true_names <= {m["name"] for m in o.identified}),
-        "unlisted: unexplained or undecided": (outsiders, lambda o: o.verdict in ("unexplained", "undecided")),
+        "unlisted: left open, or a law learned in its slot": (outsiders, is_left_open_or_learned),
         "confidently wrong": (every, lambda o: o.is_confidently_wrong),
     }
     found = {what: text_of(count(what, cases, is_so)) for what, (cases, is_so) in rows.items()}

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from proof.families import FAMILIES
 from proof.intervals import bootstrap, count
-from proof.outcome import DECISION_THRESHOLD, Outcome, is_located, same_place
+from proof.outcome import DECISION_THRESHOLD, Outcome, is_located
 
 # A confident law of a wrong slot counts as wrong if its model's error is above so many noise floors.
 STILL_WRONG = 2.0
@@ -22,7 +22,7 @@ def score_of_laws(outcomes: Sequence[Outcome]) -> list[dict]:
     visible = [o for o in every if o.is_visible]
     with_slot = [o for o in visible if _truth(o).get("slot")]
     found = [o for o in with_slot if law_in_slot(o) is not None and _truth(o)["curve"]]
-    removed = [o for o in visible if o.kind == "removed" and _laws(o)]
+    removed = [o for o in visible if o.kind == "removed" and o.laws]
     gaps = [gap for o in visible if (gap := o.gap_closed) is not None]
     shares = [share for o in found if (share := inside(o)) is not None]
     return [
@@ -40,19 +40,14 @@ def _truth(o: Outcome) -> dict:
     return o.key["truth"][0]
 
 
-def _laws(o: Outcome) -> list[dict]:
-    return (o.diagnosis or {}).get("laws") or []
-
-
 def law_in_slot(o: Outcome) -> dict | None:
-    """The first law of the true slot at the true place; None if there is none."""
-    truth = _truth(o)
-    return next((w for w in _laws(o) if w["slot"] == truth["slot"] and same_place(w["place"], truth["place"])), None)
+    """The first law of the true slot at the true place; None if there is none, or no slot holds the effect."""
+    return next((w for w in o.laws if _truth(o).get("slot") and o.is_law_of(w, _truth(o))), None)
 
 
 def is_slot_right(o: Outcome) -> bool:
     """Whether a law of the true slot was learned; of an effect that no slot holds, or without laws, the place."""
-    return law_in_slot(o) is not None if _truth(o).get("slot") and _laws(o) else is_located(o)
+    return law_in_slot(o) is not None if _truth(o).get("slot") and o.laws else is_located(o)
 
 
 def is_argument_right(o: Outcome) -> bool:
@@ -64,12 +59,12 @@ def is_argument_right(o: Outcome) -> bool:
 def is_recognised(o: Outcome) -> bool:
     """Whether the nearest listed law is that of the mechanism that was removed."""
     name = _truth(o)["name"].removeprefix(PREFIX)
-    return any((law["nearest_listed"] or {}).get("name") == name for law in _laws(o))
+    return any((law["nearest_listed"] or {}).get("name") == name for law in o.laws)
 
 
 def is_confidently_wrong_law(o: Outcome) -> bool:
     """Whether a law of another slot is stated with confidence, and its model is still wrong."""
-    sure = [law for law in _laws(o) if law["confidence"] >= DECISION_THRESHOLD]
+    sure = [law for law in o.laws if law["confidence"] >= DECISION_THRESHOLD]
     return bool(sure) and not is_slot_right(o) and not o.error_after <= STILL_WRONG
 
 

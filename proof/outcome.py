@@ -108,10 +108,20 @@ class Outcome:
         return list(names)[:MOST_ALTERNATIVES]
 
     @property
+    def laws(self) -> list[dict]:
+        """Learned laws of the diagnosis."""
+        return (self.diagnosis or {}).get("laws") or []
+
+    def is_law_of(self, law: dict, truth: dict) -> bool:
+        """Whether a learned law is in the slot of a concealed effect; of one that no slot holds, at its place."""
+        return truth.get("slot") in (law["slot"], "", None) and same_place(law["place"], truth["place"])
+
+    @property
     def claims(self) -> list[tuple[float, bool]]:
-        """Every stated confidence, and whether it belongs to a concealed effect."""
+        """Every stated confidence, and whether it belongs to a concealed effect: of a mechanism by its name."""
         claims = self.diagnosis["mechanisms"] + self.diagnosis["alternatives"] if self.diagnosis else []
-        return [(c["confidence"], c["name"] in self.true_names) for c in claims]
+        of_laws = [(w["confidence"], any(self.is_law_of(w, t) for t in self.key["truth"])) for w in self.laws]
+        return [(c["confidence"], c["name"] in self.true_names) for c in claims] + of_laws
 
     @property
     def error_before(self) -> float:
@@ -171,10 +181,10 @@ class Outcome:
 
     @property
     def is_confidently_wrong(self) -> bool:
-        """Whether a mechanism stated with confidence is none of the concealed effects, or too many are reported.
+        """Whether a mechanism or law stated with confidence is none of the concealed effects, or too many are reported.
 
-        An alternative counts like a mechanism that is named. Several effects that are declared explained with
-        confidence while one of them is not named count too.
+        An alternative counts like a mechanism that is named, and a law that is in the slot of none is wrong. Several
+        effects that are declared explained with confidence while one of them is not named count too.
         """
         reported = self.diagnosis["mechanisms"] if self.diagnosis else []
         wrong = any(p >= DECISION_THRESHOLD and not is_true for p, is_true in self.claims)
@@ -185,8 +195,9 @@ class Outcome:
 
 
 def after(o: Outcome, which: str) -> Outcome:
-    """A case as it is diagnosed with a further experiment."""
-    return replace(o, diagnosis=o.follow_ups[which], failure="" if o.follow_ups[which] else "no diagnosis")
+    """A case as it is diagnosed with a further experiment; without a diagnosis if there was no such experiment."""
+    diagnosis = o.follow_ups.get(which)
+    return replace(o, diagnosis=diagnosis, failure="" if diagnosis else "no diagnosis")
 
 
 class Answered(Protocol):

@@ -104,11 +104,13 @@ The held-out recordings are simulated after the diagnosis has ended.
 - **No candidate**: unlisted and removed cases.
 - **Inconsistent inputs**: all inputs of these cases are right, so the verdict `inputs-inconsistent` is a false alarm.
   It names no physics and counts as not detected.
-- **No confident misidentification**: no mechanism with a confidence of at least 0.8 is wrong, and no pair is declared
-  explained with such a confidence while one of its effects is not named.
+- **No confident misidentification**: no mechanism and no law's slot with a confidence of at least 0.8 is wrong, and no
+  pair is declared explained with such a confidence while one of its effects is not named. Confidences of laws count as
+  those of mechanisms do.
 - **Further experiment**: where the verdict is `undecided` or `unexplained`, the recordings that the diagnosis proposes
   are made on the same rig, at most three, and the batch is diagnosed again with them. The control is as many recordings
-  of a motion, a tension and a bend drawn at random from those of the batch.
+  of a motion, a tension and a bend drawn at random from those of the batch. "Decided" is any other verdict than these
+  two; where no experiment was proposed, nothing was decided.
 - **Located**: the reported place is the true one. Places that no recording distinguishes count as equal: cable and
   conduit, a pulley and its cable end, the load and its pulley.
 - **Open** in the column "met": the 95 % interval includes the target, so that more cases are needed to decide.
@@ -235,7 +237,9 @@ _MISS_HEAD = ["case", "protocol", "true effects", "size", "error before, in nois
 
 
 def _miss_row(m: dict) -> list[str]:
-    reported = "; ".join(m["identified"]) or (", ".join(m["alternatives"]) if m["verdict"] == "undecided" else "")
+    reported = "; ".join(m["identified"] + m["laws"])
+    if m["verdict"] == "undecided":
+        reported = ", ".join(m["alternatives"])
     # One line without the column separator of Markdown; the end of a failure's output holds the error message.
     failure = " ".join(m["failure"].split()).replace("|", "/")[-160:]
     return [

@@ -15,6 +15,7 @@ from proof.outcome import INCONSISTENT, Outcome, after, is_located
 INPUTS_ACCEPTED = "right inputs are not called inconsistent"
 COVERAGE = 0.9
 EXPERIMENT_DECIDES = 0.7
+DECIDED = ("agrees", "explained", "learned")
 COVERAGE_RATE = "coverage of the 90 % intervals"
 SPIEGELHALTER = "Spiegelhalter's z of confidences from 0.3 to 0.9 (calibrated: within 2)"
 CALIBRATION_ERROR = "expected calibration error of stated confidences"
@@ -63,7 +64,7 @@ def _rates_of_outsiders(outsiders: Sequence[Outcome]) -> list[dict]:
     visible, detected = [o for o in outsiders if o.is_visible], [o for o in outsiders if o.is_detected]
     name = "no candidate: unexplained, undecided, or a law learned in the true slot"
     return [
-        count(name, outsiders, _is_left_open_or_learned, 0.85),
+        count(name, outsiders, is_left_open_or_learned, 0.85),
         count("no candidate: unexplained", outsiders, lambda o: o.verdict == "unexplained"),
         count("no candidate, visible: detected", visible, lambda o: o.is_detected),
         count("no candidate, detected: located", detected, is_located),
@@ -87,22 +88,30 @@ def _rates_of_open_cases(outcomes: Sequence[Outcome]) -> list[dict]:
 
 
 def _rates_of_experiments(outcomes: Sequence[Outcome]) -> list[dict]:
-    """How often a further experiment decides: the proposed one, and one drawn at random."""
+    """How often a further experiment decides: the proposed one, and one drawn at random.
+
+    Where none was proposed, nothing is decided.
+    """
     found = []
     for verdict, target in (("undecided", EXPERIMENT_DECIDES), ("unexplained", None)):
-        asked = [o for o in outcomes if o.verdict == verdict and o.follow_ups]
         for which in (PROPOSED, RANDOM):
-            later = [after(o, which) for o in asked]
+            later = [after(o, which) for o in outcomes if o.verdict == verdict]
             what = f"{verdict}: after the {which} experiment"
             wanted = target if which == PROPOSED else None
-            found.append(count(f"{what}: explained", later, lambda o: o.verdict == "explained", wanted))
-            found.append(count(f"{what}: explained by the concealed effects", later, _is_complete))
+            found.append(count(f"{what}: decided", later, lambda o: o.verdict in DECIDED, wanted))
+            found.append(count(f"{what}: decided rightly", later, _is_decided_rightly))
     return found
 
 
-def _is_complete(o: Outcome) -> bool:
-    """Whether exactly the concealed effects are identified."""
-    return bool(o.identified) and {m["name"] for m in o.identified} == o.true_names
+def _is_decided_rightly(o: Outcome) -> bool:
+    """Whether exactly the concealed effects are identified; of an effect without a candidate, its slot."""
+    match o.kind:
+        case "clean":
+            return o.verdict == "agrees"
+        case "unlisted" | "removed":
+            return o.verdict == "learned" and is_slot_right(o)
+        case _:
+            return bool(o.identified) and {m["name"] for m in o.identified} == o.true_names
 
 
 def _by_kind(outcomes: Iterable[Outcome]) -> dict[str, list[Outcome]]:
@@ -192,7 +201,7 @@ def _gap_closed(o: Outcome, method: str) -> float:
     return o.gap_closed_by(_error(o, method)[o.worst_channel])
 
 
-def _is_left_open_or_learned(o: Outcome) -> bool:
+def is_left_open_or_learned(o: Outcome) -> bool:
     """Whether nothing is said to be the cause of an effect without a candidate, or a law of its slot."""
     return o.verdict in ("unexplained", "undecided") or (o.verdict == "learned" and is_slot_right(o))
 
@@ -209,6 +218,9 @@ def misses(outcomes: Iterable[Outcome]) -> list[dict]:
             "error_before": None if np.isnan(o.error_before) else round(float(o.error_before), 2),
             "verdict": o.verdict,
             "identified": [f"{m['name']} at {m['place']} ({m['confidence']:.2f})" for m in o.identified],
+            "laws": [
+                f"{w['slot']} at {w['place']} by {', '.join(w['arguments'])} ({w['confidence']:.2f})" for w in o.laws
+            ],
             "alternatives": o.alternatives,
             "failure": o.failure,
         }
@@ -226,7 +238,7 @@ def is_right(o: Outcome) -> bool:
         case "clean":
             return o.verdict == "agrees"
         case "unlisted" | "removed":
-            return _is_left_open_or_learned(o) or is_tolerated
+            return is_left_open_or_learned(o) or is_tolerated
         case "pair":
             return _are_all_identified(o)
         case "poor":

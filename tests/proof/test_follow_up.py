@@ -83,11 +83,41 @@ def test_an_experiment_decides_rightly_if_it_names_all_and_no_more(case):
     cases = [
         Outcome(case.key, said("undecided"), follow_ups=further),
         Outcome(case.key, said("undecided"), follow_ups=further | {RANDOM: None}),
+        # Nothing was proposed.
+        Outcome(case.key, said("undecided")),
         Outcome(case.key, said("explained", "torque-scale")),
     ]
     assert after(cases[1], RANDOM).verdict == "none"
     counted = {r["what"]: (r["k"], r["n"]) for r in rates(cases)}
-    assert counted["undecided: after the proposed experiment: explained"] == (2, 2)
-    assert counted["undecided: after the proposed experiment: explained by the concealed effects"] == (2, 2)
-    assert counted["undecided: after the random experiment: explained"] == (1, 2)
-    assert counted["undecided: after the random experiment: explained by the concealed effects"] == (0, 2)
+    assert counted["undecided: after the proposed experiment: decided"] == (2, 3)
+    assert counted["undecided: after the proposed experiment: decided rightly"] == (2, 3)
+    assert counted["undecided: after the random experiment: decided"] == (1, 3)
+    assert counted["undecided: after the random experiment: decided rightly"] == (0, 3)
+
+
+def test_a_clean_case_is_decided_by_agrees_and_one_without_a_candidate_by_its_law():
+    """None of them has a mechanism that could explain it."""
+    clean = {"kind": "clean", "truth": [{"name": "none", "place": None}]}
+    effect = {"name": "unlisted-cogging-motor", "place": "drive-pulley", "slot": "pulley-bearing"}
+    unlisted = {"kind": "unlisted", "truth": [effect]}
+    law = {"place": "drive-pulley", "slot": "pulley-bearing", "arguments": ["drive-angle"], "confidence": 0.9}
+
+    def said(verdict, **laws):
+        return {
+            "verdict": verdict,
+            "place": "drive-pulley",
+            "mechanisms": [],
+            "alternatives": [],
+            "laws": [laws] if laws else [],
+        }
+
+    def decided(key, found):
+        case = Outcome(key, said("undecided"), follow_ups={PROPOSED: found})
+        (counted,) = [r["k"] for r in rates([case]) if r["what"].endswith("proposed experiment: decided rightly")][:1]
+        return bool(counted)
+
+    assert decided(clean, said("agrees"))
+    assert not decided(clean, said("learned", **law))
+    assert decided(unlisted, said("learned", **law))
+    assert not decided(unlisted, said("learned", **law | {"slot": "load"}))
+    assert not decided(unlisted, said("agrees"))

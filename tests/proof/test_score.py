@@ -96,6 +96,24 @@ def test_an_alternative_that_is_stated_with_confidence_counts_like_a_mechanism(n
     assert Outcome(answer("single", GAIN), said).is_confidently_wrong == wrong
 
 
+@pytest.mark.parametrize(
+    ("kind", "slot", "confidence", "wrong"),
+    [
+        ("single", "torque-map", 0.9, False),
+        ("single", "load", 0.9, True),
+        ("single", "load", 0.7, False),
+        ("clean", "torque-map", 0.9, True),
+    ],
+)
+def test_a_law_that_is_stated_with_confidence_is_wrong_in_another_slot(kind, slot, confidence, wrong):
+    key = answer(kind, *([GAIN] if kind == "single" else []))
+    key["truth"][0]["slot"] = "torque-map" if kind == "single" else None
+    law = {"slot": slot, "place": "drive-sensor", "arguments": ["torque"], "confidence": confidence}
+    o = Outcome(key, reported("learned", place="drive-sensor") | {"laws": [law]})
+    assert o.is_confidently_wrong == wrong
+    assert o.claims == [(confidence, slot == "torque-map" and kind == "single")]
+
+
 def test_rates_of_the_mechanisms_law_and_of_another_stand_apart():
     other = answer("single", GAIN)
     other["truth"][0]["law"] = "another"

@@ -22,8 +22,12 @@ STEP = 1e-6
 
 
 def laws_of(judgement: Judgement) -> list[dict]:
-    """The laws of a judgement as the diagnosis format states them, none with another verdict than ``learned``."""
-    return [_stated(judgement, law) for law in laws_in(judgement.best.hypothesis) if judgement.verdict == "learned"]
+    """The laws of a judgement as the diagnosis format states them, the highest confidence first.
+
+    There are none with another verdict than ``learned``.
+    """
+    every = laws_in(judgement.best.hypothesis) if judgement.verdict == "learned" else ()
+    return [_stated(judgement, law) for law in sorted(every, key=lambda law: -judgement.confidence_in_slot(law))]
 
 
 def _stated(judgement: Judgement, law: Law) -> dict:
