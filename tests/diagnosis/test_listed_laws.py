@@ -11,7 +11,7 @@ from ccmodel.diagnosis.settings import WITHIN_BAND
 from ccmodel.mechanisms import laws
 from ccmodel.mechanisms.contract import Parameter
 from ccmodel.mechanisms.learned import FINE
-from ccmodel.report.verdict import law_claim
+from ccmodel.report.verdict import law_claim, law_size
 
 # What recordings visit of each argument.
 RANGES = {
@@ -156,8 +156,11 @@ def test_a_map_is_compared_with_faults_of_its_own_sensor():
 
 def said(formula="a + b x", **nearest):
     law = {
+        "name": "learned-sliding-friction-by-speed",
         "formula": formula,
         "slot": "sliding-friction",
+        "curve": [[-2.0, 1.1, 1.0, 1.2], [-1.0, 0.9, 0.8, 1.0]],
+        "argument_unit": "log10(m/s)",
         "place": "conduit",
         "argument_is": "the speed",
         "indistinguishable": [],
@@ -180,8 +183,11 @@ def test_the_report_says_where_a_law_is_a_constant():
 
 def test_the_report_says_by_how_much_a_radius_is_wrong():
     law = {
+        "name": "learned-pulley-radius-drive-by-drive-angle",
         "formula": "a",
         "slot": "pulley-radius",
+        "curve": [[-0.5, 1.03, 1.02, 1.04], [0.5, 1.03, 1.02, 1.04]],
+        "argument_unit": "rad",
         "place": "drive-pulley",
         "argument_is": "the drive pulley's angle",
         "parameters": [{"name": "a", "value": 1.0312, "low": 1.03, "high": 1.033, "unit": "1"}],
@@ -201,5 +207,52 @@ def test_a_delay_is_said_of_its_end_and_compared_with_a_late_clock():
     kept = law.curve(x, np.full(x.size, 0.012), Parameter("strength", "1", 0.1, 3.0, 1.0, "size"))
     assert distance(found, kept) < WITHIN_BAND and _is_comparable(law, kept)
     stated = {"slot": law.slot, "place": law.place, "channel": None, "argument_is": "the time", "confidence": 0.9}
-    text = law_claim(stated | {"indistinguishable": [], "nearest_listed": None})
-    assert text.startswith("The delay of the load's channels depends on the time")
+    curve = {"name": law.name, "curve": [[0.0, 0.0, 0.0, 0.0], [9.0, 0.012, 0.01, 0.02]], "argument_unit": "s"}
+    text = law_claim(stated | curve | {"indistinguishable": [], "nearest_listed": None})
+    assert text.startswith(
+        "The delay of the load's channels depends on the time: from 0 s at 0 s to 12 ms at 9 s, conf"
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "curve", "says"),
+    [
+        (
+            "learned-sliding-friction-by-direction",
+            [[-1.0, 0.9, 0.89, 0.91], [1.0, 1.1, 1.09, 1.11]],
+            "22 % (20 to 25 %) higher towards the drive than away from the drive",
+        ),
+        (
+            "learned-sliding-friction-by-cable",
+            [[-1.0, 1.1, 1.09, 1.11], [1.0, 0.9, 0.89, 0.91]],
+            "22 % (20 to 25 %) higher in cable A than in cable B",
+        ),
+        (
+            "learned-sliding-friction-by-tension",
+            [[0.5, 1.05, 1.0, 1.1], [5.0, 0.97, 0.96, 0.98], [25.0, 0.93, 0.92, 0.94]],
+            "from 0.93 times the calibrated one at 25 N to 1.05 times at 0.5 N",
+        ),
+        (
+            "learned-bearing-torque-by-drive-angle",
+            [[-0.6, 0.001, 0.0, 0.002], [0.0, -0.0057, -0.006, -0.005], [0.6, 0.0061, 0.006, 0.007]],
+            "from -5.7 mN m at 0 rad to 6.1 mN m at 0.6 rad",
+        ),
+        (
+            "learned-sliding-friction-bend-by-position-along-conduit",
+            [[0.0, -0.1, -0.2, 0.0], [0.5, 0.9, 0.8, 1.0]],
+            "bend added to the conduits from -0.1 rad at 0 to 0.9 rad at 0.5",
+        ),
+    ],
+)
+def test_a_law_says_how_large_it_is(name, curve, says):
+    learned = laws()[name]
+    law = {"name": name, "slot": learned.slot, "curve": curve, "argument_unit": learned.argument.unit}
+    assert law_size(law) == says
+
+
+def test_a_mass_is_said_by_its_constant():
+    (name,) = (n for n, law in laws().items() if law.form.in_proportion)
+    constant = {"name": "a", "value": 4.06e-4, "low": 4.0e-4, "high": 4.1e-4, "unit": "N*m/(rad/s^2)"}
+    assert law_size({"name": name, "slot": laws()[name].slot, "curve": [], "parameters": [constant]}).endswith(
+        " times it"
+    )

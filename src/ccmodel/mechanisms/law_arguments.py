@@ -162,7 +162,7 @@ DIRECTION = Argument(
     ("away from the drive", "towards the drive"),
     "sign(v)",
 )
-CABLE = Argument("cable", "1", "the cable", _cables, ("A", "B"))
+CABLE = Argument("cable", "1", "the cable", _cables, ("in cable A", "in cable B"))
 TIME = Argument("time", "s", "the time since the recording's start", lambda s: s.time_s - s.time_s[0])
 TRAVEL = Argument("travel", "m", "the drive's travel since the recording's start", lambda s: s.drive_travel_m)
 LOG_SPEED = Argument("speed", "log10(m/s)", "the logarithm of the cables' speed at the drive", _log_speed)

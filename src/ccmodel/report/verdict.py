@@ -150,12 +150,12 @@ def law_sentence(diagnosis: Mapping) -> str:
 
 
 def law_claim(law: Mapping) -> str:
-    """What a learned law says, with its confidence."""
+    """What a learned law says and how large it is, with its confidence."""
     is_of_one = law["slot"] == SENSOR_MAP and law["channel"] is not None
     what = f"The error of {symbol_of(law['channel'])}" if is_of_one else IN_SLOT[law["slot"]]
     what = what.format(side=side(law["place"]))
     others = f" (or on {' or '.join(law['indistinguishable'])})" if law["indistinguishable"] else ""
-    says = f"depends on {law['argument_is']}{others}"
+    says = f"depends on {law['argument_is']}{others}: {law_size(law)}"
     if law.get("formula") == CONSTANT:
         is_radius = law["slot"] == PULLEY_RADIUS
         says = f"is {law['parameters'][0]['value']:.3g} times the stated one" if is_radius else "is constant"
@@ -163,6 +163,44 @@ def law_claim(law: Mapping) -> str:
         f"{what} {says}, confidence {law['confidence']:.2f}. {_resemblance(law)}; the law was learned from the"
         " recordings."
     )
+
+
+def law_size(law: Mapping) -> str:
+    """How far apart the two values of a law are, what its constant is, or between which values its curve goes."""
+    learned = registry.laws()[law["name"]]
+    curve, is_factor, unit = law["curve"], learned.form.is_factor, learned.unit.replace(" ", "*")
+    if learned.argument.has_two_values:
+        # Both follow from one number: as one grows, the other falls.
+        (_, *first), (_, *second) = curve
+        lower, higher = sorted((first, second))
+        pairs = zip(higher, (lower[0], lower[2], lower[1]), strict=True)
+        apart = [high / low - 1 if is_factor else high - low for high, low in pairs]
+        value, interval = quantity(*apart, "%" if is_factor else unit)
+        names = learned.argument.two_values
+        more, less = names if higher is first else names[::-1]
+        return f"{value} ({interval}) higher {more} than {less}"
+    if learned.form.in_proportion:
+        (constant,) = law["parameters"]
+        value, interval = quantity(constant["value"], constant["low"], constant["high"], constant["unit"])
+        return f"{value} ({interval}) times it"
+    reference = "stated" if law["slot"] == PULLEY_RADIUS else "calibrated"
+
+    def shown(row: Sequence[float]) -> str:
+        return f"{row[1]:.2f} times the {reference} one" if is_factor else rounded(row[1], unit)
+
+    (low, at_low), (high, at_high) = (
+        (shown(row), _argument(row[0], law["argument_unit"]))
+        for row in (min(curve, key=lambda row: row[1]), max(curve, key=lambda row: row[1]))
+    )
+    # Friction may have a drag or a bend added to it.
+    added = f"{learned.curve_is.partition(',')[0]} " if law["slot"] == SLIDING_FRICTION and not is_factor else ""
+    return f"{added}from {low} at {at_low} to {high.removesuffix(f' the {reference} one')} at {at_high}"
+
+
+def _argument(x: float, unit: str) -> str:
+    """A value of a law's argument; of a logarithm, that of which it is taken."""
+    of = re.fullmatch(r"log10\((.*)\)", unit)
+    return rounded(10.0**x, of[1]) if of else rounded(x, unit.replace(" ", "*"))
 
 
 def recognised_as(law: Mapping) -> str | None:
