@@ -24,6 +24,8 @@ LIMIT_FACTOR = 1.5
 HIGHEST_LIMIT_N = 2000.0
 # Time over which the drive's sub-count offset is added to the motion, s.
 OFFSET_RISE_S = 0.3
+# Channels whose reading at rest a model begins with.
+FROM_REST = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm")
 
 
 def build(case: Case, out: Path) -> dict:
@@ -123,10 +125,11 @@ def noise_floor(
 
     The recording is simulated again with friction higher by its standard deviation from run to run, the drive offset by
     one standard deviation of its sub-count position, and a past in the middle of its range. A model takes the tension
-    from the rest: the pretension is such that the load cells read the same there. The difference is added in
-    quadrature to the sensors' noise and to the uncertainty of their zeros. The load's sub-count position counts twice,
-    because its zero is read at the same rest. Both load cells give the pretension at rest, so that each is off by half
-    the difference of their zeros.
+    from the rest: the pretension is such that the load cells read the same there. It also begins with the torques and
+    the angle that are read there, so that the difference counts from its value at rest: another profile of the tension
+    moves the load before anything else moves. What is left is added in quadrature to the sensors' noise and to the
+    uncertainty of their zeros. The load's sub-count position counts twice, because its zero is read at the same rest.
+    Both load cells give the pretension at rest, so that each is off by half the difference of their zeros.
 
     Parameters
     ----------
@@ -156,7 +159,10 @@ def noise_floor(
         "F_drive_N": force,
         "F_load_N": force,
     }
-    return {name: float(np.sqrt(np.mean((first[name] - second[name]) ** 2) + sensor_variance[name])) for name in first}
+    differ = {name: first[name] - second[name] for name in first}
+    rest = trajectory.time_s < plan.excitation.rest_s
+    differ |= {name: differ[name] - differ[name][rest].mean() for name in FROM_REST}
+    return {name: float(np.sqrt(np.mean(values**2) + sensor_variance[name])) for name, values in differ.items()}
 
 
 def _at_rest(channels: Mapping[str, NDArray]) -> float:

@@ -172,9 +172,10 @@ def test_a_case_that_cannot_be_built_is_refused(arguments, message, tmp_path):
 
 def test_the_noise_floor_adds_sensors_and_repeatability(poor, monkeypatch):
     plan, time_s = poor.kept_back[0], np.linspace(0, 5, 500)
+    is_moving = time_s >= plan.excitation.rest_s
 
     def simulated(campaign, plan, preparation):
-        torque = preparation.friction_coefficient * np.ones_like(time_s)
+        torque = preparation.friction_coefficient * is_moving
         angle, _ = plan.excitation.angle_and_rate(time_s)
         return Trajectory(time_s, angle, angle, *(np.ones_like(time_s) for _ in range(4)), torque, torque)
 
@@ -184,7 +185,9 @@ def test_the_noise_floor_adds_sensors_and_repeatability(poor, monkeypatch):
     floor = build.noise_floor(campaign, plan, prepared, simulated(campaign, plan, prepared))
     noise, slow = campaign.sensors.torque.noise_Nm, campaign.sensors.torque.slow_noise.ratio
     expected = np.sqrt(
-        campaign.repeatability.friction**2 + noise**2 * (1 + slow**2) + campaign.sensors.torque.accuracy_Nm**2 / 3
+        is_moving.mean() * campaign.repeatability.friction**2
+        + noise**2 * (1 + slow**2)
+        + campaign.sensors.torque.accuracy_Nm**2 / 3
     )
     assert floor["tau_in_Nm"] == pytest.approx(expected, rel=1e-6)
     count = 2 * np.pi / 2000 / np.sqrt(12)
@@ -204,6 +207,21 @@ def test_the_noise_floor_has_what_the_rest_does_not_show_of_the_initial_tension(
         floors.append(build.noise_floor(campaign, plan, preparation, trajectory)["F_drive_N"])
         at_rest.append(trajectory.T1_N[0] + trajectory.T3_N[0])
     assert np.sqrt(floors[1] ** 2 - floors[0] ** 2) == pytest.approx(abs(at_rest[1] - at_rest[0]), rel=0.5)
+
+
+def test_the_noise_floor_lacks_what_the_rest_shows_of_the_initial_tension():
+    """Cables whose profiles differ hold the load at another angle, which the zero of its encoder takes away."""
+    case = draw(5, "clean")
+    plan, campaign = case.kept_back[0], case.campaign
+    apart = replace(
+        build.prepare(campaign, plan, np.random.default_rng(1)), profile_curvature=(-0.3, 0.3), profile_share=(0.0, 0.0)
+    )
+    even = replace(apart, profile_curvature=(0.0, 0.0))
+    trajectory, other = (build.simulate(campaign, plan, preparation) for preparation in (apart, even))
+    moved = abs(trajectory.theta_out_rad[0] - other.theta_out_rad[0])
+    floor = build.noise_floor(campaign, plan, apart, trajectory)
+    assert floor["theta_out_rad"] < 0.3 * moved
+    assert floor["tau_out_Nm"] < 0.3 * moved * campaign.rig.load.spring_stiffness_Nm_per_rad
 
 
 def test_a_rig_that_has_some_of_its_effects_is_otherwise_the_same():
