@@ -62,7 +62,9 @@ def judge(
         record(case, case.recordings, batch)
         report(f"{case.name}: diagnosing, {conceal.core_s() - started:.0f} s of one core so far")
         digest = folder_digest(batch)
+        before_s = conceal.core_s()
         completed = conceal.diagnose(batch, out, case.without, sources)
+        diagnosis_s = conceal.core_s() - before_s
         report(f"{case.name}: predicting held-out recordings, {conceal.core_s() - started:.0f} s of one core so far")
         diagnosis = _read_diagnosis(out / "diagnosis.json") if completed.is_usable else None
         held_out = _compare_with_held_out(case, batch, out, sources, with_regressors) if diagnosis else _HeldOut()
@@ -83,6 +85,7 @@ def judge(
         "errors": held_out.errors,
         "rivals": held_out.regressors,
         "follow_ups": further,
+        "diagnosis_s": round(diagnosis_s, 1),
         "took_s": round(took_s, 1),
     }
     write_result(result, out, report)

@@ -52,8 +52,9 @@ class Outcome:
     errors : dict
         By channel, the root mean square errors on held-out recordings "before" and "after" the diagnosis, and the
         noise floor ("floor"), in the channel's unit.
-    took_s : float
-        Processor time, s.
+    diagnosis_s, took_s : float
+        Processor time of the diagnosis, and of the case with its simulations and predictions, s; the first is NaN in
+        results from before it was measured.
     regressors : dict
         By reference regressor and channel, the root mean square error on held-out recordings.
     follow_ups : dict
@@ -64,6 +65,7 @@ class Outcome:
     diagnosis: dict | None
     failure: str = ""
     errors: dict = field(default_factory=dict)
+    diagnosis_s: float = np.nan
     took_s: float = 0.0
     regressors: dict = field(default_factory=dict)
     follow_ups: dict = field(default_factory=dict)
@@ -217,6 +219,7 @@ def outcome(result: dict) -> Outcome:
         diagnosis=diagnosis,
         failure=refused or result["why"] or "",
         errors=result["errors"] if diagnosis else {},
+        diagnosis_s=result.get("diagnosis_s", np.nan),
         took_s=result["took_s"],
         regressors=result["rivals"] if diagnosis else {},
         follow_ups={k: v["diagnosis"] for k, v in result.get("follow_ups", {}).items()} if diagnosis else {},

@@ -111,6 +111,8 @@ The held-out recordings are simulated after the diagnosis has ended.
   are made on the same rig, at most three, and the batch is diagnosed again with them. The control is as many recordings
   of a motion, a tension and a bend drawn at random from those of the batch. "Decided" is any other verdict than these
   two; where no experiment was proposed, nothing was decided.
+- **Times** are of one core, with other cases beside it. The diagnoses here are limited by their model runs alone; a
+  diagnosis outside the proof has a time limit too.
 - **Located**: the reported place is the true one. Places that no recording distinguishes count as equal: cable and
   conduit, a pulley and its cable end, the load and its pulley.
 - **Open** in the column "met": the 95 % interval includes the target, so that more cases are needed to decide.

@@ -153,11 +153,19 @@ def statistics(outcomes: Sequence[Outcome]) -> list[dict]:
         bootstrap("clean: error after over the noise floor, worst channel, median", clean, np.median),
         bootstrap("parameter values: relative error, median", relative_errors, np.median),
         bootstrap("undecided: number of alternatives, mean", alternatives, np.mean),
-        bootstrap(
-            "processor time of a case with its simulations and predictions, median (s)",
-            [o.took_s for o in outcomes],
-            np.median,
-        ),
+        *_times(outcomes),
+    ]
+
+
+def _times(outcomes: Sequence[Outcome]) -> list[dict]:
+    """Processor times of one core, s."""
+    timed = [o for o in outcomes if np.isfinite(o.diagnosis_s)]
+    clean, others = ([o.diagnosis_s for o in timed if (o.kind == "clean") == is_clean] for is_clean in (True, False))
+    return [
+        bootstrap("processor time of a diagnosis, clean, median (s)", clean, np.median),
+        bootstrap("processor time of a diagnosis, not clean, median (s)", others, np.median),
+        bootstrap("processor time of a diagnosis, not clean, largest (s)", others, np.max),
+        bootstrap("processor time of a case with all runs, median (s)", [o.took_s for o in outcomes], np.median),
     ]
 
 

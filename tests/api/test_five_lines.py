@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -117,6 +118,13 @@ def test_a_diagnosis_saves_what_the_command_writes(found, folder, tmp_path):
     assert names == {file.name for file in (tmp_path / "mine").iterdir()}
     for name in ("diagnosis.json", "calibrated.json", "model.json"):
         assert (tmp_path / "mine" / name).read_bytes() == (tmp_path / "command" / name).read_bytes(), name
+
+
+@pytest.mark.parametrize(("verdict", "confidence"), [("learned", 0.7), ("explained", 0.9), ("unexplained", None)])
+def test_the_confidence_is_that_of_what_the_verdict_names(batch, verdict, confidence):
+    named = {"laws": [{"confidence": 0.95}, {"confidence": 0.7}], "mechanisms": [{"confidence": 0.9}]}
+    content = {"verdict": verdict, "alternatives": [], "not_judged": []} | named
+    assert cc.Diagnosis(batch, SimpleNamespace(content=content)).confidence == confidence
 
 
 def test_a_diagnosis_shows_its_verdict_and_its_candidates(found, truth):

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from ccmodel import mechanisms as registry
 from ccmodel.diagnosis import experiment as experiment_module
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.drive import speed
@@ -89,6 +90,27 @@ def test_candidates_are_told_from_the_calibrated_model_if_that_may_be_all(monkey
     monkeypatch.setattr(experiment_module, "separation", lambda *given: 0.0)
     assert proposed(judged(recordings, *rivals, of_base=of_base), PARAMETERS) is None
     assert set(planned) == {("kink",), ("stribeck",), *([()] if of_base else [])}
+
+
+def test_a_learned_law_is_told_from_the_same_law_of_another_argument(monkeypatch):
+    """Not from one of another slot, nor from the same argument with more knots."""
+    recordings, planned = batch(), []
+    names = (
+        "learned-sliding-friction-by-direction",
+        "learned-sliding-friction-by-tension",
+        "learned-sliding-friction-by-tension-fine",
+        "learned-cable-stretch-by-tension",
+    )
+    rivals = [fitted(recordings, (name, registry.get(name).places[0])) for name in names]
+    found = replace(judged(recordings, *rivals), verdict="learned")
+    found.comparison.log_weight = lambda candidate: np.log(1 / len(rivals))
+    monkeypatch.setattr(
+        experiment_module, "planned_observations", lambda e, c, *rest: planned.append(c.hypothesis.names)
+    )
+    monkeypatch.setattr(experiment_module, "separation", lambda *given: 1.0)
+    said = proposed(found, PARAMETERS)
+    assert said["separates"] == ["sliding-friction by direction", "sliding-friction by tension"]
+    assert set(planned) == {(names[0],), (names[1],)}
 
 
 def test_a_load_that_was_measured_is_taken_as_in_the_recordings():

@@ -268,3 +268,11 @@ def test_a_regressor_is_better_with_less_error():
 def test_a_crash_counts_as_not_detected():
     crashed = Outcome(answer("single", GAIN), None, "exit code 1")
     assert rate_of("single, visible: detected", IDENTIFIED, crashed) == (1, 2)
+
+
+def test_times_of_clean_and_other_cases_stand_apart():
+    timed = [replace(CLEAN, diagnosis_s=8.0), replace(IDENTIFIED, diagnosis_s=20.0), replace(MISSED, diagnosis_s=60.0)]
+    found = {s["what"]: (s["n"], s["value"]) for s in scoring.statistics([*timed, OUTSIDER])}
+    assert found["processor time of a diagnosis, clean, median (s)"] == (1, 8.0)
+    assert found["processor time of a diagnosis, not clean, median (s)"] == (2, 40.0)
+    assert found["processor time of a diagnosis, not clean, largest (s)"] == (2, 60.0)

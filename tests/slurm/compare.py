@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 NOT_RESULTS = ("logs", "benchmarks")
-TIMES = {"took_s"}
+TIMES = {"diagnosis_s", "took_s"}
 # A line of the score on such times, by its first words.
 TIME_IN_SCORE = "processor time "
 

@@ -59,11 +59,13 @@ class Diagnosis:
     def confidence(self) -> float | None:
         """Probability of what the verdict names, 0 to 1.
 
-        Of the least certain of the mechanisms (``explained``), of the most probable mechanism (``undecided``), of the
-        surest contradiction (``inputs-inconsistent``); None for the verdicts that name nothing.
+        Of the least certain of the mechanisms (``explained``), of the least certain law (``learned``), of the most
+        probable mechanism (``undecided``), of the surest contradiction (``inputs-inconsistent``); None for the verdicts
+        that name nothing.
         """
         named = {
             "explained": self.report["mechanisms"],
+            "learned": self.report["laws"],
             "undecided": [*self.report["mechanisms"], *self.report["alternatives"]][:1],
             "inputs-inconsistent": self.report["not_judged"][:1],
         }

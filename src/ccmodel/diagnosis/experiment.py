@@ -13,9 +13,11 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel import mechanisms as registry
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.drive import speed
+from ccmodel.diagnosis.hypothesis import laws_in
 from ccmodel.diagnosis.verdict import Judgement
 from ccmodel.diagnosis.whitening import Whitened, nuisances, shrinkage_of
 from ccmodel.failure import ModelError
@@ -68,12 +70,11 @@ class Experiment:
 
 
 def proposed(judgement: Judgement, estimates: Parameters) -> dict | None:
-    """The experiment that best separates the leading candidates; None without two that can be run."""
-    pairs = zip(judgement.candidates, judgement.probability, strict=True)
-    candidates = [c for c, p in pairs if p > settings.ALTERNATIVE]
-    if judgement.comparison.probability_of_base > settings.ALTERNATIVE or len(candidates) < 2:
-        candidates = [judgement.calibrated, *(candidates or judgement.candidates)]
-    candidates = candidates[: settings.SEPARATED]
+    """The experiment that best separates the leading candidates; None without two that can be run.
+
+    Of a learned law, it separates the arguments that it may have.
+    """
+    candidates = (_by_argument if judgement.verdict == "learned" else _leading)(judgement)[: settings.SEPARATED]
     if len(candidates) < 2:
         return None
     template = max(judgement.whitened, key=lambda w: w.observations.given.recording.pretension_N).observations
@@ -85,7 +86,7 @@ def proposed(judgement: Judgement, estimates: Parameters) -> dict | None:
     if max(refitted, default=0.0) <= 0:
         return None
     best = int(np.argmax(refitted))
-    names = list(dict.fromkeys(name for c in candidates for name, _ in c.hypothesis.acting))
+    names = list(dict.fromkeys(_in_words(name) for c in candidates for name, _ in c.hypothesis.acting))
     differ = f"there any two candidates differ by at least {refitted[best]:.2g} times the noise after a refit"
     wanted = recordings_wanted(refitted[best], len(template.channels))
     give = "one such recording gives" if wanted == 1 else f"{wanted} such recordings give"
@@ -93,6 +94,32 @@ def proposed(judgement: Judgement, estimates: Parameters) -> dict | None:
     odds = f"odds of {settings.WANTED_ODDS:g} for the better of two"
     text = f"{chosen.text}: {differ}, more than in any other motion tried; {give} {odds}."
     return {"text": text, "separates": names, "recording": chosen.recording(wanted)}
+
+
+def _leading(judgement: Judgement) -> list[CandidateFit]:
+    """The probable candidates, and the calibrated model if it may be all or if there are too few others."""
+    pairs = zip(judgement.candidates, judgement.probability, strict=True)
+    candidates = [c for c, p in pairs if p > settings.ALTERNATIVE]
+    if judgement.comparison.probability_of_base > settings.ALTERNATIVE or len(candidates) < 2:
+        return [judgement.calibrated, *(candidates or judgement.candidates)]
+    return candidates
+
+
+def _by_argument(judgement: Judgement) -> list[CandidateFit]:
+    """The most probable candidate with each argument that the recordings do not exclude for a learned law."""
+    learned, confidence = laws_in(judgement.best.hypothesis), judgement.confidence
+    found: dict[tuple[str, ...], CandidateFit] = {}
+    for candidate in (judgement.best, *judgement.candidates):
+        laws = [law for law in laws_in(candidate.hypothesis) if any(law.is_of_slot(one) for one in learned)]
+        if laws and (candidate is judgement.best or confidence[candidate.hypothesis] > settings.ALTERNATIVE):
+            found.setdefault(tuple(sorted(law.argument.name for law in laws)), candidate)
+    return list(found.values())
+
+
+def _in_words(name: str) -> str:
+    """A mechanism's name, or the slot and the argument of a learned law."""
+    law = registry.laws().get(name)
+    return name if law is None else f"{law.slot} by {law.argument.name}"
 
 
 def recordings_wanted(apart: float, channels: int) -> int:

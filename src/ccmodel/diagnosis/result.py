@@ -41,6 +41,8 @@ def report(
     of_list = identified(judgement.verdict, best.hypothesis, confidence)
     named = [best.hypothesis.acting[k] for k in of_list]
     shift, failures = _discretisation(judgement) if named else (None, [])
+    laws = laws_of(judgement)
+    is_open = judgement.is_open or any(law["indistinguishable"] for law in laws)
     return {
         "format": FORMAT,
         "batch": batch,
@@ -48,7 +50,7 @@ def report(
         "is_held": base.hypothesis.is_frozen,
         "location": location.location(judgement, calibrated),
         "mechanisms": [mechanism_of(best, k, _below_certainty(confidence[k]), shift) for k in of_list],
-        "laws": laws_of(judgement),
+        "laws": laws,
         "alternatives": alternatives_of(judgement, dict(named)),
         "likeliest": [{"name": n, "place": p} for n, p in best.hypothesis.acting if judgement.verdict == "undecided"],
         "nearest": _nearest(judgement, calibrated),
@@ -59,7 +61,7 @@ def report(
             "error": held_out_errors(judgement, calibrated, nested_choice(judgement)),
         },
         "repeatability": repeatability.report(whitened),
-        "next_experiment": experiment.proposed(judgement, estimates) if judgement.is_open else None,
+        "next_experiment": experiment.proposed(judgement, estimates) if is_open else None,
         "not_judged": [*not_judged, *contradicting_recording(judgement), *_at_bounds(best), *failures],
     }
 

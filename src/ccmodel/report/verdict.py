@@ -174,8 +174,8 @@ def law_size(law: Mapping) -> str:
         (_, *first), (_, *second) = curve
         lower, higher = sorted((first, second))
         pairs = zip(higher, (lower[0], lower[2], lower[1]), strict=True)
-        apart = [high / low - 1 if is_factor else high - low for high, low in pairs]
-        value, interval = quantity(*apart, "%" if is_factor else unit)
+        apart, least, most = (high / low - 1 if is_factor else high - low for high, low in pairs)
+        value, interval = quantity(apart, least, most, "%" if is_factor else unit)
         names = learned.argument.two_values
         more, less = names if higher is first else names[::-1]
         return f"{value} ({interval}) higher {more} than {less}"
