@@ -91,12 +91,13 @@ def family(
     name: Annotated[str, typer.Argument(help="removed or unlisted.")],
     seed: Seed = 0,
     count: Annotated[int | None, typer.Option(min=1, help="Number of cases; the plan's if not given.")] = None,
+    regressors: Regressors = False,
     cores: Cores = 1,
 ) -> None:
     """Run a family of cases of laws that the list lacks: every effect in turn, at two strengths."""
     if name not in FAMILIES:
         raise typer.BadParameter(f"there is no family {name!r}; there are {', '.join(FAMILIES)}")
-    _judge_each(list(family_of(name, seed, count)), out, False, cores)
+    _judge_each(list(family_of(name, seed, count)), out, regressors, cores)
 
 
 @app.command()

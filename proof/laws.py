@@ -23,6 +23,7 @@ def score_of_laws(outcomes: Sequence[Outcome]) -> list[dict]:
     with_slot = [o for o in visible if _truth(o).get("slot")]
     found = [o for o in with_slot if law_in_slot(o) is not None and _truth(o)["curve"]]
     removed = [o for o in visible if o.kind == "removed" and o.laws]
+    compared = [o for o in visible if o.regressors]
     gaps = [gap for o in visible if (gap := o.gap_closed) is not None]
     shares = [share for o in found if (share := inside(o)) is not None]
     return [
@@ -32,6 +33,7 @@ def score_of_laws(outcomes: Sequence[Outcome]) -> list[dict]:
         count("visible: argument right or among those not told apart", with_slot, is_argument_right, 0.8),
         bootstrap("true curve inside the 90 % band, share of the points", shares, np.mean, 0.85),
         count("removed, a law learned: the mechanism is the nearest listed", removed, is_recognised, 0.8),
+        count("visible: no reference regressor has less error", compared, _is_nearest, 0.9),
         count("no confident wrong law", every, lambda o: not is_confidently_wrong_law(o), 0.98),
     ]
 
@@ -54,6 +56,10 @@ def is_argument_right(o: Outcome) -> bool:
     """Whether the law depends on the true quantity, or on one that the recordings do not tell from it."""
     law = law_in_slot(o)
     return law is not None and _truth(o)["argument"] in [*law["arguments"], *law["indistinguishable"]]
+
+
+def _is_nearest(o: Outcome) -> bool:
+    return o.error_after <= o.error_of_regressors
 
 
 def is_recognised(o: Outcome) -> bool:

@@ -136,6 +136,12 @@ class Outcome:
         return max((e["after"] / e["floor"] for e in self.errors.values()), default=np.nan)
 
     @property
+    def error_of_regressors(self) -> float:
+        """Error of the best reference regressor over the noise floor, in its worst channel; NaN if none was fitted."""
+        worst = (max(error / self.errors[c]["floor"] for c, error in r.items()) for r in self.regressors.values())
+        return min(worst, default=np.nan)
+
+    @property
     def is_visible(self) -> bool:
         """Whether the recalibrated model's error is at least `VISIBLE` noise floors; True if it is not known."""
         return not self.errors or self.error_before >= VISIBLE

@@ -66,6 +66,19 @@ def test_a_radius_has_no_slope_from_the_calibration():
     assert absorbed(1 + 0.05 * angle, angle, np.ones(9), truth) == pytest.approx(1 + 0.05 * angle)
 
 
+def test_regressors_are_compared_where_they_were_fitted():
+    learned = outcome(answer(y=rising), law(rising))
+    nearer, further = (
+        replace(
+            learned, regressors={"a": {"tau_in_Nm": learned.errors["tau_in_Nm"]["floor"] * 9}, "b": {"tau_in_Nm": x}}
+        )
+        for x in (0.0, learned.errors["tau_in_Nm"]["floor"] * 5)
+    )
+    assert nearer.error_of_regressors == 0.0 and further.error_of_regressors == pytest.approx(5.0)
+    row = of("no reference regressor", learned, nearer, further)
+    assert (row["k"], row["n"]) == (1, 2)
+
+
 def test_slots_and_arguments_are_counted():
     right = outcome(answer(y=rising), law(rising))
     untold = outcome(answer(y=rising, argument="speed"), law(rising, indistinguishable=["speed"]))
