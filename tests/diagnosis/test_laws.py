@@ -17,7 +17,7 @@ from ccmodel.deadline import UNLIMITED
 from ccmodel.diagnosis import laws as proposing
 from ccmodel.diagnosis.equation_error import INERTIA
 from ccmodel.diagnosis.hypothesis import Hypothesis
-from ccmodel.diagnosis.laws import _missing_mass, _unit_of, proposals
+from ccmodel.diagnosis.laws import _missing_mass, _unit_of, proposals, visited
 from ccmodel.diagnosis.selection import finer_laws
 from ccmodel.diagnosis.settings import WITHIN_BAND
 from ccmodel.failure import ModelError
@@ -209,7 +209,9 @@ def test_a_drag_is_proposed_where_it_acts(place):
     z = np.linalg.lstsq(law.basis, wanted, rcond=None)[0]
     values = {"first": 0.0, "last": 1.0, "scale": 1.0} | dict(zip(law.coefficients, z.tolist(), strict=True))
     truth = replace(PARAMETERS, mechanisms=(Active(law.name, law.place, values),))
-    (proposal,) = proposals(calibrated(batch(truth=truth)), [law], UNLIMITED)
+    base = calibrated(batch(truth=truth))
+    (proposal,) = proposals(base, [law], UNLIMITED)
+    assert set(visited(base, law)) == {0.0, 1.0}
     scale = dict(proposal.hypothesis.fixed)[mechanism_key(law.name, law.place, "scale")]
     assert scale * law.basis @ list(proposal.values.values()) == pytest.approx(wanted, abs=0.35)
 

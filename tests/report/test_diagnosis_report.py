@@ -1,10 +1,19 @@
 """The report of a diagnosis: what it must not leave unsaid."""
 
+import numpy as np
 import pytest
 from made_pages import content, diagnosis
 
+from ccmodel.report.figures import subplots
 from ccmodel.report.page import write_page
-from ccmodel.studies.diagnosis.page import _caution, _map_in_words, repeatability_in_words, write_not_diagnosed
+from ccmodel.studies.diagnosis.page import (
+    MARKS,
+    _caution,
+    _map_in_words,
+    _mark_visited,
+    repeatability_in_words,
+    write_not_diagnosed,
+)
 
 YELLOW = {"tau_in": {"at rest": 0.9, "after a reversal": 2.4, "under way": 1.0}}
 QUIET = {"tau_in": {"at rest": 0.9, "after a reversal": 1.2, "under way": float("nan")}}
@@ -46,3 +55,11 @@ def test_a_batch_that_was_not_diagnosed_has_a_report_with_a_way_back(tmp_path):
         "<h3>b: not diagnosed</h3>\n<p>no &lt;recording&gt; that can be used.</p>"
         in (tmp_path / "index.html").read_text()
     )
+
+
+def test_what_the_recordings_visited_is_marked_by_equal_shares_within_the_curve():
+    figure, axes = subplots(1, 1, squeeze=False)
+    values = np.concatenate([np.linspace(0.0, 1.0, 9000), np.full(1000, 5.0)])
+    _mark_visited(axes[0][0], values, np.array([0.0, 2.0]))
+    (marks,) = axes[0][0].lines
+    assert marks.get_xdata() == pytest.approx((np.arange(MARKS) + 0.5) / MARKS, abs=1e-3)

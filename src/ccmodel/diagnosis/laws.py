@@ -91,6 +91,16 @@ def proposals(
     return sorted(found, key=lambda p: -p.evidence)
 
 
+def visited(candidate: CandidateFit, law: Law) -> NDArray:
+    """Values of a law's argument at all samples that are judged, as a fitted model simulates the recordings."""
+    return _visited(candidate, law, each(candidate.whitened, lambda i, w: _motion(candidate, i)))
+
+
+def _visited(base: CandidateFit, law: Law, motions: Sequence[Sensing]) -> NDArray:
+    pairs = zip(base.whitened, motions, strict=True)
+    return np.concatenate([law.argument.of(m)[..., w.observations.judged].ravel() for w, m in pairs])
+
+
 def _missing_mass(base: CandidateFit, known: Mapping[str, float]) -> float:
     """What a model lacks of the inertia that a regression shows, kg m^2; 0 if that is no plausible inertia."""
     acting = settings_of(base.model(base.whitened[0].observations.parameters).mechanisms)
@@ -110,9 +120,7 @@ def _proposed(
     base: CandidateFit, law: Law, motions: Sequence[Sensing], nothing: float, about: float
 ) -> Iterator[Proposal]:
     """A law with each a priori size; it is linearised where its values are `about` times its argument."""
-    pairs = zip(base.whitened, motions, strict=True)
-    visited = np.concatenate([law.argument.of(m)[..., w.observations.judged].ravel() for w, m in pairs])
-    first, last = law.range_of(visited)
+    first, last = law.range_of(_visited(base, law, motions))
     if not last > first:
         raise ValueError("its argument does not vary")
     unit = _unit_of(law, base, motions)

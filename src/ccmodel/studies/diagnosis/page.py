@@ -9,17 +9,21 @@ from textwrap import fill
 import jinja2
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
 from ccmodel.channels import TABLE, THETA_IN, short_name
 from ccmodel.diagnosis.candidate import CandidateFit
+from ccmodel.diagnosis.laws import visited
 from ccmodel.diagnosis.location import PHASES, mismatch
 from ccmodel.diagnosis.run import Diagnosis
 from ccmodel.diagnosis.settings import CONSPICUOUS
 from ccmodel.diagnosis.verdict import nested_choice
 from ccmodel.mechanisms import catalogue
+from ccmodel.mechanisms.law_arguments import POSITION
 from ccmodel.model.parameters import batch_key
 from ccmodel.provenance import stamp
 from ccmodel.recording import ORIGIN, Recording
@@ -48,6 +52,8 @@ CANDIDATES = 8
 FAINT = "#9a9a9a"
 # Letters of an axis label that fit beside a panel of a law.
 LABEL_LETTERS = 34
+# Marks of what the recordings visit of a law's argument.
+MARKS = 100
 WITH_FOUND = "extended model"
 
 
@@ -282,7 +288,7 @@ def _loops(found: Diagnosis) -> Figure:
 
 
 def _law(law: Mapping, found: Diagnosis) -> Figure:
-    """The curve of a learned law with its 90 % band."""
+    """The curve of a learned law with its 90 % band, and where the recordings visited its argument."""
     x, y, low, high = np.array(law["curve"]).T
     figure, axes = subplots(1, 1, figsize=(5.2, 3.1), squeeze=False)
     ax = axes[0][0]
@@ -294,6 +300,8 @@ def _law(law: Mapping, found: Diagnosis) -> Figure:
     else:
         ax.fill_between(x, low, high, color=COLOURS[1], alpha=0.25, lw=0, label="90 % band")
         ax.plot(x, y, color=COLOURS[1], lw=1.4, label="learned law")
+        if learned.argument is not POSITION:
+            _mark_visited(ax, visited(found.judgement.best, learned), x)
     ax.axhline(learned.form.neutral, color=FAINT, lw=1.0, ls="--", label="calibrated model")
     if learned.is_spaced_by_ratio:
         ax.set_xscale("log")
@@ -303,6 +311,16 @@ def _law(law: Mapping, found: Diagnosis) -> Figure:
     legend_below(figure, axes)
     stamp_figure(figure, _stamp(found))
     return figure
+
+
+def _mark_visited(ax: Axes, values: NDArray, x: NDArray) -> None:
+    """Marks along the lower edge, each for an equal share of the samples within the range of a curve."""
+    within = values[(values >= x[0]) & (values <= x[-1])]
+    marked = np.quantile(within, (np.arange(MARKS) + 0.5) / MARKS)
+    label = f"recorded: a mark for each {100 / MARKS:g} % of the samples"
+    ax.plot(
+        marked, np.full(MARKS, 0.03), "|", color="0.3", ms=7, mew=0.7, transform=ax.get_xaxis_transform(), label=label
+    )
 
 
 def _origin(found: Diagnosis) -> str:
