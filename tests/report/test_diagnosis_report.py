@@ -58,7 +58,7 @@ def test_a_batch_that_was_not_diagnosed_has_a_report_with_a_way_back(tmp_path):
 
 
 def test_what_the_recordings_visited_is_marked_by_equal_shares_within_the_curve():
-    figure, axes = subplots(1, 1, squeeze=False)
+    _, axes = subplots(1, 1, squeeze=False)
     values = np.concatenate([np.linspace(0.0, 1.0, 9000), np.full(1000, 5.0)])
     _mark_visited(axes[0][0], values, np.array([0.0, 2.0]))
     (marks,) = axes[0][0].lines
