@@ -186,7 +186,7 @@ def law_size(law: Mapping) -> str:
     reference = "stated" if law["slot"] == PULLEY_RADIUS else "calibrated"
 
     def shown(row: Sequence[float]) -> str:
-        return f"{row[1]:.2f} times the {reference} one" if is_factor else rounded(row[1], unit)
+        return f"{row[1]:.3g} times the {reference} one" if is_factor else rounded(row[1], unit)
 
     (low, at_low), (high, at_high) = (
         (shown(row), _argument(row[0], law["argument_unit"]))
