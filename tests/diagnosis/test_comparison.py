@@ -586,6 +586,34 @@ def test_laws_are_proposed_beside_what_is_listed_unless_one_of_them_leaves_nothi
     assert ((FRICTION,) in proposed) == is_proposed
 
 
+@pytest.mark.parametrize(("left", "is_tried"), [(4.0, True), (0.4, False)])
+def test_a_law_and_a_mechanism_that_leave_much_may_be_two_laws(monkeypatch, left, is_tried):
+    """The mechanism's own law may have another form; a second law is looked for beside the first by itself."""
+    names = "learned-sliding-friction-by-direction", "learned-cable-stretch-by-tension"
+    one, proposed, screened = (names[0], "conduit"), [], []
+    alone = fitted(36.0, one), evidence(NONE - 9, NONE - 9, size=35.0)
+    both = fitted(1.0 + left, one, FRICTION), evidence(NONE + 5, NONE + 5, size=left)
+    found = compared(evidence(size=60.0), alone, both, model=fitted(61.0))
+    assert found.leading[0] is both[0]
+    monkeypatch.setattr(
+        selections, "proposals", lambda beside, others, *_: proposed.append((beside, [w.name for w in others])) or []
+    )
+    monkeypatch.setattr(Selection, "_screened", lambda self, *given: screened.append(given))
+    assert Selection({}, [], laws=[laws()[name] for name in names]).beside_law(found) is found
+    assert proposed == ([(alone[0], [names[1]])] if is_tried else [])
+    assert not screened
+
+
+def test_of_two_laws_none_is_by_itself():
+    one, other = ("learned-sliding-friction-by-direction", "conduit"), ("learned-cable-stretch-by-tension", "cable")
+    alone, two, beside = fitted(9.0, one), fitted(1.0, one, other), fitted(2.0, other, FRICTION)
+    found = compared(evidence(), *((c, evidence()) for c in (alone, two, beside)), model=fitted(61.0))
+    assert selections.law_by_itself(found, alone) is alone
+    assert selections.law_by_itself(found, two) is None
+    # It was never fitted without the mechanism.
+    assert selections.law_by_itself(found, beside) is None
+
+
 def test_what_may_be_an_imitation_competes_with_laws():
     """A mechanism that leaves nothing is identified without laws only with the probability `SETTLED`."""
     strong = compared(evidence(), (fitted(1.0, FRICTION), evidence(NONE)), model=fitted(61.0))

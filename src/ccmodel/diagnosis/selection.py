@@ -7,6 +7,7 @@ from typing import Self
 
 import numpy as np
 
+from ccmodel import mechanisms as registry
 from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import LAST_SEARCH, SEARCH, VALUES_STAY, CandidateFit, evaluated, fit
@@ -161,14 +162,19 @@ class Selection:
         return found.with_candidates([*found.candidates, *learned])
 
     def beside_law(self, found: Comparison) -> Comparison:
-        """The same with what acts beside the leading law, a listed mechanism or a second law, if something is left."""
-        best = found.leading[0]
-        if found.is_adequate or self.deadline.has_passed or best.hypothesis.size > 1:
+        """The same with what acts beside the leading law, a listed mechanism or a second law, if something is left.
+
+        A law and a listed mechanism that leave much may be two laws: the mechanism's own may have another form.
+        """
+        leading = found.leading[0]
+        best = law_by_itself(found, leading)
+        if found.is_adequate or self.deadline.has_passed or best is None or (best is not leading and leading.is_good):
             return found
         self.progress(f"looking for what acts beside {best.hypothesis}", 0.0)
         acting = laws_in(best.hypothesis)
         others = [law for law in self.laws if not any(law.has_the_quantity_of(one) for one in acting)]
-        scores = [s for s in self._screened(best, self.mechanisms).singles() if s.gain > settings.WORTH_FITTING]
+        scores = self._screened(best, self.mechanisms).singles() if best is leading else []
+        scores = [s for s in scores if s.gain > settings.WORTH_FITTING]
         second = proposals(best, others, self.deadline, self.progress, self.known)[: settings.PARTNERS]
         chosen = scores[: settings.PARTNERS] + [Score(p.hypothesis, 0.0, p.values) for p in second]
         pairs = self.fit_all(found.whitened, best, chosen)
@@ -349,6 +355,15 @@ def least_evidence(found: Comparison) -> float:
     prior_of_law = found.log_prior(1)
     best = max(NormalEquations.of(c).log_evidence + found.log_prior(c.hypothesis.size) for c in plausible)
     return best - prior_of_law - NormalEquations.of(found.base).log_evidence - settings.LAW_FAR_BEHIND
+
+
+def law_by_itself(found: Comparison, candidate: CandidateFit) -> CandidateFit | None:
+    """The only law of a candidate without the mechanisms beside it; None if there are several, or it was not fitted."""
+    if len(laws_in(candidate.hypothesis)) > 1:
+        return None
+    law = [one for one in candidate.hypothesis.acting if one[0] in registry.laws()]
+    alone = (c for c in found.candidates if list(c.hypothesis.acting) == law)
+    return min(alone, key=lambda c: c.mean_square, default=None)
 
 
 def finer_laws(fitted: Sequence[Hypothesis]) -> list[Law]:
