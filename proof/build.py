@@ -127,7 +127,7 @@ def noise_floor(
     one standard deviation of its sub-count position, and a past in the middle of its range. A model takes the tension
     from the rest: the pretension is such that the load cells read the same there. It also begins with the torques and
     the angle that are read there, so that the difference counts from its value at rest: another profile of the tension
-    moves the load before anything else moves. What is left is added in quadrature to the sensors' noise and to the
+    moves the load before anything else moves. The difference is added in quadrature to the sensors' noise and to the
     uncertainty of their zeros. The load's sub-count position counts twice, because its zero is read at the same rest.
     Both load cells give the pretension at rest, so that each is off by half the difference of their zeros.
 

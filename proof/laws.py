@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from proof.families import FAMILIES
 from proof.intervals import bootstrap, count
-from proof.outcome import DECISION_THRESHOLD, Outcome, is_located
+from proof.outcome import DECISION_THRESHOLD, Outcome, is_law_of, is_located
 
 # A confident law of a wrong slot counts as wrong if its model's error is above so many noise floors.
 STILL_WRONG = 2.0
@@ -44,7 +44,7 @@ def _truth(o: Outcome) -> dict:
 
 def law_in_slot(o: Outcome) -> dict | None:
     """The first law of the true slot at the true place; None if there is none, or no slot holds the effect."""
-    return next((w for w in o.laws if _truth(o).get("slot") and o.is_law_of(w, _truth(o))), None)
+    return next((w for w in o.laws if _truth(o).get("slot") and is_law_of(w, _truth(o))), None)
 
 
 def is_slot_right(o: Outcome) -> bool:

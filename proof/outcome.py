@@ -6,7 +6,7 @@ more than its batch, is refused. A refused result counts as a failure in every r
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
@@ -114,32 +114,31 @@ class Outcome:
         """Learned laws of the diagnosis."""
         return (self.diagnosis or {}).get("laws") or []
 
-    def is_law_of(self, law: dict, truth: dict) -> bool:
-        """Whether a learned law is in the slot of a concealed effect; of one that no slot holds, at its place."""
-        return truth.get("slot") in (law["slot"], "", None) and same_place(law["place"], truth["place"])
-
     @property
     def claims(self) -> list[tuple[float, bool]]:
         """Every stated confidence, and whether it belongs to a concealed effect: of a mechanism by its name."""
         claims = self.diagnosis["mechanisms"] + self.diagnosis["alternatives"] if self.diagnosis else []
-        of_laws = [(w["confidence"], any(self.is_law_of(w, t) for t in self.key["truth"])) for w in self.laws]
+        of_laws = [(w["confidence"], any(is_law_of(w, t) for t in self.key["truth"])) for w in self.laws]
         return [(c["confidence"], c["name"] in self.true_names) for c in claims] + of_laws
 
     @property
     def error_before(self) -> float:
         """Error of the recalibrated model over the noise floor, in the worst channel; NaN if not known."""
-        return max((e["before"] / e["floor"] for e in self.errors.values()), default=np.nan)
+        return self.over_floor({c: e["before"] for c, e in self.errors.items()})
 
     @property
     def error_after(self) -> float:
         """Error of the diagnosed model over the noise floor, in the worst channel; NaN if not known."""
-        return max((e["after"] / e["floor"] for e in self.errors.values()), default=np.nan)
+        return self.over_floor({c: e["after"] for c, e in self.errors.items()})
 
     @property
     def error_of_regressors(self) -> float:
         """Error of the best reference regressor over the noise floor, in its worst channel; NaN if none was fitted."""
-        worst = (max(error / self.errors[c]["floor"] for c, error in r.items()) for r in self.regressors.values())
-        return min(worst, default=np.nan)
+        return min(map(self.over_floor, self.regressors.values()), default=np.nan)
+
+    def over_floor(self, errors: Mapping[str, float]) -> float:
+        """Largest of errors by channel, each over its noise floor; NaN without channels."""
+        return max((error / self.errors[c]["floor"] for c, error in errors.items()), default=np.nan)
 
     @property
     def is_visible(self) -> bool:
@@ -253,6 +252,11 @@ def read_outcomes(folder: Path, names: Sequence[str] | None = None) -> list[Outc
 def same_place(a: str | None, b: str | None) -> bool:
     """Whether two places are equal, or equivalent because no recording distinguishes them."""
     return a is not None and (a == b or (a, b) in EQUIVALENT_PLACES or (b, a) in EQUIVALENT_PLACES)
+
+
+def is_law_of(law: dict, truth: dict) -> bool:
+    """Whether a learned law is in the slot of a concealed effect; of one that no slot holds, at its place."""
+    return truth.get("slot") in (law["slot"], "", None) and same_place(law["place"], truth["place"])
 
 
 def is_located(o: Outcome) -> bool:

@@ -182,8 +182,8 @@ def method_comparison(outcomes: Iterable[Outcome]) -> list[dict]:
     return [
         {
             "method": method,
-            "clean": bootstrap("clean", [max(_over_floor(o, method)) for o in clean], np.median),
-            "visible": bootstrap("visible", [max(_over_floor(o, method)) for o in visible], np.median),
+            "clean": bootstrap("clean", [o.over_floor(_error(o, method)) for o in clean], np.median),
+            "visible": bootstrap("visible", [o.over_floor(_error(o, method)) for o in visible], np.median),
             "closed": bootstrap("closed", [_gap_closed(o, method) for o in visible], np.median),
             "better": count("less error than this diagnosis", visible, lambda o, m=method: _is_better(o, m)),
         }
@@ -197,12 +197,8 @@ def _error(o: Outcome, method: str) -> dict[str, float]:
     return {c: e[which] for c, e in o.errors.items()} if which else o.regressors[method]
 
 
-def _over_floor(o: Outcome, method: str) -> list[float]:
-    return [error / o.errors[c]["floor"] for c, error in _error(o, method).items()]
-
-
 def _is_better(o: Outcome, method: str) -> bool:
-    return max(_over_floor(o, method)) < max(_over_floor(o, DIAGNOSED))
+    return o.over_floor(_error(o, method)) < o.over_floor(_error(o, DIAGNOSED))
 
 
 def _gap_closed(o: Outcome, method: str) -> float:
