@@ -7,7 +7,6 @@ from typing import Self
 
 import numpy as np
 
-from ccmodel import mechanisms as registry
 from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import LAST_SEARCH, SEARCH, VALUES_STAY, CandidateFit, evaluated, fit
@@ -359,10 +358,10 @@ def least_evidence(found: Comparison) -> float:
 
 def law_by_itself(found: Comparison, candidate: CandidateFit) -> CandidateFit | None:
     """The only law of a candidate without the mechanisms beside it; None if there are several, or it was not fitted."""
-    if len(laws_in(candidate.hypothesis)) > 1:
+    laws = laws_in(candidate.hypothesis)
+    if len(laws) > 1:
         return None
-    law = [one for one in candidate.hypothesis.acting if one[0] in registry.laws()]
-    alone = (c for c in found.candidates if list(c.hypothesis.acting) == law)
+    alone = (c for c in found.candidates if c.hypothesis.size == 1 and laws_in(c.hypothesis) == laws)
     return min(alone, key=lambda c: c.mean_square, default=None)
 
 

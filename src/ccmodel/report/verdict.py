@@ -155,10 +155,12 @@ def law_claim(law: Mapping) -> str:
     what = f"The error of {symbol_of(law['channel'])}" if is_of_one else IN_SLOT[law["slot"]]
     what = what.format(side=side(law["place"]))
     others = f" (or on {' or '.join(law['indistinguishable'])})" if law["indistinguishable"] else ""
-    says = f"depends on {law['argument_is']}{others}: {law_size(law)}"
-    if law.get("formula") == CONSTANT:
-        is_radius = law["slot"] == PULLEY_RADIUS
-        says = f"is {law['parameters'][0]['value']:.3g} times the stated one" if is_radius else "is constant"
+    if law.get("formula") != CONSTANT:
+        says = f"depends on {law['argument_is']}{others}: {law_size(law)}"
+    elif law["slot"] == PULLEY_RADIUS:
+        says = f"is {law['parameters'][0]['value']:.3g} times the stated one"
+    else:
+        says = "is constant"
     return (
         f"{what} {says}, confidence {law['confidence']:.2f}. {_resemblance(law)}; the law was learned from the"
         " recordings."
@@ -183,18 +185,14 @@ def law_size(law: Mapping) -> str:
         (constant,) = law["parameters"]
         value, interval = quantity(constant["value"], constant["low"], constant["high"], constant["unit"])
         return f"{value} ({interval}) times it"
-    reference = "stated" if law["slot"] == PULLEY_RADIUS else "calibrated"
-
-    def shown(row: Sequence[float]) -> str:
-        return f"{row[1]:.3g} times the {reference} one" if is_factor else rounded(row[1], unit)
-
-    (low, at_low), (high, at_high) = (
-        (shown(row), _argument(row[0], law["argument_unit"]))
-        for row in (min(curve, key=lambda row: row[1]), max(curve, key=lambda row: row[1]))
-    )
+    (x_low, low, *_), (x_high, high, *_) = (end(curve, key=lambda row: row[1]) for end in (min, max))
+    at_low, at_high = (_argument(x, law["argument_unit"]) for x in (x_low, x_high))
+    if is_factor:
+        reference = "stated" if law["slot"] == PULLEY_RADIUS else "calibrated"
+        return f"from {low:.3g} times the {reference} one at {at_low} to {high:.3g} times at {at_high}"
     # Friction may have a drag or a bend added to it.
-    added = f"{learned.curve_is.partition(',')[0]} " if law["slot"] == SLIDING_FRICTION and not is_factor else ""
-    return f"{added}from {low} at {at_low} to {high.removesuffix(f' the {reference} one')} at {at_high}"
+    added = f"{learned.curve_is.partition(',')[0]} " if law["slot"] == SLIDING_FRICTION else ""
+    return f"{added}from {rounded(low, unit)} at {at_low} to {rounded(high, unit)} at {at_high}"
 
 
 def _argument(x: float, unit: str) -> str:
