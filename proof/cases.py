@@ -224,12 +224,16 @@ def _chosen(kind: str, effect: str | None, plan: Plan, random: Generator) -> lis
         return []
     if kind == "unlisted":
         name = effect or str(random.choice(list(plan.unlisted)))
-        return [(plan.unlisted[name], random.uniform())]
+        return [(plan.unlisted[name], _strength(plan, random))]
     if kind in SEVERAL:
         several = random.choice(list(plan.effects), SEVERAL[kind], replace=False)
         return [(plan.effects[name], random.uniform(*plan.pair_strength)) for name in several]
     name = effect or str(random.choice(list(plan.effects)))
-    return [(plan.effects[name], random.uniform())]
+    return [(plan.effects[name], _strength(plan, random))]
+
+
+def _strength(plan: Plan, random: Generator) -> float:
+    return float(random.uniform() ** plan.strength_power)
 
 
 def _effect(twin: Twin, strength: float, spring: float, other: float, random: Generator) -> tuple[Truth, dict]:

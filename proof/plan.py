@@ -174,6 +174,7 @@ class Plan(Strict):
     other_law_share: Share
     kinds: dict[str, Share]
     protocol_shares: dict[str, Share]
+    strength_power: PositiveFloat
     pair_strength: Range
     protocols: dict[str, Protocol]
     kept_back: KeptBackPlan

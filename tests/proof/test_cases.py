@@ -80,12 +80,13 @@ def test_kinds_come_in_their_shares():
         assert low <= kinds.count(kind) <= high
 
 
-def test_strengths_are_even_in_the_logarithm():
-    strengths = [draw(seed, "single", "backlash").truth[0].strength for seed in range(300)]
-    assert np.histogram(strengths, 3, (0, 1))[0].min() > 70
-    assert np.median([draw(s, "single", "backlash").truth[0].size for s in range(300)]) == pytest.approx(
-        8.4e-3, rel=0.3
-    )
+def test_strengths_follow_the_stated_power():
+    truths = [draw(seed, "single", "backlash").truth[0] for seed in range(300)]
+    even = np.power([t.strength for t in truths], 1 / PLAN.strength_power)
+    assert np.histogram(even, 3, (0, 1))[0].min() > 70
+    low, high = PLAN.effects["backlash"].size
+    middle = low * (high / low) ** (0.5**PLAN.strength_power)
+    assert np.median([t.size for t in truths]) == pytest.approx(middle, rel=0.3)
 
 
 def test_a_pair_is_two_effects_and_a_removed_one_is_no_candidate():

@@ -123,7 +123,7 @@ class Twin:
     places : tuple of str
         Where the proof seeds it.
     size : (float, float)
-        Range of its size, drawn uniformly in the logarithm: from below the sensors' resolution to plain.
+        Range of its size, from below the sensors' resolution to plain. Its logarithm is in proportion to the strength.
     unit : str
         Unit of the size.
     seed : callable
