@@ -137,7 +137,7 @@ def _rates(every: Sequence[Outcome]) -> dict[str, str]:
     clean = [o for o in every if o.kind == "clean"]
     listed = [o for o in every if o.kind in ("single", "poor", "pair", "triple")]
     visible = [o for o in listed if o.is_visible]
-    outsiders = [o for o in every if o.kind in ("unlisted", "removed")]
+    outsiders = [o for o in every if o.has_no_candidate]
     several = [o for o in visible if len(o.true_names) > 1]
     rows = {
         "clean: false positive": (clean, lambda o: o.is_detected),

@@ -16,7 +16,6 @@ from proof import conceal
 from proof.archive import pack, unpack
 from proof.build import build as build_case
 from proof.cases import SEVERAL, Case, draw
-from proof.families import FAMILIES
 from proof.families import family as family_of
 from proof.plan import read_plan
 
@@ -88,15 +87,15 @@ def run(
 @app.command()
 def family(
     out: Out,
-    name: Annotated[str, typer.Argument(help="removed or unlisted.")],
+    name: Annotated[str, typer.Argument(help="removed, unlisted or doubtful.")],
     seed: Seed = 0,
     count: Annotated[int | None, typer.Option(min=1, help="Number of cases; the plan's if not given.")] = None,
     regressors: Regressors = False,
     cores: Cores = 1,
 ) -> None:
-    """Run a family of cases of laws that the list lacks: every effect in turn, at two strengths."""
-    if name not in FAMILIES:
-        raise typer.BadParameter(f"there is no family {name!r}; there are {', '.join(FAMILIES)}")
+    """Run a family of cases: every effect in turn, at each strength of the family."""
+    if name not in (families := read_plan().families):
+        raise typer.BadParameter(f"there is no family {name!r}; there are {', '.join(families)}")
     _judge_each(list(family_of(name, seed, count)), out, regressors, cores)
 
 

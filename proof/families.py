@@ -1,12 +1,10 @@
-"""Families of cases of laws that the diagnosis's list lacks: every effect in turn, each on a rig of its own."""
+"""Families of cases: every effect in turn, each on a rig of its own."""
 
 from collections.abc import Iterator
 from itertools import cycle, islice, product
 
 from proof.cases import Case, draw
 from proof.plan import Plan, read_plan
-
-FAMILIES = ("removed", "unlisted")
 
 
 def family(name: str, seed: int, count: int | None = None) -> Iterator[Case]:
@@ -15,7 +13,8 @@ def family(name: str, seed: int, count: int | None = None) -> Iterator[Case]:
     Parameters
     ----------
     name : str
-        "removed": an effect whose mechanism is taken off the list; "unlisted": one that the list never had.
+        "removed": an effect whose mechanism is taken off the list; "unlisted": one that the list never had;
+        "doubtful": a weak effect in few recordings.
     seed : int
         Of the first case.
     count : int, optional
@@ -27,12 +26,14 @@ def family(name: str, seed: int, count: int | None = None) -> Iterator[Case]:
         Effects come in the order of the plan, all of them at its first strength before any at the next.
     """
     plan = read_plan()
-    members = islice(cycle(members_of(name, plan)), count or plan.families.cases)
+    of_plan = plan.families[name]
+    members = islice(cycle(members_of(name, plan)), count or of_plan.cases)
     for k, (effect, strength) in enumerate(members):
-        yield draw(seed + k, name, effect, strength)
+        yield draw(seed + k, of_plan.kind, effect, strength)
 
 
 def members_of(name: str, plan: Plan) -> list[tuple[str, float]]:
     """Effects of a family with their strengths."""
-    effects = plan.effects if name == "removed" else plan.unlisted
-    return [(effect, strength) for strength, effect in product(plan.families.strengths, effects)]
+    of_plan = plan.families[name]
+    effects = plan.unlisted if of_plan.kind == "unlisted" else plan.effects
+    return [(effect, strength) for strength, effect in product(of_plan.strengths, effects)]

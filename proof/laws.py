@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from proof.families import FAMILIES
 from proof.intervals import bootstrap, count
 from proof.outcome import DECISION_THRESHOLD, Outcome, is_law_of, is_located
 
@@ -17,8 +16,8 @@ PREFIX = "unlisted-"
 
 
 def score_of_laws(outcomes: Sequence[Outcome]) -> list[dict]:
-    """Rates of the families of laws that the list lacks; the targets are those that the families were made for."""
-    every = [o for o in outcomes if o.kind in FAMILIES]
+    """Rates of the kinds of cases whose laws the list lacks; the targets are those that they were made for."""
+    every = [o for o in outcomes if o.has_no_candidate]
     visible = [o for o in every if o.is_visible]
     with_slot = [o for o in visible if _truth(o).get("slot")]
     found = [o for o in with_slot if law_in_slot(o) is not None and _truth(o)["curve"]]

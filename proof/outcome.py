@@ -141,6 +141,11 @@ class Outcome:
         return max((error / self.errors[c]["floor"] for c, error in errors.items()), default=np.nan)
 
     @property
+    def has_no_candidate(self) -> bool:
+        """Whether no mechanism of the diagnosis is that of the effect."""
+        return self.kind in ("removed", "unlisted")
+
+    @property
     def is_visible(self) -> bool:
         """Whether the recalibrated model's error is at least `VISIBLE` noise floors; True if it is not known."""
         return not self.errors or self.error_before >= VISIBLE

@@ -146,9 +146,10 @@ class FixedCase(Strict):
     verdict: str | None = None
 
 
-class FamiliesPlan(Strict):
-    """Cases of each family of laws that the list lacks, and the strengths at which each effect comes."""
+class FamilyPlan(Strict):
+    """A family: the kind and the number of its cases, and the strengths at which each effect comes."""
 
+    kind: str
     cases: PositiveInt
     strengths: tuple[Share, ...] = Field(min_length=1)
 
@@ -181,7 +182,7 @@ class Plan(Strict):
     order: tuple[str, ...]
     quick: tuple[FixedCase, ...]
     full: Full
-    families: FamiliesPlan
+    families: dict[str, FamilyPlan]
 
     @property
     def effects(self) -> dict[str, Twin]:

@@ -29,7 +29,7 @@ def rates(outcomes: Sequence[Outcome]) -> list[dict]:
         count(INPUTS_ACCEPTED, outcomes, lambda o: o.verdict != INCONSISTENT, 1.0),
         *_rates_of_listed(outcomes),
         count("no confident misidentification", outcomes, lambda o: not o.is_confidently_wrong, 0.98),
-        *_rates_of_outsiders([o for o in outcomes if o.kind in ("unlisted", "removed")]),
+        *_rates_of_outsiders([o for o in outcomes if o.has_no_candidate]),
         *_rates_of_open_cases(outcomes),
         *_rates_of_experiments(outcomes),
         count(COVERAGE_RATE, compared_values(outcomes), lambda v: v["low"] <= v["true"] <= v["high"], COVERAGE),
