@@ -176,6 +176,8 @@ def minimise(
         reduced.compute_derivatives()
         if reduced.predicted_reduction(y) <= how.tolerance * reduced.lowest_cost:
             break
+        # Rounding errors must not decide whether the point where the search goes on counts as one.
+        reduced.lowest_cost = np.inf
     return _solution(reduced, y, _message(found, reduced), evaluations)
 
 
@@ -272,8 +274,10 @@ class _Reduced:
         therefore not computed there, and the norm stands in the first row.
         """
         self.how.deadline.check()
+        x = self.place(y)
+        if self.point is not None and np.array_equal(x, self.point):
+            return self._taken()
         try:
-            x = self.place(y)
             errors = self.problem.errors(x)
             cost = self.problem.cost(x, errors)
             norm = np.sqrt(cost)
@@ -284,6 +288,10 @@ class _Reduced:
             if not (self.how.retreats and len(self.rows)):
                 raise
             return np.full(len(self.rows), np.inf)
+        return self._taken()
+
+    def _taken(self) -> NDArray:
+        """Rows of the residuals at `point`, whose cost is now the lowest."""
         rows = np.ascontiguousarray(self.rows[:, -1])
         self.lowest_cost = float(rows @ rows)
         return rows
