@@ -181,7 +181,7 @@ def test_a_listed_mechanism_is_named_beside_a_law(tmp_path):
     (gain,) = said["mechanisms"]
     assert (gain["name"], gain["place"]) == ("torque-scale", "load-sensor")
     assert gain["parameters"][0]["value"] == pytest.approx(0.08, abs=0.012)
-    assert "Beside it: the load's torque sensor reads" in said["headline"]
+    assert "Listed mechanisms that act as well: the load's torque sensor reads" in said["headline"]
 
 
 @pytest.mark.long

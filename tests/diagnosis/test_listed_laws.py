@@ -10,6 +10,7 @@ from ccmodel.diagnosis.listed_laws import Learned, _is_comparable, distance, nea
 from ccmodel.diagnosis.settings import WITHIN_BAND
 from ccmodel.mechanisms import laws
 from ccmodel.mechanisms.contract import Parameter
+from ccmodel.mechanisms.law_forms import CONSTANT_DRAG
 from ccmodel.mechanisms.learned import FINE
 from ccmodel.report.verdict import law_claim, law_size
 
@@ -154,9 +155,9 @@ def test_a_map_is_compared_with_faults_of_its_own_sensor():
     assert nearest_listed(learned(laws()["learned-sensor-map-theta-out-by-reading"], lambda x: 0.05 * x)) is None
 
 
-def said(formula="a + b x", **nearest):
+def said(formula="a + b x", name_of_law="learned-sliding-friction-by-speed", **nearest):
     law = {
-        "name": "learned-sliding-friction-by-speed",
+        "name": name_of_law,
         "formula": formula,
         "slot": "sliding-friction",
         "curve": [[-2.0, 1.1, 1.0, 1.2], [-1.0, 0.9, 0.8, 1.0]],
@@ -167,6 +168,7 @@ def said(formula="a + b x", **nearest):
         "confidence": 0.9,
         "channel": None,
         "nearest_listed": nearest or None,
+        "parameters": [{"name": "a", "value": 1.2, "low": 1.1, "high": 1.3, "unit": "y"}],
     }
     return law_claim(law)
 
@@ -178,7 +180,12 @@ def test_the_report_says_whether_it_is_a_listed_law():
 
 
 def test_the_report_says_where_a_law_is_a_constant():
-    assert "Friction along the conduits is constant, confidence 0.90" in said("a", name="stribeck", distance=0.9)
+    friction = said("a", name="stribeck", distance=0.9)
+    assert "Friction along the conduits is constant: 1.2 (1.1 to 1.3) times the calibrated one, confidence" in friction
+    drag = next(name for name, law in laws().items() if law.form is CONSTANT_DRAG)
+    assert "Friction along the conduits has a constant drag of a cable per length of conduit: 1.2 N/m (1.1 to" in said(
+        "a", name_of_law=drag
+    )
 
 
 def test_the_report_says_by_how_much_a_radius_is_wrong():

@@ -65,7 +65,9 @@ def test_what_an_accepted_model_leaves_above_the_noise_is_said():
     worse = diagnosis("b", "explained")
     worse["fit"]["error"] = ERROR | {"theta_out": ERROR["theta_out"] | {"after": 4e-3}}
     (card,) = cards([summary("b")], [worse])
-    assert card["caution"] == "Not all is accounted for: up to 4.0 times the noise is left, in the load angle θ_out."
+    assert (
+        card["caution"] == "Not all is accounted for: up to 4.0 times the noise floor is left, in the load angle θ_out."
+    )
 
 
 def test_the_overview_tells_measured_from_simulated_and_says_how_far_the_errors_fall():
@@ -99,7 +101,7 @@ def test_the_fall_is_that_of_the_largest_error_of_any_channel():
 def test_contradictory_inputs_stand_first_and_have_no_errors():
     first, second = made("explained", "inputs-inconsistent")
     assert (first["shown_verdict"], first["rows"], first["mechanisms"]) == ("inputs inconsistent", [], [])
-    assert first["sentence"].endswith("one.csv, tau_in_Nm: is 0 throughout. No model was fitted.")
+    assert first["sentence"].endswith("one.csv, tau_in_Nm: is 0 throughout. No model is given.")
     assert second["verdict"] == "explained"
     (line,) = overview([first, second])
     assert line.startswith("Simulated, 2 batches: 1 explained and 1 inputs inconsistent.")

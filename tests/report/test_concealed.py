@@ -95,9 +95,9 @@ def test_what_is_left_is_said_with_the_model_that_leaves_it(concealed):
     said = [diagnosis(batch, verdict) for batch, verdict in verdicts.items()]
     (table,) = beside(concealed(batches=["b", "c", "d", "f", "e"]), said)
     assert table["falls"] == [
-        "τ_out: 6.0 to 1.2 times the noise (model: extended)",
-        "τ_out: 6.0 to 1.2 times the noise (model: nearest (not accepted))",
-        "τ_out: 6.0 times the noise",
+        "τ_out: 6.0 to 1.2 times the noise floor (model: extended)",
+        "τ_out: 6.0 to 1.2 times the noise floor (model: nearest (not accepted))",
+        "τ_out: 6.0 times the noise floor",
         "–",
         "–",
     ]

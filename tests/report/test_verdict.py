@@ -128,10 +128,10 @@ def test_beside_what_is_certain_the_rest_of_the_likeliest_model_is_said(further,
 def test_each_verdict_has_its_sentence():
     assert "confidence 0.97" in sentence(diagnosis("b", "explained"))
     assert "may be backlash at the load pulley (0.50)" in sentence(diagnosis("b", "undecided"))
-    unexplained = "Something is missing at the load pulley, and no listed mechanism explains it."
+    unexplained = "Something is missing, most likely at the load pulley, and no listed mechanism explains it."
     assert sentence(diagnosis("b", "unexplained")) == unexplained
     assert "no missing physics" in sentence(diagnosis("b", "agrees"))
-    dead = "The inputs contradict one another. one.csv, tau_in_Nm: is 0 throughout. No model was fitted."
+    dead = "The inputs contradict one another. one.csv, tau_in_Nm: is 0 throughout. No model is given."
     assert sentence(diagnosis("b", "inputs-inconsistent")) == dead
     assert sentence(diagnosis("b", None)) == "Not diagnosed: no recording that can be used."
 
@@ -139,12 +139,16 @@ def test_each_verdict_has_its_sentence():
 def test_against_a_model_given_a_verdict_is_a_change():
     assert sentence(diagnosis("b", "explained", is_held=True)).startswith("This has changed: the load follows")
     assert "no change" in sentence(diagnosis("b", "agrees", is_held=True))
-    assert "Something has changed at the load pulley" in sentence(diagnosis("b", "unexplained", is_held=True))
+    assert "Something has changed, most likely at the load pulley" in sentence(
+        diagnosis("b", "unexplained", is_held=True)
+    )
 
 
 def test_all_possible_places_of_a_mismatch_are_said():
     location = {"place": "load", "places": ["load", "load-pulley"], "channels": [], "phases": [], "text": ""}
-    assert "missing at the load or the load pulley, and" in sentence(diagnosis("b", "unexplained", location=location))
+    assert "missing, most likely at the load or the load pulley, and" in sentence(
+        diagnosis("b", "unexplained", location=location)
+    )
 
 
 def test_two_mechanisms_are_both_said_with_their_confidence():
@@ -157,7 +161,7 @@ def test_two_mechanisms_are_both_said_with_their_confidence():
 
 
 def test_the_headline_says_how_far_the_error_fell():
-    assert "of τ_out falls from 6.0 to 1.2 times the noise" in headline(diagnosis("b", "explained"))
+    assert "of τ_out falls from 6.0 to 1.2 times the noise floor" in headline(diagnosis("b", "explained"))
     assert "falls" not in headline(diagnosis("b", "agrees"))
 
 
@@ -171,9 +175,11 @@ def headline_of(mean_square, **errors):
 
 def test_the_headline_of_a_small_effect_does_not_promise_a_smaller_error():
     said = headline_of((1.11, 1.05), F_load=(3.88, 3.9), tau_in=(1.5, 1.5))
-    assert "the held-out error of F_load is 3.9 times the noise before and 3.9 after" in said
-    assert "the mean square of the errors falls from 1.11 to 1.05 (1: noise)" in said
-    assert "is 1.2 times the noise before and 1.9 after" in headline_of((1.11, 1.05), F_load=(1.2, 1.9))
+    assert "the held-out error of F_load is 3.9 times the noise floor before and 3.9 after" in said
+    assert (
+        "The mean square of the residuals, for which this scatter is noise, falls from 1.11 to 1.05 (1: noise)." in said
+    )
+    assert "is 1.2 times the noise floor before and 1.9 after" in headline_of((1.11, 1.05), F_load=(1.2, 1.9))
     nothing = headline_of((1.04, 1.04), F_load=(1.2, 1.2))
     assert "The held-out error of no channel falls; that of F_load is 1.2" in nothing
     assert "falls from" not in nothing
@@ -181,7 +187,7 @@ def test_the_headline_of_a_small_effect_does_not_promise_a_smaller_error():
 
 def test_where_the_worst_error_stays_the_headline_names_the_one_that_falls_most():
     said = headline_of((9.0, 2.0), F_load=(3.9, 3.9), tau_out=(1.2, 1.1), tau_in=(3.5, 1.0))
-    assert said.endswith("the held-out error of τ_in falls from 3.5 to 1.0 times the noise.")
+    assert said.endswith("the held-out error of τ_in falls from 3.5 to 1.0 times the noise floor.")
     assert "of F_load falls from 3.9 to 3.5" in headline_of((9.0, 2.0), F_load=(3.9, 3.5), tau_in=(3.5, 1.0))
 
 

@@ -83,8 +83,8 @@ def check(batch: Batch, as_json: Json = False, quiet: Quiet = False) -> None:
         raise typer.Exit(1)
     if not any(recording.shows_tensions for recording in ingested.recordings):
         output.hint(
-            "the logs do not show the tensions at both ends, as load cells and torques do: a diagnosis will take the"
-            " initial tension from pretension_N, and identify nothing with certainty"
+            "the logs do not show the tensions at both ends, as load cells and torques do: a diagnosis will fit the"
+            " initial tension, and no single mechanism reaches a confidence of 0.8 (docs/limits.md)"
         )
     output.hint(f"nothing contradicts another value. Next: ccmodel diagnose {batch} --out DIR")
 

@@ -50,7 +50,9 @@ def diagnose(
             help="Model file to start from, instead of the estimates.", callback=input_file, show_default=False
         ),
     ] = None,
-    freeze: Annotated[bool, typer.Option("--freeze", help="Keep all values of the baseline: find a change.")] = False,
+    freeze: Annotated[
+        bool, typer.Option("--freeze", help="Keep the baseline's values, but for sensor zeros, and look for a change.")
+    ] = False,
     candidate: Annotated[
         list[str],
         typer.Option(
@@ -71,13 +73,17 @@ def diagnose(
     run_limit: Annotated[
         int | None,
         typer.Option(
-            "--run-limit", help="Model runs after which no candidate is fitted; 50000 if not given.", show_default=False
+            "--run-limit",
+            help="Model runs after which no further candidate is fitted; 50000 if not given.",
+            show_default=False,
         ),
     ] = None,
     time_limit: Annotated[
         float | None,
         typer.Option(
-            "--time-limit", help="Time after which no candidate is fitted, s; 160 if not given.", show_default=False
+            "--time-limit",
+            help="Time after which no further candidate is fitted, s; 160 if not given.",
+            show_default=False,
         ),
     ] = None,
     trust_inputs: TrustInputs = False,

@@ -26,8 +26,8 @@ from ccmodel.cli.output import as_json, say
 from ccmodel.version import __version__
 
 CODES = """\
-Exit codes: 0 done; 1 a finding, or something was left out (diagnose: only with --strict); 2 the input cannot be used; \
-70 an error of the program; 130 interrupted."""
+Exit codes: 0 done; 1 a finding, or something was left out (diagnose: only with --strict or --keep-law); 2 the input \
+cannot be used; 70 an error of the program; 130 interrupted."""
 # Typer does not export this class.
 _WRONG_USAGE: Any = typer.BadParameter.__base__
 INTERRUPTED = "nothing was written"
@@ -69,7 +69,7 @@ def describe(
         bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
     ] = False,
 ) -> None:
-    """Cable-conduit transmissions: recordings beside a distributed friction model, and the physics of what differs."""
+    """Compare recordings of a cable-conduit transmission with a model, and find the physics that it leaves out."""
 
 
 def main() -> None:

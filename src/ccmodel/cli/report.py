@@ -17,7 +17,7 @@ def add_to(app: typer.Typer) -> None:
 
 
 def report(results: Results = Path("results"), as_json: Json = False, quiet: Quiet = False) -> None:
-    """Print the verdicts of a run, or of one diagnosis: held-out errors, what was left out, contradictions, the page.
+    """Print the verdicts of a run, or of one diagnosis: held-out errors, what was not used, contradictions, the page.
 
     Exits with 1 if something was left out or inputs contradict one another.
     """

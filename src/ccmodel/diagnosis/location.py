@@ -47,9 +47,8 @@ def location(judgement: Judgement, calibrated: CandidateFit) -> dict:
     squares = {p: np.array([table[c][p] ** 2 for c in channels]) for p in PHASES}
     by_phase = {p: float(np.nanmean(s)) for p, s in squares.items() if np.isfinite(s).any()}
     phases = sorted(prominent(by_phase, settings.NAMED_PHASE), key=PHASES.index)
-    verb = "is" if len(channels) == 1 else "are"
     where = joined([TEXT[place] for place in places], "and" if hypothesis.acting else "or")
-    text = f"The mismatch sits {where}: {joined(channels)} {verb} off most, {joined(phases)}."
+    text = f"Most likely place: {where}. Largest errors: {joined(channels)}, {joined(phases)}."
     return {"place": places[0], "places": list(places), "channels": channels, "phases": phases, "text": text}
 
 

@@ -48,7 +48,7 @@ MECHANISM = Mechanism(
     text=__doc__,
     tex=r"\mu(t, w) = \mu\,\Bigl(1 + \mathrm{change}\,"
     r"\bigl(1 - (1 - \mathrm{done})\, e^{-t/\tau - \mathrm{per\_m}\,w}\bigr)\Bigr)",
-    sentence="friction [rises|falls] by {change:%} through a recording",
+    sentence="friction [rises|falls] by {change:%} in all as it runs in",
     places=("conduit",),
     parameters=(
         _CHANGE,

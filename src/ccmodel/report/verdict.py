@@ -56,14 +56,14 @@ def sentence(diagnosis: Mapping) -> str:
     if verdict == "undecided":
         return _undecided(diagnosis, missing)
     places = " or ".join(f"the {place_in_words(place)}" for place in possible_places(diagnosis))
-    return f"Something {missing} at {places}, and no listed mechanism explains it."
+    return f"Something {missing}, most likely at {places}, and no listed mechanism explains it."
 
 
 def _contradiction(not_judged: Sequence[Mapping]) -> str:
     """The first contradiction of the inputs, and how many there are besides."""
     first, *others = not_judged
     more = f" ({len(others)} more in the report)" if others else ""
-    return f"The inputs contradict one another. {first['what']}: {first['why'].rstrip('.')}{more}. No model was fitted."
+    return f"The inputs contradict one another. {first['what']}: {first['why'].rstrip('.')}{more}. No model is given."
 
 
 def possible_places(diagnosis: Mapping) -> list[str]:
@@ -112,22 +112,22 @@ def headline(diagnosis: Mapping) -> str:
 def _gain(fit: Mapping) -> str:
     """How far the held-out error falls: of the worst channel, or else of the one in which it falls most.
 
-    Where it falls in none, the mean square of the errors says how far it falls beyond what differs from run to run.
+    Where it falls in none, the mean square of the errors is stated, for which what differs from run to run is noise.
     """
     worst, error = worst_channel(fit["error"]), error_name(fit)
     before, after = ({c: round(e[w] / e["noise"], 1) for c, e in fit["error"].items()} for w in ("before", "after"))
     falls = {channel: before[channel] - after[channel] for channel in before}
     most = worst if falls[worst] > 0.0 else max(falls, key=lambda channel: falls[channel])
     if falls[most] > 0.0:
-        fall = f"falls from {before[most]:.1f} to {after[most]:.1f} times the noise"
+        fall = f"falls from {before[most]:.1f} to {after[most]:.1f} times the noise floor"
         return f"With this in the model, the {error} of {SYMBOL[most]} {fall}."
-    changes = f"{before[worst]:.1f} times the noise before and {after[worst]:.1f} after"
+    changes = f"{before[worst]:.1f} times the noise floor before and {after[worst]:.1f} after"
     low, high = (f"{fit['mean_square'][model]:.2f}" for model in ("extended", "calibrated"))
     if not float(low) < float(high):
         return f"The {error} of no channel falls; that of {SYMBOL[worst]} is {changes}."
     return (
-        f"The effect is smaller than what differs from run to run: the {error} of {SYMBOL[worst]} is {changes}."
-        f" Beyond such differences the mean square of the errors falls from {high} to {low} (1: noise)."
+        f"The effect is smaller than the scatter between runs: the {error} of {SYMBOL[worst]} is {changes}."
+        f" The mean square of the residuals, for which this scatter is noise, falls from {high} to {low} (1: noise)."
     )
 
 
@@ -145,7 +145,8 @@ IN_SLOT = {
 
 def law_sentence(diagnosis: Mapping) -> str:
     """What the learned laws say, that they are on no list, and what acts beside them."""
-    beside = f" Beside it: {_with_confidence(diagnosis['mechanisms'])}." if diagnosis["mechanisms"] else ""
+    others = diagnosis["mechanisms"]
+    beside = f" Listed mechanisms that act as well: {_with_confidence(others)}." if others else ""
     return " ".join(map(law_claim, diagnosis["laws"])) + beside
 
 
@@ -160,11 +161,28 @@ def law_claim(law: Mapping) -> str:
     elif law["slot"] == PULLEY_RADIUS:
         says = f"is {law['parameters'][0]['value']:.3g} times the stated one"
     else:
-        says = "is constant"
+        says = _constant(law)
     return (
         f"{what} {says}, confidence {law['confidence']:.2f}. {_resemblance(law)}; the law was learned from the"
         " recordings."
     )
+
+
+def _constant(law: Mapping) -> str:
+    """What is constant, and its value."""
+    (constant,) = law["parameters"]
+    learned = registry.laws()[law["name"]]
+    low, high = constant["low"], constant["high"]
+    if learned.form.is_factor:
+        return f"is constant: {constant['value']:.3g} ({low:.3g} to {high:.3g}) times the calibrated one"
+    value, interval = quantity(constant["value"], low, high, learned.unit.replace(" ", "*"))
+    is_added = law["slot"] == SLIDING_FRICTION
+    return f"{f'has a constant {_added(law)}' if is_added else 'is constant'}: {value} ({interval})"
+
+
+def _added(law: Mapping) -> str:
+    """What is added to friction: a drag, or a bend."""
+    return registry.laws()[law["name"]].curve_is.partition(",")[0]
 
 
 def law_size(law: Mapping) -> str:
@@ -190,8 +208,7 @@ def law_size(law: Mapping) -> str:
     if is_factor:
         reference = "stated" if law["slot"] == PULLEY_RADIUS else "calibrated"
         return f"from {low:.3g} times the {reference} one at {at_low} to {high:.3g} times at {at_high}"
-    # Friction may have a drag or a bend added to it.
-    added = f"{learned.curve_is.partition(',')[0]} " if law["slot"] == SLIDING_FRICTION else ""
+    added = f"{_added(law)} " if law["slot"] == SLIDING_FRICTION else ""
     return f"{added}from {rounded(low, unit)} at {at_low} to {rounded(high, unit)} at {at_high}"
 
 

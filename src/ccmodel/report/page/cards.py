@@ -150,7 +150,7 @@ def caution(diagnosis: Mapping) -> str | None:
         return None
     if diagnosis["verdict"] != "agrees":
         worst = max(above, key=above.__getitem__)
-        return f"Not all is accounted for: up to {above[worst]:.1f} times the noise is left, in the {worst}."
+        return f"Not all is accounted for: up to {above[worst]:.1f} times the noise floor is left, in the {worst}."
     square = diagnosis["fit"]["mean_square"]["calibrated"]
     return (
         f"{joined([*above])}: above the noise floor by differences between runs, which the verdict takes into account"

@@ -153,5 +153,5 @@ def _fall(diagnosis: Mapping) -> str:
     before, after = error[worst]["before"] / noise, (nearest or error)[worst]["after"] / noise
     model = after_is(diagnosis)
     if not model:
-        return f"{SYMBOL[worst]}: {before:.1f} times the noise"
-    return f"{SYMBOL[worst]}: {before:.1f} to {after:.1f} times the noise (model: {model})"
+        return f"{SYMBOL[worst]}: {before:.1f} times the noise floor"
+    return f"{SYMBOL[worst]}: {before:.1f} to {after:.1f} times the noise floor (model: {model})"
