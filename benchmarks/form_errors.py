@@ -83,7 +83,7 @@ def fitted(calibrated: Calibration, hypothesis: Hypothesis) -> CandidateFit:
     (score,) = screen(base, [hypothesis]).singles()
     found = fit(calibrated.whitened, hypothesis, free, base.values | (score.values or hypothesis.start))
     spreads = estimated(found.whitened, found.residuals)
-    about = [relinearised(w, found.model(w.observations.parameters), spreads) for w in found.whitened]
+    about = [relinearised(w, found.model(w.observations.parameters, w.session), spreads) for w in found.whitened]
     return fit(about, hypothesis, free, found.values)
 
 

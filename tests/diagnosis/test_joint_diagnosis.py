@@ -53,6 +53,16 @@ def test_days_with_different_friction_agree_with_one_rig(joint):
     assert calibrated[KEYS[0]] / calibrated[KEYS[1]] == pytest.approx(DAYS[0] / DAYS[1], abs=0.01)
 
 
+def test_errors_are_linearised_about_the_friction_of_their_own_day(raw):
+    calibrated = cc.diagnose([raw / "monday", raw / "tuesday"])._outcome.found.calibrated
+    assert {w.session for w in calibrated.whitened} == {"monday", "tuesday"}
+    for w in calibrated.whitened:
+        assert w.own["friction_scale"] == pytest.approx(1.0, abs=0.008), w.name
+        model = calibrated.model(PARAMETERS, w.session)
+        whole = calibrated.values["friction_coefficient"] * calibrated.values[batch_key("friction_scale", w.session)]
+        assert (model.friction_coefficient, model.friction_scale) == (pytest.approx(whole), 1.0)
+
+
 def test_recordings_and_batches_are_named(joint):
     said = json.loads((joint / "diagnosis.json").read_text())
     assert (said["batch"], said["batches"]) == ("monday + tuesday", ["monday", "tuesday"])

@@ -246,9 +246,14 @@ class CandidateFit:
     def _is_at_bound(value: float, free: Free) -> bool:
         return any(np.isclose(value, bound, rtol=settings.AT_BOUND, atol=0.0) for bound in (free.low, free.high))
 
-    def model(self, estimates: Parameters) -> Parameters:
-        """The fitted model, with estimates of everything that is not fitted."""
-        return self.hypothesis.of(estimates).with_values(self.values)
+    def model(self, estimates: Parameters, batch: str = "") -> Parameters:
+        """The fitted model, with estimates of everything that is not fitted; of one batch, with its own values.
+
+        Of several batches, each has its own factor of friction. The coefficient has it here, so that the friction of a
+        recording (`Whitened.own`) is relative to its batch's.
+        """
+        model = self.hypothesis.of(estimates).with_values(self.values, batch)
+        return replace(model, friction_coefficient=model.friction, friction_scale=1.0) if batch else model
 
     def held_out(self, i: int) -> Observations:
         """One of the recordings with the model that was fitted to all others."""

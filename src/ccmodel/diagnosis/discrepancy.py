@@ -296,7 +296,7 @@ def _features(inputs: Sequence[NDArray]) -> list[NDArray]:
 def _inputs(w: Whitened, candidate: CandidateFit) -> NDArray:
     """State of the rig at every sample, as the model simulates it; shape (samples, quantities)."""
     given, time_s = w.observations.given, w.observations.given.recording.time_s
-    simulated = simulate(given, candidate.model(w.observations.parameters))
+    simulated = simulate(given, candidate.model(w.observations.parameters, w.session))
     omega = speed(given)
     travel, since_s = since_reversal(given)
     tensions = [simulated[c] for c in simulated.tensions]

@@ -44,9 +44,13 @@ def excess(parts: Sequence[tuple[Whitened, Observations]], calibrated: Candidate
 
     What differs from run to run has the spreads, and each recording the own values, of the whole recordings.
     """
-    model = calibrated.model(parts[0][1].parameters)
+
+    def whitened_part(_: int, part: tuple[Whitened, Observations]) -> Whitened:
+        whole, o = part
+        return whiten(o, calibrated.model(o.parameters, o.session), whole.repeatability, whole.own)
+
     try:
-        whitened = each(parts, lambda i, part: whiten(part[1], model, part[0].repeatability, part[0].own))
+        whitened = each(parts, whitened_part)
         return fit(whitened, calibrated.hypothesis, calibrated.free, calibrated.values).mean_square - 1.0
     except ModelError:
         return np.inf

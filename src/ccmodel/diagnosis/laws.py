@@ -111,7 +111,7 @@ def _missing_mass(base: CandidateFit, known: Mapping[str, float]) -> float:
 def _motion(base: CandidateFit, i: int) -> Sensing:
     """What the arguments of laws are read from, as the fitted model simulates a recording."""
     o = base.whitened[i].observations
-    simulated = simulate(o.given, base.model(o.parameters))
+    simulated = simulate(o.given, base.model(o.parameters, o.session))
     channels = {c: simulated[c] for c in CHANNELS if c in simulated} | {THETA_IN: o.given.theta_in}
     return Sensing(o.given.recording.time_s, channels, o.parameters.drive_radius_m, o.parameters.load_radius_m)
 

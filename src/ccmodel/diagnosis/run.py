@@ -166,8 +166,8 @@ def calibrate(
     progress("calibrating with whitened errors", FIRST_FIT)
     whitened = each(at_estimates, lambda i, o: whiten(o, tested.model))
     first = fit(whitened, tested.hypothesis, tested.free, tested.start)
-    repeatability, model = estimated(first.whitened, first.residuals), first.model(tested.estimates)
-    whitened = each(whitened, lambda i, w: relinearised(w, model, repeatability))
+    repeatability = estimated(first.whitened, first.residuals)
+    whitened = each(whitened, lambda i, w: relinearised(w, first.model(tested.estimates, w.session), repeatability))
     return Calibration(tested, whitened, fit(whitened, tested.hypothesis, tested.free, first.values), missing)
 
 

@@ -281,7 +281,7 @@ class Selection:
         if found.is_linearised_about(best):
             return found
         self.progress(f"linearising the covariance about {best.hypothesis}", 0.0)
-        models = [best.model(w.observations.parameters) for w in found.whitened]
+        models = [best.model(w.observations.parameters, w.session) for w in found.whitened]
 
         def starts(candidate: CandidateFit) -> list[dict[str, float]]:
             if candidate is best or self.is_tension_observed:
