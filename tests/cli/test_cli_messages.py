@@ -21,6 +21,10 @@ CHECKS = {
     "no argument": (["check"], "Missing argument"),
     "an argument too many": (["check", "raw/loops", "raw/loops"], "unexpected extra argument"),
     "a mechanism": (["mechanisms", "backlsh"], "backlash"),
+    "an excluded law": (
+        ["diagnose", "raw/loops", "--out", "out", "--without", "learned-sliding-friction-by-speed"],
+        "--without: learned-sliding-friction-by-speed is a learned law",
+    ),
     "an excluded mechanism": (["diagnose", "raw/loops", "--out", "out", "--without", "kinck"], "--without: "),
     "a candidate": (["diagnose", "raw/loops", "--out", "out", "--candidate", "kink at moon"], "--candidate: "),
     "a tolerance that is no number": (["diagnose", "raw/loops", "--out", "out", "--tolerance", "abc"], "--tolerance: "),

@@ -329,10 +329,17 @@ def test_the_strength_of_a_frozen_baselines_mechanism_is_its_change():
     k = list(free.values).index("pulley-friction/drive-pulley/friction_torque")
     covariance = np.zeros((len(free.values),) * 2)
     covariance[k, k] = (1e-4) ** 2
+    j = list(free.values).index("pulley-friction/drive-pulley/presliding")
+    covariance[j, j] = (1e-2) ** 2
     free = replace(free, whitened=whitened, covariance=covariance, degrees_of_freedom=np.full(len(free.values), 7.0))
     frozen = replace(free, hypothesis=Hypothesis((FRICTION,), baseline=(FRICTION,), is_frozen=True))
     assert free.log_support(*FRICTION) > 10
     assert frozen.log_support(*FRICTION) < 0
+    # Its other parameter may be what has changed.
+    covariance = covariance.copy()
+    covariance[j, j] = (1e-4) ** 2
+    values = frozen.values | {"pulley-friction/drive-pulley/presliding": 4e-3}
+    assert replace(frozen, covariance=covariance, values=values).log_support(*FRICTION) > 10
 
 
 def test_a_search_goes_on_from_what_may_be_an_imitation():
@@ -526,6 +533,17 @@ def test_shares_have_proper_densities(has_part, with_laws):
         (1.5, evidence(NONE), False),
     ],
 )
+def test_a_fit_with_an_implausible_strength_is_no_reason_to_stop():
+    """The only candidate leaves nothing, but its strength is beyond what it can be."""
+    found = compared(
+        evidence(),
+        (fitted(1.0, FRICTION, **{"pulley-friction/drive-pulley/friction_torque": 1e3}), evidence(NONE)),
+    )
+    assert found.most_probable is found.base
+    assert not found.is_adequate
+    assert verdict(evidence(), *zip(found.candidates, [evidence(NONE)], strict=True)).verdict == "unexplained"
+
+
 def test_a_further_mechanism_is_searched_for_where_something_is_left(mean_square, given, enough):
     assert compared(evidence(), (fitted(mean_square, FRICTION), given)).is_adequate == enough
 

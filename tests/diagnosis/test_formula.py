@@ -50,6 +50,14 @@ def test_a_wider_band_has_a_shorter_formula():
     assert formula_of(y, sd=0.001)[0] != "a + b x"
 
 
+@pytest.mark.parametrize("middle", [-500.0, 500.0])
+def test_an_exponential_far_from_zero_is_no_error(middle):
+    """A load cell's reading that varies by a hundredth of its mean: exp(-x/c) is zero or infinite."""
+    x = middle + np.linspace(-0.5, 0.5, 25)
+    y = 0.3 * np.tanh((x - middle) / 0.05) * np.cos(40 * (x - middle))
+    formula_of(y, sd=1e-4, law=laws()["learned-sensor-map-F-load-by-reading"], x=x)
+
+
 def test_a_curve_that_no_formula_meets_has_none():
     y = np.random.default_rng(2).standard_normal(X.size)
     assert formula_of(y, sd=1e-3) == (None, [])

@@ -97,6 +97,7 @@ def test_the_mechanism_of_the_file_reproduces_the_law(law, tmp_path, listed):
     listed(kept)
     theta_in = sine(cycles=1)
     without, learned = run(theta_in), run(theta_in, (law.name, law.place, values))
+    assert kept.looks_ahead == law.looks_ahead
     found = run(theta_in, (NAME, law.place, {"strength": 1.0}))
     neutral = run(theta_in, (NAME, law.place, {"strength": 0.0}))
     for channel, reading in learned.read.items():

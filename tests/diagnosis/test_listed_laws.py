@@ -188,6 +188,13 @@ def test_the_report_says_where_a_law_is_a_constant():
     )
 
 
+def test_a_factor_that_may_be_zero_has_no_upper_limit_in_the_report():
+    """Two recordings hardly determine friction by direction."""
+    law = laws()["learned-sliding-friction-by-direction"]
+    stated = {"name": law.name, "slot": "sliding-friction", "curve": [[-1.0, 0.8, -0.1, 1.7], [1.0, 1.2, 0.3, 2.1]]}
+    assert law_size(stated).startswith("50 % (at least -")
+
+
 def test_the_report_says_by_how_much_a_radius_is_wrong():
     law = {
         "name": "learned-pulley-radius-drive-by-drive-angle",

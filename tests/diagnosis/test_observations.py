@@ -44,6 +44,10 @@ def test_of_a_large_one_each_condition_has_an_equal_number(counts, most, share):
     assert Counter(one.split("-")[0] for one in found) == share
 
 
+def test_of_more_conditions_than_are_compared_some_are_taken_over_the_whole_sequence():
+    assert chosen({float(tension): 1 for tension in range(1, 10)}, 3) == ["1N-0", "5N-0", "9N-0"]
+
+
 def test_recordings_of_a_condition_are_taken_over_the_whole_sequence():
     found = [int(one.split("-")[1]) for one in chosen({7.0: 101}, 5)]
     assert found == [0, 25, 50, 75, 100]
@@ -59,7 +63,7 @@ def test_what_is_left_out_is_said(monkeypatch):
     monkeypatch.setattr(stage.settings, "MOST_RECORDINGS", 2)
     recordings = [w.observations.given.recording for w in made_observations.batch()]
     observations, not_judged = observations_of(recordings, made_observations.PARAMETERS)
-    # The first two have one pretension, and no motion is stated.
-    assert [o.given.recording.id for o in observations] == ["r0", "r2"]
+    # The first two have one pretension, and no motion is stated: of three conditions, the first and the last.
+    assert [o.given.recording.id for o in observations] == ["r0", "r3"]
     assert not_judged[0]["what"] == "2 of 4 recordings"
     assert "at most 2" in not_judged[0]["why"]

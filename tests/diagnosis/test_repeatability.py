@@ -171,6 +171,20 @@ def test_a_trend_is_no_scatter():
     assert np.mean([trend(observed(d)) < TREND_LEVEL for d in draws]) <= 0.01
 
 
+def test_batches_of_different_length_keep_their_means_without_the_trend():
+    drift = np.concatenate([np.linspace(-1, 1, n) * n for n in (3, 9)])
+    left = without_trend(observed(drift), [range(3), range(3, 12)]).values
+    assert abs(left[:3].mean() - left[3:].mean()) < 0.05
+    assert left.std() < 0.3 * drift.std()
+
+
+def test_the_error_of_a_mean_is_no_scatter_of_a_frozen_friction():
+    """Nothing scatters: all that the frictions differ by is the error of their estimates."""
+    draws = np.random.default_rng(5).standard_normal((2000, 9))
+    low = [between_p_value(observed(d, variance=0.9), ALONE, is_fitted=False) < 0.05 for d in draws]
+    assert np.mean(low) < 0.05
+
+
 def test_a_trend_is_that_of_each_batch():
     """Batches one after another, each of which drifts alike and begins anew."""
     drift = np.tile(np.linspace(-4, 4, 5), 3) + np.random.default_rng(0).standard_normal(15)

@@ -56,6 +56,12 @@ def test_the_load_follows_with_mechanisms(mechanism):
     assert np.sqrt(np.mean(lost**2)) < straight / 50
 
 
+def test_a_fault_of_the_loads_sensor_is_no_lost_motion():
+    late = Active("time-skew", "load-sensor", {"delay": 0.05})
+    found = compensated(WANTED, replace(PARAMETERS, mechanisms=(late,), theta_out_zero_rad=0.01), RIG, FREE)
+    assert np.abs(found.table["theta_out_rad"] - SWING).max() < 1e-6
+
+
 @pytest.mark.parametrize(
     ("name", "first", "last", "scale"),
     [

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ccmodel import mechanisms as registry
 from ccmodel.channels import TAU_IN, TAU_OUT, ZERO_OF
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.hypothesis import PAPER, Hypothesis
@@ -13,7 +14,19 @@ from ccmodel.inference.effective_samples import prior_spread
 from ccmodel.inference.least_squares import Search, solve
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.problem import Free, Problem
-from ccmodel.model.parameters import Parameters, batch_key, parameter_of
+from ccmodel.model.active import active_of
+from ccmodel.model.parameters import Parameters, batch_key, mechanism_key, parameter_of
+
+# What belongs to a rig, whatever its batches show of it; a stiffness goes with the length that it is of.
+OF_RIG = (
+    "stiffness_N_per_m",
+    "reference_length_m",
+    "friction_coefficient",
+    "extra_bend_rad",
+    "load_radius_m",
+    "load_stiffness_Nm_per_rad",
+    "spring_beside_load_Nm_per_rad",
+)
 
 
 @dataclass(frozen=True)
@@ -64,7 +77,15 @@ def tested_model(
     if baseline is None:
         at_estimates = [o.with_parameters(estimates) for o in observations]
         return TestedModel(PAPER, estimates, free, _first_fit(at_estimates, free))
-    hypothesis = Hypothesis(baseline=tuple((m.name, m.place) for m in baseline.mechanisms))
+    if freeze:
+        # What drifted while the baseline's batch was recorded says nothing of another session.
+        kept = tuple(m for m in baseline.mechanisms if registry.get(m.name).drift is None)
+        baseline = replace(baseline, mechanisms=kept)
+        estimates = _with_rig_of(baseline, estimates)
+    baseline = replace(baseline, mechanisms=tuple(active_of(baseline.mechanisms)))
+    hypothesis = Hypothesis(
+        baseline=tuple((m.name, m.place) for m in baseline.mechanisms), fixed=_fixed_by_conditions(baseline)
+    )
     pretension_N = float(np.mean([o.given.recording.pretension_N for o in observations]))
     start = _values_of(baseline, free, hypothesis, pretension_N)
     if freeze:
@@ -73,6 +94,22 @@ def tested_model(
         free = {name: one for name, one in free.items() if parameter_of(name) in ZERO_OF.values()}
         hypothesis = replace(hypothesis, is_frozen=True)
     return TestedModel(hypothesis, estimates, free, start)
+
+
+def _with_rig_of(baseline: Parameters, estimates: Parameters) -> Parameters:
+    """Estimates with all that a baseline has of its rig, also where the recordings at hand would not free it."""
+    values = {name: value for name in OF_RIG if (value := getattr(baseline, name)) is not None}
+    return replace(estimates, **values)
+
+
+def _fixed_by_conditions(baseline: Parameters) -> tuple[tuple[str, float], ...]:
+    """Values that the conditions of the recordings set, such as a learned law's range, which belong to its others."""
+    return tuple(
+        (mechanism_key(m.name, m.place, p.name), m.values[p.name])
+        for m in baseline.mechanisms
+        for p in registry.get(m.name).parameters
+        if p.fixed
+    )
 
 
 def calibration(estimates: Parameters, observations: Sequence[Observations]) -> dict[str, Free]:

@@ -22,7 +22,6 @@ from ccmodel.inference.least_squares import STALLED, STOPPED, Search, Solution, 
 from ccmodel.inference.observations import Observations
 from ccmodel.inference.pool import each
 from ccmodel.inference.problem import Free, Problem
-from ccmodel.mechanisms import Parameter
 from ccmodel.model.parameters import Parameters, mechanism_key
 
 SEARCH = Search(
@@ -186,7 +185,7 @@ class CandidateFit:
         Raftery, Bayes factors, Journal of the American Statistical Association 90(430), 773-795, 1995,
         doi:10.1080/01621459.1995.10476572). Of several strengths, the clearest one counts. The result is infinite for a
         law, which has no strength, and if nothing scatters. The strength of a mechanism with states is the part that
-        remains when the recordings start. That of a frozen baseline's mechanism is its change.
+        remains when the recordings start. Of a frozen baseline's mechanism, the clearest change of a parameter counts.
 
         The variance is conditional on the mechanism's other parameters, which have no meaning without the mechanism;
         each of them takes a degree of freedom. If fewer than one would be left, the variance is the marginal one.
@@ -199,6 +198,8 @@ class CandidateFit:
 
     def _log_support(self, name: str, place: str, covariance: NDArray, degrees: NDArray) -> float:
         mechanism, names = registry.get(name), list(self.values)
+        if (name, place) in self.hypothesis.baseline:
+            return self._log_support_of_change(name, place, covariance, degrees)
         apart = {p.name for p in (*mechanism.strengths, *mechanism.states)}
         keys = [mechanism_key(name, place, p.name) for p in mechanism.parameters if p.name not in apart]
         shapes = [names.index(key) for key in keys if key in self.values]
@@ -207,7 +208,7 @@ class CandidateFit:
         most = -np.inf
         for strength in mechanism.strengths:
             k = names.index(mechanism_key(name, place, strength.name))
-            whole = self.values[names[k]] - self._without(name, place, strength)
+            whole = self.values[names[k]] - strength.neutral
             nu = float(degrees[k])
             # The derivatives of what is left: by the strength, and by each state.
             slopes = [float(left.prod()), *(-whole * float(np.delete(left, i).prod()) for i in range(left.size))]
@@ -217,17 +218,21 @@ class CandidateFit:
             variance = np.array(slopes) @ of_part @ np.array(slopes)
             if not variance > 0.0:
                 return np.inf
-            t2 = (whole * float(left.prod())) ** 2 / variance
-            by_recordings = (nu + 1) / 2 * np.log1p(t2 / nu) - np.log(nu + 1) / 2 if np.isfinite(nu) else t2 / 2
-            most = max(most, float(by_recordings))
+            most = max(most, _log_factor((whole * float(left.prod())) ** 2 / variance, nu))
         return most if np.isfinite(most) else np.inf
 
-    def _without(self, name: str, place: str, strength: Parameter) -> float:
-        """Value of a strength without its mechanism, or without a change of a mechanism of a frozen baseline."""
-        if (name, place) not in self.hypothesis.baseline:
-            return strength.neutral
-        known = {(m.name, m.place): m.values for m in self.whitened[0].observations.parameters.mechanisms}
-        return known.get((name, place), {}).get(strength.name, strength.neutral)
+    def _log_support_of_change(self, name: str, place: str, covariance: NDArray, degrees: NDArray) -> float:
+        """As `_log_support`, of a mechanism of a frozen baseline."""
+        names, model = list(self.values), self.whitened[0].observations.parameters
+        known = next(m.values for m in model.mechanisms if (m.name, m.place) == (name, place))
+        found = [-np.inf]
+        for parameter, before in known.items():
+            if (key := mechanism_key(name, place, parameter)) in self.values:
+                k = names.index(key)
+                if not covariance[k, k] > 0.0:
+                    return np.inf
+                found.append(_log_factor((self.values[key] - before) ** 2 / covariance[k, k], float(degrees[k])))
+        return max(found)
 
     def intervals(self) -> dict[str, Interval]:
         """The 90 % interval of each unknown of the calibration, within its bounds."""
@@ -518,6 +523,11 @@ def discretisation_shift(candidate: CandidateFit) -> NDArray:
     weights = [mean_weight(w.observations) for w in candidate.whitened]
     score = sum(c * J.T @ e for J, e, c in zip(candidate.jacobian, changes, weights, strict=True))
     return -inverse_of(candidate.total_information, candidate.sizes) @ score
+
+
+def _log_factor(t2: float, nu: float) -> float:
+    """Log Bayes factor of the square of a Student's t statistic on `nu` degrees of freedom, which may be infinite."""
+    return float((nu + 1) / 2 * np.log1p(t2 / nu) - np.log(nu + 1) / 2 if np.isfinite(nu) else t2 / 2)
 
 
 def _given(covariance: NDArray, wanted: list[int], known: list[int]) -> NDArray:

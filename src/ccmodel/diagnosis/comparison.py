@@ -336,9 +336,11 @@ class Comparison:
 
     @property
     def most_probable(self) -> CandidateFit:
-        """The candidate that is most probably complete; the calibrated model if there are no candidates."""
+        """The candidate that is most probably complete; the calibrated model if none is plausible."""
         complete = self.log_posterior[1:, 0]
-        return self.candidates[int(np.argmax(complete))] if self.candidates else self.base
+        if not np.isfinite(complete).any():
+            return self.base
+        return self.candidates[int(np.argmax(complete))]
 
     @property
     def leading(self) -> list[CandidateFit]:

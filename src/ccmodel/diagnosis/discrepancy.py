@@ -284,7 +284,8 @@ def _features(inputs: Sequence[NDArray]) -> list[NDArray]:
     random = np.random.default_rng(settings.FEATURES_SEED)
     every = np.concatenate(inputs)
     mean, scale = every.mean(axis=0), every.std(axis=0)
-    scale[scale == 0] = 1.0
+    # The standard deviation of a constant is a rounding error.
+    scale[scale <= 1e-9 * np.abs(mean)] = 1.0
     shape = (every.shape[1], settings.FEATURES)
     used = random.random(shape) < settings.INPUTS_PER_FEATURE / every.shape[1]
     directions = used * random.standard_normal(shape) / random.choice(settings.LENGTH_SCALES, settings.FEATURES)

@@ -20,6 +20,10 @@ TRIED = 40
 EXPONENTS = tuple(0.1 * k for k in (*range(-25, 0), *range(1, 26)))
 
 
+# Error, over its standard deviation, of a term that cannot be computed: finite, as a search needs it.
+NO_FIT = 1e50
+
+
 @dataclass(frozen=True)
 class Form:
     """A formula: a sum of terms with a factor each, and perhaps a length.
@@ -110,9 +114,13 @@ def _fitted(form: Form, x: NDArray, y: NDArray, sd: NDArray) -> tuple[NDArray, N
     """Constants of a formula by least squares, its errors over their standard deviation, and their derivatives."""
 
     def linear(length: float) -> tuple[NDArray, NDArray]:
-        weighted = np.stack(form.terms(x, length), axis=1) / sd[:, None]
-        # A term of another size than the rest would be dropped as if it were dependent on them.
-        size = np.linalg.norm(weighted, axis=0)
+        with np.errstate(over="ignore"):
+            weighted = np.stack(form.terms(x, length), axis=1) / sd[:, None]
+            # A term of another size than the rest would be dropped as if it were dependent on them.
+            size = np.linalg.norm(weighted, axis=0)
+        if not (np.isfinite(size).all() and size.all()):
+            # An exponential of many lengths is zero, or infinite.
+            return np.zeros(size.size), np.full(x.size, NO_FIT)
         factors = np.linalg.lstsq(weighted / size, y / sd, rcond=None)[0] / size
         return factors, weighted @ factors - y / sd
 
@@ -129,6 +137,8 @@ def _fitted(form: Form, x: NDArray, y: NDArray, sd: NDArray) -> tuple[NDArray, N
         method="bounded",
     ).x
     factors, errors = linear(refined)
+    if errors[0] == NO_FIT:
+        return np.append(factors, refined), errors, np.ones((x.size, factors.size + 1))
     step = 1e-4 * abs(refined)
     higher, lower = (np.stack(form.terms(x, refined + s), axis=1) @ factors for s in (step, -step))
     by_length = (higher - lower) / (2 * step) / sd

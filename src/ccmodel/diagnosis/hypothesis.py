@@ -46,7 +46,8 @@ class Hypothesis:
 
     def part(self, acting: tuple[tuple[str, str], ...]) -> "Hypothesis":
         """The same with some of its mechanisms alone."""
-        kept = tuple(one for one in self.fixed if (mechanism_parameter(one[0]) or ())[:2] in acting)
+        of = self.baseline + acting
+        kept = tuple(one for one in self.fixed if (mechanism_parameter(one[0]) or ())[:2] in of)
         return replace(self, acting=acting, fixed=kept)
 
     @property

@@ -82,6 +82,7 @@ def mechanism_file(name: str, stated: Mapping, candidate: CandidateFit, batch: s
         curve="\n".join(f"        [{a!r}, {b!r}]," for a, b in zip(x.tolist(), y.tolist(), strict=True)),
         look_alike=nearest["name"] if nearest else LOOK_ALIKES[law.slot],
         depends_on_time=law.argument.depends_on_time,
+        looks_ahead=law.looks_ahead,
     )
 
 
@@ -127,6 +128,7 @@ MECHANISM = Mechanism(
     parameters=(STRENGTH,),
     mistaken_for=("{look_alike}",),
     depends_on_time={depends_on_time},
+    looks_ahead={looks_ahead},
     curves=(LAW.curve(X, Y, STRENGTH),),
     **LAW.acting(lambda values: (X, values["strength"] * Y)),
 )

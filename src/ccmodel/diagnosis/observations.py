@@ -67,7 +67,8 @@ def spread_over_conditions(recordings: Sequence[Recording], most: int) -> list[R
     share = Counter[str]()
     while share.total() < most:
         left = [condition for condition, of in by_condition.items() if share[condition] < len(of)]
-        share.update(left[: most - share.total()])
+        evenly = np.linspace(0, len(left) - 1, min(len(left), most - share.total())).round()
+        share.update(left[int(k)] for k in evenly)
     chosen = [
         of[int(k)]
         for condition, of in by_condition.items()

@@ -254,7 +254,7 @@ def between_p_value(found: Deviations, groups: Sequence[Sequence[int]], is_fitte
     between = found.sum_of_squares([known.tolist()])[0] - within
     between_freedom = len(known) - 1 - freedom
     if not is_fitted and len(known):
-        between += len(known) * float(found.values[known].mean()) ** 2
+        between += len(known) * float(found.values[known].mean()) ** 2 - float(found.variances[known].mean())
         between_freedom += 1
     if between_freedom < 1:
         return None
@@ -292,7 +292,9 @@ def without_trend(found: Deviations, runs: Sequence[Sequence[int]]) -> Deviation
         return found
     slope, values = _slope(*_over_sequence(found, runs)), found.values.copy()
     for run in runs:
-        values[list(run)] -= slope * np.arange(len(run))
+        at = np.arange(len(run), dtype=float)
+        known = np.isfinite(values[list(run)])
+        values[list(run)] -= slope * (at - (at[known].mean() if known.any() else 0.0))
     return Deviations(values, found.variances)
 
 

@@ -119,7 +119,7 @@ class Selection:
                     break
                 if is_over:
                     continue
-            listed = next(c for c in found.by_evidence if law_of(c.hypothesis) is None)
+            listed = next((c for c in found.by_evidence if law_of(c.hypothesis) is None), found.base)
             if is_over or listed.hypothesis.size < size:
                 break
             size += 1

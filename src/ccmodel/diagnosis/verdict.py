@@ -117,9 +117,8 @@ def judge(comparison: Comparison, scores: list[Score]) -> Judgement:
     if comparison.unlisted + learned > 0.5 and max(map(found.confidence_in, names), default=0.0) <= 0.5:
         return replace(found, verdict="unexplained", single_fault_places=single_fault_places(comparison))
     # Whether its last member is missing or imitates something, the set with the highest evidence predicts best.
-    return replace(
-        found, verdict="undecided", best=next(c for c in comparison.by_evidence if law_of(c.hypothesis) is None)
-    )
+    best = next((c for c in comparison.by_evidence if law_of(c.hypothesis) is None), comparison.base)
+    return replace(found, verdict="undecided", best=best)
 
 
 def _is_explained(judgement: Judgement, best: CandidateFit) -> bool:

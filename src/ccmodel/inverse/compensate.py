@@ -11,7 +11,7 @@ from ccmodel.channels import THETA_IN, THETA_OUT
 from ccmodel.failure import ModelError
 from ccmodel.inverse import follow
 from ccmodel.kernel import kernel
-from ccmodel.model.active import modify_physics
+from ccmodel.model.active import modify_physics, without_faults
 from ccmodel.model.general.run import settings_of
 from ccmodel.model.model_input import ModelInput
 from ccmodel.model.parameters import Parameters
@@ -83,10 +83,12 @@ def compensated(
         pretension_N = like.pretension_N
     else:
         parameters = replace(parameters, pretension_N=None)
+    # A fault of the encoder at the load moves nothing: what is compared is the load itself.
+    itself = replace(parameters, mechanisms=without_faults(parameters.mechanisms), theta_out_zero_rad=0.0)
     time_s, load = wanted["time_s"].to_numpy(float), wanted[THETA_OUT].to_numpy(float)
 
     def response(theta_in: NDArray) -> NDArray:
-        return simulate(ModelInput.prescribed(like, time_s, theta_in, pretension_N), parameters)[THETA_OUT]
+        return simulate(ModelInput.prescribed(like, time_s, theta_in, pretension_N), itself)[THETA_OUT]
 
     straight = load * parameters.load_radius_m / parameters.drive_radius_m
     given = ModelInput.prescribed(like, time_s, straight, pretension_N)

@@ -52,6 +52,12 @@ def modify_physics(mechanisms: Sequence[Active]) -> bool:
     return any(registry.get(a.name).modifies_settings for a in mechanisms)
 
 
+def without_faults(mechanisms: Sequence[Active]) -> tuple[Active, ...]:
+    """Mechanisms without those that modify the observation alone."""
+    every = [(m, registry.get(m.name)) for m in mechanisms]
+    return tuple(m for m, known in every if known.modifies_settings or known.modifies_observation is None)
+
+
 def _check(a: Active, known: Mechanism) -> None:
     if a.place not in known.places:
         raise ModelError(f"{a.name} acts at {' or '.join(known.places)}; got {a.place!r}")

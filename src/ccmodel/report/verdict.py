@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from math import floor, log10
+from math import floor, inf, isinf, log10
 
 from ccmodel import mechanisms as registry
 from ccmodel.channels import TABLE, symbol_of
@@ -194,7 +194,7 @@ def law_size(law: Mapping) -> str:
         (_, *first), (_, *second) = curve
         lower, higher = sorted((first, second))
         pairs = zip(higher, (lower[0], lower[2], lower[1]), strict=True)
-        apart, least, most = (high / low - 1 if is_factor else high - low for high, low in pairs)
+        apart, least, most = (_apart(high, low, is_factor) for high, low in pairs)
         value, interval = quantity(apart, least, most, "%" if is_factor else unit)
         names = learned.argument.two_values
         more, less = names if higher is first else names[::-1]
@@ -210,6 +210,13 @@ def law_size(law: Mapping) -> str:
         return f"from {low:.3g} times the {reference} one at {at_low} to {high:.3g} times at {at_high}"
     added = f"{_added(law)} " if law["slot"] == SLIDING_FRICTION else ""
     return f"{added}from {rounded(low, unit)} at {at_low} to {rounded(high, unit)} at {at_high}"
+
+
+def _apart(high: float, low: float, is_factor: bool) -> float:
+    """How far apart two values are; of factors by a share, which has no limit where the lower one may be zero."""
+    if not is_factor:
+        return high - low
+    return high / low - 1 if low > 0 else inf
 
 
 def _argument(x: float, unit: str) -> str:
@@ -304,10 +311,13 @@ def quantity(value: float, low: float, high: float, unit: str) -> tuple[str, str
     Parameters
     ----------
     value, low, high : float
-        In SI units.
+        In SI units; `high` may be infinite.
     unit : str
         SI unit as in diagnosis.json, "1" for a number, or "%" for a number that is shown in per cent.
     """
+    if isinf(high):
+        factor, printed = _scale(max(abs(value), abs(low)), unit)
+        return f"{factor * value:.3g}{printed}", f"at least {factor * low:.2g}{printed}"
     factor, printed = _scale(max(abs(value), abs(low), abs(high)), unit)
     value, low, high = factor * value, factor * low, factor * high
     reach = float(f"{(high - low) / 2:.3g}")  # without the rounding of binary numbers

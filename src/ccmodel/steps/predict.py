@@ -122,7 +122,7 @@ def conditions_of(
         if model.rig is None:
             raise InputError("the model does not state its rig's conduits (its file is an old one): state a batch too")
         return model.rig.recording(name)
-    usable = {r.id: r for r in recordings}
+    usable = {r.id: r for r in model.placed(recordings)}
     if not usable or (name is not None and name not in usable):
         raise InputError(f"{batch}: no recording {name or ''} that can be used; there is {', '.join(usable) or 'none'}")
     return next(iter(usable.values())) if name is None else usable[name]

@@ -166,6 +166,8 @@ def check_options(options: Options, has_baseline: bool, prefix: str = "") -> Non
     try:
         for name in options.without:
             registry.get(name)
+            if name in registry.laws():
+                raise InputError(f"{prefix}without: {name} is a learned law; only a listed mechanism can be excluded")
     except registry.UnknownMechanismError as error:
         raise InputError(f"{prefix}without: {error}") from None
     if options.freeze and not has_baseline:
