@@ -56,6 +56,11 @@ def test_a_rest_that_scatters_twice_as_much_as_cycles_is_none(at_rest, found):
     assert repeated(SensorNoise(at_rest, "rest"), 1.0, 5.0) == found
 
 
+def test_cycles_that_do_not_scatter_show_no_less_than_a_quiet_rest():
+    """Of a channel that repeats exactly, as one that a program has made, noise would be zero."""
+    assert repeated(SensorNoise(0.1, "rest", 8, least=0.1), 0.0, 3.0).sd == 0.1
+
+
 def test_cycles_and_rest_are_weighed_by_their_degrees_of_freedom():
     found = repeated(SensorNoise(1.0, "rest"), 4.0, 0.2)
     assert IN_DIAGNOSIS == 20

@@ -44,11 +44,14 @@ class SensorNoise:
         Consecutive cycles, scatter at rest, the step of a counted angle, or the stated accuracy.
     freedom : float
         Degrees of freedom of the scatter at rest; 0 of another source.
+    least : float
+        Least standard deviation that a rest, or cycles in its place, may show.
     """
 
     sd: float
     source: str
     freedom: float = 0.0
+    least: float = 0.0
 
 
 def sensor_noise(given: ModelInput) -> dict[str, SensorNoise]:
@@ -68,7 +71,7 @@ def sensor_noise(given: ModelInput) -> dict[str, SensorNoise]:
         elif rest.size >= FEWEST_AT_REST:
             best = BEST_SHARE * stated if stated else 1e-6 * max(float(np.abs(values).max()), 1e-9)
             first = rest[: max(FEWEST_AT_REST, rest.size // 2)]
-            prior = SensorNoise(max(_scatter(first), best), "rest", first.size - 2)
+            prior = SensorNoise(max(_scatter(first), best), "rest", first.size - 2, best)
         else:
             prior = SensorNoise(stated or 0.01 * max(float(np.ptp(values)), 1e-9), "assumed")
         found[channel] = prior
@@ -108,7 +111,7 @@ def repeated(prior: SensorNoise, variance: float | None, cycles: float) -> Senso
     do is no rest.
     """
     if variance is not None and prior.source == "rest" and prior.sd**2 > RESTLESS**2 * variance:
-        return SensorNoise(float(np.sqrt(variance)), "cycles")
+        return SensorNoise(max(float(np.sqrt(variance)), prior.least), "cycles")
     if variance is None or variance <= prior.sd**2:
         return prior
     freedom = IN_DIAGNOSIS * cycles
