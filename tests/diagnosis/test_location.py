@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from builders import recording
+from ccmodel.deadline import Deadline
 from ccmodel.diagnosis.comparison import Comparison
+from ccmodel.diagnosis.discrepancy import Evidence
 from ccmodel.diagnosis.location import PHASES, location, phases_of, prominent
+from ccmodel.diagnosis.result import report
 from ccmodel.diagnosis.verdict import Judgement
 from ccmodel.diagnosis.whitening import whiten
 from ccmodel.model.general.run import Active
@@ -63,6 +66,19 @@ def test_errors_at_both_ends_are_located_between_them():
         )
     )
     assert located(recordings)["place"] == "conduit"
+
+
+def test_a_place_that_there_was_no_time_to_isolate_is_said():
+    recordings = batch(lambda simulated: wave(simulated, "tau_in_Nm"))
+    found = unexplained(recordings)
+    past = Evidence(-500.0, -500.0, -10.0, {"tau_in_Nm": -500.0}, 0.0, 0.01)
+    found = replace(found, comparison=replace(found.comparison, evidence={found.calibrated.hypothesis: past}))
+    said = report("b", found, found.calibrated, PARAMETERS, [], deadline=Deadline(at_s=0.0))
+    assert said["location"]["place"] == "conduit"
+    assert said["not_judged"][0]["what"] == "the place of the mismatch"
+    in_time = report("b", found, found.calibrated, PARAMETERS, [])
+    assert in_time["location"]["place"] == "drive-pulley"
+    assert not in_time["not_judged"]
 
 
 def test_a_single_channel_gives_a_place():

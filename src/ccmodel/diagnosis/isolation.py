@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ccmodel.channels import PLACES_OF, TAU_OUT, THETA_OUT
+from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis.candidate import CandidateFit, fit
 from ccmodel.diagnosis.whitening import Whitened, whiten
 from ccmodel.failure import ModelError
@@ -19,13 +20,21 @@ from ccmodel.inference.pool import each
 AT_THE_LOAD = ("load", "load-pulley")
 
 
-def isolate(whitened: Sequence[Whitened], calibrated: CandidateFit) -> list[tuple[float, tuple[str, ...]]]:
-    """For each part that may be at fault, the excess mean square without it and the places of that part."""
+def isolate(
+    whitened: Sequence[Whitened], calibrated: CandidateFit, deadline: Deadline = UNLIMITED
+) -> list[tuple[float, tuple[str, ...]]]:
+    """For each part that may be at fault, the excess mean square without it and the places of that part.
+
+    Raises
+    ------
+    ccmodel.deadline.OutOfTimeError
+        If the deadline passes.
+    """
     channels = channels_of(whitened)
-    found = [(excess(without(c, whitened), calibrated), PLACES_OF[c]) for c in channels if len(channels) > 1]
+    found = [(excess(without(c, whitened), calibrated, deadline), PLACES_OF[c]) for c in channels if len(channels) > 1]
     if all({TAU_OUT, THETA_OUT} < set(w.observations.channels) for w in whitened):
         driven = [(w, w.observations.driven_by_torque()) for w in whitened]
-        found.append((excess(driven, calibrated), AT_THE_LOAD))
+        found.append((excess(driven, calibrated, deadline), AT_THE_LOAD))
     return found
 
 
@@ -39,7 +48,9 @@ def without(channel: str, whitened: Sequence[Whitened]) -> list[tuple[Whitened, 
     return [(w, o) for w in whitened if (o := w.observations.without(channel)).channels]
 
 
-def excess(parts: Sequence[tuple[Whitened, Observations]], calibrated: CandidateFit) -> float:
+def excess(
+    parts: Sequence[tuple[Whitened, Observations]], calibrated: CandidateFit, deadline: Deadline = UNLIMITED
+) -> float:
     """Mean square above the noise of the calibrated model, fitted to a part of each recording; infinite if it fails.
 
     What differs from run to run has the spreads, and each recording the own values, of the whole recordings.
@@ -51,6 +62,8 @@ def excess(parts: Sequence[tuple[Whitened, Observations]], calibrated: Candidate
 
     try:
         whitened = each(parts, whitened_part)
-        return fit(whitened, calibrated.hypothesis, calibrated.free, calibrated.values).mean_square - 1.0
+        return fit(whitened, calibrated.hypothesis, calibrated.free, calibrated.values, deadline).mean_square - 1.0
+    except OutOfTimeError:
+        raise
     except ModelError:
         return np.inf

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.channels import PLACES_OF, short_name
+from ccmodel.deadline import UNLIMITED, Deadline
 from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.drive import is_moving, since_reversal
@@ -34,13 +35,23 @@ TEXT = {
 }
 
 
-def location(judgement: Judgement, calibrated: CandidateFit) -> dict:
-    """Most likely place of the mismatch and all possible ones, the calibration's worst channels and phases, a text."""
+def location(
+    judgement: Judgement, calibrated: CandidateFit, deadline: Deadline = UNLIMITED, isolating: bool = True
+) -> dict:
+    """Most likely place of the mismatch and all possible ones, the calibration's worst channels and phases, a text.
+
+    Without `isolating`, a fault of one channel or of the load is not looked for.
+
+    Raises
+    ------
+    ccmodel.deadline.OutOfTimeError
+        If the deadline passes while a fault is isolated.
+    """
     if judgement.verdict == "agrees":
         text = "model and recordings agree within the noise"
         return {"place": None, "places": [], "channels": [], "phases": [], "text": text}
     hypothesis = judgement.best.hypothesis
-    places = hypothesis.places or judgement.single_fault_places or _places(judgement)
+    places = hypothesis.places or judgement.single_fault_places or _places(judgement, deadline, isolating)
     table = mismatch(calibrated, judgement.whitened)
     square = {c: float(np.nanmean(np.square(list(phases.values())))) for c, phases in table.items()}
     channels = prominent(square, settings.NAMED_CHANNEL)
@@ -60,14 +71,15 @@ def prominent(square: dict[str, float], share: float) -> list[str]:
     return [name for name in ranked if beyond[name] > share**2 * worst] or ranked[:1]
 
 
-def _places(judgement: Judgement) -> list[str]:
+def _places(judgement: Judgement, deadline: Deadline, isolating: bool) -> list[str]:
     """Possible places of a mismatch that no mechanism explains, the most likely first.
 
     If no part alone is at fault (`ccmodel.diagnosis.isolation`), the fault lies between drive and load, where nearly
     every effect acts along the conduits. Places that this does not separate are ordered by their screening scores.
     """
     whitened, calibrated = judgement.whitened, judgement.calibrated
-    least, places = min(isolate(whitened, calibrated), default=(0.0, PLACES_OF[channels_of(whitened)[0]]))
+    isolated = isolate(whitened, calibrated, deadline) if isolating else [(np.inf, BETWEEN)]
+    least, places = min(isolated, default=(0.0, PLACES_OF[channels_of(whitened)[0]]))
     possible = places if least <= settings.ISOLATED_SHARE * judgement.comparison.excess else BETWEEN
     scored = [s.hypothesis.acting[0][1] for s in judgement.scores if s.values]
     return list(dict.fromkeys([*(place for place in scored if place in possible), *possible]))

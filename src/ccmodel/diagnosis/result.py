@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
 from ccmodel.channels import short_name, unit_of
+from ccmodel.deadline import UNLIMITED, Deadline, OutOfTimeError
 from ccmodel.diagnosis import experiment, location, repeatability, settings
 from ccmodel.diagnosis.candidate import CandidateFit, discretisation_shift, fit
 from ccmodel.diagnosis.hypothesis import Hypothesis
@@ -22,7 +23,12 @@ FORMAT = 1
 
 
 def report(
-    batch: str, judgement: Judgement, calibrated: CandidateFit, estimates: Parameters, not_judged: NotJudged
+    batch: str,
+    judgement: Judgement,
+    calibrated: CandidateFit,
+    estimates: Parameters,
+    not_judged: NotJudged,
+    deadline: Deadline = UNLIMITED,
 ) -> dict:
     """The content of diagnosis.json.
 
@@ -35,6 +41,8 @@ def report(
         which may raise its errors.
     estimates : Parameters
     not_judged : list of {"what", "why"}
+    deadline : Deadline
+        When the isolation of a fault is given up.
     """
     best, base, whitened = judgement.best, judgement.calibrated, judgement.whitened
     confidence = judgement.comparison.confidences(best.hypothesis)
@@ -43,12 +51,18 @@ def report(
     shift, failures = _discretisation(judgement) if named else (None, [])
     laws = laws_of(judgement)
     is_open = judgement.is_open or any(law["indistinguishable"] for law in laws)
+    try:
+        located = location.location(judgement, calibrated, deadline)
+    except OutOfTimeError:
+        located = location.location(judgement, calibrated, isolating=False)
+        why = "the limit was reached before the model was fitted without each channel"
+        failures = [*failures, {"what": "the place of the mismatch", "why": why}]
     return {
         "format": FORMAT,
         "batch": batch,
         "verdict": judgement.verdict,
         "is_held": base.hypothesis.is_frozen,
-        "location": location.location(judgement, calibrated),
+        "location": located,
         "mechanisms": [mechanism_of(best, k, _below_certainty(confidence[k]), shift) for k in of_list],
         "laws": laws,
         "alternatives": alternatives_of(judgement, dict(named)),

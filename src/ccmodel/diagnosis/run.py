@@ -207,6 +207,7 @@ def diagnose(
         If the model cannot be run on any of the recordings.
     """
     deadline, sets_until = options.deadline(), options.deadline(settings.SETS_SHARE)
+    reported_by = options.deadline(settings.REPORT_SHARE)
     found = calibrate(recordings, estimates, options, baseline, within(progress, 0.0, CALIBRATED))
     tested, whitened = found.tested, found.whitened
     unjudged = [*map(dict, not_judged), *found.not_judged]
@@ -233,5 +234,5 @@ def diagnose(
     progress("deciding the verdict", SELECTED)
     judgement = judge(comparison, scores)
     progress("correcting the values for the discretisation, designing an experiment", JUDGED)
-    content = report(recordings[0].batch, judgement, found.fit, tested.estimates, unjudged)
+    content = report(recordings[0].batch, judgement, found.fit, tested.estimates, unjudged, reported_by)
     return Diagnosis(content, judgement, found.fit, tested.estimates)

@@ -251,6 +251,9 @@ WITHIN_BAND = 1.645
 MOSTLY_LISTED = 0.5
 # Share of both limits after which no further set is fitted before laws are learned. Chosen: laws take some 40 s.
 SETS_SHARE = 0.6
+# Limits of a diagnosis with its report, over those of the selection, at which isolation of faults is given up. Chosen:
+# of ten recordings it takes 2,600 runs, of a hundred ten times as many.
+REPORT_SHARE = 1.2
 # Ratio of a larger set's `unexplained_mean_square` to that of smaller ones up to which still larger sets come before
 # laws, and up to which a larger set outdoes a candidate without a good fit (`is_outdone`). Chosen.
 LEADING_ON = 0.5
