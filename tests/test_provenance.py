@@ -45,3 +45,18 @@ def test_hidden_files_are_none_of_a_batch(tmp_path):
     (tmp_path / "logs").mkdir()
     (tmp_path / "logs/b.csv").write_text("x")
     assert [f.name for f in files_in(tmp_path)] == ["a.csv", "b.csv"]
+
+
+def test_files_behind_a_link_are_those_of_the_batch(tmp_path):
+    """Logs may lie in a data store; a link back to the batch itself ends."""
+    batch, store = tmp_path / "batch", tmp_path / "store"
+    batch.mkdir()
+    store.mkdir()
+    (store / "a.csv").write_text("x")
+    (batch / "logs").symlink_to(store)
+    (store / "back").symlink_to(batch)
+    assert [f.relative_to(batch).as_posix() for f in files_in(batch)] == ["logs/a.csv"]
+
+
+def test_what_a_module_reads_from_a_table_is_one_of_its_sources():
+    assert "units.txt" in {file.name for file in sources_of("ccmodel.steps.ingest")}

@@ -16,14 +16,21 @@ from ccmodel.version import __version__
 
 _PACKAGE = Path(__file__).parent
 _ROOT = _PACKAGE.parent
-# Endings of templates, styles and scripts.
-PAGE_PARTS = (".j2", ".css", ".js")
+# Endings of templates, styles, scripts and tables that modules read.
+READ_BY_MODULES = (".j2", ".css", ".js", ".txt")
 
 
 def files_in(folder: Path) -> list[Path]:
-    """The files of a folder, at any depth, without the hidden ones of editors and file browsers."""
-    files = (f for f in Path(folder).rglob("*") if f.is_file())
-    return sorted(f for f in files if not any(part.startswith(".") for part in f.relative_to(folder).parts))
+    """The files of a folder, at any depth and behind links, without the hidden ones of editors and file browsers."""
+    found, entered = [], set()
+    for here, folders, names in os.walk(folder, followlinks=True):
+        # A link to a folder above would be walked for ever.
+        is_new = os.path.realpath(here) not in entered
+        entered.add(os.path.realpath(here))
+        folders[:] = [name for name in folders if is_new and not name.startswith(".")]
+        files = (Path(here) / name for name in names if is_new and not name.startswith("."))
+        found += [file for file in files if file.is_file()]
+    return sorted(found)
 
 
 def of_inputs(paths: Iterable[Path], folder: Path = Path()) -> dict:
@@ -88,7 +95,7 @@ def sources_of(module: str, discovered: bool = True) -> set[Path]:
         if name in seen or (file := _file_of(name)) is None:
             continue
         seen.add(name)
-        files |= {file, *(part for ending in PAGE_PARTS for part in file.parent.glob(f"*{ending}"))}
+        files |= {file, *(part for ending in READ_BY_MODULES for part in file.parent.glob(f"*{ending}"))}
         waiting += [f"{name.rpartition('.')[0]}.__init__", *_imports(file)]
         if discovered and not name.endswith("__init__") and "iter_modules(__path__)" in file.read_text():
             waiting += [f"{name}.{found.stem}" for found in file.parent.glob("*.py")]

@@ -4,15 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from inverse_runs import EVEN, GROWING, K_E, PAIR, PARAMETERS, TIME_S, R, recording
+from inverse_runs import EVEN, GROWING, K_E, MU, PAIR, PARAMETERS, PATH, T0, TIME_S, R, recording
 
+import single_cable_batches
 from ccmodel.failure import ModelError
 from ccmodel.inverse.estimate import COLUMNS, VISIBLE, estimated
 from ccmodel.inverse.proximal import Proximal, true_torque
 from ccmodel.mechanisms import laws
 from ccmodel.model.exact import simulate_pair
 from ccmodel.model.general import Active, simulate
+from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad
+from ccmodel.model.parameters import Parameters
+from ccmodel.recording import Recording
+from ccmodel.rig.ingest import ingest_batch
 
 COUNT = 0.00314
 
@@ -201,3 +206,62 @@ def test_a_single_cables_load_rests_at_its_tension_in_both_solvers():
     exactly, generally = found
     assert exactly[0] == pytest.approx(true.tau_out_Nm[0], rel=1e-6)
     assert np.abs(generally - exactly).max() < 0.02 * np.ptp(true.tau_out_Nm)
+
+
+@pytest.fixture(scope="module")
+def rested():
+    """A pair at rest for half a second, whose initial tension falls by a tenth towards the load."""
+    theta = np.where(TIME_S > 0.5, 0.5 * np.sin(2 * np.pi * (TIME_S - 0.5)), 0.0)
+    falling = InitialTension.between_ends(PATH, MU, (T0, 0.9 * T0), (T0, 0.9 * T0))
+    return theta, simulate_pair(PAIR, SpringLoad(K_E), theta, falling)
+
+
+def of_drive(theta, torque, total, accuracy_Nm=1e-4):
+    channels = {"theta_in_rad": theta, "tau_in_Nm": torque, "F_drive_N": total}
+    accuracy = {"tau_in_Nm": accuracy_Nm, "F_drive_N": 0.05}
+    made = dict.fromkeys(channels, "made")
+    return Recording("b", "r", "virtual-rig", TIME_S, channels, made, T0, PATH, accuracy=accuracy, rest_s=0.5)
+
+
+def test_the_zero_of_the_torque_sensor_is_in_the_intervals(rested):
+    """The rest is read by the same sensor: its zero is a difference of the initial tensions as well."""
+    theta, true = rested
+    random, inside, accuracy = np.random.default_rng(1), [], 3e-3
+    for _ in range(6):
+        torque = true.tau_in_Nm + random.uniform(-accuracy, accuracy) + random.normal(0, 1e-4, theta.size)
+        table = estimated(of_drive(theta, torque, true.T1_N + true.T3_N, accuracy), PARAMETERS).table
+        inside.append(table["tau_out_Nm_low"].le(true.tau_out_Nm) & table["tau_out_Nm_high"].ge(true.tau_out_Nm))
+    assert np.mean(inside) > 0.85
+
+
+@pytest.mark.parametrize(
+    ("fault", "read"),
+    [
+        (Active("load-cell-offset", "load-sensor", {"offset": 3.0}), lambda total: total),
+        (Active("load-cell-offset", "drive-sensor", {"offset": 3.0}), lambda total: total + 3.0),
+        (Active("load-cell-scale", "drive-sensor", {"gain": 0.1}), lambda total: 1.1 * total),
+    ],
+    ids=["at the load", "offset at the drive", "gain at the drive"],
+)
+def test_known_faults_of_load_cells_do_not_change_the_initial_tension(rested, fault, read):
+    theta, true = rested
+    torque = true.tau_in_Nm + np.random.default_rng(2).normal(0, 1e-4, theta.size)
+    total = true.T1_N + true.T3_N
+    without = estimated(of_drive(theta, torque, total), PARAMETERS).table
+    known = estimated(of_drive(theta, torque, read(total)), replace(PARAMETERS, mechanisms=(fault,))).table
+    np.testing.assert_allclose(known["tau_out_Nm"], without["tau_out_Nm"], atol=1e-6)
+
+
+def test_a_single_cables_tension_is_that_at_rest_and_not_the_nominal_one(tmp_path):
+    ingested = ingest_batch(single_cable_batches.write_batch(tmp_path / "one", "spring"))
+    parameters = replace(
+        Parameters.estimated(ingested.stated.rig),
+        stiffness_N_per_m=single_cable_batches.STIFFNESS,
+        friction_coefficient=single_cable_batches.FRICTION,
+        load_stiffness_Nm_per_rad=single_cable_batches.SPRING,
+    )
+    one = ingested.recordings[0]
+    table = estimated(one, parameters).table
+    assert table.equals(estimated(replace(one, pretension_N=0.7 * one.pretension_N), parameters).table)
+    wrong = table["theta_out_rad"] - (one["theta_out_rad"] - one["theta_out_rad"][0])
+    assert np.sqrt((wrong**2).mean()) < 2e-3

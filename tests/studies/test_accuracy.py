@@ -6,12 +6,17 @@ import numpy as np
 import pytest
 
 from builders import recording
-from ccmodel.model.run import simulate_recording
+from ccmodel.model.model_input import ModelInput
+from ccmodel.model.parameters import Parameters
+from ccmodel.model.run import simulate, simulate_recording
+from ccmodel.rig.ingest import ingest_batch
 from ccmodel.studies.accuracy.figure import ratio_figure, scatter_figure
 from ccmodel.studies.accuracy.settings import Accuracy
 from ccmodel.studies.accuracy.study import (
     BY_RECORDING,
     Case,
+    _every_other,
+    _shifted,
     bias_and_scatter,
     comparison_table,
     sensor_uncertainty,
@@ -21,6 +26,7 @@ from ccmodel.studies.claims import model_runs
 from ccmodel.studies.loops.measures import Quantity
 from ccmodel.studies.loops.settings import Measuring
 from model_runs import CABLE, STUDY
+from single_cable_batches import write_batch
 
 ASKED, HOW = Accuracy(), Measuring()
 
@@ -167,3 +173,24 @@ def test_repeats_count_as_far_as_the_model_was_not_told_of_them():
     assert table.loc["tau_in", "u_repeat"].iloc[0] == pytest.approx(
         np.log(1.02) / np.sqrt(2) * table.loc["tau_in", "recorded"].iloc[0], rel=0.01
     )
+
+
+def test_a_single_cable_with_a_measured_tension_has_uncertainties_of_its_own(tmp_path):
+    """The measurement at its far end is thinned with the rest, and its tension at rest is an input."""
+    ingested = ingest_batch(write_batch(tmp_path / "one", "measured-tension"))
+    measured, parameters = ingested.recordings[0], Parameters.estimated(ingested.stated.rig)
+    given = ModelInput.of(measured)
+    thinned = _every_other(given)
+    assert "F_load" in given.series
+    assert {name: v.shape[-1] for name, v in thinned.series.items()} == dict.fromkeys(
+        given.series, thinned.theta_in.size
+    )
+    fine, coarse = simulate(given, parameters), simulate(thinned, parameters)
+    assert np.abs(coarse["tau_in_Nm"] - fine["tau_in_Nm"][::2]).max() < 0.02 * np.ptp(fine["tau_in_Nm"])
+    assert _shifted(Case(measured, fine, parameters, {}, False))["pretension_scale"] > 1.0
+
+
+def test_the_motors_angle_is_thinned_with_the_drives():
+    drive = recording(theta_in_rad=np.sin, theta_motor_rad=np.sin)
+    given = ModelInput.of(drive)
+    assert _every_other(given).theta_motor.size == _every_other(given).theta_in.size

@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 import pandas as pd
 
 from ccmodel import inputs
-from ccmodel.accuracy.measure import Batches, Simulated, measure
+from ccmodel.accuracy.measure import NOT_ACCEPTED, Batches, Simulated, measure
 from ccmodel.outputs import new_file
 from ccmodel.steps.files import longer_rows_refused
 from ccmodel.typed import InputError
@@ -155,11 +155,12 @@ def _run_pipeline(folder: Path, cores: int) -> str:
 
 
 def _simulated_in(results: Path) -> list[Simulated]:
-    """Every simulation in a folder of results, with the diagnosis of its batch, if any."""
+    """Every simulation in a folder of results that is watched, with the diagnosis of its batch, if any."""
     return [
         Simulated("", file.parent.name, results / "recordings" / file.name, file,
                   results / "diagnoses" / file.stem / "model.json")
         for file in sorted(results.glob("simulated/*/*.nc"))
+        if file.parent.name not in NOT_ACCEPTED
     ]  # fmt: skip
 
 

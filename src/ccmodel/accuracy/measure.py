@@ -29,6 +29,8 @@ from ccmodel.recording import read_provenance
 from ccmodel.steps.files import Fitted, Pair, fitted, read_json, read_pairs
 from ccmodel.typed import LARGEST, OneOf, TypedModel
 
+# A parameter set that no verdict accepts is not watched.
+NOT_ACCEPTED = ("nearest",)
 DIGITS = 5
 # Beginning and end of what is compared of a recording, s, and its samples.
 Window = Annotated[list[float], Field(min_length=3, max_length=3)]

@@ -252,8 +252,9 @@ class Compensation:
 
     @property
     def largest_speed_rad_per_s(self) -> float:
-        """Largest speed of the drive from sample to sample."""
-        return float(np.abs(np.diff(self.table[THETA_IN]) / np.diff(self.table["time_s"])).max(initial=0.0))
+        """Largest speed of the drive from sample to sample; to the first one it comes from rest, at zero."""
+        theta, steps = self.table[THETA_IN].to_numpy(), np.diff(self.table["time_s"])
+        return float(np.abs(np.diff(theta, prepend=0.0) / np.concatenate([steps[:1], steps])).max(initial=0.0))
 
     def save(self, file: str | Path) -> None:
         """Write the table as CSV, which ``ccmodel simulate`` reads as a motion.

@@ -18,7 +18,7 @@ from ccmodel.model.general.run import settings_of
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad, TorqueLoad
 from ccmodel.model.parameters import Parameters, mechanism_key
-from ccmodel.model.run import initial_tension, spring_load, transmission_of
+from ccmodel.model.run import spring_load, transmission_of
 from ccmodel.model.session import of_recording
 from ccmodel.recording import Recording
 
@@ -169,7 +169,7 @@ class _Problem:
     @property
     def initial(self) -> InitialTension:
         """Tension before the drive moves."""
-        return initial_tension(self.proximal.model_input(self.parameters), self.parameters)
+        return self.proximal.initial_tension(self.parameters)
 
     @property
     def drive_tensions_N(self) -> float:
@@ -203,7 +203,7 @@ class _Problem:
         """A run of the filter, or of the model along a misfit, with the drive shifted after the first sample."""
         recording = self.proximal.recording
         transmission = transmission_of(recording, parameters)
-        initial = initial_tension(self.proximal.model_input(parameters, falls), parameters)
+        initial = self.proximal.initial_tension(parameters, falls)
         drive = self.drive
         if shift_rad:
             theta = drive.theta_rad + shift_rad
@@ -255,19 +255,22 @@ class _Problem:
             raise ModelError("the cables have no initial tension, so that the drive torque shows no load")
         runs = [coarse.run(self.parameters, misfit + shift), *coarse.perturbed(misfit)]
         torque = np.array([run.trace[EXPECTED] - unperturbed.trace[EXPECTED] for run in runs])
+        torque[1] += self.proximal.torque_zero_Nm
         outputs = np.array([run.out - unperturbed.out for run in runs])
         outputs[:, 0] -= outputs[:, 0, :1]
         held = np.arange(n) // EVERY
         by_misfit = outputs[0][:, held] / shift
         # Until the load first shows at the drive, a misfit is no more than a torque that nothing tells of.
         by_misfit[1, np.cumsum(nominal.trace[BY_MISFIT]) == 0.0] = 1.0
-        zero = np.full((1, n), self.proximal.torque_zero_Nm)
-        effects = np.concatenate([zero, torque[1:, held]])
-        return effects, np.concatenate([np.zeros((1, 2, n)), outputs[1:, :, held]]), by_misfit
+        return torque[1:, held], outputs[1:, :, held], by_misfit
 
     def perturbed(self, misfit_Nm: NDArray) -> Iterator[Run]:
-        """Runs with one error each, along the same misfit."""
+        """Runs with one error each, along the same misfit; first with the torque sensor's zero.
+
+        A rest is read by the same sensor, so that its zero is one of the initial tensions too.
+        """
         p = self.parameters
+        yield self.run(replace(p, tau_in_zero_Nm=p.tau_in_zero_Nm + self.proximal.torque_zero_Nm), misfit_Nm)
         friction = p.friction_scale * (1 + self.prior.considered.friction)
         yield self.run(replace(p, friction_scale=friction), misfit_Nm)
         yield self.run(replace(p, pretension_scale=p.pretension_scale * (1 + REPEATS_TO)), misfit_Nm)
@@ -278,7 +281,8 @@ class _Problem:
         if self.proximal.rests and p.pretension_N is None:
             other = FALL * (1 - UNIFORM)
             yield self.run(p, misfit_Nm, falls=(other, FALL))
-            yield self.run(p, misfit_Nm, falls=(FALL, other))
+            if self.proximal.recording.far_end is None:
+                yield self.run(p, misfit_Nm, falls=(FALL, other))
 
     def _uncertain(self) -> Iterator[tuple[str, float]]:
         """Further parameters with a standard deviation, and it."""

@@ -9,10 +9,12 @@ from ccmodel import mechanisms as registry
 from ccmodel.channels import F_DRIVE, F_LOAD, T1, T2, T3, T4, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
 from ccmodel.encoder.filtering import causal_motion
 from ccmodel.failure import ModelError
-from ccmodel.model.active import Active
+from ccmodel.model.active import Active, without_faults
+from ccmodel.model.initial import InitialTension
 from ccmodel.model.model_input import ModelInput
 from ccmodel.model.parameters import Parameters
-from ccmodel.model.sensors import FAULT_ITERATIONS, read_by_sensors
+from ccmodel.model.run import initial_tension
+from ccmodel.model.sensors import FAULT_ITERATIONS, read_by_sensors, true_at
 from ccmodel.recording import Recording
 
 # White noise of a torque is measured over so many samples of the rest at least.
@@ -41,7 +43,7 @@ class Proximal:
     torque_noise_Nm, torque_zero_Nm : float
         Standard deviations of the torque sensor's white noise and zero.
     rests : bool
-        Whether a pair of cables rests at the start, so that the drive torque there shows their difference in tension.
+        Whether the cables rest at the start, so that the drive's sensors show their tensions there.
     """
 
     recording: Recording
@@ -75,14 +77,13 @@ class Proximal:
             noise = float(np.median(np.abs(np.diff(recording[TAU_IN][rest]))) / (0.6745 * np.sqrt(2)))
         offset = step_rad / 2 * UNIFORM if step_rad is not None and rest.any() else 0.0
         theta = theta - theta[0] if rest.any() else theta
-        rests = bool(rest.any()) and recording.far_end is None
         seen = replace(recording, channels=own)
-        return cls(seen, theta, sigma, offset, noise, accuracy * UNIFORM, rests)
+        return cls(seen, theta, sigma, offset, noise, accuracy * UNIFORM, bool(rest.any()))
 
-    def model_input(self, parameters: Parameters, falls: tuple[float, float] = (FALL, FALL)) -> ModelInput:
-        """The model's input, in which the tensions at the load at rest follow from those at the drive.
+    def initial_tension(self, parameters: Parameters, falls: tuple[float, float] = (FALL, FALL)) -> InitialTension:
+        """Tension before the drive moves; at rest, that at the load follows from that at the drive.
 
-        Without load cells the nominal pretension stands for the mean tension of the cables.
+        Without load cells the nominal pretension stands for the mean tension of a pair of cables.
 
         Parameters
         ----------
@@ -91,28 +92,55 @@ class Proximal:
             Share of its tension by which each cable's falls from the drive to the load.
         """
         resting: dict[str, NDArray] = {}
+        # The faults of sensors are removed here: those at the load have read nothing.
+        physical = replace(parameters, mechanisms=without_faults(parameters.mechanisms))
         if self.rests:
-            seen, radius = self.recording, parameters.drive_radius_m
-            rest = seen.time_s < seen.rest_s
-            tau = float(seen[TAU_IN][rest].mean()) - parameters.tau_in_zero_Nm
-            if F_DRIVE in seen:
-                total = float(seen[F_DRIVE][rest].mean()) - parameters.F_drive_zero_N
+            tau, total = self._at_rest(parameters)
+            if self.recording.far_end:
+                near: tuple[float, ...] = (total,)
             else:
-                total = 2 * parameters.pretension_share * seen.pretension_N / (1 - FALL / 2)
-            near = (total + tau / radius) / 2, (total - tau / radius) / 2
-            far = near[0] * (1 - falls[0]), near[1] * (1 - falls[1])
+                near = tuple((total + sign * tau / parameters.drive_radius_m) / 2 for sign in (1, -1))
+            far = [tension * (1 - fall) for tension, fall in zip(near, falls, strict=False)]
             # As the sensors would read them.
             read = {
                 TAU_IN: tau + parameters.tau_in_zero_Nm,
                 F_DRIVE: total + parameters.F_drive_zero_N,
-                TAU_OUT: parameters.load_radius_m * (far[0] - far[1]) + parameters.tau_out_zero_Nm,
-                F_LOAD: far[0] + far[1] + parameters.F_load_zero_N,
-                **dict(zip((T1, T3, T2, T4), (*near, *far), strict=True)),
-                "time_s": float(seen.time_s[rest].mean()),
+                TAU_OUT: parameters.load_radius_m * (far[0] - sum(far[1:])) + parameters.tau_out_zero_Nm,
+                F_LOAD: sum(far) + parameters.F_load_zero_N,
+                **dict(zip((T1, T3), near, strict=False)),
+                **dict(zip((T2, T4), far, strict=False)),
+                "time_s": self._rest_s,
             }
             resting = {name: np.array([value]) for name, value in read.items()}
         none = np.zeros((0, self.theta_in.size)), np.zeros(self.theta_in.size)
-        return ModelInput(self.recording, self.theta_in, *none, None, None, None, resting)
+        given = ModelInput(self.recording, self.theta_in, *none, None, None, None, resting)
+        return initial_tension(given, physical)
+
+    @property
+    def _rest_s(self) -> float:
+        """Mean time of the rest, s."""
+        seen = self.recording
+        return float(seen.time_s[seen.time_s < seen.rest_s].mean())
+
+    def _at_rest(self, parameters: Parameters) -> tuple[float, float]:
+        """Torque and sum of tensions of the drive at rest, from their sensors' readings without zeros and faults."""
+        seen, radii = self.recording, (parameters.drive_radius_m, parameters.load_radius_m)
+        rest = seen.time_s < seen.rest_s
+        tau = float(seen[TAU_IN][rest].mean()) - parameters.tau_in_zero_Nm
+        if F_DRIVE in seen:
+            total = float(seen[F_DRIVE][rest].mean()) - parameters.F_drive_zero_N
+        elif seen.far_end:
+            total = tau / radii[0]
+        else:
+            total = 2 * parameters.pretension_share * seen.pretension_N / (1 - FALL / 2)
+        nothing = dict.fromkeys((THETA_IN, THETA_OUT, TAU_OUT, F_LOAD), 0.0)
+        seconds = self._rest_s - float(seen.time_s[0])
+        true = true_at(parameters.mechanisms, seconds, nothing | {TAU_IN: tau, F_DRIVE: total}, radii)
+        if F_DRIVE in seen:
+            total = true[F_DRIVE]
+        elif seen.far_end:
+            total = true[TAU_IN] / radii[0]
+        return true[TAU_IN], total
 
     @property
     def lasting_variance(self) -> NDArray:

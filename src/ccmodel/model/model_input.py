@@ -82,6 +82,20 @@ class ModelInput:
             recording[THETA_MOTOR][::every] if THETA_MOTOR in recording else None,
         )
 
+    @property
+    def series(self) -> dict[str, NDArray]:
+        """Its arrays with a value at each sample, the last axis, by attribute; without those that were not recorded."""
+        names = (
+            "theta_in",
+            "drive_deviations",
+            "drive_encoder_offset",
+            "theta_out",
+            "tau_out",
+            "F_load",
+            "theta_motor",
+        )
+        return {name: values for name in names if (values := getattr(self, name)) is not None}
+
     @classmethod
     def prescribed(
         cls, like: Recording, time_s: NDArray, theta_in: NDArray, pretension_N: float, **load: NDArray

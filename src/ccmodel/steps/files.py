@@ -11,7 +11,7 @@ from pathlib import Path
 import pandas as pd
 
 from ccmodel.model.files import read_model_file
-from ccmodel.model.parameters import Parameters
+from ccmodel.model.parameters import Parameters, mechanism_key
 from ccmodel.outputs import new_file
 from ccmodel.recording import Recording, read_recordings
 from ccmodel.rig.batch import Batch
@@ -66,7 +66,9 @@ def fitted(recordings_file: Path, fit_file: Path | None) -> Fitted:
         file = read_model_file(fit_file)
         model = file.parameters
         names = [f.name for f in fields(model) if getattr(model, f.name) != getattr(estimates, f.name)]
-        sds = dict.fromkeys([name for name in names if name != "mechanisms"], inf)
+        known = {"mechanisms", "session_start_s", "session_end_s"}
+        sds = dict.fromkeys([name for name in names if name not in known], inf)
+        sds |= {mechanism_key(m.name, m.place, name): inf for m in model.mechanisms for name in m.values}
         sds |= {name: one["sd"] for name, one in file.intervals.items() if one["sd"] is not None}
         return Fitted(model, sds, [f"{r.batch}/{r.id}" for r in read_recordings(recordings_file)])
     if not result["succeeded"]:

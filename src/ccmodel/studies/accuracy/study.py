@@ -21,6 +21,7 @@ and E + k u_val; where |E| <= k u_val, the comparison cannot resolve it.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -257,15 +258,14 @@ def _model_uncertainty(case: Case, names: Sequence[str], how: Measuring) -> tupl
 def _shifted(case: Case) -> dict[str, float]:
     """By parameter, its value plus one standard deviation."""
     shifted = {name: case.parameters.value_of(name) + sd for name, sd in case.input_sd.items()}
-    read = [case.recorded.accuracy.get(tension, 0.0) for tension in TENSIONS]
+    read = [case.recorded.accuracy.get(tension, 0.0) for tension in case.recorded.tensions]
     if case.parameters.pretension_N is None and all(read) and case.recorded.rest_s > 0:
         shifted["pretension_scale"] = case.parameters.pretension_scale * (1 + max(read) / case.recorded.pretension_N)
     return shifted
 
 
 def _every_other(given: ModelInput) -> ModelInput:
-    thin = {n: v[..., ::2] for n in ("theta_in", "drive_deviations", "drive_encoder_offset", "theta_out", "tau_out")
-            if (v := getattr(given, n)) is not None}  # fmt: skip
+    thin: dict[str, Any] = {name: values[..., ::2] for name, values in given.series.items()}
     return replace(given, recording=given.recording[::2], **thin)
 
 

@@ -7,10 +7,8 @@ from typing import ClassVar
 from pydantic import Field
 
 from ccmodel.accuracy.comparison import Limits
+from ccmodel.accuracy.measure import NOT_ACCEPTED
 from ccmodel.studies.settings import Configuration, StudySettings
-
-# A set that no verdict accepts is not watched.
-NOT_ACCEPTED = ("nearest",)
 
 
 class AgainstBaseline(StudySettings, Limits):

@@ -66,12 +66,22 @@ class _Series:
 def recorded_claims(
     pairs: Mapping[str, Sequence[Pair]], parameters: Parameters | None, claims: Claims, how: Measuring
 ) -> list[Claim]:
-    """Claims on recordings, in the order of the paper; the parameters are as for `claims_of`."""
+    """Claims on recordings, in the order of the paper; the parameters are as for `claims_of`.
+
+    Of a study with measured and simulated recordings, the measured ones are judged: two rigs are no trend.
+    """
+    pairs = {variable: of_one_origin(of_study) for variable, of_study in pairs.items()}
     return [
         *(_trend(trend, pairs[trend.variable], claims, how) for trend in _TRENDS),
         _phases(pairs["pretension"], claims, how),
         _radius(pairs["radius"], parameters, claims, how),
     ]
+
+
+def of_one_origin(pairs: Sequence[Pair]) -> list[Pair]:
+    """The measured recordings of a study with their simulations, or all if none is measured."""
+    measured = [pair for pair in pairs if pair[0].origin == "rig"]
+    return measured or list(pairs)
 
 
 def _series(pairs: Sequence[Pair], variable: str, quantity: str, claims: Claims, how: Measuring) -> _Series:
