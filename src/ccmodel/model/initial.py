@@ -64,6 +64,7 @@ class InitialTension:
         B_N: tuple[float, float],
         curvatures: tuple[float, float] = (0.0, 0.0),
         kinks_rad: float = 0.0,
+        held: tuple[float, float] | None = None,
     ) -> "InitialTension":
         """Profiles with the given tensions at the drive and the load end of each cable.
 
@@ -82,17 +83,19 @@ class InitialTension:
             friction can hold, -1 to 1. It depends on how the cable was tensioned, and the ends do not show it.
         kinks_rad : float
             Bend at kinks, which is not in the path, as far as it holds tension at rest.
+        held : (float, float), optional
+            Bound of each cable, where friction is another than mu phi.
         """
-        bound = friction_coefficient * (path.bend_rad + kinks_rad)
+        coulomb = max(friction_coefficient * (path.bend_rad + kinks_rad), 0.0)
         profiles = []
-        for (drive, load), curvature in zip((A_N, B_N), curvatures, strict=True):
+        for (drive, load), curvature, bound in zip((A_N, B_N), curvatures, held or (coulomb, coulomb), strict=True):
             if min(drive, load) <= 0:
                 profiles.append(np.zeros(3))
                 continue
             # Numbers of Python's own: numpy takes ten times as long for single ones, in every run of a fit.
             ends = log(drive), log(load)
             mean, half = 0.5 * (ends[0] + ends[1]), 0.5 * max(-bound, min(ends[1] - ends[0], bound))
-            off = max(-1.0, min(curvature, 1.0)) * (0.5 * bound - abs(half))
+            off = max(-1.0, min(curvature, 1.0)) * max(0.5 * coulomb - abs(half), 0.0)
             profiles.append(np.exp([mean - half, mean + off, mean + half]))
         corners = np.array([0.0, path.halfway_m, path.length_m])
         if not any(curvatures):  # a corner without a change of slope would only cost time

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from math import log
 from typing import Literal
 
 import numpy as np
@@ -27,6 +28,7 @@ from ccmodel.mechanisms.relaxation import branch_times, kept_at_rest
 from ccmodel.model.active import active_of, modify_physics
 from ccmodel.model.exact import pair as exact
 from ccmodel.model.general import run as general
+from ccmodel.model.general.rest import held_at_rest
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad
 from ccmodel.model.model_input import PRESCRIBED, ModelInput
@@ -190,11 +192,23 @@ def initial_tension(given: ModelInput, parameters: Parameters, load_from: LoadFr
     scale /= kept_at_rest(seconds, settings.relaxing_share, times, settings.relaxed_share)
     A = _both_ends("A", tensions, scale)
     B = A if given.recording.far_end else _both_ends("B", tensions, scale)
+    ends = A, (0.0, 0.0) if given.recording.far_end else B
     curvatures = parameters.tension_curvature_A, parameters.tension_curvature_B
     kinks_rad = sum(kink.hold * kink.bend_rad for kink in settings.kinks)
     if (added := settings.added_bend) is not None:
         kinks_rad += float(np.trapezoid(added.values, added.knots))
-    return InitialTension.between_ends(path, parameters.friction, A, B, curvatures, kinks_rad)
+    coulomb = parameters.friction * (path.bend_rad + kinks_rad)
+    held = None
+    if modify_physics(parameters.mechanisms) and any(_beyond(coulomb, *pair) for pair in ends):
+        motion = given.recording.time_s, given.theta_in
+        factor = general.friction_factors(transmission_of(given.recording, parameters), settings, *motion)[0]
+        held = held_at_rest(settings, coulomb, path.length_m, factor, ends)
+    return InitialTension.between_ends(path, parameters.friction, A, B, curvatures, kinks_rad, held)
+
+
+def _beyond(coulomb: float, near: float, far: float) -> bool:
+    """Whether two ends of a cable are further apart than Coulomb friction of mu phi holds."""
+    return min(near, far) > 0.0 and abs(log(far / near)) > coulomb
 
 
 def _true_at_rest(given: ModelInput, parameters: Parameters, load_from: LoadFrom = "law") -> dict[str, float]:

@@ -1,6 +1,7 @@
 """The chain at rest before the drive moves: stretch and friction under the initial tension, and the load's angle."""
 
 from collections.abc import Sequence
+from math import hypot, log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoa
 
 # Slack of a cable B that is not there: longer than any travel of the drive or the load, m.
 ABSENT_SLACK_M = 1e3
+# Steps of the integral of friction along the conduit at rest.
+REST_STEPS = 16
 
 
 def initial_state(
@@ -62,6 +65,63 @@ def initial_state(
     node[rows.BRISTLE] = np.clip(xi, -1, 1)
     node[rows.ELEMENT : rows.ELEMENT_NEXT] = node[rows.BRISTLE]
     return T
+
+
+def held_at_rest(
+    settings: Settings,
+    coulomb: float,
+    length_m: float,
+    friction_factor: NDArray,
+    ends_N: Sequence[tuple[float, float]],
+) -> tuple[float, float]:
+    """Largest |ln(T_load / T_drive)| that friction holds at rest, by cable.
+
+    Parameters
+    ----------
+    settings : Settings
+    coulomb : float
+        mu phi with all bend that holds at rest.
+    length_m : float
+    friction_factor : ndarray, shape (2,)
+        Factor of mu at the first sample, by cable.
+    ends_N : sequence of (float, float)
+        Tension of each cable at the drive and at the load, N.
+    """
+    along = np.linspace(0.0, 1.0, 33)
+    coulomb *= 1.0 + settings.stribeck_rise
+    if settings.friction_by_position is not None:
+        coulomb *= float(settings.friction_by_position.at(along).mean())
+    drag_N = settings.drag_N
+    if settings.added_drag is not None:
+        drag_N += float(settings.added_drag.at(along).mean()) * length_m
+    if settings.conduit_drag is not None:
+        drag_N += max(float(settings.conduit_drag.at(np.zeros(1))[0]), 0.0) * length_m
+
+    def law(tension: float) -> float:
+        factor = (hypot(tension, FLOOR_N) / REFERENCE_N) ** settings.tension_exponent
+        by_tension = settings.friction_by_tension
+        return factor if by_tension is None else factor * float(by_tension.at(np.array([tension]))[0])
+
+    found = []
+    for ratio, factor, ends in zip(friction_ratios(settings), friction_factor, ends_N, strict=True):
+        lowest, held = min(ends), max(coulomb * float(ratio * factor), 0.0)
+        has_law = bool(drag_N or settings.tension_exponent or settings.friction_by_tension is not None)
+        if lowest <= 0.0 or not has_law:
+            found.append(held)
+            continue
+        # From the end with less tension to the other: a drag adds the same force at every place, friction a share.
+        tension = lowest
+        for _ in range(REST_STEPS):
+            middle = tension + (held * law(tension) * tension + drag_N) / (2 * REST_STEPS)
+            tension += (held * law(middle) * middle + drag_N) / REST_STEPS
+        found.append(log(tension / lowest))
+    return found[0], found[1]
+
+
+def friction_ratios(settings: Settings) -> NDArray:
+    """Friction of cables A and B over that of the transmission, shape (2,)."""
+    of_cable = np.array([-1.0, 1.0])
+    return np.array([1.0, settings.friction_ratio_B]) * (1.0 + settings.friction_by_cable * of_cable)
 
 
 @kernel

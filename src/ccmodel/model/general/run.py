@@ -22,7 +22,7 @@ from ccmodel.model.active import Active, active_of
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.grid import Grid, make_grid
 from ccmodel.model.general.march import COULOMB_BRISTLE_M, SOFT_CONDUIT_BRISTLE_M, march
-from ccmodel.model.general.rest import initial_state, load_angle, remove_cable_B
+from ccmodel.model.general.rest import friction_ratios, initial_state, load_angle, remove_cable_B
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad, one_row
 from ccmodel.model.response import PairResponse, Status
@@ -185,7 +185,7 @@ def prepared(
     physics = _physics(transmission, load, settings, elements, load_laws)
     added_rad = _added_bend(settings, grid, transmission.path.length_m)
     piece, node = _constants(transmission, settings, grid, added_rad)
-    friction_factor = _friction_factor(transmission, settings, time_s, theta_in)
+    friction_factor = friction_factors(transmission, settings, time_s, theta_in)
     mean = np.zeros((rows.MEAN_ROWS, 2))
     state = np.concatenate([np.zeros(rows.LOAD_ROWS), *load_laws.values()])
     held_rad = grid.held_rad + np.concatenate([[0.0], np.cumsum(added_rad)])
@@ -231,7 +231,7 @@ def _marched(
     return solved, out
 
 
-def _friction_factor(transmission: Transmission, settings: Settings, time_s: NDArray, theta_in: NDArray) -> NDArray:
+def friction_factors(transmission: Transmission, settings: Settings, time_s: NDArray, theta_in: NDArray) -> NDArray:
     """Factor of mu at each sample or throughout, by cable; shape (n, 2) or (1, 2)."""
     factor = np.ones((1, 2))
     radii = transmission.drive_radius_m, transmission.load_radius_m
@@ -294,7 +294,7 @@ def _constants(
 ) -> tuple[NDArray, NDArray]:
     """Constants of pieces and nodes; a compliant end is a piece of its own, next to a node without friction."""
     of_cable = np.array([[-1.0], [1.0]])
-    ratio_mu = np.array([[1.0], [settings.friction_ratio_B]]) * (1.0 + settings.friction_by_cable * of_cable)
+    ratio_mu = friction_ratios(settings)[:, None]
     ratio_K = np.array([[1.0], [settings.stiffness_ratio_B]]) / (1.0 + settings.compliance_by_cable * of_cable)
     EA = transmission.axial_rigidity_N * ratio_K
     segment, cell, length = grid.segment_m, grid.cell_m, transmission.path.length_m
