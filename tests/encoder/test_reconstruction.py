@@ -216,3 +216,31 @@ def test_a_glitch_is_survived(glitch):
 def test_invalid_input_is_refused(n, step):
     with pytest.raises(ValueError, match="must be"):
         reconstruct_motion(np.arange(n), np.zeros(n), step, 0.0)
+
+
+def counted_at(true_s, time_s, motion):
+    """A motion as counted at true times, reconstructed from the times that a log states; error in counts."""
+    truth = motion(true_s)
+    counts = np.floor(truth / COARSE + 0.3)
+    counts -= counts[0]
+    found = reconstruct_motion(time_s, counts * COARSE, COARSE, time_s[np.flatnonzero(counts)[0] - 1])
+    outside = np.abs(found.theta_rad + found.zero_rad - counts * COARSE) / COARSE - 0.5
+    error = (found.theta_rad - truth) / COARSE
+    return np.std(error), outside.max()
+
+
+@pytest.mark.parametrize("rate", [60, 120, 227, 240, 300, 480])
+def test_a_clock_of_whole_milliseconds_is_no_drift(rate):
+    """Of samples at 240 Hz the median step is 4 ms, whose multiples drift away from them."""
+    true_s = np.arange(1, 6 * rate) / rate
+    error, outside = counted_at(true_s, np.round(true_s, 3), sine)
+    assert error < 0.3
+    assert outside < 0.4
+
+
+def test_a_gap_of_half_a_step_more_moves_nothing_after_it():
+    true_s = np.arange(1, 1500) / 250
+    true_s = np.where(true_s > 2.0, true_s + 0.042, true_s)
+    error, outside = counted_at(true_s, true_s, sine)
+    assert error < 0.15
+    assert outside < 0.1

@@ -56,6 +56,9 @@ from ccmodel.encoder.smoothing import REST_SAMPLES, smooth
 WINDOW_S = 0.08
 # Step of time of the reconstruction; motions are much slower.
 STEP_S = 0.004
+# Samples over which the even step of a recording is estimated, the usual one first; largest distance of a sample from
+# its multiple, in steps; and by how much finer the grid is where samples are further away.
+SPANS, OFF_GRID, FINER = (1, 4, 16, 64, 256, 1024), 0.26, (1, 2, 3, 4)
 
 
 @dataclass(frozen=True)
@@ -143,13 +146,37 @@ def _stride(time: NDArray, counts: NDArray) -> int:
 
 
 def _on_even_steps(time: NDArray, counts: NDArray) -> tuple[float, NDArray, NDArray]:
-    """Median time step, s, whole counts at even steps, and which were observed: a gap repeats the count before it."""
-    step_s = float(np.median(np.diff(time)))
-    index = np.round((time - time[0]) / step_s).astype(int)
+    """Even time step, s, whole counts at these steps, and which were observed: a gap repeats the count before it."""
+    step_s, index = _even_step(time)
     observed = np.zeros(index[-1] + 1, bool)
     observed[index] = True
     latest = np.searchsorted(index, np.arange(observed.size), "right") - 1
     return step_s, np.round(counts[latest]), observed
+
+
+def _even_step(time: NDArray) -> tuple[float, NDArray]:
+    """Time step, s, at whole multiples of which all samples lie, as nearly as can be, and their numbers.
+
+    The median step is one sample's: of a clock of whole ms that runs at 240 Hz it is 4 ms, and multiples of it drift
+    away from the samples. A gap of ten and a half steps, or a jitter, needs a finer grid.
+    """
+    passed = time - time[0]
+    medians = [float(np.median((time[m:] - time[:-m]) / m)) for m in SPANS if m < time.size]
+    steps = [step for median in medians for step in (median, _fitted_step(passed, median))]
+    for factor in FINER:
+        for step_s in steps:
+            index = np.round(passed * factor / step_s)
+            if float(np.abs(index * step_s / factor - passed).max()) <= OFF_GRID * step_s:
+                return step_s / factor, index.astype(int)
+    return step_s / factor, index.astype(int)
+
+
+def _fitted_step(passed: NDArray, step_s: float) -> float:
+    """Step of the straight line through samples over their numbers, which follow from a first guess, s."""
+    for _ in range(2):
+        index = np.round(passed / step_s)
+        step_s = float(index @ passed / (index @ index))
+    return step_s
 
 
 def _smoothly(time: NDArray, grid: NDArray, curve: NDArray) -> NDArray:

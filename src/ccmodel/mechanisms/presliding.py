@@ -126,6 +126,8 @@ _PARAMETERS = (
         scale="linear",
         screening_grid=(0.5,),
         default=1.0,
+        above=-1e-9,
+        below=1.0 + 1e-9,
     ),
 )
 

@@ -35,14 +35,17 @@ def active_of(mechanisms: Sequence[Active]) -> list[Active]:
     Raises
     ------
     ModelError
-        If a place, a parameter's name or a value is not one that the mechanism can have.
+        If a place, a parameter's name or a value is not one that the mechanism can have, or if a mechanism is there
+        twice.
     ccmodel.mechanisms.UnknownMechanismError
         If a mechanism's name is not known.
     """
-    found = []
+    found: list[Active] = []
     for a in mechanisms:
         known = registry.get(a.name)
         _check(a, known)
+        if any((a.name, a.place) == (other.name, other.place) for other in found):
+            raise ModelError(f"{a.name} acts at {a.place} twice; a model has each mechanism once at a place")
         found.append(replace(a, values=known.default | dict(a.values)))
     return found
 

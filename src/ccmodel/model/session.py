@@ -26,7 +26,7 @@ def with_session(parameters: Parameters, recordings: Sequence[Recording]) -> Par
 def position_of(recording: Recording, parameters: Parameters) -> float:
     """Position of a recording in the session of the parameters: by its start, else by its order."""
     start, end = parameters.session_start_s, parameters.session_end_s
-    if recording.started_at_s is None or start is None or end is None:
+    if recording.started_at_s is None or start is None or end is None or not end > start:
         return recording.position
     return float(np.clip((recording.started_at_s - start) / (end - start) - 0.5, -FURTHEST, FURTHEST))
 

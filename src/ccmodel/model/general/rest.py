@@ -6,6 +6,7 @@ from math import hypot, log
 import numpy as np
 from numpy.typing import NDArray
 
+from ccmodel.failure import ModelError
 from ccmodel.kernel import kernel
 from ccmodel.mechanisms.contract import Settings
 from ccmodel.mechanisms.learned import end_spring
@@ -149,19 +150,38 @@ def load_angle(physics: rows.Physics, T: NDArray, load: Load, series: NDArray, b
     K, K3 = physics.stiffness_load, physics.cubic_stiffness
     if isinstance(load, TorqueLoad | FixedLoad) or (K == 0 and K3 == 0):
         return 0.0
-    theta, force = 0.0, T[0, -1] - T[1, -1]
+    force = T[0, -1] - T[1, -1]
+
+    def torque_at(theta: float) -> float:
+        of_cables = physics.load_pulley.radius_m * winding(theta, physics.load_pulley)[1] * force
+        return of_cables if by_angle is None else of_cables - float(by_angle.at(np.array(theta)))
+
+    def held_at(torque: float) -> float:
+        return _angle_at_rest(K, K3, physics.half_gap, torque, load)
+
+    theta = 0.0
     for _ in range(50):
-        torque = physics.load_pulley.radius_m * winding(theta, physics.load_pulley)[1] * force
-        if by_angle is not None:
-            torque -= float(by_angle.at(np.array(theta)))
-        before, theta = theta, _angle_at_rest(K, K3, physics.half_gap, torque, load)
+        before, theta = theta, held_at(torque_at(theta))
         if theta == before:
-            break
-    return float(theta)
+            return float(theta)
+    if by_angle is None:
+        return float(theta)
+    # Few models need it, and it takes long to import.
+    from scipy.optimize import brentq
+
+    # A law that is steeper than the spring: at one of the ends its torque is too small, at the other too large.
+    most = 2 * physics.load_pulley.radius_m * abs(force) + float(np.abs(by_angle.values).max())
+    return float(brentq(lambda theta: theta - held_at(torque_at(theta)), held_at(-most), held_at(most)))
 
 
 def _deflection(K: float, K3: float, torque: float) -> float:
-    """Solve K z + K3 z^3 = torque for the angle z (rad), by Newton's method from the linear spring's angle."""
+    """Solve K z + K3 z^3 = torque for the angle z (rad), by Newton's method from the linear spring's angle.
+
+    Raises
+    ------
+    ModelError
+        If the spring softens and holds no such torque.
+    """
     if K == 0:
         return float(np.cbrt(torque / K3))
     z = torque / K
@@ -169,6 +189,8 @@ def _deflection(K: float, K3: float, torque: float) -> float:
         before, z = z, z - (K * z + K3 * z**3 - torque) / (K + 3 * K3 * z * z)
         if z == before:
             break
+    if K3 and not abs(K * z + K3 * z**3 - torque) <= 1e-6 * abs(torque) + 1e-12:
+        raise ModelError(f"the load's spring with K3 = {K3:g} holds no torque of {1e3 * torque:.3g} mN m")
     return float(z)
 
 
@@ -181,5 +203,5 @@ def _angle_at_rest(K: float, K3: float, half_gap: float, torque: float, load: Sp
     """
     known_to, position = load.rest_known_to_Nm, load.rest_gap_position
     held = float(np.clip(2 * abs(torque) / known_to - 1.5, 0.0, 1.0)) if known_to else float(torque != 0)
-    side = held * float(np.sign(torque)) + (1 - held) * position
+    side = held * float(np.sign(torque)) + (1 - held) * min(max(position, -1.0), 1.0)
     return _deflection(K, K3, torque) + half_gap * side
