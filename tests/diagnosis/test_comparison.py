@@ -325,7 +325,7 @@ def test_the_strength_of_a_frozen_baselines_mechanism_is_its_change():
     known = SimpleNamespace(name=FRICTION[0], place=FRICTION[1], values={"friction_torque": 3.9e-3, "presliding": 2e-3})
     observations = SimpleNamespace(**vars(OBSERVATIONS), parameters=SimpleNamespace(mechanisms=(known,)))
     whitened = [SimpleNamespace(observations=observations, measured=np.zeros((5, 1)))] * 8
-    free = fitted(1.0, FRICTION)
+    free = fitted(1.0, FRICTION, **{"pulley-friction/drive-pulley/presliding": 2e-3})
     k = list(free.values).index("pulley-friction/drive-pulley/friction_torque")
     covariance = np.zeros((len(free.values),) * 2)
     covariance[k, k] = (1e-4) ** 2
@@ -525,6 +525,16 @@ def test_shares_have_proper_densities(has_part, with_laws):
         assert np.trapezoid(densities, shares, axis=0) == pytest.approx(expected, rel=0.05)
 
 
+def test_a_fit_with_an_implausible_strength_is_no_reason_to_stop():
+    """The only candidate leaves nothing, but its strength is beyond what it can be."""
+    missing = evidence(incomplete=NONE, size=5.0)
+    huge = fitted(1.0, FRICTION, **{"pulley-friction/drive-pulley/friction_torque": 1e3})
+    found = compared(missing, (huge, evidence(NONE)))
+    assert found.most_probable is found.base
+    assert not found.is_adequate
+    assert verdict(missing, (huge, evidence(NONE))).verdict == "unexplained"
+
+
 @pytest.mark.parametrize(
     "mean_square, given, enough",
     [
@@ -533,17 +543,6 @@ def test_shares_have_proper_densities(has_part, with_laws):
         (1.5, evidence(NONE), False),
     ],
 )
-def test_a_fit_with_an_implausible_strength_is_no_reason_to_stop():
-    """The only candidate leaves nothing, but its strength is beyond what it can be."""
-    found = compared(
-        evidence(),
-        (fitted(1.0, FRICTION, **{"pulley-friction/drive-pulley/friction_torque": 1e3}), evidence(NONE)),
-    )
-    assert found.most_probable is found.base
-    assert not found.is_adequate
-    assert verdict(evidence(), *zip(found.candidates, [evidence(NONE)], strict=True)).verdict == "unexplained"
-
-
 def test_a_further_mechanism_is_searched_for_where_something_is_left(mean_square, given, enough):
     assert compared(evidence(), (fitted(mean_square, FRICTION), given)).is_adequate == enough
 

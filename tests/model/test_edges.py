@@ -1,4 +1,4 @@
-"""Edges of what a model may hold: what is there twice, laws steeper than the spring, faults in any order."""
+"""Edges of what a model may hold: what is there twice, laws steeper than the spring, a session without length."""
 
 from dataclasses import replace
 
@@ -14,7 +14,6 @@ from ccmodel.model.general import Active, simulate
 from ccmodel.model.general.rest import _angle_at_rest, _deflection
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import SpringLoad
-from ccmodel.model.sensors import read_by_sensors
 from ccmodel.model.session import position_of
 from ccmodel.model.transmission import Transmission
 from made_observations import PARAMETERS
@@ -71,23 +70,6 @@ def test_a_spring_that_softens_holds_no_torque_beyond_its_peak():
 def test_a_load_stays_within_its_gap():
     at = [_angle_at_rest(0.05, 0.0, 0.03, 0.0, SpringLoad(0.05, 1e-3, position)) for position in (1.0, 3.0)]
     assert at[0] == at[1] == 0.03
-
-
-def test_faults_of_sensors_do_not_depend_on_their_order():
-    channels = {c: np.sin(7 * TIME_S + k) for k, c in enumerate(("theta_in_rad", "theta_out_rad", "tau_in_Nm"))}
-    channels |= {"tau_out_Nm": 0.05 * np.cos(9 * TIME_S), "F_drive_N": 14 + TIME_S, "F_load_N": 14 + np.sin(5 * TIME_S)}
-    faults = [
-        Active("time-skew", "load-sensor", {"delay": 0.05}),
-        Active("load-cell-crosstalk", "load-sensor", {"crosstalk": 0.1}),
-        Active("load-cell-offset", "load-sensor", {"offset": 3.0}),
-        Active("load-cell-scale", "load-sensor", {"gain": 0.1}),
-    ]
-    one, other = (read_by_sensors(order, TIME_S, channels, (R, R)) for order in (faults, faults[::-1]))
-    for channel, values in one.items():
-        np.testing.assert_array_equal(values, other[channel])
-    # What is read late is read late with all its faults.
-    late = read_by_sensors(faults[1:], TIME_S, channels, (R, R))["F_load_N"]
-    np.testing.assert_allclose(one["F_load_N"][20:], np.interp(TIME_S[20:] - 0.05, TIME_S, late), atol=1e-9)
 
 
 def test_a_session_without_length_has_no_position_by_time():

@@ -47,8 +47,7 @@ def read_by_sensors(
     if time_s.size == 0:  # a run that ended before its first sample
         return channels
     true = channels
-    # Crosstalk, drift and offset come before gain, and all before what reads late, in whatever order they stand.
-    for a in sorted(active, key=lambda one: (registry.get(one.name).looks_ahead, one.name, one.place)):
+    for a in active:
         mechanism = registry.get(a.name)
         if mechanism.modifies_observation is not None:
             sensing = Sensing(time_s, channels, *radii, true)

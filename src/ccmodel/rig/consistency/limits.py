@@ -129,6 +129,8 @@ EQUAL_CYCLES, FEWEST_CROSSINGS = 0.05, 4
 
 # Share of equal changes from which a channel is a copy: sensors with noise, and angles, whose counts agree by chance.
 COPIED_NOISE, COPIED_ANGLE = 0.5, 0.98
+# Distance of two drives' angles, in counts, up to which they may have moved alike: each is off by up to half a count.
+ALIKE_STEPS = 1.01
 # Changes by which pairs of recordings are compared first, and the share of them from which all are compared.
 COMPARED_CHANGES, MAYBE_COPIED = 400, 0.25
 # White noise over the stated accuracy, which includes it, that contradicts the accuracy: it was 1.1 at most. And the

@@ -15,6 +15,7 @@ from ccmodel.channels import (
     TAU_IN,
     TAU_OUT,
     TENSIONS,
+    THETA_IN,
     THETA_MOTOR,
     THETA_OUT,
     TORQUE_AT,
@@ -57,8 +58,8 @@ def copied_channels(parities: Sequence[Parity]) -> list[Contradiction]:
             earlier = parities[e]
             copied = [c for c in channels if alike[c][k, e] and _is_copy(parity, earlier, c)]
             # The same command gives the same counts of motor and drive, and perhaps of the load: angles that agree
-            # together are no copies.
-            if set(copied) - ANGLES or copied == [THETA_OUT]:
+            # together, or at the load alone where the drive moves alike, are no copies.
+            if set(copied) - ANGLES or (copied == [THETA_OUT] and not _moves_alike(parity, earlier)):
                 names, ids = ", ".join(copied), (parity.recording.id, earlier.recording.id)
                 repeat = f"{names} of {ids[0]} repeat those of {ids[1]}, sample by sample"
                 text = f"{repeat}: noise does not repeat; one of the two logs holds a copy"
@@ -128,6 +129,14 @@ def _is_copy(one: Parity, other: Parity, channel: str) -> bool:
     # Without noise, equal physics gives equal readings.
     least_noise = limits.NOISE_OVER_ACCURACY * one.recording.accuracy[channel]
     return is_angle or is_noisy(a) or white_noise(one.recording[channel]) > least_noise
+
+
+def _moves_alike(one: Parity, other: Parity) -> bool:
+    """Whether the drives of two recordings are at the same angle, within what their encoders show."""
+    n = min(one.recording.time_s.size, other.recording.time_s.size)
+    apart = one.recording[THETA_IN][:n] - other.recording[THETA_IN][:n]
+    step = max(p.recording.encoder_step_rad.get(THETA_IN, 0.0) for p in (one, other))
+    return float(np.abs(apart - np.median(apart)).max()) <= limits.ALIKE_STEPS * step
 
 
 def _two_runs(parity: Parity) -> Contradiction | None:
