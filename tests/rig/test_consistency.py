@@ -646,3 +646,17 @@ def test_the_speed_of_a_log_with_few_samples_a_second_is_not_late():
     # Exact for a parabola, but for the constant that averaging adds, if the window is as long on either side.
     assert np.diff(speed(time_s**2, time_s))[4:-4] == pytest.approx(2.0)
     assert speed(time_s**2, time_s)[10] == pytest.approx(20.0)
+
+
+@pytest.mark.parametrize(("counts", "is_named"), [(1, False), (6, True)])
+def test_a_load_that_moves_alike_is_no_copy_where_the_drive_does(tmp_path, counts, is_named):
+    """A repeated command moves the drive within a count of before, and may move the load through equal counts."""
+    copy = read_copy(SIMULATED)
+    one, other = list(copy.logs)[:2]
+    n = min(len(copy.logs[one]), len(copy.logs[other]))
+    copy.logs = {name: log[:n].copy() for name, log in copy.logs.items()}
+    aside = np.round(counts * np.sin(np.arange(n) / 40.0)).astype(int)
+    copy.logs[other]["drive_encoder_counts"] = copy.logs[one]["drive_encoder_counts"].to_numpy() + aside
+    copy.logs[other]["load_encoder_counts"] = copy.logs[one]["load_encoder_counts"].to_numpy()
+    said = said_of(write_copy(copy, tmp_path / "b"))
+    assert any("noise does not repeat" in sentence for sentence in said) == is_named
