@@ -113,6 +113,16 @@ def test_a_learned_law_is_told_from_the_same_law_of_another_argument(monkeypatch
     assert set(planned) == {(names[0],), (names[1],)}
 
 
+@pytest.mark.parametrize(("apart", "is_said"), [(1.0, False), (0.02, True)])
+def test_a_lab_is_told_where_a_few_recordings_are_unlikely_to_decide(monkeypatch, apart, is_said):
+    recordings = batch()
+    rivals = [fitted(recordings, one) for one in (("kink", "conduit"), ("stribeck", "conduit"))]
+    monkeypatch.setattr(experiment_module, "planned_observations", lambda *given: None)
+    monkeypatch.setattr(experiment_module, "separation", lambda *given: apart)
+    text = proposed(judged(recordings, *rivals), PARAMETERS)["text"]
+    assert ("a few recordings are unlikely to decide" in text) == is_said
+
+
 def test_a_load_that_was_measured_is_taken_as_in_the_recordings():
     """A torque that follows the drive's angle and direction does so in another motion, and the models can be run."""
     recordings = batch()

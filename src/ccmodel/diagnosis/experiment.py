@@ -93,6 +93,8 @@ def proposed(judgement: Judgement, estimates: Parameters) -> dict | None:
     chosen = every[leading[best]]
     odds = f"odds of {settings.WANTED_ODDS:g} for the better of two"
     text = f"{chosen.text}: {differ}, more than in any other motion tried; {give} {odds}."
+    if wanted > settings.MANY_RECORDINGS:
+        text += " The candidates are nearly alike in all of these motions: a few recordings are unlikely to decide."
     return {"text": text, "separates": names, "recording": chosen.recording(wanted)}
 
 

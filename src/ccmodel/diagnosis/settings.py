@@ -316,5 +316,7 @@ EXPERIMENT_SIZES = ((1.0, 1.0), (1.0, 0.4), (0.4, 1.0))
 SINES_HZ, HOLDS_S, NESTED_HZ, STEP_DURATION_S = (0.1, 0.4, 1.2), (1.0, 3.0, 8.0), 0.5, 0.5
 # Odds that the recordings of an experiment should give for the better of two candidates. Chosen.
 WANTED_ODDS = 20.0
+# Recordings of one experiment beyond which a lab is told that it is unlikely to decide. Chosen.
+MANY_RECORDINGS = 10
 # Experiments, of the most separating ones, for which a refit is taken into account. Chosen for time.
 REFITTED = 8
