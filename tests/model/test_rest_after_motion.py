@@ -28,10 +28,12 @@ def recorded_after(active, tension_N):
     time_s = np.arange(THETA.size) / RATE_HZ
     found = simulate(PAIR, SpringLoad(SPRING), time_s, THETA, even, [active] if active else [])
     T1, T2, T3, T4 = (getattr(found, f"T{k}_N")[BEFORE.size :] for k in (1, 2, 3, 4))
+    tau_in, tau_out = (torque[BEFORE.size :] for torque in (found.tau_in_Nm, found.tau_out_Nm))
+    # As derived from torques and sums, with the stated radii.
     channels = {
         "theta_in_rad": THETA[BEFORE.size :],
-        **{"tau_in_Nm": (T1 - T3) * R, "tau_out_Nm": (T2 - T4) * R, "F_drive_N": T1 + T3, "F_load_N": T2 + T4},
-        **{"T1_N": T1, "T2_N": T2, "T3_N": T3, "T4_N": T4},
+        **{"tau_in_Nm": tau_in, "tau_out_Nm": tau_out, "F_drive_N": T1 + T3, "F_load_N": T2 + T4},
+        **{"T1_N": (T1 + T3 + tau_in / R) / 2, "T3_N": (T1 + T3 - tau_in / R) / 2, "T2_N": T2, "T4_N": T4},
     }
     made = dict.fromkeys(channels, "made")
     return Recording("b", "r", "virtual-rig", time_s[: T1.size], channels, made, tension_N, PATH, rest_s=RESTS_S - 0.02)
@@ -45,6 +47,7 @@ def recorded_after(active, tension_N):
         (Active("cable-asymmetry", "cable", {"ratio": 1.4, "K_ratio": 1.0}), 7.3, 1e-3),
         (Active("running-in", "conduit", {"change": 0.3, "tau": 2.0, "done": 1.0}), 7.3, 1e-3),
         (Active("stribeck", "conduit", {"a": 0.3, "vs": 1e-2}), 7.3, 1e-2),
+        (Active("pulley-eccentricity", "drive-pulley", {"e": 0.08, "psi": -np.pi / 2}), 7.3, 1e-3),
         # Between its ends the profile is that of friction in proportion to tension.
         (Active("constant-drag", "conduit", {"f0": 0.5}), 7.3, 0.05),
         (Active("load-dependent-friction", "conduit", {"n": -0.35}), 3.0, 0.06),

@@ -25,6 +25,7 @@ from ccmodel.channels import (
 from ccmodel.effort import count_run
 from ccmodel.failure import ModelError
 from ccmodel.mechanisms.relaxation import branch_times, kept_at_rest
+from ccmodel.mechanisms.winding import winding
 from ccmodel.model.active import active_of, modify_physics
 from ccmodel.model.exact import pair as exact
 from ccmodel.model.general import run as general
@@ -158,9 +159,14 @@ def _channels(
     return {THETA_IN: read[THETA_IN], THETA_OUT: theta_out, **sensed, **_tensions(sensed, recording, parameters)}
 
 
-def _tensions(sensed: Mapping, recording: Recording, parameters: Parameters) -> dict[str, NDArray | float]:
-    """Tensions at the cables' ends from torques and sums; a single cable's from one sensor at each end."""
-    radii = {"drive": parameters.drive_radius_m, "load": parameters.load_radius_m}
+def _tensions(
+    sensed: Mapping, recording: Recording, parameters: Parameters, drive_ratio: float = 1.0
+) -> dict[str, NDArray | float]:
+    """Tensions at the cables' ends from torques and sums; a single cable's from one sensor at each end.
+
+    `drive_ratio` is the radius at which the cables pull at the drive over the pulley's stated one.
+    """
+    radii = {"drive": drive_ratio * parameters.drive_radius_m, "load": parameters.load_radius_m}
     total = {end: sensed[SUM_AT[end]] for end in radii}
     difference = {end: sensed[TORQUE_AT[end]] / radius for end, radius in radii.items()}
     if recording.far_end:
@@ -184,8 +190,10 @@ def initial_tension(given: ModelInput, parameters: Parameters, load_from: LoadFr
         return InitialTension.uniform(path, scale * parameters.pretension_N)
     if not given.initial_tension_observed:
         return InitialTension.uniform(path, scale * parameters.pretension_share * given.recording.pretension_N)
-    tensions = _tensions(_true_at_rest(given, parameters, load_from), given.recording, parameters)
     settings = general.settings_of(parameters.mechanisms)
+    # The drive rests at its zero. At which angle the load rests is not known here: its pulley counts as stated.
+    drive_ratio = winding(0.0, general.pulley_at(settings, "drive", parameters.drive_radius_m))[1]
+    tensions = _tensions(_true_at_rest(given, parameters, load_from), given.recording, parameters, drive_ratio)
     seconds = given.resting_mean["time_s"] - float(given.recording.time_s[0])
     # The rest's mean is what the cables have after half of the rest.
     times = branch_times(settings.relaxing_time_s, settings.relaxing_spread)

@@ -198,7 +198,7 @@ def prepared(
     mean[rows.MEAN] = (piece[rows.SHARE] * T).sum(axis=1)
     state[rows.ANGLE] = load_angle(physics, T, load, series, settings.load_by_angle)
     slide = np.zeros((rows.SLIDE_ROWS, 2, node.shape[2] + 2))
-    drive = _pulley(settings, "drive", transmission.drive_radius_m)
+    drive = pulley_at(settings, "drive", transmission.drive_radius_m)
     steps *= _steps(physics, transmission, time_s)
     return Prepared(physics, piece, node, slide, mean, state, drive, friction_factor, steps)
 
@@ -397,7 +397,7 @@ def _physics(
         element_m=contacts.element_m,
         element_share=contacts.element_share,
         elements=contacts.elements,
-        load_pulley=_pulley(settings, "load", transmission.load_radius_m),
+        load_pulley=pulley_at(settings, "load", transmission.load_radius_m),
         stiffness_load=float(K_e),
         load_damping=float(load_damping(settings, K_e)),
         kind=rows.PRESCRIBED_ANGLE if isinstance(load, AngleLoad | FixedLoad) else rows.IMPEDANCE,
@@ -413,7 +413,8 @@ def _physics(
     )
 
 
-def _pulley(settings: Settings, end: str, radius_m: float) -> Pulley:
+def pulley_at(settings: Settings, end: str, radius_m: float) -> Pulley:
+    """The pulley of an end, "drive" or "load", whose radius may change with its angle."""
     by_bore = getattr(settings, f"{end}_eccentricity"), getattr(settings, f"{end}_eccentricity_rad")
     return pulley_of(radius_m, *by_bore, getattr(settings, f"{end}_radius_factor"))
 
