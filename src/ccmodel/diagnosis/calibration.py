@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,6 @@ OF_RIG = (
     "friction_coefficient",
     "extra_bend_rad",
     "load_radius_m",
-    "load_stiffness_Nm_per_rad",
     "spring_beside_load_Nm_per_rad",
 )
 
@@ -98,7 +98,7 @@ def tested_model(
 
 def _with_rig_of(baseline: Parameters, estimates: Parameters) -> Parameters:
     """Estimates with all that a baseline has of its rig, also where the recordings at hand would not free it."""
-    values = {name: value for name in OF_RIG if (value := getattr(baseline, name)) is not None}
+    values: dict[str, Any] = {name: getattr(baseline, name) for name in OF_RIG}
     return replace(estimates, **values)
 
 
