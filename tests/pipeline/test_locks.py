@@ -75,7 +75,9 @@ def test_a_second_run_says_which_process_goes_on_and_other_results_do_not_wait(s
     other = start("two")
     until_it_works(tmp_path, "two")
     (tmp_path / "go").touch()
-    assert ended(other)[0] == 0 and ended(first)[0] == 0
+    for process in (other, first):
+        code, said = ended(process)
+        assert code == 0, said
     assert (tmp_path / "one/index.html").exists() and (tmp_path / "two/index.html").exists()
 
 
