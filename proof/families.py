@@ -13,7 +13,7 @@ def family(name: str, seed: int, count: int | None = None) -> Iterator[Case]:
     Parameters
     ----------
     name : str
-        "removed": an effect whose mechanism is taken off the list; "unlisted": one that the list never had;
+        "removed": an effect whose mechanism is excluded from the candidates; "unlisted": one without a mechanism;
         "doubtful": a weak effect in few recordings.
     seed : int
         Of the first case.

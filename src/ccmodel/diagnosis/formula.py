@@ -18,8 +18,6 @@ CONSTANT = "a"
 TRIED = 40
 # Exponents that are tried first.
 EXPONENTS = tuple(0.1 * k for k in (*range(-25, 0), *range(1, 26)))
-
-
 # Error, over its standard deviation, of a term that cannot be computed: finite, as a search needs it.
 NO_FIT = 1e50
 

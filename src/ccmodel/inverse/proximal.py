@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel import mechanisms as registry
-from ccmodel.channels import F_DRIVE, F_LOAD, T1, T2, T3, T4, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
+from ccmodel.channels import F_DRIVE, F_LOAD, T1, T2, T3, T4, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT, ZERO_OF
 from ccmodel.encoder.filtering import causal_motion
 from ccmodel.failure import ModelError
 from ccmodel.model.active import Active, without_faults
@@ -92,8 +92,9 @@ class Proximal:
             Share of its tension by which each cable's falls from the drive to the load.
         """
         resting: dict[str, NDArray] = {}
-        # The faults of sensors are removed here: those at the load have read nothing.
-        physical = replace(parameters, mechanisms=without_faults(parameters.mechanisms))
+        # Zeros and faults of sensors are removed here: those at the load have read nothing.
+        none_has = dict.fromkeys(ZERO_OF.values(), 0.0)
+        physical = replace(parameters, mechanisms=without_faults(parameters.mechanisms)).with_values(none_has)
         if self.rests:
             tau, total = self._at_rest(parameters)
             if self.recording.far_end:
@@ -101,12 +102,11 @@ class Proximal:
             else:
                 near = tuple((total + sign * tau / parameters.drive_radius_m) / 2 for sign in (1, -1))
             far = [tension * (1 - fall) for tension, fall in zip(near, falls, strict=False)]
-            # As the sensors would read them.
             read = {
-                TAU_IN: tau + parameters.tau_in_zero_Nm,
-                F_DRIVE: total + parameters.F_drive_zero_N,
-                TAU_OUT: parameters.load_radius_m * (far[0] - sum(far[1:])) + parameters.tau_out_zero_Nm,
-                F_LOAD: sum(far) + parameters.F_load_zero_N,
+                TAU_IN: tau,
+                F_DRIVE: total,
+                TAU_OUT: parameters.load_radius_m * (far[0] - sum(far[1:])),
+                F_LOAD: sum(far),
                 **dict(zip((T1, T3), near, strict=False)),
                 **dict(zip((T2, T4), far, strict=False)),
                 "time_s": self._rest_s,

@@ -1,7 +1,7 @@
 """The chain at rest before the drive moves: stretch and friction under the initial tension, and the load's angle."""
 
 from collections.abc import Sequence
-from math import hypot, log
+from math import log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,10 +53,8 @@ def initial_state(
     piece[rows.BRANCH : rows.BRANCH + branches.size] = branches[:, None, None] * elastic
     both = T[:, :-1] + T[:, 1:]
     factor = friction_factor[:, None] * (1 + physics.stribeck_rise)
-    if physics.tension_exponent != 0:
-        factor = factor * (np.hypot(both / 2, FLOOR_N) / REFERENCE_N) ** physics.tension_exponent
-    if settings.friction_by_tension is not None:
-        factor = factor * settings.friction_by_tension.at(both / 2)
+    if has_friction_by_tension(settings):
+        factor = factor * friction_at_tension(settings, both / 2)
     hold = np.tanh(node[rows.HALF_BEND] * factor) * both + node[rows.DRAG]
     if physics.drag_table:
         hold = (hold + node[physics.drag_table + 1 + settings.conduit_drag.knots.size]).clip(0.0)
@@ -99,15 +97,12 @@ def held_at_rest(
         drag_N += max(float(settings.conduit_drag.at(np.zeros(1))[0]), 0.0) * length_m
 
     def law(tension: float) -> float:
-        factor = (hypot(tension, FLOOR_N) / REFERENCE_N) ** settings.tension_exponent
-        by_tension = settings.friction_by_tension
-        return factor if by_tension is None else factor * float(by_tension.at(np.array([tension]))[0])
+        return float(friction_at_tension(settings, np.array(tension)))
 
     found = []
     for ratio, factor, ends in zip(friction_ratios(settings), friction_factor, ends_N, strict=True):
         lowest, held = min(ends), max(coulomb * float(ratio * factor), 0.0)
-        has_law = bool(drag_N or settings.tension_exponent or settings.friction_by_tension is not None)
-        if lowest <= 0.0 or not has_law:
+        if lowest <= 0.0 or not (drag_N or has_friction_by_tension(settings)):
             found.append(held)
             continue
         # From the end with less tension to the other: a drag adds the same force at every place, friction a share.
@@ -117,6 +112,18 @@ def held_at_rest(
             tension += (held * law(middle) * middle + drag_N) / REST_STEPS
         found.append(log(tension / lowest))
     return found[0], found[1]
+
+
+def has_friction_by_tension(settings: Settings) -> bool:
+    """Whether friction is not in proportion to tension."""
+    return settings.tension_exponent != 0 or settings.friction_by_tension is not None
+
+
+def friction_at_tension(settings: Settings, tension_N: NDArray) -> NDArray:
+    """Factor of mu at tensions, of their shape."""
+    factor = (np.hypot(tension_N, FLOOR_N) / REFERENCE_N) ** settings.tension_exponent
+    by_tension = settings.friction_by_tension
+    return factor if by_tension is None else factor * by_tension.at(tension_N)
 
 
 def friction_ratios(settings: Settings) -> NDArray:

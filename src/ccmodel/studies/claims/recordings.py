@@ -70,7 +70,7 @@ def recorded_claims(
 
     Of a study with measured and simulated recordings, the measured ones are judged: two rigs are no trend.
     """
-    pairs = {variable: of_one_origin(of_study) for variable, of_study in pairs.items()}
+    pairs = {variable: _of_one_origin(of_study) for variable, of_study in pairs.items()}
     return [
         *(_trend(trend, pairs[trend.variable], claims, how) for trend in _TRENDS),
         _phases(pairs["pretension"], claims, how),
@@ -78,7 +78,7 @@ def recorded_claims(
     ]
 
 
-def of_one_origin(pairs: Sequence[Pair]) -> list[Pair]:
+def _of_one_origin(pairs: Sequence[Pair]) -> list[Pair]:
     """The measured recordings of a study with their simulations, or all if none is measured."""
     measured = [pair for pair in pairs if pair[0].origin == "rig"]
     return measured or list(pairs)
