@@ -107,7 +107,7 @@ def rig_tensions(
     time_s = sample_times(case, rate_Hz)
     conduit = [Piece(length_m=LENGTH_M, bend_rad=np.pi)]
     grid = make_grid(conduit, numerics.cell_length_m, numerics.cell_bend_rad)
-    preparation = Preparation(MU, case.pretension_N, (0.0, 0.0))
+    preparation = Preparation(MU, (case.pretension_N,) * 2, (0.0, 0.0))
     trajectory = run_rig(rig, grid, numerics, preparation, time_s, case.drive.angle_and_rate(time_s))
     return np.stack([getattr(trajectory, name) for name in TENSIONS])
 

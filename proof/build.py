@@ -24,8 +24,6 @@ LIMIT_FACTOR = 1.5
 HIGHEST_LIMIT_N = 2000.0
 # Time over which the drive's sub-count offset is added to the motion, s.
 OFFSET_RISE_S = 0.3
-# Channels whose reading at rest a model begins with.
-FROM_REST = ("theta_out_rad", "tau_in_Nm", "tau_out_Nm")
 
 
 def build(case: Case, out: Path) -> dict:
@@ -124,12 +122,11 @@ def noise_floor(
     """Root mean square error of a model with the true physics, by channel: repeatability plus sensors.
 
     The recording is simulated again with friction higher by its standard deviation from run to run, the drive offset by
-    one standard deviation of its sub-count position, and a past in the middle of its range. A model takes the tension
-    from the rest: the pretension is such that the load cells read the same there. It also begins with the torques and
-    the angle that are read there, so that the difference counts from its value at rest: another profile of the tension
-    moves the load before anything else moves. The difference is added in quadrature to the sensors' noise and to the
-    uncertainty of their zeros. The load's sub-count position counts twice, because its zero is read at the same rest.
-    Both load cells give the pretension at rest, so that each is off by half the difference of their zeros.
+    one standard deviation of its sub-count position, and a past in the middle of its range. A model takes the tensions
+    at both ends of the cables from the rest, so these are the same there. The sign of the offset is by chance: the
+    square of the difference is the mean over both. It is added to the variances of the sensors' noise and of their
+    zeros. The load's sub-count position counts twice, because its zero is read at the same rest. Both load cells give
+    the pretension at rest, so that each is off by half the difference of their zeros.
 
     Parameters
     ----------
@@ -142,14 +139,14 @@ def noise_floor(
     """
     sensors = campaign.sensors
     count_variance = (2 * np.pi / sensors.encoder.counts_per_rev) ** 2 / 12
-    friction = preparation.friction_coefficient * (1 + campaign.repeatability.friction)
-    repeat = replace(preparation, friction_coefficient=friction, **_usual_past(campaign.repeatability))
-    offset = plan.model_copy(update={"excitation": OffsetMotion(plan.excitation, np.sqrt(count_variance))})
+    repeat = _repeat(campaign, plan, preparation, trajectory)
     first = noise_free_channels(campaign, trajectory)
-    start = plan.model_copy(update={"excitation": Start(plan.excitation, 1 / campaign.sensors.sample_rate_Hz)})
-    at_rest = _at_rest(noise_free_channels(campaign, simulate(campaign, start, repeat)))
-    repeat = replace(repeat, pretension_N=repeat.pretension_N * _at_rest(first) / at_rest)
-    second = noise_free_channels(campaign, simulate(campaign, offset, repeat))
+    squares = dict.fromkeys(first, 0.0)
+    for sign in (-1, 1):
+        motion = OffsetMotion(plan.excitation, sign * np.sqrt(count_variance))
+        again = simulate(campaign, plan.model_copy(update={"excitation": motion}), repeat)
+        for name, values in noise_free_channels(campaign, again).items():
+            squares[name] += float(np.mean((values - first[name]) ** 2)) / 2
     torque = _noise_variance(sensors.torque) + sensors.torque.accuracy_Nm**2 / 3
     force = _noise_variance(sensors.load_cell) + sensors.load_cell.accuracy_N**2 / 6
     sensor_variance = {
@@ -159,15 +156,24 @@ def noise_floor(
         "F_drive_N": force,
         "F_load_N": force,
     }
-    differ = {name: first[name] - second[name] for name in first}
-    rest = trajectory.time_s < plan.excitation.rest_s
-    differ |= {name: differ[name] - differ[name][rest].mean() for name in FROM_REST}
-    return {name: float(np.sqrt(np.mean(values**2) + sensor_variance[name])) for name, values in differ.items()}
+    return {name: float(np.sqrt(square + sensor_variance[name])) for name, square in squares.items()}
 
 
-def _at_rest(channels: Mapping[str, NDArray]) -> float:
-    """Sum of all tensions at the first sample, N."""
-    return float(channels["F_drive_N"][0] + channels["F_load_N"][0])
+def _repeat(campaign: Campaign, plan: RecordingPlan, preparation: Preparation, trajectory: Trajectory) -> Preparation:
+    """Another run with higher friction and the usual past that begins with the same tensions at the ends."""
+    factor = 1 + campaign.repeatability.friction
+    repeat = replace(
+        preparation,
+        friction_coefficient=factor * preparation.friction_coefficient,
+        # The curvature does not change the ratio of a cable's end tensions.
+        profile_share=tuple(share / factor for share in preparation.profile_share),
+        **_usual_past(campaign.repeatability),
+    )
+    start = plan.model_copy(update={"excitation": Start(plan.excitation, 1 / campaign.sensors.sample_rate_Hz)})
+    began = simulate(campaign, start, repeat)
+    ratios = trajectory.T1_N[0] / began.T1_N[0], trajectory.T3_N[0] / began.T3_N[0]
+    pretension_N = tuple(mean * ratio for mean, ratio in zip(repeat.pretension_N, ratios, strict=True))
+    return replace(repeat, pretension_N=pretension_N)
 
 
 def _usual_past(spread: Repeatability) -> dict[str, Any]:

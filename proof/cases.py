@@ -47,6 +47,8 @@ class Truth:
         them; empty for an effect that is none.
     curve : tuple of (float, float)
         The law as a table: arguments and values (`virtualrig.effects.contract.TrueLaw`).
+    channel : str
+        The channel that a law of the slot of sensor maps is added to.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Truth:
     slot: str = ""
     argument: str = ""
     curve: tuple[tuple[float, float], ...] = ()
+    channel: str = ""
 
 
 @dataclass(frozen=True)
@@ -172,6 +175,9 @@ def draw(
     protocol = plan.protocols[protocol_name]
     spring = log_uniform(plan.rig.load_stiffness_Nm_per_rad, random)
     chosen = _chosen(kind, effect, plan, random)
+    if len(protocol.recordings) == 1 and any(twin.between_recordings for twin, _ in chosen):
+        protocol_name = next(name for name, p in plan.protocols.items() if p.poor and len(p.recordings) > 1)
+        protocol = plan.protocols[protocol_name]
     if strength is not None:
         chosen = [(twin, strength) for twin, _ in chosen]
     drawn = [_effect(*one, spring, plan.other_law_share, random) for one in chosen]
@@ -264,4 +270,4 @@ def _in_rig(truth: Truth, campaign: Campaign) -> Truth:
         return truth
     law = twin.law(campaign.rig, truth.place)
     curve = tuple(zip(law.x.tolist(), law.y.tolist(), strict=True))
-    return replace(truth, slot=law.slot, argument=law.argument, curve=curve)
+    return replace(truth, slot=law.slot, argument=law.argument, curve=curve, channel=law.channel)

@@ -31,6 +31,8 @@ BUILDER = (
     "measured.py",
     "conceal.py",
     "guard.py",
+    "follow_up.py",
+    "regressors.py",
 )
 TIMEOUT_S = 1800
 # Data of libraries, and devices such as /dev/urandom. No home folder, and no folder that holds this project.

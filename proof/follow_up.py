@@ -19,7 +19,7 @@ from virtualrig.motion import GrowingSine, Sine, StepAndHold
 
 OPEN = ("undecided", "unexplained")
 PROPOSED, RANDOM = "proposed", "random"
-# Length of a recording, s, its rest, s, and the most that are made of one experiment.
+# Length of a recording of a cycle or more, s, its rest, s, and the most that are made of one experiment.
 DURATION_S, REST_S, MOST_RECORDINGS = 10.0, 0.5, 3
 START_UP_CYCLES = 0.25
 # Final amplitude of nested reversals over the first; a sine of none is no motion.
@@ -88,7 +88,8 @@ def _amplitude(plan: RecordingPlan) -> float:
 
 
 def plans_of(case: Case, experiment: dict) -> Sequence[RecordingPlan]:
-    """The recordings of an experiment on a case's rig, at the end of its session."""
+    """The recordings of an experiment on a case's rig, after its session: a drift goes on at its rate."""
+    step = 1 / max(len(case.recordings) - 1, 1)
     length_m = sum(piece.length_m for piece in case.recordings[0].conduit)
     motion = _motion(**experiment["excitation"])
     return [
@@ -97,14 +98,14 @@ def plans_of(case: Case, experiment: dict) -> Sequence[RecordingPlan]:
             pretension_N=experiment["pretension_N"],
             conduit=(Piece(length_m=length_m, bend_rad=experiment["bend_rad"]),),
             excitation=motion,
-            position=0.5,
+            position=0.5 + (k + 1) * step,
         )
         for k in range(min(experiment["recordings"], MOST_RECORDINGS))
     ]
 
 
 def _motion(wave: str, **numbers: float | Sequence[float]) -> Sine | StepAndHold | GrowingSine:
-    """A motion of `DURATION_S` from the numbers of a proposal."""
+    """A motion from the numbers of a proposal, of `DURATION_S` or, if that is longer, of one cycle."""
     if wave == "step-and-hold":
         angles, move_s, hold_s = numbers["angles_rad"], float(numbers["move_s"]), float(numbers["hold_s"])
         count = max(1, int((DURATION_S - REST_S) / (move_s + hold_s)))

@@ -23,8 +23,7 @@ INCONSISTENT = "inputs-inconsistent"
 # More mechanisms or alternatives than these are not counted.
 MOST_MECHANISMS = 4
 MOST_ALTERNATIVES = 4
-# Least error over the noise floor of a visible effect: three times the difference of two repeats, which is
-# sqrt(2) times the noise floor.
+# Least error over the noise floor of a visible effect.
 VISIBLE = 3 * np.sqrt(2)
 # Least error over the noise floor at which the share of the gap that was closed is computed.
 LEAST_GAP = 1.5
@@ -102,12 +101,20 @@ class Outcome:
         return self.identified[0]["name"] if self.identified else None
 
     @property
-    def alternatives(self) -> list[str]:
-        """Names of the candidates that an undecided diagnosis reports."""
+    def listed(self) -> list[dict]:
+        """The candidates that an undecided diagnosis reports, the most probable first."""
         if self.verdict != "undecided":
             return []
-        names = dict.fromkeys(c["name"] for c in self.diagnosis["mechanisms"] + self.diagnosis["alternatives"])
-        return list(names)[:MOST_ALTERNATIVES]
+        return (self.diagnosis["mechanisms"] + self.diagnosis["alternatives"])[:MOST_ALTERNATIVES]
+
+    @property
+    def alternatives(self) -> list[str]:
+        """Their names."""
+        return list(dict.fromkeys(c["name"] for c in self.listed))
+
+    def true_among(self, reported: Sequence[dict]) -> set[str]:
+        """Names of the concealed effects that are among reported mechanisms, each at its place."""
+        return {t["name"] for t in self.key["truth"] if any(_is_effect(c, t) for c in reported)}
 
     @property
     def laws(self) -> list[dict]:
@@ -116,10 +123,10 @@ class Outcome:
 
     @property
     def claims(self) -> list[tuple[float, bool]]:
-        """Every stated confidence, and whether it belongs to a concealed effect: of a mechanism by its name."""
+        """Every stated confidence, and whether it belongs to a concealed effect: of a mechanism by name and place."""
         claims = self.diagnosis["mechanisms"] + self.diagnosis["alternatives"] if self.diagnosis else []
         of_laws = [(w["confidence"], any(is_law_of(w, t) for t in self.key["truth"])) for w in self.laws]
-        return [(c["confidence"], c["name"] in self.true_names) for c in claims] + of_laws
+        return [(c["confidence"], bool(self.true_among([c]))) for c in claims] + of_laws
 
     @property
     def error_before(self) -> float:
@@ -178,18 +185,18 @@ class Outcome:
 
     @property
     def is_identified_first(self) -> bool:
-        """Whether the first identified mechanism is a concealed effect."""
-        return self.first_identified in self.true_names
+        """Whether the first identified mechanism is a concealed effect, at its place."""
+        return bool(self.true_among(self.identified[:1]))
 
     @property
     def is_first_of_all(self) -> bool:
         """Whether the most probable mechanism, identified or an alternative, is a concealed effect."""
-        return (self.first_identified or next(iter(self.alternatives), None)) in self.true_names
+        return bool(self.true_among([*self.identified, *self.listed][:1]))
 
     @property
     def includes_truth(self) -> bool:
         """Whether a concealed effect is identified first or is among the alternatives."""
-        return self.is_identified_first or bool(self.true_names & set(self.alternatives))
+        return self.is_identified_first or bool(self.true_among(self.listed))
 
     @property
     def is_confidently_wrong(self) -> bool:
@@ -200,9 +207,8 @@ class Outcome:
         """
         reported = self.diagnosis["mechanisms"] if self.diagnosis else []
         wrong = any(p >= DECISION_THRESHOLD and not is_true for p, is_true in self.claims)
-        named = {c["name"] for c in reported}
         is_sure = self.verdict == "explained" and all(c["confidence"] >= DECISION_THRESHOLD for c in reported)
-        is_incomplete = is_sure and len(self.true_names) > 1 and not self.true_names <= named
+        is_incomplete = is_sure and len(self.true_names) > 1 and not self.true_names <= self.true_among(reported)
         return len(reported) > MOST_MECHANISMS or wrong or is_incomplete
 
 
@@ -259,9 +265,14 @@ def same_place(a: str | None, b: str | None) -> bool:
     return a is not None and (a == b or (a, b) in EQUIVALENT_PLACES or (b, a) in EQUIVALENT_PLACES)
 
 
+def _is_effect(reported: dict, truth: dict) -> bool:
+    return reported["name"] == truth["name"] and same_place(reported.get("place"), truth["place"])
+
+
 def is_law_of(law: dict, truth: dict) -> bool:
-    """Whether a learned law is in the slot of a concealed effect; of one that no slot holds, at its place."""
-    return truth.get("slot") in (law["slot"], "", None) and same_place(law["place"], truth["place"])
+    """Whether a learned law is in the slot and of the channel of a concealed effect; without a slot, at its place."""
+    is_in_slot = truth.get("slot") in (law["slot"], "", None) and truth.get("channel") in (law.get("channel"), "", None)
+    return is_in_slot and same_place(law["place"], truth["place"])
 
 
 def is_located(o: Outcome) -> bool:

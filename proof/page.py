@@ -97,14 +97,15 @@ The held-out recordings are simulated after the diagnosis has ended.
   not have (`other_laws` of the files in `src/virtualrig/effects`). The rates of both stand apart. Intervals are
   compared with the truth where both laws share a parameter.
 - **Recalibrated model**: the paper's model as the diagnosis fits it to the batch (`calibrated.json`).
-- **Noise floor**: the error of a model with the true physics, from sensor noise, sensor zeros, encoder resolution and
-  the run-to-run variation of friction.
-- **Visible**: the recalibrated model's error on held-out recordings is at least 3 sqrt(2) noise floors in some channel,
-  which is three standard deviations of the difference of two repeats.
+- **Noise floor**: the error of a model with the true physics, from sensor noise, sensor zeros, encoder resolution, the
+  run-to-run variation of friction, and the loading history, which no recording states: how the tension falls along the
+  conduit before the motion, and for how long the cables have been under tension.
+- **Visible**: the recalibrated model's error on held-out recordings is at least 3 sqrt(2) = 4.2 noise floors in some
+  channel.
 - **No candidate**: unlisted and removed cases.
 - **Inconsistent inputs**: all inputs of these cases are right, so the verdict `inputs-inconsistent` is a false alarm.
   It names no physics and counts as not detected.
-- **No confident misidentification**: no mechanism and no law's slot with a confidence of at least 0.8 is wrong, and no
+- **No confident misidentification**: no mechanism, no place and no law's slot with a confidence of at least 0.8 is wrong, and no
   pair is declared explained with such a confidence while one of its effects is not named. Confidences of laws count as
   those of mechanisms do.
 - **Further experiment**: where the verdict is `undecided` or `unexplained`, the recordings that the diagnosis proposes

@@ -77,12 +77,12 @@ def _rates_of_open_cases(outcomes: Sequence[Outcome]) -> list[dict]:
     pairs, poor = by_kind["pair"], by_kind["poor"]
     return [
         count("pair: both identified", pairs, _are_all_identified, 0.75),
-        count("pair: one identified", pairs, lambda o: bool(o.true_names & {m["name"] for m in o.identified})),
+        count("pair: one identified", pairs, lambda o: bool(o.true_among(o.identified))),
         count("poor protocol: identified or among the alternatives", poor, lambda o: o.includes_truth),
         count(
             "undecided: a true effect among the alternatives",
             _undecided(outcomes),
-            lambda o: bool(o.true_names & set(o.alternatives)),
+            lambda o: bool(o.true_among(o.listed)),
         ),
     ]
 
@@ -111,7 +111,7 @@ def _is_decided_rightly(o: Outcome) -> bool:
         case "unlisted" | "removed":
             return o.verdict == "learned" and is_slot_right(o)
         case _:
-            return bool(o.identified) and {m["name"] for m in o.identified} == o.true_names
+            return _are_all_identified(o) and len(o.identified) == len(o.true_names)
 
 
 def _by_kind(outcomes: Iterable[Outcome]) -> dict[str, list[Outcome]]:
@@ -122,7 +122,7 @@ def _by_kind(outcomes: Iterable[Outcome]) -> dict[str, list[Outcome]]:
 
 
 def _are_all_identified(o: Outcome) -> bool:
-    return o.true_names <= {m["name"] for m in o.identified}
+    return bool(o.identified) and o.true_names <= o.true_among(o.identified)
 
 
 def _undecided(outcomes: Sequence[Outcome]) -> list[Outcome]:
@@ -234,7 +234,7 @@ def misses(outcomes: Iterable[Outcome]) -> list[dict]:
 
 
 def is_right(o: Outcome) -> bool:
-    """Whether a diagnosis is right. If the effects are not visible, `agrees` is right too, but for a pair."""
+    """Whether a diagnosis is right. If the effects are not visible, `agrees` is right too, but for several effects."""
     if o.diagnosis is None or o.is_confidently_wrong:
         return False
     is_tolerated = o.verdict == "agrees" and not o.is_visible
@@ -243,7 +243,7 @@ def is_right(o: Outcome) -> bool:
             return o.verdict == "agrees"
         case "unlisted" | "removed":
             return is_left_open_or_learned(o) or is_tolerated
-        case "pair":
+        case "pair" | "triple" | "many":
             return _are_all_identified(o)
         case "poor":
             return o.includes_truth or is_tolerated

@@ -102,7 +102,7 @@ def prepare(campaign: Campaign, plan: RecordingPlan, draw: Generator) -> Prepara
         friction_coefficient=drifted
         * campaign.rig.cable.friction_coefficient
         * (1 + spread.friction * draw.standard_normal()),
-        pretension_N=plan.pretension_N * (1 + spread.pretension * draw.standard_normal()),
+        pretension_N=(plan.pretension_N * (1 + spread.pretension * draw.standard_normal()),) * 2,
         profile_share=(draw.uniform(low, high), draw.uniform(low, high)),
         tensioned_before_s=_drawn(spread.tensioned_before_s, draw),
         ran_in_before=_drawn(spread.ran_in_before, draw),

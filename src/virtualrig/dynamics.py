@@ -69,7 +69,8 @@ def _channels(
     radius, load, cable = rig.pulley_radius_m, rig.load, rig.cable
     grip = node_grip(grid, preparation.friction_coefficient)
     bristle = preparation.bristles(grip.size)
-    tension = np.stack([initial_tension(grid, grip, b, preparation.pretension_N) for b in bristle])
+    of_cable = zip(bristle, preparation.pretension_N, strict=True)
+    tension = np.stack([initial_tension(grid, grip, *of) for of in of_cable])
     stiffness, mass = cable.EA_N / grid.segment_length_m, cable.density_kg_per_m * grid.cell_length_m
     bristles = 2 * grip * numerics.tension_limit_N / numerics.bristle_length_m
     spring, pulley_mass = load.spring_stiffness_Nm_per_rad / radius**2 / 2, load.inertia_kg_m2 / radius**2 / 2

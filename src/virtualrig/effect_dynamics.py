@@ -169,7 +169,8 @@ def _initial_state(
     """Tension of the segments (N, shape (2, n + 1)) and bristles (shape (2, n)) that hold it in balance."""
     share = preparation.bristles(drag.size)
     grip = np.tanh(half_bend)
-    tension = np.stack([initial_tension(grid, *of, preparation.pretension_N) for of in zip(grip, share, strict=True)])
+    of_cable = zip(grip, share, preparation.pretension_N, strict=True)
+    tension = np.stack([initial_tension(grid, *of) for of in of_cable])
     both = tension[:, :-1] + tension[:, 1:]
     strength = np.vectorize(lambda y, T: slow_friction(physics, y, T, 0.0, 0.0, 0.0))(half_bend, both / 2)
     hold = (np.tanh(strength) * (1 + physics.stribeck_rise) * both + drag) * _oldest(physics, FIRST_S)

@@ -107,11 +107,10 @@ def _bristle(z: float, slide_over_length: float) -> float:
 
 @njit(error_model="numpy")
 def _set_strength(
-    p: Physics, strength: NDArray, half_bend: NDArray, tension: NDArray, time: float, travel: float, drive: float
+    p: Physics, strength: NDArray, half_bend: NDArray, tension: NDArray, time: float, travel: float, position: float
 ) -> None:
     """Friction of the nodes per sum of the tensions on both sides, without what changes fast."""
     for c in range(2):
-        position = drive if c == 0 else -drive
         for i in range(strength.shape[1]):
             mean = 0.5 * (tension[c, i] + tension[c, i + 1])
             strength[c, i] = np.tanh(slow_friction(p, half_bend[c, i], mean, time, travel, position))

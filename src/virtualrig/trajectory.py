@@ -14,8 +14,8 @@ class Preparation:
     ----------
     friction_coefficient : float
         Friction coefficient mu between cables and conduits in this run.
-    pretension_N : float
-        Mean tension along the conduit, of both cables, N.
+    pretension_N : tuple of float
+        Mean tension along the conduit, of cables A and B, N.
     profile_share : tuple of float
         Fall of ln T from the drive end to the load end over mu phi, for cables A and B.
     ran_in_before : float
@@ -27,7 +27,7 @@ class Preparation:
     """
 
     friction_coefficient: float
-    pretension_N: float
+    pretension_N: tuple[float, float]
     profile_share: tuple[float, float]
     ran_in_before: float = 0.0
     profile_curvature: tuple[float, float] = (0.0, 0.0)

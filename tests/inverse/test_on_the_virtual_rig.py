@@ -147,7 +147,7 @@ def test_compensation_takes_nearly_all_lost_motion_of_the_rig(rig, campaign, wan
     motion = cc.compensate(
         model, wanted, pretension_N=7.0, max_speed_rad_per_s=10.0, max_acceleration_rad_per_s2=2000.0
     )
-    nominal = Preparation(campaign.rig.cable.friction_coefficient, 7.0, (0.2, 0.2))
+    nominal = Preparation(campaign.rig.cable.friction_coefficient, (7.0, 7.0), (0.2, 0.2))
     time_s = wanted["time_s"].to_numpy()
     straight = load_of(campaign, time_s, wanted["theta_out_rad"].to_numpy(), nominal)
     followed = load_of(campaign, time_s, motion.table["theta_in_rad"].to_numpy(), nominal)

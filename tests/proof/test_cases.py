@@ -182,7 +182,7 @@ def test_the_noise_floor_adds_sensors_and_repeatability(poor, monkeypatch):
 
     monkeypatch.setattr(build, "simulate", simulated)
     campaign = poor.campaign.model_copy(update={"rig": poor.campaign.rig.model_copy(update={"effects": Effects()})})
-    prepared = Preparation(1.0, 7.0, (0.2, 0.2))
+    prepared = Preparation(1.0, (7.0, 7.0), (0.2, 0.2))
     floor = build.noise_floor(campaign, plan, prepared, simulated(campaign, plan, prepared))
     noise, slow = campaign.sensors.torque.noise_Nm, campaign.sensors.torque.slow_noise.ratio
     expected = np.sqrt(
@@ -223,6 +223,27 @@ def test_the_noise_floor_lacks_what_the_rest_shows_of_the_initial_tension():
     floor = build.noise_floor(campaign, plan, apart, trajectory)
     assert floor["theta_out_rad"] < 0.3 * moved
     assert floor["tau_out_Nm"] < 0.3 * moved * campaign.rig.load.spring_stiffness_Nm_per_rad
+
+
+def test_the_repeat_of_the_noise_floor_begins_with_the_tensions_of_the_run():
+    """With another profile of the tension and a load with a gap, whose motion another start would change."""
+    case = draw(3, "single", "backlash", 0.95)
+    spread = case.campaign.repeatability.model_copy(update={"friction": 0.0})
+    campaign, plan = case.campaign.model_copy(update={"repeatability": spread}), case.kept_back[0]
+    prepared = build.prepare(campaign, plan, np.random.default_rng(1))
+    repeated = build._repeat(campaign, plan, prepared, build.simulate(campaign, plan, prepared))
+    first, again = (build.simulate(campaign, plan, of) for of in (prepared, repeated))
+    for tension in ("T1_N", "T2_N", "T3_N", "T4_N"):
+        assert getattr(again, tension)[0] == pytest.approx(getattr(first, tension)[0], rel=1e-4)
+    assert again.theta_out_rad[0] == pytest.approx(first.theta_out_rad[0], abs=1e-5)
+    assert repeated.profile_curvature != prepared.profile_curvature
+
+
+@pytest.mark.parametrize("effect", ["friction-drift", "stiffness-drift"])
+def test_a_drift_is_recorded_more_than_once(effect):
+    cases = [draw(seed, "poor", effect) for seed in range(20)]
+    assert {len(case.recordings) > 1 for case in cases} == {True}
+    assert any(len(draw(seed, "poor", "kink").recordings) == 1 for seed in range(20))
 
 
 def test_a_rig_that_has_some_of_its_effects_is_otherwise_the_same():

@@ -74,9 +74,18 @@ def test_recordings_of_the_batch_are_not_made_again(case, tmp_path):
     assert folder_digest(tmp_path / "after" / case.name) == folder_digest(tmp_path / "alone" / case.name)
 
 
+def test_a_drift_goes_on_after_the_session(case):
+    """The diagnosis takes recordings to follow at even steps."""
+    asked = {"excitation": SINE, "pretension_N": 3.3, "bend_rad": 4.1, "recordings": 3}
+    positions = np.array([plan.position for plan in [*case.recordings, *plans_of(case, asked)]])
+    np.testing.assert_allclose(np.diff(positions), 1 / (len(case.recordings) - 1))
+
+
 def test_an_experiment_decides_rightly_if_it_names_all_and_no_more(case):
+    place = case.truth[0].place
+
     def said(verdict, *names):
-        named = [{"name": n, "place": "drive-sensor", "confidence": 0.9, "parameters": []} for n in names]
+        named = [{"name": n, "place": place, "confidence": 0.9, "parameters": []} for n in names]
         return {"verdict": verdict, "place": None, "mechanisms": named, "alternatives": []}
 
     further = {PROPOSED: said("explained", "torque-scale"), RANDOM: said("explained", "kink")}

@@ -92,8 +92,28 @@ def test_a_pair_that_is_declared_complete_with_one_member_is_confidently_wrong()
     ("name", "confidence", "wrong"), [("kink", 0.9, True), ("kink", 0.7, False), ("torque-scale", 0.9, False)]
 )
 def test_an_alternative_that_is_stated_with_confidence_counts_like_a_mechanism(name, confidence, wrong):
-    said = reported("undecided", alternatives=[(name, "conduit", confidence, [])])
+    said = reported("undecided", alternatives=[(name, "drive-sensor", confidence, [])])
     assert Outcome(answer("single", GAIN), said).is_confidently_wrong == wrong
+
+
+@pytest.mark.parametrize("place", ["drive-sensor", "load-sensor"])
+def test_a_mechanism_is_right_at_its_place_alone(place):
+    is_there = place == "drive-sensor"
+    one = Outcome(answer("single", GAIN), reported("explained", ("torque-scale", place, 0.9, [])))
+    assert (one.is_identified_first, one.is_confidently_wrong) == (is_there, not is_there)
+    assert one.claims == [(0.9, is_there)]
+    listed = Outcome(answer("single", GAIN), reported("undecided", alternatives=[("torque-scale", place, 0.5, [])]))
+    assert listed.includes_truth == is_there
+    assert rate_of("pair: one identified", Outcome(answer("pair", GAIN, GAIN), one.diagnosis)) == (int(is_there), 1)
+
+
+@pytest.mark.parametrize("channel", ["tau_in_Nm", "F_drive_N"])
+def test_a_sensor_map_is_right_for_its_channel_alone(channel):
+    key = answer("unlisted", GAIN)
+    key["truth"][0] |= {"name": "unlisted-torque-curvature", "slot": "sensor-map", "channel": "tau_in_Nm"}
+    law = {"slot": "sensor-map", "place": "drive-sensor", "channel": channel, "arguments": ["reading"]}
+    o = Outcome(key, reported("learned", place="drive-sensor") | {"laws": [law | {"confidence": 0.9}]})
+    assert o.claims == [(0.9, channel == "tau_in_Nm")]
 
 
 @pytest.mark.parametrize(
@@ -201,7 +221,8 @@ def test_the_gap_is_that_of_the_worst_channel():
 
 
 def test_calibration_error_of_known_claims():
-    sure = [Outcome(answer("single", GAIN), reported("explained", ("torque-scale", "x", 0.9, []))) for _ in range(9)]
+    right = reported("explained", ("torque-scale", "drive-sensor", 0.9, []))
+    sure = [Outcome(answer("single", GAIN), right) for _ in range(9)]
     wrong = [Outcome(answer("single", GAIN), reported("explained", ("kink", "x", 0.9, [])))]
     assert calibration_error(sure + wrong) == pytest.approx(0.0, abs=1e-12)
     assert calibration_error(sure + wrong * 9) == pytest.approx(0.4)

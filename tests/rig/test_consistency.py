@@ -310,16 +310,19 @@ def test_a_torque_without_its_sign_is_named_and_one_of_a_load_that_only_pulls_is
 
 
 @pytest.mark.parametrize(("samples", "is_late"), [(1, None), (3, None), (4, False), (12, True)])
-def test_readings_that_are_held_are_named_by_how_late_they_are(tmp_path, samples, is_late):
+@pytest.mark.parametrize(
+    "columns",
+    [["drive_current_A", "load_current_A", "drive_load_cell_V", "load_load_cell_V"], ["load_encoder_counts"]],
+)
+def test_readings_that_are_held_are_named_by_how_late_they_are(tmp_path, columns, samples, is_late):
     """At 500 samples a second: a converter of half the rate is common, one of a twelfth reads as late sensors."""
     copy = read_copy(SIMULATED)
-    columns = ["drive_current_A", "load_current_A", "drive_load_cell_V", "load_load_cell_V"]
     for log in copy.logs.values():
         log[columns] = log[columns].to_numpy()[np.arange(len(log)) // samples * samples]
     findings = ingest_batch(write_copy(copy, tmp_path / "held")).findings
     assert len(findings) == (0 if is_late is None else len(copy.logs))
     for finding in findings:
-        assert finding.column == "drive_current_A" and f"each reading stands in {samples} samples" in finding.text
+        assert finding.column == columns[0] and f"each reading stands in {samples} samples" in finding.text
         assert finding.is_inconsistent == is_late
 
 

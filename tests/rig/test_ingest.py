@@ -30,6 +30,10 @@ def test_a_good_batch(bench, tmp_path):
     assert read_recordings(tmp_path / "r.nc")[1]["T4_N"] == pytest.approx(ingested.recordings[1]["T4_N"])
 
 
+# The first of three empty cells in each of two columns, one after the other.
+HOLE = {"drive_current_A": 50, "load_current_A": 53}
+
+
 # Damage to log "one", then row, column and part of the text of its only finding.
 def write_bytes(change):
     return lambda bench: bench.log().write_bytes(change(bench.log().read_bytes()))
@@ -88,6 +92,12 @@ REFUSED = {
         52,
         "drive_current_A",
         "11 cells have no number, 11 of them in a row",
+    ),
+    "hole over two columns": (
+        frame(lambda t: t.assign(**{c: t[c].where((t.index < a) | (t.index > a + 2)) for c, a in HOLE.items()})),
+        52,
+        None,
+        "cells of several columns have no number, in 6 rows in a row from here",
     ),
     "column empty": (changed("load_current_A", lambda t: np.nan), None, "load_current_A", "has no numbers"),
     "row too short": (line(20, lambda s: s.rsplit(",", 1)[0]), 20, None, "has 6 cells, the header has 7"),

@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import sample_files as sample
+import xarray as xr
 from asammdf import MDF, Signal
 from nptdms import ChannelObject, GroupObject, TdmsWriter
 
@@ -166,6 +167,29 @@ def test_netcdf_time_in_milliseconds(tmp_path):
     angle = by_name(read_signals(tmp_path / "log.nc"))["angle"]
     assert angle.unit == "deg" and (angle.values == X).all()
     np.testing.assert_allclose(angle.time_s, T, atol=1e-12)
+
+
+def test_packed_and_missing_values_of_netcdf(tmp_path):
+    """A file that xarray writes with its own packing: read as xarray reads it, with nan where a value is missing."""
+    torque, force = Y.copy(), 7.0 + X
+    torque[3], force[[5, 6]] = np.nan, np.nan
+    table = xr.Dataset(
+        {"torque": ("time", torque, {"units": "N*m"}), "force": ("time", force, {"units": "N"})},
+        coords={"time": ("time", 1e3 * T, {"units": "ms"})},
+    )
+    packing = {
+        "torque": {"dtype": "int16", "scale_factor": 1e-3, "add_offset": 0.01, "_FillValue": -32768},
+        "force": {"_FillValue": 9.96921e36},
+        "time": {"dtype": "int32", "scale_factor": 0.5, "_FillValue": None},
+    }
+    table.to_netcdf(tmp_path / "log.nc", encoding=packing)
+    file = read_signals(tmp_path / "log.nc")
+    signals = by_name(file)
+    for name, expected, tolerance in (("torque", torque, 5.1e-4), ("force", force, 0.0)):
+        np.testing.assert_allclose(signals[name].values, expected, rtol=0, atol=tolerance)
+        np.testing.assert_allclose(signals[name].time_s, T, rtol=0, atol=2.6e-4)
+    (remark,) = file.remarks
+    assert "scale_factor" in remark and "torque" in remark and "force" not in remark
 
 
 def test_links_that_lead_nowhere_are_named(tmp_path):

@@ -25,7 +25,7 @@ def plan_of(campaign, batch, recording, **excitation):
 
 def strung(campaign, plan, profile_share=(0.2, 0.2)) -> Preparation:
     """The nominal preparation, without a draw."""
-    return Preparation(campaign.rig.cable.friction_coefficient, plan.pretension_N, profile_share)
+    return Preparation(campaign.rig.cable.friction_coefficient, (plan.pretension_N,) * 2, profile_share)
 
 
 def channels(campaign, trajectory: Trajectory) -> dict[str, np.ndarray]:

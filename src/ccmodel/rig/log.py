@@ -118,6 +118,9 @@ def _drop_bad(table: pd.DataFrame, warnings: list[Defect]) -> pd.DataFrame:
         rows = "row" if is_bad.sum() == 1 else "their rows are"
         warnings.append(Defect(row, column, f"{said}: {rows} dropped"))
         any_bad |= is_bad
+    if length(hole := longest_run(any_bad)) > limits.BAD_CELLS_IN_A_ROW:
+        text = f"cells of several columns have no number, in {length(hole)} rows in a row from here"
+        raise LogError(int(table.index[hole.start]), None, f"{text}: too many to be bridged")
     return without(table, any_bad)
 
 

@@ -68,7 +68,8 @@ def check_sensors(table: pd.DataFrame, rig: Rig, largest_travel: float) -> tuple
             # A sensor at the end of its range repeats one value: it is clipped and not frozen.
             defects += _saturated(table, column, drive, rig.ranges.get(column)) or _frozen(table, column, drive)
             analog.append(column)
-    return table.drop(columns=dead), defects + _held(table[["time_s", *analog]], drive.values)
+    encoders = [angle.column for angle in (load, motor) if angle is not None and angle.column not in dead]
+    return table.drop(columns=dead), defects + _held(table[["time_s", *analog, *encoders]], drive.values)
 
 
 def _drop_beyond(table: pd.DataFrame, ranges: Mapping[str, tuple[float, float]]) -> tuple[pd.DataFrame, list[Defect]]:
@@ -302,7 +303,7 @@ def _frozen(table: pd.DataFrame, column: str, drive: Angle) -> list[Defect]:
 
 
 def _held(table: pd.DataFrame, drive: NDArray) -> list[Defect]:
-    """Analog readings that are logged several times each, as of a converter that is slower than the log: one line."""
+    """Readings that are logged several times each, as of a converter or counter slower than the log: one line."""
     every = {column: held_for(table[column], drive) for column in table.columns.drop("time_s")}
     held = {column: samples for column, samples in every.items() if samples}
     if not held:
@@ -311,8 +312,8 @@ def _held(table: pd.DataFrame, drive: NDArray) -> list[Defect]:
     hold_s = longest * float(np.median(np.diff(table["time_s"])))
     others = f", as in {', '.join(c for c in held if c != first)}" if len(held) > 1 else ""
     text = (
-        f"each reading stands in {longest} samples{others}: a converter that is slower than the log, whose readings"
-        f" are late by up to {1e3 * hold_s:.3g} ms, {500 * hold_s:.3g} ms on average; log at its rate of"
+        f"each reading stands in {longest} samples{others}: a sensor that is read more slowly than it is logged, whose"
+        f" readings are late by up to {1e3 * hold_s:.3g} ms, {500 * hold_s:.3g} ms on average; log at its rate of"
         f" {1 / hold_s:.3g} Hz or less"
     )
     return [Defect(None, first, text, contradicts=hold_s > limits.HELD_S)]

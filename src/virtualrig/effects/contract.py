@@ -47,12 +47,15 @@ class TrueLaw(NamedTuple):
     x, y : ndarray, shape (n,)
         Arguments, and there a factor of friction, of a compliance or of a pulley's radius, or what is added to a
         torque or a reading. Up to what a calibration absorbs. Empty for a law that is none of a single quantity.
+    channel : str
+        Channel of a sensor map; empty at other slots.
     """
 
     slot: str
     argument: str
     x: NDArray = np.empty(0)
     y: NDArray = np.empty(0)
+    channel: str = ""
 
 
 # What the proof's recordings visit: tensions (N), times (s), the drive's travel (m), angles (rad), speeds of the cable
@@ -70,8 +73,12 @@ ACCELERATIONS_RAD_PER_S2 = (-500.0, 500.0)
 # Torques over the radius of a pulley, N.
 PULLS_N = (-12.0, 12.0)
 POINTS = 129
-# Fields of a side that a sensor reads, by the argument of its map.
+# Fields of a side that a sensor reads, by the argument of its map; and the channels of both sides.
 SIDE = {"angle": "angle_rad", "torque": "torque_Nm", "force": "force_N"}
+CHANNELS = {
+    "drive": {"torque": "tau_in_Nm", "force": "F_drive_N"},
+    "load": {"angle": "theta_out_rad", "torque": "tau_out_Nm", "force": "F_load_N"},
+}
 
 
 def along(between: Range) -> NDArray:
@@ -92,6 +99,11 @@ def added_by(read: "Read", faults: Any, of: str, over: str, x: NDArray, radius_m
     side = Side(*(x if over == name else zero for name in SIDE))
     time_s = x if over == "time" else np.arange(x.size, dtype=float)
     return getattr(read(side, side, faults, time_s, radius_m), SIDE[of]) - getattr(side, SIDE[of])
+
+
+def sensor_map(place: str, argument: str, of: str, x: NDArray, added: NDArray) -> TrueLaw:
+    """What is added to the "angle", "torque" or "force" that the sensors at a place read, as a law."""
+    return TrueLaw("sensor-map", argument, x, added, CHANNELS[place.split("-")[0]][of])
 
 
 class Law(NamedTuple):
@@ -135,14 +147,16 @@ class Twin:
         are those that both laws share.
     signed : bool
         Whether either sign is drawn.
+    between_recordings : bool
+        Whether it is a difference between recordings, so that one by itself has none of it.
     also : mapping of str to (float, float)
         Ranges of other numbers, drawn uniformly in the logarithm.
     numbers : callable
         ``numbers(effects)``: its values in the time loop, by name.
     slow_friction : Law or None
         ``value(p, y, tension, time, travel, position)``: half of mu times the bend angle of a node, which is
-        evaluated again every `SLOW_S`; mean tension (N), time (s), the drive's cable travel (m) and the cable's
-        position (m) since the start. ``p`` holds every twin's numbers.
+        evaluated again every `SLOW_S`; mean tension (N), time (s), and since the start the cable travel (m) of
+        the drive to and fro, and its position (m). ``p`` holds every twin's numbers.
     friction : Law or None
         ``value(p, force, bristle, speed)``: friction of a node (N), its bristle (-1 to 1) and sliding speed (m/s).
     read : callable or None
@@ -162,6 +176,7 @@ class Twin:
     seed: Seed
     other_laws: Mapping[str, Seed] = field(default_factory=dict)
     signed: bool = False
+    between_recordings: bool = False
     also: Mapping[str, Range] = field(default_factory=dict)
     numbers: Callable[[Any], dict[str, Any]] = lambda effects: {}
     slow_friction: Law | None = None

@@ -24,6 +24,7 @@ def _twin(what: str, place: str) -> Twin:
         size=(0.02, 0.4),
         unit="1",
         signed=True,
+        between_recordings=True,
         seed=seed,
     )
 

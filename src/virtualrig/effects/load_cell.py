@@ -23,6 +23,7 @@ from virtualrig.effects.contract import (
     added_by,
     along,
     group_of,
+    sensor_map,
 )
 from virtualrig.strict import NonNegative
 
@@ -52,7 +53,7 @@ def _map(read: Read, argument: str) -> Callable[[Any, str], TrueLaw]:
 
     def law(rig: Any, place: str) -> TrueLaw:
         x, faults = along(between), getattr(rig.effects, group_of(place))
-        return TrueLaw("sensor-map", argument, x, added_by(read, faults, "force", over, x))
+        return sensor_map(place, argument, "force", x, added_by(read, faults, "force", over, x))
 
     return law
 

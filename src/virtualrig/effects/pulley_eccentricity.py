@@ -42,10 +42,11 @@ def _law(rig: Any, place: str) -> TrueLaw:
 
 
 def _two_lobes(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:
-    settings, values = _seed(size, also, place, spring)
+    # Over the angles of a motion the lobes are not orthogonal: the first one alone has another size and phase.
+    settings, _ = _seed(size, also, place, spring)
     second = {"second_share": also["second"] * size, "second_phase_rad": 2.4 - also["phase"]}
     settings[group_of(place)]["eccentricity"] |= second
-    return settings, values
+    return settings, {}
 
 
 TWIN = Twin(

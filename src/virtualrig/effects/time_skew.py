@@ -15,8 +15,11 @@ def _read(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: fl
     late = Side(*(np.interp(time_s - faults.delay_s, time_s, values) for values in reading))
     if not faults.filter_s:
         return late
-    keep = np.exp(-(time_s[1] - time_s[0]) / faults.filter_s)
-    return Side(*(values[0] + lfilter([1 - keep], [1, -keep], values - values[0]) for values in late))
+    # Exact for readings that are linear between samples, so that a ramp is late by the time constant.
+    step_s = time_s[1] - time_s[0]
+    keep = np.exp(-step_s / faults.filter_s)
+    lost = (1 - keep) * faults.filter_s / step_s
+    return Side(*(values[0] + lfilter([1 - lost, lost - keep], [1, -keep], values - values[0]) for values in late))
 
 
 def _filtered(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:

@@ -5,7 +5,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from virtualrig.effects.contract import FORCES_N, Seeded, Side, TrueLaw, Twin, added_by, along, group_of
+from virtualrig.effects.contract import FORCES_N, Seeded, Side, TrueLaw, Twin, added_by, along, group_of, sensor_map
 
 
 def _read(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: float) -> Side:
@@ -18,7 +18,7 @@ def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> 
 
 def _law(rig: Any, place: str) -> TrueLaw:
     force, faults = along(FORCES_N), getattr(rig.effects, group_of(place))
-    return TrueLaw("sensor-map", "reading", force, added_by(_read, faults, "force", "force", force))
+    return sensor_map(place, "reading", "force", force, added_by(_read, faults, "force", "force", force))
 
 
 TWIN = Twin(

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from virtualrig.effects.contract import TIMES_S, Seeded, Side, TrueLaw, Twin, added_by, along, group_of
+from virtualrig.effects.contract import TIMES_S, Seeded, Side, TrueLaw, Twin, added_by, along, group_of, sensor_map
 
 
 def _read(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: float) -> Side:
@@ -28,7 +28,7 @@ def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> 
 
 def _law(rig: Any, place: str) -> TrueLaw:
     t, faults = along(TIMES_S), getattr(rig.effects, group_of(place))
-    return TrueLaw("sensor-map", "time", t, added_by(_read, faults, "torque", "time", t))
+    return sensor_map(place, "time", "torque", t, added_by(_read, faults, "torque", "time", t))
 
 
 TWIN = Twin(

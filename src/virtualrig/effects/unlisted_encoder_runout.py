@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from virtualrig.effects.contract import ANGLES_RAD, Seeded, Side, TrueLaw, Twin, added_by, along, group_of
+from virtualrig.effects.contract import ANGLES_RAD, Seeded, Side, TrueLaw, Twin, added_by, along, group_of, sensor_map
 
 
 def _read(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: float) -> Side:
@@ -16,7 +16,7 @@ def _read(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: fl
 
 def _law(rig: Any, place: str) -> TrueLaw:
     theta, faults = along(ANGLES_RAD), getattr(rig.effects, group_of(place))
-    return TrueLaw("sensor-map", "reading", theta, added_by(_read, faults, "angle", "angle", theta))
+    return sensor_map(place, "reading", "angle", theta, added_by(_read, faults, "angle", "angle", theta))
 
 
 def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> Seeded:

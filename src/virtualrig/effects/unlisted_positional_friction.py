@@ -1,4 +1,7 @@
-"""A cable that is worn unevenly along its length: friction 1 + rise sin(2 pi x / period + phase), x its position."""
+"""Cables that are worn unevenly along their length: friction 1 + rise sin(2 pi x / period + phase).
+
+x is the travel of the drive: both cables have their worn parts in the conduits' bends at the same drive angles.
+"""
 
 from collections.abc import Mapping
 from typing import Annotated, Any

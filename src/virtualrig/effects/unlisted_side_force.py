@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from virtualrig.effects.contract import ANGLES_RAD, Seeded, Side, TrueLaw, Twin, added_by, along, group_of
+from virtualrig.effects.contract import ANGLES_RAD, Seeded, Side, TrueLaw, Twin, added_by, along, group_of, sensor_map
 
 
 def _read(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: float) -> Side:
@@ -27,7 +27,7 @@ def _seed(size: float, also: Mapping[str, float], place: str, spring: float) -> 
 def _law(rig: Any, place: str) -> TrueLaw:
     theta, faults = along(ANGLES_RAD), getattr(rig.effects, group_of(place))
     push = added_by(_read, faults, "force", "angle", theta)
-    return TrueLaw("sensor-map", f"{place.split('-')[0]}-angle", theta, push)
+    return sensor_map(place, f"{place.split('-')[0]}-angle", "force", theta, push)
 
 
 TWIN = Twin(

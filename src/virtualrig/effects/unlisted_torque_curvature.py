@@ -4,7 +4,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from virtualrig.effects.contract import TORQUES_NM, Side, TrueLaw, Twin, added_by, along, group_of
+from virtualrig.effects.contract import TORQUES_NM, Side, TrueLaw, Twin, added_by, along, group_of, sensor_map
 
 
 def _read(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: float) -> Side:
@@ -14,7 +14,7 @@ def _read(reading: Side, truth: Side, faults: Any, time_s: NDArray, radius_m: fl
 
 def _law(rig: Any, place: str) -> TrueLaw:
     tau, faults = along(TORQUES_NM), getattr(rig.effects, group_of(place))
-    return TrueLaw("sensor-map", "reading", tau, added_by(_read, faults, "torque", "torque", tau))
+    return sensor_map(place, "reading", "torque", tau, added_by(_read, faults, "torque", "torque", tau))
 
 
 TWIN = Twin(

@@ -57,19 +57,24 @@ def test_the_interpolation_error_is_estimated_from_the_signal_itself():
 
 def test_noise_alone_is_no_interpolation_error():
     noise = np.random.default_rng(0).normal(size=20_000)
-    error, found = interpolation_cost(noise, whole=False)
+    error, found = interpolation_cost(noise)
     assert error < 0.05
     assert found == pytest.approx(1, rel=0.03)
 
 
-def test_counts_stay_whole_and_are_never_ahead():
-    time = np.arange(-0.001, 6, 0.0073)
-    counts = np.round(300 * wave(time))
-    joined = join([DRIVE, samples("load_encoder_counts", time, counts, whole=True)])
-    found = joined.columns["load_encoder_counts"]
-    at = joined.time_s + BASE[0]
-    np.testing.assert_array_equal(found, counts[np.searchsorted(time, at + 1e-9, side="right") - 1])
-    assert joined.costs[0].by == "previous sample"
+@pytest.mark.parametrize("step_s", [0.0003, 0.0073, 0.02])
+def test_counts_stay_whole_and_are_not_late(step_s):
+    """Of an encoder that is faster or slower than the drive angle; within what rounding and its steps lose."""
+    time = np.arange(-0.001, 6, step_s)
+    joined = join([DRIVE, samples("load_encoder_counts", time, np.round(3000 * wave(time)), whole=True)])
+    found, truth = joined.columns["load_encoder_counts"], 3000 * wave(joined.time_s + BASE[0])
+    assert (found == np.round(found)).all()
+    speed = np.gradient(truth, joined.time_s)
+    late_s = -np.mean((found - truth) * speed) / np.mean(speed**2)
+    assert abs(late_s) < 2e-5
+    (cost,) = joined.costs
+    assert np.sqrt(np.mean((found - truth) ** 2)) < 1.5 * np.hypot(cost.interpolation_error, np.hypot(cost.noise, 0.29))
+    assert cost.by == "linear interpolation, to whole counts"
 
 
 def test_counts_at_the_same_instants_on_another_clock_are_not_held_back():

@@ -84,13 +84,12 @@ class Cost:
     rate_Hz : float
         Median sampling rate of the signal.
     by : str
-        "linear interpolation" or "previous sample".
+        "linear interpolation", of counts "linear interpolation, to whole counts".
     interpolation_error : float or None
         Root mean square error midway between two samples, in the column's unit, where it is largest: the error of
-        predicting every second sample from its neighbours, less noise, over 4. Of counts, the root mean square change
-        from sample to sample. None of fewer than 20 samples.
+        predicting every second sample from its neighbours, less noise, over 4. None of fewer than 20 samples.
     noise : float or None
-        Standard deviation of the signal's noise, in the column's unit.
+        Standard deviation of the signal's noise, in the column's unit; of counts, that of their rounding is part of it.
     offset_s, drift, offset_uncertainty_s, drift_uncertainty, how
         See `Clock`.
     delay_s : float
@@ -233,24 +232,23 @@ def _at(one: Samples, time: NDArray) -> NDArray:
     following = np.clip(np.searchsorted(own, time + _ROUNDING * step, side="right"), 1, own.size - 1)
     too_long = own[following] - own[following - 1] > max(limits.GAP_S, limits.GAP_STEPS * step)
     on_sample = np.abs(own[following - 1] - time) <= _ROUNDING * step
+    # The previous count instead would be late by half a step of its encoder on average.
+    result = np.interp(time, own, values)
     if one.whole:
-        last = time >= own[-1] - _ROUNDING * step
-        result = np.where(last, values[-1], values[following - 1])
-    else:
-        result = np.interp(time, own, values)
+        result = np.round(result)
     outside = (time < own[0] - _ROUNDING * step) | (time > own[-1] + _ROUNDING * step)
     return np.where((too_long & ~on_sample) | outside, np.nan, result)
 
 
 def _cost(one: Samples, unbridged: int) -> Cost:
     has = np.isfinite(one.values)
-    error, noise = interpolation_cost(one.values[has], one.whole)
+    error, noise = interpolation_cost(one.values[has])
     return Cost(
         column=one.column,
         signal=one.signal,
         file=one.file,
         rate_Hz=float(1.0 / np.median(np.diff(one.time_s[has]))),
-        by="previous sample" if one.whole else "linear interpolation",
+        by=f"linear interpolation{', to whole counts' if one.whole else ''}",
         interpolation_error=error,
         noise=noise,
         offset_s=one.clock.offset_s,
@@ -263,7 +261,7 @@ def _cost(one: Samples, unbridged: int) -> Cost:
     )
 
 
-def interpolation_cost(values: NDArray, whole: bool) -> tuple[float | None, float | None]:
+def interpolation_cost(values: NDArray) -> tuple[float | None, float | None]:
     """Interpolation error and noise of a signal, from its own samples (`Cost`).
 
     A curve that bends by x'' has the error x'' h² / 2 where a sample is predicted from its neighbours at a distance h,
@@ -273,8 +271,6 @@ def interpolation_cost(values: NDArray, whole: bool) -> tuple[float | None, floa
     ----------
     values : ndarray, shape (n,)
         Samples at even steps.
-    whole : bool
-        Whether the previous sample is taken instead.
 
     Returns
     -------
@@ -283,8 +279,6 @@ def interpolation_cost(values: NDArray, whole: bool) -> tuple[float | None, floa
     """
     if values.size < _FEWEST_FOR_COST:
         return None, None
-    if whole:
-        return float(np.sqrt(np.mean(np.diff(values) ** 2))), None
     noise_power = np.mean(np.diff(values, _NOISE_ORDER) ** 2) / comb(2 * _NOISE_ORDER, _NOISE_ORDER)
     predicted = np.mean((values[1:-1] - (values[:-2] + values[2:]) / 2) ** 2)
     return float(np.sqrt(max(predicted - 1.5 * noise_power, 0.0)) / 4), float(np.sqrt(noise_power))

@@ -113,7 +113,7 @@ def sign_of_tension(force: NDArray) -> int | None:
 def roughness(values: NDArray) -> float:
     """Noise of a signal as a share of its standard deviation; an angle that moves is smoother than forces are."""
     finite = values[np.isfinite(values)]
-    noise = interpolation_cost(finite, whole=False)[1]
+    noise = interpolation_cost(finite)[1]
     return np.inf if noise is None or is_constant(finite) else float(noise / np.std(finite))
 
 

@@ -64,9 +64,10 @@ class Columns:
             "single numbers": self.scalars,
             f"more than {MOST_COLUMNS} columns": self.others,
         }
-        return tuple(f"left out ({why}): {_listed(names)}" for why, names in left_out.items() if names)
+        return tuple(f"left out ({why}): {listed(names)}" for why, names in left_out.items() if names)
 
 
-def _listed(names: list[str], most: int = 8) -> str:
+def listed(names: list[str], most: int = 8) -> str:
+    """The first of some names, and how many more there are."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more

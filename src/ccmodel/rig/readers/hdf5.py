@@ -9,13 +9,16 @@ from numpy.typing import NDArray
 
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers.attempt import COPY
-from ccmodel.rig.readers.columns import Columns
+from ccmodel.rig.readers.columns import Columns, listed
 from ccmodel.rig.readers.content import Unpacked
 from ccmodel.rig.readers.contract import Format, SignalFile
 
 _UNIT_KEYS = ("unit", "units", "Unit", "Units", "UNIT", "UNITS", "unit_string")
 # Scales of a time axis that a file attaches to its arrays.
 _SECONDS = {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+# Attributes of the CF conventions: values in these stand for missing ones; others are packed as a linear map of integers.
+_MISSING_KEYS = ("_FillValue", "missing_value")
+_SCALE, _OFFSET = "scale_factor", "add_offset"
 # An attribute of a file written by pandas or of a dimension without an array.
 _NO_ARRAY = b"This is a netCDF dimension but not a netCDF variable"
 
@@ -24,7 +27,8 @@ def read(path: Path) -> SignalFile:
     """Read the numbers of an HDF5 file.
 
     Columns of a two-dimensional array and fields of a compound type are a signal each. An array with a dimension scale
-    in seconds (or ms, us, ns) has it as its time axis.
+    in seconds (or ms, us, ns) has it as its time axis. Values that a netCDF file packs are unpacked, and its fill values
+    are nan.
     """
     import h5py
 
@@ -34,7 +38,9 @@ def read(path: Path) -> SignalFile:
         Unpacked().add(sum(size_of(dataset) for _, dataset in found))
         for name, dataset in found:
             _add(columns, name, dataset)
-    return SignalFile(tuple(columns.signals), None, columns.remarks())
+        packed = [name for name, dataset in found if {_SCALE, _OFFSET} & set(dataset.attrs)]
+    remarks = (f"values are unpacked with their {_SCALE} and {_OFFSET}: {listed(packed)}",) if packed else ()
+    return SignalFile(tuple(columns.signals), None, (*columns.remarks(), *remarks))
 
 
 FORMAT = Format("HDF5 file", (".h5", ".hdf5", ".hdf", ".he5", ".nc"), read, extra="hdf5", apart=("h5py",))
@@ -78,7 +84,20 @@ def _add(columns: Columns, name: str, dataset: Any) -> None:
         for field in dataset.dtype.names:
             columns.add(f"{name}/{field}", unit, values[field], time)
     else:
-        columns.add(name, unit, dataset[()] if dataset.dtype.kind in "iufb" else None, time)
+        columns.add(name, unit, _unpacked(dataset) if dataset.dtype.kind in "iufb" else None, time)
+
+
+def _unpacked(dataset: Any) -> NDArray:
+    """Values of an array of numbers by the CF conventions: nan where it has none, and without its packing."""
+    values, attributes = dataset[()], dataset.attrs
+    # Missing values are stated as they are stored, that is packed.
+    missing = [np.ravel(attributes[key]) for key in _MISSING_KEYS if key in attributes]
+    if missing and (absent := np.isin(values, np.concatenate(missing))).any():
+        values = np.where(absent, np.nan, values)
+    for key, apply in ((_SCALE, np.multiply), (_OFFSET, np.add)):
+        if key in attributes:
+            values = apply(values, float(np.ravel(attributes[key])[0]))
+    return values
 
 
 def _unit(attributes: dict) -> str:
@@ -96,4 +115,4 @@ def _time_axis(dataset: Any) -> NDArray | None:
     if unit not in _SECONDS or scale.shape != dataset.shape[:1] or scale.dtype.kind not in "iuf":
         return None
     size_of(scale)
-    return scale[()].astype(float) * _SECONDS[unit]
+    return _unpacked(scale).astype(float) * _SECONDS[unit]
