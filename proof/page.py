@@ -105,9 +105,9 @@ The held-out recordings are simulated after the diagnosis has ended.
 - **No candidate**: unlisted and removed cases.
 - **Inconsistent inputs**: all inputs of these cases are right, so the verdict `inputs-inconsistent` is a false alarm.
   It names no physics and counts as not detected.
-- **No confident misidentification**: no mechanism, no place and no law's slot with a confidence of at least 0.8 is wrong, and no
-  pair is declared explained with such a confidence while one of its effects is not named. Confidences of laws count as
-  those of mechanisms do.
+- **No confident misidentification**: no mechanism, place or slot of a law with a confidence of at least 0.8 is wrong,
+  and no pair is declared explained with such a confidence while one of its effects is not named. Confidences of laws
+  count as those of mechanisms do.
 - **Further experiment**: where the verdict is `undecided` or `unexplained`, the recordings that the diagnosis proposes
   are made on the same rig, at most three, and the batch is diagnosed again with them. The control is as many recordings
   of a motion, a tension and a bend drawn at random from those of the batch. "Decided" is any other verdict than these

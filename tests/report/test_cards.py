@@ -98,6 +98,12 @@ def test_the_fall_is_that_of_the_largest_error_of_any_channel():
     assert card["largest"] == {"before": card["rows"][0]["before"], "after": 4.0}
 
 
+def test_the_overview_says_held_out_of_held_out_recordings_alone():
+    (card,) = made("explained")
+    assert "Largest held-out error over noise" in " ".join(overview([card | {"held_out": 3}]))
+    assert "Largest error over noise" in " ".join(overview([card | {"held_out": 0}]))
+
+
 def test_contradictory_inputs_stand_first_and_have_no_errors():
     first, second = made("explained", "inputs-inconsistent")
     assert (first["shown_verdict"], first["rows"], first["mechanisms"]) == ("inputs inconsistent", [], [])

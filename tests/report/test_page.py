@@ -59,8 +59,8 @@ def test_says_what_is_not_determined_and_what_is_known_instead(page):
 
 def test_shows_each_recordings_own_friction_and_the_scatter(page):
     text = page(FIT)
-    assert "1.0100 ± 0.003" in text
-    assert "0.15760 ± 0.0005" in text
+    assert "1.0100 ± 0.0033" in text
+    assert "0.15760 ± 0.00049" in text
     assert "0.0123 (0.01)" in text
     assert "2 of 3 starts ended elsewhere" in text
 
@@ -74,7 +74,7 @@ def test_a_failed_fit_has_its_reason_and_no_table(page):
 def test_numbers_have_as_many_digits_as_are_known():
     said = {"low": 7741.234567, "high": 7758.9, "sd": 5.0}
     assert interval(said) == "7741.2 to 7758.9"
-    assert about({"low": -2e-5, "high": 4e-5, "sd": 2e-5}) == "0.000010 ± 3e-05"
+    assert about({"low": -2e-5, "high": 4e-5, "sd": 2e-5}) == "0.000010 ± 0.000030"
     assert about({"low": None, "high": None, "sd": None}) == "not determined"
 
 

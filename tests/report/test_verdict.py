@@ -71,6 +71,11 @@ def test_every_mechanism_has_a_sentence_on_its_own_strengths(name):
         ((3.0, 2.0, 4.0, "1/(rad)"), ("3 1/(rad)", "2 to 4 1/(rad)")),
         ((-0.04, -0.05, -0.03, "log10(m/s)"), ("-0.04 log10(m/s)", "-0.05 to -0.03 log10(m/s)")),
         ((1e-9, -0.5, 0.5, "1"), ("0.0", "-0.5 to 0.5")),
+        # Intervals of positive quantities are often longer above.
+        ((0.04, 0.011, 0.31, "rad/s"), ("0.04 rad/s", "0.01 to 0.3 rad/s")),
+        ((4e-4, 6e-5, 2.1e-3, "m/s"), ("0.4 mm/s", "0.06 to 2 mm/s")),
+        ((0.26, 0.03, 0.75, "1"), ("0.3", "0.03 to 0.8")),
+        ((-0.26, -0.75, -0.03, "1"), ("-0.3", "-0.8 to -0.03")),
     ],
 )
 def test_a_quantity_has_the_digits_that_its_interval_leaves(given, shown):

@@ -91,6 +91,17 @@ def test_phases_are_rest_lost_motion_motion_and_slack():
     assert phases(model, None) == []
 
 
+def test_the_shading_is_that_of_the_last_model_that_is_accepted():
+    recorded, models = run()
+    header, _ = unpacked(packed(recorded, models))
+    model = models["extended"]
+    slack = model.with_channels({**model.channels, "T1_N": 0 * model.time_s}, model.derived_from, "model")
+    with_nearest, _ = unpacked(packed(recorded, models | {"nearest": slack}))
+    assert with_nearest["phases"] == header["phases"]
+    assert (with_nearest["phases_of"], header["phases_of"]) == ("extended", "extended")
+    assert unpacked(packed(recorded, {}))[0]["phases_of"] is None
+
+
 def test_a_reversal_is_no_rest():
     moving = recording(3.0, theta_out_rad=lambda t: np.sin(2 * np.pi * t))
     assert 0 not in [phase for *_, phase in phases(moving, moving)]

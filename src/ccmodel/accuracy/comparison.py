@@ -189,8 +189,8 @@ def compare(accepted: Batches, now: Batches, limits: Limits) -> Comparison:
 def intervals(batches: Batches, limits: Limits) -> Iterator[tuple[str, str, str, dict[str, list[float | None]]]]:
     """Bias, scatter and error of every batch, set and channel with the interval that holds it if it is recorded again.
 
-    The intervals hold all numbers of one kind together with the probability `limits.coverage`; two-sided for the bias.
-    That of the error is the one of `compare`.
+    With the probability `limits.coverage` no bias is outside its interval, no error or scatter above its own, and none
+    below it. The interval of the error is the one of `compare`.
     """
     places = [(batch, p, c) for batch in batches for p, c in _channels(batches[batch])]
     tail = (1 - limits.coverage) / max(len(places), 1)

@@ -308,6 +308,8 @@ def strength(mechanism: Mapping) -> str:
 def quantity(value: float, low: float, high: float, unit: str) -> tuple[str, str]:
     """A value with its unit, and its interval, both with as many digits as the interval leaves.
 
+    An interval that excludes zero has no end that is printed as zero.
+
     Parameters
     ----------
     value, low, high : float
@@ -322,8 +324,13 @@ def quantity(value: float, low: float, high: float, unit: str) -> tuple[str, str
     value, low, high = factor * value, factor * low, factor * high
     reach = float(f"{(high - low) / 2:.3g}")  # without the rounding of binary numbers
     digits = min(-_exponent(reach), 3 - _exponent(value)) if reach > 0 else 2 - _exponent(value)
-    digits = max(digits, 0)
-    return f"{value:.{digits}f}{printed}", f"{low:.{digits}f} to {high:.{digits}f}{printed}"
+    middle, lower, upper = (_fixed(number, max(digits, 0), low * high > 0) for number in (value, low, high))
+    return f"{middle}{printed}", f"{lower} to {upper}{printed}"
+
+
+def _fixed(number: float, digits: int, is_not_zero: bool) -> str:
+    """A number with so many decimals; with one digit where it is not zero and they would make it so."""
+    return f"{number:.1g}" if is_not_zero and round(number, digits) == 0 else f"{number:.{digits}f}"
 
 
 def _exponent(value: float) -> int:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 
 class Defect(NamedTuple):
@@ -34,6 +34,14 @@ class LogError(Exception):
     def defect(self) -> Defect:
         """What is wrong with the log."""
         return Defect(*self.args)
+
+
+class FileError(LogError):
+    """A file cannot be used; the arguments are those of `LogError`, and `file` is its name."""
+
+    def __init__(self, file: str, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.file = file
 
 
 Severity = Literal["warning", "refused", "inconsistent"]

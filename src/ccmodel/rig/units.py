@@ -14,12 +14,12 @@ DEFINITIONS = Path(__file__).with_name("units.txt")
 # Spellings of operators and signs; the keys are patterns.
 _SPELT = {
     r"[·⋅∙•×]": "*",
-    r"(?<=[A-Za-z])[.-](?=[A-Za-z])": "*",  # N.m, oz-in
+    r"(?<=[A-Za-z])[.-](?=[A-Za-z])": "*",  # N.m, ozf-in
     "[μµ]": "µ",
     "²": "**2",
     "³": "**3",
     r"\^": "**",
-    "°": " degree ",
+    "[°º]": " degree ",  # some keyboards give the ordinal for the degree sign
     "%": " percent ",
 }
 LONGEST_UNIT = 60

@@ -25,6 +25,17 @@ channels:
 """
 
 
+STAMPED = """\
+format: 1
+time: {signal: stamp}
+channels:
+  theta_in_rad: {signal: angle, unit: rad, file: main}
+  theta_out_rad: {signal: angle, unit: rad, file: load}
+files:
+  load: {pattern: "*_load.csv", time: {signal: stamp}}
+"""
+
+
 class Lab:
     """A folder of two recordings, a map and the folder of the batch."""
 
@@ -228,7 +239,7 @@ def test_a_folder_that_is_called_as_a_recording_names_none_unless_the_map_says_s
     folder = tmp_path / "lab/run1"
     folder.mkdir()
     (tmp_path / "map.yaml").write_text(SEVERAL.replace("CLOCK", "").replace("signal: F,", "signal: G,"))
-    with pytest.raises(InputError, match=r"recording 'run1-drive': there is no run1-drive_load\.csv"):
+    with pytest.raises(InputError, match=r"recording 'run1-drive': beside drive\.csv there is no drive_load\.csv"):
         import_files([first.rename(folder / "drive.csv"), load], tmp_path / "map.yaml", tmp_path / "batch")
 
 
@@ -280,6 +291,47 @@ def test_absolute_start_times_align_files(tmp_path, monkeypatch):
     assert table["theta_out_rad"].to_numpy() == pytest.approx(expected, abs=2e-3)
 
 
+def test_columns_of_dates_and_times_align_files(tmp_path):
+    """The load's file begins 0.75 s later, by its own stamps."""
+    time_s, started = np.arange(0, 6, 0.004), datetime(2026, 3, 31, 12, 0, 0, 250000)
+    for name, begin in (("run1", 0.0), ("run1_load", 0.75)):
+        stamps = [(started + timedelta(seconds=begin + t)).isoformat(timespec="microseconds") for t in time_s.tolist()]
+        angle = np.sin(begin + time_s) + 0.2 * np.sin(7 * (begin + time_s))
+        lines = [f"{stamp},{value:.6f}" for stamp, value in zip(stamps, angle, strict=True)]
+        (tmp_path / f"{name}.csv").write_text("\n".join(["stamp,angle", *lines]) + "\n")
+    (tmp_path / "map.yaml").write_text(STAMPED)
+    files = [tmp_path / "run1.csv", tmp_path / "run1_load.csv"]
+    one = import_files(files, tmp_path / "map.yaml", tmp_path / "batch").recordings["run1"]
+    assert "run1.csv: 'stamp' holds dates and times: read as seconds from the first" in one.remarks
+    assert one.costs[0].how == "absolute start times of both files"
+    assert one.table["theta_out_rad"].to_numpy() == pytest.approx(one.table["theta_in_rad"].to_numpy(), abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("damage", "text"),
+    [
+        (lambda lines: [*lines[:50], lines[49], *lines[50:]], "run1_load.csv: the times of 'F' must increase"),
+        (
+            lambda lines: [*lines[:5], *(f"{x.partition(',')[0]}," for x in lines[5:])],
+            "run1_load.csv: 'F' has 4 numbers only",
+        ),
+    ],
+)
+def test_what_is_wrong_with_a_further_file_is_said_of_it(tmp_path, damage, text):
+    time_s = np.arange(0, 3, 0.01)
+    for name, column in (("run1", "angle"), ("run1_load", "F")):
+        lines = [f"t,{column}", *(f"{t:.3f},{5 + np.sin(t):.5f}" for t in time_s)]
+        lines = damage(lines) if name == "run1_load" else lines
+        (tmp_path / f"{name}.csv").write_text("\n".join(lines) + "\n")
+    (tmp_path / "map.yaml").write_text(
+        STAMPED.replace("signal: stamp", "signal: t, unit: s").replace(
+            "theta_out_rad: {signal: angle, unit: rad", "F_load_N: {signal: F, unit: N"
+        )
+    )
+    with pytest.raises(InputError, match=text):
+        import_files([tmp_path / "run1.csv", tmp_path / "run1_load.csv"], tmp_path / "map.yaml", tmp_path / "batch")
+
+
 def test_a_signal_that_two_files_have_needs_its_file(tmp_path):
     _, files = several(tmp_path)
     text = SEVERAL.replace("    CLOCK\n", "").replace(", file: main", "")
@@ -291,5 +343,6 @@ def test_a_signal_that_two_files_have_needs_its_file(tmp_path):
 def test_a_missing_further_file_is_named(tmp_path):
     _, files = several(tmp_path)
     (tmp_path / "map.yaml").write_text(SEVERAL.replace("    CLOCK\n", ""))
-    with pytest.raises(InputError, match=r"recording 'run1': there is no run1_load.csv \('load'\): give that file too"):
+    text = r"recording 'run1': beside run1.csv there is no run1_load.csv \('load'\): give that file too"
+    with pytest.raises(InputError, match=text):
         import_files(files[:1], tmp_path / "map.yaml", tmp_path / "batch")

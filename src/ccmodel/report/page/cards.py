@@ -183,7 +183,8 @@ def _summary(origin: str, of: Sequence[Mapping]) -> str:
         if (those := [c for c in of if c["verdict"] in verdicts and c["worst"]["after"] is not None])
     ]
     named = f"batch {of[0]['batch']}" if len(of) == 1 else f"{len(of)} batches"
-    error = f" Largest held-out error over noise: {'; '.join(falls)}." if falls else ""
+    what = "held-out error" if all(card["held_out"] for card in of if card["rows"]) else "error"
+    error = f" Largest {what} over noise: {'; '.join(falls)}." if falls else ""
     return f"{origin.capitalize()}, {named}: {joined(counts)}.{error}"
 
 

@@ -23,11 +23,11 @@ def interval(of: dict) -> str:
 
 
 def about(of: dict) -> str:
-    """Middle of an interval and half its width."""
+    """Middle of an interval and half its width, rounded to a tenth of its standard deviation."""
     if None in of.values():
         return "not determined"
     reach = (of["high"] - of["low"]) / 2
-    return f"{_rounded((of['high'] + of['low']) / 2, of['sd'])} ± {reach:.1g}"
+    return f"{_rounded((of['high'] + of['low']) / 2, of['sd'])} ± {_rounded(reach, of['sd'])}"
 
 
 def _rounded(value: float, sd: float) -> str:

@@ -56,7 +56,7 @@
     header.series.forEach((row, k) => { (sets[row.set] ??= {})[row.channel] = series[k]; });
     const time = sets[""].time_s;
     delete sets[""];
-    return { time, sets, phases: header.phases, count: header.count };
+    return { time, sets, phases: header.phases, phasesOf: header.phases_of, count: header.count };
   };
 
   const models = () => Object.keys(run.sets).filter(name => name !== RECORDED);
@@ -315,6 +315,7 @@
       item.append(swatch, name);
       return item;
     }));
+    if (run.phasesOf) element("viewer-phases").prepend(cell("li", `Phases of the model "${nameOf(run.phasesOf)}":`, {}));
   };
 
   const chooseRun = async number => {

@@ -8,6 +8,7 @@ import numpy as np
 import plotly.offline
 from numpy.typing import NDArray
 
+from ccmodel.accuracy.measure import NOT_ACCEPTED
 from ccmodel.channels import CABLES, CHANNELS, MEASURED, TABLE, TENSIONS, THETA_IN, THETA_OUT
 from ccmodel.model.run import PRESCRIBED
 from ccmodel.recording import ORIGIN, Recording
@@ -108,8 +109,9 @@ def packed(recording: Recording, models: Mapping[str, Recording | None]) -> byte
             row |= {"low": low, "step": step}
             blocks.append(block)
         rows.append(row)
-    model = next(reversed(simulated.values()), None)
-    header = {"count": recording.time_s[every].size, "series": rows, "phases": phases(recording, model)}
+    of = next((name for name in reversed(simulated) if name not in NOT_ACCEPTED), None)
+    shading = {"phases": phases(recording, simulated[of] if of else None), "phases_of": of}
+    header = {"count": recording.time_s[every].size, "series": rows} | shading
     text = json.dumps(header, separators=(",", ":"), allow_nan=False).encode()
     return len(text).to_bytes(4, "little") + text + b"".join(blocks)
 

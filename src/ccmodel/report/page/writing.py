@@ -21,7 +21,7 @@ from ccmodel.report.embedding import as_json, asset, with_figures
 from ccmodel.report.page import cards, viewer
 from ccmodel.report.page.concealed import Concealed, beside, read_concealed
 from ccmodel.report.page.formats import FILTERS
-from ccmodel.report.verdict import INPUTS_INCONSISTENT
+from ccmodel.report.verdict import INPUTS_INCONSISTENT, rounded
 from ccmodel.rig.findings import Finding
 from ccmodel.steps.files import read_json, write_json
 from ccmodel.typed import InputError, load_json_model
@@ -307,8 +307,8 @@ def _headline(errors: pd.DataFrame) -> list[str]:
         batch, channel = means.idxmax()
         sentences.append(
             f"With {parameters} parameters the median error of the model in a recording is"
-            f" {table['nrmse_percent'].median():.2g} % of peak to peak; the largest mean over the recordings of a batch"
-            f" is {means.max():.2g} %, in {symbol_of(channel)} of batch {batch}."
+            f" {rounded(table['nrmse_percent'].median() / 100, '%')} of peak to peak; the largest mean over the"
+            f" recordings of a batch is {rounded(means.max() / 100, '%')}, in {symbol_of(channel)} of batch {batch}."
         )
     return sentences
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ccmodel.rig import limits
-from ccmodel.rig.findings import LogError
+from ccmodel.rig.findings import FileError
 
 # Order of the differences that leave only noise of a signal that is smooth over a few samples.
 _NOISE_ORDER = 4
@@ -154,7 +154,7 @@ def join(samples: Sequence[Samples]) -> Joined:
 
     Raises
     ------
-    LogError
+    FileError
         If times do not increase, a column has hardly any numbers, or the columns have no time in common.
     """
     own = [_own_samples(one) for one in samples]
@@ -182,7 +182,7 @@ def _check_has_numbers(one: Samples) -> None:
     count = int(np.isfinite(one.values).sum())
     if count < limits.FEWEST_SAMPLES:
         text = f"'{one.signal}' has {count} numbers only: take {one.column} out of the map, or record it again"
-        raise LogError(None, None, text)
+        raise FileError(one.file, None, None, text)
 
 
 def _from_zero(time: NDArray) -> NDArray:
@@ -207,7 +207,7 @@ def _check_increases(one: Samples) -> None:
         at = int(np.argmin(steps > 0))
         before, now = one.time_s[at], one.time_s[at + 1]
         text = f"the times of '{one.signal}' must increase, found {now:.9g} s after {before:.9g} s (sample {at + 2})"
-        raise LogError(None, None, f"{text}: they cannot be joined to those of other signals")
+        raise FileError(one.file, None, None, f"{text}: they cannot be joined to those of other signals")
 
 
 def _common_span(base: Samples, others: Sequence[Samples]) -> NDArray:
@@ -220,7 +220,8 @@ def _common_span(base: Samples, others: Sequence[Samples]) -> NDArray:
     inside = (base.time_s >= low - slack) & (base.time_s <= high + slack)
     if inside.sum() < limits.FEWEST_SAMPLES:
         spans = ", ".join(f"{o.column} {o.time_s[0]:.6g} to {o.time_s[-1]:.6g} s" for o in (base, *others))
-        raise LogError(None, None, f"the columns have no time in common ({spans}): check units of time and 'clock'")
+        text = f"the columns have no time in common ({spans}): check units of time and 'clock'"
+        raise FileError(base.file, None, None, text)
     return inside
 
 

@@ -57,8 +57,8 @@ def match_clocks(time: NDArray, values: NDArray, first_time: NDArray, first_valu
     LogError
         If the two do not show the same quantity.
     """
-    time, values = _finite(time, values)
-    first_time, first_values = _finite(first_time, first_values)
+    time, values = _finite(time, values, "the matched signal")
+    first_time, first_values = _finite(first_time, first_values, "the matched signal of the first file")
     step = _step(time, first_time)
     here, there = _on_grid(time, values, step), _on_grid(first_time, first_values, step)
     highest = _highest_frequency(there, step)
@@ -147,12 +147,12 @@ def _best(fits: list[_Fit], apart_s: float) -> Clock:
     return best
 
 
-def _finite(time: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
+def _finite(time: NDArray, values: NDArray, which: str) -> tuple[NDArray, NDArray]:
     has = np.isfinite(time) & np.isfinite(values)
     if has.sum() < _BLOCKS or np.ptp(values[has]) == 0:
-        raise LogError(None, None, "a matched signal is constant or nearly empty: match one that moves")
+        raise LogError(None, None, f"{which} is constant or nearly empty: match one that moves")
     if not (np.diff(time[has]) > 0).all():
-        raise LogError(None, None, "the times of a matched signal must increase")
+        raise LogError(None, None, f"the times of {which} must increase")
     return time[has], values[has]
 
 

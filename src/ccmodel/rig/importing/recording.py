@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from ccmodel.rig import readers, units
 from ccmodel.rig.batch import DRIVE_ANGLE_COLUMNS
 from ccmodel.rig.columns import TIME, UNIT_OF, is_encoder
-from ccmodel.rig.findings import LogError
+from ccmodel.rig.findings import FileError, LogError
 from ccmodel.rig.importing.clocks import Clock, Cost, Samples, join
 from ccmodel.rig.importing.map import MAIN, Channel, ImportMap, TimeSource
 from ccmodel.rig.importing.matching import match_clocks
@@ -55,14 +54,6 @@ class Built:
     remarks: list[str]
 
 
-class FileError(LogError):
-    """A file cannot be used; the arguments are those of `LogError`, and `file` is its name."""
-
-    def __init__(self, file: str, *arguments: Any) -> None:
-        super().__init__(*arguments)
-        self.file = file
-
-
 @dataclass(frozen=True)
 class _File:
     """A file of the recording: its role, name, signals and the times that the map states for it."""
@@ -75,6 +66,12 @@ class _File:
     @property
     def signals(self) -> dict[str, Signal]:
         return {signal.name: signal for signal in self.read.signals}
+
+    @property
+    def started(self) -> datetime | None:
+        """Absolute time at which this file's clock is zero; None if it is not known."""
+        time = self.time and self.signals.get(self.time.signal or "")
+        return self.read.started if self.time is None or (time and time.since_start) else None
 
     def signal(self, name: str) -> Signal:
         """A signal by its name; `FileError` with the nearest names if it is not there."""
@@ -139,10 +136,7 @@ def build(source: Source, stated: ImportMap, names: Mapping[Path, str]) -> Built
     for column in order:
         one, formulas[column] = _samples(column, stated.channels[column], files, clocks, remarks)
         samples.append(one)
-    try:
-        joined = join(samples)
-    except LogError as error:
-        raise FileError(first.name, *error.args) from None
+    joined = join(samples)
     table = pd.DataFrame({TIME: joined.time_s} | {c: joined.columns[c] for c in stated.channels})
     started = float(samples[0].time_s[0] + joined.cut_s[0])
     return Built(table, started, formulas, joined.costs, joined.cut_s, remarks + joined.remarks)
@@ -240,8 +234,8 @@ def _clock(file: _File, first: _File, stated: ImportMap, remarks: list[str]) -> 
             raise FileError(file.name, *error.args) from None
     if rule and rule.clock and rule.clock.offset_s is not None:
         return Clock(rule.clock.offset_s, rule.clock.drift, None, None, "stated in the map")
-    if file.time is None and first.time is None and file.read.started and first.read.started:
-        started = file.read.started, first.read.started
+    if file.started and first.started:
+        started = file.started, first.started
         offset = (started[0] - started[1]).total_seconds()
         return Clock(offset, 0.0, max(map(_resolution_s, started)), None, "absolute start times of both files")
     begins = [_first_time(f) for f in (file, first)]

@@ -111,6 +111,12 @@ def _by_folder(stated: ImportMap) -> bool:
     return any(rule.depth > 1 for rule in stated.files.values())
 
 
+def _star_of(file: Path, stated: ImportMap) -> str:
+    """What the star of a pattern stands for in the recording of a file: of a main file its name without endings."""
+    parts = (rule.recording_of(_absolute(file)) for rule in stated.files.values())
+    return next((part for part in parts if part), file.name.partition(".")[0])
+
+
 def _absolute(file: Path) -> Path:
     return Path(os.path.abspath(file))
 
@@ -126,7 +132,8 @@ def _by_role(found: list[Path], stated: ImportMap, recording: str) -> dict[str, 
         roles[role] = file
     missing = [role for role in stated.files if role not in roles]
     if missing:
-        pattern = stated.files[missing[0]].pattern.replace("*", recording)
-        raise InputError(f"recording '{recording}': there is no {pattern} ('{missing[0]}'): give that file too")
+        pattern = stated.files[missing[0]].pattern.replace("*", _star_of(found[0], stated))
+        text = f"beside {found[0].name} there is no {pattern} ('{missing[0]}')"
+        raise InputError(f"recording '{recording}': {text}: give that file too")
     order = [role for role in (MAIN, *stated.files) if role in roles]
     return {role: roles[role] for role in order}

@@ -19,8 +19,9 @@ from ccmodel.provenance import file_digest
 from ccmodel.rig.batch import NAMES, valid_name
 from ccmodel.rig.columns import TIME
 from ccmodel.rig.drafting import draft_batch
+from ccmodel.rig.findings import FileError
 from ccmodel.rig.importing.map import ImportMap, load_map
-from ccmodel.rig.importing.recording import Built, FileError, build
+from ccmodel.rig.importing.recording import Built, build
 from ccmodel.rig.importing.sources import Source, names_of, recordings_of
 from ccmodel.typed import InputError, Problem
 from ccmodel.version import __version__

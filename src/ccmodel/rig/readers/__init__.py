@@ -116,7 +116,7 @@ def _checked(file: SignalFile, format: Format) -> SignalFile:
     return replace(
         file,
         signals=tuple(
-            Signal(name, unit.strip(), np.asarray(s.values, float), s.time_s)
+            replace(s, name=name, unit=unit.strip(), values=np.asarray(s.values, float))
             for name, (_, unit), s in zip(names, split, signals, strict=True)
         ),
     )

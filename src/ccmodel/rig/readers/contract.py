@@ -26,12 +26,15 @@ class Signal:
     time_s : ndarray, shape (n,), or None
         Time axis that the format stores with the signal, in s from the file's time zero. None if it stores none: time
         may then be another signal of the file.
+    since_start : bool
+        Whether its values are the time since the file's `started`, in s.
     """
 
     name: str
     unit: str
     values: NDArray
     time_s: NDArray | None = None
+    since_start: bool = False
 
 
 @dataclass(frozen=True)

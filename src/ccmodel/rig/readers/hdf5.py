@@ -16,7 +16,7 @@ from ccmodel.rig.readers.contract import Format, SignalFile
 _UNIT_KEYS = ("unit", "units", "Unit", "Units", "UNIT", "UNITS", "unit_string")
 # Scales of a time axis that a file attaches to its arrays.
 _SECONDS = {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
-# Attributes of the CF conventions: values in these stand for missing ones; others are packed as a linear map of integers.
+# Attributes of the CF conventions: what stands for a missing value, and the linear map by which values are packed.
 _MISSING_KEYS = ("_FillValue", "missing_value")
 _SCALE, _OFFSET = "scale_factor", "add_offset"
 # An attribute of a file written by pandas or of a dimension without an array.
@@ -27,8 +27,8 @@ def read(path: Path) -> SignalFile:
     """Read the numbers of an HDF5 file.
 
     Columns of a two-dimensional array and fields of a compound type are a signal each. An array with a dimension scale
-    in seconds (or ms, us, ns) has it as its time axis. Values that a netCDF file packs are unpacked, and its fill values
-    are nan.
+    in seconds (or ms, us, ns) has it as its time axis. Values that a netCDF file packs are unpacked, and its fill
+    values are nan.
     """
     import h5py
 

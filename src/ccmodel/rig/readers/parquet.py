@@ -37,8 +37,9 @@ def read(path: Path) -> SignalFile:
             seconds, start = seconds_of_times(
                 values.cast(pa.timestamp("ns"), safe=False).to_numpy(zero_copy_only=False)
             )
+            is_first = started is None and start is not None
             started = started or start
-            signals.append(Signal(name, "s", seconds))
+            signals.append(Signal(name, "s", seconds, since_start=is_first))
         elif pa.types.is_temporal(values.type):
             signals.append(Signal(name, "s", _seconds(values)))
         elif pa.types.is_fixed_size_list(values.type):

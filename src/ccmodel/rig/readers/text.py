@@ -417,8 +417,9 @@ def _signals(
             signals.append(Signal(names[i], units[i], values))
             remarks += remark
         elif stamps[:1] == [i]:
-            signals.append(Signal(names[i], "s", seconds))
-            remarks.append(f"'{names[i]}' holds times of day: read as seconds from the first")
+            signals.append(Signal(names[i], "s", seconds, since_start=started is not None))
+            what = "times of day" if started is None else "dates and times"
+            remarks.append(f"'{names[i]}' holds {what}: read as seconds from the first")
         elif i in stamps[:2] and used == 2:
             continue
         elif table[i].notna().any():
