@@ -12,7 +12,7 @@ from ccmodel.rig.units import UnitError, factor, gain_factor, is_unit, quantity_
         *((text, "Nm", 1e-3) for text in ("mNm", "N mm", "Nmm", "mN·m", "mN*m")),
         ("Ncm", "Nm", 0.01),
         ("ozf*in", "Nm", 0.00706155),
-        *((text, "rad", math.pi / 180) for text in ("deg", "°", "Grad", "degrees")),
+        *((text, "rad", math.pi / 180) for text in ("deg", "°", "º", "Grad", "degrees")),
         *((text, "rad", 2 * math.pi) for text in ("rev", "turn", "U", "Umdr")),
         ("mrad", "rad", 1e-3),
         ("kgf", "N", 9.80665),
