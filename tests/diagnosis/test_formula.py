@@ -12,7 +12,8 @@ X = np.linspace(-0.6, 0.6, 25)
 
 
 def formula_of(y, sd=0.003, law=FRICTION, x=X):
-    return shortest(x, y, (y - 1.645 * sd, y + 1.645 * sd), law)
+    reach = 1.645 * sd
+    return shortest(x, y, (y - reach, y + reach), law, lambda functions: reach * np.linalg.norm(functions, axis=1))
 
 
 @pytest.mark.parametrize(
@@ -30,6 +31,34 @@ def test_a_curve_is_given_its_own_formula_with_its_constants(y, text, last):
     assert found == text
     assert parameters[-1]["value"] == pytest.approx(last, rel=0.03)
     assert parameters[-1]["low"] < last < parameters[-1]["high"]
+
+
+def test_the_interval_of_a_constant_holds_it_though_the_errors_of_the_knots_are_correlated():
+    """A level that all knots share is no smaller for their number."""
+    law, x = laws()["learned-pulley-radius-drive-by-drive-angle"], np.linspace(-1.0, 1.0, 9)
+    covariance = 1e-6 * (0.3 * np.eye(x.size) + 0.7)
+    reach = 1.645 * np.sqrt(np.diag(covariance))
+
+    def half_widths(functions):
+        return 1.645 * np.sqrt(np.einsum("ij,jk,ik->i", functions, covariance, functions))
+
+    random, held = np.random.default_rng(2), []
+    for _ in range(400):
+        y = random.multivariate_normal(np.full(x.size, 1.01), covariance)
+        text, constants = shortest(x, y, (y - reach, y + reach), law, half_widths)
+        if text == "a":
+            held.append(constants[0]["low"] <= 1.01 <= constants[0]["high"])
+    assert len(held) > 200
+    assert np.mean(held) == pytest.approx(0.9, abs=0.05)
+
+
+def test_a_formula_is_in_the_band_where_that_ends_at_what_is_possible():
+    """A compliance is not negative: a constant that is inside the band at every knot is a formula of it."""
+    law, x = laws()["learned-end-stretch-drive-by-tension-fine"], np.geomspace(0.4, 20, 9)
+    y, reach = np.repeat([12e-6, 2e-6], [5, 4]), np.repeat([3e-6, 11e-6], [5, 4])
+    band = np.maximum(y - reach, 0.0), y + reach
+    text, _ = shortest(x, y, band, law, lambda functions: np.linalg.norm(functions * reach, axis=1))
+    assert text == "a"
 
 
 @pytest.mark.parametrize(

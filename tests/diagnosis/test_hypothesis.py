@@ -9,7 +9,8 @@ from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.hypothesis import Hypothesis, _bounds, plausible, single_mechanisms
 from ccmodel.diagnosis.screening import scaled
 from ccmodel.mechanisms import Parameter
-from ccmodel.model.parameters import mechanism_parameter
+from ccmodel.model.active import Active
+from ccmodel.model.parameters import mechanism_key, mechanism_parameter
 from made_observations import PARAMETERS
 
 
@@ -18,6 +19,19 @@ def test_every_mechanism_is_asked_at_each_of_its_places_but_what_is_asked_for_by
     every = {(name, place) for name in mechanisms.names() for place in mechanisms.get(name).places}
     assert every - asked == {("drive-train", "drive-pulley")}
     assert asked < every
+
+
+def test_a_law_of_a_frozen_baseline_that_is_learned_again_has_one_range():
+    """The solver runs with the range that the report states."""
+    law = mechanisms.laws()["learned-load-by-load-angle"]
+    before, after = {"first": -0.5, "last": 0.5, "scale": 0.001}, {"first": -0.9, "last": 0.9, "scale": 0.006}
+    keys = {name: mechanism_key(law.name, law.place, name) for name in before}
+    acting = Active(law.name, law.place, before | dict.fromkeys(law.coefficients, 1.0))
+    fixed = tuple((keys[name], value) for name, value in before.items())
+    baseline = Hypothesis(baseline=((law.name, law.place),), is_frozen=True, fixed=fixed)
+    again = Hypothesis(((law.name, law.place),), fixed=tuple((keys[name], value) for name, value in after.items()))
+    (found,) = baseline.and_also(again).of(replace(PARAMETERS, mechanisms=(acting,))).mechanisms
+    assert {name: found.values[name] for name in after} == after
 
 
 @pytest.mark.parametrize("hypothesis", single_mechanisms(), ids=str)

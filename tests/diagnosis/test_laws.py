@@ -19,7 +19,6 @@ from ccmodel.diagnosis.equation_error import INERTIA
 from ccmodel.diagnosis.hypothesis import Hypothesis
 from ccmodel.diagnosis.laws import _missing_mass, _unit_of, proposals, visited
 from ccmodel.diagnosis.selection import finer_laws
-from ccmodel.diagnosis.settings import WITHIN_BAND
 from ccmodel.failure import ModelError
 from ccmodel.geometry import ConduitPath
 from ccmodel.mechanisms import laws
@@ -110,7 +109,7 @@ def test_no_listed_law_is_near(learned):
     """An eccentric pulley repeats once a turn, the motor's poles sixteen times."""
     (law,) = json.loads((learned[1] / "diagnosis.json").read_text())["laws"]
     assert law["nearest_listed"]["name"] == "pulley-eccentricity"
-    assert law["nearest_listed"]["distance"] > 2 * WITHIN_BAND
+    assert law["nearest_listed"]["distance"] > 2 * law["nearest_listed"]["limit"]
 
 
 def test_the_error_falls_and_the_model_file_has_the_law(learned, tmp_path):
@@ -150,7 +149,7 @@ def test_a_mechanism_that_is_taken_off_the_list_is_recognised_in_the_curve(tmp_p
     (law,) = said["laws"]
     assert (law["slot"], law["channel"], law["arguments"]) == ("sensor-map", "tau_in_Nm", ["reading"])
     assert law["nearest_listed"]["name"] == "torque-scale"
-    assert law["nearest_listed"]["distance"] < WITHIN_BAND
+    assert law["nearest_listed"]["distance"] < law["nearest_listed"]["limit"]
     assert "this is the law of torque-scale" in said["headline"]
 
 

@@ -15,8 +15,11 @@ from ccmodel.mechanisms.learned import COARSE, FINE
 from ccmodel.mechanisms.presliding import Contacts
 from ccmodel.mechanisms.tables import Table, pulled, stretched
 from ccmodel.mechanisms.winding import pulley_of, winding, winding_change
+from ccmodel.model.active import Active
+from ccmodel.model.general.run import friction_factors, settings_of
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, FixedLoad, SpringLoad, TorqueLoad
+from ccmodel.model.transmission import Transmission
 from tests.general_runs import HALF_LOOP, K_E, MU, K, L, R, loop_area, run, sine
 
 EVERY = list(laws().values())
@@ -210,6 +213,35 @@ def acting_values(law, values):
 
 def largest_difference(one, other):
     return max(np.abs(one.read[c] - other.read[c]).max() / np.ptp(other.read[c]) for c in one.read)
+
+
+def test_friction_by_the_drives_angle_is_the_same_in_both_cables():
+    """An odd law: at a positive angle both conduits have more friction, and not one more and one less."""
+    law = laws()["learned-sliding-friction-by-drive-angle"]
+    x = np.linspace(-0.6, 0.6, len(law.basis))
+    z = np.linalg.lstsq(law.basis, x, rcond=None)[0]
+    values = {"first": -0.6, "last": 0.6, "scale": 0.5} | dict(zip(law.coefficients, z, strict=True))
+    time_s, transmission = np.linspace(0.0, 4.0, 1001), Transmission(HALF_LOOP, K * L, MU, R, R)
+    theta = 0.6 * np.sin(2 * np.pi * 0.5 * time_s)
+    factor = friction_factors(transmission, settings_of([Active(law.name, law.place, values)]), time_s, theta)
+    np.testing.assert_array_equal(factor[:, 0], factor[:, 1])
+    np.testing.assert_allclose(factor[:, 0], 1 + 0.5 * theta, atol=0.02)
+
+
+@pytest.mark.parametrize(("first", "last"), [(-0.3, 1.4), (-1.05, 1.0), (-1.0, 1.0)])
+def test_two_laws_of_a_pulleys_radius_are_their_sum_at_every_angle(first, last):
+    names = "learned-pulley-radius-drive-by-drive-angle", "learned-pulley-radius-drive-by-drive-angle-fine"
+    acting, ranges = [], ((-1.05, 1.0), (first, last))
+    for name, between, of in zip(names, ranges, (lambda a: 0.01 * a, lambda a: 0.02 * np.sin(4 * a)), strict=True):
+        law = laws()[name]
+        z = np.linalg.lstsq(0.03 * law.basis, of(np.linspace(*between, len(law.basis))), rcond=None)[0]
+        ends = {"first": between[0], "last": between[1], "scale": 0.03}
+        acting.append(Active(name, law.place, ends | dict(zip(law.coefficients, z, strict=True))))
+    table = settings_of(acting).drive_radius_factor
+    angles = np.linspace(-1.2, 1.6, 401)
+    pulley = pulley_of(0.006, 0.0, 0.0, table)
+    np.testing.assert_allclose([winding(a, pulley)[1] for a in angles], table.at(angles), atol=1e-12)
+    assert np.diff(table.knots).min() > 1e-9
 
 
 def test_friction_by_tension_is_that_of_a_power_law_with_these_values():

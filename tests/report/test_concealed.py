@@ -68,7 +68,7 @@ def test_the_same_effect_at_two_places_is_named_at_each_by_itself(concealed):
 )
 def test_a_law_is_said_of_the_effect_that_it_is(concealed, effects, distance, said, besides):
     law = {"slot": "bearing-torque", "place": "drive-pulley", "arguments": ["drive-angle"]}
-    law |= {"nearest_listed": {"name": "torque-scale", "distance": distance}}
+    law |= {"nearest_listed": {"name": "torque-scale", "distance": distance, "limit": 1.3}}
     rig = [{"name": name, "place": place, "text": "cogging"} for name, place in effects]
     (table,) = beside(concealed(rig), [diagnosis("b", "learned", mechanisms=[], laws=[law])])
     assert [e["said"][0] for e in table["effects"]] == said
@@ -78,7 +78,7 @@ def test_a_law_is_said_of_the_effect_that_it_is(concealed, effects, distance, sa
 def test_the_law_of_a_mechanism_with_one_place_is_its_own_wherever_it_stands(concealed):
     """Friction by cable stands at the conduits; the mechanism of cables that differ at the cable."""
     law = {"slot": "sliding-friction", "place": "conduit", "arguments": ["cable"]}
-    law |= {"nearest_listed": {"name": "cable-asymmetry", "distance": 0.1}}
+    law |= {"nearest_listed": {"name": "cable-asymmetry", "distance": 0.0, "limit": None}}
     rig = [{"name": "cable-asymmetry", "place": "cable", "text": "a rough cable"}]
     (table,) = beside(concealed(rig), [diagnosis("b", "learned", mechanisms=[], laws=[law])])
     assert table["effects"][0]["said"] == ["learned: sliding-friction by cable"]

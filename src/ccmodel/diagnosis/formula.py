@@ -78,7 +78,7 @@ def _forms(law: Law) -> Iterator[Form]:
 
 
 def shortest(
-    x: NDArray, y: NDArray, band: tuple[NDArray, NDArray], law: Law
+    x: NDArray, y: NDArray, band: tuple[NDArray, NDArray], law: Law, half_widths: Callable[[NDArray], NDArray]
 ) -> tuple[str | None, list[dict[str, float | str]]]:
     """The first formula that lies in the band, and its constants with their intervals; None and none if there is none.
 
@@ -89,17 +89,23 @@ def shortest(
     band : (ndarray, ndarray)
         Lower and upper end of its 90 % band.
     law : Law
+    half_widths : callable
+        Half-widths of the 90 % intervals of linear functions of the curve's values: ``half_widths(functions)``, with
+        functions of shape (functions, knots). The errors of the values are correlated, as a band does not show.
     """
     quantile = normal_quantile(0.5 + COVERAGE / 2)
     neutral = 1.0 if law.argument.has_two_values and law.form.is_factor else 0.0
-    sd = np.maximum((band[1] - band[0]) / (2 * quantile), 1e-3 * max(float(np.ptp(y)), 1e-12))
+    least = 1e-3 * max(float(np.ptp(y)), 1e-12)
+    # A band that ends at what is physically possible is narrower than the uncertainty.
+    sd = np.maximum(half_widths(np.eye(x.size)) / quantile, least)
+    low, high = np.minimum(band[0], y - quantile * least), np.maximum(band[1], y + quantile * least)
     for form in _forms(law):
         constants, errors, derivatives = _fitted(form, x, y - neutral, sd)
-        if np.mean(np.abs(errors) <= quantile) < settings.IN_BAND:
+        value = y + errors * sd
+        if np.mean((value >= low) & (value <= high)) < settings.IN_BAND:
             continue
         size = np.linalg.norm(derivatives, axis=0)
-        scaled = derivatives / size
-        reach = quantile * np.sqrt(np.diag(np.linalg.pinv(scaled.T @ scaled))) / size
+        reach = half_widths(np.linalg.pinv(derivatives / size) / size[:, None] / sd)
         units = [_unit(unit, law) for unit in form.units]
         return form.text, [
             {"name": name, "value": float(v), "low": float(v - r), "high": float(v + r), "unit": unit}

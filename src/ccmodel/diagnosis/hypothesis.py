@@ -66,15 +66,18 @@ class Hypothesis:
         return list(dict.fromkeys(place for _, place in self.acting))
 
     def of(self, parameters: Parameters) -> Parameters:
-        """Parameters with the mechanisms added, at their values in `parameters` or else at their starting values."""
+        """Parameters with the mechanisms added, at their values in `parameters` or else at their starting values.
+
+        What is fixed, such as the range of a law that is learned again, has the hypothesis's value.
+        """
         known = {(m.name, m.place): m.values for m in parameters.mechanisms}
         every = dict.fromkeys(self.baseline + self.acting)
-        acting = tuple(Active(*one, known.get(one) or self._start_of(*one)) for one in every)
+        acting = tuple(Active(*one, self._values_of(*one, known.get(one))) for one in every)
         return replace(parameters, mechanisms=acting)
 
-    def _start_of(self, name: str, place: str) -> dict[str, float]:
-        fixed = dict(self.fixed)
-        return {p: fixed.get(mechanism_key(name, place, p), value) for p, value in registry.get(name).start.items()}
+    def _values_of(self, name: str, place: str, known: Mapping[str, float] | None) -> dict[str, float]:
+        fixed, values = dict(self.fixed), known or registry.get(name).start
+        return {p: fixed.get(mechanism_key(name, place, p), value) for p, value in values.items()}
 
     @property
     def start(self) -> dict[str, float]:

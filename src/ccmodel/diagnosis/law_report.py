@@ -1,6 +1,7 @@
 """A learned law as plain data: its curve with a band, and the shortest formula that stays in the band."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,7 @@ def laws_of(judgement: Judgement) -> list[dict]:
 def _stated(judgement: Judgement, law: Law) -> dict:
     best = judgement.best
     x, y, band = curve_of(best, law)
-    formula, parameters = shortest(x, y, band, law)
+    formula, parameters = shortest(x, y, band, law, _LinearFunctions.of(best, law).half_widths)
     unit = law.argument.unit
     others = indistinguishable(judgement, law)
     return {
@@ -56,17 +57,44 @@ def _stated(judgement: Judgement, law: Law) -> dict:
 
 def curve_of(candidate: CandidateFit, law: Law) -> tuple[NDArray, NDArray, tuple[NDArray, NDArray]]:
     """A fitted law's arguments at its knots, its values there, and the ends of their 90 % band; shapes (knots,)."""
-    values = values_of(candidate, law)
-    x, y = law.at_knots(values)
-    shown = law.shown(x)
-    by_unknowns = np.zeros((len(x), len(candidate.values)))
-    by_unknowns[:, unknowns_of(candidate, law)] = shown @ _derivatives_of(law, values)
-    y = shown @ law.form.acting(y)
-    by_pieces = normal_quantile(0.5 + COVERAGE / 2) * of_straight_pieces(x, y)
-    reach = np.hypot(half_widths_of(candidate, by_unknowns), by_pieces)
-    middle, possible = y + law.form.neutral, law.form.possible_curve
+    x, y = law.at_knots(values_of(candidate, law))
+    reach = _LinearFunctions.of(candidate, law).half_widths(np.eye(x.size))
+    middle, possible = law.shown(x) @ law.form.acting(y) + law.form.neutral, law.form.possible_curve
     low, high = (possible(middle + sign * reach) for sign in (-1, 1))
     return x, possible(middle), (low, high)
+
+
+@dataclass(frozen=True)
+class _LinearFunctions:
+    """Intervals of linear functions of a curve's values at the knots.
+
+    Attributes
+    ----------
+    candidate : CandidateFit
+    by_unknowns : ndarray, shape (knots, unknowns)
+        Derivatives of the values.
+    by_pieces : ndarray, shape (knots,)
+        Half-widths of what straight pieces miss of a smooth law.
+    """
+
+    candidate: CandidateFit
+    by_unknowns: NDArray
+    by_pieces: NDArray
+
+    @classmethod
+    def of(cls, candidate: CandidateFit, law: Law) -> "_LinearFunctions":
+        values = values_of(candidate, law)
+        x, y = law.at_knots(values)
+        shown = law.shown(x)
+        by_unknowns = np.zeros((len(x), len(candidate.values)))
+        by_unknowns[:, unknowns_of(candidate, law)] = shown @ _derivatives_of(law, values)
+        quantile = normal_quantile(0.5 + COVERAGE / 2)
+        return cls(candidate, by_unknowns, quantile * of_straight_pieces(x, shown @ law.form.acting(y)))
+
+    def half_widths(self, functions: NDArray) -> NDArray:
+        """Half-widths of the 90 % intervals of functions of the values, shape (functions, knots)."""
+        of_pieces = np.sqrt(functions**2 @ self.by_pieces**2)
+        return np.hypot(half_widths_of(self.candidate, functions @ self.by_unknowns), of_pieces)
 
 
 def _derivatives_of(law: Law, values: Mapping[str, float]) -> NDArray:

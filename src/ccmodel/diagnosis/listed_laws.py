@@ -14,6 +14,7 @@ from ccmodel.diagnosis import settings
 from ccmodel.diagnosis.candidate import CandidateFit
 from ccmodel.diagnosis.laws import unknowns_of, values_of
 from ccmodel.diagnosis.linear_functions import covariance_by_information
+from ccmodel.distributions import chi2_quantile
 from ccmodel.mechanisms.contract import Curve, Parameter
 from ccmodel.mechanisms.learned import Law
 
@@ -36,18 +37,27 @@ class Learned:
     covariance: NDArray
 
 
-def nearest_listed(learned: Learned) -> dict[str, str | float] | None:
+def nearest_listed(learned: Learned) -> dict[str, str | float | None] | None:
     """The listed mechanism whose law at this slot, of this argument, is nearest; None if no mechanism has one.
 
     ``distance`` is the root mean square distance of the coefficients in their posterior standard deviations, with the
-    listed law's own constants fitted to the curve: about 1 for a law that is the listed one.
+    listed law's own constants fitted to the curve. ``limit`` is what a law that is the listed one exceeds in one of
+    twenty cases; None if that law has as many constants as the curve has coefficients, and meets every curve.
     """
     every = [(name, curve) for name in registry.names() for curve in registry.get(name).curves]
-    distances = {name: distance(learned, curve) for name, curve in every if _is_comparable(learned.law, curve)}
+    comparable = [(name, curve) for name, curve in every if _is_comparable(learned.law, curve)]
+    distances = [distance(learned, curve) for _, curve in comparable]
     if not distances:
         return None
-    name = min(distances, key=lambda one: distances[one])
-    return {"name": name, "distance": distances[name]}
+    name, curve = comparable[int(np.argmin(distances))]
+    return {"name": name, "distance": min(distances), "limit": _limit(learned, curve)}
+
+
+def _limit(learned: Learned, curve: Curve) -> float | None:
+    """The 95 % quantile of the distance of a law that is the listed one: of chi-square, by coefficient."""
+    coefficients = len(learned.covariance)
+    freedom = coefficients - len(curve.constants)
+    return (chi2_quantile(settings.RECOGNISED, freedom) / coefficients) ** 0.5 if freedom > 0 else None
 
 
 def _is_comparable(law: Law, curve: Curve) -> bool:

@@ -243,9 +243,8 @@ LAW_FAR_BEHIND = 10.0
 IN_BAND = 0.9
 # Starts, of a listed law's constants, from which the best ones are searched. Chosen: a sine has a few minima.
 LISTED_STARTS = 3
-# Distance, in posterior standard deviations, up to which a learned law is a listed one: half of a normal
-# distribution's 90 % interval.
-WITHIN_BAND = 1.645
+# Share of the learned laws that are a listed one which are said to be it.
+RECOGNISED = 0.95
 # Laws are also learned beside the best single listed mechanism if its excess mean square is below this share of the
 # calibrated model's, it leaves something, and no law leads that leaves nothing. Chosen.
 MOSTLY_LISTED = 0.5

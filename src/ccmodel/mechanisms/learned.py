@@ -99,6 +99,8 @@ COARSE, FINE, SMOOTH = (9, 0.25), (25, 0.08), (9, 1.0)
 RANGE = (0.005, 0.995)
 # The lowest knot of a law of the tension over the highest one, at least: slack cables have no tension.
 LOWEST_TENSION = 0.02
+# Distance of two knots that are one, as a share of all that they span.
+SAME_KNOT = 1e-9
 # Friction is never negative in either direction or cable, and neither is a compliance.
 LARGEST_BIAS = 0.95
 
@@ -189,7 +191,7 @@ class Law:
                 raise ValueError("friction builds up by two laws of the sliding distance: keep one of them")
             table = Table(x, self.form.possible(y))
             return table if before is None else before.with_elements(table)
-        knots = x if before is None else np.union1d(x, before.knots)
+        knots = x if before is None else _united(x, before.knots)
         neutral = self.form.neutral if before is None else before.at(knots)
         values = self.form.possible(neutral + np.interp(knots, x, y))
         return Table(knots, values) if values.any() else None
@@ -321,7 +323,11 @@ class Law:
         """What a law looks like that has `strength` times these values at these knots."""
 
         def of(arguments: NDArray, values: Mapping[str, float]) -> NDArray:
-            return self.form.neutral + values[strength.name] * np.interp(arguments, x, self.shown(x) @ y)
+            if self.form.has_elements:
+                shown = self.shown(x, arguments) @ self.form.acting(y)
+            else:
+                shown = np.interp(arguments, x, y)
+            return self.form.neutral + values[strength.name] * shown
 
         channels = (self.channel,) if self.slot == SENSOR_MAP and self.channel else ()
         return Curve(self.slot, self.argument.name, of, (strength,), channels, self.form.name)
@@ -385,6 +391,12 @@ def end_spring(settings: Settings, end: str) -> tuple[float, Table | None] | Non
     values = compliance + law.values
     mean = float(values.mean())
     return mean, Table(law.knots, (values / mean).clip(LEAST_COMPLIANCE))
+
+
+def _united(x: NDArray, others: NDArray) -> NDArray:
+    """The knots of two laws, each once; those that differ by rounding errors are one."""
+    knots = np.union1d(x, others)
+    return knots[np.append(True, np.diff(knots) > SAME_KNOT * np.ptp(knots))]
 
 
 @kernel

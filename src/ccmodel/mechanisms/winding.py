@@ -54,7 +54,7 @@ def _added(theta: float, pulley: Pulley) -> tuple[float, float, float]:
     last = x.size - 1
     if theta >= x[last]:
         return integral[last] + f[last] * (theta - x[last]), f[last], 0.0
-    k = min(int((theta - x[0]) / (x[last] - x[0]) * last), last - 1)
+    k = min(int(np.searchsorted(x, theta, side="right")) - 1, last - 1)
     slope, beyond = (f[k + 1] - f[k]) / (x[k + 1] - x[k]), theta - x[k]
     return integral[k] + (f[k] + 0.5 * slope * beyond) * beyond, f[k] + slope * beyond, slope
 

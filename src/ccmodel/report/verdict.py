@@ -7,7 +7,6 @@ from math import floor, inf, isinf, log10
 from ccmodel import mechanisms as registry
 from ccmodel.channels import TABLE, symbol_of
 from ccmodel.diagnosis.formula import CONSTANT
-from ccmodel.diagnosis.settings import WITHIN_BAND
 from ccmodel.mechanisms.contract import (
     BEARING_TORQUE,
     CABLE_STRETCH,
@@ -226,9 +225,9 @@ def _argument(x: float, unit: str) -> str:
 
 
 def recognised_as(law: Mapping) -> str | None:
-    """The listed mechanism whose law a learned one is within its uncertainty, if there is one."""
+    """The listed mechanism whose law a learned one may be, if there is one."""
     nearest = law["nearest_listed"]
-    return nearest["name"] if nearest and nearest["distance"] <= WITHIN_BAND else None
+    return nearest["name"] if nearest and nearest["distance"] <= (nearest["limit"] or inf) else None
 
 
 def _resemblance(law: Mapping) -> str:
@@ -236,6 +235,8 @@ def _resemblance(law: Mapping) -> str:
     nearest = law["nearest_listed"]
     if nearest is None:
         return "No listed mechanism does this"
+    if nearest["limit"] is None:
+        return f"A law with so few constants may be {nearest['name']}"
     if (name := recognised_as(law)) is not None:
         return f"Within its uncertainty this is the law of {name}"
     away = f"{nearest['distance']:.1f} standard deviations away"

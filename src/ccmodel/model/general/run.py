@@ -232,16 +232,15 @@ def _marched(
 
 
 def friction_factors(transmission: Transmission, settings: Settings, time_s: NDArray, theta_in: NDArray) -> NDArray:
-    """Factor of mu at each sample or throughout, by cable; shape (n, 2) or (1, 2)."""
+    """Factor of mu at each sample or throughout, by cable, shape (n, 2) or (1, 2); the same for both cables."""
     factor = np.ones((1, 2))
     radii = transmission.drive_radius_m, transmission.load_radius_m
-    # Cable B moves towards the drive where cable A moves away from it.
-    motions = [Sensing(time_s, {THETA_IN: sign * theta_in}, *radii) for sign in (1.0, -1.0)]
+    motion = Sensing(time_s, {THETA_IN: theta_in}, *radii)
     if settings.friction_history is not None:
-        factor = np.repeat(settings.friction_history(time_s, motions[0].drive_travel_m)[:, None], 2, axis=1)
+        factor = np.repeat(settings.friction_history(time_s, motion.drive_travel_m)[:, None], 2, axis=1)
     if settings.friction_laws:
-        added = np.stack([sum(law(motion) for law in settings.friction_laws) for motion in motions], axis=1)
-        factor = factor * (1.0 + added).clip(0.0)
+        added = sum(law(motion) for law in settings.friction_laws)
+        factor = factor * (1.0 + added).clip(0.0)[:, None]
     return factor
 
 
