@@ -1,6 +1,7 @@
 """Estimates of the load and motions of the drive, as the interface and the command give them."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -45,6 +46,24 @@ def test_errors_are_those_of_the_sensors_at_the_load(estimate, batch):
     assert row["rms"] < 0.03 * np.ptp(recorded["tau_out_Nm"])
     assert 0.5 < row["share_within"] <= 1
     assert (estimate.visible_share.between(0.5, 0.95)).all()
+
+
+def test_what_the_model_file_does_not_determine_is_said(fitted, batch):
+    """And an interval of a fit to few recordings counts as wide as it is stated."""
+    model = fitted.model
+    stated = {name: dict(one) for name, one in model.intervals.items()}
+    name = "stiffness_N_per_m"
+    infinite = replace(model, intervals=stated | {name: dict.fromkeys(("low", "high", "sd"))})
+    assert cc.estimate(infinite, batch).notes == (
+        f"{name}: the model's interval is infinite, and its value is taken as exact",
+    )
+    middle, few = (stated[name]["low"] + stated[name]["high"]) / 2, 0.2 * stated[name]["high"]
+    wide = replace(model, intervals=stated | {name: stated[name] | {"low": middle - few, "high": middle + few}})
+    widths = [
+        (table["tau_out_Nm_high"] - table["tau_out_Nm_low"]).mean()
+        for table in (cc.estimate(one, batch)["t-6N"] for one in (model, wide))
+    ]
+    assert widths[1] > 1.005 * widths[0]
 
 
 def test_an_estimate_is_written_as_the_command_writes_it(estimate, fitted, folder, tmp_path, monkeypatch, capsys):

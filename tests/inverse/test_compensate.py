@@ -129,6 +129,20 @@ def test_within_limits_little_of_the_lost_motion_comes_back(limits):
     assert lost < straight / 50
 
 
+@pytest.mark.parametrize(("rest_s", "exceeds"), [(0.0, True), (0.4, False)])
+def test_a_start_that_no_drive_can_follow_is_said(rest_s, exceeds):
+    """With limits the drive begins before the load, and needs a rest for it."""
+    limits = Limits(1.5, 20.0)
+    wanted = WANTED.assign(theta_out_rad=np.interp(TIME_S - rest_s, TIME_S, SWING, left=0.0))
+    found = compensated(wanted, PARAMETERS, RIG, limits)
+    theta = np.concatenate([[0.0, 0.0], found.table["theta_in_rad"]])
+    step = TIME_S[1] - TIME_S[0]
+    speed = np.diff(theta) / step
+    most = max(np.abs(speed).max() / 1.5, np.abs(np.diff(speed)).max() / step / 20.0)
+    assert (most > 1.001) == exceeds
+    assert [("begins with a step from rest" in note) for note in found.notes] == [True] * exceeds
+
+
 def test_a_pretension_of_its_own():
     nominal, half = (compensated(WANTED, PARAMETERS, RIG, FREE, T).table["theta_in_rad"] for T in (None, T0 / 2))
     assert np.abs(nominal - half).max() > 0.01

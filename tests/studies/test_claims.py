@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from ccmodel.errors import last_cycle
-from ccmodel.repeats import condition_of, estimates, pooled_scatter
+from ccmodel.repeats import Estimate, condition_of, estimates, pooled_scatter
 from ccmodel.report.figures import save_figure
 from ccmodel.studies.claims import model_runs, study
 from ccmodel.studies.claims.claim import Row, Verdict
 from ccmodel.studies.claims.figure import _reach, model_figure, recordings_figure
-from ccmodel.studies.claims.recordings import _model_has_sign, _Series
+from ccmodel.studies.claims.recordings import _is_seen, _model_has_sign, _phases_seen, _Series
 from ccmodel.studies.claims.settings import Claims
 from ccmodel.studies.claims.study import claims_of
 from ccmodel.studies.loops.settings import Measuring
@@ -227,3 +227,15 @@ def test_an_error_bar_ends_where_the_interval_does():
     row = Row("width", "rad", "a", 0.0, "model", value=3.0, low=1.0, high=4.0)
     assert _reach(3.0, row) == (2.0, 1.0)
     assert _reach(3.0, replace(row, low=None)) == _reach(3.0, replace(row, high=None)) == (0.0, 0.0)
+
+
+def test_phases_are_seen_with_certainty_or_not_determined():
+    """By the intervals of their shares, as other claims are decided."""
+    seen = [_is_seen(Estimate(value, 0.5, 3, 2), CLAIMS) for value in (20.0, 1.5, 0.0)]
+    certain = [_is_seen(Estimate(value, 0.01, 3, 2), CLAIMS) for value in (20.0, 1.5, 0.0)]
+    assert seen == [True, None, None] and certain == [True, True, False]
+    assert _phases_seen([True, True, False], [True, False, False]) == Verdict.YES
+    assert _phases_seen([True, None, False], [True, False, False]) == Verdict.OPEN
+    assert _phases_seen([True, None, True], [True, False, False]) == Verdict.NO
+    assert _phases_seen([True, True, False], [True, True, False]) == Verdict.NO
+    assert _is_seen(Estimate(20.0, 0.0, 0, 1), CLAIMS) is None, "no repeats"

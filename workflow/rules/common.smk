@@ -17,6 +17,11 @@ from ccmodel.typed import InputError
 
 try:
     # The run's one configfile, read by its typed reader, which refuses unknown keys.
+    stated = workflow.config_settings
+    if workflow.is_main_process and (stated.config or len(stated.configfiles) > 1):
+        raise InputError(
+            "the configuration is one file: state all in it, without --config"
+        )
     CONFIG = load_config(Path(workflow.configfiles[-1]))
     RAW = Path(CONFIG.raw)
     RESULTS = CONFIG.results

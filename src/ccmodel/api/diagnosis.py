@@ -90,7 +90,7 @@ class Diagnosis:
         return self._outcome.models.get("nearest")
 
     def to_frame(self) -> pd.DataFrame:
-        """Candidate models, a row each, those with the smallest mean square first.
+        """Candidate models, a row each: the calibrated model, and then those with the smallest mean square first.
 
         Columns ``mean_square`` (of the leave-one-out residuals over their noise; 1 is noise), ``lack_of_fit`` (most
         probable mean square of what the candidate leaves as a function of the rig's state), ``probability`` (that it is
@@ -229,7 +229,8 @@ def diagnose(
     baseline : Model, Fit, Diagnosis, str or Path, optional
         Model to start from, what has one, or its file, instead of the estimates of ``batch.yaml``.
     freeze : bool
-        Whether the baseline keeps all its values: finds what has changed since it was fitted.
+        Whether the baseline keeps its values, but for the sensors' zeros: finds what has changed since it was fitted.
+        Its drifts, which are those of another session, are left out.
     without : str or collection of str
         Mechanisms that are no candidates.
     tolerance, step_s, cycles, trust_inputs, progress

@@ -256,7 +256,7 @@ def fit(
         Standard deviation of a model error that counts as noise, as a share of a channel's peak to peak: one for all,
         or by channel.
     step_s : float, optional
-        Least time between compared samples, s; without it, 0.008 s.
+        Least time between compared samples, s; without it, 0.008 s. At least a two-thousandth of a recording.
     cycles : int, optional
         Cycles of a sine that are compared, counted from the end of its start-up transient; without it, all.
     trust_inputs : bool

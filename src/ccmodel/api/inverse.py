@@ -25,7 +25,7 @@ from ccmodel.api.recordings import counted
 from ccmodel.channels import TAU_IN, TAU_OUT, THETA_IN, THETA_OUT, unit_of
 from ccmodel.failure import ModelError
 from ccmodel.inverse.compensate import WANTED, Limits, compensated
-from ccmodel.inverse.estimate import VISIBLE, Estimated, estimated
+from ccmodel.inverse.estimate import HALF_WIDTH, VISIBLE, Estimated, estimated
 from ccmodel.model.files import Model
 from ccmodel.model.parameters import Parameters
 from ccmodel.outputs import new_file, new_files
@@ -143,8 +143,9 @@ def estimate(
     unknown_load : bool
         Whether the load is unknown, though the model has the law of a spring.
     tolerance : float or mapping of str to float, optional
-        Standard deviation of the model discrepancy, as a share of peak to peak: of the drive torque, or by channel of
-        ``tau_in_Nm`` (0.005 if not stated) and ``theta_out_rad`` (0).
+        Standard deviation of the model discrepancy, as a share of peak to peak so far: of the drive torque, or by
+        channel of ``tau_in_Nm`` (0.005 if not stated) and ``theta_out_rad`` (0). The peak to peak of the torque counts
+        as no less than the sum of the tensions at the drive times its radius.
     progress : bool or callable
         True shows progress; a callable gets ``(text, share of the work done)``.
 
@@ -170,9 +171,10 @@ def estimate(
     shares = _shares(tolerance)
     if out is not None:
         try_folder(out)
-    sds = {name: sd for name, one in known.intervals.items() if (sd := one.get("sd")) is not None}
+    sds, unknown = _standard_deviations(known.intervals)
     tables: dict[str, pd.DataFrame] = {}
-    notes: dict[str, None] = {}
+    text = "{}: the model's interval is infinite, and its value is taken as exact"
+    notes = dict.fromkeys(map(text.format, unknown))
     left_out, rows = [], []
     with progress_of(progress) as report:
         batch = as_batch(batch, within(report, 0.0, READING))
@@ -194,6 +196,19 @@ def estimate(
     if out is not None:
         result.save(out)
     return result
+
+
+def _standard_deviations(intervals: Mapping[str, Mapping[str, float | None]]) -> tuple[dict[str, float], list[str]]:
+    """Standard deviations of normal distributions with these 90 % intervals, and names of those that are infinite.
+
+    Of a fit to few recordings, an interval is wider than its standard deviation tells.
+    """
+    known = {
+        name: (high - low) / (2 * HALF_WIDTH)
+        for name, one in intervals.items()
+        if (low := one["low"]) is not None and (high := one["high"]) is not None
+    }
+    return known, [name for name in intervals if name not in known]
 
 
 def _shares(tolerance: float | Mapping[str, float] | None) -> dict[str, float]:
@@ -244,11 +259,14 @@ class Compensation:
     lost_motion_rad, straight_lost_motion_rad : float
         Root mean square of the load's angle less the wanted one, by the model: with this motion of the drive, and if
         the drive makes the wanted motion itself.
+    notes : tuple of str
+        Where the motion exceeds the drive's limits: at its start, if the wanted motion begins without a rest.
     """
 
     table: pd.DataFrame
     lost_motion_rad: float
     straight_lost_motion_rad: float
+    notes: tuple[str, ...] = ()
 
     @property
     def largest_speed_rad_per_s(self) -> float:
@@ -352,7 +370,7 @@ def compensate(
         float(np.sqrt(np.mean((angle - found.table[WANTED]) ** 2)))
         for angle in (found.table[THETA_OUT], found.straight_rad)
     )
-    result = Compensation(found.table, lost, straight)
+    result = Compensation(found.table, lost, straight, found.notes)
     if out is not None:
         result.save(out)
     return result

@@ -231,7 +231,7 @@ def simulate(
     """Simulate the sensor readings of a rig for a motion of its drive, by a model.
 
     The drive angle is zero where both cables have the pretension, evenly along their length. A motion that begins
-    elsewhere begins with a step from zero to its first angle. The load angle is zero at the first sample.
+    elsewhere begins with a step from zero to its first angle. The load angle is zero before the first sample.
 
     All channels are readings of sensors. As in a recording, ``T1_N`` to ``T4_N`` follow from torques and sums of
     tensions: T1 and T3 are ``F_drive_N`` / 2 plus and minus ``tau_in_Nm`` over twice the pulley's radius, T2 and T4 the

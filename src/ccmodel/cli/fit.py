@@ -71,13 +71,14 @@ def fit(
             progress=progress,
         )
         fitted.save(out)
-    refused = [finding for finding in fitted.batch.findings if finding.severity != "warning"]
+    refused = [finding for finding in fitted.batch.findings if finding.is_refused]
+    trusted = [finding for finding in fitted.batch.findings if finding.is_inconsistent and not finding.is_refused]
     left_out = list(map(str, refused))
     data = {**fitted.to_dict(), "out": out, "warnings": fitted.warnings, "notes": fitted.notes, "left_out": left_out}
     output.result(data, fitted.text)
     for line in fitted.warnings:
         output.finding(line, "warning")
-    for finding in refused:
+    for finding in [*trusted, *refused]:
         output.finding(str(finding), finding.severity)
     output.hint(f"wrote {out}")
     if refused or not fitted.succeeded:

@@ -119,6 +119,9 @@ def compensate(
         "lost_motion_rad": found.lost_motion_rad,
         "straight_lost_motion_rad": found.straight_lost_motion_rad,
         "largest_speed_rad_per_s": found.largest_speed_rad_per_s,
+        "notes": found.notes,
     }
     output.result(data)
+    for line in found.notes:
+        output.finding(line, "warning")
     output.hint(f"wrote {out}. {found!r}")

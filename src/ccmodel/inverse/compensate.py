@@ -20,6 +20,8 @@ from ccmodel.model.session import of_recording
 from ccmodel.recording import Recording
 
 WANTED = "theta_wanted_rad"
+# A limit that is exceeded by this share is kept but for rounding.
+ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -50,10 +52,13 @@ class Compensated:
         Columns time_s, theta_in_rad, theta_out_rad (the load, by the model) and theta_wanted_rad.
     straight_rad : ndarray, shape (n,)
         Angle of the load, by the model, if the wanted motion is passed to the drive as it is.
+    notes : tuple of str
+        Where the motion exceeds the limits.
     """
 
     table: pd.DataFrame
     straight_rad: NDArray
+    notes: tuple[str, ...]
 
 
 def compensated(
@@ -94,7 +99,7 @@ def compensated(
     given = ModelInput.prescribed(like, time_s, straight, pretension_N)
     theta_in = within_limits(time_s, _drive(given, of_recording(parameters, given.recording), load), limits)
     columns = {"time_s": time_s, THETA_IN: theta_in, THETA_OUT: response(theta_in), WANTED: load}
-    return Compensated(pd.DataFrame(columns), response(straight))
+    return Compensated(pd.DataFrame(columns), response(straight), _on_start(time_s, theta_in, limits))
 
 
 def _drive(given: ModelInput, parameters: Parameters, wanted: NDArray) -> NDArray:
@@ -136,6 +141,22 @@ def within_limits(time_s: NDArray, theta: NDArray, limits: Limits) -> NDArray:
     steps = np.diff(time)
     integral = np.concatenate([[0.0], np.cumsum(steps * (padded[1:] + padded[:-1]) / 2)])
     return (_at(time_s + width / 2, time, padded, integral) - _at(time_s - width / 2, time, padded, integral)) / width
+
+
+def _on_start(time_s: NDArray, theta: NDArray, limits: Limits) -> tuple[str, ...]:
+    """A note if a drive that rests at zero before the motion cannot reach its first angles within the limits."""
+    if limits.speed_rad_per_s == inf:
+        return ()
+    step = time_s[1] - time_s[0]
+    speed = np.diff(theta, prepend=0.0)[:2] / np.diff(time_s, prepend=time_s[0] - step)[:2]
+    acceleration = np.diff(speed, prepend=0.0) / step
+    most_speed, most_acceleration = limits.speed_rad_per_s, limits.acceleration_rad_per_s2
+    over = max(np.abs(speed).max() / most_speed, np.abs(acceleration).max() / most_acceleration)
+    if over <= 1 + ROUNDING:
+        return ()
+    rest_s = np.ptp(theta) / most_speed + most_speed / most_acceleration
+    text = f"the motion begins with a step from rest that is {over:.2g} times what the drive's limits allow"
+    return (f"{text}: let the wanted motion begin with a rest, of which {rest_s:.2g} s are enough",)
 
 
 def _at(when: NDArray, time: NDArray, values: NDArray, integral: NDArray) -> NDArray:

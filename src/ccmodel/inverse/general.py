@@ -239,6 +239,15 @@ def run(
         If a step has no solution.
     """
     time_s, theta_in = one_row(time_s, "time_s"), one_row(drive.theta_rad, "theta_in")
+    if theta_in[0] != 0.0:
+        # The initial tension stands at a drive angle of zero.
+        first = np.array([2 * time_s[0] - time_s[1]])
+        begun = Drive(*(np.concatenate([values[:1], values]) for values in drive))
+        begun.theta_rad[0] = 0.0
+        misfit = None if misfit_Nm is None else np.concatenate([misfit_Nm[:1], misfit_Nm])
+        since = np.concatenate([first, time_s])
+        found = run(transmission, load, settings, initial, since, begun, prior, misfit, refinement)
+        return Run(found.trace[:, 1:], found.out[:, 1:], found.noise_variance[1:])
     noise, theta_variance = drive.torque_variance.copy(), one_row(drive.theta_variance, "theta_variance")
     n = time_s.size
     has_law = isinstance(load, SpringLoad)

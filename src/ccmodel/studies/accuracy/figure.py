@@ -103,7 +103,7 @@ def _bands(ax: Axes, at: np.ndarray, equal: np.ndarray, line: dict) -> None:
     if line["delta"] is None:
         return
     for sign in (-1, 1):
-        label = "± 2 σ_E of the recordings, as stated" if sign > 0 else None
+        label = "± 2 σ_E, sensors and parameters" if sign > 0 else None
         ax.plot(at, equal * (1 + 2 * sign * line["sigma_E_stated"]), color="black", lw=0.9, ls="--", label=label)
     biased, band = line["delta"] * equal, 2 * line["sigma_M"]
     ax.plot(at, biased, color=COLOURS[1], lw=0.9, label="the model's bias δ")

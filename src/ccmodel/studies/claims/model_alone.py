@@ -1,5 +1,7 @@
 """Claims that the model decides by itself: deadband and load, place of the loop, sections of the discretisation."""
 
+from operator import itemgetter
+
 import numpy as np
 
 from ccmodel.failure import ModelError
@@ -54,6 +56,7 @@ def _load(parameters: Parameters, claims: Claims, how: Measuring) -> Claim:
 def _load_sentence(taut: list, slack: list, changes: dict) -> str:
     if not taut:
         return "With every load a cable goes slack."
+    taut, slack = (sorted(rows, key=itemgetter(0)) for rows in (taut, slack))
     (soft, first), (stiff, _) = taut[0], taut[-1]
     sentence = (
         f"With springs of {soft:g} to {stiff:g} N·m/rad no cable goes slack: the lost motion is"

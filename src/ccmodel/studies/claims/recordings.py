@@ -157,23 +157,35 @@ def _joint(verdicts: Sequence[Verdict]) -> Verdict:
 def _phases(pairs: Sequence[Pair], claims: Claims, how: Measuring) -> Claim:
     """Phases IVa and IVb over pretension."""
     series = {q: _series(pairs, "pretension", q, claims, how) for q in ("IVa_share", "IVb_share")}
-    recorded_a, recorded_b = ([e.value for e in s.estimates] for s in series.values())
-    modelled_a, modelled_b = ([r.model for r in s.rows if r.model is not None] for s in series.values())
-    verdict = _phases_seen(recorded_a, recorded_b, claims)
-    by_model = _phases_seen(modelled_a, modelled_b, claims)
+    recorded_a, recorded_b = ([_is_seen(e, claims) for e in s.estimates] for s in series.values())
+    modelled_a, modelled_b = (
+        [r.model > claims.seen_percent for r in s.rows if r.model is not None] for s in series.values()
+    )
+    verdict = _phases_seen(recorded_a, recorded_b)
+    by_model = _phases_seen(modelled_a, modelled_b)
     says = "a high pretension shows no phase IV, a middling one IVa, a low one IVb as well"
     sentence, rows = _sentence_and_rows(series)
     return Claim("phases-and-pretension", "V-B", says, verdict, sentence, rows, by_model)
 
 
-def _phases_seen(share_a: Sequence[float], share_b: Sequence[float], claims: Claims) -> Verdict:
-    """Whether IVa and IVb occur as claimed; shares (%) in rising order of pretension."""
-    if len(share_a) < 3 or len(share_b) != len(share_a):
+def _is_seen(share: Estimate, claims: Claims) -> bool | None:
+    """Whether a phase occurs; None if the interval of its share (%) does not tell, or there is none."""
+    reach = share.reach(claims.coverage)
+    if reach is None or abs(share.value - claims.seen_percent) <= reach:
+        return None
+    return share.value > claims.seen_percent
+
+
+def _phases_seen(seen_a: Sequence[bool | None], seen_b: Sequence[bool | None]) -> Verdict:
+    """Whether IVa and IVb occur as claimed, in rising order of pretension."""
+    if len(seen_a) < 3 or len(seen_b) != len(seen_a):
         return Verdict.OPEN
-    seen_a, seen_b = ([share > claims.seen_percent for share in shares] for shares in (share_a, share_b))
-    ends = (seen_a[0], seen_a[-1], seen_b[0], seen_b[-1]) == (True, False, True, False)
-    middle = any(a and not b for a, b in zip(seen_a, seen_b, strict=True))
-    return Verdict.YES if ends and middle else Verdict.NO
+    at_ends = seen_a[0], seen_b[0], seen_a[-1], seen_b[-1]
+    if any(seen is (not wanted) for seen, wanted in zip(at_ends, (True, True, False, False), strict=True)):
+        return Verdict.NO
+    if None in (*seen_a, *seen_b):
+        return Verdict.OPEN
+    return Verdict.YES if any(a and not b for a, b in zip(seen_a, seen_b, strict=True)) else Verdict.NO
 
 
 def _radius(pairs: Sequence[Pair], parameters: Parameters | None, claims: Claims, how: Measuring) -> Claim:

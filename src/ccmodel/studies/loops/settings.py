@@ -64,5 +64,5 @@ class Measuring(TypedModel):
     closed_share: float = Field(
         0.05, gt=0, lt=1, description="a cycle ends where it began, to this share of the drive's peak to peak"
     )
-    slack_below_N: float = Field(0.1, gt=0, description="a cable with less tension than this at both ends is slack, N")
+    slack_below_N: float = Field(0.1, gt=0, description="a cable with less tension than this at the load is slack, N")
     fewest_samples: int = Field(10, ge=3, description="samples that a line needs at least")
