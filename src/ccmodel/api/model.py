@@ -65,12 +65,15 @@ class Prediction(Recordings):
         A line on each recording without a prediction.
     findings : tuple of Finding
         Faults and contradictions of the batch, which is used all the same; ``str(finding)`` says where and what.
+    notes : tuple of str
+        A line on each learned law of the model whose argument is beyond the range that it was learned in.
     """
 
     recordings: tuple[Recording, ...]
     errors: pd.DataFrame
     left_out: tuple[str, ...]
     findings: tuple[Finding, ...]
+    notes: tuple[str, ...]
     # What was predicted, in the order of `recordings`.
     _recorded: tuple[Recording, ...]
 
@@ -117,11 +120,12 @@ class Prediction(Recordings):
                 write_channels(path / f"{recording.id}.csv", recording)
 
     def __repr__(self) -> str:
-        return "\n".join([self._title, self.table.to_string(float_format="{:.2f}".format), *self.left_out])
+        table = self.table.to_string(float_format="{:.2f}".format)
+        return "\n".join([self._title, table, *self.left_out, *self.notes])
 
     def _repr_html_(self) -> str:
         table = self.table.to_html(float_format="{:.2f}".format, border=0)
-        lines = "".join(f"<li>{escape(line)}</li>" for line in self.left_out)
+        lines = "".join(f"<li>{escape(line)}</li>" for line in (*self.left_out, *self.notes))
         return f"<p>{self._title}</p>{table}{f'<ul>{lines}</ul>' if lines else ''}"
 
     @property
@@ -212,7 +216,8 @@ def predict(
         found = predicted(known.placed(batch.recordings), known.parameters, name, within(report, READING, 1.0))
     refused, others = sorted_findings(batch)
     recorded, simulations = (tuple(pair[i] for pair in found.pairs) for i in (0, 1))
-    prediction = Prediction(simulations, found.errors, (*refused, *found.failures), others, recorded)
+    left_out = (*refused, *found.failures)
+    prediction = Prediction(simulations, found.errors, left_out, others, tuple(found.notes), recorded)
     if out is not None:
         prediction.save(out)
     return prediction

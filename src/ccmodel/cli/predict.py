@@ -39,5 +39,8 @@ def predict(
         lines = ["root mean square error over the last cycle, % of peak to peak", table]
     errors = predicted.errors.to_dict("records")
     findings = [str(finding) for finding in predicted.findings]
-    output.result({"out": out, "errors": errors, "findings": findings, "left_out": predicted.left_out}, *lines)
+    data = {"out": out, "errors": errors, "findings": findings, "notes": predicted.notes}
+    output.result({**data, "left_out": predicted.left_out}, *lines)
+    for line in predicted.notes:
+        output.finding(line, "warning")
     output.findings(predicted.findings, predicted.left_out)

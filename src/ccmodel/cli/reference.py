@@ -54,7 +54,7 @@ unit is a value beside it (`unit`). A value that there is not is `null`. `out` i
 | `check` | `usable`; `recordings`: by id `samples`, `rate_Hz`, `duration_s`, `rest_s`, `stroke_rad`, `frequency_Hz`, `cycles`, `wave`, and `channels`, a list of `name`, `low`, `high`, `noise`, `step`, `unit`; `findings`: a list of `batch`, `file`, `row`, `column`, `severity` ("warning", "refused" or "inconsistent"), `text`, `confidence`, `contradicts`, and `line`, where and what in one line |
 | `fit` | the model file: `format`, `parameters` (by name, which ends with the unit), `mechanisms`, `rig`, `intervals` (90 %, by parameter `low`, `high`, `sd`), `provenance`; `fit`: `succeeded`, `message`, `mean_square`, `recordings`, `at_bound`; `out`, `warnings`, `notes`, `left_out` |
 | `simulate` | `out`, `recording`, `samples`, `pretension_N` |
-| `predict` | `out`; `errors`: a list with a row for each recording and channel, as in the table of errors of a run; `left_out` |
+| `predict` | `out`; `errors`: a list with a row for each recording and channel, as in the table of errors of a run; `findings`, `notes`, `left_out` |
 | `estimate` | `out`; `errors`: a list with a row for each recording and load sensor: `recording`, `channel`, `unit`, `bias`, `rms`, `share_within` (of the 90 % interval), `samples`; `visible_share`: by recording; `notes`, `left_out` |
 | `compensate` | `out`, `samples`, `lost_motion_rad`, `straight_lost_motion_rad`, `largest_speed_rad_per_s`, `notes` |
 | `diagnose` | [diagnosis.json](diagnosis-files.md): `format`, `batch`, `batches` (of several), `verdict`, `is_held`, `location`, `mechanisms`, `laws`, `alternatives`, `likeliest`, `nearest`, `fit`, `repeatability`, `next_experiment`, `not_judged`, `headline`, `provenance`; `out` |

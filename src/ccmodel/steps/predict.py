@@ -9,8 +9,9 @@ import numpy as np
 import pandas as pd
 
 from ccmodel import inputs
-from ccmodel.channels import THETA_IN
+from ccmodel.channels import CHANNELS, TENSIONS, THETA_IN
 from ccmodel.errors import error_table
+from ccmodel.mechanisms import Sensing, laws
 from ccmodel.model.files import Model
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import ModelInput, simulate
@@ -24,6 +25,9 @@ from ccmodel.typed import InputError
 
 # Share of reading the logs in the time of a prediction.
 READING = 0.5
+# Share of the samples beyond the range of a learned law that is worth a word. One of a hundred is beyond it in the
+# recordings that it was learned from.
+BEYOND = 0.05
 MOTION = ["time_s", THETA_IN]
 
 
@@ -43,11 +47,14 @@ class Predicted:
         A line on each recording on which the model cannot be run.
     errors : DataFrame
         Errors of the others (`ccmodel.errors.error_table`).
+    notes : list of str
+        What of the model lies beyond what it was learned from (`beyond_laws`).
     """
 
     pairs: list[tuple[Recording, Recording]]
     failures: list[str]
     errors: pd.DataFrame
+    notes: list[str]
 
 
 def predicted(
@@ -67,7 +74,31 @@ def predicted(
     """
     pairs, failures = simulate_each(recordings, parameters, progress)
     lines = [f"{recording.batch}/{recording.id}: {error}" for recording, error in failures]
-    return Predicted(pairs, lines, error_table(pairs, name))
+    notes = beyond_laws([simulation for _, simulation in pairs], parameters)
+    return Predicted(pairs, lines, error_table(pairs, name), notes)
+
+
+def beyond_laws(simulations: Sequence[Recording], parameters: Parameters) -> list[str]:
+    """A line on each learned law whose argument is often beyond the range that it was learned in."""
+    lines = []
+    for active in parameters.mechanisms:
+        law = laws().get(active.name)
+        if law is None or law.has_one_coefficient or law.form.has_elements or not simulations:
+            continue
+        x = np.concatenate([law.argument.of(_sensing(one, parameters)).ravel() for one in simulations])
+        first, last = active.values["first"], active.values["last"]
+        if np.mean((x < first) | (x > last)) > BEYOND:
+            unit = f" {law.argument.unit}" if law.argument.unit != "1" else ""
+            lines.append(
+                f"the learned law of {law.argument.meaning} was learned from {first:.3g} to {last:.3g}{unit} and is"
+                f" constant beyond; here it is asked from {x.min():.3g} to {x.max():.3g}{unit}"
+            )
+    return lines
+
+
+def _sensing(simulation: Recording, parameters: Parameters) -> Sensing:
+    channels = {c: simulation[c] for c in (THETA_IN, *CHANNELS, *TENSIONS) if c in simulation}
+    return Sensing(simulation.time_s, channels, parameters.drive_radius_m, parameters.load_radius_m)
 
 
 def simulated_motion(
