@@ -108,13 +108,13 @@ def _leading(judgement: Judgement) -> list[CandidateFit]:
 
 
 def _by_argument(judgement: Judgement) -> list[CandidateFit]:
-    """The most probable candidate with each argument that the recordings do not exclude for a learned law."""
+    """The most probable candidate with each argument and form that the recordings do not exclude for a learned law."""
     learned, confidence = laws_in(judgement.best.hypothesis), judgement.confidence
-    found: dict[tuple[str, ...], CandidateFit] = {}
+    found: dict[tuple[tuple[str, str], ...], CandidateFit] = {}
     for candidate in (judgement.best, *judgement.candidates):
         laws = [law for law in laws_in(candidate.hypothesis) if any(law.is_of_slot(one) for one in learned)]
         if laws and (candidate is judgement.best or confidence[candidate.hypothesis] > settings.ALTERNATIVE):
-            found.setdefault(tuple(sorted(law.argument.name for law in laws)), candidate)
+            found.setdefault(tuple(sorted((law.argument.name, law.form.name) for law in laws)), candidate)
     return list(found.values())
 
 

@@ -124,11 +124,18 @@ def of_straight_pieces(x: NDArray, y: NDArray) -> NDArray:
 
 
 def indistinguishable(judgement: Judgement, law: Law) -> list[str]:
-    """Other arguments of the same slot that the recordings do not exclude, the most probable first."""
-    acting = {one.argument.name for one in laws_in(judgement.best.hypothesis) if one.is_of_slot(law)}
-    by_argument: dict[str, float] = {}
+    """Other arguments of the same slot that the recordings do not exclude, the most probable first.
+
+    A law of the same argument in another form, such as a drag in place of a factor of friction, predicts otherwise
+    too, and is named by both.
+    """
+    acting = [one for one in laws_in(judgement.best.hypothesis) if one.is_of_slot(law)]
+    arguments, forms = {one.argument.name for one in acting}, {(one.argument.name, one.form.name) for one in acting}
+    probability: dict[str, float] = {}
     for hypothesis, p in judgement.confidence.items():
         for other in laws_in(hypothesis):
-            if other.is_of_slot(law) and other.argument.name not in acting:
-                by_argument[other.argument.name] = by_argument.get(other.argument.name, 0.0) + p
-    return sorted((a for a, p in by_argument.items() if p > settings.ALTERNATIVE), key=lambda a: -by_argument[a])
+            argument, form = other.argument.name, other.form.name
+            if other.is_of_slot(law) and (argument, form) not in forms:
+                name = f"{argument} as a {form or 'factor'}" if argument in arguments else argument
+                probability[name] = probability.get(name, 0.0) + p
+    return sorted((a for a, p in probability.items() if p > settings.ALTERNATIVE), key=lambda a: -probability[a])

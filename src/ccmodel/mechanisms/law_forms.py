@@ -120,11 +120,17 @@ RISING = replace(ADDED, rises=True)
 # The zero of a load cell scatters between recordings by its accuracy; beyond that it belongs to no calibration.
 ADDED_TO_SUM = Form("added to {symbol}, in {unit}", is_centred=False)
 # A torque whose elements yield one after the other. A ball bearing's yield within a few hundredths of a millimetre.
-AGAINST_MOTION = Form("added to {symbol}, against the motion, in {unit}", is_centred=False, shortest_yield=0.002)
+AGAINST_MOTION = Form(
+    "added to {symbol}, against the motion, as it builds up from rest, in {unit}",
+    is_centred=False,
+    shortest_yield=0.002,
+)
 # The bearing of the load's pulley is between the cables and the torque sensor.
 IN_BEARING = Form("torque of the {side} pulley's bearing on the cables, in N m", "N m", rises=True)
 ELEMENTS_IN_BEARING = replace(
-    AGAINST_MOTION, meaning="torque of the {side} pulley's bearing, against its motion, in N m", unit="N m"
+    AGAINST_MOTION,
+    meaning="torque of the {side} pulley's bearing, against its motion, as it builds up from rest, in N m",
+    unit="N m",
 )
 
 
