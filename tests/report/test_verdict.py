@@ -130,6 +130,17 @@ def test_beside_what_is_certain_the_rest_of_the_likeliest_model_is_said(further,
     assert sentence(found).endswith(said)
 
 
+def test_a_set_of_which_nothing_is_certain_is_said_with_what_else_is_possible():
+    likeliest = [{"name": "kink", "place": "conduit"}, {"name": "backlash", "place": "load-pulley"}]
+    alternatives = [{"name": "kink", "place": "conduit", "confidence": 0.71}]
+    alternatives += [{"name": "drift", "place": "drive-sensor", "confidence": 0.05}]
+    found = diagnosis("b", "undecided", mechanisms=[], likeliest=likeliest, alternatives=alternatives)
+    assert sentence(found) == (
+        "Something is missing, and these recordings do not tell what: most probably kink at the conduit (0.71) and"
+        " backlash at the load pulley together; also possible: drift at the drive sensor (0.05)."
+    )
+
+
 def test_each_verdict_has_its_sentence():
     assert "confidence 0.97" in sentence(diagnosis("b", "explained"))
     assert "may be backlash at the load pulley (0.50)" in sentence(diagnosis("b", "undecided"))

@@ -17,6 +17,7 @@ from ccmodel.mechanisms.contract import (
     SLIDING_FRICTION,
     side,
 )
+from ccmodel.sentences import joined
 
 # By the short names of diagnosis.json.
 SYMBOL = {channel.short_name: channel.symbol for channel in TABLE.values()}
@@ -92,7 +93,11 @@ def _undecided(diagnosis: Mapping, missing: str) -> str:
         rest = f": perhaps {' or '.join(possible)}" if possible else ""
         part = f"Part of what {missing}: {_with_confidence(diagnosis['mechanisms'])}"
         return f"{part}. These recordings do not tell what else {missing}, if anything{rest}."
-    names = [f"{' and '.join(together)} together", *others] if len(together) > 1 else list(named.values())
+    if len(together) > 1:
+        most = joined([named.get(one, one) for one in together])
+        also = f"; also possible: {joined(others)}" if others else ""
+        return f"Something {missing}, and these recordings do not tell what: most probably {most} together{also}."
+    names = list(named.values())
     if not names:
         return f"Something {missing}, and these recordings do not tell what."
     if len(names) == 1:
