@@ -93,11 +93,11 @@ def _undecided(diagnosis: Mapping, missing: str) -> str:
         rest = f": perhaps {' or '.join(possible)}" if possible else ""
         part = f"Part of what {missing}: {_with_confidence(diagnosis['mechanisms'])}"
         return f"{part}. These recordings do not tell what else {missing}, if anything{rest}."
-    if len(together) > 1:
-        most = joined([named.get(one, one) for one in together])
-        also = f"; also possible: {joined(others)}" if others else ""
-        return f"Something {missing}, and these recordings do not tell what: most probably {most} together{also}."
-    names = list(named.values())
+    if len(together) > 1 and others:
+        most = f"{joined([named.get(one, one) for one in together])} together"
+        also = f"also possible: {joined(others)}"
+        return f"Something {missing}, and these recordings do not tell what: most probably {most}; {also}."
+    names = [f"{' and '.join(together)} together"] if len(together) > 1 else list(named.values())
     if not names:
         return f"Something {missing}, and these recordings do not tell what."
     if len(names) == 1:
