@@ -159,7 +159,7 @@ def _rates(every: Sequence[Outcome]) -> dict[str, str]:
             [o for o in listed if not o.is_visible],
             lambda o: o.is_first_of_all,
         ),
-        "several, one visible: all named": (several, lambda o: o.true_names <= o.true_among(o.identified)),
+        "several, one visible: all named": (several, lambda o: o.are_all_identified),
         "unlisted: left open, or a law learned in its slot": (outsiders, is_left_open_or_learned),
         "confidently wrong": (every, lambda o: o.is_confidently_wrong),
     }

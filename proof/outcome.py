@@ -117,6 +117,11 @@ class Outcome:
         return {t["name"] for t in self.key["truth"] if any(_is_effect(c, t) for c in reported)}
 
     @property
+    def are_all_identified(self) -> bool:
+        """Whether every concealed effect is identified, at its place."""
+        return self.true_names <= self.true_among(self.identified)
+
+    @property
     def laws(self) -> list[dict]:
         """Learned laws of the diagnosis."""
         return (self.diagnosis or {}).get("laws") or []

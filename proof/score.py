@@ -76,7 +76,7 @@ def _rates_of_open_cases(outcomes: Sequence[Outcome]) -> list[dict]:
     by_kind = _by_kind(outcomes)
     pairs, poor = by_kind["pair"], by_kind["poor"]
     return [
-        count("pair: both identified", pairs, _are_all_identified, 0.75),
+        count("pair: both identified", pairs, lambda o: o.are_all_identified, 0.75),
         count("pair: one identified", pairs, lambda o: bool(o.true_among(o.identified))),
         count("poor protocol: identified or among the alternatives", poor, lambda o: o.includes_truth),
         count(
@@ -111,7 +111,7 @@ def _is_decided_rightly(o: Outcome) -> bool:
         case "unlisted" | "removed":
             return o.verdict == "learned" and is_slot_right(o)
         case _:
-            return _are_all_identified(o) and len(o.identified) == len(o.true_names)
+            return o.are_all_identified and len(o.identified) == len(o.true_names)
 
 
 def _by_kind(outcomes: Iterable[Outcome]) -> dict[str, list[Outcome]]:
@@ -119,10 +119,6 @@ def _by_kind(outcomes: Iterable[Outcome]) -> dict[str, list[Outcome]]:
     for o in outcomes:
         by_kind[o.kind].append(o)
     return by_kind
-
-
-def _are_all_identified(o: Outcome) -> bool:
-    return bool(o.identified) and o.true_names <= o.true_among(o.identified)
 
 
 def _undecided(outcomes: Sequence[Outcome]) -> list[Outcome]:
@@ -244,7 +240,7 @@ def is_right(o: Outcome) -> bool:
         case "unlisted" | "removed":
             return is_left_open_or_learned(o) or is_tolerated
         case "pair" | "triple" | "many":
-            return _are_all_identified(o)
+            return o.are_all_identified
         case "poor":
             return o.includes_truth or is_tolerated
         case _:

@@ -33,8 +33,9 @@ def laws_of(judgement: Judgement) -> list[dict]:
 
 def _stated(judgement: Judgement, law: Law) -> dict:
     best = judgement.best
-    x, y, band = curve_of(best, law)
-    formula, parameters = shortest(x, y, band, law, _LinearFunctions.of(best, law).half_widths)
+    functions = _LinearFunctions.of(best, law)
+    x, y, band = functions.curve
+    formula, parameters = shortest(x, y, band, law, functions.half_widths)
     unit = law.argument.unit
     others = indistinguishable(judgement, law)
     return {
@@ -57,11 +58,7 @@ def _stated(judgement: Judgement, law: Law) -> dict:
 
 def curve_of(candidate: CandidateFit, law: Law) -> tuple[NDArray, NDArray, tuple[NDArray, NDArray]]:
     """A fitted law's arguments at its knots, its values there, and the ends of their 90 % band; shapes (knots,)."""
-    x, y = law.at_knots(values_of(candidate, law))
-    reach = _LinearFunctions.of(candidate, law).half_widths(np.eye(x.size))
-    middle, possible = law.shown(x) @ law.form.acting(y) + law.form.neutral, law.form.possible_curve
-    low, high = (possible(middle + sign * reach) for sign in (-1, 1))
-    return x, possible(middle), (low, high)
+    return _LinearFunctions.of(candidate, law).curve
 
 
 @dataclass(frozen=True)
@@ -71,6 +68,9 @@ class _LinearFunctions:
     Attributes
     ----------
     candidate : CandidateFit
+    law : Law
+    x, y : ndarray, shape (knots,)
+        Its arguments and the values, without what is neutral.
     by_unknowns : ndarray, shape (knots, unknowns)
         Derivatives of the values.
     by_pieces : ndarray, shape (knots,)
@@ -78,18 +78,30 @@ class _LinearFunctions:
     """
 
     candidate: CandidateFit
+    law: Law
+    x: NDArray
+    y: NDArray
     by_unknowns: NDArray
     by_pieces: NDArray
 
     @classmethod
     def of(cls, candidate: CandidateFit, law: Law) -> "_LinearFunctions":
         values = values_of(candidate, law)
-        x, y = law.at_knots(values)
+        x, at_knots = law.at_knots(values)
         shown = law.shown(x)
+        y = shown @ law.form.acting(at_knots)
         by_unknowns = np.zeros((len(x), len(candidate.values)))
         by_unknowns[:, unknowns_of(candidate, law)] = shown @ _derivatives_of(law, values)
         quantile = normal_quantile(0.5 + COVERAGE / 2)
-        return cls(candidate, by_unknowns, quantile * of_straight_pieces(x, shown @ law.form.acting(y)))
+        return cls(candidate, law, x, y, by_unknowns, quantile * of_straight_pieces(x, y))
+
+    @property
+    def curve(self) -> tuple[NDArray, NDArray, tuple[NDArray, NDArray]]:
+        """What `curve_of` returns."""
+        reach = self.half_widths(np.eye(self.x.size))
+        middle, possible = self.y + self.law.form.neutral, self.law.form.possible_curve
+        low, high = (possible(middle + sign * reach) for sign in (-1, 1))
+        return self.x, possible(middle), (low, high)
 
     def half_widths(self, functions: NDArray) -> NDArray:
         """Half-widths of the 90 % intervals of functions of the values, shape (functions, knots)."""
