@@ -532,6 +532,23 @@ def test_a_torque_sensor_replaces_a_current(bench):
     assert "tau_in_Nm" in ingested.recordings[0]
 
 
+def test_a_current_beside_a_torque_sensor_may_have_faults(bench):
+    bench.described["rig"]["drive"]["torque_sensor"] = {"Nm_per_count": KT}
+    for name, frame in bench.tables.items():
+        bench.tables[name] = frame.assign(drive_torque_counts=frame["drive_current_A"])
+    whole = ingest_batch(bench.write().folder).recordings
+    for frame in bench.tables.values():
+        frame.loc[230, "drive_current_A"] = 1000.0
+        frame.loc[300:380, "drive_current_A"] = np.nan
+    ingested = ingest_batch(bench.write().folder)
+    assert ingested.findings == []
+    for recording, before in zip(ingested.recordings, whole, strict=True):
+        assert np.array_equal(recording["tau_in_Nm"], before["tau_in_Nm"])
+    # Without the sensor's constant the current is what there is.
+    del bench.described["rig"]["drive"]["torque_sensor"]
+    assert any(f.column == "drive_current_A" for f in ingest_batch(bench.write().folder).findings)
+
+
 def test_the_majority_of_logs_decides_which_sensors_a_rig_has(bench):
     drop(add_logs(bench, "three"), ["one", "two"], ["load_current_A"])
     ingested = ingest_batch(bench.write().folder)

@@ -227,6 +227,12 @@ class Rig(TypedModel):
         """Drive end and load end."""
         return self._end("drive", self.drive), self._end("load", self.load)
 
+    @property
+    def in_place_of(self) -> dict[str, str]:
+        """By column of a torque sensor, the motor current of the same end, which is not used beside it."""
+        every = ((end, RAW_COLUMNS[end.torque]) for end in self.ends)
+        return {counts: current for end, (counts, current) in every if end.side.torque_sensor}
+
     def _end(self, name: str, side: "Side") -> "End":
         tensions = TENSIONS_AT[name][: 1 if self.far_end else 2]
         return End(name, side, ANGLE_AT[name], TORQUE_AT[name], SUM_AT[name], tensions)

@@ -105,7 +105,7 @@ def ingest_batch(folder: Path, progress: Progress = silent) -> Ingested:
         return Ingested([], refusals)
     files = [str(folder / entry.file) for entry in batch.recordings]
     reading = each_of(files, within(progress, 0.0, READ), lambda file: f"reading {Path(file).name}")
-    logs = [_attempt(name, file, read_log, Path(file)) for file in reading]
+    logs = [_attempt(name, file, read_log, Path(file), batch.rig.in_place_of) for file in reading]
     # All logs are read before any is checked: a column is judged by how many logs of the batch have it.
     tables = [log[0] if log else None for log, _ in logs]
     columns = ColumnChecks(batch.rig, tables)

@@ -4,7 +4,9 @@ A log is refused as a whole if a fault shows that it is not what the rig wrote, 
 Harmless faults are warnings.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
@@ -21,13 +23,16 @@ from ccmodel.typed import nearest
 MISSPELT = 0.85
 
 
-def read_log(path: Path) -> tuple[pd.DataFrame, list[Defect]]:
+def read_log(path: Path, in_place_of: Mapping[str, str] = MappingProxyType({})) -> tuple[pd.DataFrame, list[Defect]]:
     """Read and check a log.
 
     Parameters
     ----------
     path : Path
         The log.
+    in_place_of : mapping of str to str
+        Columns, and those that are not used if the log has the former: `Rig.in_place_of`. What nobody uses has no
+        fault.
 
     Returns
     -------
@@ -43,7 +48,8 @@ def read_log(path: Path) -> tuple[pd.DataFrame, list[Defect]]:
     """
     raw = readers.read(Path(path))
     warnings = _check_header(list(raw.columns))
-    table = _numbers(raw[[name for name in raw.columns if name in COLUMNS]])
+    not_used = {other for column, other in in_place_of.items() if column in raw.columns}
+    table = _numbers(raw[[name for name in raw.columns if name in COLUMNS and name not in not_used]])
     table = _drop_repeated(_drop_bad(table, warnings), warnings)
     table, impossible = drop_outliers(table)
     warnings += impossible
