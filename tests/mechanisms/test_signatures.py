@@ -435,6 +435,14 @@ def test_a_sensor_fault_shows_in_one_channel(base, side, name, values, channel, 
     assert (base.T1_N == r.T1_N).all()
 
 
+def test_a_late_drive_ends_as_its_load_went_on():
+    """Of the last samples, which a recording on the drive's clock does not show, the rate is known and no more."""
+    theta, delay = np.linspace(0.0, 0.5, 200), 0.05
+    whole, late = run(theta), run(theta, ("time-skew", "drive-sensor", {"delay": delay}))
+    rate = np.diff(whole.theta_out_rad)[-1] / np.diff(late.time_s)[-1]
+    assert late.read["theta_out_rad"][-1] == pytest.approx(whole.theta_out_rad[-1] + rate * delay)
+
+
 def test_skewed_clocks_shift_one_side_against_the_other(base):
     steps = 6
     delay = steps / 500

@@ -63,6 +63,24 @@ def test_order_of_convergence_is_two_at_both_ends():
         assert order > 1.85, (name, order)
 
 
+def test_order_of_convergence_is_two_with_conduits_that_yield_too():
+    theta = sine()
+    found = [
+        run(theta, ("conduit-compliance", "conduit", {"compliance": 20e-6}), elements=n) for n in (16, 32, 64, 128)
+    ]
+    for name in TENSIONS:
+        changes = [rms(getattr(a, name), getattr(b, name)) for a, b in itertools.pairwise(found)]
+        assert changes[0] > 3 * changes[1] > 9 * changes[2], (name, changes)
+
+
+@pytest.mark.parametrize(
+    "effect", [("load-inertia", "load", {"J": 1e-3, "zeta": 0.1}), ("load-stiffening", "load", {"K3": 0.1})]
+)
+def test_a_measured_torque_is_read_as_it_was_whatever_acts_beside_it(effect):
+    torque = K_E * 0.5 * sine()
+    assert run(sine(), effect, load=TorqueLoad(torque)).tau_out_Nm == pytest.approx(torque)
+
+
 def test_it_converges_to_the_same_as_the_paper():
     """Errors against the reference fall until they reach the reference's own."""
     theta = sine()
@@ -123,7 +141,7 @@ def test_initial_profiles_within_friction_hold():
 def test_what_friction_holds_at_rest_it_holds_at_a_kink_too():
     kink = ("kink", "conduit", {"beta": 1.0, "s": 0.3})
     limit = np.exp(MU * (np.pi + 1.0))
-    profile = InitialTension.between_ends(HALF_LOOP, MU, (2 * T0, 2 * T0 / limit), (T0, T0), kinks_rad=1.0)
+    profile = InitialTension.between_ends(HALF_LOOP, MU, (2 * T0, 2 * T0 / limit), (T0, T0), kinks_rad=(1.0, 0.0))
     r = run(np.linspace(0.0, 0.1, 20), kink, T=profile)
     # All of cable A is about to slide, and the first pull is felt at its other end with no front to wait for.
     assert pytest.approx(limit, rel=1e-6) == r.T1_N / r.T2_N
@@ -132,7 +150,7 @@ def test_what_friction_holds_at_rest_it_holds_at_a_kink_too():
 def test_what_friction_holds_at_rest_it_holds_where_a_law_adds_bend_too():
     """The drive's pull slips all cells of a cable that is at its limit everywhere at once, and none before."""
     limit = np.exp(MU * (HALF_LOOP.bend_rad + 1.0))
-    profile = InitialTension.between_ends(HALF_LOOP, MU, (2 * T0, 2 * T0 / limit), (T0, T0), kinks_rad=1.0)
+    profile = InitialTension.between_ends(HALF_LOOP, MU, (2 * T0, 2 * T0 / limit), (T0, T0), kinks_rad=(0.5, 0.5))
     r = run(np.linspace(0.0, 0.1, 20), evenly_added_bend(1.0), T=profile)
     assert pytest.approx(limit, rel=2e-3) == r.T1_N / r.T2_N
 
@@ -235,7 +253,7 @@ def test_a_ring_that_samples_hardly_show_is_followed_between_them():
 
 def test_a_load_without_mass_is_stepped_once_a_sample():
     pair = transmission()
-    physics = _physics(pair, SpringLoad(K_E), settings_of(()), 32, {})
+    physics = _physics(pair, SpringLoad(K_E), settings_of(()), {})
     assert _steps(physics, pair, np.arange(1000) / 500) == 1
 
 

@@ -1,5 +1,7 @@
 """A recording that begins at rest after a motion: friction holds the tensions there by whatever law it has."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -37,6 +39,16 @@ def recorded_after(active, tension_N):
     }
     made = dict.fromkeys(channels, "made")
     return Recording("b", "r", "virtual-rig", time_s[: T1.size], channels, made, tension_N, PATH, rest_s=RESTS_S - 0.02)
+
+
+def test_a_curvature_of_next_to_nothing_changes_next_to_nothing_beside_a_kink_off_the_middle():
+    kink = Active("kink", "conduit", {"beta": 1.0, "s": 0.3})
+    one = recorded_after(kink, 7.3)
+    straight = Parameters(K, L, MU, R, R, SPRING, mechanisms=(kink,))
+    curved = replace(straight, tension_curvature_A=1e-6, tension_curvature_B=-1e-6)
+    found, other = (simulate_recording(one, parameters) for parameters in (straight, curved))
+    for force in ("F_drive_N", "F_load_N"):
+        assert np.abs(found[force] - other[force]).max() < 1e-4
 
 
 @pytest.mark.parametrize(

@@ -196,3 +196,22 @@ def test_a_load_that_is_driven_by_its_torque_rests_at_what_drives_it():
 )
 def test_the_torque_at_rest_is_known_to_the_accuracy_of_a_sensor(accuracy, known_to):
     assert spring_load(0.05, CABLE, accuracy).rest_known_to_Nm == pytest.approx(known_to)
+
+
+@pytest.mark.parametrize("bound", [None, (0.4, 0.2)])
+def test_a_kink_off_the_middle_leaves_a_straight_profile_straight(bound):
+    """Its corner lies where the kink has put it, and the profile stays within what friction holds on both sides."""
+    path, mu, kink_rad = ConduitPath([1.2], [2.0]), 0.3, 1.0
+    ends, kinks = (8.0, 6.5), (kink_rad, 0.0)
+    held = bound or (mu * 3.0, mu * 3.0)
+    for curvature in (0.0, 1e-9, 0.5, 1.0, -1.0):
+        shares = (curvature, curvature)
+        initial = InitialTension.between_ends(path, mu, ends, ends, shares, kinks, bound)
+        for tension, most in zip((initial.tension_A_N, initial.tension_B_N), held, strict=True):
+            # The first half has two thirds of all bend.
+            corners = [0.0, 2 / 3, 1.0] if tension.size == 3 else [0.0, 1.0]
+            near, middle, far = np.interp([0.0, 2 / 3, 1.0], corners, np.log(tension))
+            assert abs(middle - near) <= most * 2 / 3 + 1e-12
+            assert abs(far - middle) <= most / 3 + 1e-12
+            if abs(curvature) < 1e-6:
+                assert middle == pytest.approx(near + (far - near) * 2 / 3, abs=1e-8)

@@ -279,6 +279,6 @@ def run(
     if solved < n:
         raise ModelError(f"no balance of cables and load was found at sample {solved}")
     trace[EXPECTED] += own
-    if isinstance(load, TorqueLoad) and load.parallel_Nm_per_rad:  # the load's own torque, without the spring beside it
+    if isinstance(load, TorqueLoad):  # the load's own torque, without what acts beside it
         out[1] = trace[MISFIT]
     return Run(trace, out, noise)

@@ -63,7 +63,7 @@ class InitialTension:
         A_N: tuple[float, float],
         B_N: tuple[float, float],
         curvatures: tuple[float, float] = (0.0, 0.0),
-        kinks_rad: float = 0.0,
+        kinks_rad: tuple[float, float] = (0.0, 0.0),
         held: tuple[float, float] | None = None,
     ) -> "InitialTension":
         """Profiles with the given tensions at the drive and the load end of each cable.
@@ -79,14 +79,16 @@ class InitialTension:
         A_N, B_N : (float, float)
             Tension at the drive end and at the load end, N. A cable with an end at zero or below is slack.
         curvatures : (float, float)
-            Distance of ln T halfway through the bend from the straight line between the ends, over the largest that
-            friction can hold, -1 to 1. It depends on how the cable was tensioned, and the ends do not show it.
-        kinks_rad : float
-            Bend at kinks, which is not in the path, as far as it holds tension at rest.
+            Distance of ln T halfway through the path's bend from the straight line between the ends, over the largest
+            that friction can hold, -1 to 1. It depends on how the cable was tensioned, and the ends do not show it.
+        kinks_rad : (float, float)
+            Bend at kinks before and beyond this middle, which is not in the path, as far as it holds tension at rest.
         held : (float, float), optional
             Bound of each cable, where friction is another than mu phi.
         """
-        coulomb = max(friction_coefficient * (path.bend_rad + kinks_rad), 0.0)
+        halves_rad = [0.5 * path.bend_rad + kinks for kinks in kinks_rad]
+        coulomb = max(friction_coefficient * sum(halves_rad), 0.0)
+        before = halves_rad[0] / sum(halves_rad) if sum(halves_rad) > 0.0 else 0.5
         profiles = []
         for (drive, load), curvature, bound in zip((A_N, B_N), curvatures, held or (coulomb, coulomb), strict=True):
             if min(drive, load) <= 0:
@@ -94,9 +96,10 @@ class InitialTension:
                 continue
             # Numbers of Python's own: numpy takes ten times as long for single ones, in every run of a fit.
             ends = log(drive), log(load)
-            mean, half = 0.5 * (ends[0] + ends[1]), 0.5 * max(-bound, min(ends[1] - ends[0], bound))
-            off = max(-1.0, min(curvature, 1.0)) * max(0.5 * coulomb - abs(half), 0.0)
-            profiles.append(np.exp([mean - half, mean + off, mean + half]))
+            mean, rise = 0.5 * (ends[0] + ends[1]), max(-bound, min(ends[1] - ends[0], bound))
+            most = min(before, 1.0 - before) * max(bound - abs(rise), 0.0)
+            middle = mean + (before - 0.5) * rise + max(-1.0, min(curvature, 1.0)) * most
+            profiles.append(np.exp([mean - 0.5 * rise, middle, mean + 0.5 * rise]))
         corners = np.array([0.0, path.halfway_m, path.length_m])
         if not any(curvatures):  # a corner without a change of slope would only cost time
             return cls(corners[::2], *(T[::2] for T in profiles))

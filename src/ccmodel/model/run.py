@@ -24,6 +24,8 @@ from ccmodel.channels import (
 )
 from ccmodel.effort import count_run
 from ccmodel.failure import ModelError
+from ccmodel.geometry import ConduitPath
+from ccmodel.mechanisms.contract import Settings
 from ccmodel.mechanisms.relaxation import branch_times, kept_at_rest
 from ccmodel.mechanisms.winding import winding
 from ccmodel.model.active import active_of, modify_physics
@@ -202,16 +204,29 @@ def initial_tension(given: ModelInput, parameters: Parameters, load_from: LoadFr
     B = A if given.recording.far_end else _both_ends("B", tensions, scale)
     ends = A, (0.0, 0.0) if given.recording.far_end else B
     curvatures = parameters.tension_curvature_A, parameters.tension_curvature_B
-    kinks_rad = sum(kink.hold * kink.bend_rad for kink in settings.kinks)
-    if (added := settings.added_bend) is not None:
-        kinks_rad += float(np.trapezoid(added.values, added.knots))
-    coulomb = parameters.friction * (path.bend_rad + kinks_rad)
+    kinks_rad = _kinks_rad(settings, path)
+    coulomb = parameters.friction * (path.bend_rad + sum(kinks_rad))
     held = None
-    if modify_physics(parameters.mechanisms) and any(_beyond(coulomb, *pair) for pair in ends):
+    may_slip = any(curvatures) or any(_beyond(coulomb, *pair) for pair in ends)
+    if may_slip and modify_physics(parameters.mechanisms):
         motion = given.recording.time_s, given.theta_in
         factor = general.friction_factors(transmission_of(given.recording, parameters), settings, *motion)[0]
         held = held_at_rest(settings, coulomb, path.length_m, factor, ends)
     return InitialTension.between_ends(path, parameters.friction, A, B, curvatures, kinks_rad, held)
+
+
+def _kinks_rad(settings: Settings, path: ConduitPath) -> tuple[float, float]:
+    """Bend beside that of the path, as far as it holds tension at rest, before and beyond the middle of the latter."""
+    is_before = [kink.share * path.length_m <= path.halfway_m for kink in settings.kinks]
+    before = sum(kink.hold * kink.bend_rad for kink, first in zip(settings.kinks, is_before, strict=True) if first)
+    every = sum(kink.hold * kink.bend_rad for kink in settings.kinks)
+    if (added := settings.added_bend) is not None:
+        middle = path.halfway_m / path.length_m
+        knots = np.union1d(added.knots, middle)
+        bend, from_drive = added.at(knots), knots <= middle
+        before += float(np.trapezoid(bend[from_drive], knots[from_drive]))
+        every += float(np.trapezoid(bend, knots))
+    return before, every - before
 
 
 def _beyond(coulomb: float, near: float, far: float) -> bool:

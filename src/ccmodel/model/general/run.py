@@ -182,7 +182,7 @@ def prepared(
     """
     grid = make_grid(transmission.path, elements, settings.kinks)
     load_laws = _load_laws(settings, load)
-    physics = _physics(transmission, load, settings, elements, load_laws)
+    physics = _physics(transmission, load, settings, load_laws)
     added_rad = _added_bend(settings, grid, transmission.path.length_m)
     piece, node = _constants(transmission, settings, grid, added_rad)
     friction_factor = friction_factors(transmission, settings, time_s, theta_in)
@@ -224,8 +224,9 @@ def _marched(
     out = np.empty((len(OUTPUTS), time_s.size))
     drive = motor.angle_rad, motor.within_rad, at.drive
     solved = march(*state, time_s, theta_in, *drive, at.friction_factor, series, at.steps, out)
-    if isinstance(load, TorqueLoad) and load.parallel_Nm_per_rad:
-        out[5, :solved] = series[:solved]  # the sensor does not feel the spring in parallel
+    if isinstance(load, TorqueLoad):
+        # The sensor does not feel what acts beside the measured torque: a spring, a mass, friction of the load.
+        out[5, :solved] = np.broadcast_to(series, time_s.shape)[:solved]
     if settings.drive_friction_Nm != 0.0:
         out[6, :solved] += settings.drive_friction_Nm * bearing(out[7, :solved], settings.drive_presliding_rad)
     return solved, out
@@ -373,7 +374,7 @@ def _with_tables(array: NDArray, tables: Sequence[NDArray | None]) -> NDArray:
 
 
 def _physics(
-    transmission: Transmission, load: Load, settings: Settings, elements: int, load_laws: Mapping[str, NDArray]
+    transmission: Transmission, load: Load, settings: Settings, load_laws: Mapping[str, NDArray]
 ) -> rows.Physics:
     K_e = load.stiffness_Nm_per_rad if isinstance(load, SpringLoad) else 0.0
     K_e = load.parallel_Nm_per_rad if isinstance(load, TorqueLoad) else K_e
@@ -390,7 +391,7 @@ def _physics(
         has_settling=settings.settling_N > 0,
         has_relaxation=settings.relaxing_share != 0,
         relaxing_times_s=branch_times(settings.relaxing_time_s, settings.relaxing_spread),
-        bristle=contacts.bristle_m if has_presliding else _coulomb_bristle(transmission, settings, elements),
+        bristle=contacts.bristle_m if has_presliding else _coulomb_bristle(transmission, settings),
         presliding=has_presliding,
         creep=contacts.creep,
         element_m=contacts.element_m,
@@ -443,7 +444,6 @@ def _steps(physics: rows.Physics, transmission: Transmission, time_s: NDArray) -
     return steps if steps <= MOST_STEPS else UNRESOLVED_STEPS
 
 
-def _coulomb_bristle(transmission: Transmission, settings: Settings, elements: int) -> float:
+def _coulomb_bristle(transmission: Transmission, settings: Settings) -> float:
     over_cable = settings.conduit_compliance * transmission.axial_rigidity_N / transmission.path.length_m
-    soft = SOFT_CONDUIT_BRISTLE_M * ELEMENTS / elements
-    return max(COULOMB_BRISTLE_M, min(1.0, 10 * over_cable) * soft)
+    return max(COULOMB_BRISTLE_M, min(1.0, 10 * over_cable) * SOFT_CONDUIT_BRISTLE_M)
