@@ -2,7 +2,7 @@
 
 Equation: The load engages only beyond half_gap on either side of its neutral angle: a spring load gives tau_out =
 K_e (theta - half_gap sgn(theta)) outside the dead zone and zero inside. At rest the load lies against the side to
-which the cables' torque holds it.
+which the cables' torque holds it; where this torque is less than the sensors resolve, its place is unknown.
 
 Signature: The load's torque is flat around zero while the pulley turns.
 

@@ -134,10 +134,16 @@ def _parameters(mechanism: Mechanism) -> str:
     return "\n".join([f"| {' | '.join(titles)} |", "|---" * len(titles) + "|", *map(_row, mechanism.parameters)])
 
 
+def _limit(sense: str, value: float) -> str:
+    """A limit as it is printed. One that a value may reach stands a rounding error beyond it."""
+    reached = round(value, 6) + 0.0  # no -0
+    return f"{sense} {value:g}" if reached == value else f"{sense}= {reached:g}"
+
+
 def _row(p: Parameter) -> str:
     sign = "±" if p.signed else ""
     unit = "" if p.unit == "1" else p.unit
-    limits = [f"{sense} {value:g}" for sense, value in ((">", p.above), ("<", p.below)) if isfinite(value)]
+    limits = [_limit(sense, value) for sense, value in ((">", p.above), ("<", p.below)) if isfinite(value)]
     possible = f" (always {' and '.join(limits)})" if limits else ""
     default = "must be given" if p.default is None else f"{p.default:.3g}"
     cells = (

@@ -4,7 +4,8 @@ Equation: The drive train connects the motor at angle phi with the pulley at the
 theta = compliance tau + half_gap sgn(tau). The encoder of the pulley shows theta within a count; within that range the
 pulley is where the torque of the train balances that of cables and bearing.
 
-Signature: At a reversal the torque changes while the pulley stands, the slower the slower the motor.
+Signature: At a reversal the pulley stands while the motor crosses twist and gap of the train. The torque changes
+meanwhile, at a rate in proportion to the motor's speed.
 
 Separated by: the motor's own encoder (`motor_encoder_counts`), without which this mechanism has no effect.
 

@@ -1,6 +1,7 @@
 """The load's moment of inertia.
 
-Equation: tau_out = K_e theta + B dtheta/dt + J d2theta/dt2, with B = 2 zeta sqrt(J K_e).
+Equation: tau_out = K_e theta + B dtheta/dt + J d2theta/dt2, with B = 2 zeta sqrt(J K_e). Where the load is a measured
+torque, B and J act beside it, and no sensor reads what they take.
 
 Signature: The torque's deviation from the spring's grows with the square of the frequency. While the cables hold
 still the load rings on them.

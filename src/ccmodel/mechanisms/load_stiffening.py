@@ -1,6 +1,7 @@
 """The load's spring stiffens with its angle.
 
-Equation: tau_out = K_e theta + K3 theta^3, on top of the load's own law.
+Equation: tau_out = K_e theta + K3 theta^3, on top of the load's own law. Where the load is a measured torque, K3 acts
+beside it, and no sensor reads what it takes.
 
 Signature: tau_out against theta_out is curved.
 

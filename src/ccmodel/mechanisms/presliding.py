@@ -8,8 +8,9 @@ speed.
 
 Signature: Corners at reversals, sharp in the paper's model, are rounded over a few z0 of sliding.
 
-Separated by: reversals of growing amplitude: small ones lose no work in elements and creep with a bristle; with a
-compliant termination they close, and the cable next to it slides and loses work from the smallest on.
+Separated by: reversals of growing amplitude. In small loops elements are elastic and lose no work, and a Dahl bristle
+creeps. With a compliant termination small loops close as well, but the cable next to it slides, so that even the
+smallest lose work.
 
 Source: Iwan, Journal of Applied Mechanics 33(4), 893-900, 1966, doi:10.1115/1.3625199; Dahl, AIAA Journal 14(12),
 1675-1682, 1976, doi:10.2514/3.61511.

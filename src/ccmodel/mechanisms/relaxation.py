@@ -4,9 +4,9 @@ Equation: Generalised Maxwell chain: the tension is T = T_e - r q with the elast
 branches, dq_k/dt = (T_e - q_k) / tau_k. Their times tau_k are evenly spaced in the logarithm about tau; spread is the
 longest over the shortest, and at 1 the chain is a standard linear solid. r is the share that a fresh cable loses in
 all. A recording starts at rest, as if its cables had been held since their tensioning: a time t after it, q is
-(1 - e) T_e with e the mean of exp(-t / tau_k). relaxed is then the share of the loss from here on that is over,
-1 - relaxed = e / (1 - r (1 - e)): 0 in fresh cables and 1 in settled ones. Between samples T_e is taken as linear in
-time, for which each q_k is exact.
+(1 - e) T_e with e the mean of exp(-t / tau_k). From there the cables still lose the share r (1 - relaxed) of their
+tension at the start of the recording, with 1 - relaxed = e / (1 - r (1 - e)): relaxed is 0 in fresh cables and 1 in
+settled ones. Between samples T_e is taken as linear in time, for which each q_k is exact.
 
 Signature: Tension decays at rest and over cycles while the angles stay. The paper measured 10.5 % with 30 s on its
 rig and neglected it.

@@ -1,11 +1,11 @@
 """Friction is higher at rest than in motion.
 
-Equation: The friction coefficient is mu (1 + a r) with the state r of the contact: r = 1 after a rest, and dr/ds =
-(exp(-(v / vs)^delta) - r) / renewal over the sliding distance s, with v the sliding speed. Steady sliding gives mu
-(1 + a exp(-(v / vs)^delta)): a Gaussian for delta = 2, the default, and an exponential for delta = 1. By default,
-renewal is 20 um.
+Equation: The friction coefficient is mu (1 + a r) with the state r of the contact: r = 1 when a recording starts, and
+dr/ds = (exp(-(v / vs)^delta) - r) / renewal over the sliding distance s, with v the sliding speed. A rest leaves r as
+sliding made it. Steady sliding gives mu (1 + a exp(-(v / vs)^delta)): a Gaussian for delta = 2, the default, and an
+exponential for delta = 1. By default, renewal is 20 um.
 
-Signature: Friction peaks at break-away, and the loss falls with speed.
+Signature: Friction peaks when the cables first slide, and the loss falls with speed.
 
 Separated by: a speed sweep.
 

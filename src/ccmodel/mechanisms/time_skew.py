@@ -1,7 +1,8 @@
 """One side's clock is late.
 
 Equation: The channels of one side read at time t what they would have read at t - delay. The model runs on the
-drive's clock, whose angle is its input, so a late drive side is simulated as an early load side.
+drive's clock, whose angle is its input, so a late drive side is simulated as an early load side. Over the last delay
+of a recording, of which the drive's motion is not known, the load goes on at its last rate.
 
 Signature: Loops of a drive channel over a load channel widen or narrow with frequency, whichever channels are
 taken.
