@@ -11,7 +11,7 @@ from ccmodel import mechanisms as registry
 from ccmodel.channels import MEASURED, TENSIONS
 from ccmodel.geometry import ConduitPath
 from ccmodel.model.general.run import Active
-from ccmodel.model.initial import InitialTension
+from ccmodel.model.initial import Held, InitialTension
 from ccmodel.model.load import AngleLoad, FixedLoad, SpringLoad, TorqueLoad
 from ccmodel.model.run import (
     ModelInput,
@@ -198,16 +198,16 @@ def test_the_torque_at_rest_is_known_to_the_accuracy_of_a_sensor(accuracy, known
     assert spring_load(0.05, CABLE, accuracy).rest_known_to_Nm == pytest.approx(known_to)
 
 
-@pytest.mark.parametrize("bound", [None, (0.4, 0.2)])
-def test_a_kink_off_the_middle_leaves_a_straight_profile_straight(bound):
+@pytest.mark.parametrize("acting", [None, (Held(0.4), Held(0.2))])
+def test_a_kink_off_the_middle_leaves_a_straight_profile_straight(acting):
     """Its corner lies where the kink has put it, and the profile stays within what friction holds on both sides."""
     path, mu, kink_rad = ConduitPath([1.2], [2.0]), 0.3, 1.0
     ends, kinks = (8.0, 6.5), (kink_rad, 0.0)
-    held = bound or (mu * 3.0, mu * 3.0)
+    held = acting or 2 * (Held(mu * 3.0),)
     for curvature in (0.0, 1e-9, 0.5, 1.0, -1.0):
         shares = (curvature, curvature)
-        initial = InitialTension.between_ends(path, mu, ends, ends, shares, kinks, bound)
-        for tension, most in zip((initial.tension_A_N, initial.tension_B_N), held, strict=True):
+        initial = InitialTension.between_ends(path, mu, ends, ends, shares, kinks, acting)
+        for tension, (most, _) in zip((initial.tension_A_N, initial.tension_B_N), held, strict=True):
             # The first half has two thirds of all bend.
             corners = [0.0, 2 / 3, 1.0] if tension.size == 3 else [0.0, 1.0]
             near, middle, far = np.interp([0.0, 2 / 3, 1.0], corners, np.log(tension))

@@ -1,7 +1,9 @@
 """Tension along both cables before anything moves."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import log
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +15,29 @@ from ccmodel.geometry import ConduitPath
 BOUND_TOLERANCE = 1e-9
 
 
+class Held(NamedTuple):
+    """What friction and a drag hold of a cable at rest: |ln(T_load + c) - ln(T_drive + c)| of no more than `bound`.
+
+    c is `drag_N`, the drag over what friction takes of a tension of 1 N: the tension that would rub as much.
+    """
+
+    bound: float
+    drag_N: float = 0.0
+
+
 @dataclass(frozen=True)
 class InitialTension:
-    """Tension profiles of cables A and B as corners; between corners ln T is linear in the bend angle phi.
+    """Tension profiles of cables A and B as corners; between corners ln(T + c) is linear in the bend angle phi.
 
     Parameters
     ----------
     x_m : ndarray, shape (k,)
         Arc length of the corners from the drive end, m, strictly increasing, from 0 to the conduit's length.
     tension_A_N, tension_B_N : ndarray, shape (k,)
-        Tension at the corners, N: positive throughout, or zero throughout for a cable that hangs just slack.
+        Tension at the corners, N: positive throughout, or zero throughout for a cable that hangs just slack. Of a cable
+        with a drag some may be zero.
+    drags_N : (float, float)
+        c of each cable (`Held.drag_N`).
 
     Raises
     ------
@@ -33,6 +48,7 @@ class InitialTension:
     x_m: NDArray
     tension_A_N: NDArray
     tension_B_N: NDArray
+    drags_N: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         for name in ("x_m", "tension_A_N", "tension_B_N"):
@@ -44,9 +60,9 @@ class InitialTension:
             raise ModelError("an initial profile has at least two corners and a tension of A and of B at each")
         if (np.diff(self.x_m) <= 0).any():
             raise ModelError("the corners of an initial profile go from the drive end to the load end")
-        for name in ("tension_A_N", "tension_B_N"):
+        for name, drag_N in zip(("tension_A_N", "tension_B_N"), self.drags_N, strict=True):
             tension = getattr(self, name)
-            if not ((tension > 0).all() or (tension == 0).all()):
+            if not ((tension > 0).all() or (tension == 0).all() or (drag_N > 0.0 and (tension >= 0).all())):
                 raise ModelError(f"{name} must be positive along the whole cable, or zero along the whole cable")
 
     @classmethod
@@ -64,46 +80,46 @@ class InitialTension:
         B_N: tuple[float, float],
         curvatures: tuple[float, float] = (0.0, 0.0),
         kinks_rad: tuple[float, float] = (0.0, 0.0),
-        held: tuple[float, float] | None = None,
+        held: Sequence[Held] | None = None,
     ) -> "InitialTension":
         """Profiles with the given tensions at the drive and the load end of each cable.
 
         Friction holds no more than |ln(T_load / T_drive)| = mu phi. Ends that are further apart (through a measurement
         error or an underestimated mu) are moved to that bound about their geometric mean, as a cable that slips at
-        rest does.
+        rest does. Beside a drag all of this holds for T + c.
 
         Parameters
         ----------
         path : ConduitPath
         friction_coefficient : float
         A_N, B_N : (float, float)
-            Tension at the drive end and at the load end, N. A cable with an end at zero or below is slack.
+            Tension at the drive end and at the load end, N. A cable without a drag that has an end at zero or below is
+            slack.
         curvatures : (float, float)
             Distance of ln T halfway through the path's bend from the straight line between the ends, over the largest
             that friction can hold, -1 to 1. It depends on how the cable was tensioned, and the ends do not show it.
         kinks_rad : (float, float)
             Bend at kinks before and beyond this middle, which is not in the path, as far as it holds tension at rest.
-        held : (float, float), optional
-            Bound of each cable, where friction is another than mu phi.
+        held : sequence of Held, optional
+            Of each cable, where friction is another than mu phi.
         """
         halves_rad = [0.5 * path.bend_rad + kinks for kinks in kinks_rad]
         coulomb = max(friction_coefficient * sum(halves_rad), 0.0)
         before = halves_rad[0] / sum(halves_rad) if sum(halves_rad) > 0.0 else 0.5
-        profiles = []
-        for (drive, load), curvature, bound in zip((A_N, B_N), curvatures, held or (coulomb, coulomb), strict=True):
-            if min(drive, load) <= 0:
+        held, profiles = held or 2 * (Held(coulomb),), []
+        for (drive, load), curvature, (bound, drag_N) in zip((A_N, B_N), curvatures, held, strict=True):
+            if min(drive, load) <= 0 and (drag_N <= 0.0 or max(drive, load) <= 0):
                 profiles.append(np.zeros(3))
                 continue
             # Numbers of Python's own: numpy takes ten times as long for single ones, in every run of a fit.
-            ends = log(drive), log(load)
+            ends = log(max(drive, 0.0) + drag_N), log(max(load, 0.0) + drag_N)
             mean, rise = 0.5 * (ends[0] + ends[1]), max(-bound, min(ends[1] - ends[0], bound))
             most = min(before, 1.0 - before) * max(bound - abs(rise), 0.0)
             middle = mean + (before - 0.5) * rise + max(-1.0, min(curvature, 1.0)) * most
-            profiles.append(np.exp([mean - 0.5 * rise, middle, mean + 0.5 * rise]))
-        corners = np.array([0.0, path.halfway_m, path.length_m])
-        if not any(curvatures):  # a corner without a change of slope would only cost time
-            return cls(corners[::2], *(T[::2] for T in profiles))
-        return cls(corners, *profiles)
+            profiles.append((np.exp([mean - 0.5 * rise, middle, mean + 0.5 * rise]) - drag_N).clip(0.0))
+        corners, drags_N = np.array([0.0, path.halfway_m, path.length_m]), (held[0].drag_N, held[1].drag_N)
+        every = 1 if any(curvatures) else 2  # a corner without a change of slope would only cost time
+        return cls(corners[::every], profiles[0][::every], profiles[1][::every], drags_N)
 
     def at(self, x: NDArray, phi: NDArray) -> tuple[NDArray, NDArray]:
         """Tensions of A and B (N) at arc lengths `x` (m), the bend from the drive end to each of which is `phi` (rad).
@@ -112,7 +128,9 @@ class InitialTension:
         have the shape of `x`.
         """
         corner_phi = np.interp(self.x_m, x, phi)
-        return _interpolate(phi, corner_phi, self.tension_A_N), _interpolate(phi, corner_phi, self.tension_B_N)
+        pairs = zip((self.tension_A_N, self.tension_B_N), self.drags_N, strict=True)
+        of_A, of_B = (_interpolate(phi, corner_phi, tension, drag_N) for tension, drag_N in pairs)
+        return of_A, of_B
 
     def log_slopes(self, path: ConduitPath, friction_coefficient: float) -> tuple[NDArray, NDArray, NDArray]:
         """Corners in the plane of mu phi and ln T, checked against friction's bound |d ln T / d phi| <= mu.
@@ -150,8 +168,8 @@ def _slopes(m: NDArray, tension: NDArray, cable: str) -> NDArray:
     return np.where(on_bound & (run > 0), np.sign(rise), np.clip(slope, -1, 1))
 
 
-def _interpolate(phi: NDArray, corner_phi: NDArray, tension: NDArray) -> NDArray:
-    """Tension at `phi`, ln T linear between corners; zero for a slack cable."""
+def _interpolate(phi: NDArray, corner_phi: NDArray, tension: NDArray, drag_N: float) -> NDArray:
+    """Tension at `phi`, ln(T + drag) linear between corners; zero for a slack cable."""
     if not tension.any():
         return np.zeros_like(phi)
-    return np.exp(np.interp(phi, corner_phi, np.log(tension)))
+    return (np.exp(np.interp(phi, corner_phi, np.log(tension + drag_N))) - drag_N).clip(0.0)

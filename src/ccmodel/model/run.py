@@ -31,7 +31,7 @@ from ccmodel.mechanisms.winding import winding
 from ccmodel.model.active import active_of, modify_physics
 from ccmodel.model.exact import pair as exact
 from ccmodel.model.general import run as general
-from ccmodel.model.general.rest import held_at_rest
+from ccmodel.model.general.rest import has_drag, held_at_rest
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad
 from ccmodel.model.model_input import PRESCRIBED, ModelInput
@@ -208,7 +208,7 @@ def initial_tension(given: ModelInput, parameters: Parameters, load_from: LoadFr
     coulomb = parameters.friction * (path.bend_rad + sum(kinks_rad))
     held = None
     may_slip = any(curvatures) or any(_beyond(coulomb, *pair) for pair in ends)
-    if may_slip and modify_physics(parameters.mechanisms):
+    if (may_slip or has_drag(settings)) and modify_physics(parameters.mechanisms):
         motion = given.recording.time_s, given.theta_in
         factor = general.friction_factors(transmission_of(given.recording, parameters), settings, *motion)[0]
         held = held_at_rest(settings, coulomb, path.length_m, factor, ends)

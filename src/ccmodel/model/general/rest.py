@@ -16,10 +16,13 @@ from ccmodel.mechanisms.strand_settling import stretch_at
 from ccmodel.mechanisms.tables import Table, stretched
 from ccmodel.mechanisms.winding import winding
 from ccmodel.model.general import layout as rows
+from ccmodel.model.initial import Held
 from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad
 
 # Slack of a cable B that is not there: longer than any travel of the drive or the load, m.
 ABSENT_SLACK_M = 1e3
+# Friction mu phi of a conduit that all but does not rub: a drag holds the tension in a straight line there.
+SMALLEST_BOUND = 1e-6
 # Steps of the integral of friction along the conduit at rest.
 REST_STEPS = 16
 
@@ -72,8 +75,8 @@ def held_at_rest(
     length_m: float,
     friction_factor: NDArray,
     ends_N: Sequence[tuple[float, float]],
-) -> tuple[float, float]:
-    """Largest |ln(T_load / T_drive)| that friction holds at rest, by cable.
+) -> tuple[Held, Held]:
+    """What friction and a drag hold at rest, by cable; of friction by tension, with the drag in the bound.
 
     Parameters
     ----------
@@ -94,7 +97,8 @@ def held_at_rest(
     if settings.added_drag is not None:
         drag_N += float(settings.added_drag.at(along).mean()) * length_m
     if settings.conduit_drag is not None:
-        drag_N += max(float(settings.conduit_drag.at(np.zeros(1))[0]), 0.0) * length_m
+        drag_N += float(settings.conduit_drag.at(np.zeros(1))[0]) * length_m
+    drag_N = max(drag_N, 0.0)
 
     def law(tension: float) -> float:
         return float(friction_at_tension(settings, np.array(tension)))
@@ -102,16 +106,22 @@ def held_at_rest(
     found = []
     for ratio, factor, ends in zip(friction_ratios(settings), friction_factor, ends_N, strict=True):
         lowest, held = min(ends), max(coulomb * float(ratio * factor), 0.0)
-        if lowest <= 0.0 or not (drag_N or has_friction_by_tension(settings)):
-            found.append(held)
+        if lowest <= 0.0 or not has_friction_by_tension(settings):
+            # The drag is spread as the bend is.
+            found.append(Held(held, drag_N / max(held, SMALLEST_BOUND)))
             continue
         # From the end with less tension to the other: a drag adds the same force at every place, friction a share.
         tension = lowest
         for _ in range(REST_STEPS):
             middle = tension + (held * law(tension) * tension + drag_N) / (2 * REST_STEPS)
             tension += (held * law(middle) * middle + drag_N) / REST_STEPS
-        found.append(log(tension / lowest))
+        found.append(Held(log(tension / lowest)))
     return found[0], found[1]
+
+
+def has_drag(settings: Settings) -> bool:
+    """Whether a drag acts beside friction, at rest too."""
+    return settings.drag_N != 0 or settings.added_drag is not None or settings.conduit_drag is not None
 
 
 def has_friction_by_tension(settings: Settings) -> bool:
