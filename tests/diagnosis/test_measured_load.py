@@ -161,6 +161,16 @@ def test_a_fit_starts_from_a_slack_cable_too_where_the_initial_tension_is_not_ob
     assert len(starting_points(Problem([], {"friction_coefficient": Free(2.0)}))) == 1
 
 
+def test_a_fit_that_goes_on_starts_from_another_calibration_in_place_of_a_slack_cable():
+    free = {"friction_coefficient": Free(2.0, 0.0, 5.0), "pretension_share": Free(10.0, 3.0, 50.0)}
+    own, other = starting_points(Problem([], free), {"pretension_share": 4.0, "stiffness_N_per_m": 1e4})
+    assert own == pytest.approx([2.0, 10.0])
+    assert other == pytest.approx([2.0, 4.0])
+    for same in ({}, {"pretension_share": 10.0}):
+        assert len(starting_points(Problem([], free), same)) == 1
+    assert len(starting_points(Problem([], {"friction_coefficient": Free(2.0)}), {"friction_coefficient": 3.0})) == 1
+
+
 def test_the_better_start_is_taken_and_one_that_cannot_be_run_only_if_none_can(monkeypatch):
     def minimise(problem, x, how):
         if x < 0:

@@ -12,6 +12,7 @@ from ccmodel.mechanisms.pulley_friction import PRESLIDING_RAD
 from ccmodel.mechanisms.relaxation import BRANCHES, branch_times, followed, kept_at_rest, relaxed_after
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, SpringLoad
+from ccmodel.model.response import Status
 from general_runs import HALF_LOOP, K_E, MU, T0, TENSIONS, L, R, last_cycle, loop_area, rms, run, sine
 
 DRIVE_ONLY = (*TENSIONS, "theta_out_rad", "tau_out_Nm")
@@ -433,6 +434,15 @@ def test_a_sensor_fault_shows_in_one_channel(base, side, name, values, channel, 
     reading = expected(base.read[f"F_{side}_N"], base.read[torque], base.time_s)
     assert r.read[wanted] == pytest.approx(reading, rel=1e-12)
     assert (base.T1_N == r.T1_N).all()
+
+
+def test_a_fastening_that_hardly_yields_is_rigid():
+    """Its tension would be the rounding error of a difference of positions."""
+    rigid = run(sine())
+    for compliance in (1e-18, 1e-13, 1e-10, 2e-10):
+        found = run(sine(), ("termination-compliance", "drive-end", {"compliance": compliance}))
+        assert found.status is Status.OK
+        assert pytest.approx(rigid.T1_N, abs=1e-4) == found.T1_N
 
 
 def test_a_late_drive_ends_as_its_load_went_on():

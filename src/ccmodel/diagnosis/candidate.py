@@ -273,6 +273,7 @@ def fit(
     start: Mapping[str, float],
     deadline: Deadline = UNLIMITED,
     search: Search = SEARCH,
+    calibration: Mapping[str, float] | None = None,
 ) -> CandidateFit:
     """Fit a candidate model from given values and cross-validate it.
 
@@ -287,6 +288,9 @@ def fit(
     deadline : Deadline
         When the fit is given up.
     search : Search
+    calibration : mapping of str to float, optional
+        Values of `free` from which the search may start too, where the initial tension is not observed. The default is
+        the start with a slack cable. A fit that goes on from an earlier one needs none of these.
 
     Raises
     ------
@@ -301,7 +305,7 @@ def fit(
     # Runs of the paper's model are cheap, and its cost is rough where much is missing.
     secants = search.secants and bool(hypothesis.baseline or hypothesis.acting)
     search = replace(search, deadline=deadline, secants=secants)
-    solution = _search(problem, hypothesis, search)
+    solution = _search(problem, hypothesis, search, calibration)
     further = replace(search, most_evaluations=settings.START_EVALUATIONS)
     for _ in range(settings.STATE_PASSES if _has_states(hypothesis) else 0):
         # The states' effects were those of the values at the start, which the fit has left.
@@ -435,8 +439,10 @@ def _with_states(
     return each(whitened, of)
 
 
-def _search(problem: Problem, hypothesis: Hypothesis, search: Search) -> Solution:
-    starts = [inside_bounds(problem, x) for x in starting_points(problem)]
+def _search(
+    problem: Problem, hypothesis: Hypothesis, search: Search, calibration: Mapping[str, float] | None
+) -> Solution:
+    starts = [inside_bounds(problem, x) for x in starting_points(problem, calibration)]
     if len(starts) > 1:
         starts = [best_start(problem, starts, search).x]
     if hypothesis.continuation:
@@ -471,12 +477,19 @@ def _cost_without(problem: Problem, hypothesis: Hypothesis) -> float:
     return problem.cost(np.array([hypothesis.neutral.get(name, value) for name, value in values]))
 
 
-def starting_points(problem: Problem) -> list[NDArray]:
-    """The problem's start; where the initial tension is not observed, also a start with a slack cable."""
+def starting_points(problem: Problem, calibration: Mapping[str, float] | None = None) -> list[NDArray]:
+    """The problem's start; where the initial tension is not observed, also one with other values of the calibration.
+
+    These are the given ones, or, by default, those of a slack cable.
+    """
     if "pretension_share" not in problem.names:
         return [problem.start]
-    is_pretension = np.array(problem.names) == "pretension_share"
-    return [np.where(is_pretension, share * problem.start, problem.start) for share in settings.PRETENSION_STARTS]
+    if calibration is None:
+        is_pretension = np.array(problem.names) == "pretension_share"
+        return [np.where(is_pretension, share * problem.start, problem.start) for share in settings.PRETENSION_STARTS]
+    pairs = zip(problem.names, problem.start, strict=True)
+    other = np.array([calibration.get(name, value) for name, value in pairs])
+    return [problem.start] if np.array_equal(other, problem.start) else [problem.start, other]
 
 
 def best_start(problem: Problem, starts: Sequence[NDArray], search: Search = SEARCH) -> Solution:

@@ -188,11 +188,17 @@ class Selection:
         return replace(self, progress=within(self.progress, low, high))
 
     def fit_all(
-        self, whitened: Sequence[Whitened], base: CandidateFit, chosen: Sequence[Score], search: Search = SEARCH
+        self,
+        whitened: Sequence[Whitened],
+        base: CandidateFit,
+        chosen: Sequence[Score],
+        search: Search = SEARCH,
+        calibration: Mapping[str, float] | None = None,
     ) -> list[CandidateFit]:
         """Fit extensions of a fitted model, from the values of their scores and from known ones, until the deadline.
 
-        Of several fits of a hypothesis, the one with the lowest mean square is returned.
+        Of several fits of a hypothesis, the one with the lowest mean square is returned. `calibration` as of
+        `ccmodel.diagnosis.candidate.fit`.
         """
         starts = [(score.hypothesis, base.values | score.values) for score in chosen]
         every = [(h, one) for h, s in starts for one in (other_start(s, self.known), s) if one is not None]
@@ -201,7 +207,7 @@ class Selection:
             hypothesis = base.hypothesis.and_also(further)
             self.progress(f"fitting {hypothesis}", k / len(every))
             try:
-                candidate = fit(whitened, hypothesis, self.free, start, self.deadline, search)
+                candidate = fit(whitened, hypothesis, self.free, start, self.deadline, search, calibration)
             except OutOfTimeError:
                 self.progress(f"{hypothesis}: not fitted, the time is over")
                 break
@@ -274,7 +280,7 @@ class Selection:
 
         The paper's model, for instance, has no ringing load, and so no error of it from the uncertain drive motion.
         What differs from run to run is estimated again too: about a wrong model, friction seems to scatter.
-        Where the initial tension is not observed, every candidate is fitted from the best one's calibration too: the
+        Where the initial tension is not observed, every candidate may start from the best one's calibration too: the
         cost has several minima there.
         """
         best = found.by_evidence[0]
@@ -282,24 +288,17 @@ class Selection:
             return found
         self.progress(f"linearising the covariance about {best.hypothesis}", 0.0)
         models = [best.model(w.observations.parameters, w.session) for w in found.whitened]
-
-        def starts(candidate: CandidateFit) -> list[dict[str, float]]:
-            if candidate is best or self.is_tension_observed:
-                return [candidate.values]
-            return [candidate.values, candidate.values | {name: best.values[name] for name in self.free}]
-
+        calibration = {name: best.values[name] for name in self.free}
         try:
             repeatability = estimated(best.whitened, best.residuals)
             whitened = each(found.whitened, lambda i, w: relinearised(w, models[i], repeatability, best.whitened[i]))
-            base = min(
-                (fit(whitened, found.base.hypothesis, self.free, s, self.deadline) for s in starts(found.base)),
-                key=lambda c: c.mean_square,
-            )
+            of_base = found.base.hypothesis, self.free, found.base.values
+            base = fit(whitened, *of_base, self.deadline, calibration=calibration)
         except ModelError as error:
             self.progress(f"the covariance stays as it is ({error})")
             return found
         near, far = contenders(found)
-        again = self.fit_all(whitened, base, [Score(c.hypothesis, 0.0, s) for c in near for s in starts(c)])
+        again = self.fit_all(whitened, base, _scores(near), calibration=calibration)
         # Until the selection ends, all are fitted again.
         if self.deadline.has_passed and self.goes_on:
             return found
@@ -334,12 +333,16 @@ class Selection:
         """
         if found.is_adequate:
             return found
-        scores = [Score(c.hypothesis, 0.0, c.values) for c in contenders(found)[0]]
-        again = self.fit_all(found.whitened, found.base, scores, LAST_SEARCH)
+        again = self.fit_all(found.whitened, found.base, _scores(contenders(found)[0]), LAST_SEARCH, calibration={})
         if self.deadline.has_passed:
             return found
         every = {c.hypothesis: c for c in [*found.candidates, *again]}
         return found.with_candidates(list(every.values()))
+
+
+def _scores(again: Iterable[CandidateFit]) -> list[Score]:
+    """Fitted candidates as starts of another fit."""
+    return [Score(c.hypothesis, 0.0, c.values) for c in again]
 
 
 def least_evidence(found: Comparison) -> float:

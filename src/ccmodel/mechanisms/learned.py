@@ -101,6 +101,9 @@ RANGE = (0.005, 0.995)
 LOWEST_TENSION = 0.02
 # Distance of two knots that are one, as a share of all that they span.
 SAME_KNOT = 1e-9
+# Fastenings that yield less are rigid, m/N: a thousandth of the stiffest cable's stretch. The tension of a stiffer piece
+# would be made of rounding errors, and a step would take a hundred times as long.
+RIGID_M_PER_N = 1e-10
 # Friction is never negative in either direction or cable, and neither is a compliance.
 LARGEST_BIAS = 0.95
 
@@ -383,14 +386,14 @@ Source: Rasmussen and Williams, Gaussian Processes for Machine Learning, MIT Pre
 def end_spring(settings: Settings, end: str) -> tuple[float, Table | None] | None:
     """Mean compliance of the cables' fastening at "drive" or "load", m/N, and its course over the mean, if any.
 
-    None for a fastening that does not yield.
+    None for a fastening that does not yield, or by less than `RIGID_M_PER_N`.
     """
     compliance, law = getattr(settings, f"{end}_end_compliance"), getattr(settings, f"{end}_end_stretch")
-    if law is None:
-        return (compliance, None) if compliance > 0 else None
-    values = compliance + law.values
+    values = compliance + (law.values if law is not None else np.zeros(1))
     mean = float(values.mean())
-    return mean, Table(law.knots, (values / mean).clip(LEAST_COMPLIANCE))
+    if mean < RIGID_M_PER_N:
+        return None
+    return mean, None if law is None else Table(law.knots, (values / mean).clip(LEAST_COMPLIANCE))
 
 
 def _united(x: NDArray, others: NDArray) -> NDArray:
