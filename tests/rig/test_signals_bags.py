@@ -94,6 +94,55 @@ def test_joints_go_by_their_names_in_any_order_and_from_several_nodes(tmp_path):
     np.testing.assert_allclose(signals["js/position/spring"].time_s, 0.001 + 0.01 * np.arange(10), atol=1e-9)
 
 
+def nested(*fields, kind="lab/msg/State"):
+    """A store with a type of messages that holds others."""
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    store.register(get_types_from_msg("\n".join(fields), kind))
+    return store, store.types[kind]
+
+
+def test_joints_within_a_message_go_by_their_names_in_any_order(tmp_path):
+    store, state = nested("sensor_msgs/JointState drive", "sensor_msgs/JointState[] others")
+    messages = []
+    for i in range(10):
+        at = sample.STARTED_NS + 10**7 * i
+        one, other = joints(["in", "out"], [i, -i], at), joints(["out", "in"], [-i, i], at)
+        order = (one, [other, one, one]) if i % 2 else (other, [one, one, other])
+        messages.append(("/state", state(*order), at))
+    signals = {s.name: s for s in read_signals(write(tmp_path / "bag", *messages, store=store)).signals}
+    for place in ("drive", "others/0", "others/1", "others/2"):
+        assert signals[f"state/{place}/position/in"].values.tolist() == list(range(10))
+        assert signals[f"state/{place}/position/out"].values.tolist() == [-i for i in range(10)]
+
+
+def test_names_that_do_not_tell_elements_apart_are_not_used(tmp_path):
+    messages = [("/js", joints(["", ""], [i, -i], 0), sample.STARTED_NS + i) for i in range(10)]
+    signals = {s.name: s for s in read_signals(write(tmp_path / "bag", *messages)).signals}
+    assert signals["js/position/0"].values.tolist() == list(range(10))
+    assert signals["js/position/1"].values.tolist() == [-i for i in range(10)]
+
+
+def test_an_array_or_a_list_that_is_empty_at_first_is_read(tmp_path):
+    store, state = nested("sensor_msgs/JointState joints", "geometry_msgs/Vector3[] forces")
+    vector, layout, messages = T["geometry_msgs/msg/Vector3"], T["std_msgs/msg/MultiArrayLayout"]([], 0), []
+    for i in range(10):
+        at, filled = sample.STARTED_NS + 10**7 * i, i not in (0, 5)
+        joint = joints(["in"], [i], at)
+        joint.effort = np.full(int(filled), 7.0 + i)
+        messages.append(("/state", state(joint, [vector(i, 0.0, 0.0)] * filled), at))
+        messages.append(("/array", T["std_msgs/msg/Float64MultiArray"](layout, np.full(2 * filled, 1.0 * i)), at))
+    file = read_signals(write(tmp_path / "bag", *messages, store=store))
+    signals = {s.name: s for s in file.signals}
+    expected = np.where(np.isin(np.arange(10), (0, 5)), np.nan, np.arange(10))
+    np.testing.assert_array_equal(signals["state/joints/effort/in"].values, 7 + expected)
+    np.testing.assert_array_equal(signals["state/forces/0/x"].values, expected)
+    np.testing.assert_array_equal(signals["array/data/1"].values, expected)
+    assert signals["state/joints/position/in"].values.tolist() == list(range(10))
+    for place in ("state/joints/effort", "array/data"):
+        text = f"/{place}: 2 messages have another number of elements and are read as no number"
+        assert text in file.remarks
+
+
 def test_fields_within_fields_arrays_by_index_and_pictures_left_out(tmp_path):
     start = sample.STARTED_NS
     vector, layout = T["geometry_msgs/msg/Vector3"], T["std_msgs/msg/MultiArrayLayout"]([], 0)

@@ -67,6 +67,17 @@ def test_mdf_invalid_samples_are_nan(tmp_path):
     assert np.flatnonzero(np.isnan(signal.values)).tolist() == [7] or len(signal.values) == len(T) - 1
 
 
+@pytest.mark.parametrize(("name", "sync"), [("angle", 2), ("distance", 3), ("index", 4)])
+def test_a_master_of_mdf_that_is_no_time_is_a_signal(tmp_path, name, sync):
+    with MDF(version="4.10") as file:
+        file.append([Signal(Y, 0.5 * X, name="torque", unit="Nm", master_metadata=(name, sync))])
+        file.save(tmp_path / "log.mf4", overwrite=True)
+    signals = by_name(read_signals(tmp_path / "log.mf4"))
+    assert signals.keys() == {name, "torque"}
+    assert (signals[name].values == 0.5 * X).all() and (signals["torque"].values == Y).all()
+    assert all(signal.time_s is None for signal in signals.values())
+
+
 def test_tdms(tmp_path):
     file = read_signals(sample.tdms(tmp_path / "log.tdms"))
     assert [(s.name, s.unit) for s in file.signals] == [("rig/angle", "deg"), ("rig/torque", "Nm")]
@@ -99,6 +110,36 @@ def test_tdms_channels_that_start_later_time_stamps_and_text(tmp_path):
     assert signals["g/at"].unit == "s" and any("g/note" in remark for remark in file.remarks)
 
 
+def stamps(late_s):
+    """The times of the samples as absolute ones, from a time after the start of the recording on."""
+    return np.datetime64("2024-05-31T12:00:00", "us") + np.round(1e6 * (T + late_s)).astype("m8[us]")
+
+
+def test_tdms_columns_of_absolute_time_have_one_zero(tmp_path):
+    waveform = {"wf_increment": 0.002, "wf_start_time": np.datetime64("2024-05-31T12:00:00.500")}
+    with TdmsWriter(tmp_path / "log.tdms") as writer:
+        channels = [ChannelObject("drive", "at", stamps(0.25)), ChannelObject("load", "at", stamps(0.0))]
+        writer.write_segment([*channels, ChannelObject("load", "torque", Y, waveform)])
+    file = read_signals(tmp_path / "log.tdms")
+    signals = by_name(file)
+    assert file.started == sample.STARTED
+    assert signals["drive/at"].since_start and signals["load/at"].since_start
+    np.testing.assert_allclose(signals["drive/at"].values, T + 0.25, atol=1e-9)
+    np.testing.assert_allclose(signals["load/at"].values, T, atol=1e-9)
+    np.testing.assert_allclose(signals["load/torque"].time_s, T + 0.5, atol=1e-9)
+
+
+def test_a_waveform_of_tdms_without_a_start_is_named(tmp_path):
+    """The zero of LabVIEW's clock, which it writes where no start is set, is none."""
+    unset = {"wf_increment": 0.002, "wf_start_time": np.datetime64("1904-01-01T00:00:00")}
+    with TdmsWriter(tmp_path / "log.tdms") as writer:
+        writer.write_segment([ChannelObject("g", "a", X, unset), ChannelObject("g", "at", stamps(0.0))])
+    file = read_signals(tmp_path / "log.tdms")
+    assert file.started == sample.STARTED
+    np.testing.assert_allclose(by_name(file)["g/a"].time_s, T, atol=1e-9)
+    assert "waveforms without a start are taken to begin at the file's earliest time: g/a" in file.remarks
+
+
 def test_parquet(tmp_path):
     file = read_signals(sample.parquet(tmp_path / "log.parquet"))
     assert [(s.name, s.unit) for s in file.signals] == [("time", "s"), ("angle", "deg"), ("torque", "Nm")]
@@ -117,6 +158,27 @@ def test_parquet_of_pandas_with_a_time_index_and_other_columns(tmp_path):
     np.testing.assert_array_equal(signals["gap"].values, table["gap"])
     assert signals["on"].values.tolist() == (X > 0).tolist()
     assert any("state" in remark for remark in file.remarks)
+
+
+def test_parquet_columns_of_absolute_time_have_one_zero(tmp_path):
+    late = stamps(0.25)
+    late[[0, 7]] = np.datetime64("NaT")
+    table = pd.DataFrame({"at_drive": late, "angle": X, "at_load": stamps(0.0), "torque": Y})
+    table["at_category"] = table["at_drive"].astype("category")
+    table.to_parquet(tmp_path / "log.parquet")
+    file = read_signals(tmp_path / "log.parquet")
+    signals = by_name(file)
+    assert file.started == sample.STARTED
+    expected = np.where(np.isnat(late), np.nan, T + 0.25)
+    for name, times in (("at_drive", expected), ("at_category", expected), ("at_load", T)):
+        assert signals[name].since_start
+        np.testing.assert_allclose(signals[name].values, times, atol=1e-9)
+
+
+def test_parquet_without_a_single_absolute_time_has_no_start(tmp_path):
+    pd.DataFrame({"at": np.full(T.size, np.datetime64("NaT", "us")), "angle": X}).to_parquet(tmp_path / "log.parquet")
+    file = read_signals(tmp_path / "log.parquet")
+    assert file.started is None and np.isnan(by_name(file)["at"].values).all()
 
 
 def test_parquet_of_nested_columns(tmp_path):

@@ -130,6 +130,24 @@ def test_cells_without_a_number_are_nan_and_odd_ones_are_named(tmp_path):
     assert t.tolist() == [0, 1, 2, 3, 4]
 
 
+def test_a_point_between_thousands_is_no_decimal_point(tmp_path):
+    """A German export writes 1021 as 1.021: the cell is named, and never read as 1.021."""
+    counts = np.arange(0, 1100, 10)
+    cells = [f"{count:,}".replace(",", ".") for count in counts.tolist()]
+    file = read(tmp_path, "t;x\n" + "".join(f"0,{i:03d};{cell}\n" for i, cell in enumerate(cells)))
+    np.testing.assert_array_equal(file.signals[1].values, np.where(counts < 1000, counts, np.nan))
+    assert "10 cells of 'x' hold no number (row 102: '1.000')" in file.remarks
+
+
+@pytest.mark.parametrize(("separator", "decimal"), [(",", "."), (";", ",")])
+def test_infinite_and_missing_numbers_of_a_c_program(tmp_path, separator, decimal):
+    words = ("1.#INF", "-1.#INF", "1.#QNAN", "-1.#IND", "2.5")
+    rows = [separator.join((f"0.{i}", word)) for i, word in enumerate(words * 5)]
+    file = read(tmp_path, "\n".join([separator.join("tx"), *(row.replace(".", decimal) for row in rows), ""]))
+    np.testing.assert_array_equal(file.signals[1].values, [np.inf, -np.inf, np.nan, np.nan, 2.5] * 5)
+    assert not any("no number" in remark for remark in file.remarks)
+
+
 def test_a_channel_with_few_entries_is_kept_and_one_without_is_not(tmp_path):
     rows = "".join(f"{i},{i},,{'7' if i == 3 else ''}\n" for i in range(100))
     file = read(tmp_path, "t,x,empty,seldom\n" + rows)
@@ -207,6 +225,15 @@ def test_a_wrong_layout_is_named(tmp_path, layout, said):
     with pytest.raises(LogError) as error:
         read(tmp_path, "t,x\n0.1,1.5\n0.2,2\n0.3,3\n", layout=TextLayout(**layout))
     assert said in error.value.args[2]
+
+
+@pytest.mark.parametrize(("key", "what"), [("header_line", "names"), ("unit_line", "units")])
+def test_a_stated_line_of_another_width_is_named(tmp_path, key, what):
+    with pytest.raises(LogError) as error:
+        read(tmp_path, "Rig 7\nt,x\n0,1\n1,2\n2,3\n", layout=TextLayout(**{key: 1}))
+    assert error.value.args[0] == 1
+    assert f"the {what} have another number of cells than the 2 of the samples" in error.value.args[2]
+    assert f"{key} 0 if it has no {what}" in error.value.args[2]
 
 
 def test_a_row_of_another_width_is_named(tmp_path):

@@ -10,6 +10,7 @@ from ccmodel.rig.columns import UNIT_OF
 from ccmodel.rig.findings import LogError
 from ccmodel.rig.readers.attempt import IMPORTING
 from ccmodel.rig.readers.contract import SignalFile
+from ccmodel.rig.readers.names import bare_unit
 
 TIME = "time_s"
 
@@ -32,7 +33,7 @@ def log_of_signals(file: SignalFile, format: str) -> pd.DataFrame:
     Raises
     ------
     LogError
-        If the signals have no common time, or a unit is stated that is not the one in the column's name.
+        If the signals have no common time, or a unit is stated that is not that in the column's name, or not known.
     """
     names = [s.name.rpartition("/")[2] for s in file.signals]
     for name, signal in zip(names, file.signals, strict=True):
@@ -56,8 +57,16 @@ def log_of_signals(file: SignalFile, format: str) -> pd.DataFrame:
 def _check_unit(column: str, stated: str, format: str) -> None:
     """Raise `LogError` if the file states another unit of a column than its name ends in."""
     needed = UNIT_OF.get(column)
-    if needed is None or not units.is_unit(stated):
-        return
-    if units.quantity_of(stated) != units.quantity_of(needed) or not isclose(units.factor(stated, needed), 1.0):
+    # A time of netCDF has "seconds since" a date.
+    unit = bare_unit(stated.partition(" since ")[0])
+    if needed is not None and units.states_unit(unit) and not _is_same(unit, needed):
         text = f"the {format} states its unit as '{stated}', and its name ends in another one"
         raise LogError(None, column, f"{text}: {IMPORTING}")
+
+
+def _is_same(unit: str, needed: str) -> bool:
+    """Whether two units are the same one; one that cannot be read is no other."""
+    try:
+        return units.quantity_of(unit) == units.quantity_of(needed) and isclose(units.factor(unit, needed), 1.0)
+    except units.UnitError:
+        return False

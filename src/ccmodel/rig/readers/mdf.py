@@ -22,6 +22,8 @@ _PACKED, _HEADER, _HEADER_AT, _ZLIB = b"##DZ", "<2sBBIQQ", 24, (0, 1)
 _PIECE = 1 << 20
 # Type of a channel of version 4 whose values have any length, as texts have.
 _ANY_LENGTH = 1
+# What a master of version 4 is: its time, and not an angle, a distance or an index.
+_TIME = 1
 
 
 def read(path: Path) -> SignalFile:
@@ -80,19 +82,19 @@ def _size(group: Any) -> int:
 
 
 def _add_group(columns: Columns, file: Any, index: int, group: Any) -> None:
-    master = file.masters_db.get(index)
+    time_at = _time_channel(file, index, group)
     prefix = _group_name(group)
     wanted = []
     for i, channel in enumerate(group.channels):
         if file.version >= "4" and channel.channel_type == _ANY_LENGTH:
             # An array of texts is as wide as the longest of them.
             columns.add(prefix + channel.name, "", None)
-        elif i != master:
+        elif i != time_at:
             wanted.append((None, index, i))
     # Names of states ("on", "off") stay the numbers that they stand for.
     for signal in file.select(wanted, copy_master=False, ignore_value2text_conversions=True):
         values = signal.samples
-        time = signal.timestamps if master is not None else None
+        time = signal.timestamps if time_at is not None else None
         name = prefix + signal.name
         if values.dtype.names:
             for field in values.dtype.names:
@@ -101,6 +103,14 @@ def _add_group(columns: Columns, file: Any, index: int, group: Any) -> None:
         if signal.invalidation_bits is not None and values.dtype.kind in "iufb":
             values = np.where(np.asarray(signal.invalidation_bits, bool), np.nan, values)
         columns.add(name, signal.unit, values, time)
+
+
+def _time_channel(file: Any, index: int, group: Any) -> int | None:
+    """Index of the channel that is the time of a group; the master of one of version 4 may be something else."""
+    master = file.masters_db.get(index)
+    if master is None or file.version < "4" or group.channels[master].sync_type == _TIME:
+        return master
+    return None
 
 
 def _group_name(group: Any) -> str:

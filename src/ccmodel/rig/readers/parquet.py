@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 from ccmodel.rig.readers.columns import BYTES_OF_A_NUMBER
 from ccmodel.rig.readers.content import Unpacked
 from ccmodel.rig.readers.contract import Format, Signal, SignalFile
-from ccmodel.rig.readers.stamps import seconds_of_times
+from ccmodel.rig.readers.stamps import earliest, moment, seconds_since
 
 _UNIT_KEYS = (b"unit", b"units", b"Unit", b"Units")
 
@@ -23,23 +23,20 @@ def read(path: Path) -> SignalFile:
     table = pq.ParquetFile(path, metadata=metadata, read_dictionary=_texts(metadata)).read()
     while any(pa.types.is_struct(field.type) for field in table.schema):
         table = table.flatten()
-    signals, left_out, started = [], [], None
+    # Columns of absolute times have one zero: each of them may be the time of some signals.
+    zero = earliest(_times(column) for column in table.columns if pa.types.is_timestamp(_kind(column)))
+    signals, left_out = [], []
     for field, column in zip(table.schema, table.columns, strict=True):
         name = field.name.replace(".", "/") if "." in field.name else field.name
         unit = _unit(field)
-        if pa.types.is_dictionary(column.type) and not _has_numbers(column.type.value_type):
+        if pa.types.is_dictionary(column.type) and not _has_numbers(_kind(column)):
             left_out.append(name)
             continue
         values = column.combine_chunks()
         if pa.types.is_dictionary(values.type):
             values = values.dictionary_decode()
         if pa.types.is_timestamp(values.type):
-            seconds, start = seconds_of_times(
-                values.cast(pa.timestamp("ns"), safe=False).to_numpy(zero_copy_only=False)
-            )
-            is_first = started is None and start is not None
-            started = started or start
-            signals.append(Signal(name, "s", seconds, since_start=is_first))
+            signals.append(Signal(name, "s", seconds_since(zero, _times(values)), since_start=True))
         elif pa.types.is_temporal(values.type):
             signals.append(Signal(name, "s", _seconds(values)))
         elif pa.types.is_fixed_size_list(values.type):
@@ -50,7 +47,7 @@ def read(path: Path) -> SignalFile:
         else:
             left_out.append(name)
     remarks = [f"columns without numbers are left out: {', '.join(left_out)}"] if left_out else []
-    return SignalFile(tuple(signals), started, tuple(remarks))
+    return SignalFile(tuple(signals), moment(zero), tuple(remarks))
 
 
 FORMAT = Format("Parquet file", (".parquet", ".pq"), read)
@@ -76,6 +73,11 @@ def _texts(metadata: pq.FileMetaData) -> list[str]:
     return [c.path for c in columns if c.physical_type == "BYTE_ARRAY" and c.logical_type.type != "DECIMAL"]
 
 
+def _kind(column: pa.ChunkedArray) -> pa.DataType:
+    """Type of the values of a column, of one that keeps repeated values once too."""
+    return column.type.value_type if pa.types.is_dictionary(column.type) else column.type
+
+
 def _has_numbers(kind: pa.DataType) -> bool:
     return _is_number(kind) or pa.types.is_temporal(kind)
 
@@ -96,11 +98,16 @@ def _floats(values: pa.Array) -> np.ndarray:
     return values.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False).astype(float)
 
 
+def _times(values: pa.Array | pa.ChunkedArray) -> np.ndarray:
+    return np.asarray(values.cast(pa.timestamp("ns"), safe=False))
+
+
 def _seconds(values: pa.Array) -> np.ndarray:
-    """Durations, times of day and dates in seconds; times of day and dates from the first."""
+    """Durations, times of day and dates in seconds; dates from the earliest."""
     kind = values.type
     if pa.types.is_date(kind):
-        return seconds_of_times(values.cast(pa.timestamp("ns"), safe=False).to_numpy(zero_copy_only=False))[0]
+        times = _times(values)
+        return seconds_since(earliest([times]), times)
     per_second = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}[kind.unit]
     counts = values.cast(pa.int32() if kind.bit_width == 32 else pa.int64(), safe=False)
     return _floats(counts) / per_second

@@ -1,12 +1,10 @@
-"""ROS 1 and ROS 2 bags: the numbers of every message, topic by topic.
-
-The first message of a topic shows where its numbers are. Every further message is read at the same places.
-"""
+"""ROS 1 and ROS 2 bags: the numbers of every message, topic by topic."""
 
 from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,63 +24,103 @@ _NAME_FIELDS = ("name", "names", "joint_names", "interface_names")
 # Units of the fields of a message type, where its definition leaves no choice. A joint state may be of an angle or of a
 # displacement, and states none.
 _UNITS = {("geometry_msgs/msg/Wrench", "force"): "N", ("geometry_msgs/msg/Wrench", "torque"): "N*m"}
+_NUMBER = float | int | np.number | np.bool_
 _NS = 1_000_000_000
 # Stamps of a message differ less than this from the time of its arrival, unless they are of a simulation's clock.
 _SAME_CLOCK_NS = 24 * 3600 * _NS
 
 
-class _Place(NamedTuple):
-    """Where numbers are in a message: steps to them, the names of their elements (() for a number), and their unit."""
+class _Numbers(NamedTuple):
+    """Numbers at one place of a message.
 
-    steps: tuple[str | int, ...]
-    name: str
+    Attributes
+    ----------
+    path : tuple of str
+        Fields and elements of lists on the way to them.
+    names : tuple of str
+        Those that the messages on the way give to elements.
+    elements : tuple of str
+        Names of the elements of an array; () of a single number.
+    unit : str
+    values : list of float
+    """
+
+    path: tuple[str, ...]
+    names: tuple[str, ...]
     elements: tuple[str, ...]
-    unit: str = ""
+    unit: str
+    values: list[float]
+
+
+@dataclass
+class _Column:
+    """Numbers at one place of the messages of a series: plain numbers, a message after another.
+
+    Attributes
+    ----------
+    elements : tuple of str
+    unit : str
+        Those of the first message that has numbers there, see `_Numbers`.
+    values : array of float
+        nan for a message that has none there, or another number of them.
+    fits : int
+        Messages that are not nan.
+    width : int
+        Numbers of a message.
+    """
+
+    elements: tuple[str, ...]
+    unit: str
+    values: "array[float]" = field(default_factory=lambda: array("d"))
+    fits: int = 0
+    width: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.width = max(len(self.elements), 1)
+
+    def add(self, values: list[float], row: int) -> None:
+        """Keep the numbers of a message; `row` is the number of messages before it."""
+        if len(values) == self.width:
+            if self.fits < row:
+                self._fill(row)
+            self.values.extend(values)
+            self.fits += 1
+
+    def by_element(self, rows: int) -> NDArray:
+        """Numbers of so many messages, shape (width, rows)."""
+        self._fill(rows)
+        return np.reshape(self.values, (rows, self.width)).T
+
+    def _fill(self, rows: int) -> None:
+        self.values.extend([np.nan] * (rows * self.width - len(self.values)))
 
 
 @dataclass
 class _Series:
-    """Messages of a topic that have their numbers at the same places: arrays of plain numbers, a message after another.
+    """Messages of a topic that give the same names to their numbers.
 
     Attributes
     ----------
-    places : list of _Place
-    values : list of array of float
-        By place.
-    misfits : list of int
-        By place, messages that have another number of elements there.
+    columns : dict of path to _Column
     received, stamps : array of int
         Times, ns.
     """
 
-    places: list[_Place]
-    values: "list[array[float]]" = field(init=False)
-    misfits: list[int] = field(init=False)
+    columns: dict[tuple[str, ...], _Column] = field(default_factory=dict)
     received: "array[int]" = field(default_factory=lambda: array("q"))
     stamps: "array[int]" = field(default_factory=lambda: array("q"))
 
-    def __post_init__(self) -> None:
-        self.values = [array("d") for _ in self.places]
-        self.misfits = [0] * len(self.places)
-
-    @property
-    def numbers(self) -> int:
-        """Numbers that are kept of a message."""
-        return 2 + sum(max(len(place.elements), 1) for place in self.places)
-
-    def add(self, message: Any, received: int) -> None:
-        """Keep the numbers of a message."""
-        for i, place in enumerate(self.places):
-            found = _number_at(message, place.steps)
-            if not place.elements:
-                self.values[i].append(np.nan if found is None else float(found))
-            elif found is not None and len(found) == len(place.elements):
-                self.values[i].extend(np.asarray(found, float).tolist())
-            else:
-                self.values[i].extend([np.nan] * len(place.elements))
-                self.misfits[i] += 1
+    def add(self, found: Sequence[_Numbers], received: int, stamp: int) -> int:
+        """Keep the numbers of a message; how many more numbers are kept then, nan included."""
+        row, late = len(self.received), 0
+        for path, _, elements, unit, values in found:
+            if (column := self.columns.get(path)) is None:
+                column = self.columns[path] = _Column(elements, unit)
+                late += row * column.width
+            column.add(values, row)
         self.received.append(received)
-        self.stamps.append(_stamp(message))
+        self.stamps.append(stamp)
+        return 2 + late + sum(column.width for column in self.columns.values())
 
 
 def read(path: Path) -> SignalFile:
@@ -101,7 +139,7 @@ def read(path: Path) -> SignalFile:
             None, None, f"is {kind.text}, which is read only under its own ending: rename it to {kind.advice}"
         )
     ros_size.count(path)
-    topics: dict[str, dict[tuple[str, ...], _Series]] = {}
+    topics: dict[str, dict[tuple, _Series]] = {}
     unknown: set[str] = set()
     unpacked = Unpacked()
     with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as bag:
@@ -111,13 +149,14 @@ def read(path: Path) -> SignalFile:
             if not known[connection.id]:
                 unknown.add(connection.topic)
                 continue
-            series = _series(
-                topics.setdefault(connection.topic, {}), message := bag.deserialize(raw, connection.msgtype)
-            )
-            unpacked.add(series.numbers * BYTES_OF_A_NUMBER)
-            series.add(message, received)
+            message = bag.deserialize(raw, connection.msgtype)
+            found: list[_Numbers] = []
+            _collect(found, message)
+            names = tuple(dict.fromkeys((one.path[:-1], one.names) for one in found if one.names))
+            series = topics.setdefault(connection.topic, {}).setdefault(names, _Series())
+            unpacked.add(series.add(found, received, _stamp(message)) * BYTES_OF_A_NUMBER)
     remarks = [f"topics of an unknown message type are left out: {', '.join(sorted(unknown))}"] if unknown else []
-    if empty := [topic for topic, series in topics.items() if not any(s.places for s in series.values())]:
+    if empty := [topic for topic, series in topics.items() if not any(s.columns for s in series.values())]:
         remarks.append(f"topics without numbers are left out: {', '.join(sorted(empty))}")
     if not any(s.received for t in topics.values() for s in t.values()):
         return SignalFile((), None, (*remarks, "no messages"))
@@ -140,66 +179,68 @@ def _count_packed_messages(bag: Any) -> None:
                     ros_size.count_packed(raw, "zstd", unpacked)
 
 
-def _series(topic: dict[tuple[str, ...], _Series], message: Any) -> _Series:
-    """Messages of a topic that have the places of this one."""
-    names = _names_in(message)
-    if names not in topic:
-        topic[names] = _Series(list(_places(message, (), ())))
-    return topic[names]
+def _collect(
+    found: list[_Numbers],
+    value: Any,
+    path: tuple[str, ...] = (),
+    above: tuple[str, ...] = (),
+    beside: tuple[str, ...] = (),
+    unit: str = "",
+) -> None:
+    """Find the numbers of a message.
+
+    Parameters
+    ----------
+    found : list of _Numbers
+        They are added to it: a generator would take half as long again.
+    value : Any
+        The message, or a part of it at `path`.
+    above, beside : tuple of str
+        Names of elements on the way, and those in the nearest message, which may be of the elements of `value`.
+    unit : str
+        Unit of its numbers, if the message that it is in leaves no choice.
+    """
+    if isinstance(value, _NUMBER):
+        found.append(_Numbers(path, above, (), unit, [float(value)]))
+    elif isinstance(value, np.ndarray):
+        if value.ndim == 1 and 0 < value.size <= MOST_ELEMENTS and value.dtype.kind in "iufb":
+            elements = _elements(beside, value.size)
+            found.append(_Numbers(path, above, elements, unit, value.astype(float).tolist()))
+    elif isinstance(value, list):
+        if value and not isinstance(value[0], str):
+            for element, entry in zip(_elements(beside, len(value)), value[:MOST_ELEMENTS], strict=False):
+                _collect(found, entry, (*path, element), above, unit=unit)
+    elif _is_time(value):
+        found.append(_Numbers(path, above, (), unit, [value.sec + value.nanosec / _NS]))
+    else:
+        names = _names_in(value)
+        for key, known in _fields(value.__class__):
+            _collect(found, getattr(value, key), (*path, key), above + names, names or beside, known or unit)
+
+
+@lru_cache(maxsize=1000)
+def _fields(kind: type) -> tuple[tuple[str, str], ...]:
+    """Fields of a type of messages that may hold numbers, and their units; () of what is no message."""
+    keys = [key for key in getattr(kind, "__dataclass_fields__", ()) if key not in ("__msgtype__", "header")]
+    return tuple((key, _UNITS.get((getattr(kind, "__msgtype__", ""), key), "")) for key in keys)
 
 
 def _names_in(message: Any) -> tuple[str, ...]:
+    """Names of the elements of the arrays in a message; () where they do not tell them apart."""
     for key in _NAME_FIELDS:
         names = getattr(message, key, None)
         if isinstance(names, list) and names and all(isinstance(n, str) for n in names):
-            return tuple(names)
+            return tuple(names) if len(set(names)) == len(names) else ()
     return ()
 
 
-def _places(value: Any, steps: tuple, names: tuple[str, ...]) -> Iterator[_Place]:
-    """Places of the numbers in a message; `names` are those of the message that it is in."""
-    name = "/".join(map(str, steps))
-    if isinstance(value, bool | int | float | np.number | np.bool_):
-        yield _Place(steps, name, ())
-    elif isinstance(value, np.ndarray):
-        if value.ndim == 1 and 0 < value.size <= MOST_ELEMENTS and value.dtype.kind in "iufb":
-            yield _Place(steps, name, names if len(names) == value.size else tuple(map(str, range(value.size))))
-    elif isinstance(value, list):
-        for i, entry in enumerate(value[:MOST_ELEMENTS]):
-            yield from _named(_places(entry, (*steps, i), ()), steps, i, names if len(names) == len(value) else ())
-    elif _is_time(value):
-        yield _Place(steps, name, ())
-    elif hasattr(value, "__dataclass_fields__"):
-        names = _names_in(value) or names
-        for key in value.__dataclass_fields__:
-            if key not in ("__msgtype__", "header"):
-                unit = _UNITS.get((value.__msgtype__, key))
-                for place in _places(getattr(value, key), (*steps, key), names):
-                    yield place._replace(unit=unit or place.unit)
-
-
-def _named(places: Iterator[_Place], steps: tuple, index: int, names: tuple[str, ...]) -> Iterator[_Place]:
-    """Places with the name of an element of a list in place of its index."""
-    start = "/".join(map(str, (*steps, index)))
-    for place in places:
-        called = "/".join((*map(str, steps), names[index])) if names else start
-        yield place._replace(name=called + place.name[len(start) :])
+def _elements(names: tuple[str, ...], size: int) -> tuple[str, ...]:
+    """Names of the elements of an array, or else their indices."""
+    return names if len(names) == size else tuple(map(str, range(size)))
 
 
 def _is_time(value: Any) -> bool:
     return hasattr(value, "sec") and hasattr(value, "nanosec")
-
-
-def _number_at(message: Any, steps: tuple[str | int, ...]) -> Any:
-    """The number or array at a place; None if a list of this message is shorter."""
-    for step in steps:
-        if isinstance(step, str):
-            message = getattr(message, step)
-        elif step < len(message):
-            message = message[step]
-        else:
-            return None
-    return message.sec + message.nanosec / _NS if _is_time(message) else message
 
 
 def _stamp(message: Any) -> int:
@@ -229,15 +270,14 @@ def _signals(topic: str, by_names: dict, zero: int, remarks: list[str]) -> Itera
         if other:
             remarks.append(f"stamps of {topic} are of another clock: moved to begin when its first message arrived")
         time = np.array([t - zero for t in times]) / _NS
-        for i, place in enumerate(series.places):
-            values = np.array(series.values[i]).reshape(len(time), -1)
-            if count := series.misfits[i]:
-                where = f"{topic}/{place.name}"
+        for path, column in series.columns.items():
+            if column.elements and (count := len(time) - column.fits):
+                where = "/".join((topic, *path))
                 remarks.append(f"{where}: {count} messages have another number of elements and are read as no number")
-            for k, column in enumerate(values.T):
-                name = "/".join(p for p in (topic.strip("/"), place.name, *place.elements[k : k + 1]) if p)
-                chunks.setdefault(name, []).append((time, column))
-                units[name] = place.unit
+            for element, values in zip(column.elements or ("",), column.by_element(len(time)), strict=True):
+                name = "/".join(part for part in (topic.strip("/"), *path, element) if part)
+                chunks.setdefault(name, []).append((time, values))
+                units[name] = column.unit
     for name, parts in chunks.items():
         time, values = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
         # Several nodes may publish the same joint under lists of names that differ.

@@ -1,6 +1,7 @@
-"""Dates and times of day in text, as seconds."""
+"""Dates and times of day, in text or as absolute times, in seconds."""
 
 import re
+from collections.abc import Iterable
 from datetime import UTC, datetime
 
 import numpy as np
@@ -102,11 +103,19 @@ def _seconds_of_day(text: pd.Series) -> NDArray:
     return seconds - seconds[known][0]
 
 
-def seconds_of_times(times: NDArray) -> tuple[NDArray, datetime | None]:
-    """Seconds from the first of absolute times (datetime64, UTC), and the first; nan where there is no time."""
-    known = ~np.isnat(times)
-    if not known.any():
-        return np.full(times.shape, np.nan), None
-    first = times[known][0]
-    seconds = np.where(known, (times - first) / np.timedelta64(1, "s"), np.nan)
-    return seconds, datetime.fromtimestamp(float(first.astype("datetime64[us]").astype(np.int64)) / 1e6, UTC)
+def earliest(times: Iterable[NDArray]) -> np.datetime64:
+    """The earliest of several arrays of absolute times; NaT if there is none."""
+    known = [array[~np.isnat(array)] for array in times]
+    return min((array.min() for array in known if array.size), default=np.datetime64("NaT"))
+
+
+def seconds_since(zero: np.datetime64, times: NDArray) -> NDArray:
+    """Absolute times (datetime64) in s from another; nan where there is no time."""
+    return (times - zero) / np.timedelta64(1, "s")
+
+
+def moment(time: np.datetime64) -> datetime | None:
+    """An absolute time (UTC); None for NaT."""
+    if np.isnat(time):
+        return None
+    return datetime.fromtimestamp(float(time.astype("datetime64[us]").astype(np.int64)) / 1e6, UTC)

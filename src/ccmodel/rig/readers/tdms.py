@@ -1,19 +1,21 @@
 """TDMS, the format of LabVIEW: groups of channels, each with its properties."""
 
 from collections.abc import Mapping, Sequence
-from datetime import datetime
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ccmodel.rig.findings import LogError
-from ccmodel.rig.readers.columns import BYTES_OF_A_NUMBER, Columns
+from ccmodel.rig.readers.columns import BYTES_OF_A_NUMBER, Columns, listed
 from ccmodel.rig.readers.content import Unpacked
 from ccmodel.rig.readers.contract import Format, Signal, SignalFile
-from ccmodel.rig.readers.stamps import seconds_of_times
+from ccmodel.rig.readers.stamps import earliest, moment, seconds_since
 
 _UNIT_KEYS = ("unit_string", "NI_UnitDescription", "Unit", "unit", "Units", "units")
+# LabVIEW counts from 1904 and leaves this zero where a start is not set.
+_NO_START = np.datetime64("1904-01-02")
 
 
 def read(path: Path) -> SignalFile:
@@ -21,6 +23,7 @@ def read(path: Path) -> SignalFile:
     from nptdms import TdmsFile
 
     columns = Columns()
+    # Of waveforms and of channels of absolute times, by the names of their signals.
     starts: dict[str, np.datetime64] = {}
     with TdmsFile.open(path) as file:
         if file.file_status.incomplete_final_segment:
@@ -30,10 +33,9 @@ def read(path: Path) -> SignalFile:
         Unpacked().add(sum(map(_size, channels)))
         for channel in channels:
             _add(columns, channel, starts)
-    if not starts:
-        return SignalFile(tuple(columns.signals), None, columns.remarks())
-    signals, started = _from_the_first(columns.signals, starts)
-    return SignalFile(signals, started, columns.remarks())
+    zero = earliest([np.array(list(starts.values()), "datetime64[ns]")])
+    signals = tuple(_from(zero, signal, starts) for signal in columns.signals)
+    return SignalFile(signals, moment(zero), (*columns.remarks(), *_without_start(signals, starts)))
 
 
 FORMAT = Format("TDMS file", (".tdms",), read, extra="tdms")
@@ -65,27 +67,37 @@ def _add(columns: Columns, channel: Any, starts: dict[str, np.datetime64]) -> No
         return
     values = channel[:]
     if values.dtype.kind == "M":
-        seconds, start = seconds_of_times(values.astype("datetime64[ns]"))
-        columns.add(name, "s", seconds)
+        times = values.astype("datetime64[ns]")
+        start = earliest([times])
+        _note_start(starts, name, start)
+        columns.add(name, "s", seconds_since(start, times))
         return
     time = None
     if (step := _step(channel)) is not None:
         time = float(properties.get("wf_start_offset", 0.0)) + step * np.arange(len(values))
-        start = properties.get("wf_start_time")
-        if isinstance(start, np.datetime64) and not np.isnat(start):
-            starts[name] = start
+        _note_start(starts, name, properties.get("wf_start_time"))
     columns.add(name, unit, values, time)
 
 
-def _from_the_first(
-    signals: Sequence[Signal], starts: Mapping[str, np.datetime64]
-) -> tuple[tuple[Signal, ...], datetime | None]:
-    """Signals with their times from the earliest start of a waveform, and that start."""
-    first = min(starts.values())
-    zero = seconds_of_times(np.array([first]).astype("datetime64[ns]"))[1]
-    late = {name: (start - first) / np.timedelta64(1, "s") for name, start in starts.items()}
-    moved = (
-        type(s)(s.name, s.unit, s.values, s.time_s + late[s.name]) if late.get(s.name) and s.time_s is not None else s
-        for s in signals
-    )
-    return tuple(moved), zero
+def _note_start(starts: dict[str, np.datetime64], name: str, start: Any) -> None:
+    """Keep the start of a signal, if it is an absolute time."""
+    if isinstance(start, np.datetime64) and start > _NO_START:
+        starts[name] = start
+
+
+def _from(zero: np.datetime64, signal: Signal, starts: Mapping[str, np.datetime64]) -> Signal:
+    """A signal with its times, which count from their own start, counted from the zero of the file."""
+    if signal.name not in starts:
+        return signal
+    late = (starts[signal.name] - zero) / np.timedelta64(1, "s")
+    if signal.time_s is None:
+        return replace(signal, values=signal.values + late, since_start=True)
+    return replace(signal, time_s=signal.time_s + late)
+
+
+def _without_start(signals: Sequence[Signal], starts: Mapping[str, np.datetime64]) -> tuple[str, ...]:
+    """A remark on waveforms that state no start in a file where other channels do."""
+    names = [s.name for s in signals if starts and s.time_s is not None and s.name not in starts]
+    if not names:
+        return ()
+    return (f"waveforms without a start are taken to begin at the file's earliest time: {listed(names)}",)

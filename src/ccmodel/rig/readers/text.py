@@ -38,7 +38,10 @@ _OTHER_ROWS = 5
 # Lines without numbers that may follow the samples.
 _FOOTER_LINES = 3
 _COMMENT_SIGNS = ("#", "%", "//", "!", "*")
-_NO_NUMBER = ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "nil", "1.#qnan", "1.#ind", "-1.#ind")
+_NO_NUMBER = (
+    *("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "nil"),
+    *("1.#qnan", "1.#ind", "-1.#ind", "1,#qnan", "1,#ind", "-1,#ind"),
+)
 _NUMBER = {
     ".": re.compile(r"[+-]?((\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|inf(inity)?|1\.#inf)", re.IGNORECASE),
     ",": re.compile(r"[+-]?((\d+(,\d+)?|,\d+)([eEdD][+-]?\d+)?|inf(inity)?|1,#inf)", re.IGNORECASE),
@@ -272,12 +275,9 @@ def _names_and_units(above: list[str], grid: _Grid, layout: TextLayout) -> tuple
     at_names, at_units = _header_lines(above, grid, layout)
     names = units = None
     if at_names is not None:
-        names = _header_cells(_line(above, at_names, "header_line"), grid)
-        if names is None:
-            text = f"the names have another number of cells than the {grid.width} of the samples"
-            raise LogError(at_names + 1, None, f"{text}: state text.separator, or header_line 0 if it has no names")
+        names = _header_row(above, at_names, "names", "header_line", grid)
     if at_units is not None:
-        units = _header_cells(_line(above, at_units, "unit_line"), grid)
+        units = _header_row(above, at_units, "units", "unit_line", grid)
     split = [split_unit(name) for name in names or [""] * grid.width]
     names = [name or f"column_{i}" for i, (name, _) in enumerate(split, start=1)]
     units = [bare_unit(unit) or own for unit, (_, own) in zip(units or [""] * grid.width, split, strict=True)]
@@ -289,12 +289,16 @@ def _names_and_units(above: list[str], grid: _Grid, layout: TextLayout) -> tuple
     return names, units, found
 
 
-def _line(lines: list[str], index: int, key: str) -> str:
-    if index >= len(lines):
+def _header_row(above: list[str], index: int, what: str, key: str, grid: _Grid) -> list[str]:
+    """Names or units of the columns, of the line that the key `key` of the layout states or that was found."""
+    if index >= len(above):
         raise LogError(
-            None, None, f"text.{key}: must be a line above the samples, which begin in line {len(lines) + 1}"
+            None, None, f"text.{key}: must be a line above the samples, which begin in line {len(above) + 1}"
         )
-    return lines[index]
+    if (cells := _header_cells(above[index], grid)) is None:
+        text = f"the {what} have another number of cells than the {grid.width} of the samples"
+        raise LogError(index + 1, None, f"{text}: state text.separator, or {key} 0 if it has no {what}")
+    return cells
 
 
 def _header_lines(above: list[str], grid: _Grid, layout: TextLayout) -> tuple[int | None, int | None]:
@@ -435,13 +439,13 @@ def _floats(column: pd.Series, name: str, decimal: str) -> tuple[NDArray, list[s
     """A column as floats; cells without a number are nan, and said."""
     if column.dtype.kind in "iufb":
         return column.to_numpy(float), []
-    text = column.astype("string").str.strip().str.strip("\"'").str.strip()
-    if decimal == ",":
-        text = text.str.replace(",", ".", regex=False)
-    text = text.mask(text.str.lower().isin(_NO_NUMBER))
-    values = pd.to_numeric(
-        text.str.replace("[dD]", "e", regex=True).str.replace("1.#e", "", regex=False), errors="coerce"
-    )
+    text = column.astype("string").str.strip().str.strip("\"'").str.strip().str.lower()
+    text = text.mask(text.isin(_NO_NUMBER))
+    # "1.021" is no number where the decimal sign is a comma: it may be a thousand and twenty-one.
+    numbers = text.where(text.str.fullmatch(_NUMBER[decimal].pattern))
+    for written, meant in ((",", "."), ("1.#inf", "inf"), ("d", "e")):
+        numbers = numbers.str.replace(written, meant, regex=False)
+    values = pd.to_numeric(numbers, errors="coerce")
     bad = column[(values.isna() & text.notna()).to_numpy()]
     if bad.empty:
         return values.to_numpy(float, na_value=np.nan), []
