@@ -1,5 +1,6 @@
 """Parity relations of known values, and mistakes in recorded batches."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,6 +11,7 @@ import yaml
 from made_up_batch import T0, Bench, table
 
 from benchmarks.input_mistakes import MISTAKES, Copy, outcome, read_copy, said_of, write_copy
+from ccmodel.channels import ANGLE_AT, SUM_AT, TENSIONS_AT
 from ccmodel.rig.consistency.clocks import drift_of, trend
 from ccmodel.rig.consistency.exchanges import TORQUES, exchange_of
 from ccmodel.rig.consistency.fitted import contradicted_by_fit
@@ -17,7 +19,14 @@ from ccmodel.rig.consistency.parity import Parity, closed_part, crossings, speed
 from ccmodel.rig.consistency.rectified import is_rectified
 from ccmodel.rig.consistency.runs import deviations_of, forgotten_bend
 from ccmodel.rig.consistency.scales import _angle_of_one_end, pooled
-from ccmodel.rig.consistency.signs import EXCHANGED, FAULTS, explanation, negative_relations, wrong_signs
+from ccmodel.rig.consistency.signs import (
+    EXCHANGED,
+    FAULTS,
+    explanation,
+    negative_relations,
+    turning,
+    wrong_signs,
+)
 from ccmodel.rig.ingest import ingest_batch
 from ccmodel.rig.sensor_checks import held_for
 from proof.build import record
@@ -49,6 +58,47 @@ def measured(tmp_path_factory):
     copy.description["recordings"] = [copy.entry(name) for name in kept]
     few = Copy({name: copy.logs[name] for name in kept}, copy.description, [])
     return write_copy(few, tmp_path_factory.mktemp("measured") / "da-vinci")
+
+
+def logging_rad(copy):
+    """The same batch with the angles in rad."""
+    for end, angle in ANGLE_AT.items():
+        step = 2 * np.pi / copy.rig[end].pop("encoder_counts_per_rev")
+        copy.rig[end]["angle_resolution_rad"] = step
+        for log in copy.logs.values():
+            log[angle] = log.pop(f"{end}_encoder_counts") * step
+    return copy
+
+
+def logging_sums(copy):
+    """The same batch with the sums of tensions in N, in place of the load cells' voltage."""
+    for end, channel in SUM_AT.items():
+        cell = copy.rig[end].pop("load_cell")
+        for log in copy.logs.values():
+            log[channel] = (log.pop(f"{end}_load_cell_V") - cell["zero_V"]) / cell["sensitivity_V_per_N"]
+    return copy
+
+
+def logging_tensions(copy):
+    """The same batch with the four tensions, in place of load cells and currents."""
+    copy = logging_sums(copy)
+    for end, tensions in TENSIONS_AT.items():
+        constant, radius = copy.rig[end].pop("torque_constant_Nm_per_A"), copy.rig[end]["pulley_radius_m"]
+        for log in copy.logs.values():
+            total, difference = log.pop(SUM_AT[end]), log.pop(f"{end}_current_A") * constant / radius
+            for name, sign in zip(tensions, (1, -1), strict=True):
+                log[name] = (total + sign * difference) / 2
+    del copy.rig["accuracy"]["torque_Nm"]
+    return copy
+
+
+def logging_one_tension(copy):
+    """The same batch with a tension and the sum at each end, from which the torque follows."""
+    copy = logging_tensions(copy)
+    for end, (one, other) in TENSIONS_AT.items():
+        for log in copy.logs.values():
+            log[SUM_AT[end]] = log[one] + log.pop(other)
+    return copy
 
 
 def parity_of(tmp_path, **changes):
@@ -203,6 +253,60 @@ def test_a_wrong_sign_explains_what_it_makes_negative(fault):
     assert explanation(negative_relations(signs), signs) == (fault,)
 
 
+@pytest.mark.parametrize(
+    ("form", "exchanged", "remedy"),
+    [
+        (logging_tensions, {"T1_N": "T3_N", "T3_N": "T1_N"}, "exchange the columns T1_N and T3_N"),
+        (logging_tensions, {"T2_N": "T4_N", "T4_N": "T2_N"}, "exchange the columns T2_N and T4_N"),
+        (logging_one_tension, {"T1_N": "T3_N"}, "rename the column T3_N to T1_N"),
+    ],
+)
+def test_a_torque_that_follows_from_tensions_is_turned_by_their_names(tmp_path, form, exchanged, remedy):
+    """`torque_sign` turns the sign of a sensor, and there is none."""
+    copy = form(read_copy(SIMULATED))
+    assert said_of(write_copy(copy, tmp_path / "right")) == []
+    copy.logs = {name: log.rename(columns=exchanged) for name, log in copy.logs.items()}
+    (said,) = said_of(write_copy(copy, tmp_path / "exchanged"))
+    assert "torque has the wrong sign" in said and said.endswith(f"; {remedy}")
+
+
+def test_a_sensor_of_torque_is_turned_by_its_key(tmp_path):
+    remedies = turning(parity_of(tmp_path))
+    assert remedies["tau_in_Nm"] == "change rig.drive.torque_sign"
+    assert remedies["tau_out_Nm"] == "change rig.load.torque_sign"
+
+
+def test_cables_that_are_exchanged_in_all_tensions_are_exchanged_by_their_names(tmp_path):
+    copy, other = logging_tensions(read_copy(SIMULATED)), {"T1_N": "T3_N", "T2_N": "T4_N"}
+    other |= {b: a for a, b in other.items()}
+    copy.logs = {name: log.rename(columns=other) for name, log in copy.logs.items()}
+    (said,) = said_of(write_copy(copy, tmp_path / "exchanged"))
+    remedy = "exchange the columns T1_N and T3_N and exchange the columns T2_N and T4_N, or change both encoder signs"
+    assert said.startswith("batch.yaml cables A and B: ") and said.endswith(f"; {remedy}")
+
+
+@pytest.mark.parametrize(
+    ("form", "columns", "remedy"),
+    [
+        (None, ["load_load_cell_V"], "the column load_load_cell_V and of rig.load.load_cell.zero_V"),
+        (logging_sums, ["F_load_N"], "the column F_load_N"),
+        (logging_tensions, ["T2_N", "T4_N"], "the columns T2_N and T4_N"),
+    ],
+)
+def test_a_load_cell_of_the_wrong_sign_is_turned_in_the_batch(tmp_path, form, columns, remedy):
+    """No key turns it: a sensitivity is positive."""
+    copy = form(read_copy(SIMULATED)) if form else read_copy(SIMULATED)
+    cell = copy.rig["load"].get("load_cell", {"zero_V": 0.0})
+    for log in copy.logs.values():
+        log[columns] = 2 * cell["zero_V"] - log[columns]
+    found = said_of(write_copy(copy, tmp_path / "turned"))
+    assert any(said.endswith(f"; turn the sign of {remedy}") for said in found), found
+    cell["zero_V"] *= -1
+    for log in copy.logs.values():
+        log[columns] *= -1
+    assert said_of(write_copy(copy, tmp_path / "right")) == []
+
+
 @pytest.mark.parametrize(("sum_N", "count", "is_refused"), [(-1.0, 1, False), (-4.0, 1, True), (-1.0, 2, True)])
 def test_an_offset_may_make_the_sum_of_one_recording_negative(tmp_path, sum_N, count, is_refused):
     """Not by more than cells' offsets, and not in all recordings: cables cannot push."""
@@ -255,7 +359,7 @@ def test_what_is_exchanged_is_said_also_of_a_rig_whose_drive_comes_late(tmp_path
 )
 def test_torques_are_exchanged_if_nothing_else_turns_the_energies(lag_of_angles, work, is_mirrored, found):
     loss = 0.3 if is_mirrored else -0.3
-    ends = [SimpleNamespace(side=SimpleNamespace(encoder_counts_per_rev=2000))] * 2
+    ends = [SimpleNamespace(side=SimpleNamespace(encoder_counts_per_rev=2000, pulley_radius_m=0.006))] * 2
     parity = SimpleNamespace(
         signs={"loss": loss, "work": work},
         lags={"angles": lag_of_angles, "torques": -0.2},
@@ -277,6 +381,26 @@ def test_what_is_exchanged_is_said_also_where_the_signs_of_the_ends_are_unlike(t
         log[column] *= -1
     assert said_of(write_copy(copy, tmp_path / "right")) == []
     what = MISTAKES[f"{sensors} of drive and load exchanged"](copy, None)
+    (said,) = said_of(write_copy(copy, tmp_path / "exchanged"))
+    assert said.startswith(f"batch.yaml {what}: ")
+
+
+@pytest.mark.parametrize("form", [None, logging_rad])
+@pytest.mark.parametrize(
+    ("columns", "what"), [("encoder|theta", "theta_in_rad and theta_out_rad"), ("drive|load|theta", "drive and load")]
+)
+def test_what_is_exchanged_is_said_also_of_pulleys_of_unlike_radii(tmp_path, form, columns, what):
+    """The same rig with a load pulley one and a half times as large, which turns by as much less."""
+    copy, larger = read_copy(SIMULATED), 1.5
+    for key, power in (("pulley_radius_m", 1), ("torque_constant_Nm_per_A", 1), ("spring_stiffness_Nm_per_rad", 2)):
+        copy.rig["load"][key] *= larger**power
+    for log in copy.logs.values():
+        log["load_encoder_counts"] = (log["load_encoder_counts"] / larger).round().astype(int)
+    copy = form(copy) if form else copy
+    assert said_of(write_copy(copy, tmp_path / "right")) == []
+    other = {"drive": "load", "load": "drive", "in": "out", "out": "in"}
+    renamed = {c: re.sub("^(drive|load)|(?<=theta_)(in|out)", lambda m: other[m[0]], c) for c in copy.columns(columns)}
+    copy.logs = {name: log.rename(columns=renamed) for name, log in copy.logs.items()}
     (said,) = said_of(write_copy(copy, tmp_path / "exchanged"))
     assert said.startswith(f"batch.yaml {what}: ")
 
@@ -347,6 +471,28 @@ def test_an_accuracy_below_the_noise_is_named(tmp_path, key, by):
     assert said.startswith(f"batch.yaml rig.accuracy.{key}: rig.accuracy.{key} is {accuracy[key]:g}, but the ")
     accuracy[key] *= by / 3
     assert said_of(write_copy(copy, tmp_path / "honest")) == []
+
+
+@pytest.mark.parametrize(
+    ("accuracy_rad", "of_what"), [(5e-6, "the rounding to whole steps of theta_out_rad"), (0.4, "theta_out_rad reads")]
+)
+def test_the_accuracy_of_one_encoder_is_named_by_its_own_key(tmp_path, accuracy_rad, of_what):
+    copy = read_copy(SIMULATED)
+    copy.rig["load"]["encoder_accuracy_rad"] = accuracy_rad
+    (said,) = said_of(write_copy(copy, tmp_path / "one"))
+    key = "rig.load.encoder_accuracy_rad"
+    assert said.startswith(f"batch.yaml {key}: {key} is {accuracy_rad:g}, but {of_what}")
+
+
+@pytest.mark.parametrize("form", [logging_tensions, logging_one_tension])
+def test_an_accuracy_is_compared_with_sensors_and_not_with_what_follows_from_them(tmp_path, form):
+    copy, key = form(read_copy(SIMULATED)), "rig.accuracy.load_cell_N"
+    copy.rig["accuracy"]["load_cell_N"] = 0.001
+    (said,) = said_of(write_copy(copy, tmp_path / "fine"))
+    assert said.startswith(f"batch.yaml {key}: {key} is 0.001, but the noise from sample to sample of ")
+    copy.rig["accuracy"]["load_cell_N"] = 1000.0
+    (said,) = said_of(write_copy(copy, tmp_path / "coarse"))
+    assert said.startswith(f"batch.yaml {key}: {key} is 1000, but ")
 
 
 @pytest.mark.parametrize(

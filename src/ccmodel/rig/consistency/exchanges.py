@@ -50,7 +50,7 @@ ENDS = Exchange(
 TORQUES = Exchange(
     f"{TAU_IN} and {TAU_OUT}",
     "the torques (motor currents) of drive and load are exchanged, and their angles are not",
-    "exchange the columns of the torques or currents of drive and load, and no others",
+    "exchange the columns of the torques, currents or tensions of drive and load, and no others",
 )
 ENCODERS = Exchange(
     f"{THETA_IN} and {THETA_OUT}",
@@ -134,7 +134,10 @@ def travels_as_exchanged(parities: Sequence[Parity]) -> bool:
     if not travel:
         return False
     is_right = limits.LEAST_TRAVEL <= travel <= limits.MOST_TRAVEL_OF_RADII
-    drive, load = (end.side.encoder_counts_per_rev for end in parities[0].batch.rig.ends)
-    # Exchanged counts of unlike encoders are converted by each other's counts per turn.
-    unlike = (load / drive) ** 2 if drive and load else 1.0
+    drive, load = (end.side for end in parities[0].batch.rig.ends)
+    # Exchanged angles are taken to the cable by each other's radii, and counts to angles by each other's counts per
+    # turn.
+    unlike = (drive.pulley_radius_m / load.pulley_radius_m) ** 2
+    if drive.encoder_counts_per_rev and load.encoder_counts_per_rev:
+        unlike *= (load.encoder_counts_per_rev / drive.encoder_counts_per_rev) ** 2
     return not is_right and 1 / limits.MOST_TRAVEL < 1 / (travel * unlike) <= limits.MOST_TRAVEL_OF_RADII

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from ccmodel.channels import (
+    CHANNELS,
     F_DRIVE,
     F_LOAD,
     SUM_AT,
@@ -70,6 +71,11 @@ class Parity:
         corrected = {SUM_AT[end]: r[SUM_AT[end]] - error}
         corrected |= {name: r[name] - error / 2 for name in TENSIONS_AT[end] if name in r}
         return replace(self, recording=replace(r, channels=dict(r.channels) | corrected))
+
+    def sources(self, channel: str) -> tuple[str, ...]:
+        """Other channels that a channel follows from; none if it is a sensor's own."""
+        formula = self.recording.derived_from.get(channel, "")
+        return tuple(other for other in CHANNELS if other != channel and other in formula)
 
     @cached_property
     def signs(self) -> dict[str, float]:
@@ -147,7 +153,7 @@ class Parity:
             found["frequency"] = 0.5 / np.median(np.diff(x["time_s"][marks])) / frequency
         for channel in (TAU_IN, TAU_OUT, F_DRIVE, F_LOAD):
             if channel in x:
-                found[f"noise of {channel}"] = self._noise(channel)
+                found[f"noise of {channel}"] = self.noise(channel)
         # A far end that is moved by something else need not follow.
         if THETA_OUT in x and entry.far_end != "measured-motion":
             found["travel"] = np.ptp(x[THETA_OUT]) * radii[1] / (np.ptp(x[THETA_IN]) * radii[0])
@@ -190,7 +196,7 @@ class Parity:
             return None
         return float(speed(x[THETA_OUT], x["time_s"]).var()) / variance
 
-    def _noise(self, channel: str) -> float:
+    def noise(self, channel: str) -> float:
         """Standard deviation of white noise in motion; at rest, if it is far less: cables may stick and slip."""
         moving = white_noise(self.moving[channel])
         at_rest = self.recording[channel][self.recording.time_s <= self.recording.rest_s]

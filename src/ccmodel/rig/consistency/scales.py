@@ -125,35 +125,43 @@ def _conduits(parities: Sequence[Parity], batch: Batch) -> list[Contradiction]:
     return found
 
 
-# Keys of the accuracies by channel.
-_ACCURACY_OF = {
-    **dict.fromkeys(TORQUE_AT.values(), "torque_Nm"),
-    **dict.fromkeys(SUM_AT.values(), "load_cell_N"),
-    **dict.fromkeys(ANGLE_AT.values(), "encoder_rad"),
-}
-
-
 def _accuracies(parities: Sequence[Parity]) -> list[Contradiction]:
     """Stated accuracies that are as large as what the sensors read, or far less than their noise or step."""
     found: dict[str, Contradiction] = {}
-    for channel, key in _ACCURACY_OF.items():
-        reading = [p for p in parities if channel in p.recording]
-        if not reading:
-            continue
-        accuracy = reading[0].recording.accuracy[channel]
-        largest = max(float(np.abs(p.moving[channel]).max()) for p in reading)
-        error, of_what = _least_error(reading, channel)
-        if accuracy > limits.COARSEST_ACCURACY * largest:
-            text = f"but {channel} reads at most {largest:.3g}: is it in another unit?"
-        elif error > limits.NOISE_BEYOND_ACCURACY * accuracy:
-            text = (
-                f"but {of_what} of {channel} alone is {error:.3g}, {error / accuracy:.3g} times as much: the accuracy"
-                f" includes noise and zero, state {_rounded_up(error)} or more, in the unit of the key"
-            )
-        else:
-            continue
-        found[key] = Contradiction(f"rig.accuracy.{key}", f"rig.accuracy.{key} is {accuracy:g}, {text}")
+    for end in parities[0].batch.rig.ends:
+        own = end.side.encoder_accuracy_rad
+        channels_of = {
+            "rig.accuracy.torque_Nm": (end.torque,),
+            "rig.accuracy.load_cell_N": (end.force, *end.tensions),
+            f"rig.{end.name}.encoder_accuracy_rad" if own else "rig.accuracy.encoder_rad": (end.angle,),
+        }
+        for key, channels in channels_of.items():
+            if wrong := _wrong_accuracy(parities, channels):
+                found[key] = Contradiction(key, f"{key} is {wrong}")
     return list(found.values())
+
+
+def _wrong_accuracy(parities: Sequence[Parity], channels: Sequence[str]) -> str:
+    """The accuracy of the sensors among channels of one end, and what contradicts it; empty if nothing does.
+
+    A channel that follows from others has another accuracy, which nobody stated.
+    """
+    reading = {c: [p for p in parities if c in p.recording and not p.sources(c)] for c in channels}
+    reading = {c: of for c, of in reading.items() if of}
+    if not reading:
+        return ""
+    accuracy = next(of[0].recording.accuracy[c] for c, of in reading.items())
+    # The tension of a cable that is always slack tells nothing of its sensor's unit, but the other tension does.
+    largest, at = max((float(np.abs(p.moving[c]).max()), c) for c, of in reading.items() for p in of)
+    error, of_what, channel = max((*_least_error(of, c), c) for c, of in reading.items())
+    if accuracy > limits.COARSEST_ACCURACY * largest:
+        return f"{accuracy:g}, but {at} reads at most {largest:.3g}: is it in another unit?"
+    if error > limits.NOISE_BEYOND_ACCURACY * accuracy:
+        return (
+            f"{accuracy:g}, but {of_what} of {channel} alone is {error:.3g}, {error / accuracy:.3g} times as much: the"
+            f" accuracy includes noise and zero, state {_rounded_up(error)} or more, in the unit of the key"
+        )
+    return ""
 
 
 def _least_error(parities: Sequence[Parity], channel: str) -> tuple[float, str]:
@@ -161,10 +169,8 @@ def _least_error(parities: Sequence[Parity], channel: str) -> tuple[float, str]:
     if channel in ANGLE_AT.values():
         steps = [p.recording.encoder_step_rad.get(channel, 0.0) for p in parities]
         return limits.ROUNDING * min(steps), "the rounding to whole steps"
-    noises = [
-        p.ratios.get(f"noise of {channel}", 0.0) for p in parities if _samples_in_cycle(p) > limits.NOISE_CYCLE_SAMPLES
-    ]
-    return float(np.median(noises or [0.0])), "the noise from sample to sample"
+    noises = [p.noise(channel) for p in parities if _samples_in_cycle(p) > limits.NOISE_CYCLE_SAMPLES]
+    return float(np.median([n for n in noises if np.isfinite(n)] or [0.0])), "the noise from sample to sample"
 
 
 def _samples_in_cycle(parity: Parity) -> float:

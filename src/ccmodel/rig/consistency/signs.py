@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ccmodel.channels import F_DRIVE, F_LOAD, TAU_IN, TAU_OUT, THETA_IN, THETA_OUT
+from ccmodel.rig.batch import RAW_COLUMNS, End
 from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.contradiction import Contradiction
 from ccmodel.rig.consistency.exchanges import ENCODERS, ENDS, Exchange, exchange_of, median_loss, travel_of
@@ -15,7 +16,10 @@ from ccmodel.rig.consistency.parity import SUMS, Parity
 
 
 class _Fault(NamedTuple):
-    """A mistake, the relations (`Parity.signs`) that it makes negative, and its remedy."""
+    """A mistake, the relations (`Parity.signs`) that it makes negative, and its remedy.
+
+    The remedy has fields for how a torque or sum is turned, which depends on what the logs hold (`turning`).
+    """
 
     what: str
     text: str
@@ -28,24 +32,24 @@ def _fault(what: str, text: str, negative: str, remedy: str) -> _Fault:
 
 
 FAULTS = (
-    _fault(TAU_IN, "the drive torque has the wrong sign", "work torques", "change rig.drive.torque_sign"),
-    _fault(TAU_OUT, "the load torque has the wrong sign", "load torques", "change rig.load.torque_sign"),
+    _fault(TAU_IN, "the drive torque has the wrong sign", "work torques", "{tau_in_Nm}"),
+    _fault(TAU_OUT, "the load torque has the wrong sign", "load torques", "{tau_out_Nm}"),
     _fault(THETA_OUT, "the load angle has the wrong sign", "angles load", "change rig.load.encoder_sign"),
     _fault(THETA_IN, "the drive angle has the wrong sign", "angles work", "change rig.drive.encoder_sign"),
     _fault(
         "cables A and B",
         "cables A and B are exchanged: both torques have the wrong sign for the angles",
         "work load",
-        "change rig.drive.torque_sign and rig.load.torque_sign, or both encoder signs",
+        "{tau_in_Nm} and {tau_out_Nm}, or change both encoder signs",
     ),
     _fault(
         "cables A and B",
         "cables A and B are exchanged at one end",
         "angles torques",
-        "change encoder_sign and torque_sign of one end",
+        "at one end, change encoder_sign and turn the torque: {tau_in_Nm}, or {tau_out_Nm}",
     ),
-    _fault(F_DRIVE, "the load cell at the drive has the wrong sign", "F_drive", "change its sensitivity or wiring"),
-    _fault(F_LOAD, "the load cell at the load has the wrong sign", "F_load", "change its sensitivity or wiring"),
+    _fault(F_DRIVE, "the load cell at the drive has the wrong sign", "F_drive", "{F_drive_N}"),
+    _fault(F_LOAD, "the load cell at the load has the wrong sign", "F_load", "{F_load_N}"),
 )
 EXCHANGED = _fault(*ENDS[:2], "loss", ENDS.remedy)
 EVIDENCE = {
@@ -159,5 +163,35 @@ def _contradictions(
         evidence = " and ".join(
             EVIDENCE[name].format(float(np.median([p.signs[name] for p in parities]))) for name in shown
         )
-        found.append(Contradiction(fault.what, f"{fault.text}: {where}{evidence}; {fault.remedy}", recording))
+        remedy = fault.remedy.format(**turning(parities[0]))
+        found.append(Contradiction(fault.what, f"{fault.text}: {where}{evidence}; {remedy}", recording))
     return found
+
+
+def turning(parity: Parity) -> dict[str, str]:
+    """By channel, how the sign of a torque or of a sum of tensions is turned in a batch."""
+    found = {}
+    for end in parity.batch.rig.ends:
+        found[end.torque] = _turn_torque(parity, end)
+        found[end.force] = _turn_sum(parity, end)
+    return found
+
+
+def _turn_torque(parity: Parity, end: End) -> str:
+    """By its sign in `batch.yaml`, which only a sensor's torque follows; otherwise by the names of the tensions."""
+    tensions = [name for name in parity.sources(end.torque) if name in end.tensions]
+    if not tensions:
+        return f"change rig.{end.name}.torque_sign"
+    if len(tensions) == 1:
+        (other,) = set(end.tensions) - set(tensions)
+        return f"rename the column {tensions[0]} to {other}"
+    return f"exchange the columns {' and '.join(tensions)}"
+
+
+def _turn_sum(parity: Parity, end: End) -> str:
+    """By its columns: no key has the sign of a load cell."""
+    (volts,) = RAW_COLUMNS[end.force]
+    if volts in parity.recording.derived_from.get(end.force, ""):
+        return f"turn the sign of the column {volts} and of rig.{end.name}.load_cell.zero_V"
+    columns = [name for name in parity.sources(end.force) if name in end.tensions] or [end.force]
+    return f"turn the sign of the column{'s' * (len(columns) > 1)} {' and '.join(columns)}"
