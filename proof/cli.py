@@ -215,11 +215,11 @@ def real(
     out: Annotated[Path, typer.Option(help="Folder that gets the baseline model and one folder a case.")],
     page: Annotated[Path | None, typer.Option(help="Markdown page.")] = None,
 ) -> None:
-    """Seed faults in measured recordings and diagnose them with a frozen baseline; results are kept."""
+    """Seed faults in measured recordings, diagnose them with a frozen baseline; results of the same plan are kept."""
     from proof.real.cases import cases_of as real_cases_of
     from proof.real.page import real_page
     from proof.real.plan import read_real_plan
-    from proof.real.run import BASELINE, find_baseline, judge_real
+    from proof.real.run import BASELINE, find_baseline, judge_real, made_by
     from proof.real.score import read_real_outcomes
 
     plan, baseline = read_real_plan(), out / "baseline"
@@ -227,9 +227,9 @@ def real(
     if not (source / "batch.yaml").exists():
         raise typer.BadParameter(f"there is no batch {plan.batch} in {raw}: import it with ccmodel import-mis-tool")
     find_baseline(plan, source, baseline, typer.echo)
-    made_by = {"sources": conceal.digest_of()}
+    made = made_by(plan, baseline)
     for case in real_cases_of(plan, json.loads((baseline / BASELINE).read_text(encoding="utf-8"))):
-        if not _is_of(made_by, out / "cases" / case.name / "result.json"):
+        if not _is_of(made, out / "cases" / case.name / "result.json"):
             judge_real(case, plan, source, baseline, out / "cases" / case.name, typer.echo)
     if page is not None:
         earlier = page.read_text(encoding="utf-8") if page.exists() else ""

@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 DRAG_REVERSAL_RAD = 4e-3
 # Periods of a cogging torque in a revolution of the spindle, which turns by a sixth of one.
 COGS = 24
+# Torque by which the bent torque sensor is stated: the drive's largest in the recordings. A sensor has one curve,
+# however large the torque of a recording is.
+FULL_SCALE_NM = 0.112
 
 Rig = Mapping[str, Mapping]
 Fault = Callable[[pd.DataFrame, Rig, float], pd.DataFrame]
@@ -108,9 +111,9 @@ def cogging(log: pd.DataFrame, rig: Rig, size: float) -> pd.DataFrame:
 
 
 def bent_torque_sensor(log: pd.DataFrame, rig: Rig, size: float) -> pd.DataFrame:
-    """A drive torque sensor that reads its largest torque size (a share) too high, and lower ones less, by a square."""
+    """A drive torque sensor that reads `FULL_SCALE_NM` size (a share) too high, and lower torques less, by a square."""
     torque = torque_Nm(log, rig, "drive")
-    return _add_torque(log, rig, "drive", size * torque * np.abs(torque) / np.abs(torque).max())
+    return _add_torque(log, rig, "drive", size * torque * np.abs(torque) / FULL_SCALE_NM)
 
 
 FAULTS: dict[str, Fault] = {

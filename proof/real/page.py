@@ -33,7 +33,7 @@ def real_page(outcomes: Sequence[RealOutcome], plan: RealPlan, baseline: Path, e
     by_hand = earlier[earlier.index(BY_HAND) :] if BY_HAND in earlier else f"{BY_HAND}\n\nNot written yet.\n"
     return f"""# Seeded faults in measured recordings
 
-{_method(plan, baseline)}
+{_method(plan, baseline, outcomes)}
 ## Result
 
 {_summary(outcomes)}
@@ -51,7 +51,8 @@ Test recordings without a fault:
   tolerance.
 - **Right**: the mechanism is identified or among the alternatives, at its place, or an equivalent that no recording
   distinguishes from it (a gain at one end is an inverse gain at the other). If no candidate models the fault, right is
-  `learned`, `unexplained` or `undecided` at any place, with no mechanism stated with confidence.
+  `learned`, `unexplained` or `undecided` at any place, with no mechanism and no law at another place stated with
+  confidence.
 
 {_rows(_FAULT_HEAD, seeded)}
 
@@ -59,20 +60,21 @@ Test recordings without a fault:
 
 The test recordings without a fault, with one mechanism removed from the baseline. If this mechanism is a candidate, a
 diagnosis is right that identifies it with its value. Otherwise a diagnosis is right if it is `learned`, `unexplained`
-or `undecided` at the place of the mechanism.
+or `undecided` at the place of the mechanism, with no other mechanism and no law at another place stated with
+confidence.
 
 {_rows(_REMOVED_HEAD, removed)}
 
 {by_hand}"""
 
 
-def _method(plan: RealPlan, baseline: Path) -> str:
+def _method(plan: RealPlan, baseline: Path, outcomes: Sequence[RealOutcome]) -> str:
     model, tolerance, first = (
         json.loads((baseline / file).read_text(encoding="utf-8"))
         for file in (BASELINE, TOLERANCE, "first/diagnosis.json")
     )
     return f"""Made by `make proof-real` on {date.today().isoformat()}, commit {commit()}; the diagnosis's sources
-have the digest {tolerance["diagnosis"]}.
+have the digest {", ".join(sorted({o.sources for o in outcomes}))}.
 
 - **Recordings**: `{plan.batch}` of MRDLab/mis-tool-characterization, a da Vinci grasper ([the
   instrument](real-instrument.md)). They are measured.
@@ -92,11 +94,12 @@ have the digest {tolerance["diagnosis"]}.
 
 
 def _summary(outcomes: Sequence[RealOutcome]) -> str:
-    sizes = [is_size_recovered(o) for o in outcomes if classification(o) in IDENTIFIED and is_right(o)]
+    sizes = [is_size_recovered(o) for o in outcomes if classification(o) in IDENTIFIED]
+    wrong = sum(bool(o.confidently_wrong) for o in outcomes)
     took = sorted(o.took_s for o in outcomes)
     return f"""- Right diagnoses: {sum(map(is_right, outcomes))} of {len(outcomes)}.
-- Confident misidentifications, with a confidence of 0.8 or more: {sum(bool(o.confidently_wrong) for o in outcomes)}.
-- Right identifications with a size within 25 %: {sum(map(bool, sizes))} of {len(sizes)}.
+- Confident misidentifications (wrong mechanisms or laws at wrong places, with a confidence of 0.8 or more): {wrong}.
+- Identifications with a size within 25 %: {sum(map(bool, sizes))} of {len(sizes)}.
 - Processor time of a diagnosis: median {took[len(took) // 2]:.0f} s, maximum {took[-1]:.0f} s."""
 
 

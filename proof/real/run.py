@@ -1,5 +1,6 @@
 """From the plan to results: the baseline model, its tolerance, and the diagnosis of each case."""
 
+import hashlib
 import json
 import shutil
 import tempfile
@@ -16,19 +17,43 @@ from proof.real.faults import write_batch
 from proof.real.plan import RealPlan
 
 BASELINE, TOLERANCE = "baseline.json", "tolerance.json"
+# Files that determine a case and its result, beside the plan.
+BUILDER = ("cases.py", "faults.py", "run.py")
 Report = Callable[[str], None]
 
 
+def made_by(plan: RealPlan, baseline: Path | None = None, sources: Path = conceal.SOURCES) -> dict[str, str]:
+    """Digests of the diagnosis, of plan and faults, and of a baseline, under their keys in a result."""
+    code = [Path(__file__).with_name(name).read_bytes() for name in BUILDER]
+    made = {"sources": conceal.digest_of(sources), "builder": _digest(plan.model_dump_json().encode(), *code)}
+    if baseline is not None:
+        made["baseline"] = _digest(*((baseline / name).read_bytes() for name in (BASELINE, TOLERANCE)))
+    return made
+
+
+def _digest(*parts: bytes) -> str:
+    return hashlib.sha256(b"\0".join(parts)).hexdigest()[:16]
+
+
 def find_baseline(plan: RealPlan, source: Path, out: Path, report: Report, sources: Path = conceal.SOURCES) -> None:
-    """Identify the baseline and its tolerance from the training recordings alone; an existing one in `out` is kept.
+    """Identify the baseline and its tolerance from the training recordings alone.
+
+    What an earlier run left in `out` is kept if it was `made_by` the same, and otherwise removed.
 
     Raises
     ------
     ValueError
         If the frozen baseline agrees with the training recordings for none of the plan's tolerances.
     """
-    if (out / TOLERANCE).exists():
+    made = made_by(plan, sources=sources)
+    found = json.loads((out / TOLERANCE).read_text(encoding="utf-8")) if (out / TOLERANCE).exists() else {}
+    if made.items() <= found.items() and "tolerance_factor" in found:
         return
+    if out.exists() and not made.items() <= found.items():
+        shutil.rmtree(out)
+    out.mkdir(parents=True, exist_ok=True)
+    # Written first, so that an interrupted run goes on with its own diagnoses only.
+    (out / TOLERANCE).write_text(json.dumps(made), encoding="utf-8")
     tried: dict[str, dict] = {}
     with tempfile.TemporaryDirectory(prefix="training-") as folder:
         batch = Path(folder) / "known"
@@ -45,7 +70,7 @@ def find_baseline(plan: RealPlan, source: Path, out: Path, report: Report, sourc
             tried[f"{factor:g}"] = {"verdict": diagnosis["verdict"], "mean_square": mean_square}
             report(f"frozen baseline, {factor:g} times the tolerance: {diagnosis['verdict']}")
             if diagnosis["verdict"] == "agrees":
-                found = {"tolerance_factor": factor, "tried": tried, "diagnosis": conceal.digest_of(sources)}
+                found = {"tolerance_factor": factor, "tried": tried, **made}
                 (out / TOLERANCE).write_text(json.dumps(found, indent=1), encoding="utf-8")
                 return
     raise ValueError(f"the baseline agrees with none of the tolerances {plan.tolerance_factors}: {tried}")
@@ -110,7 +135,7 @@ def judge_real(
         "case": case.name,
         "number": case.number,
         "key": case.digest,
-        "sources": conceal.digest_of(),
+        **made_by(plan, baseline),
         "batch": digest,
         "tolerance_factor": factor,
         "tampering": list(completed.tampering),

@@ -50,7 +50,10 @@ class Truth:
 
 @dataclass(frozen=True)
 class RealOutcome:
-    """A case, its right diagnosis and the reported one; `failure` is why there is none."""
+    """A case, its right diagnosis and the reported one; `failure` is why there is none.
+
+    `sources` is the digest of the diagnosis's sources.
+    """
 
     case: RealCase
     truth: Truth
@@ -58,6 +61,7 @@ class RealOutcome:
     failure: str = ""
     changed: dict[str, float] = field(default_factory=dict)
     took_s: float = 0.0
+    sources: str = ""
 
     @property
     def verdict(self) -> str:
@@ -78,7 +82,12 @@ class RealOutcome:
     def is_located(self) -> bool:
         """Whether the reported place, or that of the law that was found, is the right one or equivalent to it."""
         places = [law["place"] for law in self.laws[:1]] or [self.diagnosis["place"]] if self.diagnosis else []
-        return any(same_place(place, self.truth.place) for place in places)
+        return any(map(self.is_right_place, places))
+
+    def is_right_place(self, place: str | None) -> bool:
+        """Whether a place is that of the change or of a mechanism that no recording distinguishes from it."""
+        right = [self.truth.place, *map(place_of, self.truth.equivalent)]
+        return any(same_place(place, one) for one in right)
 
     @property
     def right_labels(self) -> tuple[str, ...]:
@@ -89,9 +98,13 @@ class RealOutcome:
 
     @property
     def confidently_wrong(self) -> list[str]:
-        """Wrong mechanisms that are stated with confidence."""
+        """Wrong mechanisms, and laws at a wrong place, that are stated with confidence."""
         confident = [label(claim) for claim in self.claims if claim["confidence"] >= DECISION_THRESHOLD]
-        return [mechanism for mechanism in confident if mechanism not in self.right_labels]
+        laws = [law for law in self.laws if law["confidence"] >= DECISION_THRESHOLD]
+        return [
+            *(mechanism for mechanism in confident if mechanism not in self.right_labels),
+            *(f"law of {law['slot']} at {law['place']}" for law in laws if not self.is_right_place(law["place"])),
+        ]
 
 
 def truth_of(case: RealCase, plan: RealPlan, model: dict) -> Truth:
@@ -121,7 +134,7 @@ def outcome_of(case: RealCase, truth: Truth, result: dict) -> RealOutcome:
     refused = refusal(result, case)
     diagnosis = None if refused else result["diagnosis"]
     failure = refused or result["failure"] or ""
-    return RealOutcome(case, truth, diagnosis, failure, result["changed"], result["took_s"])
+    return RealOutcome(case, truth, diagnosis, failure, result["changed"], result["took_s"], result["sources"])
 
 
 def classification(o: RealOutcome) -> str:

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from proof.real.faults import COGS, DRAG_REVERSAL_RAD, FAULTS, angle_rad, play, torque_Nm, write_batch
+from proof.real.faults import COGS, DRAG_REVERSAL_RAD, FAULTS, FULL_SCALE_NM, angle_rad, play, torque_Nm, write_batch
 
 COUNTS = {
     "drive": {
@@ -152,8 +152,20 @@ def test_laws_that_no_list_holds(in_counts):
     np.testing.assert_allclose(one_way[moves & rising][5:], 0.01, atol=count)
     np.testing.assert_allclose(added("cogging", 0.005), 0.005 * np.sin(COGS * theta), atol=count)
     bent = added("bent-torque-sensor", 0.2)
-    assert np.abs(bent).max() == pytest.approx(0.2 * np.abs(torque).max(), rel=0.01)
-    np.testing.assert_allclose(bent, 0.2 * torque * np.abs(torque) / np.abs(torque).max(), atol=count)
+    np.testing.assert_allclose(bent, 0.2 * torque * np.abs(torque) / FULL_SCALE_NM, atol=count)
+
+
+def test_a_bent_torque_sensor_has_one_curve_in_all_recordings(in_amperes):
+    def added(log):
+        before, after = (
+            torque_Nm(one, CURRENTS, "drive") for one in (log, FAULTS["bent-torque-sensor"](log, CURRENTS, 0.3))
+        )
+        return after - before
+
+    weak = in_amperes[np.abs(in_amperes["drive_current_A"]) < 0.5]
+    np.testing.assert_allclose(added(weak), added(in_amperes)[weak.index])
+    full = in_amperes.assign(drive_current_A=FULL_SCALE_NM / 0.0234)
+    np.testing.assert_allclose(added(full), 0.3 * FULL_SCALE_NM)
 
 
 def test_the_motor_is_late_with_the_drive_side(in_counts):

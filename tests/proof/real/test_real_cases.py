@@ -1,6 +1,7 @@
 """From a plan to results and their page, with a stand-in of a few lines for the diagnosis."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -8,6 +9,7 @@ import pytest
 import yaml
 
 from proof import conceal
+from proof.cli import real
 from proof.real import run
 from proof.real.cases import cases_of
 from proof.real.faults import FAULTS
@@ -155,11 +157,47 @@ def test_every_case_gets_its_frozen_baseline(plan, batch, baseline, tmp_path):
     result = json.loads((tmp_path / "results" / "cases" / one.case.name / "result.json").read_text())
     for spoilt in ({"key": "0"}, {"tampering": ["read the plan"]}):
         assert outcome_of(one.case, one.truth, result | spoilt).diagnosis is None
+    outcomes = [replace(o, sources="0123456789abcdef") for o in outcomes]
     page = real_page(outcomes, plan, baseline, f"# old\n\n{BY_HAND}\n\nKept.\n")
     assert page.endswith(f"{BY_HAND}\n\nKept.\n")
     assert "drag with load" not in page
     assert page.count("| gain of load torque |") == 1
-    assert "- Right diagnoses: 2 of 8.\n- Confident misidentifications, with a confidence of 0.8 or more: 0.\n" in page
+    assert "- Right diagnoses: 2 of 8.\n- Confident misidentifications (wrong mechanisms or laws" in page
+    assert "the diagnosis's sources\nhave the digest 0123456789abcdef.\n" in page
+
+
+def test_results_of_another_plan_code_or_baseline_are_made_again(plan, batch, tmp_path, monkeypatch):
+    results, lines = tmp_path / "results", []
+    monkeypatch.setattr("typer.echo", lines.append)
+
+    def made(changed):
+        """Whether the baseline is made, and how many cases."""
+        lines.clear()
+        monkeypatch.setattr("proof.real.plan.read_real_plan", lambda: changed)
+        real(batch, results)
+        of_baseline = any(line.startswith("baseline: ") for line in lines)
+        return of_baseline, sum(line.startswith("case-") for line in lines)
+
+    plan = plan.model_copy(update={"batch": "measured"})
+    assert made(plan) == (True, 8)
+    assert made(plan) == (False, 0)
+    plan = plan.model_copy(update={"tolerance": {"theta_out_rad": 0.0071, "tau_in_Nm": 0.02}})
+    assert made(plan) == (True, 8)
+    (results / "baseline" / run.BASELINE).write_text(json.dumps(MODEL | {"provenance": {"by": "hand"}}))
+    assert made(plan) == (False, 8)
+    monkeypatch.setattr(run, "BUILDER", (*run.BUILDER, "page.py"))
+    assert made(plan) == (True, 8)
+    assert made(plan) == (False, 0)
+
+
+def test_a_baseline_that_was_interrupted_goes_on_only_with_the_same_plan(plan, batch, tmp_path):
+    few, out = plan.model_copy(update={"tolerance_factors": (1.0,)}), tmp_path / "baseline"
+    for tolerance, again in ((0.007, True), (0.007, False), (0.008, True)):
+        tried = few.model_copy(update={"tolerance": {"theta_out_rad": tolerance, "tau_in_Nm": 0.02}})
+        before = (out / "first" / "diagnosis.json").stat().st_mtime_ns if out.exists() else None
+        with pytest.raises(ValueError, match="none of the tolerances"):
+            find_baseline(tried, batch, out, lambda line: None)
+        assert ((out / "first" / "diagnosis.json").stat().st_mtime_ns != before) == again
 
 
 def test_an_inconsistent_plan_is_refused():

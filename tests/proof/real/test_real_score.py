@@ -3,6 +3,7 @@
 import pytest
 
 from proof.real.cases import cases_of
+from proof.real.page import _summary
 from proof.real.plan import read_real_plan
 from proof.real.score import classification, estimated_size, is_right, is_size_recovered, outcome_of, truth_of
 
@@ -35,6 +36,7 @@ def judged(verdict="agrees", mechanisms=(), alternatives=(), place=None, **case)
         "tampering": [],
         "case": found.name,
         "key": found.digest,
+        "sources": "0123456789abcdef",
         "changed": {},
         "took_s": 1.0,
     }
@@ -59,6 +61,24 @@ def test_a_law_stands_for_a_mechanism_off_the_list_where_it_acts(place, right):
     o.diagnosis["laws"] = [{"place": place, "slot": "bearing-torque", "arguments": ["angle"], "confidence": 0.9}]
     assert classification(o) == ("learned, right place" if right else "learned, other place")
     assert is_right(o) == right
+
+
+@pytest.mark.parametrize(
+    ("place", "confidence", "case", "wrong"),
+    [
+        ("drive-pulley", 0.95, {}, 1),
+        ("drive-pulley", 0.7, {}, 0),
+        ("drive-pulley", 0.95, {"fault": "cogging"}, 0),
+        ("conduit", 0.95, {"fault": "cogging"}, 1),
+        ("drive-sensor", 0.95, {"fault": "gain-of-load-torque"}, 0),  # of the equivalent gain
+    ],
+)
+def test_a_law_of_another_place_is_wrong_with_confidence(place, confidence, case, wrong):
+    """As in the simulated validation; in a control every place is wrong."""
+    o = judged("learned", place=place, **case)
+    o.diagnosis["laws"] = [{"place": place, "slot": "drag", "arguments": ["theta_in"], "confidence": confidence}]
+    assert o.confidently_wrong == [f"law of drag at {place}"] * wrong
+    assert not (o.confidently_wrong and is_right(o))
 
 
 GAIN, DRIFT = {"fault": "gain-of-drive-torque"}, {"fault": "drift-of-drive-torque"}
@@ -120,6 +140,11 @@ def test_a_removed_mechanism_must_be_identified_with_its_value():
         assert classification(o) == "identified"
         assert estimated_size(o) == value
         assert is_right(o) is right
+
+
+def test_a_size_that_is_not_recovered_counts_among_the_identifications():
+    outcomes = [with_values(judged("explained", removed=PULLEY), PULLEY, friction_torque=v) for v in (0.03, 0.09)]
+    assert "- Identifications with a size within 25 %: 1 of 2.\n" in _summary(outcomes)
 
 
 def test_the_size_of_a_drag_is_its_difference_from_the_baseline():
