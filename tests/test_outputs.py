@@ -1,8 +1,10 @@
 """Files are written whole: whatever ends the writing, what is there belongs together, and the next run completes it."""
 
+import contextlib
 import os
 import resource
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -130,6 +132,31 @@ def test_files_that_have_been_replaced_never_come_back(tmp_path):
     (work / "complete").mkdir()
     fail(tmp_path, None)
     assert content(tmp_path) == dict.fromkeys(NAMES, "new")
+
+
+def test_a_second_command_that_writes_into_a_folder_is_refused(tmp_path):
+    """Otherwise its files and those of the first would mix."""
+    with new_files(tmp_path / "out", last=VERDICT) as fresh:
+        (fresh / VERDICT).write_text("first")
+        with pytest.raises(InputError, match="out: another command is writing there"):
+            write_files(tmp_path / "out", "second")
+        assert not in_child(write_files, tmp_path / "out", "second")
+        write_files(tmp_path / "other", "second")
+    assert content(tmp_path / "out") == {VERDICT: "first"}
+    write_files(tmp_path / "out", "third")
+    assert content(tmp_path / "out") == dict.fromkeys(NAMES, "third")
+
+
+def test_many_commands_that_write_into_a_folder_leave_the_files_of_one(tmp_path):
+    def repeatedly(run):
+        for _ in range(100):
+            with contextlib.suppress(InputError):
+                write_files(tmp_path, run)
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(repeatedly, ["a", "b", "c", "d"]))
+    found = content(tmp_path)
+    assert found.keys() == set(NAMES) and len(set(found.values())) == 1
 
 
 def test_a_file_of_a_killed_command_is_the_old_or_the_new_one(tmp_path):

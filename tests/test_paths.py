@@ -19,9 +19,9 @@ def test_results_do_not_go_into_the_folder_of_a_batch(tmp_path):
     with pytest.raises(InputError, match="--out: .*known: is the folder of a batch"):
         try_folder(batch, "--out")
     assert try_batch_folder(batch) == batch
-    with pytest.raises(InputError, match="is a file of a batch"):
-        try_file(batch / "batch.yaml")
-    assert try_file(batch / "fit.json") == batch / "fit.json"
+    for name in ("batch.yaml", "fit.json"):
+        with pytest.raises(InputError, match="is in .*known, the folder of a batch; name a file outside it"):
+            try_file(batch / name)
 
 
 def test_predictions_leave_the_logs_of_a_batch(fitted_model, tmp_path):
@@ -36,22 +36,34 @@ def test_predictions_leave_the_logs_of_a_batch(fitted_model, tmp_path):
     assert {file.name: file.read_bytes() for file in batch.iterdir()} == before
 
 
-def test_results_do_not_go_among_the_logs_of_a_batch_that_lie_in_a_folder(tmp_path):
+@pytest.mark.parametrize("exists", [False, True])
+def test_results_do_not_go_into_a_folder_within_a_batch(tmp_path, exists):
+    """Its logs may lie there, and whatever the folder of a batch holds is part of what identifies the batch."""
     batch = write_batch(tmp_path / "known", pretensions=(7.0,))
-    logs, log = batch / "logs", batch / "logs/t-7N.csv.gz"
-    logs.mkdir()
-    (batch / "t-7N.csv.gz").rename(log)
-    stated = (batch / "batch.yaml").read_text()
-    (batch / "batch.yaml").write_text(stated.replace("t-7N.csv.gz", "logs/t-7N.csv.gz"))
-    with pytest.raises(InputError, match="logs: holds t-7N.csv.gz, a log of a batch"):
-        try_folder(logs)
-    with pytest.raises(InputError, match="is a file of a batch"):
-        try_file(log)
-    # Other places in the folder of a batch may be used.
-    assert try_folder(batch / "out") == batch / "out"
-    (batch / "out").mkdir()
-    (batch / "out/diagnosis.json").touch()
-    assert try_folder(batch / "out") == batch / "out"
+    if exists:
+        (batch / "logs").mkdir()
+        (batch / "t-7N.csv.gz").rename(batch / "logs/t-7N.csv.gz")
+        (tmp_path / "link").symlink_to(batch / "logs")
+    for inside in (batch / "logs", batch / "logs/further", *([tmp_path / "link"] if exists else [])):
+        with pytest.raises(InputError, match="is in .*known, the folder of a batch; name a folder outside it"):
+            try_folder(inside)
+        with pytest.raises(InputError, match="is in .*known, the folder of a batch; name a file outside it"):
+            try_file(inside / "t-7N.csv.gz")
+    assert not (batch / "logs/further").exists()
+
+
+@pytest.mark.parametrize("name", ["model.json", "calibrated.json", "nearest.json"])
+def test_a_diagnosis_does_not_replace_its_baseline(fitted_model, tmp_path, name):
+    batch, out = write_batch(tmp_path / "known", pretensions=(7.0,)), tmp_path / "out"
+    out.mkdir()
+    before = fitted_model.read_bytes()
+    (out / name).write_bytes(before)
+    words = ["diagnose", str(batch), "--baseline", str(out / name), "--freeze", "--out", str(out)]
+    ended = CliRunner().invoke(cli.app, words)
+    assert isinstance(ended.exception, InputError)
+    assert f"{out / name}: is read by this command" in str(ended.exception)
+    assert (out / name).read_bytes() == before
+    assert try_folder(out, files=["model.json"], read=[fitted_model]) == out
 
 
 @pytest.mark.parametrize("read", ["motion", "model"])

@@ -1,6 +1,8 @@
 """A step reruns if a source file that it uses changes, and only then."""
 
-from ccmodel.provenance import files_in, source_digest, sources_of
+import os
+
+from ccmodel.provenance import files_in, folder_digest, source_digest, sources_of
 
 
 def names(module):
@@ -45,6 +47,20 @@ def test_hidden_files_are_none_of_a_batch(tmp_path):
     (tmp_path / "logs").mkdir()
     (tmp_path / "logs/b.csv").write_text("x")
     assert [f.name for f in files_in(tmp_path)] == ["a.csv", "b.csv"]
+
+
+def test_a_folders_digest_is_of_names_and_contents_and_not_of_dates(tmp_path):
+    log = tmp_path / "a.csv"
+    log.write_text("1")
+    first = folder_digest(tmp_path)
+    os.utime(log, (0, 0))
+    assert folder_digest(tmp_path) == first
+    log.write_text("2")
+    os.utime(log, (0, 0))
+    assert folder_digest(tmp_path) != first
+    log.write_text("1")
+    log.rename(tmp_path / "b.csv")
+    assert folder_digest(tmp_path) != first
 
 
 def test_files_behind_a_link_are_those_of_the_batch(tmp_path):

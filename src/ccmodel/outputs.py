@@ -5,17 +5,26 @@ of it, and nothing of what was there before is lost. What a killed command has l
 brings to an end.
 """
 
+import os
 import shutil
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import IO
 
 from ccmodel.paths import UNFINISHED, expanded
 from ccmodel.typed import InputError
 
+try:
+    import fcntl
+except ImportError:  # not Unix
+    fcntl = None  # type: ignore[assignment]
+
 # Where `new_files` works, within the folder of its files, and what its new files are called once they may take places.
 _FILES = f"{UNFINISHED}files"
 _COMPLETE = "complete"
+# Held by the command that writes into the folder; the system lets go of the lock of a killed one.
+_LOCK = f"{UNFINISHED}lock"
 
 
 @contextmanager
@@ -77,24 +86,57 @@ def new_files(folder: str | Path, last: str | None = None, without: Collection[s
     Raises
     ------
     InputError
-        If they cannot be written.
+        If they cannot be written, or another command is writing into the folder.
     """
     folder = expanded(folder)
     with _naming(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        _settle(folder, last)
-        work = folder / _FILES
-        fresh, earlier = work / "new", work / "earlier"
-        for made in (work, fresh, earlier):
-            made.mkdir()
-        try:
-            yield fresh
-            for name in (*reversed(_in_order(fresh, last)), *without):
-                with suppress(FileNotFoundError):
-                    (folder / name).rename(earlier / name)
-            fresh.rename(work / _COMPLETE)
-        finally:
+        with _alone_in(folder):
             _settle(folder, last)
+            work = folder / _FILES
+            fresh, earlier = work / "new", work / "earlier"
+            for made in (work, fresh, earlier):
+                made.mkdir()
+            try:
+                yield fresh
+                for name in (*reversed(_in_order(fresh, last)), *without):
+                    with suppress(FileNotFoundError):
+                        (folder / name).rename(earlier / name)
+                fresh.rename(work / _COMPLETE)
+            finally:
+                _settle(folder, last)
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """The only command that writes into a folder; raises `InputError` if there is another one."""
+    lock = folder / _LOCK
+    file = _held(lock)
+    try:
+        yield
+    finally:
+        # Before it is let go of, so that nobody holds a file that is going to be removed.
+        lock.unlink(missing_ok=True)
+        file.close()
+
+
+def _held(lock: Path) -> IO[str]:
+    """The file of a lock, open and locked as far as the file system knows locks."""
+    while True:
+        file = lock.open("w")
+        try:
+            if fcntl:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            file.close()
+            raise InputError(f"{lock.parent}: another command is writing there; try again when it has ended") from None
+        except OSError:
+            return file
+        # The command that had the lock may have removed its file since it was opened here.
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(file.fileno()), lock.stat()):
+                return file
+        file.close()
 
 
 def is_unfinished(folder: Path) -> bool:

@@ -8,6 +8,7 @@ import difflib
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
+from shlex import quote
 from tempfile import TemporaryFile
 from typing import NoReturn
 
@@ -33,7 +34,7 @@ def batch_folder(path: str | Path) -> Path:
         advice = (
             f"it holds the batches {', '.join(inside)}"
             if inside
-            else f"if it has the logs of a rig, draft one with: ccmodel init {folder}"
+            else f"if it has the logs of a rig, draft one with: ccmodel init {quote(str(folder))}"
         )
         _refuse(f"{folder}: has no {BATCH_FILE}; {advice}")
     return folder
@@ -82,7 +83,9 @@ def _missing(path: Path, wanted: str, other: str) -> NoReturn:
     _refuse(f"{path}: there is no such {wanted}{advice}")
 
 
-def try_folder(path: str | Path, option: str = "out") -> Path:
+def try_folder(
+    path: str | Path, option: str = "out", files: Iterable[str] = (), read: Iterable[str | Path] = ()
+) -> Path:
     """A folder that can be written to, or made, for results.
 
     Parameters
@@ -90,29 +93,35 @@ def try_folder(path: str | Path, option: str = "out") -> Path:
     path : str or Path
     option : str
         Option that names it, in the message.
+    files : iterable of str
+        Names of the files that are written into it.
+    read : iterable of str or Path
+        Files that are read.
 
     Raises
     ------
     InputError
-        If it cannot, or is the folder of a batch or of its logs: a result may have the name of a log.
+        If it cannot, or lies in the folder of a batch, or a file in it that would be written is read.
     """
     path = try_batch_folder(path, option)
-    if (path / BATCH_FILE).exists():
-        _refuse(f"{option}: {path}: is the folder of a batch; name another one")
-    if path.exists() and (log := next(filter(_is_log, path.iterdir()), None)):
-        _refuse(f"{option}: {path}: holds {log.name}, a log of a batch; name another folder")
+    _check_outside_batches(path, option, "folder")
+    for name in files:
+        _check_not_read(path / name, option, read)
     return path
 
 
-def _is_log(file: Path) -> bool:
-    """Whether a batch in a folder above names a file."""
-    place = file.resolve()
-    for folder in place.parents:
-        stated = folder / BATCH_FILE
-        with suppress(OSError, UnicodeDecodeError):  # one that cannot be read names nothing
-            if stated.is_file() and place.relative_to(folder).as_posix() in stated.read_text(encoding="utf-8"):
-                return True
-    return False
+def _check_outside_batches(path: Path, option: str, kind: str) -> None:
+    """Refuse the folder of a batch and all that lies in it: whatever a batch's folder holds becomes part of it."""
+    place = path.resolve()
+    if (place / BATCH_FILE).exists():
+        _refuse(f"{option}: {path}: is the folder of a batch; name another one")
+    if batch := next((folder for folder in place.parents if (folder / BATCH_FILE).exists()), None):
+        _refuse(f"{option}: {path}: is in {batch}, the folder of a batch; name a {kind} outside it")
+
+
+def _check_not_read(path: Path, option: str, read: Iterable[str | Path]) -> None:
+    if path.exists() and any(path.samefile(one) for one in map(expanded, read) if one.exists()):
+        _refuse(f"{option}: {path}: is read by this command; name another place")
 
 
 def try_batch_folder(path: str | Path, option: str = "out") -> Path:
@@ -133,17 +142,14 @@ def try_file(path: str | Path, option: str = "out", read: Iterable[str | Path] =
     Raises
     ------
     InputError
-        If it cannot, or if it is read, or a file of a batch.
+        If it cannot, or if it is read, or lies in the folder of a batch.
     """
     path = expanded(path)
     if path.is_dir():
         _refuse(f"{option}: {path}: is a folder; name a file")
-    if path.exists():
-        if (path.parent / BATCH_FILE).exists() or _is_log(path):
-            _refuse(f"{option}: {path}: is a file of a batch; name another one")
-        if any(path.samefile(one) for one in map(expanded, read) if one.exists()):
-            _refuse(f"{option}: {path}: is read by this command; name another file")
     _try(path.parent, path, option, path.with_name(UNFINISHED + path.name))
+    _check_outside_batches(path, option, "file")
+    _check_not_read(path, option, read)
     if path.exists():
         _check_regular(path, f"{option}: ")
         try:

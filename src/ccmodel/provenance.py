@@ -39,6 +39,11 @@ def of_inputs(paths: Iterable[Path], folder: Path = Path()) -> dict:
     return {"ccmodel_version": __version__, "sha256": digests}
 
 
+def folder_digest(folder: Path) -> str:
+    """Digest of the names and contents of a folder's files (`files_in`), whatever their dates."""
+    return content_digest(of_inputs(files_in(folder), folder)["sha256"])[:16]
+
+
 def file_digest(path: Path) -> str:
     """SHA-256 of a file, which need not fit into the memory."""
     with open(path, "rb") as file:

@@ -1,7 +1,10 @@
 """Past commits: run in a clean worktree, measured by the present sources, skipped with a line where they fail."""
 
 import shutil
+import signal
 import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -15,6 +18,11 @@ from ccmodel.typed import InputError
 # A pipeline that "simulates" by taking files that stand in the repository.
 SNAKEFILE = (
     'rule all:\n    output: "results/tables/errors.csv"\n    shell: "cp -r stored/. results && touch {output}"\n'
+)
+# One whose job does not end by itself, and states its process.
+WAITING = (
+    'rule all:\n    output: "results/tables/errors.csv"\n'
+    '    shell: "echo $$ > {job}; while true; do mkdir -p results; touch results/$RANDOM; sleep 0.05; done"\n'
 )
 FAILING = 'raise ValueError("this commit has a fault")\n'
 
@@ -70,6 +78,28 @@ def test_past_commits_are_run_and_measured_and_failures_are_lines(repository, me
         assert row.bias == pytest.approx(now[row.channel].bias, rel=1e-3)
     assert good in overview(file)
     assert git(repository, "worktree", "list").count("\n") == 0, "no worktree is left"
+
+
+@pytest.mark.parametrize("number, code", [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+def test_an_interruption_ends_the_run_of_a_past_commit_with_its_jobs(repository, number, code):
+    job = repository / "job"
+    commit(repository, WAITING.format(job=job), "0.5.0")
+    command = [sys.executable, "-m", "ccmodel.cli", "accuracy", "history", "--rev", "HEAD", "--history", "h.csv"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    until(lambda: job.exists() and job.read_text().strip())
+    process.send_signal(number)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == code
+    assert said.startswith("interrupted: nothing was written to h.csv")
+    until(lambda: not Path(f"/proc/{job.read_text().strip()}").exists())
+    assert git(repository, "worktree", "list").count("\n") == 0, "no worktree is left"
+
+
+def until(holds):
+    ends = time.monotonic() + 60
+    while not holds():
+        assert time.monotonic() < ends
+        time.sleep(0.05)
 
 
 def test_an_unknown_revision_is_one_line(repository):

@@ -262,6 +262,18 @@ def test_a_prediction_says_what_is_wrong_with_its_batch(fitted, folder, tmp_path
     assert cc.predict(fitted, folder).findings == ()
 
 
+def test_files_of_an_earlier_model_do_not_stay_for_a_recording_that_now_has_none(fitted, folder, tmp_path):
+    batch, out = shutil.copytree(folder, tmp_path / folder.name), tmp_path / "out"
+    for use in (cc.predict, cc.estimate):
+        use(fitted, batch, out)
+    (out / "notes.csv").write_text("mine")
+    (batch / "t-6N.csv.gz").write_bytes(b"")
+    for use in (cc.predict, cc.estimate):
+        shutil.copy(out / "t-5N.csv", out / "t-6N.csv")
+        assert "t-6N.csv.gz" in use(fitted, batch, out).left_out[0]
+        assert sorted(file.name for file in out.iterdir()) == ["notes.csv", "t-5N.csv", "t-7N.csv"]
+
+
 def test_a_model_of_a_pair_does_not_predict_a_single_cable(fitted, batch):
     of_single = replace(fitted.model, rig=replace(fitted.model.rig, far_end="fixed"))
     with pytest.raises(cc.InputError, match="is of a pair of cables, and the model is of a single cable"):

@@ -1,12 +1,18 @@
 """What a person may type by mistake: one clear line for each problem, no traceback, the exit code 2; as JSON too."""
 
 import json
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from example_folder import noisy_batch
+
+from ccmodel.model.files import model_as_dict
+from ccmodel.rig.findings import Finding
+from model_runs import CABLE
 
 CHECKS = {
     "no such folder": (["check", "raw/loopss"], "raw/loopss: there is no such folder; did you mean raw/loops?"),
@@ -102,6 +108,56 @@ def test_a_reader_that_leaves_is_no_finding(folder):
     assert (process.stderr.read(), process.wait()) == ("", 141)
 
 
+@pytest.mark.parametrize(
+    "words, line",
+    [(["check", "raw/loops", "--json"], ""), (["mechanisms"], ""), (["check", "no", "--json"], "no: there is no")],
+)
+def test_an_output_that_takes_nothing_is_one_line(words, line, folder):
+    command = [sys.executable, "-m", "ccmodel.cli", *words]
+    with open("/dev/full", "w") as full:
+        ended = subprocess.run(command, cwd=folder, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert ended.returncode == 2
+    assert ended.stderr.startswith(f"standard output: No space left on device\n{line}")
+    assert ended.stderr.count("\n") == (2 if line else 1)
+
+
+def test_a_suggested_command_can_be_copied(folder, run):
+    noisy_batch(folder / "my data/loops", pretensions=(7.0,))
+    batch = folder / "my data/loops"
+    assert f"ccmodel diagnose '{batch}' --out DIR" in run("check", batch).out
+    (batch / "batch.yaml").unlink()
+    assert f"ccmodel check '{batch}'" in run("init", batch).out
+    (folder / "my data/none").mkdir()
+    assert f"ccmodel init '{folder}/my data/none'" in run("check", folder / "my data/none").err
+
+
+@pytest.mark.parametrize(
+    "words, line",
+    [
+        (["fit", "raw/loops", "--out", "f.json", "--step", "1"], "--step: 1 s leaves "),
+        (["diagnose", "raw/loops", "--out", "out", "--step", "1"], "--step: 1 s leaves "),
+        (["simulate", "motion.csv", "--model", "fit.json", "--out", "s.csv", "--pretension", "inf"], "--pretension: "),
+        (["simulate", "motion.csv", "--model", "fit.json", "--out", "fit.json"], "--out: fit.json: is read by"),
+        (["compensate", "fit.json", "--wanted", "wanted.csv", "--out", "wanted.csv"], "--out: wanted.csv: is read by"),
+        (["diagnose", "raw/loops", "--baseline", "model.json", "--out", "."], "--out: model.json: is read by"),
+        (
+            ["compensate", "fit.json", "--wanted", "wanted.csv", "--out", "d.csv", "--max-acceleration", "1"],
+            "--max-acceleration: needs --max-speed too",
+        ),
+    ],
+)
+def test_an_option_is_named_as_it_was_typed(words, line, folder, run, tmp_path, monkeypatch):
+    shutil.copytree(folder / "raw", tmp_path / "raw")
+    monkeypatch.chdir(tmp_path)
+    for name in ("fit.json", "model.json"):
+        Path(name).write_text(json.dumps(model_as_dict(CABLE, {})))
+    for name, angle in (("motion.csv", "theta_in_rad"), ("wanted.csv", "theta_out_rad")):
+        Path(name).write_text(f"time_s,{angle}\n0,0\n0.1,0.1\n")
+    ended = run(*words)
+    assert ended.code == 2
+    assert ended.err.startswith(line)
+
+
 def test_a_full_disk_is_one_line(folder, run, monkeypatch):
     def full(*_, **__):
         raise OSError(28, "No space left on device", "out/diagnosis.json")
@@ -134,9 +190,11 @@ def test_a_file_is_tried_before_the_work(out, message, folder, run, monkeypatch)
     assert message in ended.err
 
 
-def said(verdict):
+def said(verdict, findings=()):
     """A diagnosis that takes no time and writes nothing."""
-    return lambda *_, **__: SimpleNamespace(verdict=verdict, headline="it is as it is", report={"verdict": verdict})
+    batch = SimpleNamespace(findings=findings)
+    found = SimpleNamespace(verdict=verdict, headline="it is as it is", report={"verdict": verdict}, batch=batch)
+    return lambda *_, **__: found
 
 
 def test_the_trial_leaves_nothing(folder, run, monkeypatch):
@@ -157,6 +215,14 @@ def test_agreement_is_no_failure_if_asked_for(folder, run, monkeypatch):
 def test_a_verdict_is_no_failure_unless_asked_for(verdict, strict, code, folder, run, monkeypatch):
     monkeypatch.setattr("ccmodel.diagnose", said(verdict))
     assert run("diagnose", folder / "raw/loops", "--out", folder / "out", *strict).code == code
+
+
+def test_a_diagnosis_names_the_files_that_were_refused(folder, run, monkeypatch):
+    empty = Finding("loops", "raw/loops/b.csv", None, None, "refused", "is empty")
+    gap = Finding("loops", "raw/loops/a.csv", None, None, "warning", "has a gap")
+    monkeypatch.setattr("ccmodel.diagnose", said("agrees", (gap, empty)))
+    ended = run("diagnose", folder / "raw/loops", "--out", folder / "out")
+    assert (ended.code, ended.err) == (0, "refused: raw/loops/b.csv: is empty\n")
 
 
 def test_no_text_of_a_file_steers_the_terminal(run, tmp_path):

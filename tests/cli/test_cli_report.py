@@ -36,11 +36,30 @@ def test_a_run(run, tmp_path):
     assert [v["verdict"] for v in content["verdicts"]] == [None, "agrees"]
 
 
+def test_a_verdict_of_an_earlier_run_is_not_reported(run, tmp_path):
+    for name in ("loops", "taken-out"):
+        write(tmp_path / f"diagnoses/{name}/diagnosis.json", AGREES | {"batch": name})
+    write(tmp_path / "left-out.json", {"left_out": [], "warnings": [], "diagnosed": ["loops"]})
+    content = json.loads(run("report", tmp_path, "--json").out)
+    assert [v["batch"] for v in content["verdicts"]] == ["loops"]
+
+
 def test_a_diagnosis(run, tmp_path):
     write(tmp_path / "diagnosis.json", AGREES)
     ended = run("report", tmp_path)
     assert ended.code == 0
     assert ended.out.startswith("loops: agrees.")
+
+
+@pytest.mark.parametrize("verdict", ["agrees", "inputs-inconsistent"])
+def test_a_file_that_the_diagnosis_refused_was_left_out(run, tmp_path, verdict):
+    refused = {"what": "b.csv", "why": "is empty", "refused": True}
+    other = {"what": "a.csv, drive_current_A", "why": "is 0 throughout"}
+    write(tmp_path / "diagnosis.json", AGREES | {"verdict": verdict, "not_judged": [other, refused]})
+    ended = run("report", tmp_path)
+    assert ended.code == 1
+    assert ended.err.splitlines()[-1] == "refused: b.csv: is empty"
+    assert json.loads(run("report", tmp_path, "--json").out)["left_out"] == ["b.csv: is empty"]
 
 
 def test_a_folder_whose_files_a_killed_command_has_put_aside(run, tmp_path):

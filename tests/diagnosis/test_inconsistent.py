@@ -95,8 +95,13 @@ def test_a_drive_encoder_that_wraps_makes_the_batch_inconsistent_and_a_cut_file_
     assert [f.is_inconsistent for f in ingested.findings] == [False]
     jump = "drive_encoder_counts"
     rewrite(batch, "t-7N", lambda t: t.assign(**{jump: t[jump] + 65536 * (t.index > len(t) // 2)}))
-    assert run("diagnose", batch, "--out", tmp_path).exit_code == 0, "although no recording is left"
+    told = run("diagnose", batch, "--out", tmp_path)
+    assert told.exit_code == 0, "although no recording is left"
+    assert [line.partition(".gz")[0] for line in told.stderr.splitlines()] == [
+        f"refused: {batch / name}.csv" for name in ("t-7N", "t-6N")
+    ]
     said = json.loads((tmp_path / "diagnosis.json").read_text())
+    assert [n.get("refused", False) for n in said["not_judged"]] == [False, True]
     assert [n["what"].partition(",")[0] for n in said["not_judged"]] == ["t-7N.csv.gz", "t-6N.csv.gz"]
     assert "jumps by 65536 counts" in said["headline"]
     assert "(1 more in the report)" in said["headline"]

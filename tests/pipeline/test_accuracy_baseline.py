@@ -10,7 +10,10 @@ import yaml
 from test_pipeline import snakemake
 
 from builders import write_batch
-from ccmodel.accuracy.history import read_history
+from ccmodel.accuracy.gate import state_of
+from ccmodel.accuracy.history import now, read_history
+from ccmodel.provenance import file_digest
+from ccmodel.studies.baseline.settings import AgainstBaseline
 
 
 def accuracy(folder: Path, *arguments: str) -> subprocess.CompletedProcess:
@@ -79,6 +82,54 @@ def test_from_no_baseline_to_a_loss(finished):
     said = accuracy(finished, "check")
     assert (said.returncode, said.stderr.count("\n")) == (2, 1)
     assert "format 9" in said.stderr
+
+
+@pytest.fixture
+def measured(tmp_path):
+    """The study's file beside what it has measured, of a run in a folder of its own."""
+    folder = tmp_path / "project"
+    inputs = {f"out/results/{name}": "1" for name in ("recordings/tiny.nc", "simulated/estimated/tiny.nc")}
+    for name, text in (inputs | {"config/baseline.json": "{}"}).items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    stated = {"file": "config/baseline.json", "history": "config/history.csv"}
+    digests = {name: file_digest(folder / name) for name in (*inputs, "config/baseline.json")}
+    content = {"settings": stated | AgainstBaseline().limits.model_dump(), "measured": {}}
+    content |= {"commit": "abc1234", "date": "2026-01-01T00:00:00+00:00", "provenance": {"sha256": digests}}
+    (folder / "out/results/tables").mkdir()
+    (folder / "out/results/tables/baseline.json").write_text(json.dumps(content))
+    return folder
+
+
+@pytest.mark.parametrize("started_in", [".", "project", "project/config"])
+def test_baseline_and_commit_are_those_of_the_run(measured, tmp_path, monkeypatch, started_in):
+    monkeypatch.chdir(tmp_path / started_in)
+    state = state_of(measured / "out/results")
+    assert state.baseline.samefile(measured / "config/baseline.json")
+    assert state.history.parent.samefile(measured / "config")
+    assert (state.commit, state.date) == ("abc1234", "2026-01-01T00:00:00+00:00")
+    (measured / "config/baseline.json").write_text("accepted since")
+    assert state_of(measured / "out/results") == state
+
+
+def test_a_run_with_changes_that_are_not_committed_has_the_present_date(measured):
+    file = measured / "out/results/tables/baseline.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"commit": "abc1234+", "date": None}))
+    state = state_of(measured / "out/results")
+    assert state.commit == "abc1234+"
+    assert state.date[:10] == now()[:10]
+
+
+@pytest.mark.parametrize("change", [lambda file: file.write_text("2"), lambda file: file.unlink()])
+def test_results_that_have_changed_since_they_were_measured_are_refused(measured, change):
+    change(measured / "out/results/simulated/estimated/tiny.nc")
+    for words in (["check"], ["accept", "--reason", "why"]):
+        said = accuracy(measured, *words, "out/results")
+        assert (said.returncode, said.stderr) == (
+            2,
+            "out/results/simulated/estimated/tiny.nc: the results have changed since their accuracy was measured; run"
+            " again\n",
+        )
 
 
 def test_a_folder_without_a_run_is_one_line(tmp_path):

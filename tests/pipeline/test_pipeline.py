@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -126,6 +127,7 @@ def test_it_makes_figures_tables_and_the_page(finished):
         assert (results / f"figures/{name}.png").stat().st_size > 10_000
     csv, parquet = pd.read_csv(results / "tables/errors.csv"), pd.read_parquet(results / "tables/errors.parquet")
     assert csv["rmse"].to_numpy() == pytest.approx(parquet["rmse"].to_numpy(), rel=1e-4)
+    assert json.loads((results / "left-out.json").read_text())["diagnosed"] == ["tiny"]
     said = ccmodel("report", str(results))
     assert said.returncode == 0
     assert said.stderr.startswith("warning: "), "a warning is no failure"
@@ -348,6 +350,14 @@ def test_a_second_run_does_nothing(copy):
     run = snakemake(copy)
     assert "Nothing to be done" in run.stdout + run.stderr
     assert (copy / "results/index.html").stat().st_mtime_ns == before
+
+
+def test_a_log_is_read_again_if_an_older_one_takes_its_place(copy):
+    """As mv, cp -p, rsync -a and tar leave its date."""
+    log = copy / "data/raw/tiny/t-7N.csv.gz"
+    write_gz(log, read_gz(log).replace("100,", "101,", 1))
+    os.utime(log, (0, 0))
+    assert "Reading batch tiny" in planned(copy)
 
 
 @pytest.mark.long

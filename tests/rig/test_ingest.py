@@ -424,6 +424,7 @@ def edit(*keys, value=None, drop=False, new=None):
             "recordings[1].excitation: amplitude_rad of a triangle is a number that is not negative",
         ),
         (edit("recordings", 1, "file", value="../one.csv"), "recordings[1].file: a log lies inside"),
+        (edit("recordings", 1, "file", value=".old/one.csv"), "recordings[1].file: a log is no hidden file"),
         (edit("recordings", 0, "conduit", value=[]), "recordings[0].conduit: needs at least 1 entries, has 0"),
         (edit("rig", "ranges", value={"drive_curent_A": [0, 1]}), "did you mean 'drive_current_A'?"),
         (edit("rig", "ranges", value={"drive_current_A": [1, 0]}), "a range is [lowest, highest], found [1.0, 0.0]"),

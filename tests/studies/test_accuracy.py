@@ -5,11 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import builders
 from builders import recording
+from ccmodel.inference.fit import FitResult
+from ccmodel.inference.intervals import Interval
 from ccmodel.model.model_input import ModelInput
 from ccmodel.model.parameters import Parameters
 from ccmodel.model.run import simulate, simulate_recording
 from ccmodel.rig.ingest import ingest_batch
+from ccmodel.steps.files import fitted, write_json
+from ccmodel.steps.ingest import ingest
 from ccmodel.studies.accuracy.figure import ratio_figure, scatter_figure
 from ccmodel.studies.accuracy.settings import Accuracy
 from ccmodel.studies.accuracy.study import (
@@ -159,6 +164,18 @@ def test_an_input_that_is_not_determined_is_named():
     table = comparison_table([replace(case, input_sd={"friction_coefficient": np.inf})], ASKED, HOW)
     assert (table["inputs_left_out"] == "friction_coefficient").all()
     assert (table["u_input"] == 0).all()
+
+
+def test_a_parameter_that_a_fit_does_not_determine_is_left_out_of_the_inputs(tmp_path):
+    """Its standard deviation is infinite, which the JSON of a fit has as null."""
+    recordings, fit = tmp_path / "known.nc", tmp_path / "fit.json"
+    ingest(builders.write_batch(tmp_path / "known", pretensions=(7.0,)), recordings, tmp_path / "known.json")
+    name = "friction_coefficient"
+    write_json(fit, FitResult(True, "", {name: 0.2}, {name: Interval.about(0.2, np.inf)}).as_dict())
+    known = fitted(recordings, fit)
+    assert known.sds == {"friction_coefficient": np.inf}
+    table = comparison_table([replace(case, input_sd=known.sds) for case in cases()], ASKED, HOW)
+    assert (table["inputs_left_out"] == "friction_coefficient").all()
 
 
 def test_repeats_count_as_far_as_the_model_was_not_told_of_them():

@@ -11,7 +11,7 @@ from ccmodel.config import (
     expand_studies,
     load_config,
 )
-from ccmodel.provenance import files_in, source_digest
+from ccmodel.provenance import files_in, folder_digest, source_digest
 from ccmodel.studies.diagnosis.settings import MODEL_FILES
 from ccmodel.typed import InputError
 

@@ -1,16 +1,18 @@
 """What `ccmodel accuracy` does: compare the last run with the baseline, accept it, fill the history of past commits."""
 
-from collections.abc import Iterable
+import os
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from pydantic import BaseModel
 
 from ccmodel.accuracy.baseline import ACCEPT, make_baseline, read_baseline, write_baseline
 from ccmodel.accuracy.comparison import GAINED, Comparison, Limits, compare
-from ccmodel.accuracy.history import add_rows, commits_in, head, rows_of, run_commit
+from ccmodel.accuracy.history import add_rows, commits_in, head, now, rows_of, run_commit
 from ccmodel.accuracy.measure import Batches
 from ccmodel.progress import Progress, each_of
+from ccmodel.provenance import file_digest
 from ccmodel.typed import InputError, load_json_model
 from ccmodel.version import __version__
 
@@ -23,9 +25,20 @@ class _Settings(Limits, extra="ignore"):
     history: str
 
 
+class _Inputs(BaseModel):
+    """Digests of what was measured, by path from the folder in which the run was started."""
+
+    sha256: dict[str, str] = {}
+
+
 class _Measured(BaseModel):
+    """What is read of the study's file; one of before does not state its commit."""
+
     settings: _Settings
     measured: Batches
+    commit: str | None = None
+    date: str | None = None
+    provenance: _Inputs = _Inputs()
 
 
 @dataclass(frozen=True)
@@ -37,12 +50,16 @@ class State:
     baseline, history : Path
     limits : Limits
     batches : dict of str to BatchAccuracy
+    commit, date : str
+        Commit whose sources were measured, and its date; the present date, if there were changes.
     """
 
     baseline: Path
     history: Path
     limits: Limits
     batches: Batches
+    commit: str
+    date: str
 
 
 def state_of(results: Path) -> State:
@@ -51,7 +68,7 @@ def state_of(results: Path) -> State:
     Raises
     ------
     InputError
-        If no run has measured it there.
+        If no run has measured it there, or the results have changed since.
     """
     file = results / STATE
     if not file.exists():
@@ -59,8 +76,36 @@ def state_of(results: Path) -> State:
             f"{file}: not there: no run with the key 'baseline' in its configuration came to its end in {results}"
         )
     stated = load_json_model(file, _Measured, "a run")
+    within = _results_of(stated.provenance.sha256)
+    if changed := _changed(results, stated.provenance.sha256, within):
+        raise InputError(f"{results / changed}: the results have changed since their accuracy was measured; run again")
+    folder = _folder_of_run(results, within)
     limits = Limits(coverage=stated.settings.coverage, reproducibility=stated.settings.reproducibility)
-    return State(Path(stated.settings.file), Path(stated.settings.history), limits, stated.measured)
+    commit, date = head(folder) if stated.commit is None else (stated.commit, stated.date)
+    baseline, history = folder / stated.settings.file, folder / stated.settings.history
+    return State(baseline, history, limits, stated.measured, commit, date or now())
+
+
+def _results_of(inputs: Iterable[str]) -> PurePath:
+    """The folder of results as the run named it, which has the recordings that were measured."""
+    return next((path.parents[1] for path in map(PurePath, inputs) if path.parent.name == "recordings"), PurePath())
+
+
+def _changed(results: Path, inputs: Mapping[str, str], within: PurePath) -> PurePath | None:
+    """One of the results that are no longer what was measured; the baseline and the history are none of them."""
+    for path, digest in inputs.items():
+        if within.parts and PurePath(path).is_relative_to(within):
+            own = PurePath(path).relative_to(within)
+            if not (results / own).is_file() or file_digest(results / own) != digest:
+                return own
+    return None
+
+
+def _folder_of_run(results: Path, within: PurePath) -> Path:
+    """The folder in which the run was started, which has the baseline; the present one, if nothing tells."""
+    place, parts = results.resolve(), within.parts
+    is_below = bool(parts) and place.parts[-len(parts) :] == parts
+    return Path(os.path.relpath(place.parents[len(parts) - 1])) if is_below else Path()
 
 
 def check(results: Path) -> tuple[Comparison, str]:
@@ -69,7 +114,7 @@ def check(results: Path) -> tuple[Comparison, str]:
     Raises
     ------
     InputError
-        If there is no run, or no baseline that can be read.
+        If there is no run, its results have changed since, or there is no baseline that can be read.
     """
     state = state_of(results)
     baseline = read_baseline(state.baseline)
@@ -99,10 +144,9 @@ def accept(results: Path, reason: str) -> State:
     state = state_of(results)
     if not state.batches:
         raise InputError(f"{results}: the run has measured no batch; there is nothing to accept")
-    commit, date = head()
-    baseline = make_baseline(state.batches, state.limits, date, commit, reason.strip())
+    baseline = make_baseline(state.batches, state.limits, state.date, state.commit, reason.strip())
     # The history first: if the baseline fails, the same command replaces this commit's rows.
-    add_rows(state.history, rows_of(state.batches, commit, date, __version__))
+    add_rows(state.history, rows_of(state.batches, state.commit, state.date, __version__))
     write_baseline(state.baseline, baseline)
     return state
 

@@ -1,13 +1,15 @@
 """Accuracy over the project's commits: a CSV file in version control, and the past commits that fill it."""
 
 import os
+import signal
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import pandas as pd
 
@@ -84,16 +86,22 @@ def overview(file: Path) -> str:
     return "median error over the channels, % of peak to peak\n" + columns.to_string(float_format="%.2f", na_rep="-")
 
 
-def head(folder: Path = Path()) -> tuple[str, str]:
-    """Commit of a folder's sources and its date; "+" marks changes that are not committed, "unknown" no repository."""
+def head(folder: Path = Path()) -> tuple[str, str | None]:
+    """Commit of a folder's sources and its date.
+
+    "+" marks changes that are not committed, and "unknown" no repository; both have no date.
+    """
     try:
         commit, date = _git(folder, "log", "-1", "--format=%h %cI").split()
         changed = _git(folder, "status", "--porcelain", "--untracked-files=no")
     except InputError:
-        return "unknown", pd.Timestamp.now("UTC").isoformat(timespec="seconds")
-    if not changed:
-        return commit, date
-    return commit + "+", pd.Timestamp.now("UTC").isoformat(timespec="seconds")
+        return "unknown", None
+    return (commit + "+", None) if changed else (commit, date)
+
+
+def now() -> str:
+    """The present date and time, for what has no commit."""
+    return pd.Timestamp.now("UTC").isoformat(timespec="seconds")
 
 
 def commits_in(revisions: Iterable[str]) -> list[str]:
@@ -131,7 +139,7 @@ def run_commit(commit: str, cores: int) -> tuple[pd.DataFrame, str]:
 
 @contextmanager
 def _worktree(commit: str) -> Iterator[Path]:
-    with TemporaryDirectory(prefix="ccmodel-history-") as scratch:
+    with TemporaryDirectory(prefix="ccmodel-history-", ignore_cleanup_errors=True) as scratch:
         folder = Path(scratch) / "tree"
         _git(Path(), "worktree", "add", "--detach", "--quiet", str(folder), commit)
         try:
@@ -146,12 +154,27 @@ def _run_pipeline(folder: Path, cores: int) -> str:
         return "it has no pipeline"
     command = [sys.executable, "-m", "snakemake", "--cores", str(cores), "--configfile", CONFIG, "--", TARGET]
     environment = os.environ | {"PYTHONPATH": str(folder / "src")}
-    run = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    run = _run(command, folder, environment)
     if run.returncode == 0:
         return ""
     lines = [line.strip() for line in (run.stderr + run.stdout).splitlines() if line.strip()]
     first = next((k for k, line in enumerate(lines) if "error" in line.lower()), 0)
     return f"its run failed ({_one_line(' '.join(lines[first : first + 2]).replace(f'{folder}/', ''))})"
+
+
+def _run(command: list[str], folder: Path, environment: Mapping[str, str]) -> subprocess.CompletedProcess[str]:
+    """Run a command in a process group of its own, which ends if this process is interrupted."""
+    pipes: Any = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, cwd=folder, env=environment, start_new_session=True, **pipes) as process:
+        try:
+            out, err = process.communicate()
+        except BaseException:
+            # The jobs too: Snakemake itself waits for those that run, and they write into the folder.
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGTERM)
+            process.communicate()
+            raise
+    return subprocess.CompletedProcess(command, process.returncode, out, err)
 
 
 def _simulated_in(results: Path) -> list[Simulated]:

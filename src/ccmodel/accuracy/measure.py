@@ -195,7 +195,7 @@ def _fit_sds(pairs: Sequence[Pair], known: Fitted, table: pd.DataFrame) -> dict[
     The changes of several parameters are added in squares. A parameter that the recordings do not determine, or with
     which the model cannot be run, is left out, and so is a channel's change to or from an error of zero.
     """
-    sds = {name: sd for name, sd in known.sds.items() if sd is not None and np.isfinite(sd)}
+    sds = {name: sd for name, sd in known.sds.items() if np.isfinite(sd)}
     if not sds or known.parameters is None:
         return {}
     given = [(recorded, ModelInput.of(recorded)) for recorded, simulated in pairs if simulated is not None]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from ccmodel.api.batch import Batch, joint_batch
-from ccmodel.api.model import HasModel, as_model
+from ccmodel.api.model import HasModel, as_model, files_among
 from ccmodel.api.options import Candidates, Tolerance, check_step, diagnosis_options, progress_of
 from ccmodel.api.recordings import counted
 from ccmodel.diagnosis.kept_law import check_name, file_of, mechanism_file
@@ -20,7 +20,7 @@ from ccmodel.paths import try_folder
 from ccmodel.progress import Progress, within
 from ccmodel.report.verdict import SYMBOL, error_name, errors_in_words, nearest_sentence, sentence
 from ccmodel.studies.diagnosis.page import candidates_of
-from ccmodel.studies.diagnosis.run import INGEST, PAGE, Outcome, diagnosed, write_alone
+from ccmodel.studies.diagnosis.run import FILES, INGEST, PAGE, Outcome, diagnosed, write_alone
 from ccmodel.typed import InputError
 
 if TYPE_CHECKING:
@@ -282,7 +282,7 @@ def diagnose(
     )
     known = None if baseline is None else as_model(baseline).parameters
     if out is not None:
-        try_folder(out)
+        try_folder(out, files=FILES, read=files_among(baseline))
     with progress_of(progress) as report:
         several = batch if isinstance(batch, Sequence) and not isinstance(batch, str) else [batch]
         batch = joint_batch(several, within(report, 0.0, INGEST))

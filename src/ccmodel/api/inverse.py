@@ -19,6 +19,7 @@ from ccmodel.api.model import (
     check_same_rig,
     files_among,
     sorted_findings,
+    stated_ids,
 )
 from ccmodel.api.options import progress_of
 from ccmodel.api.recordings import counted
@@ -68,6 +69,8 @@ class Estimate(Mapping[str, pd.DataFrame]):
     notes: tuple[str, ...]
     findings: tuple[Finding, ...]
     _tables: Mapping[str, pd.DataFrame]
+    # Ids of all recordings of the batch.
+    _stated: tuple[str, ...]
 
     def __getitem__(self, id: str) -> pd.DataFrame:
         """The table of the recording with this id.
@@ -95,12 +98,14 @@ class Estimate(Mapping[str, pd.DataFrame]):
     def save(self, folder: str | Path) -> None:
         """Write a CSV for each recording, as ``ccmodel estimate --out`` does.
 
+        An earlier one of a recording that has no estimate now is removed.
+
         Raises
         ------
         InputError
             If the folder cannot be made or written to.
         """
-        with new_files(folder) as path:
+        with new_files(folder, without=[f"{id}.csv" for id in self._stated]) as path:
             for id, table in self._tables.items():
                 write_table(path / f"{id}.csv", table.reset_index().astype({VISIBLE: int}), digits=9)
 
@@ -192,7 +197,8 @@ def estimate(
             rows += _errors(found, known.parameters)
     refused, others = sorted_findings(batch)
     columns = ["recording", "channel", "unit", "bias", "rms", "share_within", "samples"]
-    result = Estimate(pd.DataFrame(rows, columns=columns), (*refused, *left_out), tuple(notes), others, tables)
+    errors, lines = pd.DataFrame(rows, columns=columns), (*refused, *left_out)
+    result = Estimate(errors, lines, tuple(notes), others, tables, stated_ids(batch))
     if out is not None:
         result.save(out)
     return result

@@ -76,6 +76,8 @@ class Prediction(Recordings):
     notes: tuple[str, ...]
     # What was predicted, in the order of `recordings`.
     _recorded: tuple[Recording, ...]
+    # Ids of all recordings of the batch.
+    _stated: tuple[str, ...]
 
     @property
     def table(self) -> pd.DataFrame:
@@ -110,12 +112,14 @@ class Prediction(Recordings):
     def save(self, folder: str | Path) -> None:
         """Write a CSV for each recording, as ``ccmodel predict --out`` does: its id, all channels over time.
 
+        An earlier one of a recording that has no prediction now is removed.
+
         Raises
         ------
         InputError
             If the folder cannot be made or written to.
         """
-        with new_files(folder) as path:
+        with new_files(folder, without=[f"{id}.csv" for id in self._stated]) as path:
             for recording in self.recordings:
                 write_channels(path / f"{recording.id}.csv", recording)
 
@@ -217,7 +221,8 @@ def predict(
     refused, others = sorted_findings(batch)
     recorded, simulations = (tuple(pair[i] for pair in found.pairs) for i in (0, 1))
     left_out = (*refused, *found.failures)
-    prediction = Prediction(simulations, found.errors, left_out, others, tuple(found.notes), recorded)
+    notes, stated = tuple(found.notes), stated_ids(batch)
+    prediction = Prediction(simulations, found.errors, left_out, others, notes, recorded, stated)
     if out is not None:
         prediction.save(out)
     return prediction
@@ -325,6 +330,11 @@ def sorted_findings(batch: Batch) -> tuple[list[str], tuple[Finding, ...]]:
     """Lines on what a batch's files are refused for, and its other findings."""
     refused = [str(f) for f in batch.findings if f.is_refused]
     return refused, tuple(f for f in batch.findings if not f.is_refused)
+
+
+def stated_ids(batch: Batch) -> tuple[str, ...]:
+    """Ids of all recordings in a batch's file, also of those that are refused."""
+    return tuple(entry.id for entry in batch._file.recordings)
 
 
 def files_among(*given: object) -> list[str | Path]:

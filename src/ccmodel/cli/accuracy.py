@@ -24,7 +24,7 @@ def check(results: RunResults = Path("results"), as_json: Json = False, quiet: Q
     """Compare the last run with the accepted accuracy.
 
     Exits with 0 if everything was compared and nothing was lost, with 1 on a loss or something that could not be
-    compared, with 2 if there is no run or no baseline that can be read.
+    compared, with 2 if there is no run, if its results have changed since, or if there is no baseline that can be read.
     """
     from ccmodel.accuracy.baseline import ACCEPT
     from ccmodel.accuracy.comparison import GAINED

@@ -2,6 +2,7 @@
 
 from dataclasses import asdict
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -44,7 +45,7 @@ def init(
         problems: tuple[Problem, ...] = ()
     except InputError as error:
         problems = error.problems
-    output.hint(f"{file}: fill in what is empty, then run: ccmodel check {folder}")
+    output.hint(f"{file}: fill in what is empty, then run: ccmodel check {quote(str(folder))}")
     fill_in = [{"line": p.line, "text": p.text} for p in problems]
     content = {"batch_file": file, "fill_in": fill_in, "refused": refused}
     output.result(content, *(f"  line {p.line}: {p.text}" for p in problems))
@@ -79,14 +80,14 @@ def check(batch: Batch, as_json: Json = False, quiet: Quiet = False) -> None:
     for finding in ingested.findings:
         output.finding(str(finding), finding.severity)
     if not is_usable:
-        output.hint(f"mend this, then run again: ccmodel check {batch}")
+        output.hint(f"mend this, then run again: ccmodel check {quote(str(batch))}")
         raise typer.Exit(1)
     if not any(recording.shows_tensions for recording in ingested.recordings):
         output.hint(
             "the logs do not show the tensions at both ends, as load cells and torques do: a diagnosis will fit the"
             " initial tension, and no single mechanism reaches a confidence of 0.8 (docs/limits.md)"
         )
-    output.hint(f"nothing contradicts another value. Next: ccmodel diagnose {batch} --out DIR")
+    output.hint(f"nothing contradicts another value. Next: ccmodel diagnose {quote(str(batch))} --out DIR")
 
 
 def _as_data(seen: "Overview") -> dict:

@@ -1,6 +1,7 @@
 """Diagnosis of a batch, or of several batches of one rig."""
 
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -99,9 +100,11 @@ def diagnose(
     import ccmodel
     from ccmodel.api.options import diagnosis_options
     from ccmodel.diagnosis.kept_law import check_name
+    from ccmodel.paths import try_folder
+    from ccmodel.studies.diagnosis.run import FILES
 
     output, shares = Output(as_json, quiet), tolerance_of(tolerance)
-    # The same check as below, with the names that options have here.
+    # The same checks as below, with the names that options have here.
     diagnosis_options(
         shares,
         step,
@@ -114,6 +117,7 @@ def diagnose(
         run_limit=run_limit,
         time_limit_s=time_limit,
     )
+    try_folder(out, "--out", FILES, () if baseline is None else (baseline,))
     if keep_law is not None:
         check_name(keep_law, prefix="--")
     with leaving(out), output.progress() as progress:
@@ -134,7 +138,10 @@ def diagnose(
         )
     kept = None if keep_law is None else found.keep_law(keep_law, out)
     output.result({**found.report, "out": out}, found.headline)
-    output.hint(f"wrote {out}: diagnosis.json, report.html and the models. Next: ccmodel report {out}")
+    for finding in found.batch.findings:
+        if finding.is_refused:
+            output.finding(str(finding), "refused")
+    output.hint(f"wrote {out}: diagnosis.json, report.html and the models. Next: ccmodel report {quote(str(out))}")
     if kept is not None:
         output.hint(f"wrote {kept}: the law as a mechanism, to be reviewed (docs/how-to/add-a-mechanism.md)")
     elif keep_law is not None:

@@ -1,8 +1,11 @@
 """The application and its entry point."""
 
+import errno
+import os
 import signal
 import sys
 import traceback
+from contextlib import suppress
 from typing import Annotated, Any
 
 import typer
@@ -33,6 +36,15 @@ _WRONG_USAGE: Any = typer.BadParameter.__base__
 INTERRUPTED = "nothing was written"
 # EX_SOFTWARE of sysexits.h; and what a shell has for a command that SIGPIPE ended.
 PROGRAM_ERROR, CLOSED_PIPE = 70, 128 + signal.SIGPIPE
+# Errors of writing. One of a file has its name, so that one without a name is of standard output.
+_OF_WRITING = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF}
+# Arguments of the Python interface that are options of another name here.
+_OPTION_OF = {
+    "step_s": "--step",
+    "pretension_N": "--pretension",
+    "max_speed_rad_per_s": "--max-speed",
+    "max_acceleration_rad_per_s2": "--max-acceleration",
+}
 
 app = typer.Typer(
     cls=Commands,
@@ -92,6 +104,9 @@ def main() -> None:
         closed = isinstance(ended.__context__, BrokenPipeError)
         lines, code = [], CLOSED_PIPE if closed else ended.code
     except Exception as error:
+        if isinstance(error, OSError) and error.filename is None and error.errno in _OF_WRITING:
+            _give_up_output(error)
+            sys.exit(2)
         lines, code = _lines_on(error), 2
         if not lines:
             traceback.print_exc()
@@ -99,6 +114,13 @@ def main() -> None:
     if lines:
         _print_error(lines)
     sys.exit(code or 0)
+
+
+def _give_up_output(error: OSError) -> None:
+    """Say that standard output cannot be written to, and drop the rest of it, which Python would write at its end."""
+    say(f"standard output: {error.strerror}")
+    with suppress(OSError):  # in a test it is no file
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _check_words(words: list[str]) -> None:
@@ -115,13 +137,21 @@ def _lines_on(error: Exception) -> list[str]:
     from ccmodel.typed import InputError
 
     if isinstance(error, InputError):
-        return str(error).splitlines()
+        return list(map(_with_options, str(error).splitlines()))
     if isinstance(error, _WRONG_USAGE):
         command = error.ctx.command_path if error.ctx else "ccmodel"
         return [f"{_text_of(error)} {command} --help shows what there is."]
     if isinstance(error, OSError) and error.filename is not None:
         return [f"{error.filename}: {error.strerror}"]
     return []
+
+
+def _with_options(line: str) -> str:
+    """A line, in which an argument that it is on has the name of the option."""
+    if line.partition(":")[0] in _OPTION_OF:
+        for name, option in _OPTION_OF.items():
+            line = line.replace(name, option)
+    return line
 
 
 def _text_of(error: Any) -> str:
@@ -137,7 +167,10 @@ def _text_of(error: Any) -> str:
 
 def _print_error(lines: list[str]) -> None:
     if "--json" in sys.argv:
-        typer.echo(as_json({"error": lines}))
-    else:
-        for line in lines:
-            say(line)
+        try:
+            typer.echo(as_json({"error": lines}))
+            return
+        except OSError as error:
+            _give_up_output(error)
+    for line in lines:
+        say(line)

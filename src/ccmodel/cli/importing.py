@@ -79,6 +79,7 @@ def _import_as_data(imported: "Written") -> dict:
         "recordings": recordings,
         "left_out": imported.remarks,
         "batch_file_drafted": imported.drafted,
+        "not_listed": imported.unlisted,
     }
 
 

@@ -22,6 +22,7 @@ from ccmodel.cli.options import (
     tolerance_of,
 )
 from ccmodel.cli.output import Output
+from ccmodel.paths import try_file
 
 
 def add_to(app: typer.Typer) -> None:
@@ -101,6 +102,8 @@ def compensate(
     import ccmodel
 
     output = Output(as_json, quiet)
+    # The same check as below, with the name that the option has here.
+    try_file(out, "--out", read=(model, wanted))
     with leaving(out), output.progress() as progress:
         found = ccmodel.compensate(
             model,

@@ -50,7 +50,7 @@ unit is a value beside it (`unit`). A value that there is not is `null`. `out` i
 | command | keys |
 |---|---|
 | `init` | `batch_file`; `fill_in`: a list of `line` and `text`; `refused`: why a log is left out, by its name |
-| `import` | without a map `map`, `files` (by file a list of `column`, `signal`, `unit`, `sign`, `sure`, `why`), `missing`, `remarks`; with one `folder`, `recordings` (by id `samples`, `columns`, `remarks`), `left_out`, `batch_file_drafted` |
+| `import` | without a map `map`, `files` (by file a list of `column`, `signal`, `unit`, `sign`, `sure`, `why`), `missing`, `remarks`; with one `folder`, `recordings` (by id `samples`, `columns`, `remarks`), `left_out`, `batch_file_drafted`, `not_listed` (ids that an earlier `batch.yaml` lacks) |
 | `check` | `usable`; `recordings`: by id `samples`, `rate_Hz`, `duration_s`, `rest_s`, `stroke_rad`, `frequency_Hz`, `cycles`, `wave`, and `channels`, a list of `name`, `low`, `high`, `noise`, `step`, `unit`; `findings`: a list of `batch`, `file`, `row`, `column`, `severity` ("warning", "refused" or "inconsistent"), `text`, `confidence`, `contradicts`, and `line`, where and what in one line |
 | `fit` | the model file: `format`, `parameters` (by name, which ends with the unit), `mechanisms`, `rig`, `intervals` (90 %, by parameter `low`, `high`, `sd`), `provenance`; `fit`: `succeeded`, `message`, `mean_square`, `recordings`, `at_bound`; `out`, `warnings`, `notes`, `left_out` |
 | `simulate` | `out`, `recording`, `samples`, `pretension_N` |

@@ -9,6 +9,7 @@ from ccmodel.cli.group import MODEL, command
 from ccmodel.cli.interruption import leaving
 from ccmodel.cli.options import BatchOption, ConduitsOf, Json, Model, Pretension, Quiet, input_file, out_file
 from ccmodel.cli.output import Output
+from ccmodel.paths import try_file
 
 
 def add_to(app: typer.Typer) -> None:
@@ -42,6 +43,8 @@ def simulate(
     import ccmodel
 
     output = Output(as_json, quiet)
+    # The same check as below, with the name that the option has here.
+    try_file(out, "--out", read=(model, motion))
     with leaving(out), output.progress() as progress:
         simulated = ccmodel.simulate(
             model, motion, recording=recording, batch=batch, pretension_N=pretension, out=out, progress=progress

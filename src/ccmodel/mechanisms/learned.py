@@ -101,8 +101,8 @@ RANGE = (0.005, 0.995)
 LOWEST_TENSION = 0.02
 # Distance of two knots that are one, as a share of all that they span.
 SAME_KNOT = 1e-9
-# Fastenings that yield less are rigid, m/N: a thousandth of the stiffest cable's stretch. The tension of a stiffer piece
-# would be made of rounding errors, and a step would take a hundred times as long.
+# Fastenings that yield less are rigid, m/N: a thousandth of the stretch of the stiffest cable. The tension of a stiffer
+# piece would be made of rounding errors, and a step would take a hundred times as long.
 RIGID_M_PER_N = 1e-10
 # Friction is never negative in either direction or cable, and neither is a compliance.
 LARGEST_BIAS = 0.95

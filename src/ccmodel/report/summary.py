@@ -30,6 +30,7 @@ class _Fit(BaseModel):
 class _NotJudged(BaseModel):
     what: str
     why: str
+    refused: bool = False
 
 
 class _Diagnosis(BaseModel):
@@ -75,7 +76,7 @@ class Summary:
     ----------
     verdicts : sequence of Verdict
     left_out, inconsistent, warnings : sequence of str
-        Lines, as in `ccmodel.report.page.writing.left_out_of`.
+        Lines, as in `ccmodel.report.page.writing.messages_of`.
     page : Path or None
         Page of the run or of the diagnosis.
     """
@@ -111,19 +112,25 @@ def summary_of(folder: Path) -> Summary:
     """
     if (folder / DIAGNOSIS).exists():
         return _of_diagnosis(folder)
-    messages = left_out_of(folder)
-    verdicts = [_verdict(file) for file in sorted(folder.glob(f"diagnoses/*/{DIAGNOSIS}"))]
-    return Summary(verdicts, **messages, page=_if_there(folder / "index.html"))
+    of_run = left_out_of(folder)
+    # Verdicts of earlier runs, on batches that the configuration no longer has, stay in the folder.
+    files = [
+        file
+        for file in sorted(folder.glob(f"diagnoses/*/{DIAGNOSIS}"))
+        if of_run.diagnosed is None or file.parent.name in of_run.diagnosed
+    ]
+    page = _if_there(folder / "index.html")
+    return Summary([_verdict(file) for file in files], of_run.left_out, of_run.inconsistent, of_run.warnings, page)
 
 
 def _of_diagnosis(folder: Path) -> Summary:
     verdict = _verdict(folder / DIAGNOSIS)
     stated = load_json_model(folder / DIAGNOSIS, _Diagnosis, WRITER)
-    lines = [f"{one.what}: {one.why}" for one in stated.not_judged]
+    refused, lines = ([f"{n.what}: {n.why}" for n in stated.not_judged if n.refused is kind] for kind in (True, False))
     if verdict.verdict == INPUTS_INCONSISTENT:
-        return Summary([verdict], inconsistent=lines, page=verdict.page)
-    left_out = [] if verdict.verdict else [f"{verdict.batch}: {verdict.sentence}"]
-    return Summary([verdict], left_out=left_out, warnings=[f"not judged: {line}" for line in lines], page=verdict.page)
+        return Summary([verdict], refused, inconsistent=lines, page=verdict.page)
+    left_out = refused if verdict.verdict else [f"{verdict.batch}: {verdict.sentence}", *refused]
+    return Summary([verdict], left_out, warnings=[f"not judged: {line}" for line in lines], page=verdict.page)
 
 
 def _verdict(file: Path) -> Verdict:

@@ -363,6 +363,9 @@ class RecordingEntry(TypedModel):
             raise ValueError(f"{shown(file)}: has characters that do not show; rename the log")
         if Path(file).is_absolute() or ".." in Path(file).parts:
             raise ValueError("a log lies inside its batch's folder: give its path from there")
+        if any(part.startswith(".") for part in Path(file).parts):
+            # Hidden files are not among the inputs that a result names (`ccmodel.provenance.files_in`).
+            raise ValueError("a log is no hidden file and lies in no hidden folder: rename it")
         return file
 
     @property

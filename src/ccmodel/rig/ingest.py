@@ -16,6 +16,7 @@ from ccmodel.rig.calibration import calibrate
 from ccmodel.rig.column_checks import ColumnChecks
 from ccmodel.rig.consistency import check_consistency
 from ccmodel.rig.findings import Defect, Finding, LogError, Severity
+from ccmodel.rig.imported import PROVENANCE, unlisted_logs
 from ccmodel.rig.log import read_log
 from ccmodel.rig.sensor_checks import check_sensors, drive_travel
 from ccmodel.typed import InputError
@@ -113,6 +114,7 @@ def ingest_batch(folder: Path, progress: Progress = silent) -> Ingested:
         return Ingested([], [_finding(name, batch_file, "refused", defect) for defect in columns.refusals])
     travel = max((drive_travel(table, batch.rig) for table in tables if table is not None), default=0.0)
     findings = [_finding(name, batch_file, "warning", defect) for defect in columns.warnings]
+    findings += _unlisted(name, folder, batch)
     recordings, used_files = [], []
     checking = each_of(files, within(progress, READ, CHECKED), lambda file: f"checking {Path(file).name}")
     for k, (entry, file) in enumerate(zip(batch.recordings, checking, strict=True)):
@@ -136,6 +138,17 @@ def ingest_batch(folder: Path, progress: Progress = silent) -> Ingested:
     contradictions, errors = _attempt(name, batch_file, check_consistency, sound, batch)
     findings += [replace(f, file=str(folder / f.file)) for f in contradictions or []] + errors
     return Ingested(recordings, findings, batch)
+
+
+def _unlisted(name: str, folder: Path, batch: Batch) -> list[Finding]:
+    """Warnings on imported logs that `batch.yaml` does not list."""
+    try:
+        unlisted = unlisted_logs(folder, [entry.file for entry in batch.recordings])
+    except (InputError, OSError):
+        text = "cannot be read: whether batch.yaml lists all imported logs is not known"
+        return [Finding(name, str(folder / PROVENANCE), None, None, "warning", text)]
+    text = "not used: it was imported, and batch.yaml does not list it; add an entry for it, or remove the file"
+    return [Finding(name, str(folder / file), None, None, "warning", text) for file in unlisted.values()]
 
 
 def _attempt(batch: str, file: str, step: Callable[..., T], *args: Any) -> tuple[T | None, list[Finding]]:

@@ -46,7 +46,8 @@ class Fitted:
     parameters : Parameters or None
         None for a refused batch, a failed fit or a batch that could not be diagnosed.
     sds : dict of str to float
-        Standard deviations of the fitted parameters; infinite where the file of a model states none.
+        Standard deviations of the fitted parameters; infinite where the file states none, as of a parameter that the
+        recordings do not determine.
     recordings : list of str
         Names (batch/id) of the recordings that they were fitted to.
     """
@@ -73,7 +74,8 @@ def fitted(recordings_file: Path, fit_file: Path | None) -> Fitted:
         return Fitted(model, sds, [f"{r.batch}/{r.id}" for r in read_recordings(recordings_file)])
     if not result["succeeded"]:
         return Fitted(None)
-    sds = {name: interval["sd"] for name, interval in result.get("intervals", {}).items()}
+    intervals = result.get("intervals", {})
+    sds = {name: inf if one["sd"] is None else one["sd"] for name, one in intervals.items()}
     return Fitted(estimates.with_values(result["values"]), sds, result["recordings"])
 
 

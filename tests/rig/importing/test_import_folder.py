@@ -7,11 +7,14 @@ from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
+import pandas as pd
 import pytest
 from made_up_lab import counts, recording, write_text
 
 from ccmodel.rig import readers
 from ccmodel.rig.importing import import_files
+from ccmodel.rig.importing.showing import next_of_import
+from ccmodel.rig.ingest import ingest_batch
 from ccmodel.rig.log import read_log
 from ccmodel.typed import InputError
 
@@ -33,6 +36,29 @@ channels:
   theta_out_rad: {signal: angle, unit: rad, file: load}
 files:
   load: {pattern: "*_load.csv", time: {signal: stamp}}
+"""
+
+TWO_TIMES = """\
+format: 1
+time: {signal: at_drive}
+channels:
+  theta_in_rad: {signal: angle_drive, unit: rad}
+  theta_out_rad: {signal: angle_load, unit: rad, time: {signal: at_load}}
+"""
+
+
+FILLED_IN = """\
+format: 1
+batch: batch-1
+origin: rig
+rig:
+  drive: {pulley_radius_m: 0.006, encoder_counts_per_rev: 2000}
+  load: {pulley_radius_m: 0.006}
+  cable: {stiffness_N_per_m: 13880.0, length_m: 1.2, friction_coefficient: 0.147}
+  accuracy: {encoder_rad: 0.00314, torque_Nm: 0.0001, load_cell_N: 0.1}
+defaults: {pretension_N: 7.0, conduit: [{length_m: 1.2, bend_rad: 3.14}]}
+recordings:
+- {id: one, file: one.csv.gz}
 """
 
 
@@ -103,6 +129,33 @@ def test_a_repeated_import_replaces_its_own_and_keeps_batch_yaml(lab):
     assert (lab.batch / "batch.yaml").read_text() == "mine: true\n"
 
 
+@pytest.mark.parametrize("filled_in", [True, False])
+def test_a_recording_that_was_imported_later_is_named_until_batch_yaml_lists_it(lab, filled_in):
+    lab.run(lab.files[:1])
+    stated = lab.batch / "batch.yaml"
+    if filled_in:
+        stated.write_text(FILLED_IN)
+    written = lab.run()
+    assert written.unlisted == ["two"]
+    assert f"add two to {stated}, which does not list them, then: " in next_of_import(written, lab.batch)
+    stated.write_text(FILLED_IN)
+    named = [f for f in ingest_batch(lab.batch).findings if f.file == str(lab.batch / "two.csv.gz")]
+    assert [(f.severity, f.text.partition(";")[0]) for f in named] == [
+        ("warning", "not used: it was imported, and batch.yaml does not list it")
+    ]
+    (lab.batch / "two.csv.gz").unlink()
+    assert not any("two" in f.file for f in ingest_batch(lab.batch).findings)
+
+
+def test_an_import_whose_recordings_are_all_listed_has_no_finding_on_it(lab):
+    assert lab.run().unlisted == []
+    both = FILLED_IN.replace("file: one.csv.gz}", "file: ./one.csv.gz}\n- {id: second, file: two.csv.gz}")
+    (lab.batch / "batch.yaml").write_text(both)
+    assert not any("list" in f.text for f in ingest_batch(lab.batch).findings)
+    (lab.batch / "import.json").write_text("[]")
+    assert [f.severity for f in ingest_batch(lab.batch).findings if f.file.endswith("import.json")] == ["warning"]
+
+
 def test_a_failed_import_leaves_all_as_it_was(lab):
     lab.run()
     before = {entry.name: entry.read_bytes() for entry in lab.batch.iterdir()}
@@ -124,7 +177,7 @@ def test_what_is_no_import_is_never_replaced(lab):
     with pytest.raises(InputError, match="would be replaced, but one.csv is from no import"):
         lab.run(batch=lab.root / "lab")
     (lab.batch / "thesis.txt").rename(lab.batch / "import.json")
-    with pytest.raises(InputError, match="import.json: is not an import's"):
+    with pytest.raises(InputError, match="import.json: is not what an import wrote .*; give a new or empty folder"):
         lab.run()
     assert (lab.batch / "import.json").read_text() == "years of work"
     with pytest.raises(InputError, match="its name becomes the batch's"):
@@ -304,6 +357,20 @@ def test_columns_of_dates_and_times_align_files(tmp_path):
     one = import_files(files, tmp_path / "map.yaml", tmp_path / "batch").recordings["run1"]
     assert "run1.csv: 'stamp' holds dates and times: read as seconds from the first" in one.remarks
     assert one.costs[0].how == "absolute start times of both files"
+    assert one.table["theta_out_rad"].to_numpy() == pytest.approx(one.table["theta_in_rad"].to_numpy(), abs=1e-4)
+
+
+def test_two_columns_of_dates_and_times_in_a_file_keep_their_offset(tmp_path):
+    """The load's samples of a table begin 0.75 s after the drive's, by their own stamps."""
+    time_s, started = np.arange(0, 6, 0.004), pd.Timestamp("2026-03-31T12:00:00Z")
+    table = pd.DataFrame()
+    for end, begin in (("drive", 0.0), ("load", 0.75)):
+        table[f"at_{end}"] = started + pd.to_timedelta(begin + time_s, unit="s")
+        table[f"angle_{end}"] = np.sin(begin + time_s) + 0.2 * np.sin(7 * (begin + time_s))
+    table.to_parquet(tmp_path / "run1.parquet")
+    (tmp_path / "map.yaml").write_text(TWO_TIMES)
+    written = import_files([tmp_path / "run1.parquet"], tmp_path / "map.yaml", tmp_path / "batch")
+    one = written.recordings["run1"]
     assert one.table["theta_out_rad"].to_numpy() == pytest.approx(one.table["theta_in_rad"].to_numpy(), abs=1e-4)
 
 

@@ -58,7 +58,7 @@ class Content:
     concealed : Concealed, optional
         What the simulated rigs have.
     left_out, inconsistent, warnings : sequence of str
-        Messages, as in `left_out_of`.
+        Messages, as in `messages_of`.
     """
 
     batches: Sequence[dict]
@@ -102,7 +102,8 @@ def write_report(
     batches, fits, simulations = ([read_json(Path(f)) for f in inputs[k]] for k in ("summaries", "fits", "simulations"))
     diagnoses = [read_json(Path(file)) for file in inputs["diagnoses"]]
     messages = messages_of(raw, unusable, batches, fits, simulations, diagnoses)
-    write_json(page_file.parent / LEFT_OUT, messages)
+    diagnosed = [Path(file).parent.name for file in inputs["diagnoses"]]
+    write_json(page_file.parent / LEFT_OUT, messages | {"diagnosed": diagnosed})
     reports = [Path(file).read_text(encoding="utf-8") for file in inputs["reports"]]
     content = Content(
         batches=batches,
@@ -165,14 +166,17 @@ def messages_of(
     }
 
 
-class _LeftOut(BaseModel):
+class LeftOut(BaseModel):
+    """Messages of a run, and the names of its diagnoses; a run of before named none, and had no contradictions."""
+
     left_out: list[str]
-    inconsistent: list[str] = []  # a run of before had none
+    inconsistent: list[str] = []
     warnings: list[str]
+    diagnosed: list[str] | None = None
 
 
-def left_out_of(results: Path) -> dict[str, list[str]]:
-    """Messages of the last run into a results folder: ``left_out``, ``inconsistent`` and ``warnings``.
+def left_out_of(results: Path) -> LeftOut:
+    """Messages of the last run into a results folder.
 
     Raises
     ------
@@ -183,7 +187,7 @@ def left_out_of(results: Path) -> dict[str, list[str]]:
     if not file.exists():
         text = "holds no results of a run that came to its end, and none of a diagnosis"
         raise InputError(f"{results}: {text}; give the folder that --out has named, or that of a run's results")
-    return load_json_model(file, _LeftOut, "a run").model_dump()
+    return load_json_model(file, LeftOut, "a run")
 
 
 def write_page(file: Path, content: Content) -> None:

@@ -66,7 +66,10 @@ def import_tables(written: Written) -> list[RenderableType]:
 def next_of_import(written: Written, out: Path) -> str:
     """What to do after an import."""
     folder = shlex.quote(str(out))
-    filled = f"fill in {Path(out) / BATCH}, then: " if written.drafted else ""
+    batch_file = Path(out) / BATCH
+    filled = f"fill in {batch_file}, then: " if written.drafted else ""
+    if written.unlisted:
+        filled = f"add {', '.join(written.unlisted)} to {batch_file}, which does not list them, then: "
     count = len(written.recordings)
     return f"wrote {count} recording{'s' if count > 1 else ''} to {out}. Next, {filled}ccmodel check {folder}"
 

@@ -20,13 +20,14 @@ from ccmodel.rig.batch import NAMES, valid_name
 from ccmodel.rig.columns import TIME
 from ccmodel.rig.drafting import draft_batch
 from ccmodel.rig.findings import FileError
+from ccmodel.rig.imported import PROVENANCE, imported_logs, listed_files, unlisted_logs
 from ccmodel.rig.importing.map import ImportMap, load_map
 from ccmodel.rig.importing.recording import Built, build
 from ccmodel.rig.importing.sources import Source, names_of, recordings_of
 from ccmodel.typed import InputError, Problem
 from ccmodel.version import __version__
 
-MAP, PROVENANCE, BATCH = "map.yaml", "import.json", "batch.yaml"
+MAP, BATCH = "map.yaml", "batch.yaml"
 FORMAT = 1
 # Share of reading the files in the time of an import; the logs are then written.
 BUILDING = 0.5
@@ -50,12 +51,15 @@ class Written:
         Files that were left out.
     drafted : bool
         Whether a `batch.yaml` was drafted.
+    unlisted : list of str
+        Recordings that an earlier `batch.yaml` does not list, so that no command will use them.
     """
 
     folder: Path
     recordings: dict[str, Built]
     remarks: list[str] = field(default_factory=list)
     drafted: bool = False
+    unlisted: list[str] = field(default_factory=list)
 
 
 def import_files(files: Sequence[Path], map_file: Path, out: Path, progress: Progress = silent) -> Written:
@@ -104,7 +108,8 @@ def import_files(files: Sequence[Path], map_file: Path, out: Path, progress: Pro
         if (out / BATCH).exists():
             shutil.copy2(out / BATCH, fresh / BATCH)
     # In its place, so that a message on a log names a file that is there.
-    return Written(out, built, remarks, _draft(out))
+    drafted = _draft(out)
+    return Written(out, built, remarks, drafted, _unlisted(out))
 
 
 def check_folder(out: Path) -> None:
@@ -130,12 +135,17 @@ def check_folder(out: Path) -> None:
 def _files_of_import(folder: Path) -> list[str]:
     """Names of the logs that an earlier import wrote to a folder."""
     try:
-        earlier = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
-        return [recording["file"] for recording in earlier["recordings"]]
-    except FileNotFoundError:
+        return list(imported_logs(folder).values())
+    except InputError as error:
+        raise InputError(f"{error}; give a new or empty folder") from None
+
+
+def _unlisted(folder: Path) -> list[str]:
+    """Recordings of an import that `batch.yaml` does not list; of one that cannot be read, `ccmodel check` says why."""
+    try:
+        return list(unlisted_logs(folder, listed_files(folder)))
+    except InputError:
         return []
-    except (OSError, ValueError, KeyError, TypeError):
-        raise InputError(f"{folder / PROVENANCE}: is not an import's; give a new or empty folder") from None
 
 
 def _content(file: Path) -> bytes:

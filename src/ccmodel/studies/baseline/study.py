@@ -9,7 +9,7 @@ import pandas as pd
 from ccmodel.accuracy.baseline import read_baseline
 from ccmodel.accuracy.comparison import GAINED, Change, Comparison, compare
 from ccmodel.accuracy.gate import summary
-from ccmodel.accuracy.history import read_history, rows_of
+from ccmodel.accuracy.history import head, read_history, rows_of
 from ccmodel.accuracy.measure import Simulated, measure
 from ccmodel.recording import ORIGIN
 from ccmodel.studies.baseline.figure import history_figure
@@ -35,7 +35,10 @@ def judge(settings: AgainstBaseline, runs: Sequence[Run], measuring: Measuring) 
     except InputError as error:
         message = str(error)
     history, present = read_history(Path(settings.history)), rows_of(batches, NOW, "", __version__)
+    commit, date = head()
     content = {
+        "commit": commit,
+        "date": date,
         "settings": settings.model_dump(),
         "message": message,
         "accepted": accepted,

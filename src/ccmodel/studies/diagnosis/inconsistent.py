@@ -48,8 +48,9 @@ def report(batch: str, findings: Sequence[Finding], is_held: bool = False, sever
         "repeatability": [],
         "next_experiment": {"text": _correction(contradictions, several), "separates": []},
         "not_judged": [
-            {"what": f.place_in(several), "why": f.text, "confidence": round(f.confidence, 4)}
-            for f in [*contradictions, *damaged]
+            {"what": f.place_in(several), "why": f.text, "confidence": round(f.confidence, 4)} | more
+            for some, more in ((contradictions, {}), (damaged, {"refused": True}))
+            for f in some
         ],
     }
 

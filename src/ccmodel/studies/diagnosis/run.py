@@ -28,6 +28,8 @@ from ccmodel.studies.diagnosis.settings import MODEL_FILES, Diagnosing
 from ccmodel.typed import InputError
 
 VERDICT, PAGE_FILE = "diagnosis.json", "report.html"
+# All that a diagnosis writes into its folder.
+FILES = (VERDICT, PAGE_FILE, *MODEL_FILES.values())
 # The page of a run of the pipeline, seen from the report of a diagnosis.
 PAGE_OF_RUN = "../../index.html"
 # Shares of the time at which the batch is read, and at which the page is written; measured as in `ccmodel.diagnosis`.
@@ -225,7 +227,7 @@ def _not_judged(ingested: Ingested) -> list[dict]:
     trusted = [f for f in findings if f.severity == "inconsistent"]
     differing = [f for f in findings if several and f.batch == ingested.stated.batch]
     return [
-        *({"what": f.place_in(several), "why": f.text} for f in refused),
+        *({"what": f.place_in(several), "why": f.text, "refused": True} for f in refused),
         *({"what": f.place_in(several), "why": f.text, "confidence": f.confidence} for f in trusted),
         *({"what": f"{f.file}, {f.column}", "why": f.text} for f in differing),
     ]
