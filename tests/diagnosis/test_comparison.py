@@ -603,6 +603,29 @@ def test_laws_are_proposed_beside_what_is_listed_unless_one_of_them_leaves_nothi
     assert ((FRICTION,) in proposed) == is_proposed
 
 
+@pytest.mark.parametrize(
+    ("left_by_pair", "left_by_single", "hides"),
+    [(4.0, 20.0, (FRICTION, SCALE)), (0.0, 20.0, (FRICTION,)), (0.0, 45.0, None), (40.0, 50.0, None)],
+)
+def test_laws_are_learned_beside_the_leading_set_or_else_its_part(left_by_pair, left_by_single, hides):
+    """A set that leaves nothing may have an imitation of a law for its last member."""
+    pair = fitted(1.0 + left_by_pair, FRICTION, SCALE), evidence(NONE, NONE, size=left_by_pair)
+    single = fitted(1.0 + left_by_single, FRICTION), evidence(NONE - 50, NONE - 50, size=left_by_single)
+    found = compared(evidence(NONE - 99, NONE - 99, size=60.0), pair, single, model=fitted(61.0))
+    beside = selections.hides_a_law(found)
+    assert (beside and beside.hypothesis.acting) == hides
+
+
+def test_laws_that_leave_far_more_than_a_listed_set_are_followed_by_no_others():
+    listed = fitted(2.0, FRICTION), evidence(NONE, size=1.0)
+    found = compared(evidence(size=60.0), listed, model=fitted(61.0))
+    far, near = fitted(41.0, ("learned-sliding-friction-by-direction", "conduit")), fitted(20.0, SCALE)
+    assert selections.are_hopeless([far], found)
+    assert not selections.are_hopeless([far, near], found)
+    assert not selections.are_hopeless([], found)
+    assert not selections.are_hopeless([far], compared(evidence(size=60.0), model=fitted(61.0)))
+
+
 @pytest.mark.parametrize(("left", "is_tried"), [(4.0, True), (0.4, False)])
 def test_a_law_and_a_mechanism_that_leave_much_may_be_two_laws(monkeypatch, left, is_tried):
     """The mechanism's own law may have another form; a second law is looked for beside the first by itself."""
@@ -894,7 +917,7 @@ def test_contenders_are_fitted_to_the_end_and_others_stay(monkeypatch):
     best, hopeless = fitted(1.4, SCALE), fitted(60.0, FRICTION)
     found = compared(evidence(), (best, evidence(NONE, size=0.4)), (hopeless, evidence()))
     end, asked = fitted(1.45, SCALE), []
-    monkeypatch.setattr(Selection, "fit_all", lambda *given: asked.append(given[3:]) or [end])
+    monkeypatch.setattr(Selection, "fit_all", lambda *given, calibration: asked.append(given[3:]) or [end])
     monkeypatch.setattr(Comparison, "with_candidates", lambda self, every: every)
     assert Selection({}, []).completed(found) == [end, hopeless]
     assert asked == [([Score(best.hypothesis, 0.0, best.values)], LAST_SEARCH)]
@@ -933,7 +956,7 @@ def test_the_covariance_is_linearised_about_the_best_candidate(monkeypatch):
 
     deadline = SimpleNamespace(has_passed=False, check=lambda: None)
 
-    def in_time_for_one(self, *given):
+    def in_time_for_one(self, *given, calibration):
         deadline.has_passed = True
         return candidates[:1]
 
@@ -949,7 +972,7 @@ def test_the_covariance_is_linearised_about_the_best_candidate(monkeypatch):
     assert late.whitened[0].shrinkage == pytest.approx(again.whitened[0].shrinkage)
     # So does one that cannot be run from them.
     deadline.has_passed = False
-    monkeypatch.setattr(Selection, "fit_all", lambda *given: candidates[:1])
+    monkeypatch.setattr(Selection, "fit_all", lambda *given, calibration: candidates[:1])
     failed = late_selection.relinearise(Comparison.of(recordings, base, candidates, SCREENED)).candidates[1]
     assert failed.values == pytest.approx(candidates[1].values, rel=1e-6, abs=1e-6)
     assert failed.message == VALUES_STAY

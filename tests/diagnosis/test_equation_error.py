@@ -101,7 +101,7 @@ def test_a_fit_with_the_inertia_also_starts_from_the_known_values():
 def test_of_both_starts_the_better_fit_that_can_be_made_is_kept(monkeypatch, ends, kept):
     inertia, left = Hypothesis((("load-inertia", "load"),)), list(ends)
 
-    def fit(whitened, hypothesis, free, start, deadline, search):
+    def fit(whitened, hypothesis, free, start, deadline, search, calibration):
         end = left.pop(0)
         if isinstance(end, Exception):
             raise end

@@ -440,7 +440,7 @@ def _with_states(
 
 
 def _search(
-    problem: Problem, hypothesis: Hypothesis, search: Search, calibration: Mapping[str, float] | None
+    problem: Problem, hypothesis: Hypothesis, search: Search, calibration: Mapping[str, float] | None = None
 ) -> Solution:
     starts = [inside_bounds(problem, x) for x in starting_points(problem, calibration)]
     if len(starts) > 1:

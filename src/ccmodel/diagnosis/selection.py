@@ -135,19 +135,18 @@ class Selection:
             every: Sequence[Law], most: int, beside: CandidateFit = base, least: float = -np.inf
         ) -> list[CandidateFit]:
             proposed = proposals(beside, every, self.deadline, self.progress, self.known)
-            leading = [p for p in proposed if p.evidence > least][:most]
-            return self.fit_all(found.whitened, beside, [Score(p.hypothesis, 0.0, p.values) for p in leading])
+            leading = [Score(p.hypothesis, 0.0, p.values) for p in proposed if p.evidence > least][:most]
+            first, others = leading[: settings.PARTNERS], leading[settings.PARTNERS :]
+            found_first = self.fit_all(found.whitened, beside, first)
+            if not others or are_hopeless(found_first, found):
+                return found_first
+            return found_first + self.fit_all(found.whitened, beside, others)
 
         first = sorted(fitted(self.laws, settings.LAWS_FITTED, least=least), key=lambda c: c.mean_square)
-        learned = first + fitted(finer_laws([c.hypothesis for c in first]), settings.LAWS_REFINED, least=least)
-        excess = settings.MOSTLY_LISTED * found.excess
-        single = (c for c in found.candidates if c.hypothesis.size == 1 and c.is_plausible)
-        listed = [c for c in single if c.mean_square - 1 < excess]
-        found = self.with_laws(found, base, learned)
-        # A listed effect that is far larger hides a law from the calibrated model. None is hidden if it leaves nothing,
-        # or if a law that leaves nothing leads.
-        beside = min(listed, key=lambda c: c.mean_square, default=base)
-        if listed and not found.leading_law_leaves_nothing and found.unexplained_mean_square(beside) > 0.0:
+        finer = [] if are_hopeless(first, found) else finer_laws([c.hypothesis for c in first])
+        found = self.with_laws(found, base, first + fitted(finer, settings.LAWS_REFINED, least=least))
+        beside = hides_a_law(found)
+        if beside is not None:
             found = self.with_laws(found, beside, fitted(self.laws, settings.PARTNERS, beside))
         if not found.candidates:
             return found
@@ -357,6 +356,37 @@ def least_evidence(found: Comparison) -> float:
     prior_of_law = found.log_prior(1)
     best = max(NormalEquations.of(c).log_evidence + found.log_prior(c.hypothesis.size) for c in plausible)
     return best - prior_of_law - NormalEquations.of(found.base).log_evidence - settings.LAW_FAR_BEHIND
+
+
+def are_hopeless(laws: Sequence[CandidateFit], found: Comparison) -> bool:
+    """Whether fitted laws leave far more than the best set of listed mechanisms; False if there is none of them."""
+    least = min((c.mean_square for c in _listed(found)), default=np.inf)
+    highest = 1.0 + settings.HOPELESS * max(least - 1.0, settings.NEAR_NOISE)
+    return bool(laws) and min(c.mean_square for c in laws) > highest
+
+
+def hides_a_law(found: Comparison) -> CandidateFit | None:
+    """The listed mechanisms beside which laws are learned too: much larger effects hide one from the calibrated model.
+
+    It is the leading set, or, if that leaves nothing, its largest part, whose last member may be an imitation of a law.
+    None if a law that leaves nothing leads, or if that set does not account for most of what is missing.
+    """
+    if found.leading_law_leaves_nothing:
+        return None
+    leading = next(iter(_listed(found)), None)
+    if leading is None:
+        return None
+    is_full = leading.hypothesis.size >= settings.MOST_MECHANISMS
+    if is_full or found.unexplained_mean_square(leading) == 0.0:
+        leading = found.part_of(leading)
+    if leading is None or leading is found.base:
+        return None
+    return leading if leading.mean_square - 1.0 < settings.MOSTLY_LISTED * found.excess else None
+
+
+def _listed(found: Comparison) -> list[CandidateFit]:
+    """Plausible sets of listed mechanisms, the most probable first."""
+    return [c for c in found.by_evidence if c.is_plausible and c is not found.base and not laws_in(c.hypothesis)]
 
 
 def law_by_itself(found: Comparison, candidate: CandidateFit) -> CandidateFit | None:
