@@ -11,7 +11,9 @@ import yaml
 from made_up_batch import T0, Bench, table
 
 from benchmarks.input_mistakes import MISTAKES, Copy, outcome, read_copy, said_of, write_copy
+from ccmodel import mechanisms as registry
 from ccmodel.channels import ANGLE_AT, SUM_AT, TENSIONS_AT
+from ccmodel.rig.consistency import limits
 from ccmodel.rig.consistency.clocks import drift_of, trend
 from ccmodel.rig.consistency.exchanges import TORQUES, exchange_of
 from ccmodel.rig.consistency.fitted import contradicted_by_fit
@@ -204,6 +206,18 @@ def test_a_bend_in_degrees_is_no_conduit(tmp_path):
         entry["conduit"] = [{"length_m": 1.2, "bend_rad": 540.0}]
     (said,) = said_of(write_copy(copy, tmp_path / "degrees"))
     assert said.startswith("batch.yaml bend_rad") and "bends by 540 rad: is the bend in degrees?" in said
+
+
+def test_a_cable_that_looks_soft_may_have_soft_fastenings(tmp_path):
+    """As a warning that names the stated stiffness: two fastenings may yield by more than a stiff cable."""
+    termination = registry.get("termination-compliance").parameter("compliance")
+    assert pytest.approx(2 * termination.high) == limits.END_COMPLIANCE_M_PER_N
+    copy = read_copy(SIMULATED)
+    copy.rig["cable"]["stiffness_N_per_m"] *= 4.5
+    ingested = ingest_batch(write_copy(copy, tmp_path / "soft"))
+    (said,) = [f for f in ingested.findings if "rig.cable.stiffness_N_per_m is" in f.text]
+    assert said.severity == "warning" and "fastenings of the cable that yield look the same" in said.text
+    assert not ingested.contradicts
 
 
 def test_a_nominal_value_is_not_compared(tmp_path):

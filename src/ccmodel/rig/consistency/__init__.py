@@ -14,7 +14,7 @@ from ccmodel.rig.consistency.contradiction import Contradiction
 from ccmodel.rig.consistency.parity import Parity
 from ccmodel.rig.consistency.rectified import rectified_torques
 from ccmodel.rig.consistency.runs import copied_channels, foreign_runs, one_sensor_twice
-from ccmodel.rig.consistency.scales import doubtful_travel, wrong_geometry, wrong_scales
+from ccmodel.rig.consistency.scales import doubtful_stiffness, doubtful_travel, wrong_geometry, wrong_scales
 from ccmodel.rig.consistency.sessions import overlapping
 from ccmodel.rig.consistency.signs import wrong_signs
 from ccmodel.rig.consistency.transmissions import doubtful_pair, pair_as_single, single_as_pair
@@ -50,7 +50,7 @@ def contradictions(parities: Sequence[Parity]) -> list[Contradiction]:
 
 def doubts(parities: Sequence[Parity]) -> list[Contradiction]:
     """What is probably wrong with a batch that contradicts itself in nothing."""
-    return [*doubtful_pair(parities), *doubtful_travel(parities)]
+    return [*doubtful_pair(parities), *doubtful_travel(parities), *doubtful_stiffness(parities)]
 
 
 def check_consistency(recordings: list[Recording], batch: Batch) -> list[Finding]:

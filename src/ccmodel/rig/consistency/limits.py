@@ -62,8 +62,11 @@ SAME_NOISE = 0.99
 # Correlation of the two angles below which they are not of one run. Small strokes in much friction reach 0.7.
 SAME_RUN = 0.4
 
-# Factor by which stated and found stiffness, friction or spring may differ. Compliant ends alone reach 2.
+# Factor by which stated and found stiffness, friction or spring may differ.
 STATED_FACTOR = 3.0
+# What both fastenings of a cable may yield, m/N: twice the largest plausible `termination-compliance`. It makes a
+# cable of 15 kN/m look five times as soft.
+END_COMPLIANCE_M_PER_N = 300e-6
 # The same of a fitted stiffness. A model that lacks some physics may be off; of six batches it was 0.5 to 1.1 of the
 # stated one. Units differ by more.
 FITTED_FACTOR = 10.0

@@ -51,9 +51,14 @@ def wrong_scales(parities: Sequence[Parity]) -> list[Contradiction]:
     ratios, batch = pooled(parities), parities[0].batch
     found = _torque(ratios, "load", limits.MOST_TORQUE) or _spring(ratios, batch)
     found += _torque(ratios, "drive", limits.MOST_DRIVE_TORQUE)
-    found += _pretension(ratios) + _cable(ratios, batch)
+    found += _pretension(ratios) + [c for c in _cable(ratios, batch) if c.confidence > DOUBTFUL]
     found += _frequency(ratios)
     return [*found, *_accuracies(parities)]
+
+
+def doubtful_stiffness(parities: Sequence[Parity]) -> list[Contradiction]:
+    """A cable that is softer than stated, by what its fastenings may yield."""
+    return [c for c in _cable(pooled(parities), parities[0].batch) if c.confidence == DOUBTFUL]
 
 
 def pooled(parities: Sequence[Parity]) -> dict[str, float]:
@@ -332,5 +337,14 @@ def _cable(ratios: Mapping[str, float], batch: Batch) -> list[Contradiction]:
             f"rig.cable.{key} is {value:g}, and the recordings show {ratio * value:.3g}{unit} ({how}, {ratio:.3g} times"
             f" as much); correct it, or {other}"
         )
-        found.append(Contradiction(f"rig.cable.{key}", text, None, SURE))
+        confidence = SURE
+        if key == "stiffness_N_per_m" and _may_be_of_ends(ratio, value):
+            confidence, text = DOUBTFUL, f"{text}; fastenings of the cable that yield look the same"
+        found.append(Contradiction(f"rig.cable.{key}", text, None, confidence))
     return found
+
+
+def _may_be_of_ends(ratio: float, stiffness_N_per_m: float) -> bool:
+    """Whether a cable that is softer than stated, by this ratio, may have the stated stiffness between soft ends."""
+    further_m_per_N = (1.0 / ratio - 1.0) / stiffness_N_per_m
+    return 1.0 / limits.FITTED_FACTOR < ratio < 1.0 and further_m_per_N <= limits.END_COMPLIANCE_M_PER_N
