@@ -603,19 +603,6 @@ def test_laws_are_proposed_beside_what_is_listed_unless_one_of_them_leaves_nothi
     assert ((FRICTION,) in proposed) == is_proposed
 
 
-@pytest.mark.parametrize(
-    ("left_by_pair", "left_by_single", "hides"),
-    [(4.0, 20.0, (FRICTION, SCALE)), (0.0, 20.0, (FRICTION,)), (0.0, 45.0, None), (40.0, 50.0, None)],
-)
-def test_laws_are_learned_beside_the_leading_set_or_else_its_part(left_by_pair, left_by_single, hides):
-    """A set that leaves nothing may have an imitation of a law for its last member."""
-    pair = fitted(1.0 + left_by_pair, FRICTION, SCALE), evidence(NONE, NONE, size=left_by_pair)
-    single = fitted(1.0 + left_by_single, FRICTION), evidence(NONE - 50, NONE - 50, size=left_by_single)
-    found = compared(evidence(NONE - 99, NONE - 99, size=60.0), pair, single, model=fitted(61.0))
-    beside = selections.hides_a_law(found)
-    assert (beside and beside.hypothesis.acting) == hides
-
-
 def test_laws_that_leave_far_more_than_a_listed_set_are_followed_by_no_others():
     listed = fitted(2.0, FRICTION), evidence(NONE, size=1.0)
     found = compared(evidence(size=60.0), listed, model=fitted(61.0))

@@ -366,22 +366,16 @@ def are_hopeless(laws: Sequence[CandidateFit], found: Comparison) -> bool:
 
 
 def hides_a_law(found: Comparison) -> CandidateFit | None:
-    """The listed mechanisms beside which laws are learned too: much larger effects hide one from the calibrated model.
+    """The single listed mechanism beside which laws are learned too: a far larger effect hides one from the base.
 
-    It is the leading set, or, if that leaves nothing, its largest part, whose last member may be an imitation of a law.
-    None if a law that leaves nothing leads, or if that set does not account for most of what is missing.
+    None if it does not account for most of what is missing or leaves nothing, or if a law that leaves nothing leads.
     """
-    if found.leading_law_leaves_nothing:
+    excess = settings.MOSTLY_LISTED * found.excess
+    singles = [c for c in _listed(found) if c.hypothesis.size == 1 and c.mean_square - 1.0 < excess]
+    best = min(singles, key=lambda c: c.mean_square, default=found.base)
+    if best is found.base or found.leading_law_leaves_nothing or found.unexplained_mean_square(best) == 0.0:
         return None
-    leading = next(iter(_listed(found)), None)
-    if leading is None:
-        return None
-    is_full = leading.hypothesis.size >= settings.MOST_MECHANISMS
-    if is_full or found.unexplained_mean_square(leading) == 0.0:
-        leading = found.part_of(leading)
-    if leading is None or leading is found.base:
-        return None
-    return leading if leading.mean_square - 1.0 < settings.MOSTLY_LISTED * found.excess else None
+    return best
 
 
 def _listed(found: Comparison) -> list[CandidateFit]:

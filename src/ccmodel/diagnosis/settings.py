@@ -245,8 +245,8 @@ IN_BAND = 0.9
 LISTED_STARTS = 3
 # Share of the learned laws that are a listed one which are said to be it.
 RECOGNISED = 0.95
-# Laws are also learned beside the leading set of listed mechanisms, or a part of it, if its excess mean square is below
-# this share of the calibrated model's, it leaves something, and no law leads that leaves nothing. Chosen.
+# Laws are also learned beside the best single listed mechanism if its excess mean square is below this share of the
+# calibrated model's, it leaves something, and no law leads that leaves nothing. Chosen.
 MOSTLY_LISTED = 0.5
 # Share of both limits after which no further set is fitted before laws are learned. Chosen: laws take some 40 s.
 SETS_SHARE = 0.6
