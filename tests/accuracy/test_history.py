@@ -85,7 +85,9 @@ def test_an_interruption_ends_the_run_of_a_past_commit_with_its_jobs(repository,
     job = repository / "job"
     commit(repository, WAITING.format(job=job), "0.5.0")
     command = [sys.executable, "-m", "ccmodel.cli", "accuracy", "history", "--rev", "HEAD", "--history", "h.csv"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    # A job in the background of a shell ignores this signal, and its processes inherit that.
+    heeding = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **heeding)
     until(lambda: job.exists() and job.read_text().strip())
     process.send_signal(number)
     _, said = process.communicate(timeout=60)
