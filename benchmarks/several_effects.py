@@ -76,6 +76,9 @@ def judged(seed: int, kind: str, out: Path) -> dict:
             "verdict": found.verdict,
             "failure": found.failure,
             "named": [m["name"] for m in found.identified],
+            "all_named": found.are_all_identified,
+            "not_there": [m["name"] for m in found.identified if not found.true_among([m])],
+            "all_listed": found.true_names <= found.true_among([*found.identified, *found.listed]),
             "confidence": [m["confidence"] for m in found.identified],
             "alternatives": found.alternatives,
             "before": found.error_before,
@@ -88,10 +91,12 @@ def judged(seed: int, kind: str, out: Path) -> dict:
 
 
 def rates(rows: list[dict], size: int) -> list[dict]:
-    """How often all effects are named, listed, one that is not there named, and more named than there are."""
-    all_named = [set(r["true"]) <= set(r["named"]) for r in rows]
-    all_listed = [set(r["true"]) <= {*r["named"], *r["alternatives"]} for r in rows]
-    wrong = [bool(set(r["named"]) - set(r["true"])) for r in rows]
+    """How often all effects are named, listed, one that is not there named, and more named than there are.
+
+    An effect counts at its place.
+    """
+    all_named, all_listed = ([r[key] for r in rows] for key in ("all_named", "all_listed"))
+    wrong = [bool(r["not_there"]) for r in rows]
     too_many = [len(r["named"]) > size for r in rows]
     return [
         rate("all effects named", sum(all_named), len(rows)),
