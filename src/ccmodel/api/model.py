@@ -333,7 +333,7 @@ def sorted_findings(batch: Batch) -> tuple[list[str], tuple[Finding, ...]]:
 
 
 def stated_ids(batch: Batch) -> tuple[str, ...]:
-    """Ids of all recordings in a batch's file, also of those that are refused."""
+    """Ids of all recordings in a batch's file, the refused ones included."""
     return tuple(entry.id for entry in batch._file.recordings)
 
 

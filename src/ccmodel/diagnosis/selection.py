@@ -291,8 +291,8 @@ class Selection:
         try:
             repeatability = estimated(best.whitened, best.residuals)
             whitened = each(found.whitened, lambda i, w: relinearised(w, models[i], repeatability, best.whitened[i]))
-            of_base = found.base.hypothesis, self.free, found.base.values
-            base = fit(whitened, *of_base, self.deadline, calibration=calibration)
+            start = found.base.values
+            base = fit(whitened, found.base.hypothesis, self.free, start, self.deadline, calibration=calibration)
         except ModelError as error:
             self.progress(f"the covariance stays as it is ({error})")
             return found
@@ -379,8 +379,8 @@ def hides_a_law(found: Comparison) -> CandidateFit | None:
 
 
 def _listed(found: Comparison) -> list[CandidateFit]:
-    """Plausible sets of listed mechanisms, the most probable first."""
-    return [c for c in found.by_evidence if c.is_plausible and c is not found.base and not laws_in(c.hypothesis)]
+    """Plausible sets of listed mechanisms, by ascending mean square."""
+    return [c for c in found.candidates if c.is_plausible and law_of(c.hypothesis) is None]
 
 
 def law_by_itself(found: Comparison, candidate: CandidateFit) -> CandidateFit | None:
@@ -410,8 +410,7 @@ def contenders(found: Comparison) -> tuple[list[CandidateFit], list[CandidateFit
     most = len(found.candidates) if found.unlisted < 0.5 else settings.CONTENDERS
     highest = 1.0 + settings.HOPELESS * max(best.mean_square - 1.0, settings.NEAR_NOISE)
 
-    listed = [c for c in found.candidates if c.is_plausible and law_of(c.hypothesis) is None]
-    leads_on = min(listed, key=lambda c: (-c.hypothesis.size, c.mean_square), default=best)
+    leads_on = min(_listed(found), key=lambda c: (-c.hypothesis.size, c.mean_square), default=best)
     near: list[CandidateFit] = []
     far: list[CandidateFit] = []
     for k, c in enumerate(found.by_evidence):

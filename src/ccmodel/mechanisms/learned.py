@@ -389,11 +389,11 @@ def end_spring(settings: Settings, end: str) -> tuple[float, Table | None] | Non
     None for a fastening that does not yield, or by less than `RIGID_M_PER_N`.
     """
     compliance, law = getattr(settings, f"{end}_end_compliance"), getattr(settings, f"{end}_end_stretch")
-    values = compliance + (law.values if law is not None else np.zeros(1))
+    if law is None:
+        return (compliance, None) if compliance >= RIGID_M_PER_N else None
+    values = compliance + law.values
     mean = float(values.mean())
-    if mean < RIGID_M_PER_N:
-        return None
-    return mean, None if law is None else Table(law.knots, (values / mean).clip(LEAST_COMPLIANCE))
+    return (mean, Table(law.knots, (values / mean).clip(LEAST_COMPLIANCE))) if mean >= RIGID_M_PER_N else None
 
 
 def _united(x: NDArray, others: NDArray) -> NDArray:

@@ -217,8 +217,7 @@ def initial_tension(given: ModelInput, parameters: Parameters, load_from: LoadFr
 
 def _kinks_rad(settings: Settings, path: ConduitPath) -> tuple[float, float]:
     """Bend beside that of the path, as far as it holds tension at rest, before and beyond the middle of the latter."""
-    is_before = [kink.share * path.length_m <= path.halfway_m for kink in settings.kinks]
-    before = sum(kink.hold * kink.bend_rad for kink, first in zip(settings.kinks, is_before, strict=True) if first)
+    before = sum(kink.hold * kink.bend_rad for kink in settings.kinks if kink.share * path.length_m <= path.halfway_m)
     every = sum(kink.hold * kink.bend_rad for kink in settings.kinks)
     if (added := settings.added_bend) is not None:
         middle = path.halfway_m / path.length_m

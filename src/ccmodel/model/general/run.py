@@ -22,7 +22,14 @@ from ccmodel.model.active import Active, active_of
 from ccmodel.model.general import layout as rows
 from ccmodel.model.general.grid import Grid, make_grid
 from ccmodel.model.general.march import COULOMB_BRISTLE_M, SOFT_CONDUIT_BRISTLE_M, march
-from ccmodel.model.general.rest import friction_ratios, initial_state, load_angle, remove_cable_B
+from ccmodel.model.general.rest import (
+    friction_ratios,
+    has_drag,
+    has_friction_by_tension,
+    initial_state,
+    load_angle,
+    remove_cable_B,
+)
 from ccmodel.model.initial import InitialTension
 from ccmodel.model.load import AngleLoad, FixedLoad, Load, SpringLoad, TorqueLoad, one_row
 from ccmodel.model.response import PairResponse, Status
@@ -381,7 +388,6 @@ def _physics(
     values: dict[str, Any] = {name: float(getattr(settings, name)) for name in registry.march_settings()}
     values["inertia"] += sum(settings.load_masses)
     has_friction_table, has_drag_table = settings.friction_by_tension is not None, settings.conduit_drag is not None
-    has_drag = settings.drag_N != 0 or settings.added_drag is not None
     contacts, has_presliding = _contacts(settings)
     springs = settings.cable_compliance, settings.drive_end_stretch, settings.load_end_stretch
     first_rows, end = dict.fromkeys(rows.LOAD_LAWS, 0), rows.LOAD_ROWS
@@ -401,9 +407,7 @@ def _physics(
         stiffness_load=float(K_e),
         load_damping=float(load_damping(settings, K_e)),
         kind=rows.PRESCRIBED_ANGLE if isinstance(load, AngleLoad | FixedLoad) else rows.IMPEDANCE,
-        general_friction=bool(
-            settings.tension_exponent or has_drag or settings.viscous or has_friction_table or has_drag_table
-        ),
+        general_friction=has_friction_by_tension(settings) or has_drag(settings) or settings.viscous != 0,
         has_spring_table=any(law is not None for law in springs),
         has_friction_table=has_friction_table,
         drag_table=rows.NODE_ROWS + _size(settings.friction_by_tension) if has_drag_table else 0,
