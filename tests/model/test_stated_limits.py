@@ -59,6 +59,17 @@ def test_a_status_or_tensions_within_the_capstan_bound(load, data):
     check_mechanics(one, far, initial, found, solved_to=1e-9)
 
 
+@pytest.mark.parametrize("stiffness", [0.1, 1.0, 1e4])
+@pytest.mark.parametrize("back_rad", [0.35, 0.7, 1.0])
+def test_a_cable_that_goes_slack_in_one_step(stiffness, back_rad):
+    path = ConduitPath([1.0, 0.25], [0.0, 6.0])
+    one = Transmission(path, 1000.0, 0.75, 0.006, 0.008, True)
+    found = simulate(
+        one, SpringLoad(stiffness), np.arange(2.0), np.array([0.0, -back_rad]), InitialTension.uniform(path, 1.0)
+    ).complete()
+    np.testing.assert_allclose([found.T1_N[-1], found.T2_N[-1]], 0.0, atol=1e-5)
+
+
 @pytest.mark.parametrize("load", LOADS)
 def test_the_general_solver_too(load):
     statuses = []

@@ -27,6 +27,8 @@ from ccmodel.model.general.layout import Physics
 
 # Tension below which a cable is nearly slack.
 SLACK_N = 0.02
+# Balance is judged against no less than this tension: against those of slack cables, no step would be balanced.
+LEAST_SCALE_N = 1.0
 
 
 @kernel(error_model="numpy", fastmath=rows.FAST)
@@ -325,7 +327,7 @@ def imbalance(
     bristle: float,
     follows: float,
 ) -> tuple[float, float, float, float, float]:
-    """Imbalance of the whole chain: sum of squares (N^2), highest tension (N), and the terms of `_load`."""
+    """Imbalance of the whole chain: sum of squares (N^2), scale of the tensions (N), and the terms of `_load`."""
     n = node.shape[2]
     pulled = ph.load_pulley.radius_m * winding_change(load[rows.ANGLE], rotation, ph.load_pulley)
     slide[rows.NOW, 0, n + 1], slide[rows.NOW, 1, n + 1] = pulled, -pulled
@@ -340,7 +342,7 @@ def imbalance(
             error += mean[rows.MEAN_EXCESS, c] ** 2
     T = piece[rows.TENSION]
     highest = max(max(T[0, 0], T[0, n]), max(T[1, 0], T[1, n]))
-    return error, max(highest, 1e-2), G, slope, R
+    return error, max(highest, LEAST_SCALE_N), G, slope, R
 
 
 @kernel(error_model="numpy")

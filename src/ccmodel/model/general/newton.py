@@ -12,7 +12,7 @@ from ccmodel.model.general import layout as rows
 from ccmodel.model.general.equations import imbalance, set_memory
 from ccmodel.model.general.layout import Physics
 
-# Out of balance by no more than this share of the highest tension.
+# Out of balance by no more than this share of the tensions' scale: the highest one, or 1 N.
 TOLERANCE = 1e-8
 LOOSE_TOLERANCE = 1e-5
 # A node about to reverse is stopped at the edge of sticking, where its friction is still that of sliding.
