@@ -90,13 +90,14 @@ def family(
     name: Annotated[str, typer.Argument(help="removed, unlisted or doubtful.")],
     seed: Seed = 0,
     count: Annotated[int | None, typer.Option(min=1, help="Number of cases; the plan's if not given.")] = None,
+    first: Annotated[int, typer.Option(min=0, help="Number of the first case, from 0.")] = 0,
     regressors: Regressors = False,
     cores: Cores = 1,
 ) -> None:
     """Run a family of cases: every effect in turn, at each strength of the family."""
     if name not in (families := read_plan().families):
         raise typer.BadParameter(f"there is no family {name!r}; there are {', '.join(families)}")
-    _judge_each(list(family_of(name, seed, count)), out, regressors, cores)
+    _judge_each(list(family_of(name, seed, count, first)), out, regressors, cores)
 
 
 @app.command()

@@ -7,7 +7,7 @@ from proof.cases import Case, draw
 from proof.plan import Plan, read_plan
 
 
-def family(name: str, seed: int, count: int | None = None) -> Iterator[Case]:
+def family(name: str, seed: int, count: int | None = None, first: int = 0) -> Iterator[Case]:
     """Cases of a family from consecutive seeds.
 
     Parameters
@@ -16,9 +16,11 @@ def family(name: str, seed: int, count: int | None = None) -> Iterator[Case]:
         "removed": an effect whose mechanism is excluded from the candidates; "unlisted": one without a mechanism;
         "doubtful": a weak effect in few recordings.
     seed : int
-        Of the first case.
+        Of case 0 of the family.
     count : int, optional
-        Number of cases; the plan's if not given.
+        Number of cases; those up to the plan's last one if not given.
+    first : int
+        Number of the first case.
 
     Yields
     ------
@@ -27,8 +29,9 @@ def family(name: str, seed: int, count: int | None = None) -> Iterator[Case]:
     """
     plan = read_plan()
     of_plan = plan.families[name]
-    members = islice(cycle(members_of(name, plan)), count or of_plan.cases)
-    for k, (effect, strength) in enumerate(members):
+    last = of_plan.cases if count is None else first + count
+    members = islice(enumerate(cycle(members_of(name, plan))), first, last)
+    for k, (effect, strength) in members:
         yield draw(seed + k, of_plan.kind, effect, strength)
 
 

@@ -38,6 +38,8 @@ def test_a_family_has_every_effect_at_every_strength(name):
     assert set(strengths[: len(effects)]) == {plan.strengths[0]}
     assert set(strengths) == set(plan.strengths)
     assert len(members_of(name, PLAN)) == len(effects) * len(plan.strengths)
+    assert list(family(name, 7000, 3, first=2)) == cases[2:5]
+    assert list(family(name, 7000, first=2)) == cases[2:]
 
 
 def test_the_laws_that_the_list_never_had_are_of_many_slots_and_arguments():
